@@ -1,0 +1,101 @@
+//! What a consumer knows of an obstacle: a function ω(x, y, z), its gradient and its range over a box.
+//!
+//! Sign convention everywhere: **ω > 0 inside the obstacle, 0 on its surface, < 0 in the fluid**; the outward
+//! unit normal is n = −∇ω/|∇ω|.
+//!
+//! Invariant: nothing here knows that a compiler exists, so a closure can stand in for a compiled solid.
+
+use glam::DVec3;
+
+use crate::{geom::Aabb, interval::Interval};
+
+/// Borrowed points as a structure of arrays; the three slices have one length.
+#[derive(Debug, Clone, Copy)]
+pub struct Points<'a> {
+    pub x: &'a [f64],
+    pub y: &'a [f64],
+    pub z: &'a [f64],
+}
+
+impl<'a> Points<'a> {
+    /// # Panics
+    /// If the slices differ in length: a bug of the caller, never of a file.
+    pub fn new(x: &'a [f64], y: &'a [f64], z: &'a [f64]) -> Self {
+        assert!(x.len() == y.len() && y.len() == z.len(), "coordinate slices differ in length");
+        Self { x, y, z }
+    }
+
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.x.is_empty()
+    }
+
+    pub fn get(&self, i: usize) -> DVec3 {
+        DVec3::new(self.x[i], self.y[i], self.z[i])
+    }
+}
+
+/// Caller's slices for ω and ∇ω of many points, each as long as the points.
+#[derive(Debug)]
+pub struct GradientsMut<'a> {
+    pub omega: &'a mut [f64],
+    pub x: &'a mut [f64],
+    pub y: &'a mut [f64],
+    pub z: &'a mut [f64],
+}
+
+/// A scalar field over space: positive inside an obstacle, negative in the fluid.
+///
+/// Implementations are pure: the same point gives the same bits on every thread. Non-finite coordinates
+/// give NaN, never "outside".
+pub trait Field: Sync {
+    /// ω at a point.
+    fn omega(&self, p: DVec3) -> f64;
+
+    /// ω and ∇ω at a point. At corners and edges ∇ω is one finite member of the limits, never NaN.
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3);
+
+    /// ω at many points; `omega` is as long as `points`. No allocation, caller's thread.
+    fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        for (i, w) in omega.iter_mut().enumerate() {
+            *w = self.omega(points.get(i));
+        }
+    }
+
+    /// ω and ∇ω at many points. No allocation, caller's thread.
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        for i in 0..points.len() {
+            let (w, g) = self.omega_grad(points.get(i));
+            (out.omega[i], out.x[i], out.y[i], out.z[i]) = (w, g.x, g.y, g.z);
+        }
+    }
+
+    /// An interval that contains ω of every point of the box; the default knows nothing.
+    fn range(&self, _over: &Aabb) -> Interval {
+        Interval::ALL
+    }
+}
+
+/// A field made of two closures, for tests and for callers with formulas of their own.
+#[derive(Debug, Clone, Copy)]
+pub struct Closures<V, G> {
+    pub omega: V,
+    pub gradient: G,
+}
+
+impl<V, G> Field for Closures<V, G>
+where
+    V: Fn(DVec3) -> f64 + Sync,
+    G: Fn(DVec3) -> DVec3 + Sync,
+{
+    fn omega(&self, p: DVec3) -> f64 {
+        (self.omega)(p)
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        ((self.omega)(p), (self.gradient)(p))
+    }
+}

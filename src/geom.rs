@@ -1,0 +1,108 @@
+//! Points, boxes and regular grids in the scene's coordinates (metres unless a file says otherwise).
+
+use glam::DVec3;
+
+/// An axis-aligned box, `min ≤ max` in each coordinate unless it is empty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aabb {
+    pub min: DVec3,
+    pub max: DVec3,
+}
+
+impl Aabb {
+    /// The box that holds nothing: every union with it gives the other box.
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    pub const fn new(min: DVec3, max: DVec3) -> Self {
+        Self { min, max }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        !(self.min.x <= self.max.x && self.min.y <= self.max.y && self.min.z <= self.max.z)
+    }
+
+    /// True when no side is infinite or NaN.
+    pub fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+
+    pub fn size(&self) -> DVec3 {
+        self.max - self.min
+    }
+
+    pub fn centre(&self) -> DVec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    pub fn volume(&self) -> f64 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        let size = self.size();
+        size.x * size.y * size.z
+    }
+
+    /// True for points inside and on the border.
+    pub fn contains(&self, p: DVec3) -> bool {
+        p.cmpge(self.min).all() && p.cmple(self.max).all()
+    }
+
+    pub fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
+    }
+
+    pub fn including(&self, p: DVec3) -> Self {
+        Self { min: self.min.min(p), max: self.max.max(p) }
+    }
+
+    /// The box grown by `margin` on every side.
+    pub fn grown(&self, margin: f64) -> Self {
+        Self { min: self.min - margin, max: self.max + margin }
+    }
+
+    /// The eight corners; bit 0 of the index chooses x, bit 1 y, bit 2 z.
+    pub fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |bit: usize, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };
+            DVec3::new(
+                pick(0, self.min.x, self.max.x),
+                pick(1, self.min.y, self.max.y),
+                pick(2, self.min.z, self.max.z),
+            )
+        })
+    }
+
+    /// Cuts the box across its longest side.
+    pub fn halves(&self) -> [Self; 2] {
+        let axis = self.size().max_position();
+        let middle = self.centre()[axis];
+        let (mut low, mut high) = (*self, *self);
+        low.max[axis] = middle;
+        high.min[axis] = middle;
+        [low, high]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn empty_box_is_the_neutral_element_of_union() {
+        let unit = Aabb::new(DVec3::ZERO, DVec3::ONE);
+        assert_eq!(Aabb::EMPTY.union(&unit), unit);
+        assert!(Aabb::EMPTY.is_empty());
+        assert_eq!(Aabb::EMPTY.volume(), 0.0);
+    }
+
+    #[test]
+    fn halves_share_the_middle_plane_of_the_longest_side() {
+        let [low, high] = Aabb::new(DVec3::ZERO, DVec3::new(1.0, 4.0, 2.0)).halves();
+        assert_eq!((low.max.y, high.min.y), (2.0, 2.0));
+        assert_eq!(low.max.x, 1.0);
+    }
+}

@@ -1,0 +1,7 @@
+//! `rfm` compiles obstacles written as R-functions into machine code for ω(x, y, z) and ∇ω.
+
+pub mod field;
+pub mod geom;
+pub mod interval;
+
+pub use glam;

@@ -1,0 +1,1 @@
+//! One test binary: one link of the code generator.
