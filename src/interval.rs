@@ -1,9 +1,11 @@
 //! Closed intervals with outward rounding: the enclosure of a real computation, never narrower.
 //!
-//! Every operation here contains the exact image of its operands: results of the correctly rounded
-//! operations (+ − × ÷ √) are widened by one unit in the last place, those of library functions by four.
-//! An undefined point (√ of a negative number, division by an interval around zero) widens to [`Interval::ALL`],
-//! which also stands for "may be NaN".
+//! Every operation contains the exact image of its operands: results of the correctly rounded operations
+//! (+ − × ÷ √) are widened by one unit in the last place, those of library functions by four. An undefined
+//! point (√ of a negative number, division by an interval around zero) widens to [`Interval::ALL`], which
+//! also stands for "may be NaN".
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `lo ≤ hi`; either may be infinite; never NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +22,7 @@ impl Interval {
         Self { lo: x, hi: x }
     }
 
-    /// The interval between two bounds; [`Interval::ALL`] if either is NaN.
+    /// The interval between two bounds; [`Interval::ALL`] if they are out of order or NaN.
     pub fn new(lo: f64, hi: f64) -> Self {
         if lo <= hi { Self { lo, hi } } else { Self::ALL }
     }
@@ -31,5 +33,197 @@ impl Interval {
 
     pub fn width(&self) -> f64 {
         self.hi - self.lo
+    }
+
+    /// The smallest interval that contains both.
+    pub fn hull(&self, other: Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    /// `ulps` floating-point neighbours further out on both sides; exact zeros stay zero, so that a widened
+    /// bound never loses a sign.
+    #[must_use]
+    pub fn widened(self, ulps: u32) -> Self {
+        let (mut lo, mut hi) = (self.lo, self.hi);
+        for _ in 0..ulps {
+            if lo != 0.0 {
+                lo = lo.next_down();
+            }
+            if hi != 0.0 {
+                hi = hi.next_up();
+            }
+        }
+        Self::new(lo, hi)
+    }
+
+    /// Widened by one neighbour, zeros included: a result that rounded to zero may have been non-zero.
+    fn rounded_out(lo: f64, hi: f64) -> Self {
+        Self::new(lo.next_down(), hi.next_up())
+    }
+
+    /// x², without the sign that a product of an interval with itself would lose.
+    pub fn square(self) -> Self {
+        let (a, b) = (self.lo * self.lo, self.hi * self.hi);
+        let hi = a.max(b).next_up();
+        if self.contains(0.0) {
+            return Self::new(0.0, hi);
+        }
+        Self::new(a.min(b).next_down().max(0.0), hi)
+    }
+
+    pub fn sqrt(self) -> Self {
+        if self.lo < 0.0 {
+            return Self::ALL;
+        }
+        Self::new(self.lo.sqrt().next_down().max(0.0), self.hi.sqrt().next_up())
+    }
+
+    pub fn abs(self) -> Self {
+        if self.lo >= 0.0 {
+            self
+        } else if self.hi <= 0.0 {
+            -self
+        } else {
+            Self { lo: 0.0, hi: self.hi.max(-self.lo) }
+        }
+    }
+
+    pub fn min(self, other: Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.min(other.hi) }
+    }
+
+    pub fn max(self, other: Self) -> Self {
+        Self { lo: self.lo.max(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    /// The image under a function that never decreases.
+    pub fn increasing(self, f: impl Fn(f64) -> f64) -> Self {
+        let (lo, hi) = (f(self.lo), f(self.hi));
+        if lo.is_nan() || hi.is_nan() {
+            return Self::ALL;
+        }
+        Self::rounded_out(lo, hi).widened(3)
+    }
+
+    pub fn sin(self) -> Self {
+        self.periodic(libm::sin, std::f64::consts::FRAC_PI_2)
+    }
+
+    pub fn cos(self) -> Self {
+        self.periodic(libm::cos, 0.0)
+    }
+
+    /// sin or cos: extremes at the ends, and ±1 where a crest (at `crest + 2πk`) or a trough lies between.
+    fn periodic(self, f: impl Fn(f64) -> f64, crest: f64) -> Self {
+        use std::f64::consts::{PI, TAU};
+        // beyond 2^20 the position of a crest is no longer known to a useful accuracy
+        if self.width() >= TAU || self.lo.abs().max(self.hi.abs()) >= f64::from(1 << 20) {
+            return Self { lo: -1.0, hi: 1.0 };
+        }
+        let slack = 1e-9;
+        let spans = |at: f64| {
+            let first = ((self.lo - slack - at) / TAU).ceil() * TAU + at;
+            first <= self.hi + slack
+        };
+        let (a, b) = (f(self.lo), f(self.hi));
+        let ends = Self::rounded_out(a.min(b), a.max(b)).widened(3);
+        Self {
+            lo: if spans(crest + PI) { -1.0 } else { ends.lo.max(-1.0) },
+            hi: if spans(crest) { 1.0 } else { ends.hi.min(1.0) },
+        }
+    }
+}
+
+/// 0 · ∞ is 0 here: an infinite bound is a limit that no operand reaches.
+fn bound_product(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
+}
+
+impl Neg for Interval {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { lo: -self.hi, hi: -self.lo }
+    }
+}
+
+impl Add for Interval {
+    type Output = Self;
+    fn add(self, b: Self) -> Self {
+        Self::rounded_out(self.lo + b.lo, self.hi + b.hi)
+    }
+}
+
+impl Sub for Interval {
+    type Output = Self;
+    fn sub(self, b: Self) -> Self {
+        self + -b
+    }
+}
+
+impl Mul for Interval {
+    type Output = Self;
+    fn mul(self, b: Self) -> Self {
+        let corners = [
+            bound_product(self.lo, b.lo),
+            bound_product(self.lo, b.hi),
+            bound_product(self.hi, b.lo),
+            bound_product(self.hi, b.hi),
+        ];
+        let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
+        let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let both_positive = self.lo >= 0.0 && b.lo >= 0.0;
+        let out = Self::rounded_out(lo, hi);
+        if both_positive { Self { lo: out.lo.max(0.0), ..out } } else { out }
+    }
+}
+
+impl Div for Interval {
+    type Output = Self;
+    fn div(self, b: Self) -> Self {
+        if b.contains(0.0) {
+            return Self::ALL;
+        }
+        let corners = [self.lo / b.lo, self.lo / b.hi, self.hi / b.lo, self.hi / b.hi];
+        if corners.iter().any(|c| c.is_nan()) {
+            return Self::ALL; // ∞/∞
+        }
+        let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
+        let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        Self::rounded_out(lo, hi)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn interval() -> impl Strategy<Value = Interval> {
+        (-10.0..10.0f64, 0.0..5.0f64).prop_map(|(lo, width)| Interval::new(lo, lo + width))
+    }
+
+    proptest! {
+        #[test]
+        fn operations_contain_the_image(a in interval(), b in interval(), s in 0.0..1.0f64, t in 0.0..1.0f64) {
+            let x = (a.lo + s * (a.hi - a.lo)).clamp(a.lo, a.hi);
+            let y = (b.lo + t * (b.hi - b.lo)).clamp(b.lo, b.hi);
+            prop_assert!((a + b).contains(x + y));
+            prop_assert!((a - b).contains(x - y));
+            prop_assert!((a * b).contains(x * y));
+            prop_assert!((a / b).contains(x / y));
+            prop_assert!(a.square().contains(x * x));
+            prop_assert!(a.abs().contains(x.abs()));
+            prop_assert!(a.sin().contains(x.sin()));
+            prop_assert!(a.cos().contains(x.cos()));
+            prop_assert!(a.min(b).contains(x.min(y)));
+            prop_assert!(a.abs().sqrt().contains(x.abs().sqrt()));
+        }
+    }
+
+    #[test]
+    fn undefined_points_widen_to_all() {
+        assert_eq!(Interval::new(-1.0, 4.0).sqrt(), Interval::ALL);
+        assert_eq!(Interval::point(1.0) / Interval::new(-1.0, 1.0), Interval::ALL);
+        assert_eq!(Interval::new(f64::NAN, 1.0), Interval::ALL);
     }
 }

@@ -1,1 +1,3 @@
 //! One test binary: one link of the code generator.
+
+mod agreement;

@@ -1,0 +1,63 @@
+//! Ownership of generated code.
+
+use std::fmt;
+use std::sync::Mutex;
+
+use cranelift_jit::JITModule;
+
+use super::{Precision, Shape};
+
+/// Machine code of one program, freed when this is dropped.
+pub struct Code {
+    entry: *const u8,
+    pub precision: Precision,
+    pub shape: Shape,
+    pub outputs: usize,
+    /// Bytes of machine code.
+    pub size: usize,
+    /// Owns the pages; taken out only to be freed.
+    module: Mutex<Option<JITModule>>,
+}
+
+// SAFETY: `entry` points to finished code that nobody writes to again; it stays mapped until the drop of `self`,
+// and any number of threads may execute the same code. The module is behind a mutex.
+unsafe impl Send for Code {}
+// SAFETY: as above.
+unsafe impl Sync for Code {}
+
+impl Code {
+    pub(super) fn new(
+        module: JITModule,
+        entry: *const u8,
+        (precision, shape): (Precision, Shape),
+        outputs: usize,
+        size: usize,
+    ) -> Self {
+        Self { entry, precision, shape, outputs, size, module: Mutex::new(Some(module)) }
+    }
+
+    /// The start of the function; valid as long as `self`.
+    pub fn entry(&self) -> *const u8 {
+        self.entry
+    }
+}
+
+impl fmt::Debug for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Code({:?}, {:?}, {} bytes)", self.precision, self.shape, self.size)
+    }
+}
+
+impl Drop for Code {
+    fn drop(&mut self) {
+        let module = match self.module.get_mut() {
+            Ok(module) => module.take(),
+            Err(poisoned) => poisoned.into_inner().take(),
+        };
+        if let Some(module) = module {
+            // SAFETY: `entry` is private and callers borrow `self` while they run it (`solid::compiled`), so no
+            // code of this module is running or can be called again.
+            unsafe { module.free_memory() };
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! A whole program: signature, loop over blocks, nodes in order, outputs; then compilation and linking.
+
+use std::collections::HashMap;
+
+use cranelift_codegen::Context;
+use cranelift_codegen::ir::condcodes::IntCC;
+use cranelift_codegen::ir::{
+    AbiParam, FuncRef, Function, InstBuilder, MemFlagsData, UserFuncName, Value, types,
+};
+use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
+use cranelift_jit::{JITBuilder, JITModule};
+use cranelift_module::{Linkage, Module, default_libcall_names};
+
+use super::emit::Emitter;
+use super::math_calls::{self, HostFunction};
+use super::{Code, CodegenError, Precision, Request, Shape, target};
+use crate::ir::{Axis, Expr, Node};
+
+/// The code generator's own texts of a program.
+#[derive(Debug, Clone)]
+pub struct Listing {
+    /// Cranelift's intermediate representation, before optimisation.
+    pub clif: String,
+    /// Assembly of this machine.
+    pub assembly: String,
+}
+
+/// Compiles a program into executable memory.
+///
+/// # Errors
+/// [`CodegenError::Unsupported`] where the system gives no executable memory or the processor is not known;
+/// [`CodegenError::Bug`] if the generated function is refused.
+pub fn compile(request: Request<'_>) -> Result<Code, CodegenError> {
+    Ok(build(request, false)?.0)
+}
+
+impl Listing {
+    /// The texts of a program.
+    ///
+    /// # Errors
+    /// As for [`compile`].
+    pub fn of(request: Request<'_>) -> Result<Self, CodegenError> {
+        Ok(build(request, true)?.1)
+    }
+}
+
+fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), CodegenError> {
+    let isa = target(request.graph.len())?;
+    let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
+    let mut linker = JITBuilder::with_isa(isa, default_libcall_names());
+    for function in math_calls::all(request.precision) {
+        linker.symbol(function.name, function.address);
+    }
+    let mut module = JITModule::new(linker);
+    let mut context = module.make_context();
+    context.func = Function::with_name_signature(UserFuncName::user(0, 0), module.make_signature());
+    declare_parameters(&mut context.func, &module, request);
+
+    let hosts = declare_hosts(&mut module, &mut context.func, request).map_err(|e| bug(&e))?;
+    let mut shared = FunctionBuilderContext::new();
+    let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
+    match request.shape {
+        Shape::Point => point(&mut builder, request, &hosts),
+        Shape::Batch => batch(&mut builder, request, &hosts, module.target_config().pointer_type()),
+    }
+    builder.finalize(module.target_config());
+
+    let clif = if listing { context.func.display().to_string() } else { String::new() };
+    context.set_disasm(listing);
+    let signature = context.func.signature.clone();
+    let id = module.declare_function("program", Linkage::Local, &signature).map_err(|e| bug(&e))?;
+    module.define_function(id, &mut context).map_err(|e| CodegenError::Bug(format!("{e:?}")))?;
+    let (size, assembly) = compiled_texts(&context);
+    module.finalize_definitions().map_err(|e| CodegenError::Unsupported(e.to_string()))?;
+    let entry = module.get_finalized_function(id);
+    let code = Code::new(module, entry, (request.precision, request.shape), request.outputs.len(), size);
+    Ok((code, Listing { clif, assembly }))
+}
+
+fn compiled_texts(context: &Context) -> (usize, String) {
+    context
+        .compiled_code()
+        .map_or((0, String::new()), |code| (code.code_buffer().len(), code.vcode.clone().unwrap_or_default()))
+}
+
+fn declare_parameters(function: &mut Function, module: &JITModule, request: Request<'_>) {
+    let pointer = AbiParam::new(module.target_config().pointer_type());
+    let scalar = AbiParam::new(match request.precision {
+        Precision::F32 => types::F32,
+        Precision::F64 => types::F64,
+    });
+    function.signature.params = match request.shape {
+        Shape::Point => vec![scalar, scalar, scalar, pointer],
+        Shape::Batch => vec![pointer, pointer],
+    };
+}
+
+type Hosts = HashMap<String, FuncRef>;
+
+fn declare_hosts(
+    module: &mut JITModule,
+    function: &mut Function,
+    request: Request<'_>,
+) -> Result<Hosts, cranelift_module::ModuleError> {
+    let mut hosts = Hosts::new();
+    for (_, expr) in request.graph.nodes() {
+        let Some(host) = host_of(expr, request.precision) else { continue };
+        if hosts.contains_key(&host.name) {
+            continue;
+        }
+        let convention = module.target_config().default_call_conv;
+        let signature = math_calls::signature(convention, request.precision, host.arity);
+        let id = module.declare_function(&host.name, Linkage::Import, &signature)?;
+        hosts.insert(host.name, module.declare_func_in_func(id, function));
+    }
+    Ok(hosts)
+}
+
+fn host_of(expr: Expr, precision: Precision) -> Option<HostFunction> {
+    match expr {
+        Expr::Unary(op, _) => math_calls::unary(op, precision),
+        Expr::Binary(op, ..) => math_calls::binary(op, precision),
+        _ => None,
+    }
+}
+
+fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, hosts: &Hosts) {
+    let block = builder.create_block();
+    builder.append_block_params_for_function_params(block);
+    builder.switch_to_block(block);
+    builder.seal_block(block);
+    let parameters = builder.block_params(block).to_vec();
+    let mut emitter = Emitter::new(builder, request.precision);
+    let vector = emitter.vector_type();
+    let coordinates: [Value; 3] =
+        std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
+    let values = nodes(&mut emitter, request, hosts, coordinates);
+    let bytes = emitter.lane_type().bytes() as i32;
+    for (i, output) in request.outputs.iter().enumerate() {
+        let lane = emitter.builder.ins().extractlane(values[output], 0);
+        emitter.builder.ins().store(MemFlagsData::new(), lane, parameters[3], i as i32 * bytes);
+    }
+    emitter.builder.ins().return_(&[]);
+}
+
+fn batch(
+    builder: &mut FunctionBuilder<'_>,
+    request: Request<'_>,
+    hosts: &Hosts,
+    pointer: cranelift_codegen::ir::Type,
+) {
+    let [entry, body, exit] = std::array::from_fn(|_| builder.create_block());
+    builder.append_block_params_for_function_params(entry);
+    builder.switch_to_block(entry);
+    let (columns, blocks) = (builder.block_params(entry)[0], builder.block_params(entry)[1]);
+    let column = |builder: &mut FunctionBuilder<'_>, i: usize| {
+        let offset = i as i32 * pointer.bytes() as i32;
+        builder.ins().load(pointer, MemFlagsData::trusted(), columns, offset)
+    };
+    let inputs: [Value; 3] = std::array::from_fn(|i| column(builder, i));
+    let outputs: Vec<Value> = (0..request.outputs.len()).map(|i| column(builder, 3 + i)).collect();
+    let end = builder.ins().ishl_imm_u(blocks, 4); // 16 bytes a block
+    let zero = builder.ins().iconst(pointer, 0);
+    let any = builder.ins().icmp_imm_u(IntCC::NotEqual, blocks, 0);
+    builder.ins().brif(any, body, &[zero.into()], exit, &[]);
+
+    let offset = builder.append_block_param(body, pointer);
+    builder.switch_to_block(body);
+    let mut emitter = Emitter::new(builder, request.precision);
+    let vector = emitter.vector_type();
+    // columns may start anywhere, so no alignment is promised
+    let coordinates = inputs.map(|base| {
+        let address = emitter.builder.ins().iadd(base, offset);
+        emitter.builder.ins().load(vector, MemFlagsData::new(), address, 0)
+    });
+    let values = nodes(&mut emitter, request, hosts, coordinates);
+    for (output, base) in request.outputs.iter().zip(outputs) {
+        let address = builder.ins().iadd(base, offset);
+        builder.ins().store(MemFlagsData::new(), values[output], address, 0);
+    }
+    let next = builder.ins().iadd_imm_s(offset, 16);
+    let more = builder.ins().icmp(IntCC::UnsignedLessThan, next, end);
+    builder.ins().brif(more, body, &[next.into()], exit, &[]);
+    builder.seal_all_blocks();
+    builder.switch_to_block(exit);
+    builder.ins().return_(&[]);
+}
+
+/// The values of all nodes, in the graph's order.
+fn nodes(
+    emitter: &mut Emitter<'_, '_>,
+    request: Request<'_>,
+    hosts: &Hosts,
+    coordinates: [Value; 3],
+) -> HashMap<Node, Value> {
+    let mut values: HashMap<Node, Value> = HashMap::with_capacity(request.graph.len());
+    for (node, expr) in request.graph.nodes() {
+        let host = host_of(expr, request.precision).and_then(|host| hosts.get(&host.name).copied());
+        let value = match expr {
+            Expr::Constant(bits) => emitter.constant(f64::from_bits(bits)),
+            Expr::Coordinate(Axis::X) => coordinates[0],
+            Expr::Coordinate(Axis::Y) => coordinates[1],
+            Expr::Coordinate(Axis::Z) => coordinates[2],
+            Expr::Unary(op, a) => emitter.unary(op, values[&a], host),
+            Expr::Binary(op, a, b) => emitter.binary(op, (a, values[&a]), (b, values[&b]), host),
+        };
+        values.insert(node, value);
+    }
+    values
+}

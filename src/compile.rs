@@ -1,0 +1,216 @@
+//! The driver: text → solids and scenes, each stage inspectable.
+//!
+//! ```
+//! use rfm::{Program, glam::DVec3};
+//!
+//! let program = Program::from_source("post.rfm", "rfm 1\nparam r = 0.5\nsolid post = cylinder(r, h = 2)")?;
+//! let post = program.with("r", 0.25)?.solid("post")?;
+//! let (omega, gradient) = post.omega_grad(DVec3::new(0.25, 0.0, 1.0));
+//! assert_eq!(omega, 0.0);
+//! assert_eq!(-gradient.normalize(), DVec3::X); // the outward normal
+//! # Ok::<(), rfm::Error>(())
+//! ```
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::codegen::CodegenError;
+use crate::diagnostic::{Diagnostic, Diagnostics, Severity, Source, nearest};
+use crate::ir::Node;
+use crate::lower::{self, Module, Options};
+use crate::solid::{Engine, Solid};
+use crate::syntax::{self, Ast};
+
+/// Why a file gives no solid.
+#[derive(Debug)]
+pub enum Error {
+    /// The file could not be read.
+    File {
+        path: String,
+        error: std::io::Error,
+    },
+    /// The file has mistakes; prints as the compiler's own messages.
+    Diagnostics(Diagnostics),
+    /// The file has no solid or scene of this name.
+    UnknownName {
+        kind: &'static str,
+        name: String,
+        known: Vec<String>,
+    },
+    Codegen(CodegenError),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File { path, error } => write!(f, "cannot read `{path}`: {error}"),
+            Self::Diagnostics(diagnostics) => diagnostics.fmt(f),
+            Self::UnknownName { kind, name, known } => {
+                write!(f, "the file has no {kind} `{name}`")?;
+                match nearest(name, known.iter().map(String::as_str)) {
+                    Some(near) => write!(f, "; did you mean `{near}`?"),
+                    None if known.is_empty() => write!(f, "; it defines none"),
+                    None => write!(f, "; it has {}", known.join(", ")),
+                }
+            }
+            Self::Codegen(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::File { error, .. } => Some(error),
+            Self::Codegen(error) => Some(error),
+            Self::Diagnostics(_) | Self::UnknownName { .. } => None,
+        }
+    }
+}
+
+impl From<CodegenError> for Error {
+    fn from(error: CodegenError) -> Self {
+        Self::Codegen(error)
+    }
+}
+
+/// A checked file: its solids can be compiled and its scenes read.
+#[derive(Debug, Clone)]
+pub struct Program {
+    sources: Arc<[Source]>,
+    ast: Arc<Ast>,
+    syntax_messages: Arc<[Diagnostic]>,
+    options: Options,
+    module: Arc<Module>,
+    warnings: Vec<Diagnostic>,
+}
+
+impl Program {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// If it cannot be read as UTF-8 text, or has mistakes.
+    pub fn from_path(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let name = path.as_ref().display().to_string();
+        let text = std::fs::read(path.as_ref())
+            .and_then(text_of)
+            .map_err(|error| Error::File { path: name.clone(), error })?;
+        Self::from_source(name, text)
+    }
+
+    /// Checks a text; the name stands in its messages.
+    ///
+    /// # Errors
+    /// If the text has mistakes.
+    pub fn from_source(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Result<Self, Error> {
+        Self::check(Source::file(name, text), Options::default()).map_err(Error::Diagnostics)
+    }
+
+    /// Checks a text with params overridden and limits set.
+    ///
+    /// # Errors
+    /// All messages, warnings included, if one of them is an error.
+    pub fn check(source: Source, options: Options) -> Result<Self, Diagnostics> {
+        let (ast, syntax_messages) = syntax::parse(&source);
+        let sources = Arc::from([source, lower::prelude_source()]);
+        Self::lowered(sources, Arc::new(ast), syntax_messages.into(), options)
+    }
+
+    fn lowered(
+        sources: Arc<[Source]>,
+        ast: Arc<Ast>,
+        syntax_messages: Arc<[Diagnostic]>,
+        options: Options,
+    ) -> Result<Self, Diagnostics> {
+        let mut list = syntax_messages.to_vec();
+        let broken = list.iter().any(|d| d.severity == Severity::Error);
+        let (module, messages) = lower::lower(&ast, &options);
+        // names of items that do not parse are missing: what follows from that would mislead
+        let follows = |d: &Diagnostic| {
+            use crate::diagnostic::Code;
+            [Code::UNKNOWN_NAME, Code::UNKNOWN_PARAM, Code::UNUSED, Code::SCENE_MISSING].contains(&d.code)
+        };
+        list.extend(messages.into_iter().filter(|d| !(broken && follows(d))));
+        if list.iter().any(|d| d.severity == Severity::Error) {
+            return Err(Diagnostics { list, sources });
+        }
+        Ok(Self { sources, ast, syntax_messages, options, module: Arc::new(module), warnings: list })
+    }
+
+    /// The same file with another value for one of its params.
+    ///
+    /// # Errors
+    /// If the file declares no such param, or the value makes it wrong.
+    pub fn with(&self, param: &str, value: f64) -> Result<Self, Error> {
+        let mut options = self.options.clone();
+        options.overrides.insert(param.to_string(), value);
+        Self::lowered(self.sources.clone(), self.ast.clone(), self.syntax_messages.clone(), options)
+            .map_err(Error::Diagnostics)
+    }
+
+    /// The values of params that were set.
+    pub fn overrides(&self) -> &BTreeMap<String, f64> {
+        &self.options.overrides
+    }
+
+    /// Compiles a solid by name.
+    ///
+    /// # Errors
+    /// If there is no such solid.
+    pub fn solid(&self, name: &str) -> Result<Solid, Error> {
+        self.solid_with(name, Engine::Auto)
+    }
+
+    /// Compiles a solid for an engine.
+    ///
+    /// # Errors
+    /// If there is no such solid, or the engine is not to be had.
+    pub fn solid_with(&self, name: &str, engine: Engine) -> Result<Solid, Error> {
+        let found = self.module.solids.iter().find(|solid| solid.name == name);
+        let Some(solid) = found else {
+            let known = self.module.solids.iter().map(|solid| solid.name.clone()).collect();
+            return Err(Error::UnknownName { kind: "solid", name: name.into(), known });
+        };
+        self.compile(&solid.name, solid.node, engine)
+    }
+
+    /// Compiles any shape of the file's graph, such as the shape of a scene's fluid.
+    ///
+    /// # Errors
+    /// If the engine is not to be had.
+    pub fn compile(&self, name: &str, shape: Node, engine: Engine) -> Result<Solid, Error> {
+        Ok(Solid::new(name, &self.module.graph, shape, engine)?)
+    }
+
+    /// What the file defines.
+    pub fn module(&self) -> &Module {
+        &self.module
+    }
+
+    pub fn ast(&self) -> &Ast {
+        &self.ast
+    }
+
+    pub fn sources(&self) -> &Arc<[Source]> {
+        &self.sources
+    }
+
+    /// Messages that do not keep the file from being used.
+    pub fn warnings(&self) -> Diagnostics {
+        Diagnostics { list: self.warnings.clone(), sources: self.sources.clone() }
+    }
+}
+
+/// Bytes as text, or an error that says where they stop being text.
+///
+/// # Errors
+/// If the bytes are not UTF-8.
+pub fn text_of(bytes: Vec<u8>) -> std::io::Result<String> {
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let message = format!("it is not a UTF-8 text (byte {at} does not belong to a character)");
+        std::io::Error::new(std::io::ErrorKind::InvalidData, message)
+    })
+}

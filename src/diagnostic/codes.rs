@@ -1,0 +1,116 @@
+//! Every code a message can carry, with the explanation that `rfm explain CODE` prints.
+
+/// A stable name of a kind of message: `E…` errors, `W…` warnings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Code(pub &'static str);
+
+macro_rules! codes {
+    ($($name:ident = $code:literal : $text:literal;)*) => {
+        impl Code {
+            $(pub const $name: Self = Self($code);)*
+        }
+        const TABLE: &[(&str, &str)] = &[$(($code, $text)),*];
+    };
+}
+
+/// The long explanation of a code, or nothing if there is no such code.
+pub fn explain(code: &str) -> Option<&'static str> {
+    TABLE.iter().find(|(name, _)| name.eq_ignore_ascii_case(code)).map(|&(_, text)| text)
+}
+
+codes! {
+VERSION_UNKNOWN = "E0001":
+"The first line of a file names the edition of the language it is written in: `rfm 1`. This file names an
+edition that this program does not know. Install a newer rfm, or write `rfm 1` if the file uses nothing newer.";
+VERSION_MISSING = "W0002":
+"The file does not start with `rfm 1`. It is read as edition 1, but a later rfm could read it differently.
+Write `rfm 1` as the first line.";
+SYNTAX = "E0101":
+"The text does not fit the grammar at the marked place. Items start with one of the words `param`, `let`, `fn`,
+`solid`, `scene`; an item ends where the next one begins.
+
+    rfm 1
+    param r = 0.5
+    solid ball = x² + y² + z² <= r²";
+TOO_DEEP = "E0102":
+"Brackets are nested deeper than 200 levels. Name a part with `let` and use the name.";
+TOO_LONG = "E0103":
+"The file is longer than the 256 MiB that are read at most.";
+UNKNOWN_UNIT = "E0104":
+"A word right after a number on the same line is read as its unit, and this one is not known. Lengths: m cm mm
+um km; time: s ms us min h; mass: kg g; force, pressure, energy: N Pa kPa J; angle: deg rad; combined with `/`,
+`·` and `^`: `kg/m^3`, `Pa·s`, `m/s^2`, `deg/s`.";
+EQUALITY = "E0105":
+"`a == b` would be a surface of zero thickness: no point is inside it, so it can neither be meshed nor hit.
+Write a thin layer instead, `-t <= a - b <= t`, or `a <= b` for the half of space on one side.";
+CHAIN = "E0106":
+"A chain of comparisons is a layer between two bounds, `a <= e <= b`, and means the product (e − a)·(b − e). Three
+or more bounds, or bounds that point in different directions, have no such meaning: join the parts with `and`.";
+UNKNOWN_NAME = "E0201":
+"The name is not defined at this place. Names are defined by `param`, `let`, `fn` and `solid` further up in the
+file; `x`, `y`, `z`, `pi` and the standard solids and functions are always there.";
+DUPLICATE_NAME = "E0202":
+"Two items have the same name. All items share one set of names; rename one of them.";
+RESERVED_NAME = "E0203":
+"`x`, `y`, `z` and `pi` always mean the coordinates and the number: an item cannot take their names.";
+NOT_A_FUNCTION = "E0204":
+"Brackets after a name call a function, but this name is a value (or the other way round).";
+ARGUMENTS = "E0205":
+"The arguments do not fit the function: too many, too few, or a name that it does not have. Arguments are given in
+order, then by name: `cylinder(0.2, h = 1)`.";
+RECURSION = "E0206":
+"A function calls itself. Everything is unrolled when the file is compiled, so a function cannot recurse; use
+`any i in 0..n:` or `all i in 0..n:` for repetition.";
+WRONG_TYPE = "E0207":
+"A number (or field) was expected and a vector or text was found, or the other way round. Vectors are written
+`[a, b, c]`; texts are written in double quotes.";
+NOT_CONSTANT = "E0208":
+"This value must be known when the file is compiled: it may use numbers, params and constants, but not x, y, z.";
+OUT_OF_RANGE = "E0209":
+"The value lies outside the range that is allowed for it: a size that must be positive, or a param outside its
+declared `in a .. b`.";
+TOO_LARGE = "E0210":
+"The file unrolls to more operations than the limit (1 million, or what --max-nodes says). A range such as
+`0..1000000` may have too many members.";
+UNKNOWN_PARAM = "E0211":
+"-D can only set what the file declares with `param`.";
+UNIT_MISMATCH = "E0212":
+"The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
+only lengths and angles are meaningful.";
+SCENE_KEY = "E0301":
+"The scene does not know this key at this place. `rfm explain E0301` lists what it knows:
+
+    scene name {
+      box       { min: [0,0,0], max: [3,3,3], restitution: 0.5 }
+      fluid NAME{ shape: FIELD, particles: 10000, density: 998.29 kg/m^3, mass: 0.02 kg, viscosity: 3.5 Pa·s,
+                  surface_tension: 0.0728 N/m, threshold: 7.065, stiffness: 3 J, support_radius: 0.1 m,
+                  velocity: [0,0,0] m/s-values, jitter: 0, seed: 1 }
+      obstacle  { solid: NAME, restitution: 0.5 }
+      gravity: [0, 0, -9.81 m/s^2]
+      method: paper
+      run       { dt: 2 ms, until: 5 s, save_every: 0.04 s }
+    }";
+SCENE_MISSING = "E0302":
+"The scene lacks something without which it cannot be run: a box, one fluid with a shape, a run time.";
+SCENE_REPEATED = "E0303":
+"A key or block stands twice where it may stand once.";
+SCENE_NO_ROOM = "E0304":
+"The shape of the fluid, less what the obstacles take, does not hold the particles that are asked for.";
+UNUSED = "W0401":
+"The item is never used. Remove it, or start its name with `_` to keep it silently.";
+EMPTY_SOLID = "W0402":
+"Interval arithmetic proves that ω is nowhere positive: the solid is empty, its mesh has no triangles and nothing
+ever collides with it.";
+UNBOUNDED_SOLID = "W0403":
+"The solid could not be proven to end within a million units of the origin: it cannot be meshed over its own bounds.
+Intersect it with a box, or mesh it over a scene's box.";
+FOLD_OF_ONE = "W0404":
+"`any` or `all` over a range with one member, or none, is likely a slip: the range `a..b` holds a, a+1, … b−1.";
+STRICT_COMPARISON = "W0405":
+"`<` means the same as `<=` here: a comparison builds a field whose zero is the surface itself.";
+FLUID_IN_OBSTACLE = "W0501":
+"Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
+run starts.";
+OBSTACLE_FILLS_BOX = "E0502":
+"The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
+}

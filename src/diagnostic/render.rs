@@ -1,0 +1,98 @@
+//! The only place where a diagnostic becomes text.
+
+use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Renderer, Snippet, renderer::DecorStyle};
+
+use super::{Diagnostic, Diagnostics, Label, Severity, Source, Span};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// ASCII decorations, no escape codes: for logs, snapshots and error values.
+    Plain,
+    /// Escape codes and line drawing characters, for terminals.
+    Terminal,
+}
+
+/// Lines longer than this are not quoted whole: a generated file may be one line of megabytes.
+const LONGEST_QUOTED_LINE: usize = 400;
+
+/// All messages, one after the other, each ended by a newline.
+pub fn render(diagnostics: &Diagnostics, style: Style) -> String {
+    let renderer = match style {
+        Style::Plain => Renderer::plain(),
+        Style::Terminal => Renderer::styled().decor_style(DecorStyle::Unicode),
+    };
+    let mut out = String::new();
+    for diagnostic in &diagnostics.list {
+        let groups = groups(diagnostic, &diagnostics.sources);
+        out.push_str(renderer.render(&groups).trim_end());
+        out.push_str("\n\n");
+    }
+    out.truncate(out.trim_end().len());
+    out.push('\n');
+    out
+}
+
+fn groups<'a>(diagnostic: &'a Diagnostic, sources: &'a [Source]) -> Vec<Group<'a>> {
+    let level = match diagnostic.severity {
+        Severity::Error => Level::ERROR,
+        Severity::Warning => Level::WARNING,
+    };
+    let mut group = Group::with_title(level.primary_title(diagnostic.message.as_str()).id(diagnostic.code.0));
+    for source in sources {
+        let labels: Vec<_> = std::iter::once((AnnotationKind::Primary, &diagnostic.primary))
+            .chain(diagnostic.secondary.iter().map(|label| (AnnotationKind::Context, label)))
+            .filter(|(_, label)| label.span.source == source.id)
+            .collect();
+        if !labels.is_empty() {
+            group = group.element(snippet(source, &labels));
+        }
+    }
+    if let Some(help) = &diagnostic.help {
+        group = group.element(Level::HELP.message(help.as_str()));
+    }
+    vec![group]
+}
+
+/// The quoted lines that the labels touch: cut out first, so that the cost does not grow with the file.
+fn snippet<'a>(source: &'a Source, labels: &[(AnnotationKind, &'a Label)]) -> Snippet<'a, Annotation<'a>> {
+    let text = &source.text;
+    let first = labels.iter().map(|(_, l)| clamp(text, l.span).start).min().unwrap_or(0);
+    let last = labels.iter().map(|(_, l)| clamp(text, l.span).end).max().unwrap_or(0);
+    let mut start = text[..first].rfind('\n').map_or(0, |at| at + 1);
+    let mut end = text[last..].find('\n').map_or(text.len(), |at| last + at);
+    if first - start > LONGEST_QUOTED_LINE {
+        start = floor_boundary(text, first - LONGEST_QUOTED_LINE / 2);
+    }
+    if end - last > LONGEST_QUOTED_LINE {
+        end = floor_boundary(text, last + LONGEST_QUOTED_LINE / 2);
+    }
+    let mut snippet = Snippet::source(&text[start..end])
+        .line_start(source.position(start).line)
+        .path(source.name.as_ref())
+        .fold(true);
+    for (kind, label) in labels {
+        let range = clamp(text, label.span);
+        let annotation = kind.span(range.start - start..range.end.min(end) - start);
+        snippet = snippet.annotation(if label.text.is_empty() {
+            annotation
+        } else {
+            annotation.label(label.text.as_str())
+        });
+    }
+    snippet
+}
+
+/// The span's bytes, moved onto character boundaries inside the text.
+fn clamp(text: &str, span: Span) -> std::ops::Range<usize> {
+    let start = floor_boundary(text, span.start as usize);
+    let end = floor_boundary(text, span.end as usize).max(start);
+    start..end
+}
+
+fn floor_boundary(text: &str, byte: usize) -> usize {
+    let mut byte = byte.min(text.len());
+    while !text.is_char_boundary(byte) {
+        byte -= 1;
+    }
+    byte
+}

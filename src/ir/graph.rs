@@ -1,0 +1,255 @@
+//! The graph itself: interning, spans, substitution, extraction.
+
+use std::collections::HashMap;
+
+use super::op::{Binary, Unary};
+use crate::diagnostic::Span;
+
+/// An operation of one graph; only that graph makes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Node(u32);
+
+impl Node {
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Expr {
+    /// The bits of an `f64`: equal bits, equal constant.
+    Constant(u64),
+    Coordinate(Axis),
+    Unary(Unary, Node),
+    Binary(Binary, Node, Node),
+}
+
+impl Expr {
+    pub fn operands(self) -> impl Iterator<Item = Node> {
+        let (a, b) = match self {
+            Self::Constant(_) | Self::Coordinate(_) => (None, None),
+            Self::Unary(_, a) => (Some(a), None),
+            Self::Binary(_, a, b) => (Some(a), Some(b)),
+        };
+        a.into_iter().chain(b)
+    }
+
+    /// The same operation on other operands.
+    pub fn map(self, mut f: impl FnMut(Node) -> Node) -> Self {
+        match self {
+            Self::Constant(_) | Self::Coordinate(_) => self,
+            Self::Unary(op, a) => Self::Unary(op, f(a)),
+            Self::Binary(op, a, b) => Self::Binary(op, f(a), f(b)),
+        }
+    }
+
+    /// One key for both orders of a commutative operation.
+    fn key(self) -> Self {
+        match self {
+            Self::Binary(op, a, b) if op.commutes() && a > b => Self::Binary(op, b, a),
+            other => other,
+        }
+    }
+}
+
+/// Operations in an order in which operands come before their uses.
+#[derive(Debug, Clone, Default)]
+pub struct Graph {
+    exprs: Vec<Expr>,
+    spans: Vec<Option<Span>>,
+    interned: HashMap<Expr, Node>,
+}
+
+impl Graph {
+    pub fn len(&self) -> usize {
+        self.exprs.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.exprs.is_empty()
+    }
+
+    /// The node of an expression: the one that exists, or a new one that remembers the span.
+    pub fn intern(&mut self, expr: Expr, span: Option<Span>) -> Node {
+        *self.interned.entry(expr.key()).or_insert_with(|| {
+            // operands are u32 themselves, and the compiler's node budget is far below 2³²
+            let node = Node(self.exprs.len() as u32);
+            self.exprs.push(expr);
+            self.spans.push(span);
+            node
+        })
+    }
+
+    /// The node at a place in the order.
+    ///
+    /// # Panics
+    /// If the graph has no such node: a bug of the calling pass.
+    pub fn node(&self, index: usize) -> Node {
+        assert!(index < self.exprs.len(), "no node {index}");
+        Node(index as u32)
+    }
+
+    pub fn expr(&self, node: Node) -> Expr {
+        self.exprs[node.index()]
+    }
+
+    /// Where the node was first written.
+    pub fn span(&self, node: Node) -> Option<Span> {
+        self.spans[node.index()]
+    }
+
+    pub fn nodes(&self) -> impl Iterator<Item = (Node, Expr)> + '_ {
+        self.exprs.iter().enumerate().map(|(i, &expr)| (Node(i as u32), expr))
+    }
+
+    pub fn constant(&mut self, value: f64) -> Node {
+        self.intern(Expr::Constant(value.to_bits()), None)
+    }
+
+    pub fn coordinate(&mut self, axis: Axis) -> Node {
+        self.intern(Expr::Coordinate(axis), None)
+    }
+
+    pub fn unary(&mut self, op: Unary, a: Node) -> Node {
+        let span = self.span(a);
+        self.intern(Expr::Unary(op, a), span)
+    }
+
+    pub fn binary(&mut self, op: Binary, a: Node, b: Node) -> Node {
+        let span = self.span(a);
+        self.intern(Expr::Binary(op, a, b), span)
+    }
+
+    /// The constant that a node is, if it is one.
+    pub fn as_constant(&self, node: Node) -> Option<f64> {
+        match self.expr(node) {
+            Expr::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// Which nodes the roots depend on, the roots included.
+    pub fn reachable(&self, roots: &[Node]) -> Vec<bool> {
+        let mut used = vec![false; self.len()];
+        for root in roots {
+            used[root.index()] = true;
+        }
+        for i in (0..self.len()).rev() {
+            if used[i] {
+                for operand in self.exprs[i].operands() {
+                    used[operand.index()] = true;
+                }
+            }
+        }
+        used
+    }
+
+    /// The nodes a root depends on, in order; cheap when the root uses little of a large graph.
+    fn cone(&self, root: Node) -> Vec<Node> {
+        let mut seen = std::collections::HashSet::from([root]);
+        let mut cone = vec![root];
+        let mut next = 0;
+        while next < cone.len() {
+            for operand in self.expr(cone[next]).operands() {
+                if seen.insert(operand) {
+                    cone.push(operand);
+                }
+            }
+            next += 1;
+        }
+        cone.sort_unstable();
+        cone
+    }
+
+    /// The node with x, y, z replaced: the same shape in other coordinates.
+    pub fn substitute(&mut self, root: Node, coordinates: [Node; 3]) -> Node {
+        let mut image: HashMap<Node, Node> = HashMap::new();
+        for node in self.cone(root) {
+            let new = match self.expr(node) {
+                Expr::Coordinate(Axis::X) => coordinates[0],
+                Expr::Coordinate(Axis::Y) => coordinates[1],
+                Expr::Coordinate(Axis::Z) => coordinates[2],
+                expr => {
+                    let mapped = expr.map(|operand| image[&operand]);
+                    let span = self.span(node);
+                    self.intern(mapped, span)
+                }
+            };
+            image.insert(node, new);
+        }
+        image[&root]
+    }
+
+    /// The value of a node that uses no coordinate.
+    pub fn constant_value(&self, root: Node) -> Option<f64> {
+        let mut values: HashMap<Node, f64> = HashMap::new();
+        for node in self.cone(root) {
+            let value = match self.expr(node) {
+                Expr::Constant(bits) => f64::from_bits(bits),
+                Expr::Coordinate(_) => return None,
+                Expr::Unary(op, a) => op.eval(values[&a]),
+                Expr::Binary(op, a, b) => op.eval(values[&a], values[&b]),
+            };
+            values.insert(node, value);
+        }
+        values.get(&root).copied()
+    }
+
+    /// A graph of its own for some roots, without what they do not use.
+    pub fn extract(&self, roots: &[Node]) -> (Self, Vec<Node>) {
+        let used = self.reachable(roots);
+        let mut out = Self::default();
+        let mut image: Vec<Option<Node>> = vec![None; self.len()];
+        for (node, expr) in self.nodes().filter(|(node, _)| used[node.index()]) {
+            let mapped = expr.map(|operand| image[operand.index()].unwrap_or(operand));
+            image[node.index()] = Some(out.intern(mapped, self.span(node)));
+        }
+        let roots = roots.iter().map(|root| image[root.index()].unwrap_or(*root)).collect();
+        (out, roots)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_expressions_share_a_node() {
+        let mut graph = Graph::default();
+        let (x, y) = (graph.coordinate(Axis::X), graph.coordinate(Axis::Y));
+        let sum = graph.binary(Binary::Add, x, y);
+        assert_eq!(graph.binary(Binary::Add, y, x), sum);
+        assert_ne!(graph.binary(Binary::Sub, y, x), graph.binary(Binary::Sub, x, y));
+    }
+
+    #[test]
+    fn substitution_moves_a_shape() {
+        let mut graph = Graph::default();
+        let (x, y, z) = (graph.coordinate(Axis::X), graph.coordinate(Axis::Y), graph.coordinate(Axis::Z));
+        let product = graph.binary(Binary::Mul, x, y);
+        let one = graph.constant(1.0);
+        let two = graph.constant(2.0);
+        let moved = graph.substitute(product, [one, two, z]);
+        assert_eq!(graph.constant_value(moved), Some(2.0));
+        assert_eq!(graph.constant_value(product), None);
+    }
+
+    #[test]
+    fn extraction_leaves_out_the_unused() {
+        let mut graph = Graph::default();
+        let x = graph.coordinate(Axis::X);
+        let unused = graph.unary(Unary::Sin, x);
+        let root = graph.unary(Unary::Neg, x);
+        let (small, roots) = graph.extract(&[root]);
+        assert_eq!(small.len(), 2);
+        assert_eq!(small.expr(roots[0]), Expr::Unary(Unary::Neg, Node(0)));
+        assert!(unused.index() < graph.len());
+    }
+}

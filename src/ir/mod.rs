@@ -1,0 +1,23 @@
+//! The expression graph of ω: typed, interned, each node stored once; its meaning is the interpreter's.
+//!
+//! A [`Graph`] is a list of operations in which operands come before their uses, so every pass is one loop over
+//! it. R-functions are operations of their own (not spelt out in square roots): each consumer chooses its form.
+//!
+//! Invariant: nothing here knows the syntax or the code generator; equal expressions have equal [`Node`]s.
+
+mod adjoint;
+mod dump;
+mod eval;
+mod graph;
+mod op;
+pub mod r0;
+mod range;
+mod real;
+
+pub use adjoint::gradient;
+pub use dump::dump;
+pub use eval::Interpreter;
+pub use graph::{Axis, Expr, Graph, Node};
+pub use op::{Binary, Unary};
+pub use range::RangeEvaluator;
+pub use real::Real;

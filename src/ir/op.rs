@@ -1,0 +1,205 @@
+//! The operations: each is defined once, here, by its name and its value; the code generator is tested against
+//! these values bit for bit.
+
+use super::r0;
+use super::real::Real;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Unary {
+    Neg,
+    Abs,
+    Sqrt,
+    /// −1, 0 or 1; the derivative of |a|, 0 at 0 by convention.
+    Sign,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Exp,
+    Ln,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Binary {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains 0.
+    DivOrZero,
+    /// The smaller operand; NaN if either is NaN.
+    Min,
+    Max,
+    /// ∂min(a, b)/∂a: 1, ½ or 0 where a is smaller, equal or larger.
+    MinWeight,
+    MaxWeight,
+    Pow,
+    /// `atan2(a, b)`: the angle of the point (b, a).
+    Atan2,
+    /// R₀-conjunction a ∧ b, see [`r0::and`].
+    And,
+    /// R₀-disjunction a ∨ b, see [`r0::or`].
+    Or,
+    /// ∂(a ∧ b)/∂a, see [`r0::and_weights`].
+    AndWeight,
+    /// ∂(a ∨ b)/∂a.
+    OrWeight,
+}
+
+impl Unary {
+    pub const ALL: [Self; 12] = [
+        Self::Neg,
+        Self::Abs,
+        Self::Sqrt,
+        Self::Sign,
+        Self::Sin,
+        Self::Cos,
+        Self::Tan,
+        Self::Asin,
+        Self::Acos,
+        Self::Atan,
+        Self::Exp,
+        Self::Ln,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Neg => "neg",
+            Self::Abs => "abs",
+            Self::Sqrt => "sqrt",
+            Self::Sign => "sign",
+            Self::Sin => "sin",
+            Self::Cos => "cos",
+            Self::Tan => "tan",
+            Self::Asin => "asin",
+            Self::Acos => "acos",
+            Self::Atan => "atan",
+            Self::Exp => "exp",
+            Self::Ln => "ln",
+        }
+    }
+
+    pub fn eval<T: Real>(self, a: T) -> T {
+        match self {
+            Self::Neg => -a,
+            Self::Abs => a.abs(),
+            Self::Sqrt => a.sqrt(),
+            Self::Sign => sign(a),
+            Self::Sin => a.sin(),
+            Self::Cos => a.cos(),
+            Self::Tan => a.tan(),
+            Self::Asin => a.asin(),
+            Self::Acos => a.acos(),
+            Self::Atan => a.atan(),
+            Self::Exp => a.exp(),
+            Self::Ln => a.ln(),
+        }
+    }
+}
+
+impl Binary {
+    pub const ALL: [Self; 15] = [
+        Self::Add,
+        Self::Sub,
+        Self::Mul,
+        Self::Div,
+        Self::DivOrZero,
+        Self::Min,
+        Self::Max,
+        Self::MinWeight,
+        Self::MaxWeight,
+        Self::Pow,
+        Self::Atan2,
+        Self::And,
+        Self::Or,
+        Self::AndWeight,
+        Self::OrWeight,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Add => "add",
+            Self::Sub => "sub",
+            Self::Mul => "mul",
+            Self::Div => "div",
+            Self::DivOrZero => "div_or_zero",
+            Self::Min => "min",
+            Self::Max => "max",
+            Self::MinWeight => "min_weight",
+            Self::MaxWeight => "max_weight",
+            Self::Pow => "pow",
+            Self::Atan2 => "atan2",
+            Self::And => "r0_and",
+            Self::Or => "r0_or",
+            Self::AndWeight => "r0_and_weight",
+            Self::OrWeight => "r0_or_weight",
+        }
+    }
+
+    /// Whether swapping the operands gives the same bits.
+    pub fn commutes(self) -> bool {
+        matches!(self, Self::Add | Self::Mul | Self::Min | Self::Max | Self::And | Self::Or)
+    }
+
+    pub fn eval<T: Real>(self, a: T, b: T) -> T {
+        let zero = T::from_f64(0.0);
+        match self {
+            Self::Add => a + b,
+            Self::Sub => a - b,
+            Self::Mul => a * b,
+            Self::Div => a / b,
+            Self::DivOrZero => {
+                if b == zero {
+                    zero
+                } else {
+                    a / b
+                }
+            }
+            Self::Min => ordered(a < b, a, b),
+            Self::Max => ordered(a > b, a, b),
+            Self::MinWeight => weight(a < b, a, b),
+            Self::MaxWeight => weight(a > b, a, b),
+            Self::Pow => a.pow(b),
+            Self::Atan2 => a.atan2(b),
+            Self::And => r0::and(a, b),
+            Self::Or => r0::or(a, b),
+            Self::AndWeight => r0::and_weights(a, b).0,
+            Self::OrWeight => r0::or_weights(a, b).0,
+        }
+    }
+}
+
+fn sign<T: Real>(a: T) -> T {
+    let zero = T::from_f64(0.0);
+    if a > zero {
+        T::from_f64(1.0)
+    } else if a < zero {
+        T::from_f64(-1.0)
+    } else {
+        a // ±0 and NaN
+    }
+}
+
+/// The first operand if it was found to be the one sought; the other otherwise, but never a number for a NaN.
+#[allow(clippy::eq_op)]
+fn ordered<T: Real>(first: bool, a: T, b: T) -> T {
+    if first {
+        a
+    } else if a == a {
+        b
+    } else {
+        a
+    }
+}
+
+fn weight<T: Real>(first: bool, a: T, b: T) -> T {
+    if first {
+        T::from_f64(1.0)
+    } else if a == b {
+        T::from_f64(0.5)
+    } else {
+        T::from_f64(0.0)
+    }
+}

@@ -1,0 +1,137 @@
+//! Calls: arguments are bound to parameters, then the body is evaluated in a scope of its own.
+
+use super::builtins;
+use super::eval::{Call, Local, Lowering, Scope};
+use super::names::Kind;
+use super::value::Value;
+use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
+use crate::syntax::ast::{Argument, Function, Name};
+
+impl<'a> Lowering<'a> {
+    pub fn call(&mut self, name: &Name, arguments: &[Argument], span: Span) -> Value {
+        match self.names.get(self.scope.source, &name.text).map(|g| (g.kind.clone(), g.source)) {
+            Some((Kind::Function(function), source)) => self.call_function(function, source, arguments, span),
+            Some((Kind::Value(_) | Kind::Solid(_), _)) if !builtins::exists(&name.text) => {
+                let message = format!("`{}` is not a function", name.text);
+                self.fail(
+                    Diagnostic::error(Code::NOT_A_FUNCTION, name.span, message)
+                        .at("a value")
+                        .help("to multiply, write `*`"),
+                )
+            }
+            _ if builtins::exists(&name.text) => self.call_builtin(name, arguments, span),
+            _ => {
+                let mut candidates = self.names.candidates(true);
+                candidates.extend(builtins::names().map(String::from));
+                let message = format!("unknown function or shape `{}`", name.text);
+                let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, name.span, message)
+                    .at("not defined above")
+                    .suggest(&name.text, candidates.iter().map(String::as_str));
+                self.fail(diagnostic)
+            }
+        }
+    }
+
+    fn call_function(
+        &mut self,
+        function: &'a Function,
+        source: SourceId,
+        arguments: &[Argument],
+        span: Span,
+    ) -> Value {
+        let name = &function.name.text;
+        if !self.may_call(name, source, span) {
+            return Value::Failed;
+        }
+        let Some(mut bound) = self.bind(function, arguments, span) else { return Value::Failed };
+        let call = Call { function: name.clone(), source, span };
+        let mut calls = self.scope.calls.clone();
+        calls.push(call);
+        let outer = std::mem::replace(&mut self.scope, Scope { source, locals: Vec::new(), calls });
+        // defaults may use the parameters before them
+        for parameter in &function.parameters {
+            let local = match bound.iter().position(|local| local.name == parameter.name.text) {
+                Some(at) => bound.swap_remove(at),
+                None => {
+                    let value =
+                        parameter.default.as_ref().map_or(Value::Failed, |default| self.expr(default));
+                    Local { name: parameter.name.text.clone(), value, span }
+                }
+            };
+            self.scope.locals.push(local);
+        }
+        let value = self.expr(&function.body);
+        self.scope = outer;
+        value
+    }
+
+    /// The arguments by the names of their parameters; what does not fit is reported.
+    fn bind(&mut self, function: &Function, arguments: &[Argument], span: Span) -> Option<Vec<Local>> {
+        let name = &function.name.text;
+        let mut bound: Vec<Local> = Vec::new();
+        let mut fits = true;
+        for (position, argument) in arguments.iter().enumerate() {
+            let value = self.expr(&argument.value);
+            let parameter = match &argument.name {
+                None => function.parameters.get(position).map(|p| p.name.text.clone()),
+                Some(given) => {
+                    let known = function.parameters.iter().any(|p| p.name.text == given.text);
+                    if !known {
+                        let names = function.parameters.iter().map(|p| p.name.text.as_str());
+                        let message = format!("`{name}` has no parameter `{}`", given.text);
+                        let all: Vec<&str> = names.clone().collect();
+                        let diagnostic = Diagnostic::error(Code::ARGUMENTS, given.span, message)
+                            .help(format!("its parameters are {}", all.join(", ")))
+                            .suggest(&given.text, names);
+                        self.report(diagnostic);
+                        fits = false;
+                        continue;
+                    }
+                    Some(given.text.clone())
+                }
+            };
+            let Some(parameter) = parameter else {
+                let message = format!(
+                    "`{name}` takes at most {} argument{}, found {}",
+                    function.parameters.len(),
+                    if function.parameters.len() == 1 { "" } else { "s" },
+                    arguments.len()
+                );
+                let at = self.user_span(argument.value.span);
+                self.report(Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many"));
+                return None;
+            };
+            if bound.iter().any(|local| local.name == parameter) {
+                let at = self.user_span(argument.value.span);
+                let message = format!("parameter `{parameter}` of `{name}` is given twice");
+                self.report(Diagnostic::error(Code::ARGUMENTS, at, message));
+                fits = false;
+                continue;
+            }
+            let at = if argument.value.span.source == SourceId::File {
+                argument.value.span
+            } else {
+                self.user_span(span)
+            };
+            bound.push(Local { name: parameter, value, span: at });
+        }
+        for parameter in &function.parameters {
+            let given = bound.iter().any(|local| local.name == parameter.name.text);
+            if !given && parameter.default.is_none() && fits {
+                let at = self.user_span(span);
+                let message = format!("`{name}` needs a value for `{}`", parameter.name.text);
+                let signature: Vec<String> = function
+                    .parameters
+                    .iter()
+                    .map(|p| p.name.text.clone() + if p.default.is_some() { " = …" } else { "" })
+                    .collect();
+                self.report(
+                    Diagnostic::error(Code::ARGUMENTS, at, message)
+                        .help(format!("its parameters are {name}({})", signature.join(", "))),
+                );
+                fits = false;
+            }
+        }
+        fits.then_some(bound)
+    }
+}

@@ -1,0 +1,502 @@
+//! Expressions → values.
+
+use super::Module;
+use super::names::{Kind, Names};
+use super::value::Value;
+use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
+use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
+use crate::syntax::ast::{AddOp, Comparison, Expr, ExprKind, Logic, MulOp, Name};
+use crate::syntax::{Dimension, parse_unit};
+
+/// Calls nested deeper than this are refused: functions cannot recurse, so only a chain of them gets here.
+const DEEPEST_CALL: usize = 64;
+
+/// Members of a fold, at most: the node budget is checked after each member, this only bounds the empty ones.
+const LONGEST_FOLD: f64 = 1e7;
+
+/// The state of a lowering.
+pub(super) struct Lowering<'a> {
+    pub module: Module,
+    pub diagnostics: Vec<Diagnostic>,
+    pub names: Names<'a>,
+    pub scope: Scope,
+    max_nodes: usize,
+    budget_reported: bool,
+}
+
+/// Where an expression is evaluated: whose code it is, its local names, and the call that led there.
+#[derive(Debug, Clone)]
+pub(super) struct Scope {
+    pub source: SourceId,
+    pub locals: Vec<Local>,
+    /// The functions being called, outermost first.
+    pub calls: Vec<Call>,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Local {
+    pub name: String,
+    pub value: Value,
+    /// Of the argument that it was bound to.
+    pub span: Span,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Call {
+    pub function: String,
+    pub source: SourceId,
+    pub span: Span,
+}
+
+impl<'a> Lowering<'a> {
+    pub fn new(max_nodes: usize) -> Self {
+        Self {
+            module: Module::default(),
+            diagnostics: Vec::new(),
+            names: Names::default(),
+            scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
+            max_nodes,
+            budget_reported: false,
+        }
+    }
+
+    pub fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    /// Reports and gives the value that silences what depends on it.
+    pub fn fail(&mut self, diagnostic: Diagnostic) -> Value {
+        self.report(diagnostic);
+        Value::Failed
+    }
+
+    /// The span in the user's file that an expression belongs to: its own, or that of the call that led into the
+    /// standard solids.
+    pub fn user_span(&self, span: Span) -> Span {
+        if span.source == SourceId::File {
+            return span;
+        }
+        self.scope.calls.iter().rev().map(|c| c.span).find(|s| s.source == SourceId::File).unwrap_or(span)
+    }
+
+    /// Whether the file has grown beyond its budget; reported once.
+    pub fn over_budget(&mut self, span: Span) -> bool {
+        let over = self.module.graph.len() > self.max_nodes;
+        if over && !self.budget_reported {
+            self.budget_reported = true;
+            let message = format!("the file unrolls to more than {} operations", self.max_nodes);
+            let span = self.user_span(span);
+            self.report(
+                Diagnostic::error(Code::TOO_LARGE, span, message)
+                    .help("make a range shorter, or allow more with --max-nodes"),
+            );
+        }
+        over
+    }
+
+    pub fn node(&mut self, operation: Operation, span: Span) -> Node {
+        let span = self.user_span(span);
+        self.module.graph.intern(operation, Some(span))
+    }
+
+    pub fn unary(&mut self, op: Unary, a: Node, span: Span) -> Node {
+        self.node(Operation::Unary(op, a), span)
+    }
+
+    pub fn binary(&mut self, op: Binary, a: Node, b: Node, span: Span) -> Node {
+        self.node(Operation::Binary(op, a, b), span)
+    }
+
+    pub fn constant(&mut self, value: f64) -> Node {
+        self.module.graph.constant(value)
+    }
+
+    /// A number or field; anything else is reported.
+    pub fn field(&mut self, expr: &Expr) -> Option<Node> {
+        let value = self.expr(expr);
+        self.as_number(&value, expr.span)
+    }
+
+    pub fn as_number(&mut self, value: &Value, span: Span) -> Option<Node> {
+        match value {
+            Value::Number(node) => Some(*node),
+            Value::Failed => None,
+            other => {
+                let span = self.user_span(span);
+                let message = format!("expected a number or a field, found {}", other.describe());
+                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
+                None
+            }
+        }
+    }
+
+    pub fn as_vector(&mut self, value: &Value, span: Span) -> Option<[Node; 3]> {
+        match value {
+            Value::Vector(parts) => Some(*parts),
+            Value::Failed => None,
+            other => {
+                let span = self.user_span(span);
+                let message = format!("expected a vector `[a, b, c]`, found {}", other.describe());
+                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
+                None
+            }
+        }
+    }
+
+    /// A number known when the file is compiled; anything else is reported.
+    pub fn constant_expr(&mut self, expr: &Expr, what: &str) -> Option<f64> {
+        let node = self.field(expr)?;
+        self.as_constant(node, expr.span, what)
+    }
+
+    pub fn as_constant(&mut self, node: Node, span: Span, what: &str) -> Option<f64> {
+        let value = self.module.graph.constant_value(node);
+        if value.is_none() {
+            let span = self.user_span(span);
+            let message = format!("{what} must be a constant, but it depends on x, y or z");
+            self.report(Diagnostic::error(Code::NOT_CONSTANT, span, message));
+        }
+        value
+    }
+
+    pub fn expr(&mut self, expr: &Expr) -> Value {
+        let span = expr.span;
+        if self.over_budget(span) {
+            return Value::Failed;
+        }
+        match &expr.kind {
+            ExprKind::Number(value) => Value::Number(self.constant(*value)),
+            ExprKind::Quantity { value, unit } => self.quantity(*value, unit),
+            ExprKind::Text(text) => Value::Text(text.clone()),
+            ExprKind::Name(name) => self.name(name, span),
+            ExprKind::Vector(parts) => self.vector(parts, span),
+            ExprKind::Logic { op, operands } => self.logic(*op, operands, span),
+            ExprKind::Not(inner) | ExprKind::Negate(inner) => {
+                let value = self.expr(inner);
+                self.negate(&value, span)
+            }
+            ExprKind::Compare { first, rest } => self.compare(first, rest, span),
+            ExprKind::Sum { first, rest } => {
+                let mut value = self.expr(first);
+                for (op, operand) in rest {
+                    let right = self.expr(operand);
+                    let op = match op {
+                        AddOp::Add => Binary::Add,
+                        AddOp::Subtract => Binary::Sub,
+                    };
+                    value = self.sum(op, &value, &right, first.span.to(operand.span));
+                }
+                value
+            }
+            ExprKind::Product { first, rest } => {
+                let mut value = self.expr(first);
+                for (op, operand) in rest {
+                    let right = self.expr(operand);
+                    let op = match op {
+                        MulOp::Multiply => Binary::Mul,
+                        MulOp::Divide => Binary::Div,
+                    };
+                    value = self.product(op, &value, &right, first.span.to(operand.span));
+                }
+                value
+            }
+            ExprKind::Power { base, exponent } => self.power(base, exponent, span),
+            ExprKind::Call { function, arguments } => self.call(function, arguments, span),
+            ExprKind::Component { vector, axis } => {
+                let value = self.expr(vector);
+                self.as_vector(&value, vector.span).map_or(Value::Failed, |v| Value::Number(v[*axis]))
+            }
+            ExprKind::Method { receiver, method, arguments } => {
+                self.method(receiver, method, arguments, span)
+            }
+            ExprKind::Fold { op, variable, start, end, body } => {
+                self.fold(*op, variable, (start, end), body, span)
+            }
+        }
+    }
+
+    fn quantity(&mut self, value: f64, unit: &Name) -> Value {
+        let Some(parsed) = parse_unit(&unit.text) else {
+            let message = format!("unknown unit `{}`", unit.text);
+            return self.fail(Diagnostic::error(Code::UNKNOWN_UNIT, unit.span, message));
+        };
+        if ![Dimension::LENGTH, Dimension::ANGLE].contains(&parsed.dimension) {
+            let message = format!("`{}` is not a length or an angle", unit.text);
+            return self.fail(
+                Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(
+                    "inside shapes only lengths and angles have units; other units belong to scene keys",
+                ),
+            );
+        }
+        Value::Number(self.constant(value * parsed.factor))
+    }
+
+    fn name(&mut self, name: &str, span: Span) -> Value {
+        if let Some(local) = self.scope.locals.iter().rev().find(|local| local.name == name) {
+            return local.value.clone();
+        }
+        let axis = match name {
+            "x" => Some(Axis::X),
+            "y" => Some(Axis::Y),
+            "z" => Some(Axis::Z),
+            "pi" => return Value::Number(self.constant(std::f64::consts::PI)),
+            _ => None,
+        };
+        if let Some(axis) = axis {
+            return Value::Number(self.node(Operation::Coordinate(axis), span));
+        }
+        match self.names.get(self.scope.source, name).map(|global| global.kind.clone()) {
+            Some(Kind::Value(value) | Kind::Solid(value)) => value,
+            Some(Kind::Function(_)) => {
+                let message = format!("`{name}` is a function");
+                self.fail(
+                    Diagnostic::error(Code::NOT_A_FUNCTION, span, message)
+                        .at("used without arguments")
+                        .help(format!("write `{name}(…)`")),
+                )
+            }
+            None if super::builtins::exists(name) => {
+                let message = format!("`{name}` is a function");
+                self.fail(
+                    Diagnostic::error(Code::NOT_A_FUNCTION, span, message).help(format!("write `{name}(…)`")),
+                )
+            }
+            None => {
+                let candidates = self.names.candidates(false);
+                let locals: Vec<String> = self.scope.locals.iter().map(|l| l.name.clone()).collect();
+                let all = candidates.iter().chain(&locals).map(String::as_str).chain(["x", "y", "z", "pi"]);
+                let diagnostic =
+                    Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"))
+                        .at("not defined above")
+                        .suggest(name, all);
+                self.fail(diagnostic)
+            }
+        }
+    }
+
+    fn vector(&mut self, parts: &[Expr], span: Span) -> Value {
+        let nodes: Vec<Option<Node>> = parts.iter().map(|part| self.field(part)).collect();
+        match nodes[..] {
+            [Some(a), Some(b), Some(c)] => Value::Vector([a, b, c]),
+            [_, _, _] => Value::Failed,
+            _ => {
+                let message = format!("a vector has three components, found {}", parts.len());
+                self.fail(Diagnostic::error(Code::WRONG_TYPE, span, message))
+            }
+        }
+    }
+
+    pub fn negate(&mut self, value: &Value, span: Span) -> Value {
+        match value {
+            Value::Number(a) => Value::Number(self.unary(Unary::Neg, *a, span)),
+            Value::Vector(v) => Value::Vector(v.map(|a| self.unary(Unary::Neg, a, span))),
+            other => {
+                self.as_number(other, span);
+                Value::Failed
+            }
+        }
+    }
+
+    fn sum(&mut self, op: Binary, a: &Value, b: &Value, span: Span) -> Value {
+        match (a, b) {
+            (Value::Failed, _) | (_, Value::Failed) => Value::Failed,
+            (Value::Vector(a), Value::Vector(b)) => {
+                Value::Vector(std::array::from_fn(|i| self.binary(op, a[i], b[i], span)))
+            }
+            (Value::Number(a), Value::Number(b)) => Value::Number(self.binary(op, *a, *b, span)),
+            _ => {
+                let span = self.user_span(span);
+                let message = format!("cannot add or subtract {} and {}", a.describe(), b.describe());
+                self.fail(Diagnostic::error(Code::WRONG_TYPE, span, message))
+            }
+        }
+    }
+
+    fn product(&mut self, op: Binary, a: &Value, b: &Value, span: Span) -> Value {
+        match (a, b) {
+            (Value::Failed, _) | (_, Value::Failed) => Value::Failed,
+            (Value::Number(a), Value::Number(b)) => Value::Number(self.binary(op, *a, *b, span)),
+            (Value::Vector(v), Value::Number(s)) => Value::Vector(v.map(|c| self.binary(op, c, *s, span))),
+            (Value::Number(s), Value::Vector(v)) if op == Binary::Mul => {
+                Value::Vector(v.map(|c| self.binary(op, *s, c, span)))
+            }
+            _ => {
+                let span = self.user_span(span);
+                let what = if op == Binary::Mul { "multiply" } else { "divide" };
+                let message = format!("cannot {what} {} by {}", a.describe(), b.describe());
+                let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
+                self.fail(diagnostic.help("`dot(a, b)` is the scalar product of two vectors"))
+            }
+        }
+    }
+
+    /// Whole exponents up to 64 are products (by repeated squaring), ½ is the root, the rest is `pow`.
+    fn power(&mut self, base: &Expr, exponent: &Expr, span: Span) -> Value {
+        let (Some(a), Some(b)) = (self.field(base), self.field(exponent)) else { return Value::Failed };
+        Value::Number(self.raise(a, b, span))
+    }
+
+    pub fn raise(&mut self, a: Node, b: Node, span: Span) -> Node {
+        let Some(exponent) = self.module.graph.constant_value(b) else {
+            return self.binary(Binary::Pow, a, b, span);
+        };
+        if exponent == 0.5 {
+            return self.unary(Unary::Sqrt, a, span);
+        }
+        let whole = exponent.abs();
+        if whole.fract() != 0.0 || whole > 64.0 {
+            return self.binary(Binary::Pow, a, b, span);
+        }
+        let power = self.whole_power(a, whole as u32, span);
+        if exponent < 0.0 {
+            let one = self.constant(1.0);
+            return self.binary(Binary::Div, one, power, span);
+        }
+        power
+    }
+
+    fn whole_power(&mut self, a: Node, exponent: u32, span: Span) -> Node {
+        match exponent {
+            0 => self.constant(1.0),
+            1 => a,
+            n => {
+                let half = self.whole_power(a, n / 2, span);
+                let square = self.binary(Binary::Mul, half, half, span);
+                if n % 2 == 0 { square } else { self.binary(Binary::Mul, square, a, span) }
+            }
+        }
+    }
+
+    /// `a <= b` is b − a; `a <= e <= b` is (e − a)·(b − e), the slab of the R-function literature.
+    fn compare(&mut self, first: &Expr, rest: &[(Comparison, Span, Expr)], span: Span) -> Value {
+        for (op, at, _) in rest {
+            match op {
+                Comparison::Equal => {
+                    return self.fail(
+                        Diagnostic::error(Code::EQUALITY, *at, "`==` would be a surface of zero thickness")
+                            .help("write a thin layer `-t <= a - b <= t`, or a half-space `a <= b`"),
+                    );
+                }
+                Comparison::Less | Comparison::Greater => {
+                    let orders = if *op == Comparison::Less { ("<", "<=") } else { (">", ">=") };
+                    let message = format!("`{}` means the same as `{}` here", orders.0, orders.1);
+                    self.report(
+                        Diagnostic::warning(Code::STRICT_COMPARISON, *at, message)
+                            .help(format!("write `{}`", orders.1)),
+                    );
+                }
+                Comparison::LessEqual | Comparison::GreaterEqual => {}
+            }
+        }
+        let upwards = |op: Comparison| matches!(op, Comparison::LessEqual | Comparison::Less);
+        let same_way = rest.windows(2).all(|pair| upwards(pair[0].0) == upwards(pair[1].0));
+        if rest.len() > 2 || !same_way {
+            let message = if same_way {
+                format!("a chain of {} comparisons", rest.len())
+            } else {
+                "comparisons in opposite directions".to_string()
+            };
+            return self
+                .fail(Diagnostic::error(Code::CHAIN, span, message).help("join the comparisons with `and`"));
+        }
+        let mut terms = vec![self.field(first)];
+        terms.extend(rest.iter().map(|(_, _, operand)| self.field(operand)));
+        let Some(mut terms) = terms.into_iter().collect::<Option<Vec<Node>>>() else { return Value::Failed };
+        if !upwards(rest[0].0) {
+            terms.reverse();
+        }
+        let difference = self.binary(Binary::Sub, terms[1], terms[0], span);
+        let Some(&third) = terms.get(2) else { return Value::Number(difference) };
+        let other = self.binary(Binary::Sub, third, terms[1], span);
+        Value::Number(self.binary(Binary::Mul, difference, other, span))
+    }
+
+    fn logic(&mut self, op: Logic, operands: &[Expr], span: Span) -> Value {
+        let nodes: Vec<Option<Node>> = operands.iter().map(|operand| self.field(operand)).collect();
+        let Some(mut nodes) = nodes.into_iter().collect::<Option<Vec<Node>>>() else { return Value::Failed };
+        if op == Logic::Minus {
+            for node in &mut nodes[1..] {
+                *node = self.unary(Unary::Neg, *node, span);
+            }
+        }
+        Value::Number(self.balanced(op, &nodes, span))
+    }
+
+    /// An n-ary operation as a balanced tree, the left half the larger one: a fold would let ω grow as 2ⁿ.
+    fn balanced(&mut self, op: Logic, nodes: &[Node], span: Span) -> Node {
+        match nodes {
+            [only] => *only,
+            _ => {
+                let (left, right) = nodes.split_at(nodes.len().div_ceil(2));
+                let (a, b) = (self.balanced(op, left, span), self.balanced(op, right, span));
+                let op = if op == Logic::Or { Binary::Or } else { Binary::And };
+                self.binary(op, a, b, span)
+            }
+        }
+    }
+
+    fn fold(&mut self, op: Logic, variable: &Name, range: (&Expr, &Expr), body: &Expr, span: Span) -> Value {
+        let start = self.constant_expr(range.0, "the start of a range");
+        let end = self.constant_expr(range.1, "the end of a range");
+        let (Some(start), Some(end)) = (start, end) else { return Value::Failed };
+        let whole = range.0.span.to(range.1.span);
+        if start.fract() != 0.0 || end.fract() != 0.0 {
+            let message = format!("a range goes from one whole number to another, found {start} .. {end}");
+            return self.fail(Diagnostic::error(Code::OUT_OF_RANGE, whole, message));
+        }
+        let word = if op == Logic::Or { "any" } else { "all" };
+        if start >= end {
+            let message = format!("`{word}` over the range {start} .. {end}, which has no member");
+            return self.fail(
+                Diagnostic::error(Code::OUT_OF_RANGE, whole, message)
+                    .help("a range a..b holds a, a+1, … b−1; a must be less than b"),
+            );
+        }
+        if end - start > LONGEST_FOLD {
+            let message = format!("a range with {} members", end - start);
+            return self.fail(Diagnostic::error(Code::TOO_LARGE, whole, message));
+        }
+        if end - start == 1.0 {
+            self.report(Diagnostic::warning(
+                Code::FOLD_OF_ONE,
+                whole,
+                format!("`{word}` over the single member {start}"),
+            ));
+        }
+        let mut members = Vec::new();
+        let mut index = start;
+        while index < end {
+            let value = Value::Number(self.constant(index));
+            self.scope.locals.push(Local { name: variable.text.clone(), value, span: variable.span });
+            let member = self.field(body);
+            self.scope.locals.pop();
+            match member {
+                Some(member) => members.push(member),
+                None => return Value::Failed, // one message is enough
+            }
+            index += 1.0;
+        }
+        Value::Number(self.balanced(op, &members, span))
+    }
+
+    /// Whether one more call may be made.
+    pub fn may_call(&mut self, function: &str, source: SourceId, span: Span) -> bool {
+        let calls = &self.scope.calls;
+        if calls.iter().any(|call| call.function == function && call.source == source) {
+            let span = self.user_span(span);
+            let message = format!("`{function}` calls itself");
+            self.report(
+                Diagnostic::error(Code::RECURSION, span, message)
+                    .help("use `any i in 0..n:` or `all i in 0..n:` for repetition"),
+            );
+            return false;
+        }
+        if calls.len() >= DEEPEST_CALL {
+            let span = self.user_span(span);
+            let message = format!("calls nested more than {DEEPEST_CALL} deep");
+            self.report(Diagnostic::error(Code::TOO_DEEP, span, message));
+            return false;
+        }
+        true
+    }
+}

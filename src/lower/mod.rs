@@ -1,0 +1,243 @@
+//! Ast → one graph with named roots, and scenes: names are looked up, functions unrolled, ranges checked.
+//!
+//! Items are read in order; a name means what was defined above it. Errors are collected, and an item that failed
+//! stands for nothing further down, so that one mistake gives one message.
+//!
+//! Invariant: what is written is what is built: no formula is rearranged here.
+
+mod arguments;
+mod builtins;
+mod eval;
+mod names;
+mod scene;
+mod transforms;
+mod value;
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+pub use scene::{Fluid, Method, Obstacle, Run, Scene};
+
+use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
+use crate::ir::{Graph, Node};
+use crate::syntax::Ast;
+use crate::syntax::ast::{Definition, Item, Param};
+use eval::Lowering;
+use names::{Kind, RESERVED};
+use value::Value;
+
+/// A file, lowered.
+#[derive(Debug, Clone, Default)]
+pub struct Module {
+    pub graph: Graph,
+    pub params: Vec<ParamValue>,
+    pub solids: Vec<NamedSolid>,
+    pub scenes: Vec<Scene>,
+}
+
+/// A `param` with the value that it had in this lowering.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParamValue {
+    pub name: String,
+    pub value: f64,
+    pub range: Option<(f64, f64)>,
+    pub doc: Option<String>,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedSolid {
+    pub name: String,
+    pub node: Node,
+    /// Of the name in its definition.
+    pub span: Span,
+}
+
+/// Limits and overrides of a lowering.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Values for params, as `-D name=value` gives them.
+    pub overrides: BTreeMap<String, f64>,
+    /// Operations that a file may unroll to.
+    pub max_nodes: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { overrides: BTreeMap::new(), max_nodes: 1_000_000 }
+    }
+}
+
+/// The source of the standard solids.
+pub fn prelude_source() -> Source {
+    Source {
+        id: SourceId::Prelude,
+        name: "<standard solids>".into(),
+        text: include_str!("prelude.rfm").into(),
+    }
+}
+
+fn prelude() -> &'static Ast {
+    static PRELUDE: OnceLock<Ast> = OnceLock::new();
+    PRELUDE.get_or_init(|| {
+        let (ast, diagnostics) = crate::syntax::parse(&prelude_source());
+        debug_assert!(diagnostics.is_empty(), "{diagnostics:?}");
+        ast
+    })
+}
+
+/// Lowers a file. The messages tell which items failed; the module holds the others.
+pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
+    let mut lowering = Lowering::new(options.max_nodes);
+    for item in &prelude().items {
+        lowering.item(item, options);
+    }
+    lowering.scope.source = SourceId::File;
+    for item in &ast.items {
+        lowering.item(item, options);
+    }
+    lowering.unused();
+    lowering.unknown_overrides(ast, options);
+    (lowering.module, lowering.diagnostics)
+}
+
+impl<'a> Lowering<'a> {
+    fn item(&mut self, item: &'a Item, options: &Options) {
+        match item {
+            Item::Param(param) => self.param(param, options),
+            Item::Let(definition) => self.definition(definition),
+            Item::Function(function) => {
+                if self.may_define(&function.name) {
+                    self.names.define(self.scope.source, &function.name, Kind::Function(function));
+                }
+            }
+            Item::Solid(definition) => self.solid(definition),
+            Item::Scene(scene) => {
+                if let Some(scene) = self.scene(scene) {
+                    self.module.scenes.push(scene);
+                }
+            }
+        }
+    }
+
+    fn param(&mut self, param: &'a Param, options: &Options) {
+        if !self.may_define(&param.name) {
+            return;
+        }
+        let value = self.constant_expr(&param.value, "the value of a param");
+        let range = param.range.as_ref().map(|(low, high)| {
+            (
+                self.constant_expr(low, "the range of a param"),
+                self.constant_expr(high, "the range of a param"),
+            )
+        });
+        let range = match range {
+            Some((Some(low), Some(high))) => Some((low, high)),
+            _ => None,
+        };
+        let overridden = options.overrides.get(&param.name.text).copied();
+        let Some(value) = overridden.or(value) else {
+            self.names.define(self.scope.source, &param.name, Kind::Value(Value::Failed));
+            return;
+        };
+        if let Some((low, high)) = range
+            && !(low <= value && value <= high)
+        {
+            let from = if overridden.is_some() { "-D sets" } else { "the value of" };
+            let message =
+                format!("{from} `{}` to {value}, outside its range {low} .. {high}", param.name.text);
+            let message = if overridden.is_some() {
+                message
+            } else {
+                format!("`{}` = {value} lies outside its range {low} .. {high}", param.name.text)
+            };
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, param.name.span, message).at("declared here"));
+        }
+        if overridden.is_some_and(|v| !v.is_finite()) {
+            let message = format!("-D sets `{}` to {value}, which is not a finite number", param.name.text);
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, param.name.span, message));
+        }
+        let node = self.module.graph.constant(value);
+        self.names.define(self.scope.source, &param.name, Kind::Value(Value::Number(node)));
+        self.module.params.push(ParamValue {
+            name: param.name.text.clone(),
+            value,
+            range,
+            doc: param.doc.clone(),
+            span: param.name.span,
+        });
+    }
+
+    fn definition(&mut self, definition: &'a Definition) {
+        let value = self.expr(&definition.value);
+        if self.may_define(&definition.name) {
+            self.names.define(self.scope.source, &definition.name, Kind::Value(value));
+        }
+    }
+
+    fn solid(&mut self, definition: &'a Definition) {
+        let node = self.field(&definition.value);
+        if !self.may_define(&definition.name) {
+            return;
+        }
+        let value = node.map_or(Value::Failed, Value::Number);
+        self.names.define(self.scope.source, &definition.name, Kind::Solid(value));
+        if let Some(node) = node {
+            let name = definition.name.text.clone();
+            self.module.solids.push(NamedSolid { name, node, span: definition.name.span });
+        }
+    }
+
+    /// Reports a name that is taken or reserved.
+    fn may_define(&mut self, name: &crate::syntax::ast::Name) -> bool {
+        if RESERVED.contains(&name.text.as_str()) {
+            let message = format!("`{}` has a fixed meaning and cannot be defined", name.text);
+            self.report(
+                Diagnostic::error(Code::RESERVED_NAME, name.span, message).help("choose another name"),
+            );
+            return false;
+        }
+        if let Some(first) = self.names.defined_at(self.scope.source, &name.text) {
+            let message = format!("`{}` is defined twice", name.text);
+            self.report(
+                Diagnostic::error(Code::DUPLICATE_NAME, name.span, message)
+                    .at("defined again")
+                    .label(first, "first defined here"),
+            );
+            return false;
+        }
+        true
+    }
+
+    fn unused(&mut self) {
+        let unused = self.names.unused();
+        for (name, kind, span) in unused {
+            self.report(
+                Diagnostic::warning(Code::UNUSED, span, format!("{kind} `{name}` is never used"))
+                    .help(format!("remove it, or write `_{name}`")),
+            );
+        }
+    }
+
+    fn unknown_overrides(&mut self, ast: &Ast, options: &Options) {
+        let declared: Vec<&str> = ast
+            .items
+            .iter()
+            .filter_map(|item| match item {
+                Item::Param(param) => Some(param.name.text.as_str()),
+                _ => None,
+            })
+            .collect();
+        for name in options.overrides.keys().filter(|name| !declared.contains(&name.as_str())) {
+            let span = Span::new(SourceId::File, 0, 0);
+            let message = format!("-D sets `{name}`, but the file declares no such param");
+            let mut diagnostic = Diagnostic::error(Code::UNKNOWN_PARAM, span, message);
+            diagnostic = match crate::diagnostic::nearest(name, declared.iter().copied()) {
+                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                None if declared.is_empty() => diagnostic.help("the file declares no params"),
+                None => diagnostic.help(format!("declared params: {}", declared.join(", "))),
+            };
+            self.report(diagnostic);
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Names: what is defined, where, and whether it is used.
+
+use std::collections::HashMap;
+
+use super::value::Value;
+use crate::diagnostic::{SourceId, Span};
+use crate::syntax::ast::{Function, Name};
+
+/// Names with a meaning that no item can change.
+pub(super) const RESERVED: [&str; 4] = ["x", "y", "z", "pi"];
+
+#[derive(Debug, Clone)]
+pub(super) enum Kind<'a> {
+    Value(Value),
+    Solid(Value),
+    Function(&'a Function),
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Global<'a> {
+    pub kind: Kind<'a>,
+    pub span: Span,
+    pub source: SourceId,
+    used: bool,
+}
+
+/// The items of the prelude and of the file; the file's shadow the prelude's, but not inside the prelude itself.
+#[derive(Debug, Default)]
+pub(super) struct Names<'a> {
+    prelude: HashMap<String, Global<'a>>,
+    file: HashMap<String, Global<'a>>,
+}
+
+impl<'a> Names<'a> {
+    pub fn define(&mut self, source: SourceId, name: &Name, kind: Kind<'a>) {
+        let global = Global { kind, span: name.span, source, used: false };
+        self.table(source).insert(name.text.clone(), global);
+    }
+
+    fn table(&mut self, source: SourceId) -> &mut HashMap<String, Global<'a>> {
+        match source {
+            SourceId::Prelude => &mut self.prelude,
+            SourceId::File => &mut self.file,
+        }
+    }
+
+    pub fn defined_at(&self, source: SourceId, name: &str) -> Option<Span> {
+        match source {
+            SourceId::Prelude => self.prelude.get(name),
+            SourceId::File => self.file.get(name),
+        }
+        .map(|global| global.span)
+    }
+
+    /// What a name means in code of a source; counts as a use.
+    pub fn get(&mut self, source: SourceId, name: &str) -> Option<&Global<'a>> {
+        if source == SourceId::File
+            && let Some(global) = self.file.get_mut(name)
+        {
+            global.used = true;
+            return Some(global);
+        }
+        self.prelude.get(name)
+    }
+
+    /// Names that can be written in the file, functions or values.
+    pub fn candidates(&self, functions: bool) -> Vec<String> {
+        let fits = |g: &Global<'_>| matches!(g.kind, Kind::Function(_)) == functions;
+        let all = self.file.iter().chain(&self.prelude);
+        let mut names: Vec<String> = all.filter(|(_, g)| fits(g)).map(|(name, _)| name.clone()).collect();
+        names.sort_unstable();
+        names
+    }
+
+    /// Items of the file that nothing uses; solids are what a file is for, so they are never unused.
+    pub fn unused(&self) -> Vec<(String, &'static str, Span)> {
+        let mut unused: Vec<_> = self
+            .file
+            .iter()
+            .filter(|(name, global)| !global.used && !name.starts_with('_'))
+            .filter_map(|(name, global)| match global.kind {
+                Kind::Value(_) => Some((name.clone(), "the name", global.span)),
+                Kind::Function(_) => Some((name.clone(), "the function", global.span)),
+                Kind::Solid(_) => None,
+            })
+            .collect();
+        unused.sort_by_key(|(_, _, span)| span.start);
+        unused
+    }
+}

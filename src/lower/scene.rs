@@ -1,0 +1,466 @@
+//! Scenes: keys with units and defaults → plain data for the solver.
+//!
+//! Invariant: after this stage every number is finite and in SI units, and every size is positive.
+
+use glam::DVec3;
+
+use super::eval::Lowering;
+use super::value::Value;
+use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::geom::Aabb;
+use crate::ir::Node;
+use crate::syntax::ast::{self, Entry, Expr, ExprKind, Name};
+use crate::syntax::{Dimension, parse_unit};
+
+/// What a simulation needs, as a file states it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    pub name: String,
+    pub span: Span,
+    /// The container.
+    pub domain: Aabb,
+    pub domain_span: Span,
+    /// Part of the normal speed that a wall of the box gives back, 0 … 1.
+    pub wall_restitution: f64,
+    pub fluid: Fluid,
+    pub obstacles: Vec<Obstacle>,
+    /// m/s²
+    pub gravity: DVec3,
+    pub method: Method,
+    pub run: Run,
+}
+
+/// The defaults are table 1 of the paper.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fluid {
+    pub name: String,
+    /// Positive where particles are put at the start.
+    pub shape: Node,
+    pub shape_span: Span,
+    /// As many as fit if it is not given.
+    pub particles: Option<usize>,
+    pub particles_span: Option<Span>,
+    /// Rest density ρ₀, kg/m³.
+    pub density: f64,
+    /// Of one particle, kg.
+    pub mass: f64,
+    /// Dynamic viscosity, Pa·s.
+    pub viscosity: f64,
+    /// N/m
+    pub surface_tension: f64,
+    /// |∇c| above which a particle belongs to the surface, the paper's l.
+    pub threshold: f64,
+    /// Gas stiffness k of p = k(ρ − ρ₀), J.
+    pub stiffness: f64,
+    /// h, m
+    pub support_radius: f64,
+    /// At the start, m/s.
+    pub velocity: DVec3,
+    /// Random displacement of the start positions, as a part of the particle spacing.
+    pub jitter: f64,
+    pub seed: u64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// The name of the solid, or `obstacle` for a shape written on the spot.
+    pub name: String,
+    pub shape: Node,
+    pub span: Span,
+    /// Coefficient of restitution c_R, 0 … 1.
+    pub restitution: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Equations (8)–(14) of the paper, corrected.
+    Paper,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Run {
+    /// Fixed time step, s; derived from the fluid if it is not given.
+    pub dt: Option<f64>,
+    /// End of the simulated time, s.
+    pub until: f64,
+    /// Time between saved frames, s.
+    pub save_every: f64,
+}
+
+const SCENE_KEYS: [&str; 7] = ["units", "box", "fluid", "obstacle", "gravity", "method", "run"];
+const BOX_KEYS: [&str; 3] = ["min", "max", "restitution"];
+const FLUID_KEYS: [&str; 12] = [
+    "shape",
+    "particles",
+    "density",
+    "mass",
+    "viscosity",
+    "surface_tension",
+    "threshold",
+    "stiffness",
+    "support_radius",
+    "velocity",
+    "jitter",
+    "seed",
+];
+const OBSTACLE_KEYS: [&str; 2] = ["solid", "restitution"];
+const RUN_KEYS: [&str; 3] = ["dt", "until", "save_every"];
+
+/// The entries of a block whose keys are known, each at most once unless it may be repeated.
+struct Block<'a> {
+    entries: &'a [Entry],
+    what: &'static str,
+    span: Span,
+}
+
+/// What a number may be.
+#[derive(Clone, Copy)]
+enum Bound {
+    Positive,
+    NotNegative,
+    Fraction,
+}
+
+impl<'a> Lowering<'a> {
+    pub fn scene(&mut self, scene: &'a ast::Scene) -> Option<Scene> {
+        let errors_before = self.errors();
+        let block =
+            self.block(&scene.entries, "a scene", scene.name.span, &SCENE_KEYS, &["obstacle", "fluid"]);
+        self.units(&block);
+        let domain = self.domain(&block);
+        let fluid = self.fluid(&block);
+        let obstacles: Vec<Obstacle> =
+            block.blocks("obstacle").filter_map(|(_, entries, span)| self.obstacle(entries, span)).collect();
+        let gravity =
+            self.vector_key(&block, "gravity", Dimension::ACCELERATION, DVec3::new(0.0, 0.0, -9.81));
+        let method = self.scene_method(&block);
+        let run = self.run(&block);
+        if self.errors() > errors_before {
+            return None;
+        }
+        let (domain, wall_restitution, domain_span) = domain?;
+        Some(Scene {
+            name: scene.name.text.clone(),
+            span: scene.name.span,
+            domain,
+            domain_span,
+            wall_restitution,
+            fluid: fluid?,
+            obstacles,
+            gravity: gravity?,
+            method: method?,
+            run: run?,
+        })
+    }
+
+    fn errors(&self) -> usize {
+        self.diagnostics.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error).count()
+    }
+
+    fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
+        let message = format!("{} needs `{key}`", block.what);
+        self.report(Diagnostic::error(Code::SCENE_MISSING, block.span, message).help(help));
+    }
+
+    /// Reports unknown keys, and known ones that stand twice.
+    fn block<'b>(
+        &mut self,
+        entries: &'b [Entry],
+        what: &'static str,
+        span: Span,
+        known: &[&'static str],
+        repeatable: &[&str],
+    ) -> Block<'b> {
+        for (i, entry) in entries.iter().enumerate() {
+            let key = entry.key();
+            if !known.contains(&key.text.as_str()) {
+                let message = format!("{what} has no key `{}`", key.text);
+                let diagnostic = Diagnostic::error(Code::SCENE_KEY, key.span, message)
+                    .help(format!("its keys are {}", known.join(", ")))
+                    .suggest(&key.text, known.iter().copied());
+                self.report(diagnostic);
+            } else if let Some(first) = entries[..i].iter().find(|e| e.key().text == key.text)
+                && !repeatable.contains(&key.text.as_str())
+            {
+                let message = format!("`{}` stands twice", key.text);
+                self.report(
+                    Diagnostic::error(Code::SCENE_REPEATED, key.span, message)
+                        .label(first.key().span, "first stated here"),
+                );
+            }
+        }
+        Block { entries, what, span }
+    }
+
+    fn units(&mut self, block: &Block<'_>) {
+        if let Some((_, value)) = block.setting("units")
+            && value.kind != ExprKind::Text("SI".into())
+        {
+            let message = "the only system of units is \"SI\"";
+            self.report(
+                Diagnostic::error(Code::UNIT_MISMATCH, value.span, message)
+                    .help("write other units at the numbers themselves: `20 mm`"),
+            );
+        }
+    }
+
+    fn domain(&mut self, block: &Block<'_>) -> Option<(Aabb, f64, Span)> {
+        let Some((_, entries, span)) = block.blocks("box").next() else {
+            self.missing(block, "box", "write `box { min: [0, 0, 0], max: [3, 3, 3] }`");
+            return None;
+        };
+        let block = self.block(entries, "a box", span, &BOX_KEYS, &[]);
+        let min = self.vector_key(&block, "min", Dimension::LENGTH, DVec3::ZERO);
+        if block.setting("max").is_none() {
+            self.missing(&block, "max", "write `max: [3, 3, 3]`");
+        }
+        let max = self.vector_key(&block, "max", Dimension::LENGTH, DVec3::ONE);
+        let restitution = self.number_key(&block, "restitution", Dimension::NONE, Some(0.5), Bound::Fraction);
+        let (min, max) = (min?, max?);
+        if !max.cmpgt(min).all() {
+            let message = format!("the box has no room: its size is {}", max - min);
+            self.report(
+                Diagnostic::error(Code::OUT_OF_RANGE, span, message)
+                    .help("max must exceed min along x, y and z"),
+            );
+            return None;
+        }
+        Some((Aabb::new(min, max), restitution?, span))
+    }
+
+    fn fluid(&mut self, block: &Block<'_>) -> Option<Fluid> {
+        let mut fluids = block.blocks("fluid");
+        let Some((label, entries, span)) = fluids.next() else {
+            self.missing(
+                block,
+                "fluid",
+                "write `fluid water { shape: ball([1.5, 1.5, 2], 0.4), particles: 10000 }`",
+            );
+            return None;
+        };
+        if let Some((_, _, second)) = fluids.next() {
+            let message = "a second fluid: this version simulates one fluid";
+            self.report(
+                Diagnostic::error(Code::SCENE_REPEATED, second, message).label(span, "the first fluid"),
+            );
+        }
+        let block = self.block(entries, "a fluid", span, &FLUID_KEYS, &[]);
+        let shape = match block.setting("shape") {
+            Some((_, value)) => self.field(value).map(|node| (node, value.span)),
+            None => {
+                self.missing(&block, "shape", "write `shape: ball([1.5, 1.5, 2], 0.4)` or any other solid");
+                None
+            }
+        };
+        let mut number =
+            |key, dimension, default, bound| self.number_key(&block, key, dimension, Some(default), bound);
+        use Bound::{Fraction, NotNegative, Positive};
+        let density = number("density", Dimension::DENSITY, 998.29, Positive);
+        let mass = number("mass", Dimension::MASS, 0.02, Positive);
+        let viscosity = number("viscosity", Dimension::VISCOSITY, 3.5, NotNegative);
+        let surface_tension = number("surface_tension", Dimension::TENSION, 0.0728, NotNegative);
+        let threshold = number("threshold", Dimension::NONE, 7.065, NotNegative);
+        let stiffness = number("stiffness", Dimension::ENERGY, 3.0, Positive);
+        let support_radius = number("support_radius", Dimension::LENGTH, 0.1, Positive);
+        let jitter = number("jitter", Dimension::NONE, 0.0, Fraction);
+        let velocity = self.vector_key(&block, "velocity", Dimension::SPEED, DVec3::ZERO);
+        let particles = self.count_key(&block, "particles", 1);
+        let seed = self.count_key(&block, "seed", 0);
+        let particles_span = block.setting("particles").map(|(_, value)| value.span);
+        let (shape, shape_span) = shape?;
+        Some(Fluid {
+            name: label.map_or_else(|| "fluid".into(), |label| label.text.clone()),
+            shape,
+            shape_span,
+            particles: particles?,
+            particles_span,
+            density: density?,
+            mass: mass?,
+            viscosity: viscosity?,
+            surface_tension: surface_tension?,
+            threshold: threshold?,
+            stiffness: stiffness?,
+            support_radius: support_radius?,
+            velocity: velocity?,
+            jitter: jitter?,
+            seed: seed?.unwrap_or(1) as u64,
+        })
+    }
+
+    fn obstacle(&mut self, entries: &'a [Entry], span: Span) -> Option<Obstacle> {
+        let block = self.block(entries, "an obstacle", span, &OBSTACLE_KEYS, &[]);
+        let restitution = self.number_key(&block, "restitution", Dimension::NONE, Some(0.5), Bound::Fraction);
+        let Some((_, value)) = block.setting("solid") else {
+            self.missing(&block, "solid", "write `solid: pawn` with the name of a solid");
+            return None;
+        };
+        let shape = self.field(value)?;
+        let name = match &value.kind {
+            ExprKind::Name(name) => name.clone(),
+            _ => "obstacle".into(),
+        };
+        Some(Obstacle { name, shape, span: value.span, restitution: restitution? })
+    }
+
+    fn scene_method(&mut self, block: &Block<'_>) -> Option<Method> {
+        let Some((_, value)) = block.setting("method") else { return Some(Method::Paper) };
+        let word = match &value.kind {
+            ExprKind::Name(word) | ExprKind::Text(word) => word.as_str(),
+            _ => "",
+        };
+        if word == "paper" {
+            return Some(Method::Paper);
+        }
+        let diagnostic = Diagnostic::error(Code::SCENE_KEY, value.span, "unknown method")
+            .help("this version knows the method `paper`");
+        self.report(diagnostic);
+        None
+    }
+
+    fn run(&mut self, block: &Block<'_>) -> Option<Run> {
+        let defaults = Run { dt: None, until: 5.0, save_every: 0.05 };
+        let Some((_, entries, span)) = block.blocks("run").next() else { return Some(defaults) };
+        let block = self.block(entries, "a run", span, &RUN_KEYS, &[]);
+        let dt = match block.setting("dt") {
+            Some(_) => Some(self.number_key(&block, "dt", Dimension::TIME, None, Bound::Positive)?),
+            None => None,
+        };
+        let until = self.number_key(&block, "until", Dimension::TIME, Some(defaults.until), Bound::Positive);
+        let save = self.number_key(
+            &block,
+            "save_every",
+            Dimension::TIME,
+            Some(defaults.save_every),
+            Bound::Positive,
+        );
+        Some(Run { dt, until: until?, save_every: save? })
+    }
+
+    /// The value of a key, checked; `None` was reported. A key without a default must be present.
+    fn number_key(
+        &mut self,
+        block: &Block<'_>,
+        key: &str,
+        dimension: Dimension,
+        default: Option<f64>,
+        bound: Bound,
+    ) -> Option<f64> {
+        let Some((_, value)) = block.setting(key) else { return default };
+        let number = self.quantity_expr(value, dimension, key)?;
+        let (fits, expected) = match bound {
+            Bound::Positive => (number > 0.0, "must be positive"),
+            Bound::NotNegative => (number >= 0.0, "must not be negative"),
+            Bound::Fraction => ((0.0..=1.0).contains(&number), "must lie between 0 and 1"),
+        };
+        if fits && number.is_finite() {
+            return Some(number);
+        }
+        let message = format!("`{key}` {expected}, found {number}");
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
+        None
+    }
+
+    fn vector_key(
+        &mut self,
+        block: &Block<'_>,
+        key: &str,
+        dimension: Dimension,
+        default: DVec3,
+    ) -> Option<DVec3> {
+        let Some((_, value)) = block.setting(key) else { return Some(default) };
+        let vector = if let ExprKind::Vector(parts) = &value.kind
+            && let [a, b, c] = &parts[..]
+        {
+            let parts = [a, b, c].map(|part| self.quantity_expr(part, dimension, key));
+            DVec3::new(parts[0]?, parts[1]?, parts[2]?)
+        } else {
+            let found = self.expr(value);
+            DVec3::from_array(self.constant_vector(&found, value.span, &format!("`{key}`"))?)
+        };
+        if vector.is_finite() {
+            return Some(vector);
+        }
+        let message = format!("`{key}` must be finite, found {vector}");
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
+        None
+    }
+
+    /// A whole number of at least `least`; the outer option is an error, the inner one an absent key.
+    fn count_key(&mut self, block: &Block<'_>, key: &str, least: u32) -> Option<Option<usize>> {
+        const MOST: f64 = 1e9;
+        let Some((_, value)) = block.setting(key) else { return Some(None) };
+        let number = self.quantity_expr(value, Dimension::NONE, key)?;
+        if number.fract() == 0.0 && number >= f64::from(least) && number <= MOST {
+            return Some(Some(number as usize));
+        }
+        let message = format!("`{key}` must be a whole number from {least} to {MOST}, found {number}");
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
+        None
+    }
+
+    /// A constant in SI units; a unit, where one is written, must fit.
+    fn quantity_expr(&mut self, expr: &Expr, expected: Dimension, key: &str) -> Option<f64> {
+        match &expr.kind {
+            ExprKind::Quantity { value, unit } => {
+                let parsed = parse_unit(&unit.text)?; // the grammar admits known units only
+                if parsed.dimension != expected {
+                    let message = format!("`{}` is not a unit of `{key}`", unit.text);
+                    let help = if expected == Dimension::NONE {
+                        format!("`{key}` has no unit")
+                    } else {
+                        format!("write for example `1 {}`", example_unit(expected))
+                    };
+                    self.report(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
+                    return None;
+                }
+                Some(value * parsed.factor)
+            }
+            ExprKind::Negate(inner) => self.quantity_expr(inner, expected, key).map(|v| -v),
+            _ => {
+                let value = self.expr(expr);
+                if let Value::Text(_) | Value::Vector(_) = value {
+                    self.as_number(&value, expr.span);
+                    return None;
+                }
+                let node = self.as_number(&value, expr.span)?;
+                self.as_constant(node, expr.span, &format!("`{key}`"))
+            }
+        }
+    }
+}
+
+fn example_unit(dimension: Dimension) -> &'static str {
+    match dimension {
+        Dimension::LENGTH => "m",
+        Dimension::MASS => "kg",
+        Dimension::TIME => "s",
+        Dimension::SPEED => "m/s",
+        Dimension::ACCELERATION => "m/s^2",
+        Dimension::DENSITY => "kg/m^3",
+        Dimension::VISCOSITY => "Pa·s",
+        Dimension::TENSION => "N/m",
+        Dimension::ENERGY => "J",
+        _ => "deg",
+    }
+}
+
+impl<'a> Block<'a> {
+    fn setting(&self, key: &str) -> Option<(&'a Name, &'a Expr)> {
+        self.entries.iter().find_map(|entry| match entry {
+            Entry::Setting { key: name, value } if name.text == key => Some((name, value)),
+            _ => None,
+        })
+    }
+
+    fn blocks(
+        &self,
+        key: &'static str,
+    ) -> impl Iterator<Item = (Option<&'a Name>, &'a [Entry], Span)> + use<'a> {
+        self.entries.iter().filter_map(move |entry| match entry {
+            Entry::Block { key: name, label, entries, .. } if name.text == key => {
+                Some((label.as_ref(), &entries[..], name.span))
+            }
+            _ => None,
+        })
+    }
+}

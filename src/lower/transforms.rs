@@ -1,0 +1,198 @@
+//! Methods of shapes: the shape is evaluated in moved, turned or scaled coordinates.
+//!
+//! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point before
+//! the transformation.
+
+use super::eval::Lowering;
+use super::value::Value;
+use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::ir::{Axis, Binary, Node};
+use crate::syntax::ast::{Argument, Expr, Name};
+
+const METHODS: [&str; 7] = ["move", "rotate_x", "rotate_y", "rotate_z", "rotate", "scale", "mirror"];
+
+/// Parameter names of a method, in order.
+fn parameters(method: &str) -> &'static [&'static str] {
+    match method {
+        "move" => &["by"],
+        "rotate" => &["axis", "angle"],
+        "scale" => &["factor"],
+        "mirror" => &["normal"],
+        _ => &["angle"],
+    }
+}
+
+impl Lowering<'_> {
+    pub fn method(&mut self, receiver: &Expr, method: &Name, arguments: &[Argument], span: Span) -> Value {
+        let shape = self.field(receiver);
+        if !METHODS.contains(&method.text.as_str()) {
+            let message = format!("shapes have no method `{}`", method.text);
+            let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message)
+                .help(format!("they have {}", METHODS.join(", ")))
+                .suggest(&method.text, METHODS);
+            return self.fail(diagnostic);
+        }
+        let parameters = parameters(&method.text);
+        let mut values: Vec<Option<(Value, Span)>> = vec![None; parameters.len()];
+        for (position, argument) in arguments.iter().enumerate() {
+            let slot = match &argument.name {
+                None => (position < parameters.len()).then_some(position),
+                Some(name) => parameters.iter().position(|p| *p == name.text),
+            };
+            let Some(slot) = slot else {
+                return self.fail(self.wrong_arguments(method, parameters, span));
+            };
+            values[slot] = Some((self.expr(&argument.value), argument.value.span));
+        }
+        let Some(values) = values.into_iter().collect::<Option<Vec<_>>>() else {
+            return self.fail(self.wrong_arguments(method, parameters, span));
+        };
+        let Some(shape) = shape else { return Value::Failed };
+        self.transform(shape, &method.text, &values, span).map_or(Value::Failed, Value::Number)
+    }
+
+    fn wrong_arguments(&self, method: &Name, parameters: &[&str], span: Span) -> Diagnostic {
+        let message = format!("`.{}` takes ({})", method.text, parameters.join(", "));
+        Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message)
+    }
+
+    fn transform(&mut self, shape: Node, method: &str, values: &[(Value, Span)], span: Span) -> Option<Node> {
+        let p = [Axis::X, Axis::Y, Axis::Z].map(|axis| self.module.graph.coordinate(axis));
+        let (first, at) = &values[0];
+        match method {
+            "move" => {
+                let by = self.as_vector(first, *at)?;
+                let q = std::array::from_fn(|i| self.binary(Binary::Sub, p[i], by[i], span));
+                Some(self.module.graph.substitute(shape, q))
+            }
+            "rotate_x" | "rotate_y" | "rotate_z" => {
+                let angle = self.as_number(first, *at)?;
+                let angle = self.as_constant(angle, *at, "an angle")?;
+                let axis = usize::from(method.as_bytes()[7] - b'x');
+                let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+                let (sin, cos) = sin_cos(angle);
+                let mut q = p;
+                q[j] = self.combination(&[(cos, p[j]), (sin, p[k])], span);
+                q[k] = self.combination(&[(-sin, p[j]), (cos, p[k])], span);
+                Some(self.module.graph.substitute(shape, q))
+            }
+            "rotate" => {
+                let axis = self.constant_vector(first, *at, "an axis")?;
+                let angle = self.as_number(&values[1].0, values[1].1)?;
+                let angle = self.as_constant(angle, values[1].1, "an angle")?;
+                let axis = self.unit_vector(axis, *at)?;
+                let q = self.rotated_back(p, axis, angle, span);
+                Some(self.module.graph.substitute(shape, q))
+            }
+            "scale" => self.scale(shape, p, first, *at, span),
+            _ => {
+                let normal = self.constant_vector(first, *at, "a normal")?;
+                let n = self.unit_vector(normal, *at)?;
+                // p − 2(p·n)n
+                let q = std::array::from_fn(|i| {
+                    let row: [(f64, Node); 3] =
+                        std::array::from_fn(|j| (f64::from(u8::from(i == j)) - 2.0 * n[i] * n[j], p[j]));
+                    self.combination(&row, span)
+                });
+                Some(self.module.graph.substitute(shape, q))
+            }
+        }
+    }
+
+    /// Scales about the origin. ω is scaled too (by the smallest factor), so that its gradient keeps its length
+    /// on the surface.
+    fn scale(&mut self, shape: Node, p: [Node; 3], factor: &Value, at: Span, span: Span) -> Option<Node> {
+        let factors = match factor {
+            Value::Vector(_) => self.constant_vector(factor, at, "a scale factor")?,
+            other => {
+                let node = self.as_number(other, at)?;
+                [self.as_constant(node, at, "a scale factor")?; 3]
+            }
+        };
+        if let Some(bad) = factors.iter().find(|f| !(f.is_finite() && **f > 0.0)) {
+            let message = format!("a scale factor must be positive, found {bad}");
+            let at = self.user_span(at);
+            self.report(
+                Diagnostic::error(Code::OUT_OF_RANGE, at, message)
+                    .help("`.mirror(normal)` turns a shape over"),
+            );
+            return None;
+        }
+        let q = std::array::from_fn(|i| {
+            let factor = self.constant(factors[i]);
+            self.binary(Binary::Div, p[i], factor, span)
+        });
+        let scaled = self.module.graph.substitute(shape, q);
+        let smallest = factors.into_iter().fold(f64::INFINITY, f64::min);
+        let smallest = self.constant(smallest);
+        Some(self.binary(Binary::Mul, smallest, scaled, span))
+    }
+
+    /// The point turned by −angle about a unit axis (Rodrigues' formula, as a matrix).
+    fn rotated_back(&mut self, p: [Node; 3], n: [f64; 3], angle: f64, span: Span) -> [Node; 3] {
+        let (sin, cos) = sin_cos(-angle);
+        std::array::from_fn(|i| {
+            let row: [(f64, Node); 3] = std::array::from_fn(|j| {
+                let cross = match (3 + j - i) % 3 {
+                    0 => 0.0,
+                    1 => -n[(i + 2) % 3],
+                    _ => n[(i + 1) % 3],
+                };
+                let identity = f64::from(u8::from(i == j));
+                (cos * identity + (1.0 - cos) * n[i] * n[j] + sin * cross, p[j])
+            });
+            self.combination(&row, span)
+        })
+    }
+
+    /// Σ factor · node; terms with factor 0 left out, factors ±1 without a product.
+    fn combination(&mut self, terms: &[(f64, Node)], span: Span) -> Node {
+        let mut sum: Option<Node> = None;
+        for &(factor, node) in terms.iter().filter(|(factor, _)| *factor != 0.0) {
+            let magnitude = self.constant(factor.abs());
+            let term =
+                if factor.abs() == 1.0 { node } else { self.binary(Binary::Mul, magnitude, node, span) };
+            sum = Some(match sum {
+                None if factor < 0.0 => self.unary(crate::ir::Unary::Neg, term, span),
+                None => term,
+                Some(sum) if factor < 0.0 => self.binary(Binary::Sub, sum, term, span),
+                Some(sum) => self.binary(Binary::Add, sum, term, span),
+            });
+        }
+        sum.unwrap_or_else(|| self.constant(0.0))
+    }
+
+    pub fn constant_vector(&mut self, value: &Value, at: Span, what: &str) -> Option<[f64; 3]> {
+        let nodes = self.as_vector(value, at)?;
+        let parts = nodes.map(|node| self.as_constant(node, at, what));
+        match parts {
+            [Some(a), Some(b), Some(c)] => Some([a, b, c]),
+            _ => None,
+        }
+    }
+
+    fn unit_vector(&mut self, v: [f64; 3], at: Span) -> Option<[f64; 3]> {
+        let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if length > 0.0 && length.is_finite() {
+            return Some(v.map(|c| c / length));
+        }
+        let at = self.user_span(at);
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, "a direction must not have length zero"));
+        None
+    }
+}
+
+/// Sine and cosine, exact at whole multiples of a quarter turn.
+fn sin_cos(angle: f64) -> (f64, f64) {
+    let quarters = angle / std::f64::consts::FRAC_PI_2;
+    let nearest = quarters.round();
+    if (quarters - nearest).abs() <= 4.0 * f64::EPSILON * nearest.abs().max(1.0) {
+        return match nearest.rem_euclid(4.0) as u8 {
+            0 => (0.0, 1.0),
+            1 => (1.0, 0.0),
+            2 => (0.0, -1.0),
+            _ => (-1.0, 0.0),
+        };
+    }
+    (libm::sin(angle), libm::cos(angle))
+}

@@ -1,0 +1,149 @@
+//! Calls into generated code: the only place that turns an address into a function.
+//!
+//! Everything unsafe about a call is checked here first: the number of outputs, the lengths of the columns.
+
+use crate::codegen::{self, Code, CodegenError, Precision, Request, Shape};
+use crate::ir::{Graph, Interpreter, Node, Real};
+
+use super::programs::{Compiled, Programs};
+
+/// A type that programs exist for: `f32` or `f64`.
+pub trait Lane: Real + Default {
+    const PRECISION: Precision;
+
+    #[doc(hidden)]
+    fn compiled(programs: &Programs) -> &Compiled<Self>;
+
+    #[doc(hidden)]
+    fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]);
+}
+
+impl Lane for f32 {
+    const PRECISION: Precision = Precision::F32;
+
+    fn compiled(programs: &Programs) -> &Compiled<Self> {
+        &programs.single
+    }
+
+    fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]) {
+        interpreter.eval_f32(point, out);
+    }
+}
+
+impl Lane for f64 {
+    const PRECISION: Precision = Precision::F64;
+
+    fn compiled(programs: &Programs) -> &Compiled<Self> {
+        &programs.double
+    }
+
+    fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]) {
+        interpreter.eval_f64(point, out);
+    }
+}
+
+/// The largest number of outputs of a program: ω and three partial derivatives.
+pub const MAX_OUTPUTS: usize = 4;
+
+/// Points in one vector, at most.
+const MAX_LANES: usize = 4;
+
+/// A compiled program for one point.
+#[derive(Debug)]
+pub struct PointProgram<T> {
+    code: Code,
+    lane: std::marker::PhantomData<T>,
+}
+
+impl<T: Lane> PointProgram<T> {
+    /// # Errors
+    /// As for [`codegen::compile`].
+    pub fn compile(graph: &Graph, outputs: &[Node]) -> Result<Self, CodegenError> {
+        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point };
+        Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
+    }
+
+    /// All outputs at a point, in the order in which they were asked for.
+    ///
+    /// # Panics
+    /// If `out` is not as long as the program's outputs.
+    pub fn call(&self, [x, y, z]: [T; 3], out: &mut [T]) {
+        assert_eq!(out.len(), self.code.outputs, "outputs of the program");
+        type Entry<T> = unsafe extern "C" fn(T, T, T, *mut T);
+        // SAFETY: `compile` asked for a point program of this precision, whose entry has this signature, and
+        // `self.code` keeps it mapped while it runs.
+        let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
+        // SAFETY: the program writes `outputs` numbers to `out`, and its length was checked above.
+        unsafe { entry(x, y, z, out.as_mut_ptr()) }
+    }
+
+    pub fn size(&self) -> usize {
+        self.code.size
+    }
+}
+
+/// A compiled program for many points.
+#[derive(Debug)]
+pub struct BatchProgram<T> {
+    code: Code,
+    lane: std::marker::PhantomData<T>,
+}
+
+impl<T: Lane> BatchProgram<T> {
+    /// # Errors
+    /// As for [`codegen::compile`].
+    pub fn compile(graph: &Graph, outputs: &[Node]) -> Result<Self, CodegenError> {
+        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch };
+        Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
+    }
+
+    /// All outputs at many points: whole blocks straight from and to the caller's columns, the rest through one
+    /// padded block on the stack.
+    ///
+    /// # Panics
+    /// If the columns differ in length or there are not as many output columns as outputs.
+    pub fn call<const N: usize>(&self, points: [&[T]; 3], mut out: [&mut [T]; N]) {
+        let count = points[0].len();
+        assert_eq!(N, self.code.outputs, "outputs of the program");
+        assert!(
+            points.iter().all(|c| c.len() == count) && out.iter().all(|c| c.len() == count),
+            "column lengths"
+        );
+        let lanes = T::PRECISION.lanes();
+        let whole = count / lanes * lanes;
+        if whole > 0 {
+            self.blocks(points.map(<[T]>::as_ptr), out.each_mut().map(|c| c.as_mut_ptr()), whole / lanes);
+        }
+        if whole < count {
+            let mut inputs = [[T::default(); MAX_LANES]; 3];
+            let mut outputs = [[T::default(); MAX_LANES]; N];
+            for (padded, column) in inputs.iter_mut().zip(points) {
+                padded[..count - whole].copy_from_slice(&column[whole..]);
+            }
+            self.blocks(inputs.each_ref().map(|c| c.as_ptr()), outputs.each_mut().map(|c| c.as_mut_ptr()), 1);
+            for (column, padded) in out.iter_mut().zip(outputs) {
+                column[whole..].copy_from_slice(&padded[..count - whole]);
+            }
+        }
+    }
+
+    /// The columns hold at least `blocks` whole blocks: both callers above have seen to it.
+    fn blocks<const N: usize>(&self, points: [*const T; 3], out: [*mut T; N], blocks: usize) {
+        let mut columns = [std::ptr::null_mut::<T>(); 3 + MAX_OUTPUTS];
+        for (column, point) in columns.iter_mut().zip(points) {
+            *column = point.cast_mut(); // the program only reads the first three
+        }
+        columns[3..3 + N].copy_from_slice(&out);
+        type Entry<T> = unsafe extern "C" fn(*const *mut T, usize);
+        // SAFETY: `compile` asked for a batch program of this precision, whose entry has this signature, and
+        // `self.code` keeps it mapped while it runs.
+        let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
+        // SAFETY: the program reads `blocks` blocks of the first three columns and writes as many of the next N,
+        // all of them long enough; it needs no alignment; outputs are exclusive borrows, so nothing overlaps.
+        unsafe { entry(columns.as_ptr(), blocks) }
+    }
+
+    pub fn size(&self) -> usize {
+        self.code.size
+    }
+}

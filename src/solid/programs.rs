@@ -1,0 +1,112 @@
+//! The programs of one graph: made on first use, for each precision and shape, with the interpreter behind them.
+
+use std::sync::OnceLock;
+
+use super::compiled::{BatchProgram, Lane, PointProgram};
+use crate::codegen::CodegenError;
+use crate::ir::{Axis, Binary, Graph, Interpreter, Node};
+
+/// What evaluates a solid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Engine {
+    /// Machine code, or the interpreter where there can be none.
+    #[default]
+    Auto,
+    /// Machine code, or an error.
+    Jit,
+    Interpreter,
+}
+
+/// Which question a program answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ProgramKind {
+    /// ω
+    Value,
+    /// ω, ∂ω/∂x, ∂ω/∂y, ∂ω/∂z
+    Gradient,
+}
+
+type Slot<P> = OnceLock<Result<P, CodegenError>>;
+
+/// The compiled programs of one precision.
+pub struct Compiled<T> {
+    point: Slot<PointProgram<T>>,
+    batch: Slot<BatchProgram<T>>,
+}
+
+impl<T> Compiled<T> {
+    fn new() -> Self {
+        Self { point: OnceLock::new(), batch: OnceLock::new() }
+    }
+}
+
+/// A graph with its outputs and all that evaluates it.
+pub struct Programs {
+    pub graph: Graph,
+    pub outputs: Vec<Node>,
+    pub interpreter: Interpreter,
+    pub double: Compiled<f64>,
+    pub single: Compiled<f32>,
+}
+
+impl Programs {
+    /// Each output becomes NaN where a coordinate is not finite: such a point is neither inside nor outside.
+    pub fn new(mut graph: Graph, outputs: Vec<Node>) -> Self {
+        let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
+        let sum = graph.binary(Binary::Add, x, y);
+        let sum = graph.binary(Binary::Add, sum, z);
+        let guard = graph.binary(Binary::Sub, sum, sum); // 0, or NaN
+        let outputs: Vec<Node> =
+            outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect();
+        let interpreter = Interpreter::new(&graph, &outputs);
+        Self { graph, outputs, interpreter, double: Compiled::new(), single: Compiled::new() }
+    }
+
+    fn point_program<T: Lane>(&self) -> Result<&PointProgram<T>, CodegenError> {
+        let slot = &T::compiled(self).point;
+        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs)).as_ref().map_err(Clone::clone)
+    }
+
+    fn batch_program<T: Lane>(&self) -> Result<&BatchProgram<T>, CodegenError> {
+        let slot = &T::compiled(self).batch;
+        slot.get_or_init(|| BatchProgram::compile(&self.graph, &self.outputs)).as_ref().map_err(Clone::clone)
+    }
+
+    /// # Errors
+    /// If no machine code can be made here.
+    pub fn require_machine_code(&self) -> Result<(), CodegenError> {
+        self.point_program::<f64>().map(|_| ())
+    }
+
+    pub fn is_compiled(&self, engine: Engine) -> bool {
+        engine != Engine::Interpreter && self.require_machine_code().is_ok()
+    }
+
+    /// All outputs at a point.
+    pub fn point<T: Lane>(&self, engine: Engine, p: [T; 3], out: &mut [T]) {
+        if engine != Engine::Interpreter
+            && let Ok(program) = self.point_program::<T>()
+        {
+            program.call(p, out);
+        } else {
+            T::interpret(&self.interpreter, p, out);
+        }
+    }
+
+    /// All outputs at many points.
+    pub fn batch<T: Lane, const N: usize>(&self, engine: Engine, points: [&[T]; 3], mut out: [&mut [T]; N]) {
+        if engine != Engine::Interpreter
+            && let Ok(program) = self.batch_program::<T>()
+        {
+            program.call(points, out);
+            return;
+        }
+        let mut one = [T::default(); N];
+        for i in 0..points[0].len() {
+            T::interpret(&self.interpreter, points.map(|column| column[i]), &mut one);
+            for (column, value) in out.iter_mut().zip(one) {
+                column[i] = value;
+            }
+        }
+    }
+}

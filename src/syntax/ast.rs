@@ -1,0 +1,175 @@
+//! The syntax tree: what was written, with its spans, and nothing that was concluded from it.
+
+use crate::diagnostic::Span;
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Name {
+    pub text: String,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Ast {
+    pub items: Vec<Item>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Item {
+    Param(Param),
+    Let(Definition),
+    Function(Function),
+    Solid(Definition),
+    Scene(Scene),
+}
+
+/// `param name = value in low .. high "doc"`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Param {
+    pub name: Name,
+    pub value: Expr,
+    pub range: Option<(Expr, Expr)>,
+    pub doc: Option<String>,
+}
+
+/// `let name = value` or `solid name = value`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Definition {
+    pub name: Name,
+    pub value: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Function {
+    pub name: Name,
+    pub parameters: Vec<Parameter>,
+    pub body: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    pub name: Name,
+    pub default: Option<Expr>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    pub name: Name,
+    pub entries: Vec<Entry>,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    Setting { key: Name, value: Expr },
+    Block { key: Name, label: Option<Name>, entries: Vec<Entry>, span: Span },
+}
+
+impl Entry {
+    pub fn key(&self) -> &Name {
+        match self {
+            Self::Setting { key, .. } | Self::Block { key, .. } => key,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expr {
+    pub kind: ExprKind,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum ExprKind {
+    Number(f64),
+    /// A number with a unit, kept as written: `9.81 m/s^2`.
+    Quantity {
+        value: f64,
+        unit: Name,
+    },
+    Text(String),
+    Name(String),
+    Vector(Vec<Expr>),
+    /// A chain of one logic operator without parentheses; two operands or more.
+    Logic {
+        op: Logic,
+        operands: Vec<Expr>,
+    },
+    Not(Box<Expr>),
+    /// Comparisons in a row; one or more after the first operand.
+    Compare {
+        first: Box<Expr>,
+        rest: Vec<(Comparison, Span, Expr)>,
+    },
+    Sum {
+        first: Box<Expr>,
+        rest: Vec<(AddOp, Expr)>,
+    },
+    Product {
+        first: Box<Expr>,
+        rest: Vec<(MulOp, Expr)>,
+    },
+    Negate(Box<Expr>),
+    Power {
+        base: Box<Expr>,
+        exponent: Box<Expr>,
+    },
+    Call {
+        function: Name,
+        arguments: Vec<Argument>,
+    },
+    /// `v.x`
+    Component {
+        vector: Box<Expr>,
+        axis: usize,
+    },
+    Method {
+        receiver: Box<Expr>,
+        method: Name,
+        arguments: Vec<Argument>,
+    },
+    /// `any i in start..end: body` (or) and `all …` (and).
+    Fold {
+        op: Logic,
+        variable: Name,
+        start: Box<Expr>,
+        end: Box<Expr>,
+        body: Box<Expr>,
+    },
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Argument {
+    pub name: Option<Name>,
+    pub value: Expr,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Logic {
+    And,
+    Or,
+    /// `a \ b`: in a and not in b.
+    Minus,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Comparison {
+    LessEqual,
+    GreaterEqual,
+    /// `<`: read as `<=`, with a hint.
+    Less,
+    Greater,
+    /// `==` or `!=`: always an error, kept for its message.
+    Equal,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AddOp {
+    Add,
+    Subtract,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MulOp {
+    Multiply,
+    Divide,
+}

@@ -1,0 +1,390 @@
+//! The grammar's pairs → [`Ast`]: one function per rule, in the grammar's order.
+//!
+//! The grammar has already accepted the text, so the shapes of the pairs are known; where a child could only be
+//! missing through a bug here, an empty name or a zero stands in, and the tests of the grammar would show it.
+
+use pest::iterators::{Pair, Pairs};
+
+use super::ast::{
+    AddOp, Argument, Ast, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic, MulOp, Name,
+    Param, Parameter, Scene,
+};
+use super::parse::{EDITION, Rule};
+use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
+
+type Node<'i> = Pair<'i, Rule>;
+
+/// A whole file, with its version line checked.
+pub(super) fn file(source: &Source, pairs: Pairs<'_, Rule>, diagnostics: &mut Vec<Diagnostic>) -> Ast {
+    let builder = Builder { source: source.id, offset: 0 };
+    let mut version = None;
+    let mut ast = Ast::default();
+    for pair in pairs.flat_map(Pair::into_inner) {
+        match pair.as_rule() {
+            Rule::version => version = Some(pair),
+            Rule::EOI => {}
+            _ => ast.items.push(builder.item(pair)),
+        }
+    }
+    match version {
+        None if source.id == SourceId::File => {
+            let start = Span::new(source.id, 0, 0);
+            diagnostics.push(
+                Diagnostic::warning(Code::VERSION_MISSING, start, "the first line does not say `rfm 1`")
+                    .help("write `rfm 1` as the first line"),
+            );
+        }
+        Some(pair) => {
+            let span = builder.span(&pair);
+            let edition = pair.into_inner().next().map_or("", |e| e.as_str());
+            if edition.parse::<u32>().ok() != Some(EDITION) {
+                let message = format!("edition {edition} of the language is not known to this program");
+                diagnostics.push(
+                    Diagnostic::error(Code::VERSION_UNKNOWN, span, message)
+                        .at(format!("this rfm reads edition {EDITION}")),
+                );
+            }
+        }
+        None => {}
+    }
+    ast
+}
+
+/// Items of a piece of a file that begins `offset` bytes into it.
+pub(super) fn items(source: &Source, offset: usize, pairs: Pairs<'_, Rule>) -> Vec<Item> {
+    let builder = Builder { source: source.id, offset };
+    pairs
+        .flat_map(Pair::into_inner)
+        .filter(|pair| pair.as_rule() != Rule::EOI)
+        .map(|pair| builder.item(pair))
+        .collect()
+}
+
+struct Builder {
+    source: SourceId,
+    offset: usize,
+}
+
+impl Builder {
+    fn span(&self, pair: &Node<'_>) -> Span {
+        let span = pair.as_span();
+        // rules end behind trailing white space: a message should not underline that
+        let length = pair.as_str().trim_end().len();
+        Span::new(self.source, self.offset + span.start(), self.offset + span.start() + length)
+    }
+
+    fn name(&self, pair: Option<Node<'_>>) -> Name {
+        match pair {
+            Some(pair) => Name { text: pair.as_str().to_string(), span: self.span(&pair) },
+            None => Name { text: String::new(), span: Span::new(self.source, 0, 0) },
+        }
+    }
+
+    fn item(&self, pair: Node<'_>) -> Item {
+        let rule = pair.as_rule();
+        if rule == Rule::scene {
+            return Item::Scene(self.scene(pair));
+        }
+        let mut inner = pair.into_inner();
+        inner.next(); // the keyword
+        let name = self.name(inner.next());
+        match rule {
+            Rule::param => self.param(name, inner),
+            Rule::fn_item => self.function(name, inner),
+            Rule::solid => Item::Solid(Definition { name, value: self.expr_or_zero(inner.next()) }),
+            _ => Item::Let(Definition { name, value: self.expr_or_zero(inner.next()) }),
+        }
+    }
+
+    fn param(&self, name: Name, mut inner: Pairs<'_, Rule>) -> Item {
+        let value = self.expr_or_zero(inner.next());
+        let (mut range, mut doc) = (None, None);
+        for pair in inner {
+            if pair.as_rule() == Rule::param_range {
+                let mut bounds = pair.into_inner().filter(|p| p.as_rule() == Rule::sum);
+                if let (Some(low), Some(high)) = (bounds.next(), bounds.next()) {
+                    range = Some((self.sum(low), self.sum(high)));
+                }
+            } else {
+                doc = Some(text_of(pair));
+            }
+        }
+        Item::Param(Param { name, value, range, doc })
+    }
+
+    fn function(&self, name: Name, inner: Pairs<'_, Rule>) -> Item {
+        let mut parameters = Vec::new();
+        let mut body = None;
+        for pair in inner {
+            if pair.as_rule() == Rule::parameter {
+                let mut inner = pair.into_inner();
+                let name = self.name(inner.next());
+                parameters.push(Parameter { name, default: inner.next().map(|e| self.expr(e)) });
+            } else {
+                body = Some(pair);
+            }
+        }
+        Item::Function(Function { name, parameters, body: self.expr_or_zero(body) })
+    }
+
+    fn scene(&self, pair: Node<'_>) -> Scene {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner();
+        inner.next();
+        let name = self.name(inner.next());
+        Scene { name, entries: inner.map(|e| self.entry(e)).collect(), span }
+    }
+
+    fn entry(&self, pair: Node<'_>) -> Entry {
+        let span = self.span(&pair);
+        let is_block = pair.as_rule() == Rule::block;
+        let mut inner = pair.into_inner().peekable();
+        let key = self.name(inner.next());
+        if !is_block {
+            return Entry::Setting { key, value: self.expr_or_zero(inner.next()) };
+        }
+        let label = inner.next_if(|p| p.as_rule() == Rule::name).map(|p| self.name(Some(p)));
+        Entry::Block { key, label, entries: inner.map(|e| self.entry(e)).collect(), span }
+    }
+
+    fn expr_or_zero(&self, pair: Option<Node<'_>>) -> Expr {
+        match pair {
+            Some(pair) => self.expr(pair),
+            None => Expr { kind: ExprKind::Number(0.0), span: Span::new(self.source, 0, 0) },
+        }
+    }
+
+    /// Runs of one operator become one n-ary node; where the operator changes, the run so far is its operand.
+    fn expr(&self, pair: Node<'_>) -> Expr {
+        let operands = pair.into_inner().filter(|p| p.as_rule() == Rule::conjunction);
+        let operands: Vec<_> = operands.map(|p| self.conjunction(p)).collect();
+        logic(Logic::Or, operands)
+    }
+
+    fn conjunction(&self, pair: Node<'_>) -> Expr {
+        let mut run: Vec<Expr> = Vec::new();
+        let mut run_op = Logic::And;
+        let mut next_op = Logic::And;
+        for pair in pair.into_inner() {
+            match pair.as_rule() {
+                Rule::and_op => next_op = Logic::And,
+                Rule::minus_op => next_op = Logic::Minus,
+                _ => {
+                    if run.len() > 1 && next_op != run_op {
+                        run = vec![logic(run_op, run)];
+                    }
+                    run_op = next_op;
+                    run.push(self.negation(pair));
+                }
+            }
+        }
+        logic(run_op, run)
+    }
+
+    fn negation(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let mut nots: Vec<Span> = Vec::new();
+        let mut operand = None;
+        for pair in pair.into_inner() {
+            if pair.as_rule() == Rule::not_op {
+                nots.push(self.span(&pair));
+            } else {
+                operand = Some(self.comparison(pair));
+            }
+        }
+        let operand = operand.unwrap_or(Expr { kind: ExprKind::Number(0.0), span });
+        nots.into_iter().rev().fold(operand, |inner, not| {
+            let span = not.to(inner.span);
+            Expr { kind: ExprKind::Not(Box::new(inner)), span }
+        })
+    }
+
+    fn comparison(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner();
+        let first = inner.next().map_or(Expr { kind: ExprKind::Number(0.0), span }, |p| self.sum(p));
+        let mut rest = Vec::new();
+        while let (Some(op), Some(operand)) = (inner.next(), inner.next()) {
+            let comparison = match op.as_str() {
+                "<=" | "≤" | "=<" => Comparison::LessEqual,
+                ">=" | "≥" | "=>" => Comparison::GreaterEqual,
+                "<" => Comparison::Less,
+                ">" => Comparison::Greater,
+                _ => Comparison::Equal,
+            };
+            rest.push((comparison, self.span(&op), self.sum(operand)));
+        }
+        if rest.is_empty() {
+            return first;
+        }
+        Expr { kind: ExprKind::Compare { first: Box::new(first), rest }, span }
+    }
+
+    fn sum(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner();
+        let first = inner.next().map_or(Expr { kind: ExprKind::Number(0.0), span }, |p| self.product(p));
+        let mut rest = Vec::new();
+        while let (Some(op), Some(operand)) = (inner.next(), inner.next()) {
+            let op = if op.as_str() == "+" { AddOp::Add } else { AddOp::Subtract };
+            rest.push((op, self.product(operand)));
+        }
+        if rest.is_empty() {
+            return first;
+        }
+        Expr { kind: ExprKind::Sum { first: Box::new(first), rest }, span }
+    }
+
+    fn product(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner();
+        let first = inner.next().map_or(Expr { kind: ExprKind::Number(0.0), span }, |p| self.signed(p));
+        let mut rest = Vec::new();
+        while let (Some(op), Some(operand)) = (inner.next(), inner.next()) {
+            let op = if matches!(op.as_str(), "/" | "÷") { MulOp::Divide } else { MulOp::Multiply };
+            rest.push((op, self.signed(operand)));
+        }
+        if rest.is_empty() {
+            return first;
+        }
+        Expr { kind: ExprKind::Product { first: Box::new(first), rest }, span }
+    }
+
+    /// `signed` and `exponent`: sign operators before an operand. An even number of minuses cancels.
+    fn signed(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let mut negative = false;
+        let mut operand = None;
+        for pair in pair.into_inner() {
+            match pair.as_rule() {
+                Rule::sign_op => negative ^= pair.as_str() != "+",
+                Rule::power => operand = Some(self.power(pair)),
+                _ => operand = Some(self.postfix(pair)),
+            }
+        }
+        let operand = operand.unwrap_or(Expr { kind: ExprKind::Number(0.0), span });
+        if negative { Expr { kind: ExprKind::Negate(Box::new(operand)), span } } else { operand }
+    }
+
+    /// a^b^c is a^(b^c).
+    fn power(&self, pair: Node<'_>) -> Expr {
+        let mut inner = pair.into_inner();
+        let Some(base) = inner.next() else { return self.expr_or_zero(None) };
+        let mut operands = vec![self.postfix(base)];
+        operands.extend(inner.map(|p| self.signed(p)));
+        let exponents = operands.split_off(1);
+        let exponent = exponents.into_iter().rev().reduce(|exponent, base| raised(base, exponent));
+        let base = operands.remove(0);
+        match exponent {
+            Some(exponent) => raised(base, exponent),
+            None => base,
+        }
+    }
+
+    fn postfix(&self, pair: Node<'_>) -> Expr {
+        let mut inner = pair.into_inner();
+        let Some(primary) = inner.next() else { return self.expr_or_zero(None) };
+        let mut result = self.primary(primary);
+        for pair in inner {
+            let span = result.span.to(self.span(&pair));
+            let kind = if pair.as_rule() == Rule::superscript {
+                let exponent = if pair.as_str() == "²" { 2.0 } else { 3.0 };
+                let exponent = Expr { kind: ExprKind::Number(exponent), span: self.span(&pair) };
+                ExprKind::Power { base: Box::new(result), exponent: Box::new(exponent) }
+            } else if pair.as_rule() == Rule::component {
+                let axis = match pair.as_str() {
+                    ".x" => 0,
+                    ".y" => 1,
+                    _ => 2,
+                };
+                ExprKind::Component { vector: Box::new(result), axis }
+            } else {
+                let mut inner = pair.into_inner();
+                let method = self.name(inner.next());
+                ExprKind::Method {
+                    receiver: Box::new(result),
+                    method,
+                    arguments: self.arguments(inner.next()),
+                }
+            };
+            result = Expr { kind, span };
+        }
+        result
+    }
+
+    fn primary(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let kind = match pair.as_rule() {
+            Rule::number => ExprKind::Number(number(pair.as_str())),
+            Rule::quantity => {
+                let mut inner = pair.into_inner();
+                let value = inner.next().map_or(0.0, |p| number(p.as_str()));
+                ExprKind::Quantity { value, unit: self.name(inner.next()) }
+            }
+            Rule::text => ExprKind::Text(text_of(pair)),
+            Rule::vector => ExprKind::Vector(pair.into_inner().map(|p| self.expr(p)).collect()),
+            Rule::name => ExprKind::Name(pair.as_str().to_string()),
+            Rule::group => {
+                // the brackets belong to the span, not to the tree: grouping is the tree's own shape
+                let inner = self.expr_or_zero(pair.into_inner().next());
+                return Expr { span, ..inner };
+            }
+            Rule::call => {
+                let mut inner = pair.into_inner();
+                let function = self.name(inner.next());
+                ExprKind::Call { function, arguments: self.arguments(inner.next()) }
+            }
+            _ => return self.fold(pair),
+        };
+        Expr { kind, span }
+    }
+
+    fn arguments(&self, pair: Option<Node<'_>>) -> Vec<Argument> {
+        let Some(pair) = pair else { return Vec::new() };
+        let argument = |pair: Node<'_>| {
+            let mut inner = pair.into_inner().peekable();
+            let name = inner.next_if(|p| p.as_rule() == Rule::name).map(|p| self.name(Some(p)));
+            Argument { name, value: self.expr_or_zero(inner.next()) }
+        };
+        pair.into_inner().map(argument).collect()
+    }
+
+    fn fold(&self, pair: Node<'_>) -> Expr {
+        let span = self.span(&pair);
+        let mut inner = pair.into_inner().filter(|p| p.as_rule() != Rule::kw_in);
+        let op = match inner.next().map(|p| p.as_rule()) {
+            Some(Rule::kw_all) => Logic::And,
+            _ => Logic::Or,
+        };
+        let variable = self.name(inner.next());
+        let mut bound = || inner.next().map_or_else(|| self.expr_or_zero(None), |p| self.sum(p));
+        let (start, end) = (Box::new(bound()), Box::new(bound()));
+        let body = Box::new(self.expr_or_zero(inner.next()));
+        Expr { kind: ExprKind::Fold { op, variable, start, end, body }, span }
+    }
+}
+
+fn raised(base: Expr, exponent: Expr) -> Expr {
+    let span = base.span.to(exponent.span);
+    Expr { kind: ExprKind::Power { base: Box::new(base), exponent: Box::new(exponent) }, span }
+}
+
+fn logic(op: Logic, mut operands: Vec<Expr>) -> Expr {
+    if operands.len() == 1 {
+        return operands.remove(0);
+    }
+    let span = match (operands.first(), operands.last()) {
+        (Some(first), Some(last)) => first.span.to(last.span),
+        _ => Span::new(SourceId::File, 0, 0),
+    };
+    Expr { kind: ExprKind::Logic { op, operands }, span }
+}
+
+fn text_of(pair: Node<'_>) -> String {
+    pair.into_inner().next().map_or_else(String::new, |body| body.as_str().to_string())
+}
+
+/// The grammar admits only what `f64` reads, but for a pasted minus sign in the exponent.
+fn number(text: &str) -> f64 {
+    text.replace('−', "-").parse().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,337 @@
+//! Runs the grammar, turns its failures into diagnostics and recovers at the next item.
+
+use pest::Parser;
+use pest::error::{Error, ErrorVariant, InputLocation};
+use pest_derive::Parser;
+
+use super::ast::Ast;
+use super::build;
+use crate::diagnostic::{Code, Diagnostic, Source, Span, nearest};
+
+#[derive(Parser)]
+#[grammar = "grammar/rfm.pest"]
+pub(super) struct Grammar;
+
+/// The newest edition of the language that this program reads.
+pub const EDITION: u32 = 1;
+
+/// Brackets nested deeper than this are refused: beyond what a person writes, and well inside the stack.
+const DEEPEST_NESTING: usize = 200;
+
+/// Stack of the parsing thread: the same limit on every platform, enough for [`DEEPEST_NESTING`] in debug builds.
+const STACK_BYTES: usize = 32 << 20;
+
+const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"];
+
+/// Parses a text. Items that fit the grammar are returned even if others do not; the messages tell which.
+pub fn parse(source: &Source) -> (Ast, Vec<Diagnostic>) {
+    if source.text.len() > Source::MAX_LEN {
+        let message =
+            format!("the file has {} bytes; at most {} are read", source.text.len(), Source::MAX_LEN);
+        return (
+            Ast::default(),
+            vec![Diagnostic::error(Code::TOO_LONG, Span::new(source.id, 0, 0), message)],
+        );
+    }
+    let scan = Scan::of(&source.text);
+    if let Some(at) = scan.too_deep {
+        let span = Span::new(source.id, at, at + 1);
+        let message = format!("brackets nested more than {DEEPEST_NESTING} deep");
+        let diagnostic = Diagnostic::error(Code::TOO_DEEP, span, message).help("name a part with `let`");
+        return (Ast::default(), vec![diagnostic]);
+    }
+    std::thread::scope(|scope| {
+        let spawned = std::thread::Builder::new()
+            .name("rfm-parse".into())
+            .stack_size(STACK_BYTES)
+            .spawn_scoped(scope, || parse_here(source, &scan));
+        match spawned.map(std::thread::ScopedJoinHandle::join) {
+            Ok(Ok(parsed)) => parsed,
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            // no thread to be had: the caller's own stack serves, and the grammar guards it
+            Err(_) => parse_here(source, &scan),
+        }
+    })
+}
+
+fn parse_here(source: &Source, scan: &Scan) -> (Ast, Vec<Diagnostic>) {
+    let mut diagnostics = Vec::new();
+    let ast = match Grammar::parse(Rule::file, &source.text) {
+        Ok(pairs) => build::file(source, pairs, &mut diagnostics),
+        Err(_) => recover(source, scan, &mut diagnostics),
+    };
+    (ast, diagnostics)
+}
+
+/// Parses item by item, so that one slip does not hide the next.
+fn recover(source: &Source, scan: &Scan, diagnostics: &mut Vec<Diagnostic>) -> Ast {
+    let text = &source.text;
+    let mut ast = Ast::default();
+    let mut starts = vec![0];
+    starts.extend(scan.items.iter().copied().filter(|&at| at > 0));
+    starts.push(text.len());
+    for (i, pair) in starts.windows(2).enumerate() {
+        let (start, end) = (pair[0], pair[1]);
+        let rule = if i == 0 { Rule::file } else { Rule::items };
+        match Grammar::parse(rule, &text[start..end]) {
+            Ok(pairs) if i == 0 => ast.items.extend(build::file(source, pairs, diagnostics).items),
+            Ok(pairs) => ast.items.extend(build::items(source, start, pairs)),
+            Err(error) => diagnostics.push(syntax_error(source, start, end, &error)),
+        }
+    }
+    if diagnostics.is_empty() {
+        // every piece fits although the whole does not: report the whole's own error
+        if let Err(error) = Grammar::parse(Rule::file, text) {
+            diagnostics.push(syntax_error(source, 0, text.len(), &error));
+        }
+    }
+    ast
+}
+
+fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) -> Diagnostic {
+    let at = start
+        + match error.location {
+            InputLocation::Pos(at) => at,
+            InputLocation::Span((at, _)) => at,
+        };
+    // at the end of an item point behind its last character, not at the next item
+    let at = if at >= end { source.text[..end].trim_end().len().max(start.min(end)) } else { at };
+    let found = token_at(&source.text, at, end);
+    let span = Span::new(source.id, at, at + found.len());
+    if let Some(diagnostic) = familiar_slip(source, at, found, span) {
+        return diagnostic;
+    }
+    let what = if found.is_empty() { "the end of the item".to_string() } else { format!("`{found}`") };
+    let expected = match &error.variant {
+        ErrorVariant::ParsingError { positives, .. } => expectation(positives),
+        ErrorVariant::CustomError { message } if message.contains("stack limit") => {
+            return Diagnostic::error(Code::TOO_DEEP, span, "the expression is nested too deeply")
+                .help("name a part with `let`");
+        }
+        ErrorVariant::CustomError { message } => message.clone(),
+    };
+    let diagnostic = Diagnostic::error(Code::SYNTAX, span, format!("unexpected {what}"));
+    if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) }
+}
+
+/// Slips that deserve better words than a list of what the grammar would accept.
+fn familiar_slip(source: &Source, at: usize, found: &str, span: Span) -> Option<Diagnostic> {
+    let before = source.text[..at].trim_end_matches([' ', '\t']);
+    let is_word = found.chars().next().is_some_and(char::is_alphabetic);
+    if is_word && before.ends_with(|c: char| c.is_ascii_digit()) && number_ends(before) {
+        const UNITS: [&str; 14] =
+            ["m", "mm", "cm", "km", "s", "ms", "min", "kg", "g", "N", "Pa", "J", "deg", "rad"];
+        return Some(
+            Diagnostic::error(Code::UNKNOWN_UNIT, span, format!("unknown unit `{found}` after a number"))
+                .at("not a unit")
+                .suggest(found, UNITS),
+        );
+    }
+    if found == "import" {
+        return Some(
+            Diagnostic::error(Code::SYNTAX, span, "`import` is not part of this version")
+                .help("copy the definitions into this file"),
+        );
+    }
+    let line_start = source.text[..at].rfind('\n').map_or(0, |n| n + 1);
+    if is_word && source.text[line_start..at].trim().is_empty() {
+        if let Some(word) = nearest(found, ITEM_WORDS) {
+            return Some(
+                Diagnostic::error(Code::SYNTAX, span, format!("unexpected `{found}`"))
+                    .help(format!("did you mean `{word}`?")),
+            );
+        }
+        return Some(
+            Diagnostic::error(Code::SYNTAX, span, format!("unexpected `{found}`"))
+                .at("expected an item or the rest of the one above")
+                .help("items start with `param`, `let`, `fn`, `solid` or `scene`"),
+        );
+    }
+    if found == "=" && before.ends_with('=') {
+        return Some(
+            Diagnostic::error(Code::EQUALITY, span, "`==` would be a surface of zero thickness")
+                .help("write a thin layer `-t <= a - b <= t`, or a half-space `a <= b`"),
+        );
+    }
+    None
+}
+
+/// Whether the text ends in a number rather than in a name such as `r2`.
+fn number_ends(text: &str) -> bool {
+    let start = text
+        .rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
+        .map_or(0, |at| at + text[at..].chars().next().map_or(1, char::len_utf8));
+    text[start..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
+}
+
+/// The word, number or single character at a place.
+fn token_at(text: &str, at: usize, end: usize) -> &str {
+    let rest = &text[at..end.max(at)];
+    let Some(first) = rest.chars().next() else { return "" };
+    let wordy = |c: char| c.is_alphanumeric() || c == '_';
+    if wordy(first) {
+        let length = rest.find(|c: char| !wordy(c)).unwrap_or(rest.len());
+        return &rest[..length];
+    }
+    if first.is_whitespace() || first.is_control() {
+        return "";
+    }
+    &rest[..first.len_utf8()]
+}
+
+/// Rule names in the words of the language, each said once.
+fn expectation(rules: &[Rule]) -> String {
+    let mut words: Vec<&str> = Vec::new();
+    for rule in rules {
+        let word = match rule {
+            Rule::or_op | Rule::and_op | Rule::minus_op | Rule::compare_op | Rule::add_op | Rule::mul_op => {
+                "an operator"
+            }
+            Rule::superscript | Rule::method | Rule::component => continue,
+            Rule::kw_param | Rule::kw_let | Rule::kw_fn | Rule::kw_solid | Rule::kw_scene => "an item",
+            Rule::param | Rule::let_item | Rule::fn_item | Rule::solid | Rule::scene => "an item",
+            Rule::name => "a name",
+            Rule::key | Rule::block | Rule::setting => "a key",
+            Rule::number
+            | Rule::quantity
+            | Rule::text
+            | Rule::vector
+            | Rule::call
+            | Rule::group
+            | Rule::fold
+            | Rule::not_op
+            | Rule::sign_op
+            | Rule::expr
+            | Rule::conjunction
+            | Rule::negation
+            | Rule::comparison
+            | Rule::sum
+            | Rule::product
+            | Rule::signed
+            | Rule::power
+            | Rule::postfix
+            | Rule::exponent
+            | Rule::argument
+            | Rule::arguments
+            | Rule::kw_any
+            | Rule::kw_all
+            | Rule::kw_not => "an expression",
+            Rule::kw_in | Rule::param_range => "`in`",
+            Rule::kw_and | Rule::kw_or => "an operator",
+            Rule::unit => "a unit",
+            Rule::version => "`rfm 1`",
+            Rule::parameter => "a parameter",
+            Rule::EOI => "the end of the item",
+            _ => continue,
+        };
+        if !words.contains(&word) {
+            words.push(word);
+        }
+    }
+    match words.split_last() {
+        None => String::new(),
+        Some((only, [])) => (*only).to_string(),
+        Some((last, rest)) => format!("{} or {last}", rest.join(", ")),
+    }
+}
+
+/// One pass over the characters before the grammar runs: nesting depth, and where items begin.
+struct Scan {
+    too_deep: Option<usize>,
+    /// Item keywords that stand first on their line, outside braces.
+    items: Vec<usize>,
+}
+
+impl Scan {
+    fn of(text: &str) -> Self {
+        let mut scan = Self { too_deep: None, items: Vec::new() };
+        let (mut depth, mut braces) = (0usize, 0usize);
+        let mut line_blank = true;
+        let mut chars = text.char_indices();
+        while let Some((at, c)) = chars.next() {
+            let comment = c == '#' || text[at..].starts_with("//");
+            match c {
+                '\n' => {
+                    line_blank = true;
+                    continue;
+                }
+                _ if comment => {
+                    for (_, c) in chars.by_ref() {
+                        if c == '\n' {
+                            break;
+                        }
+                    }
+                    line_blank = true;
+                    continue;
+                }
+                '"' => {
+                    for (_, c) in chars.by_ref() {
+                        if c == '"' || c == '\n' {
+                            break;
+                        }
+                    }
+                }
+                '(' | '[' | '{' => {
+                    depth += 1;
+                    braces += usize::from(c == '{');
+                    if depth > DEEPEST_NESTING && scan.too_deep.is_none() {
+                        scan.too_deep = Some(at);
+                    }
+                }
+                ')' | ']' | '}' => {
+                    depth = depth.saturating_sub(1);
+                    braces = braces.saturating_sub(usize::from(c == '}'));
+                }
+                c if line_blank && c.is_alphabetic() && braces == 0 => {
+                    let word = token_at(text, at, text.len());
+                    if ITEM_WORDS.contains(&word) {
+                        scan.items.push(at);
+                        depth = 0; // an unclosed bracket of the item above is that item's error
+                    }
+                }
+                _ => {}
+            }
+            line_blank &= c.is_whitespace();
+        }
+        scan
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::syntax::print;
+
+    fn tree(text: &str) -> String {
+        let (ast, diagnostics) = parse(&Source::file("t.rfm", format!("rfm 1\n{text}")));
+        assert!(diagnostics.is_empty(), "{diagnostics:?}");
+        print(&ast)
+    }
+
+    #[test]
+    fn chains_are_n_ary_and_parentheses_are_kept() {
+        assert_eq!(tree("let a = x and y and z"), "let a\n  and/3\n    x\n    y\n    z\n");
+        assert_eq!(tree("let a = x and (y and z)"), "let a\n  and/2\n    x\n    and/2\n      y\n      z\n");
+        assert_eq!(tree("let a = x & y \\ z"), "let a\n  minus/2\n    and/2\n      x\n      y\n    z\n");
+        assert_eq!(tree("let a = x ∧ y ∨ z"), tree("let a = (x and y) or z"));
+    }
+
+    #[test]
+    fn a_minus_binds_weaker_than_a_power() {
+        assert_eq!(tree("let a = -x^2"), "let a\n  negate\n    power\n      x\n      2\n");
+        assert_eq!(tree("let a = 2^3^-x²"), tree("let a = 2^(3^(-(x²)))"));
+        assert_eq!(tree("let a = - - x"), "let a\n  x\n");
+    }
+
+    #[test]
+    fn ranges_methods_and_numbers_share_the_dot() {
+        let text = tree("let a = any i in 0..6: ball(i).move([1., 0, .5])\nlet b = 2.move(1)");
+        assert!(text.contains("fold Or i\n    0\n    6\n"), "{text}");
+        assert!(text.contains("method move\n    2\n"), "{text}");
+    }
+
+    #[test]
+    fn units_stay_on_their_line() {
+        assert_eq!(tree("let a = 3 mm\nlet m = 2\nsolid s = x"), "let a\n  3 mm\nlet m\n  2\nsolid s\n  x\n");
+    }
+}

@@ -1,0 +1,131 @@
+//! Units of literals: a factor to SI and the exponents of metre, kilogram, second and radian.
+
+/// Exponents of m, kg, s and rad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dimension {
+    pub length: i8,
+    pub mass: i8,
+    pub time: i8,
+    pub angle: i8,
+}
+
+impl Dimension {
+    pub const NONE: Self = Self::new(0, 0, 0, 0);
+    pub const LENGTH: Self = Self::new(1, 0, 0, 0);
+    pub const MASS: Self = Self::new(0, 1, 0, 0);
+    pub const TIME: Self = Self::new(0, 0, 1, 0);
+    pub const ANGLE: Self = Self::new(0, 0, 0, 1);
+    pub const SPEED: Self = Self::new(1, 0, -1, 0);
+    pub const ACCELERATION: Self = Self::new(1, 0, -2, 0);
+    pub const DENSITY: Self = Self::new(-3, 1, 0, 0);
+    /// Dynamic viscosity, Pa·s.
+    pub const VISCOSITY: Self = Self::new(-1, 1, -1, 0);
+    /// Surface tension, N/m.
+    pub const TENSION: Self = Self::new(0, 1, -2, 0);
+    pub const ENERGY: Self = Self::new(2, 1, -2, 0);
+
+    pub const fn new(length: i8, mass: i8, time: i8, angle: i8) -> Self {
+        Self { length, mass, time, angle }
+    }
+
+    fn plus(self, other: Self, times: i8) -> Self {
+        let add = |a: i8, b: i8| a.saturating_add(b.saturating_mul(times));
+        Self {
+            length: add(self.length, other.length),
+            mass: add(self.mass, other.mass),
+            time: add(self.time, other.time),
+            angle: add(self.angle, other.angle),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// How many SI units one of these is.
+    pub factor: f64,
+    pub dimension: Dimension,
+}
+
+/// Reads a unit as the grammar lets it through: `kg/m^3`, `Pa·s`, `deg/s`. A `/` divides by the one next unit.
+pub fn parse_unit(text: &str) -> Option<Unit> {
+    let mut unit = Unit { factor: 1.0, dimension: Dimension::NONE };
+    let mut rest = text;
+    let mut sign = 1;
+    loop {
+        let end = rest.find(['/', '·']).unwrap_or(rest.len());
+        let (part, power) = split_power(&rest[..end])?;
+        let base = base_unit(part)?;
+        let power = power * sign;
+        unit.factor *= base.factor.powi(i32::from(power));
+        unit.dimension = unit.dimension.plus(base.dimension, power);
+        let Some(separator) = rest[end..].chars().next() else { return Some(unit) };
+        sign = if separator == '/' { -1 } else { 1 };
+        rest = &rest[end + separator.len_utf8()..];
+    }
+}
+
+fn split_power(text: &str) -> Option<(&str, i8)> {
+    if let Some(base) = text.strip_suffix('²') {
+        return Some((base, 2));
+    }
+    if let Some(base) = text.strip_suffix('³') {
+        return Some((base, 3));
+    }
+    match text.split_once('^') {
+        Some((base, power)) => Some((base, power.parse().ok()?)),
+        None => Some((text, 1)),
+    }
+}
+
+fn base_unit(word: &str) -> Option<Unit> {
+    let unit = |factor: f64, dimension: Dimension| Some(Unit { factor, dimension });
+    const FORCE: Dimension = Dimension::new(1, 1, -2, 0);
+    const PRESSURE: Dimension = Dimension::new(-1, 1, -2, 0);
+    match word {
+        "m" => unit(1.0, Dimension::LENGTH),
+        "km" => unit(1e3, Dimension::LENGTH),
+        "cm" => unit(1e-2, Dimension::LENGTH),
+        "mm" => unit(1e-3, Dimension::LENGTH),
+        "um" | "µm" => unit(1e-6, Dimension::LENGTH),
+        "kg" => unit(1.0, Dimension::MASS),
+        "g" => unit(1e-3, Dimension::MASS),
+        "s" => unit(1.0, Dimension::TIME),
+        "ms" => unit(1e-3, Dimension::TIME),
+        "us" => unit(1e-6, Dimension::TIME),
+        "min" => unit(60.0, Dimension::TIME),
+        "h" => unit(3600.0, Dimension::TIME),
+        "Hz" => unit(1.0, Dimension::new(0, 0, -1, 0)),
+        "N" => unit(1.0, FORCE),
+        "kN" => unit(1e3, FORCE),
+        "Pa" => unit(1.0, PRESSURE),
+        "kPa" => unit(1e3, PRESSURE),
+        "MPa" => unit(1e6, PRESSURE),
+        "J" => unit(1.0, Dimension::ENERGY),
+        "kJ" => unit(1e3, Dimension::ENERGY),
+        "rad" => unit(1.0, Dimension::ANGLE),
+        "deg" | "°" => unit(std::f64::consts::PI / 180.0, Dimension::ANGLE),
+        "rpm" => unit(std::f64::consts::PI / 30.0, Dimension::new(0, 0, -1, 1)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compound_units() {
+        let check = |text, factor: f64, dimension| {
+            let unit = parse_unit(text).unwrap();
+            assert!((unit.factor / factor - 1.0).abs() < 1e-15, "{text}: {}", unit.factor);
+            assert_eq!(unit.dimension, dimension, "{text}");
+        };
+        check("kg/m^3", 1.0, Dimension::DENSITY);
+        check("g/cm³", 1000.0, Dimension::DENSITY);
+        check("Pa·s", 1.0, Dimension::VISCOSITY);
+        check("N/m", 1.0, Dimension::TENSION);
+        check("m/s^2", 1.0, Dimension::ACCELERATION);
+        check("mm", 1e-3, Dimension::LENGTH);
+        assert_eq!(parse_unit("furlong"), None);
+    }
+}

@@ -1,0 +1,175 @@
+//! Machine code = interpreter bit for bit, and both = 40-digit arithmetic to a few units in the last place.
+
+use rfm::glam::{DVec3, Vec3};
+use rfm::{Engine, Program, Solid};
+
+fn example(name: &str) -> [Solid; 2] {
+    let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
+    let program = Program::from_path(path).unwrap_or_else(|e| panic!("{e}"));
+    [Engine::Jit, Engine::Interpreter].map(|engine| program.solid_with(name, engine).unwrap())
+}
+
+/// ω within `ulps` units in the last place of the scale, which is the size of the largest leaf near the point.
+#[track_caller]
+fn check(solids: &[Solid; 2], p: [f64; 3], omega: f64, scale: f64) {
+    for solid in solids {
+        let found = solid.omega(DVec3::from_array(p));
+        let error = (found - omega).abs() / (scale.max(omega.abs()) * f64::EPSILON);
+        assert!(error <= 4.0, "{solid:?} at {p:?}: {found:?} is {error:.1} ulp from {omega:?}");
+        assert_eq!(solid.omega_grad(DVec3::from_array(p)).0.to_bits(), found.to_bits());
+    }
+}
+
+#[track_caller]
+fn check_gradient(solids: &[Solid; 2], p: [f64; 3], gradient: [f64; 3], tolerance: f64) {
+    for solid in solids {
+        let (_, found) = solid.omega_grad(DVec3::from_array(p));
+        let error = (found - DVec3::from_array(gradient)).length();
+        assert!(error <= tolerance, "{solid:?} at {p:?}: {found} is {error:e} from {gradient:?}");
+    }
+}
+
+#[test]
+fn pawn_has_its_known_values() {
+    let pawn = example("pawn");
+    check(&pawn, [1.5, 1.5, 0.5], 0.159_599_576_930_204_99, 1.0);
+    check(&pawn, [1.5, 1.5, 0.75], 0.151_641_412_429_565_59, 1.0);
+    check(&pawn, [1.5, 1.5, 1.0], 0.476_246_890_528_022_26, 1.0);
+    check(&pawn, [1.5, 1.5, 1.25], 0.053_752_081_539_519_999, 1.0);
+    check(&pawn, [1.5, 1.5, 2.0], -0.475_439_595_883_728_47, 1.0);
+    check(&pawn, [1.7, 1.5, 0.2], 0.109_435_180_621_832_51, 1.0);
+    check(&pawn, [2.0, 1.5, 0.5], -0.669_258_006_364_933_61, 1.0);
+    check(&pawn, [3.0, 3.0, 3.0], -6.916_664_598_080_214_6, 1.0);
+    check(&pawn, [1.5, 1.5, -10.0], -93.478_318_409_277_189, 1000.0);
+    check(&pawn, [1.5, 1.5, 0.0], 0.0, 1.0);
+    // reference gradients are given to 12 digits
+    check_gradient(&pawn, [1.7, 1.5, 0.2], [-0.093_547_775_155_5, 0.0, 0.254_816_995_764], 1e-12);
+    check_gradient(&pawn, [2.0, 1.5, 0.5], [-0.996_359_949_883, 0.0, 1.286_994_687_54], 1e-11);
+    check_gradient(&pawn, [1.5, 1.5, 0.5], [0.0, 0.0, 0.030_975_109_5], 1e-10);
+    check_gradient(&pawn, [1.5, 1.5, 0.75], [0.0, 0.0, -0.114_410_229_1], 1e-10);
+}
+
+#[test]
+fn cube_has_its_known_values() {
+    let cube = example("cube");
+    check(&cube, [1.5, 1.5, 1.5], 0.960_400_769_828_011_92, 2.25);
+    check(&cube, [1e-8, 1e-8, 1.5], 1.757_359_301_164_986_1e-8, 3e-8);
+    check(&cube, [1000.0, 1.5, 1.5], -3_987_993.250_006_347_2, 1.0);
+    check(&cube, [0.0, 1.5, 1.5], 0.0, 1.0);
+    check_gradient(&cube, [1.5, 1.5, 1.5], [0.0; 3], 0.0);
+    check_gradient(&cube, [0.0, 1.5, 1.5], [3.0, 0.0, 0.0], 0.0);
+    check_gradient(&cube, [0.0, 0.5, 1.0], [3.0, 0.0, 0.0], 0.0);
+    check_gradient(&cube, [1e-8, 1e-8, 1.5], [0.878_679_645_9, 0.878_679_643_5, 0.0], 1e-9);
+}
+
+#[test]
+fn corner_gradients_are_finite_and_symmetric() {
+    for solid in example("cube") {
+        let (omega, gradient) = solid.omega_grad(DVec3::new(0.0, 0.0, 1.5));
+        assert_eq!(omega, 0.0);
+        let normal = -gradient.normalize();
+        assert!((normal - DVec3::new(-1.0, -1.0, 0.0).normalize()).length() < 1e-15, "{normal}");
+        let (omega, gradient) = solid.omega_grad(DVec3::ZERO);
+        assert!(omega == 0.0 && gradient.is_finite() && gradient.length() > 0.1, "{gradient}");
+    }
+    for solid in example("pawn") {
+        // the rim of the base, where the textbook formula gives NaN
+        let (omega, gradient) = solid.omega_grad(DVec3::new(2.0, 1.5, 0.0));
+        assert!(omega == 0.0 && gradient.is_finite(), "{omega} {gradient}");
+    }
+}
+
+/// Every operation of the language in one solid.
+const EVERYTHING: &str = "rfm 1
+let r = sqrt(x^2 + y^2)
+solid everything = (sin(x) <= cos(y) and exp(-z^2) >= abs(x)/3 or atan2(y, x) <= 1)
+  and min(x, y, z) <= max(x, 2)^3 or (tan(x/4) + asin(x/9) + acos(y/9) + atan(z) <= ln(4 + x) + pow(2 + y^2, z/3))
+  or hypot(x, y) <= sign(z) and not torus(1, 0.2).rotate([1, 2, 3], 40 deg).scale([1, 2, 3]).move([0.1, 0, z/5])
+  \\ normalise(box() and sphere(0.3) or cone(1, 2) and capsule(0.2, 1) and ellipsoid(1, 2, 3))
+  and any i in 0..5 : cylinder(0.1, 1).move([1, 0, 0]).rotate_z(i*72 deg) and r <= 3 - clamp(z, 0, 1)
+  and all i in 0..3 : half_space([i, 1, -1], [0, 1, 0]).mirror([1, i, 0]).rotate_x(90 deg).rotate_y(0.3)
+";
+
+fn awkward_coordinates() -> Vec<f64> {
+    let mut values =
+        vec![0.0, -0.0, 1.0, -1.0, 0.5, 1.5, 3.0, 1e-8, 1e-300, 5e-324, 1e6, -1e6, 1e160, f64::NAN];
+    values.extend([f64::INFINITY, f64::NEG_INFINITY, 0.1, -0.7, 2.0, 0.25, 1.25]);
+    values
+}
+
+fn same(a: f64, b: f64) -> bool {
+    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a == 0.0 && b == 0.0)
+}
+
+#[test]
+fn machine_code_is_the_interpreter() {
+    let source = Program::from_source("everything.rfm", EVERYTHING).unwrap_or_else(|e| panic!("{e}"));
+    let everything =
+        [Engine::Jit, Engine::Interpreter].map(|engine| source.solid_with("everything", engine).unwrap());
+    for [jit, interpreter] in [everything, example("pawn"), example("bishop"), example("cube")] {
+        let values = awkward_coordinates();
+        for &x in &values {
+            for &y in &values {
+                for &z in &values {
+                    let p = DVec3::new(x, y, z);
+                    let (a, b) = (jit.omega_grad(p), interpreter.omega_grad(p));
+                    let equal = same(a.0, b.0) && (0..3).all(|i| same(a.1[i], b.1[i]));
+                    assert!(equal, "{jit:?} at {p}: {a:?} and {b:?}");
+                    assert!(same(jit.omega(p), interpreter.omega(p)), "{jit:?} at {p}");
+                    assert!(p.is_finite() || a.0.is_nan(), "{jit:?} at {p}: {}", a.0);
+                    let q = p.as_vec3();
+                    let (a, b) = (jit.omega_grad_f32(q), interpreter.omega_grad_f32(q));
+                    let equal =
+                        same(a.0.into(), b.0.into()) && (0..3).all(|i| same(a.1[i].into(), b.1[i].into()));
+                    assert!(equal, "{jit:?} at {q} in f32: {a:?} and {b:?}");
+                    assert!(same(jit.omega_f32(q).into(), interpreter.omega_f32(q).into()));
+                    assert!(Vec3::is_finite(q) || a.0.is_nan());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn batches_of_any_length_are_the_single_points() {
+    let [jit, _] = example("bishop");
+    let mut seed = 1u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        3.0 * (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    for n in [0, 1, 2, 3, 4, 5, 7, 8, 31, 100] {
+        let [x, y, z] = std::array::from_fn(|_| (0..n + 1).map(|_| random()).collect::<Vec<f64>>());
+        // one past the start: no alignment may be needed
+        let points = [&x[1..], &y[1..], &z[1..]];
+        let mut omega = vec![0.0; n];
+        jit.omega_many(points, &mut omega);
+        let mut out: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; n]);
+        jit.omega_grad_many(points, out.each_mut().map(|c| &mut c[..]));
+        let single = points.map(|c| c.iter().map(|&v| v as f32).collect::<Vec<f32>>());
+        let mut omega32 = vec![0f32; n];
+        jit.omega_many(single.each_ref().map(|c| &c[..]), &mut omega32);
+        for i in 0..n {
+            let p = DVec3::new(points[0][i], points[1][i], points[2][i]);
+            let (w, g) = jit.omega_grad(p);
+            assert_eq!(omega[i].to_bits(), w.to_bits());
+            assert_eq!([out[0][i], out[1][i], out[2][i], out[3][i]], [w, g.x, g.y, g.z]);
+            assert_eq!(omega32[i], jit.omega_f32(p.as_vec3()));
+        }
+    }
+}
+
+#[test]
+fn programs_are_shared_between_threads_and_freed() {
+    let program = Program::from_source("ball.rfm", "rfm 1\nsolid ball = sphere(1)").unwrap();
+    for _ in 0..200 {
+        let solid = program.solid_with("ball", Engine::Jit).unwrap();
+        let copies: Vec<Solid> = (0..4).map(|_| solid.clone()).collect();
+        drop(solid);
+        std::thread::scope(|scope| {
+            for copy in copies {
+                scope.spawn(move || assert_eq!(copy.omega(DVec3::ZERO), 0.5));
+            }
+        });
+    }
+}
