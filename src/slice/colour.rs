@@ -17,8 +17,8 @@ pub const UNDEFINED: Rgb = [214, 214, 214];
 /// Levels other than zero on a side: five span a factor of 20 to 25.
 const LEVELS_PER_SIDE: usize = 5;
 /// The ramps from the surface outwards, spread evenly over a side's bands.
-const INSIDE: [Rgb; 3] = [[255, 236, 209], [246, 169, 91], [190, 84, 14]];
-const OUTSIDE: [Rgb; 3] = [[231, 240, 248], [147, 190, 222], [52, 110, 170]];
+const INSIDE: [Rgb; 3] = [[255, 237, 211], [247, 176, 102], [208, 103, 30]];
+const OUTSIDE: [Rgb; 3] = [[232, 241, 249], [155, 197, 226], [77, 134, 188]];
 
 /// Which ω has which colour: bands are numbered from the lowest ω to the highest, band k below level k.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! The numbers on isolines: one a level at most, where the line is straight and there is room.
 //!
-//! Invariant: a label keeps away from the frame, from the surface line and from the labels placed before it.
+//! Invariant: a label keeps away from the frame, from the lines of other levels and from the labels before it.
 
 use glam::DVec2;
 
@@ -23,23 +23,23 @@ const HEIGHT: f64 = 11.0;
 #[derive(Debug)]
 pub struct Placer<'a> {
     frame: &'a Frame,
-    /// The surface line, in page units.
-    surface: &'a [Vec<DVec2>],
+    /// The lines of each level, in page units, with points close together.
+    lines: &'a [Vec<Vec<DVec2>>],
     /// Centres and radii of the labels so far.
     taken: Vec<(DVec2, f64)>,
 }
 
 impl<'a> Placer<'a> {
-    pub fn new(frame: &'a Frame, surface: &'a [Vec<DVec2>]) -> Self {
-        Self { frame, surface, taken: Vec::new() }
+    pub fn new(frame: &'a Frame, lines: &'a [Vec<Vec<DVec2>>]) -> Self {
+        Self { frame, lines, taken: Vec::new() }
     }
 
-    /// The best place for a text on one of the lines (page units), if there is any.
-    pub fn place(&mut self, lines: &[Vec<DVec2>], text: &str) -> Option<Label> {
+    /// The best place for a text on the lines of a level, if there is any.
+    pub fn place(&mut self, level: usize, text: &str) -> Option<Label> {
         let width = CHARACTER * text.chars().count() as f64;
-        let candidates = lines.iter().flat_map(|line| stations(line, width));
+        let candidates = self.lines[level].iter().flat_map(|line| stations(line, width));
         let best = candidates
-            .filter(|s| self.is_free(s.at, 0.5 * width))
+            .filter(|s| self.is_free(s, level, 0.5 * width))
             .max_by(|a, b| self.merit(a).total_cmp(&self.merit(b)))?;
         self.taken.push((best.at, 0.5 * width));
         let angle = best.direction.y.atan2(best.direction.x).to_degrees();
@@ -53,13 +53,23 @@ impl<'a> Placer<'a> {
         Some(Label { at: best.at, angle: upright, text: text.to_owned() })
     }
 
-    fn is_free(&self, at: DVec2, radius: f64) -> bool {
+    fn is_free(&self, station: &Station, level: usize, radius: f64) -> bool {
+        let at = station.at;
         let (low, high) = (self.frame.origin, self.frame.origin + self.frame.size);
         let inset = DVec2::splat(radius + 5.0);
         let in_frame = at.cmpge(low + inset).all() && at.cmple(high - inset).all();
         let clear = |&(other, size): &(DVec2, f64)| at.distance(other) > radius + size + 8.0;
-        let surface = self.surface.iter().flatten().all(|p| at.distance(*p) > radius.min(8.0) + 0.5 * HEIGHT);
-        in_frame && surface && self.taken.iter().all(clear)
+        in_frame && self.taken.iter().all(clear) && !self.covers_other_lines(station, level, radius)
+    }
+
+    /// Whether a line of another level runs through the label's box.
+    fn covers_other_lines(&self, station: &Station, level: usize, radius: f64) -> bool {
+        let others = self.lines.iter().enumerate().filter(|(k, _)| *k != level);
+        others.flat_map(|(_, lines)| lines.iter().flatten()).any(|p| {
+            let d = *p - station.at;
+            d.dot(station.direction).abs() < radius + 2.0
+                && d.perp_dot(station.direction).abs() < 0.5 * HEIGHT
+        })
     }
 
     /// Straight and level places are easy to read; the right half of the picture decides between equals.
@@ -109,22 +119,25 @@ mod tests {
     use super::*;
     use crate::slice::Window;
 
-    fn line(y: f64) -> Vec<DVec2> {
-        vec![DVec2::new(0.0, y), DVec2::new(560.0, y)]
-    }
-
     #[test]
-    fn labels_keep_apart_and_stay_off_the_surface() {
+    fn labels_keep_apart_and_stay_off_other_lines() {
         let frame = Frame::new(Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0)), DVec2::ZERO);
-        let surface: Vec<DVec2> = (0..=560).map(|x| DVec2::new(f64::from(x), 200.0)).collect();
-        let surface = [surface];
-        let mut placer = Placer::new(&frame, &surface);
-        let first = placer.place(&[line(100.0)], "0.1").unwrap();
-        let second = placer.place(&[line(104.0)], "0.2").unwrap();
+        let dense = |y: f64| vec![(0..=560).map(|x| DVec2::new(f64::from(x), y)).collect::<Vec<_>>()];
+        let lines = [
+            dense(200.0),
+            dense(100.0),
+            dense(109.0),
+            dense(203.0),
+            dense(1.0),
+            vec![vec![DVec2::ZERO; 3], vec![]],
+        ];
+        let mut placer = Placer::new(&frame, &lines);
+        let first = placer.place(1, "0.1").unwrap();
+        let second = placer.place(2, "0.2").unwrap();
         assert_eq!(first.angle, 0.0);
         assert!(first.at.distance(second.at) > 16.0);
-        assert_eq!(placer.place(&[line(201.0)], "0.5"), None, "on the surface");
-        assert_eq!(placer.place(&[line(1.0)], "0.5"), None, "on the frame");
-        assert_eq!(placer.place(&[vec![DVec2::ZERO; 3], vec![]], "0.5"), None, "no length");
+        assert_eq!(placer.place(3, "0.5"), None, "beside another line");
+        assert_eq!(placer.place(4, "0.5"), None, "on the frame");
+        assert_eq!(placer.place(5, "0.5"), None, "no length");
     }
 }

@@ -99,12 +99,12 @@ fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame
 }
 
 fn labels(out: &mut String, frame: &Frame, scale: &Scale, zero: usize, lines: &[Vec<(Vec<DVec2>, bool)>]) {
-    let points = |k: usize| lines[k].iter().map(|(points, _)| points.clone()).collect::<Vec<_>>();
-    let surface = points(zero);
-    let mut placer = Placer::new(frame, &surface);
+    let lines: Vec<Vec<Vec<DVec2>>> =
+        lines.iter().map(|level| level.iter().map(|(points, _)| points.clone()).collect()).collect();
+    let mut placer = Placer::new(frame, &lines);
     let mut text = String::new();
     for (k, level) in scale.decimals().iter().enumerate().filter(|(k, _)| *k != zero) {
-        let Some(Label { at, angle, text: label }) = placer.place(&points(k), &level.to_string()) else {
+        let Some(Label { at, angle, text: label }) = placer.place(k, &level.to_string()) else {
             continue;
         };
         // The halo has the colour of the ground, so the line seems to be interrupted.
