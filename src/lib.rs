@@ -3,6 +3,7 @@
 pub mod field;
 pub mod geom;
 pub mod interval;
+pub mod render;
 pub mod slice;
 
 pub use glam;
