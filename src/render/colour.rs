@@ -11,7 +11,7 @@ pub type Rgb = [u8; 3];
 pub const UNKNOWN_SPEED: Rgb = [128, 128, 128];
 
 pub(super) const STOPS: [Rgb; 5] =
-    [[34, 82, 168], [104, 172, 222], [250, 218, 88], [240, 128, 46], [190, 24, 34]];
+    [[44, 98, 188], [108, 176, 226], [250, 218, 88], [240, 128, 46], [190, 24, 34]];
 
 /// The colour of `speed` where `fastest` is red; both in the same unit. All is blue if `fastest` is not positive.
 pub fn speed_colour(speed: f64, fastest: f64) -> Rgb {

@@ -56,8 +56,9 @@ pub fn discs(particles: &Particles<'_>, camera: &Camera, fastest: f64) -> Vec<Di
     seen.into_iter().flatten().collect()
 }
 
-/// Draws discs over the canvas, pixel rows into `pixels`, which already hold the canvas's picture.
-pub fn draw(discs: &[Disc], canvas: &Canvas, pixels: &mut [u8]) {
+/// Draws discs over the canvas and then whatever `finish` adds. Only `pixels` near discs change: they must already
+/// hold the picture of the canvas, finished.
+pub fn draw(discs: &[Disc], canvas: &Canvas, finish: impl Fn(&mut Band<'_>) + Sync, pixels: &mut [u8]) {
     let stride = canvas.width / SUBPIXELS;
     let height = canvas.nearness.len() / canvas.width;
     pixels.par_chunks_mut(3 * stride * BAND_ROWS / SUBPIXELS).enumerate().for_each(|(k, out)| {
@@ -86,6 +87,7 @@ pub fn draw(discs: &[Disc], canvas: &Canvas, pixels: &mut [u8]) {
         for disc in here {
             disc.draw(&mut band);
         }
+        finish(&mut band);
         band.average(out, stride);
     });
 }
@@ -97,15 +99,15 @@ impl Disc {
 
     fn draw(&self, band: &mut Band<'_>) {
         let reach = self.reach();
-        let span = |v: f32| (f64::from(v - reach) - 1.0, f64::from(v + reach));
-        let ((left, right), (top, bottom)) = (span(self.x), span(self.y));
         let scale = 1.0 / reach;
         let foremost = self.nearness + self.bulge;
-        let columns = band.columns(left, right);
-        for y in band.rows(top, bottom) {
+        let rows = band.rows(f64::from(self.y - reach) - 1.0, f64::from(self.y + reach));
+        for y in rows {
             let v = (y as f32 + 0.5 - self.y) * scale;
+            let half = f64::from(reach * (1.0 - v * v).max(0.0).sqrt());
+            let columns = band.columns(f64::from(self.x) - half - 1.0, f64::from(self.x) + half);
             let start = band.index(columns.start, y);
-            for (x, at) in columns.clone().zip(start..) {
+            for (x, at) in columns.zip(start..) {
                 let u = (x as f32 + 0.5 - self.x) * scale;
                 let flat = u * u + v * v;
                 if flat > 1.0 || foremost <= band.nearness[at] {

@@ -42,8 +42,11 @@ pub struct Moment {
 pub struct Scene {
     camera: Camera,
     fastest: f64,
+    /// Floor and mesh. The edges of the box are drawn last, also over particles: their soft borders need the colour
+    /// behind them.
     canvas: Canvas,
-    /// The canvas as pixels.
+    edges: Vec<Edge>,
+    /// Canvas and edges as pixels.
     still: Vec<u8>,
     title: Layer,
     bar: Layer,
@@ -66,22 +69,21 @@ impl Scene {
         let facets = Facets::new(mesh, &camera);
         let edges = edges(bounds, &camera);
         let floor = floor(bounds, &camera);
-        let thickness = EDGE_THICKNESS * unit(&camera);
         let mut canvas = Canvas::new(width, height, PAPER);
         canvas.draw(|band| {
             for corners in &floor {
                 band.triangle(corners, |_| FLOOR);
             }
             facets.draw(band);
-            for (ends, colours) in &edges {
-                band.line(*ends, *colours, thickness);
-            }
         });
-        let still = pixels(&mut canvas);
+        let mut finished = canvas.clone();
+        finished.draw(|band| draw_edges(&edges, band));
+        let still = pixels(&mut finished);
         let scale = unit(&camera);
         Ok(Self {
             fastest: legend.fastest,
             canvas,
+            edges,
             still,
             title: overlay::title(legend.title, f64::from(camera.width) / scale, scale)?,
             bar: overlay::bar(legend, scale)?,
@@ -103,7 +105,7 @@ impl Scene {
             pixels: self.still.clone(),
             skipped: total - discs.len(),
         };
-        draw(&discs, &self.canvas, &mut image.pixels);
+        draw(&discs, &self.canvas, |band| draw_edges(&self.edges, band), &mut image.pixels);
         self.write_on(&mut image, moment, total);
         image
     }
@@ -141,8 +143,16 @@ fn pixels(canvas: &mut Canvas) -> Vec<u8> {
     out
 }
 
+/// An edge of the box on the screen.
+#[derive(Debug)]
+struct Edge {
+    ends: [Seen; 2],
+    colours: [Rgb; 2],
+    thickness: f64,
+}
+
 /// The twelve edges of the box, paler with distance.
-fn edges(bounds: &Aabb, camera: &Camera) -> Vec<([Seen; 2], [Rgb; 2])> {
+fn edges(bounds: &Aabb, camera: &Camera) -> Vec<Edge> {
     let Some(corners) = see(bounds, camera) else { return Vec::new() };
     let nearest = corners.iter().map(|c| c.nearness).fold(f64::NEG_INFINITY, f64::max);
     let farthest = corners.iter().map(|c| c.nearness).fold(f64::INFINITY, f64::min);
@@ -150,8 +160,18 @@ fn edges(bounds: &Aabb, camera: &Camera) -> Vec<([Seen; 2], [Rgb; 2])> {
         let t = (seen.nearness - farthest) / (nearest - farthest).max(f64::MIN_POSITIVE);
         mix(EDGE_FAR, EDGE_NEAR, t.clamp(0.0, 1.0))
     };
+    let thickness = EDGE_THICKNESS * unit(camera);
     let pairs = (0..8).flat_map(|i| (0..3).map(move |bit| (i, i | 1 << bit))).filter(|(i, j)| i != j);
-    pairs.map(|(i, j)| ([corners[i], corners[j]], [cue(corners[i]), cue(corners[j])])).collect()
+    pairs
+        .map(|(i, j)| [corners[i], corners[j]])
+        .map(|ends| Edge { ends, colours: ends.map(cue), thickness })
+        .collect()
+}
+
+fn draw_edges(edges: &[Edge], band: &mut Band<'_>) {
+    for edge in edges {
+        band.line(edge.ends, edge.colours, edge.thickness);
+    }
 }
 
 /// The bottom of the box, seen from above only.
