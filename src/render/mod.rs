@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Everything is drawn on the processor at twice the size and averaged down. Rows are cut into bands of fixed
-//! height; within a band things are drawn in the order they were given.
+//! height, drawn in parallel; within a band the order is fixed, so ties in depth are settled alike every time.
 //!
 //! Invariant: a band depends on its inputs alone, so a picture has the same bits on any number of threads; this
 //! module takes plain slices, opens no file and reads no clock.

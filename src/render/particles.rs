@@ -107,6 +107,11 @@ impl Disc {
             let half = f64::from(reach * (1.0 - v * v).max(0.0).sqrt());
             let columns = band.columns(f64::from(self.x) - half - 1.0, f64::from(self.x) + half);
             let start = band.index(columns.start, y);
+            // Most rows of a crowd are hidden altogether, and this loop is many pixels at a time.
+            let line = &band.nearness[start..start + columns.len()];
+            if !line.iter().fold(false, |open, near| open | (*near < foremost)) {
+                continue;
+            }
             for (x, at) in columns.zip(start..) {
                 let u = (x as f32 + 0.5 - self.x) * scale;
                 let flat = u * u + v * v;

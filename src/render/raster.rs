@@ -209,10 +209,11 @@ fn is_top_or_left(a: Corner, b: Corner) -> bool {
     b.y < a.y || (b.y == a.y && b.x > a.x)
 }
 
+/// The whole numbers of lo..=hi within first..end; always a range inside of that, empty or not.
 fn clip(lo: f64, hi: f64, first: usize, end: usize) -> Range<usize> {
     // `as` saturates, and turns NaN into 0.
-    let start = (lo.floor().max(0.0) as usize).max(first);
-    start..((hi.ceil() + 1.0).max(0.0) as usize).min(end).max(start)
+    let end = ((hi.ceil() + 1.0).max(0.0) as usize).clamp(first, end);
+    (lo.floor().max(0.0) as usize).clamp(first, end)..end
 }
 
 /// From `a` (t = 0) to `b` (t = 1).

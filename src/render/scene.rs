@@ -267,6 +267,20 @@ mod tests {
     }
 
     #[test]
+    fn particles_beside_the_picture_leave_it_as_it_is() {
+        let scene = scene(&Mesh::default());
+        let nothing = frame(&scene, &[], &[]).pixels;
+        let far = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+        for z in [-1.0, 0.0, 1.0] {
+            let points = far.map(|p| 30.0 * p + z * DVec3::ONE);
+            let mut image = frame(&scene, &points, &[0.0; 4]);
+            // The caption differs in the number of particles.
+            image.pixels.truncate(3 * 320 * 220);
+            assert!(image.pixels == nothing[..3 * 320 * 220]);
+        }
+    }
+
+    #[test]
     fn frames_have_the_same_bits_on_one_and_two_threads() {
         let vertices = [DVec3::ZERO, DVec3::Y, DVec3::Z];
         let wave = |i: i32, k: f64| (f64::from(i) * k).sin();

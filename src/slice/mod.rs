@@ -5,7 +5,7 @@
 //!                      └──────terminal──▶ characters
 //! ```
 //!
-//! Invariant: this module sees a [`Field`](crate::field::Field) and nothing of how it was made; it opens no file
+//! Invariant: this module sees a [`Field`] and nothing of how it was made; it opens no file
 //! and asks no terminal; the same field gives the same bytes on any number of threads.
 
 mod axes;

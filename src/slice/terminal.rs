@@ -13,7 +13,7 @@ const INSIDE: [char; 3] = ['+', '*', '#'];
 const SURFACE: char = '=';
 const NO_VALUE: char = '?';
 
-/// Draws a slice `columns` characters wide (2 to 1000), rows chosen so that lengths look equal both ways.
+/// Draws a slice `columns` characters wide (1000 at most), rows chosen so that lengths look equal both ways.
 ///
 /// # Errors
 /// Those of [`super::sample`] and of the writer.
