@@ -130,7 +130,7 @@ impl Program {
         // names of items that do not parse are missing: what follows from that would mislead
         let follows = |d: &Diagnostic| {
             use crate::diagnostic::Code;
-            [Code::UNKNOWN_NAME, Code::UNKNOWN_PARAM, Code::UNUSED, Code::SCENE_MISSING].contains(&d.code)
+            [Code::UNKNOWN_NAME, Code::OVERRIDE, Code::UNUSED, Code::SCENE_MISSING].contains(&d.code)
         };
         list.extend(messages.into_iter().filter(|d| !(broken && follows(d))));
         if list.iter().any(|d| d.severity == Severity::Error) {

@@ -21,7 +21,9 @@ pub mod geom;
 pub mod interval;
 pub mod ir;
 pub mod lower;
+pub mod render;
 pub mod simplify;
+pub mod slice;
 pub mod solid;
 pub mod syntax;
 

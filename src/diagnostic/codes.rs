@@ -72,8 +72,9 @@ declared `in a .. b`.";
 TOO_LARGE = "E0210":
 "The file unrolls to more operations than the limit (1 million, or what --max-nodes says). A range such as
 `0..1000000` may have too many members.";
-UNKNOWN_PARAM = "E0211":
-"-D can only set what the file declares with `param`.";
+OVERRIDE = "E0211":
+"-D name=value sets a param of the file. The file must declare it with `param name = …`, and the value must lie in
+the range that the declaration states.";
 UNIT_MISMATCH = "E0212":
 "The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
 only lengths and angles are meaningful.";

@@ -143,19 +143,18 @@ impl<'a> Lowering<'a> {
         if let Some((low, high)) = range
             && !(low <= value && value <= high)
         {
-            let from = if overridden.is_some() { "-D sets" } else { "the value of" };
-            let message =
-                format!("{from} `{}` to {value}, outside its range {low} .. {high}", param.name.text);
-            let message = if overridden.is_some() {
-                message
+            let diagnostic = if overridden.is_some() {
+                let message = format!("-D sets `{}` to {value}, outside its range {low} .. {high}", param.name.text);
+                Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here")
             } else {
-                format!("`{}` = {value} lies outside its range {low} .. {high}", param.name.text)
+                let message = format!("`{}` = {value} lies outside its range {low} .. {high}", param.name.text);
+                Diagnostic::error(Code::OUT_OF_RANGE, param.value.span, message)
             };
-            self.report(Diagnostic::error(Code::OUT_OF_RANGE, param.name.span, message).at("declared here"));
-        }
-        if overridden.is_some_and(|v| !v.is_finite()) {
-            let message = format!("-D sets `{}` to {value}, which is not a finite number", param.name.text);
-            self.report(Diagnostic::error(Code::OUT_OF_RANGE, param.name.span, message));
+            self.report(diagnostic);
+        } else if !value.is_finite() {
+            let message = format!("`{}` is {value}, which is not a finite number", param.name.text);
+            let code = if overridden.is_some() { Code::OVERRIDE } else { Code::OUT_OF_RANGE };
+            self.report(Diagnostic::error(code, param.name.span, message));
         }
         let node = self.module.graph.constant(value);
         self.names.define(self.scope.source, &param.name, Kind::Value(Value::Number(node)));
@@ -231,7 +230,7 @@ impl<'a> Lowering<'a> {
         for name in options.overrides.keys().filter(|name| !declared.contains(&name.as_str())) {
             let span = Span::new(SourceId::File, 0, 0);
             let message = format!("-D sets `{name}`, but the file declares no such param");
-            let mut diagnostic = Diagnostic::error(Code::UNKNOWN_PARAM, span, message);
+            let mut diagnostic = Diagnostic::error(Code::OVERRIDE, span, message);
             diagnostic = match crate::diagnostic::nearest(name, declared.iter().copied()) {
                 Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
                 None if declared.is_empty() => diagnostic.help("the file declares no params"),

@@ -1,0 +1,161 @@
+//! Where the picture is taken from: a mild perspective that shows the whole box, z upwards.
+//!
+//! Screen coordinates are sub-pixels (two per pixel each way), x to the right, y down; nearness is the inverse
+//! of the depth along the view, so it is linear on the screen along lines and planes.
+
+use glam::{DVec2, DVec3};
+
+use super::RenderError;
+use crate::geom::Aabb;
+
+/// Sub-pixels per pixel in each direction.
+pub(super) const SUBPIXELS: usize = 2;
+
+/// Distance of the eye from the centre of the box, in diagonals of the box: far enough to keep parallels nearly so.
+const DISTANCE: f64 = 3.0;
+/// What the box keeps free of a picture 960 high: left, top, right (colour bar), bottom (caption).
+const MARGINS: [f64; 4] = [48.0, 56.0, 150.0, 72.0];
+
+/// A view of a box.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Pixels.
+    pub(super) width: u32,
+    pub(super) height: u32,
+    eye: DVec3,
+    right: DVec3,
+    up: DVec3,
+    /// From the scene to the eye.
+    back: DVec3,
+    /// Sub-pixels for a unit length at depth one.
+    focal: f64,
+    /// Where the axis of the view meets the screen.
+    centre: DVec2,
+}
+
+/// A point as the camera sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Seen {
+    pub at: DVec2,
+    pub nearness: f64,
+}
+
+impl Camera {
+    /// The usual picture size.
+    pub const SIZE: (u32, u32) = (1280, 960);
+
+    /// The three-quarter view: x to the right, y away, from a little above.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn three_quarter(bounds: &Aabb, size: (u32, u32)) -> Result<Self, RenderError> {
+        Self::new(bounds, DVec3::new(0.48, -1.0, 0.46), size)
+    }
+
+    /// A view of the whole box from the direction `towards_eye` (of any length; the three-quarter view's if it is
+    /// zero or not finite). `size` is the picture's width and height in pixels.
+    ///
+    /// # Errors
+    /// [`RenderError::Bounds`] for a box that is empty, infinite or a point; [`RenderError::Size`] for a picture
+    /// with a side outside 16 ..= 8192.
+    pub fn new(bounds: &Aabb, towards_eye: DVec3, size: (u32, u32)) -> Result<Self, RenderError> {
+        let diagonal = bounds.size().length();
+        if bounds.is_empty() || !diagonal.is_finite() || diagonal <= 0.0 {
+            return Err(RenderError::Bounds(*bounds));
+        }
+        let (width, height) = size;
+        if !(16..=8192).contains(&width) || !(16..=8192).contains(&height) {
+            return Err(RenderError::Size(width, height));
+        }
+        let back = towards_eye.try_normalize().unwrap_or(DVec3::new(0.48, -1.0, 0.46).normalize());
+        // Straight from above or below, y takes the place of "up".
+        let right = DVec3::Z.cross(back).try_normalize().unwrap_or(DVec3::X);
+        let up = back.cross(right);
+        let eye = bounds.centre() + DISTANCE * diagonal * back;
+        let mut camera = Self { width, height, eye, right, up, back, focal: 1.0, centre: DVec2::ZERO };
+        camera.fit(bounds);
+        Ok(camera)
+    }
+
+    /// Sets the focal length and the centre so that the box fills the picture but for the margins.
+    fn fit(&mut self, bounds: &Aabb) {
+        let corners = bounds.corners().map(|corner| self.look(corner).map_or(DVec2::ZERO, |seen| seen.at));
+        let (low, high) =
+            corners.iter().fold((corners[0], corners[0]), |(low, high), p| (low.min(*p), high.max(*p)));
+        let sub = SUBPIXELS as f64;
+        let page = sub * DVec2::new(f64::from(self.width), f64::from(self.height));
+        let [left, top, right, bottom] = MARGINS.map(|m| m * page.y / 960.0);
+        let room = (page - DVec2::new(left + right, top + bottom)).max(0.25 * page);
+        self.focal = (room / (high - low).max(DVec2::splat(1e-12))).min_element();
+        self.centre = DVec2::new(left, top) + 0.5 * room - 0.5 * self.focal * (low + high);
+    }
+
+    /// A point on the screen; none for points that are not finite, or behind or very near the eye.
+    pub(super) fn look(&self, p: DVec3) -> Option<Seen> {
+        let d = p - self.eye;
+        let nearness = 1.0 / -d.dot(self.back);
+        let at = self.centre + self.focal * nearness * DVec2::new(d.dot(self.right), -d.dot(self.up));
+        (nearness > 0.0 && at.abs().max_element() < 1e6).then_some(Seen { at, nearness })
+    }
+
+    /// A direction in the camera's frame: x right, y up, z towards the eye.
+    pub(super) fn turn(&self, direction: DVec3) -> DVec3 {
+        DVec3::new(direction.dot(self.right), direction.dot(self.up), direction.dot(self.back))
+    }
+
+    /// From a point to the eye.
+    pub(super) fn to_eye(&self, p: DVec3) -> DVec3 {
+        self.eye - p
+    }
+
+    /// Sub-pixels for a unit length at a nearness.
+    pub(super) fn magnification(&self, nearness: f64) -> f64 {
+        self.focal * nearness
+    }
+
+    /// Columns and rows of sub-pixels.
+    pub(super) fn subpixels(&self) -> (usize, usize) {
+        (SUBPIXELS * self.width as usize, SUBPIXELS * self.height as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube() -> Aabb {
+        Aabb::new(DVec3::ZERO, DVec3::splat(3.0))
+    }
+
+    #[test]
+    fn the_box_lies_in_the_picture_with_z_up_and_x_to_the_right() {
+        let camera = Camera::three_quarter(&cube(), Camera::SIZE).unwrap();
+        for corner in cube().corners() {
+            let at = camera.look(corner).unwrap().at;
+            assert!(
+                (95.0..=2560.0 - 299.0).contains(&at.x) && (111.0..=1920.0 - 143.0).contains(&at.y),
+                "{at}"
+            );
+        }
+        let see = |x: f64, y: f64, z: f64| camera.look(DVec3::new(x, y, z)).unwrap();
+        assert!(see(0.0, 0.0, 3.0).at.y < see(0.0, 0.0, 0.0).at.y);
+        assert!(see(3.0, 0.0, 0.0).at.x > see(0.0, 0.0, 0.0).at.x);
+        assert!(see(0.0, 0.0, 0.0).nearness > see(0.0, 3.0, 0.0).nearness);
+    }
+
+    #[test]
+    fn odd_boxes_and_views_are_errors_or_drawn() {
+        let size = Camera::SIZE;
+        assert!(matches!(Camera::three_quarter(&Aabb::EMPTY, size), Err(RenderError::Bounds(_))));
+        let point = Aabb::new(DVec3::ONE, DVec3::ONE);
+        assert!(matches!(Camera::three_quarter(&point, size), Err(RenderError::Bounds(_))));
+        assert!(matches!(Camera::three_quarter(&cube(), (0, 10)), Err(RenderError::Size(0, 10))));
+        let flat = Aabb::new(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0));
+        for towards_eye in [DVec3::Z, DVec3::NAN, DVec3::ZERO, DVec3::X] {
+            let camera = Camera::new(&flat, towards_eye, size).unwrap();
+            assert!(camera.look(DVec3::ZERO).is_some());
+            assert!(camera.look(DVec3::NAN).is_none());
+            assert!(camera.look(1e9 * camera.back).is_none(), "behind the eye");
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The obstacle: a shaded triangle mesh seen by the camera.
+
+use glam::DVec3;
+
+use super::{
+    camera::{Camera, Seen},
+    raster::{Band, Corner},
+    shade,
+};
+
+/// A triangle mesh by reference, in the scene's length unit.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Mesh<'a> {
+    pub vertices: &'a [DVec3],
+    /// Outward normals of any length, one a vertex; if there are fewer, the mesh is shaded flat.
+    pub normals: &'a [DVec3],
+    /// Indices into the vertices. Both sides are drawn.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// Triangles on the screen.
+#[derive(Debug)]
+pub struct Facets {
+    facets: Vec<Facet>,
+    /// Triangles with a bad index or a corner that the camera cannot see.
+    pub skipped: usize,
+}
+
+#[derive(Debug)]
+struct Facet {
+    corners: [Corner; 3],
+    rows: (i64, i64),
+    /// In the camera's frame, towards the side that is seen.
+    normals: [[f32; 3]; 3],
+}
+
+impl Facets {
+    pub fn new(mesh: &Mesh<'_>, camera: &Camera) -> Self {
+        let seen: Vec<_> = mesh.vertices.iter().map(|vertex| camera.look(*vertex)).collect();
+        let smooth = mesh.normals.len() >= mesh.vertices.len();
+        let facet = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|index| index as usize);
+            let corners: [Seen; 3] = [(*seen.get(a)?)?, (*seen.get(b)?)?, (*seen.get(c)?)?];
+            let points = [a, b, c].map(|i| mesh.vertices[i]);
+            let face = (points[1] - points[0]).cross(points[2] - points[0]);
+            let given = if smooth { [a, b, c].map(|i| mesh.normals[i]) } else { [face; 3] };
+            // The winding decides where the face looks only if the normals do not say.
+            let outward = if face.dot(given[0] + given[1] + given[2]) < 0.0 { -face } else { face };
+            let side = if outward.dot(camera.to_eye(points[0])) < 0.0 { -1.0 } else { 1.0 };
+            let normals = given.map(|n| {
+                let n = n.try_normalize().or_else(|| outward.try_normalize()).unwrap_or(DVec3::Z);
+                camera.turn(side * n).as_vec3().to_array()
+            });
+            let corners = corners.map(Corner::new);
+            Some(Facet { corners, rows: Corner::rows(&corners), normals })
+        };
+        let facets: Vec<_> = mesh.triangles.iter().filter_map(facet).collect();
+        let skipped = mesh.triangles.len() - facets.len();
+        Self { facets, skipped }
+    }
+
+    pub fn draw(&self, band: &mut Band<'_>) {
+        let (top, bottom) = (band.top as i64, band.bottom() as i64);
+        for facet in self.facets.iter().filter(|facet| facet.rows.0 < bottom && facet.rows.1 >= top) {
+            let [a, b, c] = facet.normals;
+            band.triangle(&facet.corners, |[u, v, w]| {
+                let n: [f32; 3] = std::array::from_fn(|i| u * a[i] + v * b[i] + w * c[i]);
+                let length = shade::dot(n, n).sqrt();
+                shade::stone(n.map(|x| x / length))
+            });
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Pictures of a simulation: the box, the obstacle's mesh and the particles, coloured by their speed.
+//!
+//! ```text
+//! Camera, box, mesh ──Scene::new──▶ Scene (drawn once) ──frame(particles)──▶ Image ──write_png──▶ PNG
+//! ```
+//!
+//! Everything is drawn on the processor at twice the size and averaged down. Rows are cut into bands of fixed
+//! height, drawn in parallel; within a band the order is fixed, so ties in depth are settled alike every time.
+//!
+//! Invariant: a band depends on its inputs alone, so a picture has the same bits on any number of threads; this
+//! module takes plain slices, opens no file and reads no clock.
+
+mod camera;
+mod colour;
+mod image;
+mod mesh;
+mod overlay;
+mod particles;
+mod raster;
+mod scene;
+mod shade;
+
+use std::{fmt, io};
+
+pub use self::{
+    camera::Camera,
+    colour::{Rgb, UNKNOWN_SPEED, speed_colour},
+    image::Image,
+    mesh::Mesh,
+    particles::Particles,
+    scene::{Legend, Moment, Scene},
+};
+use crate::geom::Aabb;
+
+/// Why a scene could not be set up or a picture not be written.
+#[derive(Debug)]
+pub enum RenderError {
+    /// The box to look at is empty, infinite or a point.
+    Bounds(Aabb),
+    /// Width and height of the picture, outside 16 ..= 8192.
+    Size(u32, u32),
+    /// The legend that we drew is not accepted: a bug of ours.
+    Legend(String),
+    Io(io::Error),
+}
+
+impl fmt::Display for RenderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bounds(Aabb { min, max }) => {
+                write!(f, "cannot look at the box {min} .. {max}: expected finite sides, not all zero")
+            }
+            Self::Size(width, height) => {
+                write!(f, "cannot draw {width} × {height} pixels: expected 16 to 8192 each way")
+            }
+            Self::Legend(reason) => write!(f, "the legend is not valid: {reason}"),
+            Self::Io(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for RenderError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        if let Self::Io(error) = self { Some(error) } else { None }
+    }
+}
+
+impl From<io::Error> for RenderError {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}

@@ -1,0 +1,66 @@
+//! Light: one lamp over the viewer's left shoulder, and light from everywhere.
+//!
+//! Normals are unit vectors in the camera's frame: x right, y up, z towards the eye.
+
+use super::Rgb;
+
+/// Towards the lamp, of unit length.
+const LAMP: [f32; 3] = [-0.452_29, 0.678_434, 0.578_931];
+/// Half-way between the lamp and the eye, of unit length: where spheres gleam.
+const GLEAM: [f32; 3] = [-0.254_519, 0.381_778, 0.888_519];
+const AMBIENT: f32 = 0.52;
+const DIFFUSE: f32 = 0.58;
+
+/// The obstacle's colour: a neutral warm grey.
+const STONE: [f32; 3] = [203.0, 195.0, 184.0];
+
+/// A point of the obstacle's surface.
+pub fn stone(normal: [f32; 3]) -> Rgb {
+    // Some light comes from below, so that undersides keep their shape.
+    let light = AMBIENT + 0.06 * normal[1] + DIFFUSE * dot(normal, LAMP).max(0.0);
+    let gleam = 14.0 * power_16(dot(normal, GLEAM));
+    STONE.map(|channel| byte(channel * light + gleam))
+}
+
+/// A point of a particle; the rim is darker, so that neighbours of one colour stay apart.
+pub fn ball(colour: [f32; 3], normal: [f32; 3]) -> Rgb {
+    let rim = (0.45 + 1.1 * normal[2]).min(1.0);
+    let light = (0.56 + 0.52 * dot(normal, LAMP).max(0.0)) * rim;
+    let gleam = 60.0 * power_16(dot(normal, GLEAM));
+    colour.map(|channel| byte(channel * light + gleam))
+}
+
+pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn power_16(x: f32) -> f32 {
+    let x2 = x.max(0.0) * x;
+    let x4 = x2 * x2;
+    let x8 = x4 * x4;
+    x8 * x8
+}
+
+fn byte(x: f32) -> u8 {
+    // `as` saturates, and turns NaN into 0.
+    (x + 0.5) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lamp_and_gleam_are_unit_vectors() {
+        for v in [LAMP, GLEAM] {
+            assert!((dot(v, v) - 1.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn faces_towards_the_lamp_are_brighter() {
+        assert!(stone(LAMP)[0] > stone([0.0, 0.0, 1.0])[0]);
+        assert!(stone([0.0, 0.0, 1.0])[0] > stone([0.8, -0.6, 0.0])[0]);
+        assert_eq!(ball([0.0; 3], [f32::NAN; 3]), [0; 3]);
+    }
+}

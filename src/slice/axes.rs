@@ -1,0 +1,116 @@
+//! The frame of a plot: where (u, v) lies on the page, and the ticks and labels around it.
+//!
+//! Page units are CSS pixels, y downwards.
+
+use std::fmt::Write;
+
+use glam::DVec2;
+
+use super::{Plane, Window, numbers::ticks};
+
+/// The longest sides of the plotted area.
+const MAX_SIZE: DVec2 = DVec2::new(560.0, 460.0);
+/// A long thin window is stretched to this rather than drawn as a line.
+const MIN_SIDE: f64 = 60.0;
+const TICK: f64 = 5.0;
+/// Room for one label on the horizontal and on the vertical axis.
+const LABEL_SPACING: DVec2 = DVec2::new(46.0, 36.0);
+
+/// The plotted area on the page.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    pub window: Window,
+    pub origin: DVec2,
+    pub size: DVec2,
+}
+
+impl Frame {
+    /// The largest frame with equal scales in both directions, its upper left corner at `origin`.
+    pub fn new(window: Window, origin: DVec2) -> Self {
+        let size = window.size();
+        let scale = (MAX_SIZE / size).min_element();
+        Self { window, origin, size: (size * scale).max(DVec2::splat(MIN_SIDE)).round() }
+    }
+
+    pub fn page(&self, uv: DVec2) -> DVec2 {
+        let t = (uv - self.window.min) / self.window.size();
+        self.origin + self.size * DVec2::new(t.x, 1.0 - t.y)
+    }
+
+    pub fn right(&self) -> f64 {
+        self.origin.x + self.size.x
+    }
+
+    pub fn bottom(&self) -> f64 {
+        self.origin.y + self.size.y
+    }
+}
+
+/// Border, ticks with numbers, and the names of the axes.
+pub fn draw(out: &mut String, frame: &Frame, plane: Plane) {
+    let (right, up) = plane.axis.right_and_up();
+    let Frame { window, origin, size } = *frame;
+    let (left, bottom) = (origin.x, frame.bottom());
+    let count = |axis: usize| ((size[axis] / LABEL_SPACING[axis]) as usize).clamp(2, 9);
+
+    let mut marks = String::new();
+    let mut numbers = String::new();
+    for tick in ticks(window.min.x, window.max.x, count(0)) {
+        let x = frame.page(DVec2::new(tick.value(), 0.0)).x;
+        let _ = write!(marks, "M{x:.2} {bottom}v{TICK}");
+        let _ = writeln!(numbers, r#"<text x="{x:.2}" y="{:.2}">{tick}</text>"#, bottom + TICK + 13.0);
+    }
+    let mut widest = 1;
+    for tick in ticks(window.min.y, window.max.y, count(1)) {
+        let y = frame.page(DVec2::new(0.0, tick.value())).y;
+        let label = tick.to_string();
+        widest = widest.max(label.chars().count());
+        let _ = write!(marks, "M{left} {y:.2}h-{TICK}");
+        let _ = writeln!(
+            numbers,
+            r#"<text x="{:.2}" y="{:.2}" text-anchor="end">{label}</text>"#,
+            left - TICK - 4.0,
+            y + 4.0
+        );
+    }
+    let _ = writeln!(
+        out,
+        r#"<path d="M{left} {}h{}v{}h-{}z{marks}" fill="none" stroke="{INK}"/>"#,
+        origin.y, size.x, size.y, size.x
+    );
+    let _ = write!(
+        out,
+        r#"<g font-size="12" text-anchor="middle">
+{numbers}</g>
+"#
+    );
+    let (x, y) = (left + 0.5 * size.x, bottom + 38.0);
+    let _ = writeln!(
+        out,
+        r#"<text x="{x:.2}" y="{y:.2}" font-size="14" text-anchor="middle">{}</text>"#,
+        right.name()
+    );
+    let (x, y) = (left - TICK - 14.0 - 6.6 * widest as f64, origin.y + 0.5 * size.y + 4.0);
+    let _ = writeln!(
+        out,
+        r#"<text x="{x:.2}" y="{y:.2}" font-size="14" text-anchor="middle">{}</text>"#,
+        up.name()
+    );
+}
+
+/// Lines and text: a little softer than black.
+pub const INK: &str = "#1c1c1c";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_keep_the_shape_of_the_window_and_the_v_axis_points_up() {
+        let window = Window::new(DVec2::new(0.0, 1.0), DVec2::new(2.0, 2.0));
+        let frame = Frame::new(window, DVec2::new(50.0, 40.0));
+        assert_eq!(frame.size, DVec2::new(560.0, 280.0));
+        assert_eq!(frame.page(window.min), DVec2::new(50.0, frame.bottom()));
+        assert_eq!(frame.page(window.max), DVec2::new(frame.right(), 40.0));
+    }
+}

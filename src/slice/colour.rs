@@ -1,0 +1,154 @@
+//! The colours of ω: bands between levels 1, 2, 5 · 10ⁿ, oranges inside and blues outside.
+//!
+//! Levels that shrink by decades keep detail near the surface while far values, often a hundred times larger, share
+//! the outermost bands instead of washing the picture out. Each side has its own largest level because ω is not a
+//! distance: an obstacle may reach +0.2 where its surroundings reach −20. Both ramps darken away from the surface
+//! and differ in hue and in no other respect, so the plot reads for the colour-blind too, and the pale ends stay
+//! apart on paper because the line ω = 0 lies between them.
+
+use super::{Samples, numbers::Decimal};
+
+/// An sRGB colour, 8 bits a channel.
+pub type Rgb = [u8; 3];
+
+/// The colour of places without a value.
+pub const UNDEFINED: Rgb = [214, 214, 214];
+
+/// Levels other than zero on a side: five span a factor of 20 to 25.
+const LEVELS_PER_SIDE: usize = 5;
+/// The ramps from the surface outwards, spread evenly over a side's bands.
+const INSIDE: [Rgb; 3] = [[255, 237, 211], [247, 176, 102], [208, 103, 30]];
+const OUTSIDE: [Rgb; 3] = [[232, 241, 249], [155, 197, 226], [77, 134, 188]];
+
+/// Which ω has which colour: bands are numbered from the lowest ω to the highest, band k below level k.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scale {
+    /// Ascending, zero among them.
+    levels: Vec<Decimal>,
+    values: Vec<f64>,
+    /// Index of the level zero: bands 0..=zero are outside, the others inside.
+    zero: usize,
+}
+
+impl Scale {
+    /// Levels that suit a slice: on each side the highest is just below the 98th percentile of |ω| there.
+    pub fn for_samples(samples: &Samples) -> Self {
+        let side = |sign: f64| {
+            let magnitudes = samples.omega.iter().map(|w| w * sign).filter(|w| *w > 0.0 && w.is_finite());
+            let mut level = Decimal::below(percentile_98(magnitudes.collect()));
+            let mut levels = Vec::new();
+            while let Some(top) = level
+                && levels.len() < LEVELS_PER_SIDE
+            {
+                levels.push(top);
+                level = Some(top.smaller());
+            }
+            levels
+        };
+        let (outside, inside) = (side(-1.0), side(1.0));
+        let zero = outside.len();
+        let mut levels: Vec<_> = outside.iter().map(|level| level.negated()).collect();
+        levels.push(Decimal::ZERO);
+        levels.extend(inside.iter().rev());
+        let values = levels.iter().map(|level| level.value()).collect();
+        Self { levels, values, zero }
+    }
+
+    /// The levels in ascending order; zero is one of them.
+    pub fn levels(&self) -> &[f64] {
+        &self.values
+    }
+
+    pub(super) fn decimals(&self) -> &[Decimal] {
+        &self.levels
+    }
+
+    /// One more than the levels.
+    pub fn bands(&self) -> usize {
+        self.levels.len() + 1
+    }
+
+    /// The band that holds a value; none for NaN.
+    pub fn band(&self, omega: f64) -> Option<usize> {
+        (!omega.is_nan()).then(|| self.values.partition_point(|level| *level <= omega))
+    }
+
+    /// How far a band is from the surface, 1 to 0 outside and 0 to 1 inside, and whether it is inside.
+    pub fn depth(&self, band: usize) -> (bool, f64) {
+        let part = |k: usize, last: usize| if last == 0 { 0.5 } else { k.min(last) as f64 / last as f64 };
+        match band.checked_sub(self.zero + 1) {
+            Some(k) => (true, part(k, self.levels.len() - self.zero - 1)),
+            None => (false, part(self.zero - band, self.zero)),
+        }
+    }
+
+    pub fn band_colour(&self, band: usize) -> Rgb {
+        let (inside, depth) = self.depth(band);
+        ramp(if inside { &INSIDE } else { &OUTSIDE }, depth)
+    }
+
+    /// The colour of a value; [`UNDEFINED`] for NaN.
+    pub fn colour(&self, omega: f64) -> Rgb {
+        self.band(omega).map_or(UNDEFINED, |band| self.band_colour(band))
+    }
+}
+
+fn percentile_98(mut magnitudes: Vec<f64>) -> f64 {
+    if magnitudes.is_empty() {
+        return 0.0;
+    }
+    let rank = (magnitudes.len() - 1) * 98 / 100;
+    *magnitudes.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+/// A piecewise linear ramp at t in [0, 1].
+fn ramp(anchors: &[Rgb; 3], t: f64) -> Rgb {
+    let (from, to, t) =
+        if t < 0.5 { (anchors[0], anchors[1], 2.0 * t) } else { (anchors[1], anchors[2], 2.0 * t - 1.0) };
+    std::array::from_fn(|i| (f64::from(from[i]) * (1.0 - t) + f64::from(to[i]) * t).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::slice::{Axis, Plane, Window};
+
+    fn scale(omega: &[f64]) -> Scale {
+        Scale::for_samples(&Samples {
+            plane: Plane::new(Axis::Z, 0.0),
+            window: Window::new(DVec2::ZERO, DVec2::ONE),
+            columns: omega.len(),
+            rows: 1,
+            omega: omega.to_vec(),
+        })
+    }
+
+    #[test]
+    fn each_side_has_its_own_round_levels() {
+        let scale = scale(&[-7.0, 0.16]);
+        assert_eq!(scale.levels(), [-5.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.005, 0.01, 0.02, 0.05, 0.1]);
+    }
+
+    #[test]
+    fn ends_of_the_scale_have_the_ends_of_the_ramps() {
+        let scale = scale(&[-7.0, 0.16]);
+        assert_eq!(scale.colour(-1e9), OUTSIDE[2]);
+        assert_eq!(scale.colour(-1e-9), OUTSIDE[0]);
+        assert_eq!(scale.colour(0.0), INSIDE[0], "the surface belongs to the inside");
+        assert_eq!(scale.colour(f64::INFINITY), INSIDE[2]);
+        assert_eq!(scale.colour(f64::NAN), UNDEFINED);
+    }
+
+    #[test]
+    fn slices_of_one_side_or_of_nothing_have_a_scale() {
+        assert_eq!(scale(&[-1.0, -3.0]).levels().last(), Some(&0.0));
+        assert_eq!(scale(&[3.0]).levels()[0], 0.0);
+        for odd in [&[f64::NAN, f64::INFINITY][..], &[0.0], &[]] {
+            let scale = scale(odd);
+            assert_eq!((scale.levels(), scale.bands()), (&[0.0][..], 2));
+            assert_ne!(scale.colour(1.0), scale.colour(-1.0));
+        }
+    }
+}

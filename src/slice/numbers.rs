@@ -1,0 +1,129 @@
+//! Round numbers, as people write them on axes: 1, 2 or 5 times a power of ten, and their multiples.
+//!
+//! Invariant: values are read back from decimal digits, so 0.05 is the double nearest to 0.05 and its label is
+//! exactly `0.05`.
+
+use std::fmt;
+
+/// mantissa · 10^exponent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decimal {
+    pub mantissa: i64,
+    pub exponent: i32,
+}
+
+impl Decimal {
+    pub const ZERO: Self = Self { mantissa: 0, exponent: 0 };
+
+    pub fn value(self) -> f64 {
+        // The digits of a number always parse.
+        format!("{}e{}", self.mantissa, self.exponent).parse().unwrap_or(f64::NAN)
+    }
+
+    pub fn negated(self) -> Self {
+        Self { mantissa: -self.mantissa, ..self }
+    }
+
+    /// The largest 1, 2 or 5 · 10ⁿ that is not above `x`; none for zero, negative and non-finite numbers.
+    pub fn below(x: f64) -> Option<Self> {
+        if !(x > 0.0 && x.is_finite()) {
+            return None;
+        }
+        // One decade lower than the logarithm says, in case that was rounded up.
+        let mut best = Self { mantissa: 1, exponent: libm::log10(x).floor() as i32 - 1 };
+        while best.larger().value() <= x {
+            best = best.larger();
+        }
+        Some(best)
+    }
+
+    fn larger(self) -> Self {
+        match self.mantissa {
+            1 => Self { mantissa: 2, ..self },
+            2 => Self { mantissa: 5, ..self },
+            _ => Self { mantissa: 1, exponent: self.exponent + 1 },
+        }
+    }
+
+    /// The next smaller one in the series 1, 2, 5.
+    pub fn smaller(self) -> Self {
+        match self.mantissa {
+            5 => Self { mantissa: 2, ..self },
+            2 => Self { mantissa: 1, ..self },
+            _ => Self { mantissa: 5, exponent: self.exponent - 1 },
+        }
+    }
+}
+
+impl fmt::Display for Decimal {
+    /// Plain digits where they are few, with a true minus sign; otherwise like 5e−7.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.mantissa < 0 { "−" } else { "" };
+        let digits = self.mantissa.unsigned_abs();
+        match self.exponent {
+            _ if digits == 0 => write!(f, "0"),
+            0..=4 => write!(f, "{sign}{}", digits * 10u64.pow(self.exponent as u32)),
+            -5..=-1 => {
+                let places = -self.exponent as usize;
+                let one = 10u64.pow(places as u32);
+                write!(f, "{sign}{}.{:0places$}", digits / one, digits % one)
+            }
+            e => write!(f, "{sign}{digits}e{}{}", if e < 0 { "−" } else { "" }, e.unsigned_abs()),
+        }
+    }
+}
+
+/// Between about `count`/2 and `count` round numbers from `min` to `max`, evenly spaced and of one precision.
+pub fn ticks(min: f64, max: f64, count: usize) -> Vec<Decimal> {
+    let span = max - min;
+    let Some(mut step) = Decimal::below(span / count as f64) else { return Vec::new() };
+    while span / step.value() > count as f64 {
+        step = step.larger();
+    }
+    // Rounding must not lose a tick on the border itself.
+    let slack = 1e-9 * span;
+    let first = ((min - slack) / step.value()).ceil();
+    let last = ((max + slack) / step.value()).floor();
+    if !(first.abs() < 1e15 && last.abs() < 1e15) {
+        return Vec::new();
+    }
+    (first as i64..=last as i64)
+        .map(|k| Decimal { mantissa: k * step.mantissa, exponent: step.exponent })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check_ticks(min: f64, max: f64, expected: &str) {
+        let labels: Vec<_> = ticks(min, max, 7).iter().map(Decimal::to_string).collect();
+        assert_eq!(labels.join(" "), expected);
+    }
+
+    #[test]
+    fn ticks_are_round_and_reach_both_ends() {
+        check_ticks(0.8, 2.2, "0.8 1.0 1.2 1.4 1.6 1.8 2.0 2.2");
+        check_ticks(0.0, 3.0, "0 0.5 1.0 1.5 2.0 2.5 3.0");
+        check_ticks(-1.0, 1.0, "−1.0 −0.5 0 0.5 1.0");
+        check_ticks(-30.0, 130.0, "0 50 100");
+        check_ticks(0.0, 3e-7, "0 5e−8 10e−8 15e−8 20e−8 25e−8 30e−8");
+        check_ticks(f64::NAN, 1.0, "");
+        check_ticks(1.0, 1.0, "");
+    }
+
+    #[test]
+    fn the_series_is_one_two_five() {
+        assert_eq!(Decimal::below(0.16).unwrap().to_string(), "0.1");
+        assert_eq!(Decimal::below(1000.0).unwrap().to_string(), "1000");
+        assert_eq!(Decimal::below(4.99).unwrap().to_string(), "2");
+        assert_eq!(Decimal::below(0.05).unwrap().value(), 0.05);
+        assert_eq!(Decimal::below(0.0), None);
+        assert_eq!(Decimal::below(f64::INFINITY), None);
+        let one = Decimal { mantissa: 1, exponent: 0 };
+        let down = std::iter::successors(Some(one), |level| Some(level.smaller()));
+        let labels: Vec<_> = down.take(5).map(|level| level.to_string()).collect();
+        assert_eq!(labels.join(" "), "1 0.5 0.2 0.1 0.05");
+    }
+}

@@ -1,0 +1,139 @@
+//! Where a slice lies: a plane across one axis, a window in it, and how densely it is sampled.
+//!
+//! In the plane the coordinates are (u, v), u to the right and v upwards: (x, y) for z = c, (x, z) for y = c and
+//! (y, z) for x = c, so that z points up whenever it is in the picture.
+
+use std::fmt;
+
+use glam::{DVec2, DVec3};
+
+use super::SliceError;
+use crate::geom::Aabb;
+
+/// A coordinate axis of the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    /// The axis's place in a vector: 0, 1 or 2.
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    pub const fn name(self) -> &'static str {
+        ["x", "y", "z"][self as usize]
+    }
+
+    /// The axes drawn to the right and upwards in a slice across this one.
+    pub const fn right_and_up(self) -> (Self, Self) {
+        match self {
+            Self::X => (Self::Y, Self::Z),
+            Self::Y => (Self::X, Self::Z),
+            Self::Z => (Self::X, Self::Y),
+        }
+    }
+}
+
+/// The plane `axis = value`, in the scene's length unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    pub axis: Axis,
+    pub value: f64,
+}
+
+impl Plane {
+    pub const fn new(axis: Axis, value: f64) -> Self {
+        Self { axis, value }
+    }
+
+    /// The point of space at (u, v) of the plane.
+    pub fn point(&self, uv: DVec2) -> DVec3 {
+        match self.axis {
+            Axis::X => DVec3::new(self.value, uv.x, uv.y),
+            Axis::Y => DVec3::new(uv.x, self.value, uv.y),
+            Axis::Z => DVec3::new(uv.x, uv.y, self.value),
+        }
+    }
+
+    /// The rectangle a box projects to along the plane's axis, whether or not the plane cuts the box.
+    pub fn window(&self, over: &Aabb) -> Window {
+        let (right, up) = self.axis.right_and_up();
+        let pick = |p: DVec3| DVec2::new(p[right.index()], p[up.index()]);
+        Window { min: pick(over.min), max: pick(over.max) }
+    }
+}
+
+impl fmt::Display for Plane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}", self.axis.name(), self.value)
+    }
+}
+
+/// The rectangle of the plane that is drawn, in (u, v).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Window {
+    pub min: DVec2,
+    pub max: DVec2,
+}
+
+impl Window {
+    pub const fn new(min: DVec2, max: DVec2) -> Self {
+        Self { min, max }
+    }
+
+    pub fn size(&self) -> DVec2 {
+        self.max - self.min
+    }
+
+    /// Columns and rows of samples for `samples` along the longer side and nearly square cells.
+    ///
+    /// # Errors
+    /// [`SliceError::Window`] for a window without area or with infinite sides, [`SliceError::Resolution`] for
+    /// fewer than 2 or more than 8192 samples.
+    pub fn grid(&self, samples: usize) -> Result<(usize, usize), SliceError> {
+        let size = self.size();
+        if !(size.is_finite() && self.min.is_finite() && size.x > 0.0 && size.y > 0.0) {
+            return Err(SliceError::Window(*self));
+        }
+        if !(2..=8192).contains(&samples) {
+            return Err(SliceError::Resolution(samples));
+        }
+        let cells = (samples - 1) as f64;
+        let along = |side: f64| (cells * side / size.max_element()).round().max(1.0) as usize + 1;
+        Ok((along(size.x), along(size.y)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_plane_puts_its_own_axis_at_the_value() {
+        for (axis, point) in
+            [(Axis::X, [9.0, 1.0, 2.0]), (Axis::Y, [1.0, 9.0, 2.0]), (Axis::Z, [1.0, 2.0, 9.0])]
+        {
+            let plane = Plane::new(axis, 9.0);
+            assert_eq!(plane.point(DVec2::new(1.0, 2.0)).to_array(), point);
+            let window = plane.window(&Aabb::new(DVec3::ZERO, DVec3::from_array(point)));
+            assert_eq!(window.max, DVec2::new(1.0, 2.0));
+        }
+        assert_eq!(Plane::new(Axis::Z, 0.5).to_string(), "z = 0.5");
+    }
+
+    #[test]
+    fn bad_windows_and_resolutions_are_errors() {
+        let flat = Window::new(DVec2::ZERO, DVec2::new(1.0, 0.0));
+        assert!(matches!(flat.grid(10), Err(SliceError::Window(_))));
+        let endless = Window::new(DVec2::ZERO, DVec2::new(f64::INFINITY, 1.0));
+        assert!(matches!(endless.grid(10), Err(SliceError::Window(_))));
+        let unit = Window::new(DVec2::ZERO, DVec2::ONE);
+        assert!(matches!(unit.grid(1), Err(SliceError::Resolution(1))));
+        let wide = Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0));
+        assert_eq!(wide.grid(101).unwrap(), (101, 51));
+    }
+}

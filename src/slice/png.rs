@@ -1,0 +1,51 @@
+//! The drawing as pixels: the same SVG, rasterised with the one font that is built in.
+//!
+//! Invariant: no font of the system is looked at, so the picture does not depend on the machine.
+
+use std::{
+    io,
+    sync::{Arc, LazyLock},
+};
+
+use resvg::{
+    tiny_skia::{Pixmap, Transform},
+    usvg::{Options, Tree, fontdb},
+};
+
+use super::SliceError;
+
+/// The family that [`super::svg`] asks for first and that the rasteriser has.
+pub(super) const FONT_FAMILY: &str = "Ubuntu";
+
+static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
+    let mut fonts = fontdb::Database::new();
+    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
+    Arc::new(fonts)
+});
+
+/// Writes a drawing as an RGB PNG with `scale` pixels per unit of the drawing.
+pub(super) fn write(svg: &str, scale: f32, out: impl io::Write) -> Result<(), SliceError> {
+    if !(0.1..=16.0).contains(&scale) {
+        return Err(SliceError::Scale(scale));
+    }
+    let tree = parse(svg)?;
+    let [width, height] = [tree.size().width(), tree.size().height()].map(|x| (x * scale).round() as u32);
+    let mut pixmap = Pixmap::new(width, height).ok_or(SliceError::Scale(scale))?;
+    resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixmap.as_mut());
+
+    // The drawing has an opaque ground, so premultiplied colours are the colours.
+    let rgb: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut encoder = png::Encoder::new(out, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header().map_err(io::Error::from)?;
+    writer.write_image_data(&rgb).map_err(io::Error::from)?;
+    writer.finish().map_err(io::Error::from)?;
+    Ok(())
+}
+
+pub(super) fn parse(svg: &str) -> Result<Tree, SliceError> {
+    let options =
+        Options { font_family: FONT_FAMILY.to_owned(), fontdb: Arc::clone(&FONTS), ..Options::default() };
+    Tree::from_str(svg, &options).map_err(|error| SliceError::Drawing(error.to_string()))
+}

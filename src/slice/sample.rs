@@ -1,0 +1,109 @@
+//! ω on a regular grid of a plane.
+//!
+//! Invariant: a row is evaluated in one batch, whatever the number of threads, so the samples have the same bits
+//! on one thread and on many.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::{Plane, SliceError, Window};
+use crate::field::{Field, Points};
+
+/// ω at the nodes of a grid: row 0 at the bottom of the window, column 0 at its left border.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Samples {
+    pub plane: Plane,
+    pub window: Window,
+    pub columns: usize,
+    pub rows: usize,
+    /// `rows × columns` values, row by row.
+    pub omega: Vec<f64>,
+}
+
+/// Samples a field over a window of a plane, with `samples` points along the window's longer side.
+///
+/// # Errors
+/// Those of [`Window::grid`].
+pub fn sample(
+    field: &dyn Field,
+    plane: Plane,
+    window: Window,
+    samples: usize,
+) -> Result<Samples, SliceError> {
+    let (columns, rows) = window.grid(samples)?;
+    Ok(sample_grid(field, plane, window, columns, rows))
+}
+
+/// As [`sample`] with the columns and rows given (at least two each); for cells that are not square.
+pub(super) fn sample_grid(
+    field: &dyn Field,
+    plane: Plane,
+    window: Window,
+    columns: usize,
+    rows: usize,
+) -> Samples {
+    let mut samples = Samples { plane, window, columns, rows, omega: Vec::new() };
+    let mut omega = vec![0.0; columns * rows];
+    omega.par_chunks_mut(columns).enumerate().for_each(|(row, out)| {
+        let points: Vec<_> = (0..columns).map(|column| plane.point(samples.position(column, row))).collect();
+        let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<_>>());
+        field.omega_many(Points::new(&x, &y, &z), out);
+    });
+    samples.omega = omega;
+    samples
+}
+
+impl Samples {
+    pub fn get(&self, column: usize, row: usize) -> f64 {
+        self.omega[row * self.columns + column]
+    }
+
+    /// (u, v) of a node; the last column and row lie on the window's border exactly.
+    pub fn position(&self, column: usize, row: usize) -> DVec2 {
+        let along = |i: usize, n: usize, from: f64, to: f64| {
+            if i + 1 == n { to } else { from + (to - from) * (i as f64 / (n - 1) as f64) }
+        };
+        let Window { min, max } = self.window;
+        DVec2::new(along(column, self.columns, min.x, max.x), along(row, self.rows, min.y, max.y))
+    }
+
+    /// True where some corner of the cell right of and above this node has no value.
+    pub fn cell_is_undefined(&self, column: usize, row: usize) -> bool {
+        [(0, 0), (1, 0), (0, 1), (1, 1)].iter().any(|&(i, j)| self.get(column + i, row + j).is_nan())
+    }
+
+    /// Number of nodes where ω is NaN.
+    pub fn undefined(&self) -> usize {
+        self.omega.iter().filter(|w| w.is_nan()).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::tests::disc, *};
+    use crate::slice::Axis;
+
+    #[test]
+    fn nodes_hold_the_value_of_the_field_there() {
+        let plane = Plane::new(Axis::Y, 0.25);
+        let window = Window::new(DVec2::new(-1.0, -0.5), DVec2::new(1.0, 0.5));
+        let samples = sample(&disc(), plane, window, 9).unwrap();
+        assert_eq!((samples.columns, samples.rows), (9, 5));
+        for (column, row) in [(0, 0), (3, 2), (8, 4)] {
+            let expected = disc().omega(plane.point(samples.position(column, row)));
+            assert_eq!(samples.get(column, row), expected);
+        }
+        assert_eq!(samples.position(8, 4), window.max);
+    }
+
+    #[test]
+    fn samples_have_the_same_bits_on_one_and_two_threads() {
+        let plane = Plane::new(Axis::Z, 0.0);
+        let window = Window::new(DVec2::splat(-1.0), DVec2::ONE);
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| sample(&disc(), plane, window, 65).unwrap())
+        };
+        assert_eq!(on(1), on(2));
+    }
+}

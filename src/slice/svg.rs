@@ -1,0 +1,319 @@
+//! A slice as an SVG document: filled bands, isolines, the surface line, axes and a colour bar.
+//!
+//! Bands are painted over each other from the lowest ω upwards, each as the whole region above its level, so no
+//! gap shows between neighbours at any magnification.
+
+use std::fmt::Write;
+
+use glam::DVec2;
+
+use super::{
+    Outline, Rgb, Samples, Scale,
+    axes::{self, Frame, INK},
+    isolines::outlines,
+    labels::{Label, Placer},
+    paths,
+};
+use crate::field::Field;
+
+const LEFT: f64 = 72.0;
+const TOP: f64 = 44.0;
+const BELOW: f64 = 52.0;
+/// The colour bar: gap before it, its width, room for its numbers and its title.
+const BAR: [f64; 4] = [26.0, 16.0, 52.0, 22.0];
+/// The height of a band in the colour bar, and the least for a legible number.
+const BAND: [f64; 2] = [26.0, 15.0];
+
+/// The slice as an SVG document; `name` becomes part of the title. The samples must be the field's own.
+pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
+    let frame = Frame::new(samples.window, DVec2::new(LEFT, TOP));
+    let scale = Scale::for_samples(samples);
+    let bar = Bar::new(&frame, &scale);
+    let width = frame.right() + BAR.iter().sum::<f64>() + 8.0;
+    let height = frame.bottom().max(bar.bottom) + BELOW;
+
+    let mut out = format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="Ubuntu, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif" font-weight="300" fill="{INK}">
+<title>{0}, {1}</title>
+<rect width="{width}" height="{height}" fill="#fff"/>
+<text x="{LEFT}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1}</tspan></text>
+"##,
+        escaped(name),
+        samples.plane,
+        TOP - 16.0
+    );
+    bands_and_lines(&mut out, field, samples, &frame, &scale);
+    undefined_cells(&mut out, samples, &frame);
+    axes::draw(&mut out, &frame, samples.plane);
+    bar.draw(&mut out, &scale);
+    out.push_str("</svg>\n");
+    out
+}
+
+fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame: &Frame, scale: &Scale) {
+    let levels: Vec<Vec<Outline>> =
+        scale.levels().iter().map(|&level| outlines(field, samples, level)).collect();
+    let Frame { origin, size, .. } = *frame;
+    let _ = writeln!(
+        out,
+        r#"<rect x="{}" y="{}" width="{}" height="{}" fill="{}"/>"#,
+        origin.x,
+        origin.y,
+        size.x,
+        size.y,
+        hex(scale.band_colour(0))
+    );
+    for (k, outlines) in levels.iter().enumerate() {
+        let mut path = String::new();
+        for outline in outlines {
+            paths::append(&mut path, &on_page(frame, &outline.points), true);
+        }
+        if !path.is_empty() {
+            let colour = hex(scale.band_colour(k + 1));
+            let _ = writeln!(out, r#"<path d="{path}" fill="{colour}" fill-rule="evenodd"/>"#);
+        }
+    }
+
+    let lines: Vec<Vec<(Vec<DVec2>, bool)>> = levels
+        .iter()
+        .map(|outlines| {
+            let lines = outlines.iter().flat_map(Outline::isolines);
+            lines.map(|line| (on_page(frame, &line.points), line.closed)).collect()
+        })
+        .collect();
+    let draw = |out: &mut String, lines: &[(Vec<DVec2>, bool)], style: &str| {
+        let mut path = String::new();
+        for (points, closed) in lines {
+            paths::append(&mut path, points, *closed);
+        }
+        if !path.is_empty() {
+            let _ = writeln!(out, r#"<path d="{path}" fill="none" stroke-linejoin="round" {style}/>"#);
+        }
+    };
+    let zero = scale.levels().iter().position(|&level| level == 0.0).unwrap_or(0);
+    for (_, lines) in lines.iter().enumerate().filter(|(k, _)| *k != zero) {
+        draw(out, lines, r##"stroke="#222" stroke-opacity="0.42" stroke-width="0.5""##);
+    }
+    draw(out, &lines[zero], r##"stroke="#111" stroke-width="1.8""##);
+    labels(out, frame, scale, zero, &lines);
+}
+
+fn labels(out: &mut String, frame: &Frame, scale: &Scale, zero: usize, lines: &[Vec<(Vec<DVec2>, bool)>]) {
+    let lines: Vec<Vec<Vec<DVec2>>> =
+        lines.iter().map(|level| level.iter().map(|(points, _)| points.clone()).collect()).collect();
+    let mut placer = Placer::new(frame, &lines);
+    let mut text = String::new();
+    for (k, level) in scale.decimals().iter().enumerate().filter(|(k, _)| *k != zero) {
+        let Some(Label { at, angle, text: label }) = placer.place(k, &level.to_string()) else {
+            continue;
+        };
+        // The halo has the colour of the ground, so the line seems to be interrupted.
+        let _ = writeln!(
+            text,
+            r#"<text transform="translate({:.2} {:.2}) rotate({angle:.1})" y="3.4" stroke="{}">{label}</text>"#,
+            at.x,
+            at.y,
+            hex(mean(scale.band_colour(k), scale.band_colour(k + 1)))
+        );
+    }
+    if !text.is_empty() {
+        let _ = write!(
+            out,
+            r#"<g font-size="10" font-weight="400" text-anchor="middle" paint-order="stroke" stroke-width="3.5" stroke-linejoin="round">
+{text}</g>
+"#
+        );
+    }
+}
+
+/// Grey hatching over every cell with a corner that has no value; cells side by side make one rectangle.
+fn undefined_cells(out: &mut String, samples: &Samples, frame: &Frame) {
+    if samples.undefined() == 0 {
+        return;
+    }
+    let mut path = String::new();
+    for row in 0..samples.rows - 1 {
+        let mut column = 0;
+        while column + 1 < samples.columns {
+            let run =
+                (column..samples.columns - 1).take_while(|&i| samples.cell_is_undefined(i, row)).count();
+            if run > 0 {
+                let low = frame.page(samples.position(column, row));
+                let high = frame.page(samples.position(column + run, row + 1));
+                let _ = write!(path, "M{:.2} {:.2}H{:.2}V{:.2}H{:.2}z", low.x, low.y, high.x, high.y, low.x);
+            }
+            column += run.max(1);
+        }
+    }
+    let [r, g, b] = super::UNDEFINED;
+    let _ = writeln!(
+        out,
+        r##"<pattern id="undefined" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="6" height="6" fill="rgb({r},{g},{b})"/><rect width="1.2" height="6" fill="#8c8c8c"/></pattern>
+<path d="{path}" fill="url(#undefined)" shape-rendering="crispEdges"/>"##
+    );
+}
+
+/// The colour bar: bands of one height, pointed ends for what lies beyond the last levels.
+struct Bar {
+    left: f64,
+    band: f64,
+    bottom: f64,
+}
+
+impl Bar {
+    fn new(frame: &Frame, scale: &Scale) -> Self {
+        let bands = scale.bands() as f64;
+        let band = (frame.size.y / bands).clamp(BAND[1], BAND[0]).floor();
+        // Centred beside the plot; below its upper edge if the plot is lower than the bar.
+        let top = frame.origin.y + (0.5 * (frame.size.y - bands * band)).max(0.0).round();
+        Self { left: frame.right() + BAR[0], band, bottom: top + bands * band }
+    }
+
+    /// The lower border of a band.
+    fn border(&self, band: usize) -> f64 {
+        self.bottom - self.band * band as f64
+    }
+
+    fn draw(&self, out: &mut String, scale: &Scale) {
+        let (left, width, band) = (self.left, BAR[1], self.band);
+        let (right, middle, bands) = (left + width, left + 0.5 * width, scale.bands());
+        for k in 0..bands {
+            let (low, high) = (self.border(k), self.border(k + 1));
+            let shape = match k {
+                0 => format!("M{left} {high}h{width}L{middle} {low}z"),
+                _ if k + 1 == bands => format!("M{left} {low}h{width}L{middle} {high}z"),
+                _ => format!("M{left} {low}h{width}v-{band}h-{width}z"),
+            };
+            let _ = writeln!(out, r#"<path d="{shape}" fill="{}"/>"#, hex(scale.band_colour(k)));
+        }
+        let (first, last) = (self.border(1), self.border(bands - 1));
+        let (tail, tip) = (self.border(0), self.border(bands));
+        let _ = writeln!(
+            out,
+            r#"<path d="M{left} {first}L{middle} {tail}L{right} {first}V{last}L{middle} {tip}L{left} {last}z" fill="none" stroke="{INK}" stroke-width="0.8"/>
+<g font-size="12">"#
+        );
+        let mut zero = 0.0;
+        for (k, level) in scale.decimals().iter().enumerate() {
+            let y = self.border(k + 1);
+            let weight = if level.mantissa == 0 { 1.8 } else { 0.8 };
+            if level.mantissa == 0 {
+                zero = y;
+            }
+            let _ = writeln!(
+                out,
+                r#"<path d="M{left} {y}h{}" stroke="{INK}" stroke-width="{weight}"/><text x="{}" y="{}">{level}</text>"#,
+                width + 4.0,
+                right + 8.0,
+                y + 4.0
+            );
+        }
+        let x = right + BAR[2] + 4.0;
+        for (y, text) in
+            [(0.5 * (zero + tip), "inside, ω &gt; 0"), (0.5 * (zero + tail), "outside, ω &lt; 0")]
+        {
+            let _ = writeln!(
+                out,
+                r#"<text transform="translate({x} {y:.2}) rotate(-90)" text-anchor="middle">{text}</text>"#
+            );
+        }
+        out.push_str("</g>\n");
+    }
+}
+
+fn on_page(frame: &Frame, points: &[DVec2]) -> Vec<DVec2> {
+    points.iter().map(|&uv| frame.page(uv)).collect()
+}
+
+fn hex([r, g, b]: Rgb) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+fn mean(a: Rgb, b: Rgb) -> Rgb {
+    std::array::from_fn(|i| a[i].midpoint(b[i]))
+}
+
+/// Text for XML: markup characters escaped, control characters left out.
+fn escaped(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars().filter(|c| !c.is_control()) {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            _ => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::{
+        super::tests::{disc, field, pawn},
+        *,
+    };
+    use crate::slice::{Axis, DEFAULT_SAMPLES, Plane, Window, png, sample, write_png};
+
+    fn pawn_window() -> Window {
+        Window::new(DVec2::new(0.8, -0.1), DVec2::new(2.2, 1.6))
+    }
+
+    fn plot(field: &dyn Field, name: &str) -> String {
+        svg(field, name, &sample(field, Plane::new(Axis::Y, 1.5), pawn_window(), DEFAULT_SAMPLES).unwrap())
+    }
+
+    #[test]
+    fn drawings_are_well_formed_and_small() {
+        let text = plot(&pawn(), "pawn");
+        assert!(png::parse(&text).is_ok());
+        assert!(text.len() < 60_000, "{} bytes", text.len());
+        for expected in ["<title>pawn, y = 1.5</title>", ">−0.5</text>", ">1.2</text>", "inside, ω &gt; 0"]
+        {
+            assert!(text.contains(expected), "no {expected}");
+        }
+    }
+
+    #[test]
+    fn names_cannot_break_the_document() {
+        let text = plot(&disc(), "a<b & \"c\"\u{1}");
+        assert!(png::parse(&text).is_ok());
+        assert!(text.contains("a&lt;b &amp; &quot;c&quot;,"));
+    }
+
+    #[test]
+    fn fields_without_values_or_surface_are_drawn() {
+        for f in [|_: DVec3| f64::NAN, |_: DVec3| f64::INFINITY, |_: DVec3| 0.0, |p: DVec3| p.x.sqrt() - 1e3]
+        {
+            assert!(png::parse(&plot(&field(f), "odd")).is_ok());
+        }
+        let half = plot(&field(|p| (p.x - 1.5).sqrt() - 0.4), "root");
+        assert!(half.contains("url(#undefined)"));
+    }
+
+    #[test]
+    fn pictures_decode_to_the_size_asked_for_and_are_the_same_on_two_threads() {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut bytes = Vec::new();
+            let plane = Plane::new(Axis::Y, 1.5);
+            pool.install(|| write_png(&pawn(), "pawn", plane, pawn_window(), 80, 0.5, &mut bytes)).unwrap();
+            bytes
+        };
+        let bytes = on(1);
+        assert!(bytes == on(2));
+        let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), (288, 278));
+        assert_eq!(pixels[..3], [255, 255, 255]);
+        let mut nothing = Vec::new();
+        assert!(
+            write_png(&pawn(), "", Plane::new(Axis::X, 0.0), pawn_window(), 8, f32::NAN, &mut nothing)
+                .is_err()
+        );
+    }
+}
