@@ -12,7 +12,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    Grid, Mesh, MeshError, Work,
+    Grid, Mesh, MeshError,
     cases::{CASES, EDGES, edge},
     collapse::{self, AtNode},
     layer::{EdgeRows, Layer, RowPoints, Shape, set_positions, shifted},

@@ -66,10 +66,10 @@ impl std::error::Error for GridError {}
 /// Cells between a solid's bounds and the low side of its padded grid. Above one half, so that bounds which
 /// err by half a cell still hold the solid; irrational and different on each axis, so that neither flat faces
 /// nor planes of symmetry (x = y, the middle plane) fall onto nodes, where ω = 0 would make slivers.
-const LOW_MARGIN: DVec3 = DVec3::new(0.618_033_988_749_895, 0.553_241_077_386_224, 0.681_792_830_507_429);
+const LOW_MARGIN: DVec3 = DVec3::new(0.618_033_988_749_895, 0.553_241_077_386_224, 0.587_401_051_968_199);
 
 /// Cells that both margins of an axis take together.
-const BOTH_MARGINS: f64 = 1.234_567_891_011_121;
+const BOTH_MARGINS: f64 = 1.370_818_339_168_115;
 
 impl Grid {
     /// Fewer cells along the longest side leave no room for the margins.
