@@ -103,8 +103,8 @@ fn face_segments(inside: u8, face: usize, ambiguous: Ambiguous) -> Vec<(usize, u
 /// Closed loops of crossed edges, given the decision for each face.
 fn loops(inside: u8, ambiguous: [Ambiguous; 6]) -> Vec<Vec<usize>> {
     let mut next = [None; EDGES];
-    for face in 0..6 {
-        for (from, to) in face_segments(inside, face, ambiguous[face]) {
+    for (face, decision) in ambiguous.into_iter().enumerate() {
+        for (from, to) in face_segments(inside, face, decision) {
             next[from] = Some(to);
         }
     }

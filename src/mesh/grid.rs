@@ -93,10 +93,10 @@ impl Grid {
         };
         check_side(side, bounds)?;
         let mut cells = [0; 3];
-        for axis in 0..3 {
+        for (axis, count) in cells.iter_mut().enumerate() {
             // The longest axis gives the whole number asked for only up to rounding.
             let needed = bounds.size()[axis] / side + BOTH_MARGINS;
-            cells[axis] = cell_count((needed - 1e-6).ceil())?;
+            *count = cell_count((needed - 1e-6).ceil())?;
         }
         let min = bounds.min - side * LOW_MARGIN;
         let counts = DVec3::from_array(cells.map(|n| n as f64));
@@ -120,8 +120,8 @@ impl Grid {
         };
         check_side(side, domain)?;
         let mut cells = [0; 3];
-        for axis in 0..3 {
-            cells[axis] = cell_count((domain.size()[axis] / side - 1e-6).ceil().max(1.0))?;
+        for (axis, count) in cells.iter_mut().enumerate() {
+            *count = cell_count((domain.size()[axis] / side - 1e-6).ceil().max(1.0))?;
         }
         let grid = Self { bounds: *domain, cells };
         check_side(grid.spacing().min_element(), domain)?;

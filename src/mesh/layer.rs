@@ -44,11 +44,12 @@ pub(super) struct Layer {
 pub(super) struct RowPoints {
     y: Vec<f64>,
     z: Vec<f64>,
+    runs: Vec<Run>,
 }
 
 impl RowPoints {
     pub(super) fn new(shape: Shape) -> Self {
-        Self { y: vec![0.0; shape.nodes[0]], z: vec![0.0; shape.nodes[0]] }
+        Self { y: vec![0.0; shape.nodes[0]], z: vec![0.0; shape.nodes[0]], runs: Vec::new() }
     }
 }
 
@@ -83,13 +84,10 @@ impl Layer {
             scratch.y.fill(nodes[1][row]);
             let inside = &mut self.inside[(row + 1) * self.shape.words..][..self.shape.words];
             let omega = &mut self.omega[row * width..][..width];
-            let touched: Vec<&[Brick]> = bricks
-                .layers_at(plane)
-                .flat_map(|layer| bricks.rows_at(row).map(move |of_row| bricks.row(of_row, layer)))
-                .collect();
-            for run in runs(&touched, width) {
+            find_runs(bricks, plane, row, width, &mut scratch.runs);
+            for run in &scratch.runs {
                 match run.sign {
-                    Some(true) => run.nodes.for_each(|i| inside[(i + 1) / 64] |= 1 << ((i + 1) % 64)),
+                    Some(true) => run.nodes.clone().for_each(|i| inside[(i + 1) / 64] |= 1 << ((i + 1) % 64)),
                     Some(false) => {}
                     None => {
                         let (x, part) = (&nodes[0][run.nodes.clone()], &mut omega[run.nodes.clone()]);
@@ -120,7 +118,8 @@ impl Layer {
 }
 
 /// Neighbouring nodes of a row that are treated alike.
-struct Run {
+#[derive(Debug, Clone)]
+pub(super) struct Run {
     nodes: std::ops::Range<usize>,
     /// True if proven inside, false if proven outside, none if samples must tell.
     sign: Option<bool>,
@@ -128,15 +127,15 @@ struct Run {
 
 /// Cuts a row of nodes by the bricks that touch it. A node is sampled if any brick it touches is near the
 /// surface, also on the brick's far border, so that both ends of every crossed edge have samples.
-fn runs(touched: &[&[Brick]], width: usize) -> Vec<Run> {
-    let bricks = touched.first().map_or(0, |row| row.len());
-    let state = |brick: usize| {
-        let mut column = touched.iter().map(|row| row[brick]);
-        if column.any(|b| b == Brick::Near) { None } else { Some(touched[0][brick] == Brick::Solid) }
-    };
-    let mut found: Vec<Run> = Vec::new();
-    for brick in 0..bricks {
-        let sign = state(brick);
+fn find_runs(bricks: &Bricks, plane: usize, row: usize, width: usize, found: &mut Vec<Run>) {
+    found.clear();
+    for brick in 0..bricks.per_row() {
+        let touching = bricks.touching(brick, row, plane);
+        let sign = match touching {
+            Brick::Near => None,
+            Brick::Solid => Some(true),
+            Brick::Fluid => Some(false),
+        };
         let end = ((brick + 1) * BRICK).min(width - 1) + 1;
         match found.last_mut() {
             Some(last) if last.sign == sign => last.nodes.end = end,
@@ -153,12 +152,10 @@ fn runs(touched: &[&[Brick]], width: usize) -> Vec<Run> {
             None => found.push(Run { nodes: 0..end, sign }),
         }
     }
-    found
 }
 
 /// Sets the bits from `first` on where ω > 0; `Err` holds the index of the first NaN.
 fn set_bits(inside: &mut [u64], first: usize, omega: &[f64]) -> Result<(), usize> {
-    let mut all_numbers = true;
     let mut done = 0;
     while done < omega.len() {
         let (word, bit) = ((first + done) / 64, (first + done) % 64);
@@ -166,12 +163,13 @@ fn set_bits(inside: &mut [u64], first: usize, omega: &[f64]) -> Result<(), usize
         let mut bits = 0_u64;
         for (i, &w) in part.iter().enumerate() {
             bits |= u64::from(w > 0.0) << i;
-            all_numbers &= !w.is_nan();
         }
         inside[word] |= bits << bit;
         done += part.len();
     }
-    if all_numbers { Ok(()) } else { Err(omega.iter().position(|w| w.is_nan()).unwrap_or(0)) }
+    // A pass of its own without a way out in the middle becomes vector code.
+    let any_nan = omega.iter().fold(false, |any, w| any | w.is_nan());
+    if any_nan { Err(omega.iter().position(|w| w.is_nan()).unwrap_or(0)) } else { Ok(()) }
 }
 
 /// Rows of edges along one axis: which of them the surface crosses, and their numbers.

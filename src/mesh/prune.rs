@@ -67,33 +67,42 @@ impl Bricks {
         found
     }
 
-    /// The layers of bricks that a plane of nodes touches: two where it lies between them.
-    pub(super) fn layers_at(&self, plane: usize) -> std::ops::RangeInclusive<usize> {
-        touching(plane - self.first_layer, self.counts[2])
+    /// Bricks along x.
+    pub(super) fn per_row(&self) -> usize {
+        self.counts[0]
     }
 
-    /// The rows of bricks that a row of nodes touches.
-    pub(super) fn rows_at(&self, row: usize) -> std::ops::RangeInclusive<usize> {
-        touching(row, self.counts[1])
+    /// What holds of the part of brick column `column` in the row of nodes (`row`, `plane`): near if any of the
+    /// up to four bricks around that line of nodes is.
+    pub(super) fn touching(&self, column: usize, row: usize, plane: usize) -> Brick {
+        let mut found = None;
+        for layer in around(plane - self.first_layer, self.counts[2]) {
+            for row in around(row, self.counts[1]) {
+                match self.bricks[self.index(column, row, layer)] {
+                    Brick::Near => return Brick::Near,
+                    proven => found = Some(proven),
+                }
+            }
+        }
+        found.unwrap_or(Brick::Near)
     }
 
-    /// The bricks of one row, along x.
-    pub(super) fn row(&self, row: usize, layer: usize) -> &[Brick] {
-        let first = (layer * self.counts[1] + row) * self.counts[0];
-        &self.bricks[first..first + self.counts[0]]
+    fn index(&self, column: usize, row: usize, layer: usize) -> usize {
+        (layer * self.counts[1] + row) * self.counts[0] + column
     }
 
     fn fill(&mut self, low: [usize; 3], high: [usize; 3], brick: Brick) {
         for layer in low[2]..high[2] {
             for row in low[1]..high[1] {
-                let first = (layer * self.counts[1] + row) * self.counts[0];
-                self.bricks[first + low[0]..first + high[0]].fill(brick);
+                let (first, end) = (self.index(low[0], row, layer), self.index(high[0], row, layer));
+                self.bricks[first..end].fill(brick);
             }
         }
     }
 }
 
-fn touching(node: usize, bricks: usize) -> std::ops::RangeInclusive<usize> {
+/// The bricks at a node along one axis: two where it lies between them.
+fn around(node: usize, bricks: usize) -> std::ops::RangeInclusive<usize> {
     let above = (node / BRICK).min(bricks - 1);
     let below = (node.max(1) - 1) / BRICK;
     below..=above
@@ -128,13 +137,12 @@ mod tests {
     fn only_bricks_that_meet_the_plane_stay_near() {
         let nodes = [0, 1, 2].map(|_| (0..=32).map(|i| f64::from(i) * 0.0625 + 0.01).collect::<Vec<_>>());
         let bricks = Bricks::classify(&HalfSpace, &nodes, 16, 32);
-        for layer in 0..2 {
-            for row in 0..4 {
-                assert_eq!(bricks.row(row, layer), [Brick::Fluid, Brick::Near, Brick::Solid, Brick::Solid]);
+        for plane in 16..=32 {
+            for row in 0..=32 {
+                let found = [0, 1, 2, 3].map(|column| bricks.touching(column, row, plane));
+                assert_eq!(found, [Brick::Fluid, Brick::Near, Brick::Solid, Brick::Solid]);
             }
         }
-        assert_eq!(bricks.layers_at(16), 0..=0);
-        assert_eq!(bricks.layers_at(24), 0..=1);
-        assert_eq!(bricks.layers_at(32), 1..=1);
+        assert_eq!([0, 8, 9, 32].map(|node| around(node, 4)), [0..=0, 0..=1, 1..=1, 3..=3]);
     }
 }

@@ -33,8 +33,8 @@ const MAX_INTERPOLATIONS: usize = 40;
 
 /// The width of the final bracket relative to the edge's coordinates: a few times the rounding of an R0 field
 /// divided by its slope. Narrower ones make the search wander in that rounding: 13 evaluations for each edge of
-/// the pawn rather than 8. The root itself is mostly right to the last digit. Roots so near to an edge's end are put on it, so that
-/// vertices which meet in a node coincide exactly and can be merged.
+/// the pawn rather than 8. The root itself is mostly right to the last digit. Roots so near to an edge's end are
+/// put on it, so that vertices which meet in a node coincide exactly and can be merged.
 const BRACKET: f64 = 32.0 * f64::EPSILON;
 
 /// The first step across a root that interpolation seems to have found, as a share of the final bracket.
