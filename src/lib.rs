@@ -13,6 +13,7 @@
 //! Sign convention, everywhere: **ω > 0 inside the obstacle, 0 on its surface, < 0 in the fluid**; the outward
 //! unit normal is −∇ω/|∇ω|.
 
+pub mod cli;
 pub mod codegen;
 pub mod compile;
 pub mod diagnostic;
@@ -21,6 +22,7 @@ pub mod geom;
 pub mod interval;
 pub mod ir;
 pub mod lower;
+pub mod mesh;
 pub mod render;
 pub mod simplify;
 pub mod slice;

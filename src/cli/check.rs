@@ -1,0 +1,319 @@
+//! `rfm check`: messages, the solids with their bounds and volumes, slices.
+
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use anstream::println;
+use glam::DVec2;
+use serde::Serialize;
+
+use super::args::{Check, Deny, Shared};
+use super::{Failure, choose, input, note, output};
+use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
+use crate::geom::Aabb;
+use crate::mesh::{self, Grid, Resolution, marching_cubes};
+use crate::slice::{self, Plane, Window};
+use crate::solid::Bounds;
+use crate::{Program, Solid};
+
+/// Cells of the meshes that volumes are measured on; the second is for their error.
+const VOLUME_CELLS: [usize; 2] = [96, 48];
+
+#[derive(Serialize)]
+struct Document {
+    schema: u32,
+    ok: bool,
+    diagnostics: Vec<Message>,
+    solids: Vec<Facts>,
+}
+
+#[derive(Serialize)]
+struct Message {
+    code: &'static str,
+    severity: String,
+    message: String,
+    file: String,
+    line: usize,
+    column: usize,
+    end_line: usize,
+    end_column: usize,
+    help: Option<String>,
+}
+
+/// What is known of a solid. Numbers that do not exist (an unbounded solid's volume) are null.
+#[derive(Serialize)]
+struct Facts {
+    name: String,
+    file: String,
+    empty: bool,
+    bounds: Option<Box3>,
+    volume: Option<f64>,
+    /// |volume − limit|, estimated from two resolutions.
+    volume_error: Option<f64>,
+    area: Option<f64>,
+    components: Option<usize>,
+}
+
+#[derive(Serialize)]
+struct Box3 {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
+    if options.slice.is_some() && options.files.len() > 1 {
+        return Err(Failure::usage("--slice plots one file at a time"));
+    }
+    if options.watch {
+        return watch(shared, options);
+    }
+    once(shared, options)
+}
+
+/// Checks again whenever one of the files has another time stamp; ends with the process.
+fn watch(shared: &Shared, options: &Check) -> Result<(), Failure> {
+    if options.files.iter().any(|f| f == Path::new("-")) {
+        return Err(Failure::usage("standard input cannot be watched"));
+    }
+    let stamps = || -> Vec<Option<SystemTime>> {
+        options.files.iter().map(|f| std::fs::metadata(f).and_then(|m| m.modified()).ok()).collect()
+    };
+    loop {
+        let seen = stamps();
+        if std::io::stdout().is_terminal() {
+            anstream::print!("\x1b[2J\x1b[H");
+        }
+        match once(shared, options) {
+            Ok(()) | Err(Failure::Findings) => {}
+            Err(Failure::Usage(message)) => super::complain(&message), // the file may be back in a moment
+            Err(other) => return Err(other),
+        }
+        note("watching; press Ctrl-C to end");
+        while stamps() == seen {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+}
+
+fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
+    let mut document = Document { schema: 1, ok: true, diagnostics: Vec::new(), solids: Vec::new() };
+    let mut usage = None;
+    for path in &options.files {
+        let source = input::read(path)?;
+        let file = source.name.to_string();
+        match input::check(shared, source) {
+            Err(diagnostics) => {
+                document.ok = false;
+                if let Failure::Usage(message) = input::failure(&diagnostics) {
+                    usage = Some(message);
+                }
+                show(shared, &mut document, &diagnostics);
+            }
+            Ok(program) => {
+                let mut diagnostics = program.warnings();
+                let facts = solids(shared, &program, &file, &mut diagnostics)?;
+                if options.deny == Some(Deny::Warnings) && !diagnostics.list.is_empty() {
+                    document.ok = false;
+                }
+                show(shared, &mut document, &diagnostics);
+                if !shared.json {
+                    print(&file, &program, &facts);
+                }
+                document.solids.extend(facts);
+                if let Some(plane) = options.slice {
+                    plot(shared, options, &program, plane)?;
+                }
+            }
+        }
+    }
+    if shared.json {
+        output::json(&document)?;
+    }
+    match usage {
+        Some(message) => Err(Failure::Usage(message)),
+        None if document.ok => Ok(()),
+        None => Err(Failure::Findings),
+    }
+}
+
+fn show(shared: &Shared, document: &mut Document, diagnostics: &Diagnostics) {
+    if shared.json {
+        document.diagnostics.extend(diagnostics.list.iter().map(|d| message(d, diagnostics)));
+    } else {
+        input::show(diagnostics);
+    }
+}
+
+fn message(diagnostic: &Diagnostic, all: &Diagnostics) -> Message {
+    let span = diagnostic.primary.span;
+    let source = all.source(span.source);
+    let at = |byte: u32| source.map_or((1, 1), |s| { let p = Source::position(s, byte as usize); (p.line, p.column) });
+    let ((line, column), (end_line, end_column)) = (at(span.start), at(span.end));
+    Message {
+        code: diagnostic.code.0,
+        severity: diagnostic.severity.to_string(),
+        message: diagnostic.message.clone(),
+        file: source.map_or_else(String::new, |s| s.name.to_string()),
+        line,
+        column,
+        end_line,
+        end_column,
+        help: diagnostic.help.clone(),
+    }
+}
+
+/// Bounds and size of every solid, with what is odd about them added to the messages.
+fn solids(
+    shared: &Shared,
+    program: &Program,
+    file: &str,
+    diagnostics: &mut Diagnostics,
+) -> Result<Vec<Facts>, Failure> {
+    let mut facts = Vec::new();
+    for named in &program.module().solids {
+        let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
+        let found = measure(&solid, file)?;
+        let warning = |code, message| Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, named.span, message) };
+        match solid.bounds() {
+            Bounds::Empty => {
+                let message = format!("solid `{}` is empty: ω is nowhere positive", named.name);
+                diagnostics.list.push(warning(Code::EMPTY_SOLID, message));
+            }
+            Bounds::Unbounded => {
+                let message = format!("solid `{}` could not be proven to end anywhere", named.name);
+                diagnostics.list.push(
+                    warning(Code::UNBOUNDED_SOLID, message).help("intersect it with a box, or mesh it with --box"),
+                );
+            }
+            Bounds::Within(_) => {}
+        }
+        facts.push(found);
+    }
+    Ok(facts)
+}
+
+fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
+    let mut facts = Facts {
+        name: solid.name().to_string(),
+        file: file.to_string(),
+        empty: *solid.bounds() == Bounds::Empty,
+        bounds: None,
+        volume: facts_of_empty(solid),
+        volume_error: facts_of_empty(solid),
+        area: facts_of_empty(solid),
+        components: facts_of_empty(solid).map(|_| 0),
+    };
+    let Bounds::Within(bounds) = solid.bounds() else { return Ok(facts) };
+    facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
+    let mut reports = Vec::new();
+    for cells in VOLUME_CELLS {
+        let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
+        match marching_cubes(solid, &grid, &|_| {}) {
+            Ok(mesh) => reports.push(mesh::check(&mesh, solid)),
+            // a field that is not a number somewhere has no volume
+            Err(_) => return Ok(facts),
+        }
+    }
+    if let [fine, coarse] = &reports[..] {
+        // with vertices on the surface the error falls as h²: the limit is a third of the difference further on
+        facts.volume = Some(fine.volume);
+        facts.volume_error = Some((fine.volume - coarse.volume).abs());
+        facts.area = Some(fine.area);
+        facts.components = Some(fine.solids);
+    }
+    Ok(facts)
+}
+
+fn facts_of_empty(solid: &Solid) -> Option<f64> {
+    (*solid.bounds() == Bounds::Empty).then_some(0.0)
+}
+
+fn print(file: &str, program: &Program, facts: &[Facts]) {
+    let module = program.module();
+    println!("{file}: {} solid(s), {} scene(s)", module.solids.len(), module.scenes.len());
+    for param in &module.params {
+        let range = param.range.map_or(String::new(), |(low, high)| format!(" in {low} .. {high}"));
+        let doc = param.doc.as_ref().map_or(String::new(), |doc| format!("   {doc}"));
+        println!("  param {} = {}{range}{doc}", param.name, param.value);
+    }
+    for solid in facts {
+        println!("  solid {}", solid.name);
+        if solid.empty {
+            println!("    empty");
+        }
+        if let Some(bounds) = &solid.bounds {
+            let corner = |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", c[0], c[1], c[2]);
+            println!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
+        } else if !solid.empty {
+            println!("    bounds      none found");
+        }
+        if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
+            println!("    volume      {volume:.6} ± {error:.1e}");
+        }
+        if let (Some(area), Some(components), false) = (solid.area, solid.components, solid.empty) {
+            println!("    area        {area:.6}");
+            println!("    components  {components}");
+        }
+    }
+    for scene in &module.scenes {
+        let obstacles: Vec<&str> = scene.obstacles.iter().map(|o| o.name.as_str()).collect();
+        let particles = scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
+        let around = if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
+        println!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
+    }
+}
+
+fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Result<(), Failure> {
+    let solid = choose::solid(shared, program, options.solid.as_deref())?;
+    let window = match options.window {
+        Some([u0, v0, u1, v1]) => Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)),
+        None => plane.window(&around(&solid)?),
+    };
+    if options.term {
+        let mut out = anstream::stdout();
+        let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        slice::terminal::draw(&solid, solid.name(), plane, window, 78, colour, &mut out).map_err(Failure::usage)?;
+        out.flush()?;
+        if options.output.is_none() {
+            return Ok(());
+        }
+    }
+    let path = match &options.output {
+        Some(path) => path.clone(),
+        None => PathBuf::from(format!("{}.{}.svg", solid.name(), plane.to_string().replace(' ', ""))),
+    };
+    let picture = picture(&solid, plane, window, &path)?;
+    output::write(&path, |out| out.write_all(&picture))?;
+    if !shared.json {
+        println!("slice {plane} of {} written to {}", solid.name(), path.display());
+    }
+    Ok(())
+}
+
+fn picture(solid: &Solid, plane: Plane, window: Window, path: &Path) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Vec::new();
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let samples = slice::DEFAULT_SAMPLES;
+    match ending.as_str() {
+        "svg" => slice::write_svg(solid, solid.name(), plane, window, samples, &mut bytes),
+        "png" => slice::write_png(solid, solid.name(), plane, window, samples, 2.0, &mut bytes),
+        _ => {
+            let message = format!("cannot tell the picture format of `{}`: the ending must be .svg or .png", path.display());
+            return Err(Failure::Usage(message));
+        }
+    }
+    .map_err(Failure::usage)?;
+    Ok(bytes)
+}
+
+/// The solid's bounds with a margin.
+fn around(solid: &Solid) -> Result<Aabb, Failure> {
+    match solid.bounds() {
+        Bounds::Within(bounds) => Ok(bounds.grown(0.15 * bounds.size().max_element())),
+        Bounds::Empty => Err(Failure::usage("the solid is empty: say what to plot with --window U0,V0,U1,V1")),
+        Bounds::Unbounded => {
+            Err(Failure::usage("the solid has no bounds: say what to plot with --window U0,V0,U1,V1"))
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Which solid or scene of a file is meant.
+
+use super::Failure;
+use super::args::Shared;
+use crate::lower::{NamedSolid, Scene};
+use crate::{Error, Program, Solid};
+
+/// The solid by name; without one, the only solid, or the first obstacle of the only scene.
+pub(super) fn solid(shared: &Shared, program: &Program, name: Option<&str>) -> Result<Solid, Failure> {
+    let name = match name {
+        Some(name) => name.to_string(),
+        None => default_solid(program)?.name.clone(),
+    };
+    program.solid_with(&name, shared.engine.into()).map_err(usage)
+}
+
+fn default_solid(program: &Program) -> Result<&NamedSolid, Failure> {
+    let module = program.module();
+    let in_scene = match &module.scenes[..] {
+        [scene] => scene.obstacles.first().and_then(|o| module.solids.iter().find(|s| s.name == o.name)),
+        _ => None,
+    };
+    match (&module.solids[..], in_scene) {
+        ([], _) => Err(Failure::usage("the file defines no solid; write `solid name = …`")),
+        ([only], _) | (_, Some(only)) => Ok(only),
+        (several, None) => {
+            let names: Vec<&str> = several.iter().map(|s| s.name.as_str()).collect();
+            Err(Failure::usage(format!("the file has several solids; choose one with -s: {}", names.join(", "))))
+        }
+    }
+}
+
+/// The scene by name; without one, the only scene.
+pub(super) fn scene<'a>(program: &'a Program, name: Option<&str>) -> Result<&'a Scene, Failure> {
+    let scenes = &program.module().scenes;
+    let names = || scenes.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
+    match (name, &scenes[..]) {
+        (Some(name), _) => scenes.iter().find(|s| s.name == name).ok_or_else(|| {
+            usage(Error::UnknownName { kind: "scene", name: name.to_string(), known: names() })
+        }),
+        (None, [only]) => Ok(only),
+        (None, []) => Err(Failure::usage("the file has no scene to run; write `scene name { … }`")),
+        (None, _) => {
+            let names = names().join(", ");
+            Err(Failure::usage(format!("the file has several scenes; choose one with --scene: {names}")))
+        }
+    }
+}
+
+pub(super) fn usage(error: Error) -> Failure {
+    Failure::usage(error)
+}

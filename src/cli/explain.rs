@@ -1,0 +1,91 @@
+//! `rfm explain`: the long text of a message, or the stages of the compiler for a file.
+
+use std::path::Path;
+
+use anstream::println;
+
+use super::args::{Explain, Shared, Stage};
+use super::{Failure, choose, input, run};
+use crate::Program;
+use crate::codegen::{Listing, Precision, Request, Shape, target_description};
+use crate::diagnostic::{explain, nearest};
+use crate::ir::dump;
+use crate::lower::NamedSolid;
+use crate::solid::ProgramKind;
+use crate::syntax;
+
+pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
+    let subject = options.subject.as_str();
+    if let Some(text) = explain(subject) {
+        println!("{}\n\n{text}", subject.to_uppercase());
+        return Ok(());
+    }
+    let is_code = subject.len() == 5 && subject.starts_with(['E', 'W']) && !Path::new(subject).exists();
+    if is_code && subject[1..].bytes().all(|b| b.is_ascii_digit()) {
+        return Err(Failure::usage(format!("there is no message {subject}")));
+    }
+    let (path, name) = match subject.rsplit_once(':') {
+        Some((path, name)) if !Path::new(subject).exists() => (path, Some(name)),
+        _ => (subject, None),
+    };
+    let program = input::program(shared, Path::new(path))?;
+    if options.show.contains(&Stage::Ast) {
+        print!("{}", syntax::print(program.ast()));
+    }
+    match name {
+        Some(name) if program.module().scenes.iter().any(|s| s.name == name) => {
+            run::explain(&program, choose::scene(&program, Some(name))?)
+        }
+        Some(name) => {
+            let module = program.module();
+            let Some(solid) = module.solids.iter().find(|s| s.name == name) else {
+                let solids = module.solids.iter().map(|s| s.name.as_str());
+                let scenes = module.scenes.iter().map(|s| s.name.as_str());
+                let near = nearest(name, solids.chain(scenes));
+                let hint = near.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
+                return Err(Failure::usage(format!("`{path}` has no solid or scene `{name}`{hint}")));
+            };
+            stages(shared, &program, solid, &options.show)
+        }
+        None => {
+            for solid in &program.module().solids {
+                stages(shared, &program, solid, &options.show)?;
+            }
+            Ok(())
+        }
+    }
+}
+
+/// What became of one solid.
+fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]) -> Result<(), Failure> {
+    let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
+    let (written, _) = program.module().graph.extract(&[named.node]);
+    let (value, value_outputs) = solid.graph(ProgramKind::Value);
+    let (gradient, gradient_outputs) = solid.graph(ProgramKind::Gradient);
+    println!("solid {}", named.name);
+    println!("  operations: {} as written, {} for ω, {} for ω and ∇ω", written.len(), value.len(), gradient.len());
+    let rules = &solid.applied_rules().0;
+    for (equation, count) in rules {
+        println!("  simplified {count:>4} ×  {equation}");
+    }
+    println!("  target: {}", target_description());
+    if show.contains(&Stage::Ir) {
+        println!("\nω:\n{}", dump(value, &[("omega", value_outputs[0])], program.sources()));
+        let names = ["omega", "gx", "gy", "gz"];
+        let roots: Vec<_> = names.into_iter().zip(gradient_outputs.iter().copied()).collect();
+        println!("ω and ∇ω:\n{}", dump(gradient, &roots, program.sources()));
+    }
+    if show.contains(&Stage::Clif) || show.contains(&Stage::Asm) {
+        for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)] {
+            let request = Request { graph, outputs, precision: Precision::F64, shape: Shape::Batch };
+            let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;
+            if show.contains(&Stage::Clif) {
+                println!("\n{title}, f64, many points, intermediate representation:\n{}", listing.clif);
+            }
+            if show.contains(&Stage::Asm) {
+                println!("\n{title}, f64, many points, machine code:\n{}", listing.assembly);
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,64 @@
+//! Reading a file: path or standard input, params from flags, messages to standard error.
+
+use std::io::{IsTerminal, Read};
+use std::path::Path;
+
+use super::Failure;
+use super::args::Shared;
+use crate::Program;
+use crate::compile::text_of;
+use crate::diagnostic::{Code, Diagnostics, Source, Style, render};
+use crate::lower::Options;
+
+/// The text of a file, under the name that messages give it.
+pub(super) fn read(path: &Path) -> Result<Source, Failure> {
+    let name = if path == Path::new("-") { "<stdin>".to_string() } else { path.display().to_string() };
+    let limit = Source::MAX_LEN as u64 + 1;
+    let mut bytes = Vec::new();
+    let result = if path == Path::new("-") {
+        std::io::stdin().lock().take(limit).read_to_end(&mut bytes)
+    } else {
+        std::fs::File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes))
+    };
+    let text = result.and_then(|_| text_of(bytes));
+    let text = text.map_err(|error| Failure::usage(format!("cannot read `{name}`: {error}")))?;
+    Ok(Source::file(name, text))
+}
+
+/// Checks a source with the params of the command line.
+pub(super) fn check(shared: &Shared, source: Source) -> Result<Program, Diagnostics> {
+    let options = Options { overrides: shared.define.iter().cloned().collect(), max_nodes: shared.max_nodes };
+    Program::check(source, options)
+}
+
+/// Reads and checks a file; prints its messages.
+pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> {
+    match check(shared, read(path)?) {
+        Ok(program) => {
+            show(&program.warnings());
+            Ok(program)
+        }
+        Err(diagnostics) => {
+            show(&diagnostics);
+            Err(failure(&diagnostics))
+        }
+    }
+}
+
+/// A file with findings, or a command line that sets what cannot be set.
+pub(super) fn failure(diagnostics: &Diagnostics) -> Failure {
+    let errors = || diagnostics.list.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error);
+    if errors().all(|d| d.code == Code::OVERRIDE) {
+        return Failure::usage("the params given with -D do not fit the file");
+    }
+    Failure::Findings
+}
+
+pub(super) fn show(diagnostics: &Diagnostics) {
+    if diagnostics.list.is_empty() {
+        return;
+    }
+    // anstream takes the colours out where they are not wanted; the line drawing is for terminals only
+    let style = if std::io::stderr().is_terminal() { Style::Terminal } else { Style::Plain };
+    anstream::eprint!("{}", render(diagnostics, style));
+}

@@ -1,0 +1,44 @@
+//! Files that are whole or not there: written to a temporary name beside the target, then renamed.
+
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::Failure;
+
+/// Writes a file through a callback. If anything fails, the file that was there before is untouched.
+pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
+    let failed = |error: io::Error| Failure::usage(format!("cannot write `{}`: {error}", path.display()));
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let temporary = tempfile::Builder::new().prefix(".rfm-").tempfile_in(folder).map_err(failed)?;
+    let mut writer = BufWriter::new(temporary);
+    fill(&mut writer).map_err(failed)?;
+    let temporary = writer.into_inner().map_err(|e| failed(e.into_error()))?;
+    readable_by_others(temporary.as_file()).map_err(failed)?;
+    temporary.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}
+
+/// Temporary files are private; results are not.
+#[cfg(unix)]
+fn readable_by_others(file: &std::fs::File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn readable_by_others(_: &std::fs::File) -> io::Result<()> {
+    Ok(())
+}
+
+/// One JSON document on standard output.
+pub(super) fn json(document: &impl Serialize) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    serde_json::to_writer_pretty(&mut out, document).map_err(io::Error::from)?;
+    writeln!(out)?;
+    Ok(())
+}

@@ -1,0 +1,182 @@
+//! The files of a run: ParaView frames with their collection, pictures, the obstacle's mesh.
+//!
+//! Invariant: after every frame the collection lists exactly the frames that are complete.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::super::args::Run;
+use super::super::{Failure, note, output};
+use super::setup::Setup;
+use crate::lower::Scene;
+use crate::mesh::{self, Grid, Mesh, Resolution, marching_cubes};
+use crate::render;
+use crate::sph::{self, Simulation};
+
+pub(super) struct Frames {
+    folder: PathBuf,
+    /// Time and file of each frame, relative to the folder.
+    saved: Vec<(f64, String)>,
+    write_frames: bool,
+    pictures: Option<Pictures>,
+    count: usize,
+    last_time: f64,
+}
+
+/// What all pictures share.
+struct Pictures {
+    scene: render::Scene,
+    radius: f64,
+    count: usize,
+}
+
+impl Frames {
+    pub fn new(options: &Run, scene: &Scene, setup: &Setup) -> Result<Self, Failure> {
+        let folder = options.output.clone().unwrap_or_else(|| default_folder(&options.file));
+        create(&folder)?;
+        let write_frames = !options.no_frames;
+        if write_frames {
+            create(&folder.join("frames"))?;
+            remove_old(&folder.join("frames"), "particles_", ".vtp")?;
+        }
+        let pictures = if write_frames && !options.no_pictures {
+            create(&folder.join("pictures"))?;
+            remove_old(&folder.join("pictures"), "frame_", ".png")?;
+            true
+        } else {
+            false
+        };
+        let obstacle = if write_frames { obstacle_mesh(options, setup, &folder)? } else { Mesh::default() };
+        let pictures = if pictures { Some(Pictures::new(scene, setup, &obstacle)?) } else { None };
+        Ok(Self { folder, saved: Vec::new(), write_frames, pictures, count: 0, last_time: 0.0 })
+    }
+
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Time of the last frame, s.
+    pub fn last_time(&self) -> f64 {
+        self.last_time
+    }
+
+    pub fn describe(&self) -> String {
+        let mut parts = vec!["summary.json".to_string()];
+        if self.write_frames {
+            parts.push(format!("particles.pvd and {} frames for ParaView, obstacle.stl, obstacle.vtp", self.saved.len()));
+        }
+        if let Some(pictures) = &self.pictures {
+            parts.push(format!("{} pictures", pictures.count));
+        }
+        parts.join(", ")
+    }
+
+    /// Saves the present instant.
+    pub fn save(&mut self, simulation: &Simulation<'_>) -> Result<(), Failure> {
+        self.last_time = simulation.time();
+        if !self.write_frames {
+            return Ok(());
+        }
+        let name = format!("frames/particles_{:06}.vtp", self.count);
+        output::write(&self.folder.join(&name), |mut out| sph::write_vtp(&mut out, simulation.particles()))?;
+        self.saved.push((simulation.time(), name));
+        output::write(&self.folder.join("particles.pvd"), |mut out| {
+            sph::write_pvd(&mut out, self.saved.iter().map(|(time, file)| (*time, file.as_str())))
+        })?;
+        if let Some(pictures) = &mut self.pictures {
+            pictures.save(&self.folder.join(format!("pictures/frame_{:06}.png", self.count)), simulation)?;
+        }
+        self.count += 1;
+        Ok(())
+    }
+}
+
+impl Pictures {
+    /// Of the speed of a fall through the whole box, the part that is drawn red: obstacles stop most particles
+    /// long before.
+    const FASTEST: f64 = 0.6;
+
+    fn new(scene: &Scene, setup: &Setup, obstacle: &Mesh) -> Result<Self, Failure> {
+        let camera = render::Camera::three_quarter(&setup.domain, render::Camera::SIZE).map_err(Failure::usage)?;
+        let mesh = render::Mesh {
+            vertices: &obstacle.positions,
+            normals: &obstacle.normals,
+            triangles: &obstacle.triangles,
+        };
+        let fastest = (Self::FASTEST * setup.typical_speed).max(f64::MIN_POSITIVE);
+        let legend = render::Legend { title: &scene.name, fastest };
+        let rendered = render::Scene::new(camera, &setup.domain, &mesh, &legend).map_err(Failure::usage)?;
+        Ok(Self { scene: rendered, radius: 0.5 * setup.parameters.spacing(), count: 0 })
+    }
+
+    fn save(&mut self, path: &Path, simulation: &Simulation<'_>) -> Result<(), Failure> {
+        let particles = simulation.particles();
+        let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
+        let image = self.scene.frame(
+            &render::Particles { positions: particles.position.points(), speeds: &speeds, radius: self.radius },
+            &render::Moment { time: simulation.time(), step: simulation.steps() },
+        );
+        output::write(path, |mut out| image.write_png(&mut out))?;
+        self.count += 1;
+        Ok(())
+    }
+}
+
+/// `pawn.rfm` → `pawn.out`, beside the file; standard input → `rfm.out`.
+fn default_folder(file: &Path) -> PathBuf {
+    if file == Path::new("-") { PathBuf::from("rfm.out") } else { file.with_extension("out") }
+}
+
+fn create(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.display())))
+}
+
+/// Removes the numbered files of an earlier run, which would mix with this one's.
+fn remove_old(folder: &Path, prefix: &str, suffix: &str) -> Result<(), Failure> {
+    let failed = |e| Failure::usage(format!("cannot clear `{}`: {e}", folder.display()));
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(suffix));
+        if number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit())) {
+            std::fs::remove_file(entry.path()).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
+
+/// All obstacles as one mesh, cut off at the box; written beside the frames.
+fn obstacle_mesh(options: &Run, setup: &Setup, folder: &Path) -> Result<Mesh, Failure> {
+    let mut all = Mesh::default();
+    for (solid, _) in &setup.obstacles {
+        let bounds = solid.bounds().aabb().unwrap_or(setup.domain);
+        let inside = setup.domain.grown(1e-3 * setup.domain.size().max_element());
+        let over = bounds.intersection(&inside);
+        let grid = if bounds == over || over.is_empty() {
+            Grid::around(&bounds, Resolution::Cells(options.mesh_cells))
+        } else {
+            Grid::filling(&over, Resolution::Cells(options.mesh_cells))
+        };
+        let grid = grid.map_err(Failure::usage)?;
+        let mesh = marching_cubes(solid, &grid, &|_| {}).map_err(Failure::usage)?;
+        if mesh.triangles.is_empty() {
+            note(format!("the obstacle `{}` has no surface in the box", solid.name()));
+        }
+        let first = all.positions.len() as u32;
+        all.positions.extend(mesh.positions);
+        all.normals.extend(mesh.normals);
+        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    if !setup.obstacles.is_empty() {
+        output::write(&folder.join("obstacle.stl"), |mut out| mesh::stl::write(&all, &mut out))?;
+        output::write(&folder.join("obstacle.vtp"), |mut out| mesh::vtp::write(&all, &mut out))?;
+    }
+    Ok(all)
+}

@@ -1,0 +1,273 @@
+//! `rfm run`: the fluid of a scene, step by step, with frames, pictures and a summary.
+//!
+//! setup (scene → simulation) → steps, with a frame every so often (`frames`) → summary.
+
+mod frames;
+mod setup;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anstream::println;
+use serde::Serialize;
+
+use super::args::{Run, Shared};
+use super::{Failure, choose, input, note, output, progress};
+use crate::Program;
+use crate::lower::Scene;
+use crate::sph::{Simulation, Stats};
+use frames::Frames;
+use setup::Setup;
+
+/// What `summary.json` and `--json` say; figures that judge the run are the worst of all saved instants.
+#[derive(Debug, Serialize)]
+struct Summary {
+    schema: u32,
+    scene: String,
+    steps: u64,
+    simulated_seconds: f64,
+    time_step: f64,
+    particles: usize,
+    particles_carved: usize,
+    milliseconds_per_step: f64,
+    neighbours_per_particle: f64,
+    max_penetration: f64,
+    inside: usize,
+    lost: usize,
+    non_finite: usize,
+    max_density_error: f64,
+    kinetic_energy: f64,
+    potential_energy: f64,
+    energy_at_start: f64,
+    /// Largest energy of a saved instant above the one at the start, as a part of that; 0 if it only fell.
+    energy_growth: f64,
+    max_speed: f64,
+    passes: Vec<&'static str>,
+    threads: usize,
+    frames: usize,
+    finished: bool,
+}
+
+pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
+    let program = input::program(shared, &options.file)?;
+    let scene = choose::scene(&program, options.scene.as_deref())?;
+    let setup = Setup::of(shared, &program, scene)?;
+    let (mut simulation, carved) = setup.simulation(&program, scene)?;
+    let last = match (options.steps, options.until) {
+        (Some(steps), _) => steps,
+        (None, Some(until)) if !(until.is_finite() && until >= 0.0) => {
+            return Err(Failure::usage(format!("--until {until}: expected a time in seconds")));
+        }
+        (None, until) => (until.unwrap_or(scene.run.until) / setup.parameters.time_step).round() as u64,
+    };
+    if options.dry_run {
+        return dry_run(&mut simulation, &setup, last);
+    }
+    let mut frames = Frames::new(options, scene, &setup)?;
+    let interrupted = interruption()?;
+    let bar = progress::bar(last, "running");
+    let mut watch = Watch::new(&simulation);
+    frames.save(&simulation)?;
+    let per_frame = ((scene.run.save_every / setup.parameters.time_step).round() as u64).max(1);
+    let mut failure = None;
+    for step in 1..=last {
+        let started = Instant::now();
+        let result = simulation.step();
+        watch.spent += started.elapsed();
+        if let Err(error) = result {
+            let kept = format!("the frames up to {:.4} s are kept", frames.last_time());
+            failure = Some(Failure::Numerical(format!("{error}\n{kept}")));
+            break;
+        }
+        bar.set_position(step);
+        let stop = interrupted.load(Ordering::Relaxed);
+        if step % per_frame == 0 || step == last || stop {
+            watch.look(&simulation);
+            bar.set_message(format!("t = {:.3} s, {:.2} m/s", simulation.time(), watch.now.max_speed));
+            frames.save(&simulation)?;
+        }
+        if stop {
+            failure = Some(Failure::Interrupted);
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    let summary = watch.summary(scene, &simulation, carved, frames.count(), failure.is_none());
+    output::write(&frames.folder().join("summary.json"), |out| {
+        serde_json::to_writer_pretty(&mut *out, &summary)?;
+        writeln!(out)
+    })?;
+    if let Some(failure) = failure {
+        if matches!(failure, Failure::Interrupted) {
+            note(format!("interrupted after {} steps; the frames so far are kept", simulation.steps()));
+        }
+        return Err(failure);
+    }
+    if shared.json {
+        return output::json(&summary);
+    }
+    print(&summary, &frames);
+    Ok(())
+}
+
+/// Set by Ctrl-C: the run ends after the step that is under way.
+fn interruption() -> Result<Arc<AtomicBool>, Failure> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let set = Arc::clone(&flag);
+    let handler = move || {
+        if set.swap(true, Ordering::Relaxed) {
+            std::process::exit(130); // asked twice
+        }
+    };
+    ctrlc::set_handler(handler).map_err(|e| Failure::usage(format!("cannot listen for Ctrl-C: {e}")))?;
+    Ok(flag)
+}
+
+fn dry_run(simulation: &mut Simulation<'_>, setup: &Setup, steps: u64) -> Result<(), Failure> {
+    const TRIAL: u32 = 3;
+    let started = Instant::now();
+    for _ in 0..TRIAL {
+        simulation.step().map_err(|e| Failure::Numerical(e.to_string()))?;
+    }
+    let per_step = started.elapsed().as_secs_f64() / f64::from(TRIAL);
+    let stats = simulation.stats();
+    // state and sorted copy of every particle, its forces, and four bytes for each neighbour
+    let bytes = simulation.particles().len() as f64 * (300.0 + 4.0 * stats.neighbours_per_particle);
+    println!("particles     {}", stats.particles);
+    println!("spacing       {:.4} m", setup.parameters.spacing());
+    println!("neighbours    {:.1} per particle", stats.neighbours_per_particle);
+    println!("time step     {:.3e} s ({})", setup.parameters.time_step, setup.time_step_reason);
+    println!("steps         {steps}");
+    println!("passes        {}", pass_names(simulation).join(", "));
+    println!("memory        about {:.0} MiB", bytes / f64::from(1 << 20));
+    println!("time          about {:.0} s ({:.2} ms per step, without frames)", per_step * steps as f64, per_step * 1e3);
+    Ok(())
+}
+
+fn pass_names(simulation: &Simulation<'_>) -> Vec<&'static str> {
+    simulation.passes().into_iter().map(crate::sph::Pass::name).collect()
+}
+
+/// The figures of a run while it goes on.
+struct Watch {
+    spent: Duration,
+    energy_at_start: f64,
+    most_energy: f64,
+    now: Stats,
+    worst: Stats,
+    neighbours: (f64, usize),
+}
+
+impl Watch {
+    fn new(simulation: &Simulation<'_>) -> Self {
+        let stats = simulation.stats();
+        let energy = stats.kinetic_energy + stats.potential_energy;
+        Self {
+            spent: Duration::ZERO,
+            energy_at_start: energy,
+            most_energy: energy,
+            neighbours: (stats.neighbours_per_particle, 1),
+            now: stats.clone(),
+            worst: stats,
+        }
+    }
+
+    fn look(&mut self, simulation: &Simulation<'_>) {
+        let now = simulation.stats();
+        self.most_energy = self.most_energy.max(now.kinetic_energy + now.potential_energy);
+        self.neighbours.0 += now.neighbours_per_particle;
+        self.neighbours.1 += 1;
+        let worst = &mut self.worst;
+        worst.max_penetration = worst.max_penetration.max(now.max_penetration);
+        worst.inside = worst.inside.max(now.inside);
+        worst.lost = worst.lost.max(now.lost);
+        worst.non_finite = worst.non_finite.max(now.non_finite);
+        worst.max_density_error = worst.max_density_error.max(now.max_density_error);
+        worst.max_speed = worst.max_speed.max(now.max_speed);
+        self.now = now;
+    }
+
+    fn summary(
+        &self,
+        scene: &Scene,
+        simulation: &Simulation<'_>,
+        carved: usize,
+        frames: usize,
+        finished: bool,
+    ) -> Summary {
+        let steps = simulation.steps();
+        Summary {
+            schema: 1,
+            scene: scene.name.clone(),
+            steps,
+            simulated_seconds: simulation.time(),
+            time_step: simulation.parameters().time_step,
+            particles: self.now.particles,
+            particles_carved: carved,
+            milliseconds_per_step: self.spent.as_secs_f64() * 1e3 / steps.max(1) as f64,
+            neighbours_per_particle: self.neighbours.0 / self.neighbours.1 as f64,
+            max_penetration: self.worst.max_penetration,
+            inside: self.worst.inside,
+            lost: self.worst.lost,
+            non_finite: self.worst.non_finite,
+            max_density_error: self.worst.max_density_error,
+            kinetic_energy: self.now.kinetic_energy,
+            potential_energy: self.now.potential_energy,
+            energy_at_start: self.energy_at_start,
+            energy_growth: (self.most_energy / self.energy_at_start - 1.0).max(0.0),
+            max_speed: self.worst.max_speed,
+            passes: pass_names(simulation),
+            threads: rayon::current_num_threads(),
+            frames,
+            finished,
+        }
+    }
+}
+
+fn print(summary: &Summary, frames: &Frames) {
+    println!(
+        "{} particles, {} steps of {:.3e} s = {:.3} s simulated",
+        summary.particles, summary.steps, summary.time_step, summary.simulated_seconds
+    );
+    println!(
+        "{:.2} ms per step on {} thread(s), {:.1} neighbours per particle",
+        summary.milliseconds_per_step, summary.threads, summary.neighbours_per_particle
+    );
+    println!(
+        "inside the obstacle: {} (deepest {:.1e} m), outside the box: {}, not finite: {}",
+        summary.inside, summary.max_penetration, summary.lost, summary.non_finite
+    );
+    println!(
+        "energy: {:.2} J at the start, {:.2} J at the end; largest compression {:.1} %",
+        summary.energy_at_start,
+        summary.kinetic_energy + summary.potential_energy,
+        100.0 * summary.max_density_error
+    );
+    println!("written to {}: {}", frames.folder().display(), frames.describe());
+}
+
+/// `rfm explain FILE:SCENE`: which passes run, which do not, and why.
+pub(super) fn explain(program: &Program, scene: &Scene) -> Result<(), Failure> {
+    let shared = Shared {
+        define: Vec::new(),
+        threads: None,
+        json: false,
+        max_nodes: usize::MAX,
+        engine: super::args::Engine::Auto,
+    };
+    let setup = Setup::of(&shared, program, scene)?;
+    let (simulation, _) = setup.simulation(program, scene)?;
+    let running = simulation.passes();
+    println!("scene {}: method paper, time step {:.3e} s ({})", scene.name, setup.parameters.time_step, setup.time_step_reason);
+    for pass in crate::sph::Pass::ALL {
+        if running.contains(&pass) {
+            println!("  runs      {pass}");
+        } else {
+            println!("  left out  {pass}: {}", pass.needs());
+        }
+    }
+    Ok(())
+}
+
+use std::io::Write as _;

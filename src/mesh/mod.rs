@@ -1,0 +1,100 @@
+//! From a field to a closed triangle mesh of its surface ω = 0, and what can be said about that mesh.
+//!
+//! [`Grid`] lays nodes → [`marching_cubes`] samples ω layer by layer, connects crossed edges by the case table,
+//! puts each vertex on the surface by a root search on ω itself, merges vertices that coincide in a node and
+//! adds normals −∇ω/|∇ω| → [`check`] reports topology, volume and distance → `stl`, `ply`, `obj`, `vtp` write.
+//!
+//! Promises: the mesh is closed, every edge lies in exactly two triangles that run along it in opposite
+//! directions, triangles are counter-clockwise seen from the fluid, and the same field and grid give the same
+//! bits on any number of threads. Not promised: creases between nodes are cut, features thinner than a cell
+//! may be missed, and where the field touches zero without a change of sign there is no surface.
+//!
+//! Invariant: this module knows nothing of a compiler; it sees only [`Field`](crate::field::Field).
+
+mod cases;
+mod check;
+mod collapse;
+mod extract;
+mod grid;
+mod layer;
+mod normals;
+pub mod obj;
+pub mod ply;
+mod prune;
+mod roots;
+mod shells;
+pub mod stl;
+pub mod vtp;
+
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+
+use glam::DVec3;
+
+pub use check::{Report, check};
+pub use extract::marching_cubes;
+pub use grid::{Grid, GridError, Resolution};
+pub use shells::{Shell, shells};
+
+/// Triangles over shared vertices.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertices, in the scene's unit (metres).
+    pub positions: Vec<DVec3>,
+    /// Outward unit normals, one for each vertex, always finite.
+    pub normals: Vec<DVec3>,
+    /// Indices of vertices, counter-clockwise seen from the fluid.
+    pub triangles: Vec<[u32; 3]>,
+    /// Ascending indices of vertices which close a solid at the grid's border: they lie on the border and
+    /// inside the solid, not on ω = 0.
+    pub caps: Vec<u32>,
+    /// What it took to make the mesh.
+    pub work: Work,
+}
+
+/// Counts of work, the same on any machine.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Evaluations of ω: samples and root steps.
+    pub evaluations: u64,
+    /// Evaluations of ∇ω, for normals.
+    pub gradients: u64,
+    /// Vertices merged because they coincided in a node of the grid, or dropped as a speck of no extent.
+    pub merged: u64,
+}
+
+/// Why a field could not be meshed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MeshError {
+    /// ω is not a number here, so nobody can say whether the point is inside.
+    NotANumber {
+        /// The first such point in the order of the search.
+        at: DVec3,
+    },
+    /// More vertices than the file formats' 32-bit indices can tell apart.
+    TooManyVertices {
+        /// The number found.
+        found: usize,
+    },
+}
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotANumber { at } => {
+                write!(f, "the field is not a number at ({}, {}, {})", at.x, at.y, at.z)
+            }
+            Self::TooManyVertices { found } => {
+                write!(
+                    f,
+                    "the mesh would have {found} vertices; at most {} are possible, use larger cells",
+                    i32::MAX
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for MeshError {}

@@ -1,0 +1,75 @@
+//! The connected parts of a mesh: outer surfaces of solids, and walls of cavities.
+//!
+//! Invariant: shells are listed in the order of their first vertices, and their triangles partition the mesh.
+
+use super::Mesh;
+
+/// One connected part of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shell {
+    /// Its lowest vertex.
+    pub first_vertex: u32,
+    pub vertices: usize,
+    pub triangles: usize,
+    /// Signed volume in cubic metres: positive for the outside of a solid, negative for the wall of a cavity.
+    pub volume: f64,
+    /// Square metres.
+    pub area: f64,
+}
+
+/// The connected parts of a mesh. Vertices that no triangle uses belong to none.
+pub fn shells(mesh: &Mesh) -> Vec<Shell> {
+    let mut roots = Roots::new(mesh.positions.len());
+    for &[a, b, c] in &mesh.triangles {
+        roots.unite(a, b);
+        roots.unite(a, c);
+    }
+    let mut place = vec![None; mesh.positions.len()];
+    let mut found: Vec<Shell> = Vec::new();
+    for &[a, b, c] in &mesh.triangles {
+        let root = roots.find(a);
+        let index = *place[root as usize].get_or_insert_with(|| {
+            found.push(Shell { first_vertex: root, vertices: 0, triangles: 0, volume: 0.0, area: 0.0 });
+            found.len() - 1
+        });
+        let shell = &mut found[index];
+        // Volumes about a vertex of the shell itself: a small shell far from the origin keeps its digits.
+        let origin = mesh.positions[root as usize];
+        let [p, q, r] = [a, b, c].map(|v| mesh.positions[v as usize] - origin);
+        shell.triangles += 1;
+        shell.volume += p.dot(q.cross(r)) / 6.0;
+        shell.area += 0.5 * (q - p).cross(r - p).length();
+    }
+    for v in 0..mesh.positions.len() as u32 {
+        if let Some(index) = place[roots.find(v) as usize] {
+            found[index].vertices += 1;
+        }
+    }
+    found.sort_by_key(|shell| shell.first_vertex);
+    found
+}
+
+/// Disjoint sets whose representative is their least member.
+pub(super) struct Roots {
+    parents: Vec<u32>,
+}
+
+impl Roots {
+    pub(super) fn new(members: usize) -> Self {
+        Self { parents: (0..members as u32).collect() }
+    }
+
+    pub(super) fn find(&mut self, mut member: u32) -> u32 {
+        while self.parents[member as usize] != member {
+            let above = self.parents[self.parents[member as usize] as usize];
+            self.parents[member as usize] = above;
+            member = above;
+        }
+        member
+    }
+
+    pub(super) fn unite(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.parents[a.max(b) as usize] = a.min(b);
+    }
+}

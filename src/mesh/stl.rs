@@ -1,0 +1,36 @@
+//! Binary STL: triangles with their own normals, all in `f32`.
+//!
+//! Invariant: normals come from the triangles in `f64`, before their corners are rounded, so slivers keep a
+//! direction; a triangle without area gets the zero normal, which readers take as "compute it".
+
+use std::io::{self, Write};
+
+use glam::DVec3;
+
+use super::{Mesh, normals::unit};
+
+/// Writes a mesh as binary STL.
+///
+/// # Errors
+/// What the writer reports.
+pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+    // A header that began with "solid" would be taken for the text form.
+    let mut header = [b' '; 80];
+    let title = b"binary STL by rfm";
+    header[..title.len()].copy_from_slice(title);
+    out.write_all(&header)?;
+    let count = u32::try_from(mesh.triangles.len()).map_err(io::Error::other)?;
+    out.write_all(&count.to_le_bytes())?;
+    for triangle in &mesh.triangles {
+        let corners = triangle.map(|v| mesh.positions[v as usize]);
+        let [a, b, c] = corners;
+        let normal = unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO);
+        let mut record = [0; 50];
+        let numbers = [normal, a, b, c].into_iter().flat_map(|v: DVec3| v.to_array());
+        for (bytes, number) in record.chunks_exact_mut(4).zip(numbers) {
+            bytes.copy_from_slice(&(number as f32).to_le_bytes());
+        }
+        out.write_all(&record)?;
+    }
+    Ok(())
+}
