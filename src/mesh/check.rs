@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{
     Mesh,
     normals::{gradients, unit},
-    shells::{Roots, Shell, shells},
+    shells::{Roots, shells},
 };
 use crate::field::Field;
 
@@ -61,11 +61,11 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
         closed: edges.closed,
         manifold: edges.two_sided && edges.fans == used,
         components: shells.len(),
-        solids: shells.iter().filter(|shell| shell.volume > 0.0).count(),
+        solids: shells.iter().filter(|shell| shell.is_solid()).count(),
         component_volumes: shells.iter().map(|shell| shell.volume).collect(),
         euler: used as i64 - edges.count as i64 + mesh.triangles.len() as i64,
         degenerate: mesh.triangles.iter().filter(|t| coincide(t)).count(),
-        volume: shells.iter().map(|shell: &Shell| shell.volume).sum(),
+        volume: shells.iter().map(|shell| shell.volume).sum(),
         area: shells.iter().map(|shell| shell.area).sum(),
         max_distance,
         rms_distance,
