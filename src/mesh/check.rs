@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{
     Mesh,
     normals::{gradients, unit},
-    shells::{Roots, Shell, shells},
+    shells::{Roots, shells},
 };
 use crate::field::Field;
 
@@ -61,11 +61,11 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
         closed: edges.closed,
         manifold: edges.two_sided && edges.fans == used,
         components: shells.len(),
-        solids: shells.iter().filter(|shell| shell.volume > 0.0).count(),
+        solids: shells.iter().filter(|shell| shell.is_solid()).count(),
         component_volumes: shells.iter().map(|shell| shell.volume).collect(),
         euler: used as i64 - edges.count as i64 + mesh.triangles.len() as i64,
         degenerate: mesh.triangles.iter().filter(|t| coincide(t)).count(),
-        volume: shells.iter().map(|shell: &Shell| shell.volume).sum(),
+        volume: shells.iter().map(|shell| shell.volume).sum(),
         area: shells.iter().map(|shell| shell.area).sum(),
         max_distance,
         rms_distance,
@@ -203,4 +203,83 @@ fn sign_change_distance(field: &dyn Field, p: DVec3, direction: DVec3) -> f64 {
         radius *= 2.0;
     }
     f64::INFINITY
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Closures;
+
+    /// Corners of the tetrahedron under the plane x + y + z = 1, facing outwards, and its copy at `offset`.
+    fn tetrahedron(offset: DVec3) -> Mesh {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        Mesh {
+            positions: corners.map(|p| p + offset).to_vec(),
+            normals: vec![DVec3::Z; 4],
+            triangles: vec![[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]],
+            ..Mesh::default()
+        }
+    }
+
+    fn report(mesh: &Mesh) -> Report {
+        check(mesh, &Closures { omega: |p: DVec3| p.x, gradient: |_| DVec3::X })
+    }
+
+    #[test]
+    fn tetrahedron_far_from_the_origin_keeps_its_volume() {
+        let found = report(&tetrahedron(DVec3::splat(1e6)));
+        assert!(found.closed && found.manifold);
+        assert_eq!((found.euler, found.components, found.solids), (2, 1, 1));
+        // Coordinates near 1e6 are rounded to 1e-10.
+        assert!((found.volume - 1.0 / 6.0).abs() < 1e-9, "{}", found.volume);
+        assert!((found.area - (1.5 + 0.75_f64.sqrt())).abs() < 1e-9, "{}", found.area);
+    }
+
+    #[test]
+    fn missing_and_flipped_triangles_are_noticed() {
+        let mut open = tetrahedron(DVec3::ZERO);
+        open.triangles.pop();
+        assert!(!report(&open).closed && !report(&open).manifold);
+        let mut flipped = tetrahedron(DVec3::ZERO);
+        flipped.triangles[0].swap(0, 1);
+        assert!(!report(&flipped).closed && !report(&flipped).manifold);
+        let mut inside_out = tetrahedron(DVec3::ZERO);
+        inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        assert!(report(&inside_out).closed && report(&inside_out).manifold);
+        assert_eq!(report(&inside_out).solids, 0);
+    }
+
+    #[test]
+    fn edges_of_four_triangles_and_pinched_vertices_are_not_manifold() {
+        // A second tetrahedron shares vertex 0, or the edge 0–1, with the first.
+        for (shared, translate) in [(1, [0, 4, 5, 6]), (2, [0, 1, 4, 5])] {
+            let mut mesh = tetrahedron(DVec3::ZERO);
+            mesh.positions.extend((shared..4).map(|i| DVec3::splat(-(i as f64))));
+            let copy: Vec<[u32; 3]> =
+                mesh.triangles.iter().map(|t| t.map(|v| translate[v as usize])).collect();
+            mesh.triangles.extend(copy);
+            let found = report(&mesh);
+            assert!(found.closed && !found.manifold, "{found:?}");
+            assert_eq!(found.components, 1);
+        }
+    }
+
+    #[test]
+    fn distance_is_true_where_the_field_is_neither_normalised_nor_smooth() {
+        let wall_at_one = |omega: fn(f64) -> f64, slope: fn(f64) -> f64| {
+            let field = Closures {
+                omega: move |p: DVec3| omega(p.x - 1.0),
+                gradient: move |p: DVec3| slope(p.x - 1.0) * DVec3::X,
+            };
+            project(&field, &[DVec3::new(1.001, 5.0, 7.0)])[0]
+        };
+        let plain = wall_at_one(|s| 50.0 * s, |_| 50.0);
+        assert!((plain - 1e-3).abs() < 1e-12, "{plain}");
+        // A triple root: Newton's steps shrink by a third; the change of sign is found within a factor of two.
+        let flat = wall_at_one(|s| s.powi(3), |s| 3.0 * s * s);
+        assert!((1e-3..=2e-3).contains(&flat) || (flat - 1e-3).abs() < 1e-4, "{flat}");
+        let kinked = wall_at_one(|s| s.min(100.0 * s), |s| if s > 0.0 { 1.0 } else { 100.0 });
+        assert!((kinked - 1e-3).abs() < 1e-12, "{kinked}");
+        assert_eq!(wall_at_one(|_| 1.0, |_| 0.0), f64::INFINITY);
+    }
 }

@@ -33,7 +33,7 @@ const BLOCK: usize = 2 * BRICK;
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,
-/// [`MeshError::TooManyVertices`] beyond the formats' limit.
+/// [`MeshError::TooManyVertices`] beyond [`Mesh::MAX_VERTICES`].
 pub fn marching_cubes(
     field: &dyn Field,
     grid: &Grid,
@@ -70,7 +70,7 @@ struct Block {
 fn join(blocks: Vec<Result<Block, MeshError>>) -> Result<(Mesh, Vec<AtNode>), MeshError> {
     let blocks = blocks.into_iter().collect::<Result<Vec<_>, _>>()?;
     let found: usize = blocks.iter().map(|block| block.positions.len()).sum();
-    if found > i32::MAX as usize {
+    if found > Mesh::MAX_VERTICES {
         return Err(MeshError::TooManyVertices { found });
     }
     let mut mesh = Mesh { positions: Vec::with_capacity(found), ..Mesh::default() };

@@ -9,6 +9,19 @@
 //! bits on any number of threads. Not promised: creases between nodes are cut, features thinner than a cell
 //! may be missed, and where the field touches zero without a change of sign there is no surface.
 //!
+//! ```
+//! use rfm::{field::Closures, geom::Aabb, glam::DVec3, mesh};
+//!
+//! let ball = Closures { omega: |p: DVec3| 1.0 - p.length_squared(), gradient: |p: DVec3| -2.0 * p };
+//! let bounds = Aabb::new(DVec3::NEG_ONE, DVec3::ONE);
+//! let grid = mesh::Grid::around(&bounds, mesh::Resolution::Cells(32))?;
+//! let surface = mesh::marching_cubes(&ball, &grid, &|_share_done| ())?;
+//! let report = mesh::check(&surface, &ball);
+//! assert!(report.closed && report.manifold && report.max_distance < 1e-12);
+//! mesh::stl::write(&surface, &mut Vec::new())?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Invariant: this module knows nothing of a compiler; it sees only [`Field`](crate::field::Field).
 
 mod cases;
@@ -54,6 +67,11 @@ pub struct Mesh {
     pub work: Work,
 }
 
+impl Mesh {
+    /// Most vertices of a mesh: the corners of twice as many triangles then still have 32-bit numbers.
+    pub const MAX_VERTICES: usize = 1 << 29;
+}
+
 /// Counts of work, the same on any machine.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Work {
@@ -73,7 +91,7 @@ pub enum MeshError {
         /// The first such point in the order of the search.
         at: DVec3,
     },
-    /// More vertices than the file formats' 32-bit indices can tell apart.
+    /// More vertices than [`Mesh::MAX_VERTICES`].
     TooManyVertices {
         /// The number found.
         found: usize,

@@ -24,3 +24,30 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::mesh::tests::pawn_mesh;
+
+    #[test]
+    fn obj_text_reads_back_exactly() {
+        let mesh = pawn_mesh();
+        let mut bytes = Vec::new();
+        write(&mesh, &mut bytes).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let numbers = |tag: &str| -> Vec<Vec<f64>> {
+            let lines = text.lines().filter_map(|line| line.strip_prefix(tag));
+            lines
+                .map(|line| line.split(' ').map(|n| n.split('/').next().unwrap().parse().unwrap()).collect())
+                .collect()
+        };
+        let as_vectors = |tag| numbers(tag).iter().map(|n| DVec3::from_slice(n)).collect::<Vec<_>>();
+        assert_eq!(as_vectors("v "), mesh.positions);
+        assert_eq!(as_vectors("vn "), mesh.normals);
+        let first_face = mesh.triangles[0].map(|v| f64::from(v + 1));
+        assert_eq!((numbers("f ").len(), &numbers("f ")[0][..]), (mesh.triangles.len(), &first_face[..]));
+    }
+}

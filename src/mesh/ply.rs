@@ -42,3 +42,32 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::tests::pawn_mesh;
+
+    #[test]
+    fn ply_reads_back() {
+        use ply_rs_bw::{
+            parser::Parser,
+            ply::{DefaultElement, Property},
+        };
+        let mesh = pawn_mesh();
+        let mut bytes = Vec::new();
+        write(&mesh, &mut bytes).unwrap();
+        let read = Parser::<DefaultElement>::new().read_ply(&mut std::io::Cursor::new(bytes)).unwrap();
+        let (vertices, faces) = (&read.payload["vertex"], &read.payload["face"]);
+        assert_eq!((vertices.len(), faces.len()), (mesh.positions.len(), mesh.triangles.len()));
+        for (i, vertex) in vertices.iter().enumerate() {
+            for (axis, (place, normal)) in [("x", "nx"), ("y", "ny"), ("z", "nz")].into_iter().enumerate() {
+                assert_eq!(vertex[place], Property::Double(mesh.positions[i][axis]));
+                assert_eq!(vertex[normal], Property::Float(mesh.normals[i][axis] as f32));
+            }
+        }
+        for (face, triangle) in faces.iter().zip(&mesh.triangles) {
+            assert_eq!(face["vertex_indices"], Property::ListInt(triangle.map(|v| v as i32).to_vec()));
+        }
+    }
+}

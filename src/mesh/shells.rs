@@ -17,6 +17,22 @@ pub struct Shell {
     pub area: f64,
 }
 
+impl Shell {
+    /// A volume this small beside its area (a ball has 0.09 of area^1.5) is rounding: the shell is a folded
+    /// sheet without inside.
+    const FLAT: f64 = 1e-12;
+
+    /// True for the outside of a solid.
+    pub fn is_solid(&self) -> bool {
+        self.volume > Self::FLAT * self.area.powf(1.5)
+    }
+
+    /// True for the wall of a cavity.
+    pub fn is_cavity(&self) -> bool {
+        self.volume < -Self::FLAT * self.area.powf(1.5)
+    }
+}
+
 /// The connected parts of a mesh. Vertices that no triangle uses belong to none.
 pub fn shells(mesh: &Mesh) -> Vec<Shell> {
     let mut roots = Roots::new(mesh.positions.len());

@@ -34,3 +34,27 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::tests::pawn_mesh;
+
+    #[test]
+    fn stl_reads_back() {
+        let mesh = pawn_mesh();
+        let mut bytes = Vec::new();
+        write(&mesh, &mut bytes).unwrap();
+        assert_eq!(bytes.len(), 84 + 50 * mesh.triangles.len());
+        let read = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).unwrap();
+        assert_eq!((read.faces.len(), read.vertices.len()), (mesh.triangles.len(), mesh.positions.len()));
+        for (face, triangle) in read.faces.iter().zip(&mesh.triangles) {
+            let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
+            let normal = (b - a).cross(c - a).normalize();
+            for axis in 0..3 {
+                assert_eq!(read.vertices[face.vertices[0]][axis], a[axis] as f32);
+                assert_eq!(face.normal[axis], normal[axis] as f32);
+            }
+        }
+    }
+}

@@ -372,89 +372,10 @@ proptest! {
     }
 }
 
-fn pawn_mesh() -> Mesh {
+/// A small mesh for the writers' tests.
+pub(super) fn pawn_mesh() -> Mesh {
     let bounds = Aabb::new(DVec3::new(0.9, 0.9, 0.0), DVec3::new(2.1, 2.1, 1.5));
     check_around(&Formula(pawn), &bounds, 24).0
-}
-
-#[test]
-fn stl_reads_back() {
-    let mesh = pawn_mesh();
-    let mut bytes = Vec::new();
-    stl::write(&mesh, &mut bytes).unwrap();
-    assert_eq!(bytes.len(), 84 + 50 * mesh.triangles.len());
-    let read = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).unwrap();
-    assert_eq!((read.faces.len(), read.vertices.len()), (mesh.triangles.len(), mesh.positions.len()));
-    for (face, triangle) in read.faces.iter().zip(&mesh.triangles) {
-        let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
-        let normal = (b - a).cross(c - a).normalize();
-        for axis in 0..3 {
-            assert_eq!(read.vertices[face.vertices[0]][axis], a[axis] as f32);
-            assert_eq!(face.normal[axis], normal[axis] as f32);
-        }
-    }
-}
-
-#[test]
-fn ply_reads_back() {
-    use ply_rs_bw::{
-        parser::Parser,
-        ply::{DefaultElement, Property},
-    };
-    let mesh = pawn_mesh();
-    let mut bytes = Vec::new();
-    ply::write(&mesh, &mut bytes).unwrap();
-    let read = Parser::<DefaultElement>::new().read_ply(&mut std::io::Cursor::new(bytes)).unwrap();
-    let (vertices, faces) = (&read.payload["vertex"], &read.payload["face"]);
-    assert_eq!((vertices.len(), faces.len()), (mesh.positions.len(), mesh.triangles.len()));
-    for (i, vertex) in vertices.iter().enumerate() {
-        for (axis, (place, normal)) in [("x", "nx"), ("y", "ny"), ("z", "nz")].into_iter().enumerate() {
-            assert_eq!(vertex[place], Property::Double(mesh.positions[i][axis]));
-            assert_eq!(vertex[normal], Property::Float(mesh.normals[i][axis] as f32));
-        }
-    }
-    for (face, triangle) in faces.iter().zip(&mesh.triangles) {
-        assert_eq!(face["vertex_indices"], Property::ListInt(triangle.map(|v| v as i32).to_vec()));
-    }
-}
-
-#[test]
-fn obj_text_reads_back_exactly() {
-    let mesh = pawn_mesh();
-    let mut bytes = Vec::new();
-    obj::write(&mesh, &mut bytes).unwrap();
-    let text = String::from_utf8(bytes).unwrap();
-    let numbers = |tag: &str| -> Vec<Vec<f64>> {
-        let lines = text.lines().filter_map(|line| line.strip_prefix(tag));
-        lines
-            .map(|line| line.split(' ').map(|n| n.split('/').next().unwrap().parse().unwrap()).collect())
-            .collect()
-    };
-    let as_vectors = |tag| numbers(tag).iter().map(|n| DVec3::from_slice(n)).collect::<Vec<_>>();
-    assert_eq!(as_vectors("v "), mesh.positions);
-    assert_eq!(as_vectors("vn "), mesh.normals);
-    let first_face = mesh.triangles[0].map(|v| f64::from(v + 1));
-    assert_eq!((numbers("f ").len(), &numbers("f ")[0][..]), (mesh.triangles.len(), &first_face[..]));
-}
-
-#[test]
-fn vtp_text_counts_agree() {
-    let mesh = pawn_mesh();
-    let mut bytes = Vec::new();
-    vtp::write(&mesh, &mut bytes).unwrap();
-    let text = String::from_utf8(bytes).unwrap();
-    let array = |name: &str| -> Vec<f64> {
-        let (_, rest) = text.split_once(&format!("Name=\"{name}\"")).unwrap();
-        let (_, rest) = rest.split_once('>').unwrap();
-        let (data, _) = rest.split_once("</DataArray>").unwrap();
-        data.split_whitespace().map(|n| n.parse().unwrap()).collect()
-    };
-    let flat: Vec<f64> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
-    assert_eq!(array("points"), flat);
-    assert_eq!(array("normals").len(), flat.len());
-    let indices: Vec<f64> = mesh.triangles.iter().flatten().map(|&v| f64::from(v)).collect();
-    assert_eq!(array("connectivity"), indices);
-    assert_eq!(array("offsets").last(), Some(&(3.0 * mesh.triangles.len() as f64)));
 }
 
 /// Prints times; asserts nothing about them. `cargo test --release --lib print_times -- --nocapture`

@@ -36,3 +36,29 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     }
     writeln!(out, "</DataArray></Polys></Piece></PolyData></VTKFile>")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::tests::pawn_mesh;
+
+    #[test]
+    fn vtp_text_counts_agree() {
+        let mesh = pawn_mesh();
+        let mut bytes = Vec::new();
+        write(&mesh, &mut bytes).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let array = |name: &str| -> Vec<f64> {
+            let (_, rest) = text.split_once(&format!("Name=\"{name}\"")).unwrap();
+            let (_, rest) = rest.split_once('>').unwrap();
+            let (data, _) = rest.split_once("</DataArray>").unwrap();
+            data.split_whitespace().map(|n| n.parse().unwrap()).collect()
+        };
+        let flat: Vec<f64> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
+        assert_eq!(array("points"), flat);
+        assert_eq!(array("normals").len(), flat.len());
+        let indices: Vec<f64> = mesh.triangles.iter().flatten().map(|&v| f64::from(v)).collect();
+        assert_eq!(array("connectivity"), indices);
+        assert_eq!(array("offsets").last(), Some(&(3.0 * mesh.triangles.len() as f64)));
+    }
+}
