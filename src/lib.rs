@@ -3,5 +3,6 @@
 pub mod field;
 pub mod geom;
 pub mod interval;
+pub mod sph;
 
 pub use glam;
