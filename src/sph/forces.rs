@@ -110,43 +110,93 @@ fn gather<const VISCOSITY: bool, const TENSION: bool>(
     k: usize,
 ) -> DVec3 {
     let i = &records[first + k];
-    let mut pressure = [0.0; 3];
-    let mut viscous = [0.0; 3];
-    let mut normal = [0.0; 3];
-    // a particle is part of its own colour field: ∇W(0) = 0, but ∇²W(0) is not
-    let mut curvature = i.volume * kernels.poly6_laplacian(0.0);
-    for &j in block.of(k) {
-        let j = &records[j as usize];
-        let d: [f64; 3] = std::array::from_fn(|c| i.position[c] - j.position[c]);
-        let r2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let r = r2.sqrt();
-        let push = j.volume * (i.pressure + j.pressure) * kernels.spiky_gradient(r);
-        for c in 0..3 {
-            pressure[c] -= push * d[c];
-        }
-        if VISCOSITY {
-            let drag = j.volume * kernels.viscosity_laplacian(r);
-            for c in 0..3 {
-                viscous[c] += drag * (j.velocity[c] - i.velocity[c]);
-            }
-        }
-        if TENSION {
-            let slope = j.volume * kernels.poly6_gradient(r2);
-            for c in 0..3 {
-                normal[c] += slope * d[c];
-            }
-            curvature += j.volume * kernels.poly6_laplacian(r2);
-        }
+    let mut sums = Sums::default();
+    let mut pairs = block.of(k).chunks_exact(LANES);
+    for j in &mut pairs {
+        sums.add::<VISCOSITY, TENSION>(kernels, i, std::array::from_fn(|l| &records[j[l] as usize]));
     }
-    let mut force = 0.5 * DVec3::from(pressure) + parameters.viscosity * DVec3::from(viscous);
+    if let [j] = pairs.remainder() {
+        sums.add::<VISCOSITY, TENSION>(kernels, i, [&records[*j as usize], &NOTHING]);
+    }
+
+    let mut force = -0.5 * total(sums.pressure) + parameters.viscosity * total(sums.viscous);
     if TENSION {
-        let normal = DVec3::from(normal);
+        let normal = total(sums.normal);
         let length = normal.length();
         if length >= parameters.surface_threshold {
+            // a particle is part of its own colour field: ∇W(0) = 0, but ∇²W(0) is not
+            let curvature = i.volume * kernels.poly6_laplacian(0.0) + sums.curvature[0] + sums.curvature[1];
             force -= parameters.surface_tension * curvature / length * normal;
         }
     }
     force * (i.volume / parameters.particle_mass) + parameters.gravity
+}
+
+/// Neighbours handled side by side: as many doubles as a vector register of every x86-64 has.
+const LANES: usize = 2;
+
+/// A neighbour without volume: it fills the last lane of an odd list and adds zero.
+const NOTHING: Record = Record { position: [0.0; 3], velocity: [0.0; 3], pressure: 0.0, volume: 0.0 };
+
+/// The sums over neighbours, each lane its own; added up once at the end, always in the same order.
+#[derive(Default)]
+struct Sums {
+    /// Σ V_j (p_i + p_j) ∇W_spiky
+    pressure: [[f64; LANES]; 3],
+    /// Σ V_j (u_j − u_i) ∇²W_viscosity
+    viscous: [[f64; LANES]; 3],
+    /// ∇c = Σ V_j ∇W_poly6
+    normal: [[f64; LANES]; 3],
+    /// ∇²c without the particle itself
+    curvature: [f64; LANES],
+}
+
+impl Sums {
+    #[inline(always)]
+    fn add<const VISCOSITY: bool, const TENSION: bool>(
+        &mut self,
+        kernels: &Kernels,
+        i: &Record,
+        j: [&Record; LANES],
+    ) {
+        let d: [[f64; LANES]; 3] =
+            std::array::from_fn(|c| std::array::from_fn(|l| i.position[c] - j[l].position[c]));
+        let r2: [f64; LANES] =
+            std::array::from_fn(|l| d[0][l] * d[0][l] + d[1][l] * d[1][l] + d[2][l] * d[2][l]);
+        let r = r2.map(f64::sqrt);
+        let push: [f64; LANES] = std::array::from_fn(|l| {
+            j[l].volume * (i.pressure + j[l].pressure) * kernels.spiky_gradient(r[l])
+        });
+        for c in 0..3 {
+            for l in 0..LANES {
+                self.pressure[c][l] += push[l] * d[c][l];
+            }
+        }
+        if VISCOSITY {
+            let drag: [f64; LANES] =
+                std::array::from_fn(|l| j[l].volume * kernels.viscosity_laplacian(r[l]));
+            for c in 0..3 {
+                for l in 0..LANES {
+                    self.viscous[c][l] += drag[l] * (j[l].velocity[c] - i.velocity[c]);
+                }
+            }
+        }
+        if TENSION {
+            let slope: [f64; LANES] = std::array::from_fn(|l| j[l].volume * kernels.poly6_gradient(r2[l]));
+            for c in 0..3 {
+                for l in 0..LANES {
+                    self.normal[c][l] += slope[l] * d[c][l];
+                }
+            }
+            for l in 0..LANES {
+                self.curvature[l] += j[l].volume * kernels.poly6_laplacian(r2[l]);
+            }
+        }
+    }
+}
+
+fn total(lanes: [[f64; LANES]; 3]) -> DVec3 {
+    DVec3::from_array(lanes.map(|[a, b]| a + b))
 }
 
 #[cfg(test)]

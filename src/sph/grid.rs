@@ -25,6 +25,8 @@ const CELLS_PER_PARTICLE: usize = 32;
 pub(super) struct CellGrid {
     origin: DVec3,
     side: f64,
+    /// 1/side
+    per_length: f64,
     /// What rounding may add to a distance, m: searches look this much further.
     slack: f64,
     counts: [usize; 3],
@@ -69,24 +71,25 @@ impl CellGrid {
         &self.order
     }
 
-    /// Ranges of particles, one per row of cells, that hold all particles within `radius` of `p`.
-    pub fn ranges_near(&self, p: DVec3, radius: f64) -> impl Iterator<Item = Range<usize>> + '_ {
+    /// Calls with ranges of particles, one per row of cells, that hold all particles within `radius` of `p`.
+    #[inline(always)]
+    pub fn for_ranges_near(&self, p: DVec3, radius: f64, mut visit: impl FnMut(Range<usize>)) {
         let reach = radius + self.slack;
-        let [y, z] = [1, 2].map(|axis| self.cell(axis, p[axis] - reach)..=self.cell(axis, p[axis] + reach));
-        z.flat_map(move |cz| {
+        let [y, z] = [1, 2].map(|axis| (self.cell(axis, p[axis] - reach), self.cell(axis, p[axis] + reach)));
+        for cz in z.0..=z.1 {
             let dz = self.gap(2, cz, p.z);
-            y.clone().filter_map(move |cy| {
+            for cy in y.0..=y.1 {
                 let dy = self.gap(1, cy, p.y);
                 let half_chord2 = reach * reach - dy * dy - dz * dz;
-                (half_chord2 >= 0.0).then(|| {
+                if half_chord2 >= 0.0 {
                     let row = self.counts[0] * (cy + self.counts[1] * cz);
                     let half_chord = half_chord2.sqrt() + self.slack;
                     let first = row + self.cell(0, p.x - half_chord);
                     let last = row + self.cell(0, p.x + half_chord);
-                    self.starts[first] as usize..self.starts[last + 1] as usize
-                })
-            })
-        })
+                    visit(self.starts[first] as usize..self.starts[last + 1] as usize);
+                }
+            }
+        }
     }
 
     /// Chooses origin, side and counts; the side grows where particles are too sparse for fine cells.
@@ -102,6 +105,7 @@ impl CellGrid {
         loop {
             let counts = ((max - min) / self.side).floor() + 1.0;
             if counts.element_product() <= limit {
+                self.per_length = 1.0 / self.side;
                 self.counts = counts.to_array().map(|n| n as usize);
                 return;
             }
@@ -111,8 +115,8 @@ impl CellGrid {
 
     /// Cell of a coordinate along an axis, clamped to the grid. Monotone in `x`.
     fn cell(&self, axis: usize, x: f64) -> usize {
-        // a negative quotient casts to 0
-        (((x - self.origin[axis]) / self.side) as usize).min(self.counts[axis] - 1)
+        // a negative product casts to 0; there are fewer cells than u32 counts
+        (((x - self.origin[axis]) * self.per_length) as u32 as usize).min(self.counts[axis] - 1)
     }
 
     /// Distance along an axis between `x` and a cell.

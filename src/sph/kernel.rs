@@ -42,34 +42,35 @@ impl Kernels {
     /// W_poly6 = 315/(64πh⁹)·(h² − r²)³, 1/m³.
     #[inline(always)]
     pub fn poly6(&self, r2: f64) -> f64 {
-        let q = (self.h2 - r2).max(0.0);
+        let q = positive(self.h2 - r2);
         self.poly6 * q * q * q
     }
 
     /// ∇W_poly6 = −945/(32πh⁹)·(h² − r²)²·**r**.
     #[inline(always)]
     pub fn poly6_gradient(&self, r2: f64) -> f64 {
-        let q = (self.h2 - r2).max(0.0);
+        let q = positive(self.h2 - r2);
         self.poly6_gradient * q * q
     }
 
     /// ∇²W_poly6 = −945/(32πh⁹)·(h² − r²)(3h² − 7r²), 1/m⁵.
     #[inline(always)]
     pub fn poly6_laplacian(&self, r2: f64) -> f64 {
-        self.poly6_gradient * (self.h2 - r2).max(0.0) * (3.0 * self.h2 - 7.0 * r2)
+        self.poly6_gradient * positive(self.h2 - r2) * (3.0 * self.h2 - 7.0 * r2)
     }
 
     /// W_spiky = 15/(πh⁶)·(h − r)³, 1/m³.
     pub fn spiky(&self, r: f64) -> f64 {
-        self.spiky * (self.h - r).max(0.0).powi(3)
+        self.spiky * positive(self.h - r).powi(3)
     }
 
     /// ∇W_spiky = −45/(πh⁶)·(h − r)²·**r**/r. Coinciding particles have no direction: the factor stays
     /// finite there, so that its product with **r** = 0 is zero.
     #[inline(always)]
     pub fn spiky_gradient(&self, r: f64) -> f64 {
-        let q = (self.h - r).max(0.0);
-        self.spiky_gradient * q * q / r.max(1e-12 * self.h)
+        let q = positive(self.h - r);
+        let least = 1e-12 * self.h;
+        self.spiky_gradient * q * q / if r > least { r } else { least }
     }
 
     /// W_viscosity = 15/(2πh³)·(−r³/2h³ + r²/h² + h/2r − 1), 1/m³; infinite at r = 0.
@@ -84,8 +85,14 @@ impl Kernels {
     /// ∇²W_viscosity = 45/(πh⁶)·(h − r), 1/m⁵.
     #[inline(always)]
     pub fn viscosity_laplacian(&self, r: f64) -> f64 {
-        -self.spiky_gradient * (self.h - r).max(0.0)
+        -self.spiky_gradient * positive(self.h - r)
     }
+}
+
+/// max(x, 0) in one instruction; `f64::max` takes three to return the number when the other is NaN.
+#[inline(always)]
+fn positive(x: f64) -> f64 {
+    if x > 0.0 { x } else { 0.0 }
 }
 
 #[cfg(test)]

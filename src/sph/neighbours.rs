@@ -7,6 +7,9 @@
 //! Invariant: the lists are complete and exact: j is in the list of i iff i ≠ j and |r_i − r_j|² < h² in
 //! double precision, hence i is in the list of j too.
 
+use std::ops::Range;
+
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{grid::CellGrid, particles::Vectors};
@@ -14,12 +17,15 @@ use super::{grid::CellGrid, particles::Vectors};
 /// Particles per block: the unit of parallel work. Small enough to balance, large enough to forget.
 pub(super) const BLOCK: usize = 128;
 
+/// Candidates whose distances are found side by side.
+const LANES: usize = 4;
+
 /// Neighbours of a block of consecutive particles.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockList {
+    /// Where each particle's list ends in `indices`, which is longer than its content.
     ends: Vec<u32>,
     indices: Vec<u32>,
-    candidates: Vec<f64>,
 }
 
 impl BlockList {
@@ -43,7 +49,6 @@ impl Neighbours {
         self.blocks.resize_with(position.len().div_ceil(BLOCK), BlockList::default);
         self.blocks.par_iter_mut().enumerate().for_each(|(b, block)| {
             block.ends.clear();
-            block.indices.clear();
             for i in b * BLOCK..((b + 1) * BLOCK).min(position.len()) {
                 block.add_particle(grid, position, h, i);
             }
@@ -56,7 +61,7 @@ impl Neighbours {
 
     /// Number of ordered pairs.
     pub fn pairs(&self) -> usize {
-        self.blocks.iter().map(|block| block.indices.len()).sum()
+        self.blocks.iter().map(BlockList::count).sum()
     }
 
     #[cfg(test)]
@@ -66,34 +71,57 @@ impl Neighbours {
 }
 
 impl BlockList {
+    /// Pairs of the block so far.
+    fn count(&self) -> usize {
+        self.ends.last().map_or(0, |&end| end as usize)
+    }
+
     fn add_particle(&mut self, grid: &CellGrid, position: &Vectors, h: f64, i: usize) {
         let p = position.get(i);
-        let h2 = h * h;
-        let mut count = self.indices.len();
-        for range in grid.ranges_near(p, h) {
-            self.candidates.clear();
-            let (xs, ys, zs) =
-                (&position.x[range.clone()], &position.y[range.clone()], &position.z[range.clone()]);
-            self.candidates.extend(xs.iter().zip(ys).zip(zs).map(|((&x, &y), &z)| {
-                let (dx, dy, dz) = (p.x - x, p.y - y, p.z - z);
-                dx * dx + dy * dy + dz * dz
-            }));
-            // Write each candidate, advance for the near ones only: no branch to mispredict.
-            if self.indices.len() < count + range.len() {
-                self.indices.resize(count + range.len(), 0);
+        let mut count = self.count();
+        grid.for_ranges_near(p, h, |range| {
+            // a particle is no neighbour of itself: its row is searched in two parts
+            if range.contains(&i) {
+                count = self.add_near(count, position, p, h * h, range.start..i);
+                count = self.add_near(count, position, p, h * h, i + 1..range.end);
+            } else {
+                count = self.add_near(count, position, p, h * h, range);
             }
-            let free = &mut self.indices[count..count + range.len()];
-            let mut found = 0;
-            for (k, &r2) in self.candidates.iter().enumerate() {
-                let j = range.start + k;
-                free[found] = j as u32;
-                found += usize::from(r2 < h2 && j != i);
-            }
-            count += found;
-        }
-        self.indices.truncate(count);
+        });
         self.ends.push(count as u32);
     }
+
+    /// Adds the particles of a range that are nearer than √h2 and returns the new count. Each is written, but
+    /// the place advances for the near ones only, so that there is no branch to mispredict.
+    #[inline(always)]
+    fn add_near(&mut self, count: usize, position: &Vectors, p: DVec3, h2: f64, range: Range<usize>) -> usize {
+        if self.indices.len() < count + range.len() {
+            self.indices.resize(2 * (count + range.len()), 0);
+        }
+        let free = &mut self.indices[count..count + range.len()];
+        let [x, y, z] = [&position.x, &position.y, &position.z].map(|c| c[range.clone()].as_chunks::<LANES>());
+        let mut found = 0;
+        let mut keep = |k: usize, near: bool| {
+            free[found] = (range.start + k) as u32;
+            found += usize::from(near);
+        };
+        for (c, ((x, y), z)) in x.0.iter().zip(y.0).zip(z.0).enumerate() {
+            let r2: [f64; LANES] = std::array::from_fn(|l| distance2(p, x[l], y[l], z[l]));
+            for (l, r2) in r2.into_iter().enumerate() {
+                keep(c * LANES + l, r2 < h2);
+            }
+        }
+        for (l, ((&x, &y), &z)) in x.1.iter().zip(y.1).zip(z.1).enumerate() {
+            keep(range.len() / LANES * LANES + l, distance2(p, x, y, z) < h2);
+        }
+        count + found
+    }
+}
+
+#[inline(always)]
+fn distance2(p: DVec3, x: f64, y: f64, z: f64) -> f64 {
+    let (dx, dy, dz) = (p.x - x, p.y - y, p.z - z);
+    dx * dx + dy * dy + dz * dz
 }
 
 #[cfg(test)]

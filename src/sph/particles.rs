@@ -38,11 +38,11 @@ impl Vectors {
     }
 
     pub fn resize(&mut self, len: usize) {
-        self.components_mut().map(|component| component.resize(len, 0.0));
+        self.components_mut().into_iter().for_each(|component| component.resize(len, 0.0));
     }
 
     pub fn clear(&mut self) {
-        self.components_mut().map(Vec::clear);
+        self.components_mut().into_iter().for_each(Vec::clear);
     }
 
     pub fn iter(&self) -> impl Iterator<Item = DVec3> + '_ {
