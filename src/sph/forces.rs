@@ -173,8 +173,7 @@ impl Sums {
             }
         }
         if VISCOSITY {
-            let drag: [f64; LANES] =
-                std::array::from_fn(|l| j[l].volume * kernels.viscosity_laplacian(r[l]));
+            let drag: [f64; LANES] = std::array::from_fn(|l| j[l].volume * kernels.viscosity_laplacian(r[l]));
             for c in 0..3 {
                 for l in 0..LANES {
                     self.viscous[c][l] += drag[l] * (j[l].velocity[c] - i.velocity[c]);

@@ -13,10 +13,6 @@ use glam::DVec3;
 
 use super::particles::Vectors;
 
-/// Cells per support radius. 2 searches half the volume that cells of side h do, in more and shorter rows;
-/// measured on the drop (10 000 particles, 200 neighbours) 1, 2, 3: see the table in `neighbours.rs`.
-const CELLS_PER_RADIUS: f64 = 2.0;
-
 /// More cells than this per particle would cost more to clear than they save.
 const CELLS_PER_PARTICLE: usize = 32;
 
@@ -24,21 +20,23 @@ const CELLS_PER_PARTICLE: usize = 32;
 #[derive(Debug, Clone, Default)]
 pub(super) struct CellGrid {
     origin: DVec3,
-    side: f64,
-    /// 1/side
+    /// 1/side, 1/m
     per_length: f64,
-    /// What rounding may add to a distance, m: searches look this much further.
-    slack: f64,
+    /// Cells to look at on either side.
+    reach: usize,
     counts: [usize; 3],
     starts: Vec<u32>,
     cell_of: Vec<u32>,
     order: Vec<u32>,
+    /// Cell of each particle in the new order.
+    cells: Vec<u32>,
 }
 
 impl CellGrid {
-    /// Bins finite positions for searches within `radius`.
-    pub fn sort(&mut self, position: &Vectors, radius: f64) {
-        self.lay_out(position, radius);
+    /// Bins finite positions for searches within `radius`, in cells of side radius/`cells_per_radius` or, where
+    /// particles are sparse, wider.
+    pub fn sort(&mut self, position: &Vectors, radius: f64, cells_per_radius: usize) {
+        self.lay_out(position, radius, cells_per_radius);
         self.cell_of.resize(position.len(), 0);
         let mut cell_of = std::mem::take(&mut self.cell_of);
         for (cell, p) in cell_of.iter_mut().zip(position.iter()) {
@@ -59,9 +57,11 @@ impl CellGrid {
             *start = sum;
         }
         self.order.resize(position.len(), 0);
+        self.cells.resize(position.len(), 0);
         for (i, &cell) in self.cell_of.iter().enumerate() {
             let place = &mut self.starts[cell as usize + 1];
             self.order[*place as usize] = i as u32;
+            self.cells[*place as usize] = cell;
             *place += 1;
         }
     }
@@ -71,45 +71,47 @@ impl CellGrid {
         &self.order
     }
 
-    /// Calls with ranges of particles, one per row of cells, that hold all particles within `radius` of `p`.
-    #[inline(always)]
-    pub fn for_ranges_near(&self, p: DVec3, radius: f64, mut visit: impl FnMut(Range<usize>)) {
-        let reach = radius + self.slack;
-        let [y, z] = [1, 2].map(|axis| (self.cell(axis, p[axis] - reach), self.cell(axis, p[axis] + reach)));
+    /// The particles of the cell that holds particle `i` of the sorted order.
+    pub fn cell_mates(&self, i: usize) -> Range<usize> {
+        let cell = self.cells[i] as usize;
+        self.starts[cell] as usize..self.starts[cell + 1] as usize
+    }
+
+    /// Calls with ranges of particles, one per row of cells, that hold all particles within the radius of any
+    /// particle in the cell of particle `i`.
+    pub fn for_ranges_around(&self, i: usize, mut visit: impl FnMut(Range<usize>)) {
+        let [nx, ny, nz] = self.counts;
+        let cell = self.cells[i] as usize;
+        let near = |c: usize, count: usize| (c.saturating_sub(self.reach), (c + self.reach).min(count - 1));
+        let (x, y, z) = (near(cell % nx, nx), near(cell / nx % ny, ny), near(cell / nx / ny, nz));
         for cz in z.0..=z.1 {
-            let dz = self.gap(2, cz, p.z);
             for cy in y.0..=y.1 {
-                let dy = self.gap(1, cy, p.y);
-                let half_chord2 = reach * reach - dy * dy - dz * dz;
-                if half_chord2 >= 0.0 {
-                    let row = self.counts[0] * (cy + self.counts[1] * cz);
-                    let half_chord = half_chord2.sqrt() + self.slack;
-                    let first = row + self.cell(0, p.x - half_chord);
-                    let last = row + self.cell(0, p.x + half_chord);
-                    visit(self.starts[first] as usize..self.starts[last + 1] as usize);
-                }
+                let row = nx * (cy + ny * cz);
+                visit(self.starts[row + x.0] as usize..self.starts[row + x.1 + 1] as usize);
             }
         }
     }
 
     /// Chooses origin, side and counts; the side grows where particles are too sparse for fine cells.
-    fn lay_out(&mut self, position: &Vectors, radius: f64) {
+    fn lay_out(&mut self, position: &Vectors, radius: f64, cells_per_radius: usize) {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in position.iter() {
             (min, max) = (min.min(p), max.max(p));
         }
         let limit = (CELLS_PER_PARTICLE * position.len()).max(4096) as f64;
         self.origin = min;
-        self.slack = 1e-9 * radius + 8.0 * f64::EPSILON * min.abs().max(max.abs()).max_element();
-        self.side = radius / CELLS_PER_RADIUS;
+        // rounding may add this to a distance: cells are wider by so much
+        let slack = 1e-9 * radius + 8.0 * f64::EPSILON * min.abs().max(max.abs()).max_element();
+        let mut side = (radius + slack) / cells_per_radius as f64;
         loop {
-            let counts = ((max - min) / self.side).floor() + 1.0;
+            let counts = ((max - min) / side).floor() + 1.0;
             if counts.element_product() <= limit {
-                self.per_length = 1.0 / self.side;
+                self.per_length = 1.0 / side;
+                self.reach = (radius * (1.0 + 1e-10) / side).ceil() as usize;
                 self.counts = counts.to_array().map(|n| n as usize);
                 return;
             }
-            self.side *= 1.25;
+            side *= 1.25;
         }
     }
 
@@ -117,12 +119,6 @@ impl CellGrid {
     fn cell(&self, axis: usize, x: f64) -> usize {
         // a negative product casts to 0; there are fewer cells than u32 counts
         (((x - self.origin[axis]) * self.per_length) as u32 as usize).min(self.counts[axis] - 1)
-    }
-
-    /// Distance along an axis between `x` and a cell.
-    fn gap(&self, axis: usize, cell: usize, x: f64) -> f64 {
-        let low = self.origin[axis] + cell as f64 * self.side;
-        ((low - x).max(x - (low + self.side)) - self.slack).max(0.0)
     }
 }
 
@@ -137,7 +133,7 @@ mod tests {
             position.push(DVec3::new(x, 0.0, 0.0));
         }
         let mut grid = CellGrid::default();
-        grid.sort(&position, 0.4);
+        grid.sort(&position, 0.4, 1);
         assert_eq!(grid.order(), [1, 3, 4, 0, 2]);
     }
 
@@ -147,7 +143,7 @@ mod tests {
         position.push(DVec3::splat(-1e9));
         position.push(DVec3::splat(1e9));
         let mut grid = CellGrid::default();
-        grid.sort(&position, 0.1);
+        grid.sort(&position, 0.1, 2);
         assert!(grid.starts.len() < 5000);
     }
 }

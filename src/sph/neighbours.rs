@@ -17,6 +17,9 @@ use super::{grid::CellGrid, particles::Vectors};
 /// Particles per block: the unit of parallel work. Small enough to balance, large enough to forget.
 pub(super) const BLOCK: usize = 128;
 
+/// Mean number of neighbours above which cells of half the radius are faster.
+const DENSE: usize = 60;
+
 /// Candidates whose distances are found side by side.
 const LANES: usize = 4;
 
@@ -26,6 +29,7 @@ pub(super) struct BlockList {
     /// Where each particle's list ends in `indices`, which is longer than its content.
     ends: Vec<u32>,
     indices: Vec<u32>,
+    candidates: Candidates,
 }
 
 impl BlockList {
@@ -35,6 +39,15 @@ impl BlockList {
         let start = if k == 0 { 0 } else { self.ends[k - 1] };
         &self.indices[start as usize..self.ends[k] as usize]
     }
+}
+
+/// Particles of the cells around one cell, copied side by side.
+#[derive(Debug, Clone, Default)]
+struct Candidates {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    z: Vec<f64>,
+    index: Vec<u32>,
 }
 
 /// Neighbours of all particles.
@@ -49,10 +62,21 @@ impl Neighbours {
         self.blocks.resize_with(position.len().div_ceil(BLOCK), BlockList::default);
         self.blocks.par_iter_mut().enumerate().for_each(|(b, block)| {
             block.ends.clear();
-            for i in b * BLOCK..((b + 1) * BLOCK).min(position.len()) {
-                block.add_particle(grid, position, h, i);
+            let (mut i, last) = (b * BLOCK, ((b + 1) * BLOCK).min(position.len()));
+            while i < last {
+                // particles of one cell share their candidates
+                let own = block.gather_candidates(grid, position, i);
+                let mates = grid.cell_mates(i).end.min(last) - i;
+                (own..own + mates).for_each(|own| block.add_particle(h, own));
+                i += mates;
             }
         });
+    }
+
+    /// How fine a grid the next search wants: small cells hold fewer candidates, but are worth their number
+    /// only where many particles share one.
+    pub fn cells_per_radius(&self, particles: usize) -> usize {
+        if self.pairs() > DENSE * particles { 2 } else { 1 }
     }
 
     pub fn blocks(&self) -> &[BlockList] {
@@ -76,45 +100,62 @@ impl BlockList {
         self.ends.last().map_or(0, |&end| end as usize)
     }
 
-    fn add_particle(&mut self, grid: &CellGrid, position: &Vectors, h: f64, i: usize) {
-        let p = position.get(i);
-        let mut count = self.count();
-        grid.for_ranges_near(p, h, |range| {
-            // a particle is no neighbour of itself: its row is searched in two parts
+    /// Copies the particles of all cells around particle `i`'s, and returns the place of `i` among them.
+    fn gather_candidates(&mut self, grid: &CellGrid, position: &Vectors, i: usize) -> usize {
+        let Candidates { x, y, z, index } = &mut self.candidates;
+        [&mut *x, &mut *y, &mut *z].into_iter().for_each(Vec::clear);
+        index.clear();
+        let mut own = 0;
+        grid.for_ranges_around(i, |range| {
             if range.contains(&i) {
-                count = self.add_near(count, position, p, h * h, range.start..i);
-                count = self.add_near(count, position, p, h * h, i + 1..range.end);
-            } else {
-                count = self.add_near(count, position, p, h * h, range);
+                own = index.len() + i - range.start;
             }
+            x.extend_from_slice(&position.x[range.clone()]);
+            y.extend_from_slice(&position.y[range.clone()]);
+            z.extend_from_slice(&position.z[range.clone()]);
+            index.extend(range.start as u32..range.end as u32);
         });
-        self.ends.push(count as u32);
+        own
     }
 
-    /// Adds the particles of a range that are nearer than √h2 and returns the new count. Each is written, but
-    /// the place advances for the near ones only, so that there is no branch to mispredict.
-    #[inline(always)]
-    fn add_near(&mut self, count: usize, position: &Vectors, p: DVec3, h2: f64, range: Range<usize>) -> usize {
-        if self.indices.len() < count + range.len() {
-            self.indices.resize(2 * (count + range.len()), 0);
+    /// Adds the neighbours of the candidate `own`.
+    fn add_particle(&mut self, h: f64, own: usize) {
+        let count = self.count();
+        let most = count + self.candidates.index.len();
+        if self.indices.len() < most {
+            self.indices.resize(2 * most, 0);
         }
-        let free = &mut self.indices[count..count + range.len()];
-        let [x, y, z] = [&position.x, &position.y, &position.z].map(|c| c[range.clone()].as_chunks::<LANES>());
+        // a particle is no neighbour of itself: the candidates before and after it
+        let c = &self.candidates;
+        let p = DVec3::new(c.x[own], c.y[own], c.z[own]);
+        let before = c.add_near(p, h * h, 0..own, &mut self.indices[count..]);
+        let after = c.add_near(p, h * h, own + 1..c.index.len(), &mut self.indices[count + before..]);
+        self.ends.push((count + before + after) as u32);
+    }
+}
+
+impl Candidates {
+    /// Writes the indices of a range's candidates that are nearer than √h2 and returns how many. Each is
+    /// written, but the place advances for the near ones only, so that there is no branch to mispredict.
+    #[inline(always)]
+    fn add_near(&self, p: DVec3, h2: f64, range: Range<usize>, free: &mut [u32]) -> usize {
+        let [x, y, z] = [&self.x, &self.y, &self.z].map(|c| c[range.clone()].as_chunks::<LANES>());
+        let index = self.index[range].as_chunks::<LANES>();
         let mut found = 0;
-        let mut keep = |k: usize, near: bool| {
-            free[found] = (range.start + k) as u32;
+        let mut keep = |j: u32, near: bool| {
+            free[found] = j;
             found += usize::from(near);
         };
-        for (c, ((x, y), z)) in x.0.iter().zip(y.0).zip(z.0).enumerate() {
+        for (((x, y), z), j) in x.0.iter().zip(y.0).zip(z.0).zip(index.0) {
             let r2: [f64; LANES] = std::array::from_fn(|l| distance2(p, x[l], y[l], z[l]));
-            for (l, r2) in r2.into_iter().enumerate() {
-                keep(c * LANES + l, r2 < h2);
+            for l in 0..LANES {
+                keep(j[l], r2[l] < h2);
             }
         }
-        for (l, ((&x, &y), &z)) in x.1.iter().zip(y.1).zip(z.1).enumerate() {
-            keep(range.len() / LANES * LANES + l, distance2(p, x, y, z) < h2);
+        for (((&x, &y), &z), &j) in x.1.iter().zip(y.1).zip(z.1).zip(index.1) {
+            keep(j, distance2(p, x, y, z) < h2);
         }
-        count + found
+        found
     }
 }
 
@@ -137,8 +178,13 @@ mod tests {
 
     #[track_caller]
     fn check(cloud: &Vectors, h: f64) {
+        [1, 2, 3].into_iter().for_each(|cells| check_cells(cloud, h, cells));
+    }
+
+    #[track_caller]
+    fn check_cells(cloud: &Vectors, h: f64, cells: usize) {
         let mut grid = CellGrid::default();
-        grid.sort(cloud, h);
+        grid.sort(cloud, h, cells);
         let mut sorted = Vectors::default();
         for &i in grid.order() {
             sorted.push(cloud.get(i as usize));

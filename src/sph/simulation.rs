@@ -271,7 +271,8 @@ impl<'a> Simulation<'a> {
     }
 
     fn find_neighbours(&mut self) {
-        self.grid.sort(&self.particles.position, self.kernels.h);
+        let cells = self.neighbours.cells_per_radius(self.particles.len());
+        self.grid.sort(&self.particles.position, self.kernels.h, cells);
         self.reorder();
         self.neighbours.search(&self.grid, &self.particles.position, self.kernels.h);
     }
