@@ -86,7 +86,8 @@ pub fn push_out(field: &dyn Field, inside: DVec3, reach: f64) -> Result<Option<C
         let step = (w / slope).max(8.0 * POINT * here.abs().max_element()).max(f64::MIN_POSITIVE);
         let next = here - gradient * (step / slope);
         // a vanishing or undefined gradient fails here: infinite and NaN distances are not within reach
-        if !(next.distance(inside) <= reach) {
+        let within_reach = next.distance(inside) <= reach;
+        if !within_reach {
             break;
         }
         if omega(field, next)? < 0.0 {
@@ -95,15 +96,15 @@ pub fn push_out(field: &dyn Field, inside: DVec3, reach: f64) -> Result<Option<C
         here = next;
     }
 
-    let mut distance = reach / 64.0;
-    while distance <= reach {
+    // thirteen lengths from reach/64 to reach
+    for k in 0..=12 {
+        let distance = reach * 2.0f64.powf(0.5 * f64::from(k) - 6.0);
         for direction in [DVec3::Z, DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, -DVec3::Z] {
             let outside = inside + direction * distance;
             if omega(field, outside)? < 0.0 {
                 return contact(inside, outside).map(Some);
             }
         }
-        distance *= 2.0f64.sqrt();
     }
     Ok(None)
 }
@@ -144,7 +145,7 @@ fn last_outside(
     let tolerance = POINT * (size / from.distance(to)).max(1.0);
     for k in 0..120 {
         let width = high - low;
-        if !(width > tolerance) {
+        if width <= tolerance {
             break;
         }
         // nearer to either end than half the tolerance teaches nothing
@@ -205,6 +206,7 @@ mod tests {
         }
         let everywhere = Closures { omega: |_: DVec3| 1.0, gradient: |_: DVec3| DVec3::ZERO };
         assert_eq!(push_out(&everywhere, DVec3::ZERO, 2.0), Ok(None));
+        assert_eq!(push_out(&everywhere, DVec3::ZERO, 0.0), Ok(None));
     }
 
     #[test]

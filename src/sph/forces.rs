@@ -167,30 +167,27 @@ impl Sums {
         let push: [f64; LANES] = std::array::from_fn(|l| {
             j[l].volume * (i.pressure + j[l].pressure) * kernels.spiky_gradient(r[l])
         });
-        for c in 0..3 {
-            for l in 0..LANES {
-                self.pressure[c][l] += push[l] * d[c][l];
-            }
-        }
+        accumulate(&mut self.pressure, push, d);
         if VISCOSITY {
             let drag: [f64; LANES] = std::array::from_fn(|l| j[l].volume * kernels.viscosity_laplacian(r[l]));
-            for c in 0..3 {
-                for l in 0..LANES {
-                    self.viscous[c][l] += drag[l] * (j[l].velocity[c] - i.velocity[c]);
-                }
-            }
+            let difference: [[f64; LANES]; 3] =
+                std::array::from_fn(|c| std::array::from_fn(|l| j[l].velocity[c] - i.velocity[c]));
+            accumulate(&mut self.viscous, drag, difference);
         }
         if TENSION {
             let slope: [f64; LANES] = std::array::from_fn(|l| j[l].volume * kernels.poly6_gradient(r2[l]));
-            for c in 0..3 {
-                for l in 0..LANES {
-                    self.normal[c][l] += slope[l] * d[c][l];
-                }
-            }
-            for l in 0..LANES {
-                self.curvature[l] += j[l].volume * kernels.poly6_laplacian(r2[l]);
-            }
+            accumulate(&mut self.normal, slope, d);
+            self.curvature =
+                std::array::from_fn(|l| self.curvature[l] + j[l].volume * kernels.poly6_laplacian(r2[l]));
         }
+    }
+}
+
+/// sum += factor · vector, lane by lane.
+#[inline(always)]
+fn accumulate(sum: &mut [[f64; LANES]; 3], factor: [f64; LANES], vector: [[f64; LANES]; 3]) {
+    for (sum, vector) in sum.iter_mut().zip(vector) {
+        *sum = std::array::from_fn(|l| sum[l] + factor[l] * vector[l]);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Cell grid: particles in the order of the cells they lie in, found by one counting sort.
 //!
-//! Cells are a fraction of the support radius wide and x runs fastest, so that all cells of a row that a
-//! support ball touches are one contiguous range of particles.
+//! A cell is as wide as the support radius, or a whole fraction of it; x runs fastest, so that the cells of a
+//! row that a support ball can touch are one contiguous range of particles.
 //!
 //! Invariant: after [`CellGrid::sort`] and a permutation by [`CellGrid::order`], the particles of cell c are
 //! `starts[c] .. starts[c + 1]`; particles of one cell keep their previous order, so the result depends on
@@ -26,6 +26,7 @@ pub(super) struct CellGrid {
     reach: usize,
     counts: [usize; 3],
     starts: Vec<u32>,
+    /// Cell of each particle in the old order.
     cell_of: Vec<u32>,
     order: Vec<u32>,
     /// Cell of each particle in the new order.
@@ -37,12 +38,12 @@ impl CellGrid {
     /// particles are sparse, wider.
     pub fn sort(&mut self, position: &Vectors, radius: f64, cells_per_radius: usize) {
         self.lay_out(position, radius, cells_per_radius);
-        self.cell_of.resize(position.len(), 0);
         let mut cell_of = std::mem::take(&mut self.cell_of);
-        for (cell, p) in cell_of.iter_mut().zip(position.iter()) {
+        cell_of.clear();
+        cell_of.extend(position.iter().map(|p| {
             let [x, y, z] = [0, 1, 2].map(|axis| self.cell(axis, p[axis]));
-            *cell = (x + self.counts[0] * (y + self.counts[1] * z)) as u32;
-        }
+            (x + self.counts[0] * (y + self.counts[1] * z)) as u32
+        }));
         self.cell_of = cell_of;
 
         self.starts.clear();

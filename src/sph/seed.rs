@@ -149,7 +149,8 @@ fn lattice(aabb: Aabb, spacing: f64) -> Result<Vec<DVec3>, SeedError> {
     // a box of whole spacings must not lose a layer to rounding
     let counts = (aabb.size() / spacing + 1e-9).floor();
     let sites = counts.element_product();
-    if !(sites <= MAX_SITES) {
+    let affordable = sites <= MAX_SITES;
+    if !affordable {
         return Err(SeedError::TooLarge { sites });
     }
     let [nx, ny, nz] = counts.to_array().map(|n| n as usize);

@@ -202,7 +202,7 @@ impl<'a> Simulation<'a> {
         &self.acceleration
     }
 
-    /// Completed steps.
+    /// Steps taken; after an error, the one that failed included.
     pub fn steps(&self) -> u64 {
         self.steps
     }
@@ -338,7 +338,7 @@ impl<'a> Simulation<'a> {
 
 fn check_setup(boundary: &Boundary<'_>, particles: &Particles) -> Result<(), SetupError> {
     let domain = boundary.domain;
-    if !(domain.is_finite() && domain.volume() > 0.0) {
+    if !(domain.is_finite() && domain.volume() > 0.0 && domain.volume() < f64::INFINITY) {
         return Err(SetupError::Domain(domain));
     }
     let wrong = |o: &Obstacle<'_>| !((0.0..=1.0).contains(&o.restitution) && o.resolution > 0.0);
@@ -353,9 +353,9 @@ fn check_setup(boundary: &Boundary<'_>, particles: &Particles) -> Result<(), Set
             return Err(SetupError::NonFinite { id: particles.id[i] });
         }
     }
-    let in_obstacle = |p: DVec3| boundary.obstacles.iter().any(|o| !(o.field.omega(p) < 0.0));
+    let in_fluid = |p: DVec3| boundary.obstacles.iter().all(|o| o.field.omega(p) < 0.0);
     let outside_box = particles.position.iter().filter(|&p| !domain.contains(p)).count();
-    let inside_obstacles = particles.position.iter().filter(|&p| in_obstacle(p)).count();
+    let inside_obstacles = particles.position.iter().filter(|&p| !in_fluid(p)).count();
     if outside_box + inside_obstacles > 0 {
         return Err(SetupError::NotInFluid { outside_box, inside_obstacles });
     }
