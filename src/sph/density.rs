@@ -41,3 +41,27 @@ pub(super) fn find_pressure(parameters: &Parameters, density: &[f64], pressure: 
         *p = parameters.pressure(rho);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::sph::{Parameters, scenes};
+
+    #[test]
+    fn a_lattice_of_the_rest_spacing_has_the_rest_density() {
+        let parameters = Parameters::default();
+        let simulation = scenes::free_drop(parameters.clone(), 2000);
+        let particles = simulation.particles();
+        let centre = particles.order_by_id()[0];
+        // 3.7 spacings per support radius: the sum differs from the integral by less than 1 %
+        assert!((particles.density[centre] / parameters.rest_density - 1.0).abs() < 0.01);
+        assert_eq!(particles.pressure[centre], parameters.pressure(particles.density[centre]));
+    }
+
+    #[test]
+    fn a_lone_particle_counts_itself() {
+        let parameters = Parameters::default();
+        let simulation = scenes::free_drop(parameters.clone(), 1);
+        let expected = parameters.particle_mass * 315.0 / (64.0 * std::f64::consts::PI * 1e-3);
+        assert!((simulation.particles().density[0] / expected - 1.0).abs() < 1e-14);
+    }
+}

@@ -10,6 +10,26 @@
 //! Obstacle  ──┘
 //! ```
 //!
+//! ```
+//! use rfm::{field::Closures, geom::Aabb, glam::DVec3, sph::*};
+//!
+//! let ball = Closures {
+//!     omega: |p: DVec3| 0.25 - p.length_squared(),
+//!     gradient: |p: DVec3| -2.0 * p,
+//! };
+//! let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
+//! let obstacles = vec![Obstacle { field: &ball, restitution: 0.5, resolution: 0.005 }];
+//! let parameters = Parameters::default();
+//! let mut fluid = FluidBlock::drop(DVec3::Z * 0.8, 200).seed(&parameters, domain)?;
+//! carve(&mut fluid, &domain, &obstacles, 0.01)?;
+//! let mut simulation = Simulation::new(parameters, fluid, domain, obstacles)?;
+//! for _ in 0..100 {
+//!     simulation.step()?;
+//! }
+//! assert_eq!(simulation.stats().inside, 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Invariants:
 //! - An obstacle is a [`Field`](crate::field::Field) and nothing else; this module knows no compiler,
 //!   no file, no clock and no terminal.
