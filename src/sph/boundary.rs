@@ -9,6 +9,9 @@
 //! The bounce is left to the velocity: a mirrored rest of path could lift a particle above the height it fell
 //! from.
 //!
+//! Walls and obstacles act on positions and velocities only. They add nothing to the density, so a fluid that
+//! has come to rest lies flatter on the floor than water would.
+//!
 //! Invariant: every particle leaves this stage finite, in the box, and with ω < 0 for every obstacle; where the
 //! wedge between a wall and an obstacle leaves no such place near the target, it stays where it last had one.
 

@@ -17,9 +17,10 @@ use super::{grid::CellGrid, particles::Vectors};
 /// Particles per block: the unit of parallel work. Small enough to balance, large enough to forget.
 pub(super) const BLOCK: usize = 128;
 
-/// Mean number of neighbours above which cells of half the radius are faster. One step of 10 000 particles with
-/// whole and half cells: 13.6 and 11.0 ns per pair at 172 neighbours, 15.9 and 20.7 at 72, 16.5 and 36.8 at 24.
-const DENSE: usize = 100;
+/// Mean number of neighbours above which cells of half the radius are faster than whole ones. Nanoseconds per
+/// pair and step with whole and half cells: 13.6 and 11.0 in the drop (172 neighbours), 9.9 and 8.5 in the pool
+/// it ends in (82), 16.5 and 36.8 in a sparse drop (24).
+const DENSE: usize = 60;
 
 /// Candidates whose distances are found side by side.
 const LANES: usize = 4;
