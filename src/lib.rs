@@ -27,6 +27,7 @@ pub mod render;
 pub mod simplify;
 pub mod slice;
 pub mod solid;
+pub mod sph;
 pub mod syntax;
 
 pub use compile::{Error, Program};

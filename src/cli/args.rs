@@ -244,8 +244,10 @@ fn definition(text: &str) -> Result<(String, f64), String> {
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parts: Vec<&str> = text.split(',').collect();
-    let values: Result<Vec<f64>, String> =
-        parts.iter().map(|part| part.trim().parse().map_err(|_| format!("`{part}` is not a number"))).collect();
+    let values: Result<Vec<f64>, String> = parts
+        .iter()
+        .map(|part| part.trim().parse().map_err(|_| format!("`{part}` is not a number")))
+        .collect();
     values?.try_into().map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
 }
 

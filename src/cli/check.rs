@@ -148,7 +148,12 @@ fn show(shared: &Shared, document: &mut Document, diagnostics: &Diagnostics) {
 fn message(diagnostic: &Diagnostic, all: &Diagnostics) -> Message {
     let span = diagnostic.primary.span;
     let source = all.source(span.source);
-    let at = |byte: u32| source.map_or((1, 1), |s| { let p = Source::position(s, byte as usize); (p.line, p.column) });
+    let at = |byte: u32| {
+        source.map_or((1, 1), |s| {
+            let p = Source::position(s, byte as usize);
+            (p.line, p.column)
+        })
+    };
     let ((line, column), (end_line, end_column)) = (at(span.start), at(span.end));
     Message {
         code: diagnostic.code.0,
@@ -174,7 +179,10 @@ fn solids(
     for named in &program.module().solids {
         let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
         let found = measure(&solid, file)?;
-        let warning = |code, message| Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, named.span, message) };
+        let warning = |code, message| Diagnostic {
+            severity: Severity::Warning,
+            ..Diagnostic::error(code, named.span, message)
+        };
         match solid.bounds() {
             Bounds::Empty => {
                 let message = format!("solid `{}` is empty: ω is nowhere positive", named.name);
@@ -183,7 +191,8 @@ fn solids(
             Bounds::Unbounded => {
                 let message = format!("solid `{}` could not be proven to end anywhere", named.name);
                 diagnostics.list.push(
-                    warning(Code::UNBOUNDED_SOLID, message).help("intersect it with a box, or mesh it with --box"),
+                    warning(Code::UNBOUNDED_SOLID, message)
+                        .help("intersect it with a box, or mesh it with --box"),
                 );
             }
             Bounds::Within(_) => {}
@@ -258,9 +267,14 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
     }
     for scene in &module.scenes {
         let obstacles: Vec<&str> = scene.obstacles.iter().map(|o| o.name.as_str()).collect();
-        let particles = scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
-        let around = if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
-        println!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
+        let particles =
+            scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
+        let around =
+            if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
+        println!(
+            "  scene {}: {particles} of {}{around}, {} s",
+            scene.name, scene.fluid.name, scene.run.until
+        );
     }
 }
 
@@ -273,7 +287,8 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
     if options.term {
         let mut out = anstream::stdout();
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        slice::terminal::draw(&solid, solid.name(), plane, window, 78, colour, &mut out).map_err(Failure::usage)?;
+        slice::terminal::draw(&solid, solid.name(), plane, window, 78, colour, &mut out)
+            .map_err(Failure::usage)?;
         out.flush()?;
         if options.output.is_none() {
             return Ok(());
@@ -299,7 +314,10 @@ fn picture(solid: &Solid, plane: Plane, window: Window, path: &Path) -> Result<V
         "svg" => slice::write_svg(solid, solid.name(), plane, window, samples, &mut bytes),
         "png" => slice::write_png(solid, solid.name(), plane, window, samples, 2.0, &mut bytes),
         _ => {
-            let message = format!("cannot tell the picture format of `{}`: the ending must be .svg or .png", path.display());
+            let message = format!(
+                "cannot tell the picture format of `{}`: the ending must be .svg or .png",
+                path.display()
+            );
             return Err(Failure::Usage(message));
         }
     }
@@ -311,7 +329,9 @@ fn picture(solid: &Solid, plane: Plane, window: Window, path: &Path) -> Result<V
 fn around(solid: &Solid) -> Result<Aabb, Failure> {
     match solid.bounds() {
         Bounds::Within(bounds) => Ok(bounds.grown(0.15 * bounds.size().max_element())),
-        Bounds::Empty => Err(Failure::usage("the solid is empty: say what to plot with --window U0,V0,U1,V1")),
+        Bounds::Empty => {
+            Err(Failure::usage("the solid is empty: say what to plot with --window U0,V0,U1,V1"))
+        }
         Bounds::Unbounded => {
             Err(Failure::usage("the solid has no bounds: say what to plot with --window U0,V0,U1,V1"))
         }

@@ -25,7 +25,10 @@ fn default_solid(program: &Program) -> Result<&NamedSolid, Failure> {
         ([only], _) | (_, Some(only)) => Ok(only),
         (several, None) => {
             let names: Vec<&str> = several.iter().map(|s| s.name.as_str()).collect();
-            Err(Failure::usage(format!("the file has several solids; choose one with -s: {}", names.join(", "))))
+            Err(Failure::usage(format!(
+                "the file has several solids; choose one with -s: {}",
+                names.join(", ")
+            )))
         }
     }
 }

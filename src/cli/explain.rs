@@ -5,7 +5,7 @@ use std::path::Path;
 use anstream::println;
 
 use super::args::{Explain, Shared, Stage};
-use super::{Failure, choose, input, run};
+use super::{Failure, choose, input};
 use crate::Program;
 use crate::codegen::{Listing, Precision, Request, Shape, target_description};
 use crate::diagnostic::{explain, nearest};
@@ -34,7 +34,7 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     }
     match name {
         Some(name) if program.module().scenes.iter().any(|s| s.name == name) => {
-            run::explain(&program, choose::scene(&program, Some(name))?)
+            super::run::explain(&program, choose::scene(&program, Some(name))?)
         }
         Some(name) => {
             let module = program.module();
@@ -63,7 +63,12 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     let (value, value_outputs) = solid.graph(ProgramKind::Value);
     let (gradient, gradient_outputs) = solid.graph(ProgramKind::Gradient);
     println!("solid {}", named.name);
-    println!("  operations: {} as written, {} for ω, {} for ω and ∇ω", written.len(), value.len(), gradient.len());
+    println!(
+        "  operations: {} as written, {} for ω, {} for ω and ∇ω",
+        written.len(),
+        value.len(),
+        gradient.len()
+    );
     let rules = &solid.applied_rules().0;
     for (equation, count) in rules {
         println!("  simplified {count:>4} ×  {equation}");
@@ -76,7 +81,8 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
         println!("ω and ∇ω:\n{}", dump(gradient, &roots, program.sources()));
     }
     if show.contains(&Stage::Clif) || show.contains(&Stage::Asm) {
-        for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)] {
+        for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)]
+        {
             let request = Request { graph, outputs, precision: Precision::F64, shape: Shape::Batch };
             let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;
             if show.contains(&Stage::Clif) {

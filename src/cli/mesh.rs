@@ -66,7 +66,9 @@ struct Summary {
 pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let format = options.output.as_deref().map(Format::of).transpose()?;
     if format.is_none() && !shared.json {
-        return Err(Failure::usage("no output: give -o FILE.stl (or .ply, .obj, .vtp), or --json for the figures alone"));
+        return Err(Failure::usage(
+            "no output: give -o FILE.stl (or .ply, .obj, .vtp), or --json for the figures alone",
+        ));
     }
     let program = input::program(shared, &options.file)?;
     let solid = choose::solid(shared, &program, options.solid.as_deref())?;

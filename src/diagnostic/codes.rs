@@ -83,7 +83,7 @@ SCENE_KEY = "E0301":
 
     scene name {
       box       { min: [0,0,0], max: [3,3,3], restitution: 0.5 }
-      fluid NAME{ shape: FIELD, particles: 10000, density: 998.29 kg/m^3, mass: 0.02 kg, viscosity: 3.5 Pa·s,
+      fluid NAME{ shape: FIELD, fill: below|middle, particles: 10000, density: 998.29 kg/m^3, mass: 0.02 kg, viscosity: 3.5 Pa·s,
                   surface_tension: 0.0728 N/m, threshold: 7.065, stiffness: 3 J, support_radius: 0.1 m,
                   velocity: [0,0,0] m/s-values, jitter: 0, seed: 1 }
       obstacle  { solid: NAME, restitution: 0.5 }
@@ -112,6 +112,9 @@ STRICT_COMPARISON = "W0405":
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";
+LONG_STEP = "W0503":
+"The time step is longer than what is stable when particles fall through the whole box. The run may still go well if
+they never become so fast; without `dt` a stable step is derived.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

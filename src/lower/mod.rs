@@ -16,7 +16,7 @@ mod value;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-pub use scene::{Fluid, Method, Obstacle, Run, Scene};
+pub use scene::{Fill, Fluid, Method, Obstacle, Run, Scene};
 
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
 use crate::ir::{Graph, Node};
@@ -144,10 +144,12 @@ impl<'a> Lowering<'a> {
             && !(low <= value && value <= high)
         {
             let diagnostic = if overridden.is_some() {
-                let message = format!("-D sets `{}` to {value}, outside its range {low} .. {high}", param.name.text);
+                let message =
+                    format!("-D sets `{}` to {value}, outside its range {low} .. {high}", param.name.text);
                 Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here")
             } else {
-                let message = format!("`{}` = {value} lies outside its range {low} .. {high}", param.name.text);
+                let message =
+                    format!("`{}` = {value} lies outside its range {low} .. {high}", param.name.text);
                 Diagnostic::error(Code::OUT_OF_RANGE, param.value.span, message)
             };
             self.report(diagnostic);

@@ -37,6 +37,8 @@ pub struct Fluid {
     /// Positive where particles are put at the start.
     pub shape: Node,
     pub shape_span: Span,
+    /// Which part of the shape is taken when it has room for more particles than are wanted.
+    pub fill: Fill,
     /// As many as fit if it is not given.
     pub particles: Option<usize>,
     pub particles_span: Option<Span>,
@@ -72,6 +74,14 @@ pub struct Obstacle {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fill {
+    /// From below, as a vessel is filled.
+    Below,
+    /// Where ω of the shape is largest: a drop of an exact number of particles.
+    Middle,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Equations (8)–(14) of the paper, corrected.
     Paper,
@@ -89,8 +99,9 @@ pub struct Run {
 
 const SCENE_KEYS: [&str; 7] = ["units", "box", "fluid", "obstacle", "gravity", "method", "run"];
 const BOX_KEYS: [&str; 3] = ["min", "max", "restitution"];
-const FLUID_KEYS: [&str; 12] = [
+const FLUID_KEYS: [&str; 13] = [
     "shape",
+    "fill",
     "particles",
     "density",
     "mass",
@@ -133,7 +144,7 @@ impl<'a> Lowering<'a> {
             block.blocks("obstacle").filter_map(|(_, entries, span)| self.obstacle(entries, span)).collect();
         let gravity =
             self.vector_key(&block, "gravity", Dimension::ACCELERATION, DVec3::new(0.0, 0.0, -9.81));
-        let method = self.scene_method(&block);
+        let method = self.word_key(&block, "method", &[("paper", Method::Paper)]);
         let run = self.run(&block);
         if self.errors() > errors_before {
             return None;
@@ -252,6 +263,7 @@ impl<'a> Lowering<'a> {
                 None
             }
         };
+        let fill = self.word_key(&block, "fill", &[("below", Fill::Below), ("middle", Fill::Middle)]);
         let mut number =
             |key, dimension, default, bound| self.number_key(&block, key, dimension, Some(default), bound);
         use Bound::{Fraction, NotNegative, Positive};
@@ -272,6 +284,7 @@ impl<'a> Lowering<'a> {
             name: label.map_or_else(|| "fluid".into(), |label| label.text.clone()),
             shape,
             shape_span,
+            fill: fill?,
             particles: particles?,
             particles_span,
             density: density?,
@@ -302,19 +315,23 @@ impl<'a> Lowering<'a> {
         Some(Obstacle { name, shape, span: value.span, restitution: restitution? })
     }
 
-    fn scene_method(&mut self, block: &Block<'_>) -> Option<Method> {
-        let Some((_, value)) = block.setting("method") else { return Some(Method::Paper) };
-        let word = match &value.kind {
+    /// One of a few words; the first is the default.
+    fn word_key<T: Copy>(&mut self, block: &Block<'_>, key: &str, words: &[(&str, T)]) -> Option<T> {
+        let Some((_, value)) = block.setting(key) else { return words.first().map(|(_, meaning)| *meaning) };
+        let found = match &value.kind {
             ExprKind::Name(word) | ExprKind::Text(word) => word.as_str(),
             _ => "",
         };
-        if word == "paper" {
-            return Some(Method::Paper);
+        let meaning = words.iter().find(|(word, _)| *word == found).map(|(_, meaning)| *meaning);
+        if meaning.is_none() {
+            let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+            let diagnostic =
+                Diagnostic::error(Code::SCENE_KEY, value.span, format!("unknown value of `{key}`"))
+                    .help(format!("this version knows {}", known.join(", ")))
+                    .suggest(found, known);
+            self.report(diagnostic);
         }
-        let diagnostic = Diagnostic::error(Code::SCENE_KEY, value.span, "unknown method")
-            .help("this version knows the method `paper`");
-        self.report(diagnostic);
-        None
+        meaning
     }
 
     fn run(&mut self, block: &Block<'_>) -> Option<Run> {

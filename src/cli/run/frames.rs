@@ -68,7 +68,10 @@ impl Frames {
     pub fn describe(&self) -> String {
         let mut parts = vec!["summary.json".to_string()];
         if self.write_frames {
-            parts.push(format!("particles.pvd and {} frames for ParaView, obstacle.stl, obstacle.vtp", self.saved.len()));
+            parts.push(format!(
+                "particles.pvd and {} frames for ParaView, obstacle.stl, obstacle.vtp",
+                self.saved.len()
+            ));
         }
         if let Some(pictures) = &self.pictures {
             parts.push(format!("{} pictures", pictures.count));
@@ -102,7 +105,8 @@ impl Pictures {
     const FASTEST: f64 = 0.6;
 
     fn new(scene: &Scene, setup: &Setup, obstacle: &Mesh) -> Result<Self, Failure> {
-        let camera = render::Camera::three_quarter(&setup.domain, render::Camera::SIZE).map_err(Failure::usage)?;
+        let camera =
+            render::Camera::three_quarter(&setup.domain, render::Camera::SIZE).map_err(Failure::usage)?;
         let mesh = render::Mesh {
             vertices: &obstacle.positions,
             normals: &obstacle.normals,
@@ -118,7 +122,11 @@ impl Pictures {
         let particles = simulation.particles();
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
         let image = self.scene.frame(
-            &render::Particles { positions: particles.position.points(), speeds: &speeds, radius: self.radius },
+            &render::Particles {
+                positions: particles.position.points(),
+                speeds: &speeds,
+                radius: self.radius,
+            },
             &render::Moment { time: simulation.time(), step: simulation.steps() },
         );
         output::write(path, |mut out| image.write_png(&mut out))?;

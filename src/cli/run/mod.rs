@@ -141,7 +141,11 @@ fn dry_run(simulation: &mut Simulation<'_>, setup: &Setup, steps: u64) -> Result
     println!("steps         {steps}");
     println!("passes        {}", pass_names(simulation).join(", "));
     println!("memory        about {:.0} MiB", bytes / f64::from(1 << 20));
-    println!("time          about {:.0} s ({:.2} ms per step, without frames)", per_step * steps as f64, per_step * 1e3);
+    println!(
+        "time          about {:.0} s ({:.2} ms per step, without frames)",
+        per_step * steps as f64,
+        per_step * 1e3
+    );
     Ok(())
 }
 
@@ -259,15 +263,16 @@ pub(super) fn explain(program: &Program, scene: &Scene) -> Result<(), Failure> {
     let setup = Setup::of(&shared, program, scene)?;
     let (simulation, _) = setup.simulation(program, scene)?;
     let running = simulation.passes();
-    println!("scene {}: method paper, time step {:.3e} s ({})", scene.name, setup.parameters.time_step, setup.time_step_reason);
+    println!(
+        "scene {}: method paper, time step {:.3e} s ({})",
+        scene.name, setup.parameters.time_step, setup.time_step_reason
+    );
     for pass in crate::sph::Pass::ALL {
         if running.contains(&pass) {
             println!("  runs      {pass}");
         } else {
-            println!("  left out  {pass}: {}", pass.needs());
+            println!("  left out  {pass}: {}", pass.absence());
         }
     }
     Ok(())
 }
-
-use std::io::Write as _;

@@ -4,9 +4,12 @@ use super::super::args::Shared;
 use super::super::{Failure, choose, input};
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
 use crate::geom::Aabb;
-use crate::lower::Scene;
+use crate::lower::{Fill, Scene};
 use crate::solid::Bounds;
-use crate::sph::{Fill, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation, carve};
+use crate::sph::{
+    self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
+    carve,
+};
 use crate::{Program, Solid};
 
 /// Particles start at least this part of the spacing away from an obstacle.
@@ -48,7 +51,8 @@ impl Setup {
             time_step: 1.0,
         };
         let height = scene.gravity.normalize_or_zero().abs().dot(scene.domain.size());
-        let typical_speed = (scene.fluid.velocity.length_squared() + 2.0 * scene.gravity.length() * height).sqrt();
+        let typical_speed =
+            (scene.fluid.velocity.length_squared() + 2.0 * scene.gravity.length() * height).sqrt();
         let stable = parameters.stable_dt(typical_speed);
         let time_step_reason = match scene.run.dt {
             Some(dt) => {
@@ -84,14 +88,20 @@ impl Setup {
             Bounds::Unbounded => self.domain,
             Bounds::Empty => {
                 let message = "the shape of the fluid is empty";
-                return Err(refuse(program, Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message)));
+                return Err(refuse(
+                    program,
+                    Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message),
+                ));
             }
         };
+        let fill = match fluid.fill {
+            Fill::Below => sph::Fill::Below,
+            Fill::Middle => sph::Fill::Middle,
+        };
         let block = FluidBlock {
-            shape: FluidShape::Field { field: &self.fluid, bounds },
+            shape: FluidShape::Field { field: &self.fluid, bounds, fill },
             count: fluid.particles,
             allow_fewer: false,
-            fill: if fluid.fill_from_below { Fill::Below } else { Fill::Middle },
             velocity: fluid.velocity,
             jitter: fluid.jitter,
             seed: fluid.seed,
@@ -99,11 +109,13 @@ impl Setup {
         let span = fluid.particles_span.unwrap_or(fluid.shape_span);
         let mut particles =
             block.seed(&self.parameters, self.domain).map_err(|e| no_fluid(program, &e, span))?;
-        let obstacles: Vec<Obstacle<'_>> = self.obstacles.iter().map(|(solid, e)| self.obstacle(solid, *e)).collect();
+        let obstacles: Vec<Obstacle<'_>> =
+            self.obstacles.iter().map(|(solid, e)| self.obstacle(solid, *e)).collect();
         let carved = self.carve(program, scene, &mut particles, &obstacles)?;
         let simulation = Simulation::new(self.parameters.clone(), particles, self.domain, obstacles);
-        let simulation = simulation
-            .map_err(|e| refuse(program, Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string())))?;
+        let simulation = simulation.map_err(|e| {
+            refuse(program, Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string()))
+        })?;
         Ok((simulation, carved))
     }
 
@@ -121,7 +133,8 @@ impl Setup {
     ) -> Result<usize, Failure> {
         let span = scene.fluid.shape_span;
         let clearance = CLEARANCE * self.parameters.spacing();
-        let carved = carve(particles, &self.domain, obstacles, clearance).map_err(|e| no_fluid(program, &e, span))?;
+        let carved =
+            carve(particles, &self.domain, obstacles, clearance).map_err(|e| no_fluid(program, &e, span))?;
         let lost = carved.inside + carved.too_close + carved.outside_box;
         if lost > 0 {
             let message = format!(

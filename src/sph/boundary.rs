@@ -1,0 +1,256 @@
+//! Collision: particles that a step has carried into an obstacle or out of the box are put back.
+//!
+//! A block of particles asks the field for its range over all its paths first; a block that is surely in the
+//! fluid costs that one call. Otherwise ω is sampled along the paths, all samples of a block in one batch, and
+//! only paths with a sample that is not in the fluid are looked at one by one.
+//!
+//! At a contact the particle stops on the surface, its velocity is reflected, and the rest of its path goes on
+//! along the surface: without that, a particle that slides would touch at once in every step and never move.
+//! The bounce is left to the velocity: a mirrored rest of path could lift a particle above the height it fell
+//! from.
+//!
+//! Walls and obstacles act on positions and velocities only. They add nothing to the density, so a fluid that
+//! has come to rest lies flatter on the floor than water would.
+//!
+//! Invariant: every particle leaves this stage finite, in the box, and with ω < 0 for every obstacle; where the
+//! wedge between a wall and an obstacle leaves no such place near the target, it stays where it last had one.
+
+use rayon::prelude::*;
+
+use glam::DVec3;
+
+use crate::{
+    field::{Field, Points},
+    geom::Aabb,
+};
+
+use super::{
+    contact::{Contact, Undefined, first_contact, push_out, reflect, samples},
+    neighbours::BLOCK,
+    particles::Vectors,
+};
+
+/// Contacts of one particle in one step, before it is left where it is.
+const MAX_CONTACTS: usize = 4;
+
+/// A body in the fluid's way.
+#[derive(Clone, Copy)]
+pub struct Obstacle<'a> {
+    /// ω > 0 inside the body.
+    pub field: &'a dyn Field,
+    /// Restitution c_R, 0 (stick) to 1 (mirror).
+    pub restitution: f64,
+    /// Thickness in metres of the thinnest part that must hold whatever the speed; paths are sampled this
+    /// closely. A twentieth of the support radius is a good value; thinner costs more samples per step.
+    pub resolution: f64,
+}
+
+/// The box and the bodies in it.
+#[derive(Clone)]
+pub(super) struct Boundary<'a> {
+    pub domain: Aabb,
+    pub wall_restitution: f64,
+    pub obstacles: Vec<Obstacle<'a>>,
+}
+
+/// Buffers of a block.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    points: Vectors,
+    omega: Vec<f64>,
+    /// Samples of each particle in `points`.
+    counts: Vec<u32>,
+    touched: Vec<bool>,
+}
+
+/// A particle (index) for which a field had no value.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fault {
+    pub index: usize,
+    pub at: DVec3,
+}
+
+impl Boundary<'_> {
+    /// Moves particles from `position` to `target` and corrects both target and velocity where they collide.
+    ///
+    /// # Errors
+    /// The first particle, in the order of the arrays, at which a field is undefined.
+    pub fn collide(
+        &self,
+        position: &Vectors,
+        target: &mut Vectors,
+        velocity: &mut Vectors,
+        scratch: &mut Vec<Scratch>,
+    ) -> Result<(), Fault> {
+        scratch.resize_with(position.len().div_ceil(BLOCK), Scratch::default);
+        let [tx, ty, tz] = target.components_mut().map(|c| c.par_chunks_mut(BLOCK));
+        let [vx, vy, vz] = velocity.components_mut().map(|c| c.par_chunks_mut(BLOCK));
+        let fault = tx
+            .zip(ty)
+            .zip(tz)
+            .zip(vx.zip(vy).zip(vz))
+            .zip(scratch)
+            .enumerate()
+            .filter_map(|(b, ((((x, y), z), ((u, v), w)), scratch))| {
+                let mut block = Block { first: b * BLOCK, position, target: [x, y, z], velocity: [u, v, w] };
+                self.collide_block(&mut block, scratch).err()
+            })
+            .min_by_key(|fault| fault.index);
+        fault.map_or(Ok(()), Err)
+    }
+
+    fn collide_block(&self, block: &mut Block<'_>, scratch: &mut Scratch) -> Result<(), Fault> {
+        scratch.touched.clear();
+        scratch.touched.resize(block.len(), false);
+        let mut swept = Aabb::EMPTY;
+        for k in 0..block.len() {
+            let (target, velocity) = self.hold_in_box(block.target(k), block.velocity(k));
+            block.put(k, target, velocity);
+            swept = swept.including(block.from(k)).including(target);
+        }
+        let mut any = false;
+        for obstacle in &self.obstacles {
+            if obstacle.field.range(&swept).hi < 0.0 {
+                continue;
+            }
+            any |= scratch.sample(block, obstacle)?;
+        }
+        if any {
+            for k in 0..block.len() {
+                if scratch.touched[k] {
+                    let (at, velocity) = self
+                        .resolve(block.from(k), block.target(k), block.velocity(k))
+                        .map_err(|undefined| block.fault(k, undefined))?;
+                    block.put(k, at, velocity);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Clamps to the box; the part of the velocity that points out of a wall that was crossed is returned.
+    fn hold_in_box(&self, mut at: DVec3, mut velocity: DVec3) -> (DVec3, DVec3) {
+        for axis in 0..3 {
+            let (low, high) = (self.domain.min[axis], self.domain.max[axis]);
+            let outward = if at[axis] < low {
+                at[axis] = low;
+                -velocity[axis]
+            } else if at[axis] > high {
+                at[axis] = high;
+                velocity[axis]
+            } else {
+                continue;
+            };
+            if outward > 0.0 {
+                velocity[axis] *= -self.wall_restitution;
+            }
+        }
+        (at, velocity)
+    }
+
+    /// Where a particle comes to rest on its way, and with what velocity.
+    fn resolve(&self, from: DVec3, to: DVec3, velocity: DVec3) -> Result<(DVec3, DVec3), Undefined> {
+        let (mut here, mut target, mut velocity) = (from, to, velocity);
+        for _ in 0..MAX_CONTACTS {
+            (target, velocity) = self.hold_in_box(target, velocity);
+            let Some((obstacle, contact)) = self.nearest_contact(here, target)? else {
+                return Ok((target, velocity));
+            };
+            velocity = reflect(velocity, contact.normal, obstacle.restitution);
+            let rest = target - contact.point;
+            let slide = reflect(rest, contact.normal, 0.0);
+            here = contact.point;
+            target = here + slide;
+            // A tangent enters a hollow surface, and by rounding a flat one: lift its end out again.
+            if obstacle.field.omega(target) >= 0.0
+                && let Some(lifted) = push_out(obstacle.field, target, slide.length())?
+            {
+                target = lifted.point;
+                velocity = reflect(velocity, lifted.normal, obstacle.restitution);
+            }
+        }
+        Ok((here, velocity))
+    }
+
+    fn nearest_contact(&self, from: DVec3, to: DVec3) -> Result<Option<(&Obstacle<'_>, Contact)>, Undefined> {
+        let mut nearest: Option<(&Obstacle<'_>, Contact)> = None;
+        for obstacle in &self.obstacles {
+            if let Some(contact) = first_contact(obstacle.field, from, to, obstacle.resolution)?
+                && nearest.is_none_or(|(_, other)| contact.fraction < other.fraction)
+            {
+                nearest = Some((obstacle, contact));
+            }
+        }
+        Ok(nearest)
+    }
+}
+
+impl Scratch {
+    /// Marks the particles whose paths are not surely in the fluid; true if there is one.
+    fn sample(&mut self, block: &Block<'_>, obstacle: &Obstacle<'_>) -> Result<bool, Fault> {
+        self.points.clear();
+        self.counts.clear();
+        for k in 0..block.len() {
+            let (from, to) = (block.from(k), block.target(k));
+            let count = samples(from.distance(to), obstacle.resolution);
+            self.counts.push(count as u32);
+            for s in 1..count {
+                self.points.push(from.lerp(to, s as f64 / count as f64));
+            }
+            self.points.push(to);
+        }
+        self.omega.resize(self.points.len(), 0.0);
+        let points = Points::new(&self.points.x, &self.points.y, &self.points.z);
+        obstacle.field.omega_many(points, &mut self.omega);
+
+        let (mut any, mut start) = (false, 0);
+        for (k, &count) in self.counts.iter().enumerate() {
+            let end = start + count as usize;
+            if let Some(s) = (start..end).find(|&s| self.omega[s].is_nan()) {
+                return Err(block.fault(k, Undefined { at: self.points.get(s) }));
+            }
+            let touched = self.omega[start..end].iter().any(|&w| w >= 0.0);
+            self.touched[k] |= touched;
+            any |= touched;
+            start = end;
+        }
+        Ok(any)
+    }
+}
+
+/// A block's particles: where they were, where they go, how fast.
+struct Block<'a> {
+    first: usize,
+    position: &'a Vectors,
+    target: [&'a mut [f64]; 3],
+    velocity: [&'a mut [f64]; 3],
+}
+
+impl Block<'_> {
+    fn len(&self) -> usize {
+        self.target[0].len()
+    }
+
+    fn from(&self, k: usize) -> DVec3 {
+        self.position.get(self.first + k)
+    }
+
+    fn target(&self, k: usize) -> DVec3 {
+        DVec3::from_array(self.target.each_ref().map(|c| c[k]))
+    }
+
+    fn velocity(&self, k: usize) -> DVec3 {
+        DVec3::from_array(self.velocity.each_ref().map(|c| c[k]))
+    }
+
+    fn put(&mut self, k: usize, target: DVec3, velocity: DVec3) {
+        for c in 0..3 {
+            self.target[c][k] = target[c];
+            self.velocity[c][k] = velocity[c];
+        }
+    }
+
+    fn fault(&self, k: usize, undefined: Undefined) -> Fault {
+        Fault { index: self.first + k, at: undefined.at }
+    }
+}

@@ -1,0 +1,180 @@
+//! The three smoothing kernels of the paper, all with support radius h.
+//!
+//! - poly6, for density and the colour field (equations 8, 13, 14);
+//! - spiky, for pressure (equation 10): its gradient does not vanish where particles meet;
+//! - viscosity (equation 11): its Laplacian is positive everywhere.
+//!
+//! Invariant: each kernel integrates to one over the ball of radius h and is exactly zero beyond it.
+
+use std::f64::consts::PI;
+
+/// Kernels of one support radius with their constants.
+///
+/// Functions of r² are called so because they need no root. A gradient is returned as the factor g in
+/// ∇W = g·**r**, with **r** from the neighbour to the particle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kernels {
+    /// Support radius h, m.
+    pub h: f64,
+    /// h²
+    pub h2: f64,
+    poly6: f64,
+    poly6_gradient: f64,
+    spiky: f64,
+    spiky_gradient: f64,
+    viscosity: f64,
+}
+
+impl Kernels {
+    pub fn new(support_radius: f64) -> Self {
+        let h = support_radius;
+        Self {
+            h,
+            h2: h * h,
+            poly6: 315.0 / (64.0 * PI * h.powi(9)),
+            poly6_gradient: -945.0 / (32.0 * PI * h.powi(9)),
+            spiky: 15.0 / (PI * h.powi(6)),
+            spiky_gradient: -45.0 / (PI * h.powi(6)),
+            viscosity: 15.0 / (2.0 * PI * h.powi(3)),
+        }
+    }
+
+    /// W_poly6 = 315/(64πh⁹)·(h² − r²)³, 1/m³.
+    #[inline(always)]
+    pub fn poly6(&self, r2: f64) -> f64 {
+        let q = positive(self.h2 - r2);
+        self.poly6 * q * q * q
+    }
+
+    /// ∇W_poly6 = −945/(32πh⁹)·(h² − r²)²·**r**.
+    #[inline(always)]
+    pub fn poly6_gradient(&self, r2: f64) -> f64 {
+        let q = positive(self.h2 - r2);
+        self.poly6_gradient * q * q
+    }
+
+    /// ∇²W_poly6 = −945/(32πh⁹)·(h² − r²)(3h² − 7r²), 1/m⁵.
+    #[inline(always)]
+    pub fn poly6_laplacian(&self, r2: f64) -> f64 {
+        self.poly6_gradient * positive(self.h2 - r2) * (3.0 * self.h2 - 7.0 * r2)
+    }
+
+    /// W_spiky = 15/(πh⁶)·(h − r)³, 1/m³.
+    pub fn spiky(&self, r: f64) -> f64 {
+        self.spiky * positive(self.h - r).powi(3)
+    }
+
+    /// ∇W_spiky = −45/(πh⁶)·(h − r)²·**r**/r. Coinciding particles have no direction: the factor stays
+    /// finite there, so that its product with **r** = 0 is zero.
+    #[inline(always)]
+    pub fn spiky_gradient(&self, r: f64) -> f64 {
+        let q = positive(self.h - r);
+        let least = 1e-12 * self.h;
+        self.spiky_gradient * q * q / if r > least { r } else { least }
+    }
+
+    /// W_viscosity = 15/(2πh³)·(−r³/2h³ + r²/h² + h/2r − 1), 1/m³; infinite at r = 0.
+    pub fn viscosity(&self, r: f64) -> f64 {
+        if r > self.h {
+            return 0.0;
+        }
+        let q = r / self.h;
+        self.viscosity * (-0.5 * q * q * q + q * q + 0.5 / q - 1.0)
+    }
+
+    /// ∇²W_viscosity = 45/(πh⁶)·(h − r), 1/m⁵.
+    #[inline(always)]
+    pub fn viscosity_laplacian(&self, r: f64) -> f64 {
+        -self.spiky_gradient * positive(self.h - r)
+    }
+}
+
+/// max(x, 0) in one instruction; `f64::max` takes three to return the number when the other is NaN.
+#[inline(always)]
+fn positive(x: f64) -> f64 {
+    if x > 0.0 { x } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    const H: f64 = 0.1;
+
+    /// ∫ W over the ball, by the midpoint rule over n shells.
+    fn integral(w: impl Fn(f64) -> f64) -> f64 {
+        let n = 2000;
+        let dr = H / n as f64;
+        (0..n).map(|i| (i as f64 + 0.5) * dr).map(|r| 4.0 * PI * r * r * w(r) * dr).sum()
+    }
+
+    #[test]
+    fn kernels_integrate_to_one() {
+        let k = Kernels::new(H);
+        // midpoint error of 2000 shells: about 1e-7
+        for total in [integral(|r| k.poly6(r * r)), integral(|r| k.spiky(r)), integral(|r| k.viscosity(r))] {
+            assert!((total - 1.0).abs() < 1e-6, "{total}");
+        }
+    }
+
+    #[test]
+    fn kernels_are_positive_inside_and_zero_beyond() {
+        let k = Kernels::new(H);
+        for i in 1..100 {
+            let r = H * i as f64 / 100.0;
+            assert!(k.poly6(r * r) > 0.0 && k.spiky(r) > 0.0 && k.viscosity(r) > 0.0);
+        }
+        let r = H * 1.0001;
+        assert_eq!(
+            [k.poly6(r * r), k.spiky(r), k.viscosity(r), k.spiky_gradient(r), k.viscosity_laplacian(r)]
+                .map(f64::abs),
+            [0.0; 5]
+        );
+    }
+
+    #[test]
+    fn closed_values() {
+        let k = Kernels::new(H);
+        let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
+        close(k.poly6(0.0), 315.0 / (64.0 * PI * 1e-3));
+        close(k.poly6(0.005), 315.0 / (64.0 * PI * 1e-3) / 8.0);
+        close(k.spiky_gradient(0.05) * 0.05, -45.0 / (PI * 1e-4) / 4.0);
+        close(k.viscosity_laplacian(0.05), 45.0 / (PI * 1e-5) / 2.0);
+        assert!(k.spiky_gradient(0.0).is_finite());
+    }
+
+    #[test]
+    fn gradients_and_laplacians_match_finite_differences() {
+        let k = Kernels::new(H);
+        let d = 1e-6;
+        for i in 1..10 {
+            let r = H * i as f64 / 10.0;
+            let slope = |w: &dyn Fn(f64) -> f64| (w(r + d) - w(r - d)) / (2.0 * d);
+            // Laplacian of a radial function: (r W)″ / r
+            let laplacian = |w: &dyn Fn(f64) -> f64| {
+                let d = 1e-4 * H;
+                ((r + d) * w(r + d) - 2.0 * r * w(r) + (r - d) * w(r - d)) / (d * d * r)
+            };
+            let poly6 = |r: f64| k.poly6(r * r);
+            let close = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < 1e-5 * scale, "{a} {b} at {r}");
+            close(k.poly6_gradient(r * r) * r, slope(&poly6), k.poly6(0.0) / H);
+            close(k.spiky_gradient(r) * r, slope(&|r| k.spiky(r)), k.spiky(0.0) / H);
+            close(k.poly6_laplacian(r * r), laplacian(&poly6), k.poly6(0.0) / (H * H));
+            close(k.viscosity_laplacian(r), laplacian(&|r| k.viscosity(r)), k.viscosity_laplacian(0.0));
+        }
+    }
+
+    #[test]
+    fn gradients_sum_to_zero_over_a_symmetric_lattice() {
+        let k = Kernels::new(H);
+        let mut sums = [DVec3::ZERO; 2];
+        for i in 0..343i32 {
+            let r = DVec3::new((i % 7 - 3) as f64, (i / 7 % 7 - 3) as f64, (i / 49 - 3) as f64) * 0.03;
+            sums[0] += k.poly6_gradient(r.length_squared()) * r;
+            sums[1] += k.spiky_gradient(r.length()) * r;
+        }
+        assert!(sums[0].length() < 1e-9 * k.poly6(0.0) / H);
+        assert!(sums[1].length() < 1e-9 * k.spiky(0.0) / H);
+    }
+}

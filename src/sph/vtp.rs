@@ -1,0 +1,153 @@
+//! Frames for ParaView: VTK PolyData with appended raw data, and the collection that lists them in time.
+//!
+//! Invariant: particles are written in the order of their ids, little-endian, as 32-bit floats (a picture
+//! needs no more); the same state gives the same bytes.
+
+use std::io::{self, Write};
+
+use super::particles::{Particles, Vectors};
+
+/// Writes one frame: points, and per point speed (m/s), velocity (m/s), density (kg/m³), pressure (Pa), id.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_vtp(out: &mut impl Write, particles: &Particles) -> io::Result<()> {
+    let order = particles.order_by_id();
+    let n = order.len();
+    let scalar = |values: &[f64]| floats(order.iter().map(|&i| values[i]));
+    let vector = |v: &Vectors| floats(order.iter().flat_map(|&i| v.get(i).to_array()));
+    let speed = floats(order.iter().map(|&i| particles.velocity.get(i).length()));
+    let ids = order.iter().flat_map(|&i| particles.id[i].to_le_bytes()).collect();
+    let counting = |from: i64| (from..from + n as i64).flat_map(i64::to_le_bytes).collect();
+
+    let mut appended = Appended::default();
+    let point_data = [
+        appended.array("speed", "Float32", 1, speed),
+        appended.array("velocity", "Float32", 3, vector(&particles.velocity)),
+        appended.array("density", "Float32", 1, scalar(&particles.density)),
+        appended.array("pressure", "Float32", 1, scalar(&particles.pressure)),
+        appended.array("id", "UInt32", 1, ids),
+    ]
+    .concat();
+    let points = appended.array("position", "Float32", 3, vector(&particles.position));
+    // one vertex cell per point, so that a viewer shows them without a filter
+    let cells = [
+        appended.array("connectivity", "Int64", 1, counting(0)),
+        appended.array("offsets", "Int64", 1, counting(1)),
+    ]
+    .concat();
+
+    write!(
+        out,
+        r#"<?xml version="1.0"?>
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<PolyData>
+<Piece NumberOfPoints="{n}" NumberOfVerts="{n}" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="0">
+<PointData Scalars="speed" Vectors="velocity">
+{point_data}</PointData>
+<Points>
+{points}</Points>
+<Verts>
+{cells}</Verts>
+</Piece>
+</PolyData>
+<AppendedData encoding="raw">
+_"#
+    )?;
+    out.write_all(&appended.bytes)?;
+    out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+}
+
+/// Writes the collection of frames: each frame's time (s) and file name.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_pvd<'a>(
+    out: &mut impl Write,
+    frames: impl IntoIterator<Item = (f64, &'a str)>,
+) -> io::Result<()> {
+    writeln!(out, r#"<?xml version="1.0"?>"#)?;
+    writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;
+    writeln!(out, "<Collection>")?;
+    for (time, file) in frames {
+        let file = file.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
+        writeln!(out, r#"<DataSet timestep="{time}" part="0" file="{file}"/>"#)?;
+    }
+    writeln!(out, "</Collection>\n</VTKFile>")
+}
+
+/// The raw block behind the document: each array is its length in bytes (u64) and its bytes.
+#[derive(Default)]
+struct Appended {
+    bytes: Vec<u8>,
+}
+
+impl Appended {
+    /// Stores an array and returns the element that describes it.
+    fn array(&mut self, name: &str, kind: &str, components: usize, data: Vec<u8>) -> String {
+        let offset = self.bytes.len();
+        self.bytes.extend((data.len() as u64).to_le_bytes());
+        self.bytes.extend(data);
+        format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" \
+             format=\"appended\" offset=\"{offset}\"/>\n"
+        )
+    }
+}
+
+fn floats(values: impl Iterator<Item = f64>) -> Vec<u8> {
+    values.flat_map(|x| (x as f32).to_le_bytes()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    /// The raw bytes of a named array of a frame.
+    fn read_array<'a>(frame: &'a [u8], name: &str) -> &'a [u8] {
+        let marker = b"<AppendedData encoding=\"raw\">\n_";
+        let start = frame.windows(marker.len()).position(|w| w == marker).unwrap();
+        let header = std::str::from_utf8(&frame[..start]).unwrap();
+        let element = header.split("<DataArray ").find(|e| e.contains(&format!("Name=\"{name}\""))).unwrap();
+        let offset: usize =
+            element.split("offset=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
+        let block = &frame[start + marker.len() + offset..];
+        let length = u64::from_le_bytes(block[..8].try_into().unwrap()) as usize;
+        &block[8..8 + length]
+    }
+
+    fn read_floats(frame: &[u8], name: &str) -> Vec<f32> {
+        read_array(frame, name).chunks(4).map(|c| f32::from_le_bytes(c.try_into().unwrap())).collect()
+    }
+
+    #[test]
+    fn a_frame_reads_back_in_the_order_of_ids() {
+        let mut fluid = Particles::default();
+        fluid.push(DVec3::new(1.0, 2.0, 3.0), DVec3::new(3.0, 4.0, 0.0));
+        fluid.push(DVec3::new(-1.0, 0.5, 0.25), DVec3::ZERO);
+        fluid.density = vec![1000.0, 500.0];
+        fluid.pressure = vec![6.0, 0.0];
+        fluid.id = vec![1, 0];
+        let mut frame = Vec::new();
+        write_vtp(&mut frame, &fluid).unwrap();
+        assert_eq!(read_floats(&frame, "position"), [-1.0, 0.5, 0.25, 1.0, 2.0, 3.0]);
+        assert_eq!(read_floats(&frame, "speed"), [0.0, 5.0]);
+        assert_eq!(read_floats(&frame, "velocity"), [0.0, 0.0, 0.0, 3.0, 4.0, 0.0]);
+        assert_eq!(read_floats(&frame, "density"), [500.0, 1000.0]);
+        assert_eq!(read_floats(&frame, "pressure"), [0.0, 6.0]);
+        assert_eq!(read_array(&frame, "id"), [0, 0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!(read_array(&frame, "offsets")[8], 2);
+        assert!(frame.ends_with(b"</AppendedData>\n</VTKFile>\n"));
+    }
+
+    #[test]
+    fn a_collection_lists_times_and_escaped_names() {
+        let mut text = Vec::new();
+        write_pvd(&mut text, [(0.0, "a.vtp"), (0.04, "b&c.vtp")]).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert!(text.contains(r#"<DataSet timestep="0" part="0" file="a.vtp"/>"#));
+        assert!(text.contains(r#"<DataSet timestep="0.04" part="0" file="b&amp;c.vtp"/>"#));
+        assert_eq!(text.matches("<DataSet").count(), 2);
+    }
+}
