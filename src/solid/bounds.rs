@@ -9,8 +9,8 @@ use glam::DVec3;
 pub enum Bounds {
     /// ω > 0 nowhere within [`SEARCH_RADIUS`]: proven.
     Empty,
-    /// The solid lies in this box: proven. Each face is within a thousandth of the longest side of the solid
-    /// itself where the budget of the proof allowed it.
+    /// The solid lies in this box: proven. Each face is within a millionth of the longest side of the solid itself
+    /// where the budget of the proof allowed it.
     Within(Aabb),
     /// No such box was found within [`SEARCH_RADIUS`].
     Unbounded,
@@ -29,7 +29,7 @@ const ENOUGH_CELLS: f64 = 24.0;
 const PROOF_BUDGET: usize = 3_000;
 
 /// Attempts for each face: each halves the uncertainty.
-const FACE_STEPS: usize = 14;
+const FACE_STEPS: usize = 24;
 
 impl Bounds {
     /// The box, if the solid has one.
@@ -102,7 +102,7 @@ pub fn prove_empty(field: &impl Field, over: Aabb, budget: usize) -> bool {
 /// Moves each face inwards as far as the slab that is cut off is proven empty.
 fn tighten(field: &impl Field, hull: Aabb) -> Aabb {
     let mut bounds = hull;
-    let goal = 1e-3 * hull.size().max_element() * 0.25;
+    let goal = 1e-6 * hull.size().max_element();
     for axis in 0..3 {
         for upper in [false, true] {
             // between `near` (known to be needed or not yet proven) and `far` (proven to be outside)
