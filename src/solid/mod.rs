@@ -88,6 +88,7 @@ impl Solid {
         &self.inner.applied
     }
 
+    #[inline]
     fn programs(&self, kind: ProgramKind) -> &Programs {
         match kind {
             ProgramKind::Value => &self.inner.value,
@@ -102,6 +103,7 @@ impl Solid {
     }
 
     /// ω at a point.
+    #[inline]
     pub fn omega(&self, p: DVec3) -> f64 {
         let mut out = [0.0];
         self.inner.value.point(self.inner.engine, p.to_array(), &mut out);
@@ -109,6 +111,7 @@ impl Solid {
     }
 
     /// ω and ∇ω at a point; at edges and corners ∇ω is one finite member of the limits.
+    #[inline]
     pub fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         let mut out = [0.0; 4];
         self.programs(ProgramKind::Gradient).point(self.inner.engine, p.to_array(), &mut out);
@@ -116,6 +119,7 @@ impl Solid {
     }
 
     /// ω in single precision throughout.
+    #[inline]
     pub fn omega_f32(&self, p: Vec3) -> f32 {
         let mut out = [0.0];
         self.inner.value.point(self.inner.engine, p.to_array(), &mut out);
@@ -123,6 +127,7 @@ impl Solid {
     }
 
     /// ω and ∇ω in single precision throughout.
+    #[inline]
     pub fn omega_grad_f32(&self, p: Vec3) -> (f32, Vec3) {
         let mut out = [0.0; 4];
         self.programs(ProgramKind::Gradient).point(self.inner.engine, p.to_array(), &mut out);
@@ -174,10 +179,12 @@ impl std::fmt::Debug for Solid {
 }
 
 impl Field for Solid {
+    #[inline]
     fn omega(&self, p: DVec3) -> f64 {
         self.omega(p)
     }
 
+    #[inline]
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         self.omega_grad(p)
     }

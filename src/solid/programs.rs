@@ -62,6 +62,7 @@ impl Programs {
         Self { graph, outputs, interpreter, double: Compiled::new(), single: Compiled::new() }
     }
 
+    #[inline]
     fn point_program<T: Lane>(&self) -> Result<&PointProgram<T>, CodegenError> {
         let slot = &T::compiled(self).point;
         slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs)).as_ref().map_err(Clone::clone)
@@ -82,7 +83,9 @@ impl Programs {
         engine != Engine::Interpreter && self.require_machine_code().is_ok()
     }
 
-    /// All outputs at a point.
+    /// All outputs at a point. Inlined, so that a point made of three loose numbers is not written to memory and
+    /// read back as a vector: that stalls for longer than the whole program takes.
+    #[inline]
     pub fn point<T: Lane>(&self, engine: Engine, p: [T; 3], out: &mut [T]) {
         if engine != Engine::Interpreter
             && let Ok(program) = self.point_program::<T>()
