@@ -122,6 +122,11 @@ impl<'a, 'f> Emitter<'a, 'f> {
             }
             Binary::Min => self.ordered(FloatCC::LessThan, a, b),
             Binary::Max => self.ordered(FloatCC::GreaterThan, a, b),
+            Binary::PlainMin => {
+                let less = self.compare(FloatCC::LessThan, a, b);
+                self.select(less, a, b)
+            }
+            Binary::PlainMax => self.max(a, b),
             Binary::MinWeight => self.tie_weight(FloatCC::LessThan, a, b),
             Binary::MaxWeight => self.tie_weight(FloatCC::GreaterThan, a, b),
             Binary::And => self.r0_value((u, a), (v, b), Junction::And),
