@@ -78,6 +78,8 @@ pub(super) enum Command {
     Mesh(Mesh),
     /// Simulate the fluid of a scene around its obstacles
     Run(Run),
+    /// Measure speed against error for every program of a solid
+    Report(Report),
     /// Explain a message, or show what a stage of the compiler makes of a file
     Explain(Explain),
 }
@@ -212,6 +214,18 @@ pub(super) struct Run {
     /// Cells of the obstacle's mesh along its longest side
     #[arg(long, value_name = "N", default_value_t = 96)]
     pub mesh_cells: usize,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Report {
+    /// The file; `-` is standard input
+    pub file: PathBuf,
+    /// The solid [default: the only one, or the first obstacle of the scene]
+    #[arg(short, long, value_name = "NAME")]
+    pub solid: Option<String>,
+    /// Plot speed against error: .svg or .png
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

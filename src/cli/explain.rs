@@ -7,7 +7,7 @@ use anstream::println;
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
 use crate::Program;
-use crate::codegen::{Listing, Precision, Request, Shape, target_description};
+use crate::codegen::{Form, Listing, Precision, Request, Shape, target_description};
 use crate::diagnostic::{explain, nearest};
 use crate::ir::dump;
 use crate::lower::NamedSolid;
@@ -83,7 +83,13 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     if show.contains(&Stage::Clif) || show.contains(&Stage::Asm) {
         for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)]
         {
-            let request = Request { graph, outputs, precision: Precision::F64, shape: Shape::Batch };
+            let request = Request {
+                graph,
+                outputs,
+                precision: Precision::F64,
+                shape: Shape::Batch,
+                form: Form::Stable,
+            };
             let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;
             if show.contains(&Stage::Clif) {
                 println!("\n{title}, f64, many points, intermediate representation:\n{}", listing.clif);

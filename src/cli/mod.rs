@@ -12,6 +12,7 @@ mod input;
 mod mesh;
 mod output;
 mod progress;
+mod report;
 mod run;
 
 use std::ffi::OsString;
@@ -85,6 +86,7 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         args::Command::Eval(options) => eval::run(&shared, &options),
         args::Command::Mesh(options) => mesh::run(&shared, &options),
         args::Command::Run(options) => run::run(&shared, &options),
+        args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),
     }
 }

@@ -11,6 +11,7 @@
 mod emit;
 mod math_calls;
 mod memory;
+mod r0;
 mod translate;
 
 use std::fmt;
@@ -39,6 +40,18 @@ pub enum Shape {
     Batch,
 }
 
+/// How R₀ is evaluated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Form {
+    /// Half-angle form: ≤ 2 ulp, exact sign for all finite operands, finite gradient at corners.
+    #[default]
+    Stable,
+    /// u + v ∓ √(u² + v²) as written: cheapest, loses digits and at worst the sign where operands cancel.
+    Textbook,
+    /// The stable form on m/M: neither overflows nor underflows before its result does; one more division.
+    Scaled,
+}
+
 /// What is to be compiled.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
@@ -46,6 +59,7 @@ pub struct Request<'a> {
     pub outputs: &'a [Node],
     pub precision: Precision,
     pub shape: Shape,
+    pub form: Form,
 }
 
 impl Precision {

@@ -8,6 +8,7 @@
 mod adjoint;
 mod dump;
 mod eval;
+pub mod exact;
 mod graph;
 mod op;
 pub mod r0;

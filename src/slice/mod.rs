@@ -27,9 +27,10 @@ pub use self::{
     isolines::{Outline, Polyline, isolines, outlines},
     plane::{Axis, Plane, Window},
     sample::{Samples, sample},
-    svg::svg,
+    svg::{escaped, svg},
 };
 use crate::field::Field;
+pub use png::rasterise;
 
 /// Samples along the longer side that make a plot smooth at the printed size.
 pub const DEFAULT_SAMPLES: usize = 320;
@@ -106,7 +107,7 @@ pub fn write_png(
     scale: f32,
     out: impl io::Write,
 ) -> Result<(), SliceError> {
-    png::write(&svg(field, name, &sample(field, plane, window, samples)?), scale, out)
+    png::rasterise(&svg(field, name, &sample(field, plane, window, samples)?), scale, out)
 }
 
 #[cfg(test)]

@@ -23,8 +23,11 @@ static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
     Arc::new(fonts)
 });
 
-/// Writes a drawing as an RGB PNG with `scale` pixels per unit of the drawing.
-pub(super) fn write(svg: &str, scale: f32, out: impl io::Write) -> Result<(), SliceError> {
+/// Writes any SVG drawing with an opaque ground as an RGB PNG with `scale` pixels per unit of the drawing.
+///
+/// # Errors
+/// [`SliceError::Drawing`] if it is no SVG, [`SliceError::Scale`] beyond 0.1 … 16, and those of the writer.
+pub fn rasterise(svg: &str, scale: f32, out: impl io::Write) -> Result<(), SliceError> {
     if !(0.1..=16.0).contains(&scale) {
         return Err(SliceError::Scale(scale));
     }

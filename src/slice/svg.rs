@@ -234,7 +234,7 @@ fn mean(a: Rgb, b: Rgb) -> Rgb {
 }
 
 /// Text for XML: markup characters escaped, control characters left out.
-fn escaped(text: &str) -> String {
+pub fn escaped(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars().filter(|c| !c.is_control()) {
         match c {

@@ -2,7 +2,7 @@
 //!
 //! Everything unsafe about a call is checked here first: the number of outputs, the lengths of the columns.
 
-use crate::codegen::{self, Code, CodegenError, Precision, Request, Shape};
+use crate::codegen::{self, Code, CodegenError, Form, Precision, Request, Shape};
 use crate::ir::{Graph, Interpreter, Node, Real};
 
 use super::programs::{Compiled, Programs};
@@ -60,8 +60,8 @@ pub struct PointProgram<T> {
 impl<T: Lane> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
-    pub fn compile(graph: &Graph, outputs: &[Node]) -> Result<Self, CodegenError> {
-        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point };
+    pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
+        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point, form };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -95,8 +95,8 @@ pub struct BatchProgram<T> {
 impl<T: Lane> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
-    pub fn compile(graph: &Graph, outputs: &[Node]) -> Result<Self, CodegenError> {
-        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch };
+    pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
+        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch, form };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 

@@ -18,7 +18,7 @@ pub use bounds::{Bounds, prove_empty};
 pub use compiled::{BatchProgram, Lane, PointProgram};
 pub use programs::{Engine, ProgramKind};
 
-use crate::codegen::CodegenError;
+use crate::codegen::{CodegenError, Form};
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -46,6 +46,7 @@ struct Inner {
 struct Function {
     value: Programs,
     guard: Guard,
+    form: Form,
     /// The graph without guards, from which further programs are derived.
     graph: Graph,
     root: Node,
@@ -54,10 +55,11 @@ struct Function {
 }
 
 impl Function {
-    fn new(graph: Graph, root: Node, guard: Guard) -> Self {
+    fn new(graph: Graph, root: Node, guard: Guard, form: Form) -> Self {
         Self {
-            value: Programs::new(graph.clone(), vec![root], guard),
+            value: Programs::new(graph.clone(), vec![root], guard, form),
             guard,
+            form,
             range: RangeEvaluator::new(&graph, root),
             graph,
             root,
@@ -70,7 +72,7 @@ impl Function {
             let mut graph = self.graph.clone();
             let [gx, gy, gz] = ir::gradient(&mut graph, self.root);
             let (graph, roots, _) = simplify(&graph, &[self.root, gx, gy, gz]);
-            Programs::new(graph, roots, self.guard)
+            Programs::new(graph, roots, self.guard, self.form)
         })
     }
 }
@@ -87,11 +89,25 @@ impl Solid {
         root: Node,
         engine: Engine,
     ) -> Result<Self, CodegenError> {
+        Self::with_form(name, graph, root, engine, Form::Stable)
+    }
+
+    /// A solid whose machine code evaluates R₀ in another form; for comparing their speed and error.
+    ///
+    /// # Errors
+    /// As for [`Solid::new`].
+    pub fn with_form(
+        name: impl Into<String>,
+        graph: &Graph,
+        root: Node,
+        engine: Engine,
+        form: Form,
+    ) -> Result<Self, CodegenError> {
         let (graph, roots, applied) = simplify(graph, &[root]);
         let inner = Inner {
             name: name.into(),
             engine,
-            omega: Function::new(graph, roots[0], Guard::Infinite),
+            omega: Function::new(graph, roots[0], Guard::Infinite, form),
             twin: OnceLock::new(),
             bounds: OnceLock::new(),
             applied,
@@ -133,7 +149,7 @@ impl Solid {
             let mut graph = self.inner.omega.graph.clone();
             let root = ir::twin(&mut graph, self.inner.omega.root);
             let (graph, roots, _) = simplify(&graph, &[root]);
-            Function::new(graph, roots[0], Guard::FarAway)
+            Function::new(graph, roots[0], Guard::FarAway, Form::Stable)
         })
     }
 

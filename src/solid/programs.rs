@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use super::compiled::{BatchProgram, Lane, PointProgram};
-use crate::codegen::CodegenError;
+use crate::codegen::{CodegenError, Form};
 use crate::ir::{Axis, Binary, Graph, Interpreter, Node, Unary};
 
 /// What evaluates a solid.
@@ -57,13 +57,15 @@ impl<T> Compiled<T> {
 pub struct Programs {
     pub graph: Graph,
     pub outputs: Vec<Node>,
+    /// Of machine code; the interpreter always uses the stable form.
+    form: Form,
     pub interpreter: Interpreter,
     pub double: Compiled<f64>,
     pub single: Compiled<f32>,
 }
 
 impl Programs {
-    pub fn new(mut graph: Graph, outputs: Vec<Node>, guard: Guard) -> Self {
+    pub fn new(mut graph: Graph, outputs: Vec<Node>, guard: Guard, form: Form) -> Self {
         let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
         let sum = |graph: &mut Graph, [x, y, z]: [Node; 3]| {
             let sum = graph.binary(Binary::Add, x, y);
@@ -82,18 +84,22 @@ impl Programs {
         let outputs: Vec<Node> =
             outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect();
         let interpreter = Interpreter::new(&graph, &outputs);
-        Self { graph, outputs, interpreter, double: Compiled::new(), single: Compiled::new() }
+        Self { graph, outputs, form, interpreter, double: Compiled::new(), single: Compiled::new() }
     }
 
     #[inline]
     fn point_program<T: Lane>(&self) -> Result<&PointProgram<T>, CodegenError> {
         let slot = &T::compiled(self).point;
-        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs)).as_ref().map_err(Clone::clone)
+        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs, self.form))
+            .as_ref()
+            .map_err(Clone::clone)
     }
 
     fn batch_program<T: Lane>(&self) -> Result<&BatchProgram<T>, CodegenError> {
         let slot = &T::compiled(self).batch;
-        slot.get_or_init(|| BatchProgram::compile(&self.graph, &self.outputs)).as_ref().map_err(Clone::clone)
+        slot.get_or_init(|| BatchProgram::compile(&self.graph, &self.outputs, self.form))
+            .as_ref()
+            .map_err(Clone::clone)
     }
 
     /// # Errors

@@ -1,0 +1,65 @@
+//! The points at which programs are timed and judged.
+
+use glam::DVec3;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+use crate::Solid;
+use crate::geom::Aabb;
+
+/// Points of a timed batch: enough to fill the pipelines, few enough to stay in the nearest cache.
+const TIMED: usize = 4096;
+
+/// Random points whose errors are measured: each costs some 100 µs of 120-digit arithmetic.
+const JUDGED: usize = 600;
+
+/// Points on the surface whose errors are measured.
+const ON_SURFACE: usize = 400;
+
+pub(super) struct Points {
+    pub over: Aabb,
+    pub random: Vec<DVec3>,
+    /// How many of the random points are judged; they come first.
+    pub random_judged: usize,
+    /// As near to ω = 0 as doubles go.
+    pub surface: Vec<DVec3>,
+}
+
+impl Points {
+    /// The same points for the same solid and box.
+    pub fn choose(solid: &Solid, over: Aabb) -> Self {
+        let mut generator = Pcg64::seed_from_u64(1);
+        let mut unit = || (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
+        let mut inside = |aabb: &Aabb| aabb.min + aabb.size() * DVec3::new(unit(), unit(), unit());
+        let random: Vec<DVec3> = (0..TIMED).map(|_| inside(&over)).collect();
+        let near = solid.bounds().aabb().map_or(over, |b| b.intersection(&over));
+        let near = if near.is_empty() { over } else { near };
+        let mut surface = Vec::new();
+        for _ in 0..50 * ON_SURFACE {
+            let (a, b) = (inside(&near), inside(&over));
+            if surface.len() < ON_SURFACE && solid.sign(a) > 0.0 && solid.sign(b) < 0.0 {
+                surface.push(bisect(solid, a, b));
+            }
+        }
+        Self { over, random, random_judged: JUDGED, surface }
+    }
+
+    /// The points whose errors are measured, random ones first; rounded to `f32` if the program will see them so.
+    pub fn judged(&self, single: bool) -> impl Iterator<Item = DVec3> + '_ {
+        let points = self.random[..self.random_judged].iter().chain(&self.surface);
+        points.map(move |p| if single { p.as_vec3().as_dvec3() } else { *p })
+    }
+}
+
+/// The last outside point between an inside and an outside one.
+fn bisect(solid: &Solid, mut inside: DVec3, mut outside: DVec3) -> DVec3 {
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        if solid.sign(middle) > 0.0 {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    outside
+}
