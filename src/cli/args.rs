@@ -72,7 +72,7 @@ impl From<Engine> for crate::Engine {
 pub(super) enum Command {
     /// Validate files, list their solids, plot slices
     Check(Check),
-    /// Evaluate ω, ∇ω, sign and normal at points
+    /// Evaluate ω, ∇ω, sign, distance and normal at points
     Eval(Eval),
     /// Make a closed triangle mesh of a solid
     Mesh(Mesh),
@@ -138,7 +138,8 @@ pub(super) struct Eval {
     pub precision: Precision,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+/// In the order of their columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub(super) enum What {
     /// ω, positive inside
     Value,
@@ -146,6 +147,8 @@ pub(super) enum What {
     Gradient,
     /// 1 inside, 0 on the surface, −1 outside
     Sign,
+    /// Distance from the surface, positive in the fluid: accurate near it, an estimate far away
+    Distance,
     /// Outward unit normal −∇ω/|∇ω|
     Normal,
 }

@@ -92,12 +92,16 @@ struct Table {
 
 impl Table {
     fn new(solid: Solid, options: &Eval, json: bool) -> Result<Self, Failure> {
+        let mut asked = options.what.clone();
+        asked.sort_unstable();
+        asked.dedup();
         let mut names = vec!["x", "y", "z"];
-        for what in &options.what {
+        for what in &asked {
             names.extend(match what {
                 What::Value => &["omega"][..],
                 What::Gradient => &["gx", "gy", "gz"],
                 What::Sign => &["sign"],
+                What::Distance => &["distance"],
                 What::Normal => &["nx", "ny", "nz"],
             });
         }
@@ -105,14 +109,7 @@ impl Table {
         if !json {
             writeln!(out, "{}", names.join(","))?;
         }
-        Ok(Self {
-            solid,
-            what: options.what.clone(),
-            precision: options.precision,
-            json: json.then(Vec::new),
-            names,
-            out,
-        })
+        Ok(Self { solid, what: asked, precision: options.precision, json: json.then(Vec::new), names, out })
     }
 
     fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {
@@ -151,6 +148,10 @@ impl Table {
                 What::Value => row.push(omega),
                 What::Gradient => row.extend(gradient.to_array()),
                 What::Sign => row.push(Unary::Sign.eval(omega)),
+                What::Distance => row.push(match self.precision {
+                    Precision::F64 => self.solid.contact(p).distance,
+                    Precision::F32 => self.solid.distance_f32(p.as_vec3()).into(),
+                }),
                 // NaN where there is no normal: tangent surfaces, centres
                 What::Normal => row.extend((-gradient / gradient.length()).to_array()),
             }

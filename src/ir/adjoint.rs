@@ -5,62 +5,65 @@
 //! derivative is one member of the limit set: 0 for √a at a = 0 and |a| at 0, ½ and ½ for min and max at a tie,
 //! equal weights for R₀ at a corner.
 
+use std::collections::{HashMap, HashSet};
+
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
 
-/// (∂root/∂x, ∂root/∂y, ∂root/∂z)
+/// (∂root/∂x, ∂root/∂y, ∂root/∂z). The work grows with what the root uses, not with the graph.
 pub fn gradient(graph: &mut Graph, root: Node) -> [Node; 3] {
-    let used = graph.reachable(&[root]);
-    let depends = depends_on_coordinates(graph, root);
-    let mut adjoints: Vec<Option<Node>> = vec![None; root.index() + 1];
-    adjoints[root.index()] = Some(graph.constant(1.0));
+    let cone = graph.cone(root);
+    let depends = depends_on_coordinates(graph, &cone);
+    let mut adjoints: HashMap<Node, Node> = HashMap::new();
+    adjoints.insert(root, graph.constant(1.0));
     let mut partials = [None; 3];
-    for i in (0..=root.index()).rev() {
-        let Some(adjoint) = adjoints[i].filter(|_| used[i]) else { continue };
-        let node = graph.node(i);
+    for &node in cone.iter().rev() {
+        let Some(&adjoint) = adjoints.get(&node) else { continue };
         if let Expr::Coordinate(axis) = graph.expr(node) {
             partials[axis as usize] = Some(adjoint);
             continue;
         }
         for (operand, contribution) in contributions(graph, node, adjoint, &depends) {
-            let so_far = adjoints[operand.index()];
-            adjoints[operand.index()] = Some(match so_far {
+            let sum = match adjoints.get(&operand) {
                 None => contribution,
-                Some(so_far) => graph.binary(Binary::Add, so_far, contribution),
-            });
+                Some(&so_far) => graph.binary(Binary::Add, so_far, contribution),
+            };
+            adjoints.insert(operand, sum);
         }
     }
     partials.map(|partial| partial.unwrap_or_else(|| graph.constant(0.0)))
 }
 
 /// Constants need no adjoint: leaving them out keeps dead multiplications out of the graph.
-fn depends_on_coordinates(graph: &Graph, root: Node) -> Vec<bool> {
-    let mut depends = vec![false; root.index() + 1];
-    for (node, expr) in graph.nodes().take(root.index() + 1) {
-        depends[node.index()] =
-            matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends[o.index()]);
+fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> HashSet<Node> {
+    let mut depends = HashSet::new();
+    for &node in cone {
+        let expr = graph.expr(node);
+        if matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends.contains(&o)) {
+            depends.insert(node);
+        }
     }
     depends
 }
 
 /// What a node's adjoint adds to the adjoints of its operands.
-fn contributions(graph: &mut Graph, node: Node, adjoint: Node, depends: &[bool]) -> Vec<(Node, Node)> {
+fn contributions(graph: &mut Graph, node: Node, adjoint: Node, depends: &HashSet<Node>) -> Vec<(Node, Node)> {
     let mut out = Vec::with_capacity(2);
     match graph.expr(node) {
         Expr::Constant(_) | Expr::Coordinate(_) => {}
         Expr::Unary(op, a) => {
-            if depends[a.index()] {
+            if depends.contains(&a) {
                 let contribution = unary(graph, op, node, a, adjoint);
                 out.push((a, contribution));
             }
         }
         Expr::Binary(op, a, b) => {
-            if depends[a.index()]
+            if depends.contains(&a)
                 && let Some(contribution) = binary(graph, op, node, [a, b], Side::First, adjoint)
             {
                 out.push((a, contribution));
             }
-            if depends[b.index()]
+            if depends.contains(&b)
                 && let Some(contribution) = binary(graph, op, node, [a, b], Side::Second, adjoint)
             {
                 out.push((b, contribution));

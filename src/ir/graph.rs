@@ -152,7 +152,7 @@ impl Graph {
     }
 
     /// The nodes a root depends on, in order; cheap when the root uses little of a large graph.
-    fn cone(&self, root: Node) -> Vec<Node> {
+    pub(super) fn cone(&self, root: Node) -> Vec<Node> {
         let mut seen = std::collections::HashSet::from([root]);
         let mut cone = vec![root];
         let mut next = 0;

@@ -6,6 +6,7 @@
 //! Invariant: nothing here knows the syntax or the code generator; equal expressions have equal [`Node`]s.
 
 mod adjoint;
+mod contact;
 mod dump;
 mod eval;
 pub mod exact;
@@ -17,6 +18,7 @@ mod real;
 mod twin;
 
 pub use adjoint::gradient;
+pub use contact::contact;
 pub use dump::dump;
 pub use eval::Interpreter;
 pub use graph::{Axis, Expr, Graph, Node};

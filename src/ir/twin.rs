@@ -58,13 +58,17 @@ pub fn twin(graph: &mut Graph, root: Node) -> Node {
 }
 
 /// The operands that alone decide the sign of a node; none if its value does.
-fn sign_operands(graph: &Graph, node: Node) -> Vec<Node> {
+pub(super) fn sign_operands(graph: &Graph, node: Node) -> Vec<Node> {
     let positive = |node| graph.as_constant(node).is_some_and(|c| c > 0.0 && c.is_finite());
     match graph.expr(node) {
-        Expr::Binary(Binary::And | Binary::Or | Binary::Min | Binary::Max, u, v) => vec![u, v],
+        Expr::Binary(
+            Binary::And | Binary::Or | Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax,
+            u,
+            v,
+        ) => vec![u, v],
         Expr::Unary(Unary::Neg, u) => vec![u],
         Expr::Binary(Binary::Mul, u, v) if positive(u) && u != v => vec![v],
-        Expr::Binary(Binary::Mul, u, v) if positive(v) && u != v => vec![u],
+        Expr::Binary(Binary::Mul | Binary::Div, u, v) if positive(v) && u != v => vec![u],
         _ => Vec::new(),
     }
 }

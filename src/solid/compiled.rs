@@ -44,8 +44,8 @@ impl Lane for f64 {
     }
 }
 
-/// The largest number of outputs of a program: ω and three partial derivatives.
-pub const MAX_OUTPUTS: usize = 4;
+/// The largest number of outputs of a program: distance, normal and curvature.
+const MAX_OUTPUTS: usize = 5;
 
 /// Points in one vector, at most.
 const MAX_LANES: usize = 4;

@@ -38,6 +38,7 @@ struct Inner {
     omega: Function,
     /// Same sign, no roots.
     twin: OnceLock<Function>,
+    contact: OnceLock<Programs>,
     bounds: OnceLock<Bounds>,
     applied: Applied,
 }
@@ -109,6 +110,7 @@ impl Solid {
             engine,
             omega: Function::new(graph, roots[0], Guard::Infinite, form),
             twin: OnceLock::new(),
+            contact: OnceLock::new(),
             bounds: OnceLock::new(),
             applied,
         };
@@ -141,6 +143,12 @@ impl Solid {
             ProgramKind::Gradient => self.inner.omega.gradient(),
             ProgramKind::Sign => &self.twin_function().value,
             ProgramKind::SignGradient => self.twin_function().gradient(),
+            ProgramKind::Contact => self.inner.contact.get_or_init(|| {
+                let mut graph = self.inner.omega.graph.clone();
+                let outputs = ir::contact(&mut graph, self.inner.omega.root);
+                let (graph, outputs, _) = simplify(&graph, &outputs);
+                Programs::new(graph, outputs, Guard::Infinite, Form::Stable)
+            }),
         }
     }
 
@@ -216,6 +224,29 @@ impl Solid {
         ir::Unary::Sign.eval(out[0])
     }
 
+    /// What a particle at this place needs to know of the surface.
+    pub fn contact(&self, p: DVec3) -> Contact {
+        let mut out = [0.0; 5];
+        self.programs(ProgramKind::Contact).point(self.inner.engine, p.to_array(), &mut out);
+        let [distance, nx, ny, nz, mean_curvature] = out;
+        Contact { distance, normal: DVec3::new(nx, ny, nz), mean_curvature }
+    }
+
+    /// The distance of [`Solid::contact`] in single precision throughout.
+    pub fn distance_f32(&self, p: Vec3) -> f32 {
+        let mut out = [0.0; 5];
+        self.programs(ProgramKind::Contact).point(self.inner.engine, p.to_array(), &mut out);
+        out[0]
+    }
+
+    /// Distance, normal x, y, z and mean curvature at many points given by columns.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
+        self.programs(ProgramKind::Contact).batch(self.inner.engine, points, out);
+    }
+
     /// The twin at many points: positive inside, 0 on the surface, negative outside.
     ///
     /// # Panics
@@ -268,6 +299,17 @@ impl Field for Solid {
     fn range(&self, over: &Aabb) -> Interval {
         self.range(over)
     }
+}
+
+/// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Positive in the fluid, negative inside the solid.
+    pub distance: f64,
+    /// Outward unit normal of the face that is nearest; the mean of two at an edge; zero where there is none.
+    pub normal: DVec3,
+    /// Of that face, positive where the solid is convex: 1/R for a ball, 1/2R for a cylinder.
+    pub mean_curvature: f64,
 }
 
 /// The min/max twin of a solid, see [`Solid::twin`].

@@ -28,6 +28,8 @@ pub enum ProgramKind {
     Sign,
     /// The twin and its gradient, which is that of the active leaf
     SignGradient,
+    /// Distance from the surface (positive in the fluid), outward unit normal, mean curvature
+    Contact,
 }
 
 /// Where a program gives NaN although its formula might not.

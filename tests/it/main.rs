@@ -1,3 +1,4 @@
 //! One test binary: one link of the code generator.
 
 mod agreement;
+mod contact;

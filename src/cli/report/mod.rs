@@ -203,6 +203,12 @@ fn measure<T: Lane>(
         let time = ns(&mut || solid.twin_many(columns.get(), black_box(&mut out[0])));
         rows.push(row("sign", "many", time, sign_errors));
     }
+    if form == "stable" {
+        let mut out: [Vec<T>; 5] = std::array::from_fn(|_| vec![T::default(); n]);
+        let time =
+            ns(&mut || solid.contact_many(columns.get(), black_box(out.each_mut().map(|c| &mut c[..]))));
+        rows.push(row("contact", "many", time, Errors::default()));
+    }
     if !single && engine == "jit" {
         let value = ns(&mut || {
             for &p in &points.random {

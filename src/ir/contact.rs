@@ -1,0 +1,200 @@
+//! Distance, normal and mean curvature at the surface, from the leaves.
+//!
+//! ω/|∇ω| is a poor distance: R₀ mixes leaves of unlike scale. A leaf u by itself knows better: along its normal it
+//! is nearly quadratic, so with g = |∇u| and b = nᵀ·Hess u·n the surface lies at
+//!
+//! ```text
+//! t = 2u / (g + √(g² − 2ub))          (u/g where the root is not real)
+//! ```
+//!
+//! which is exact along the normal for every quadric. The leaves' distances are combined by the min/max twin, and
+//! normal and curvature are those of the leaf that decides; at a tie, the mean of the two. Products of two factors
+//! are split into their faces, sign(pq) = (p∧q)∨(¬p∧¬q): the product of a slab is half the distance far away.
+
+use std::collections::HashMap;
+
+use super::adjoint::gradient;
+use super::graph::{Expr, Graph, Node};
+use super::op::{Binary, Unary};
+use super::twin::sign_operands;
+
+/// What is known of the surface nearest to a point, as nodes.
+#[derive(Debug, Clone, Copy)]
+struct Surface {
+    /// Distance, positive inside the solid.
+    depth: Node,
+    /// Outward unit normal.
+    normal: [Node; 3],
+    /// Mean curvature, positive where the solid is convex.
+    curvature: Node,
+}
+
+/// [distance (positive in the fluid), outward unit normal x, y, z, mean curvature (1/length, convex positive)]
+pub fn contact(graph: &mut Graph, root: Node) -> [Node; 5] {
+    let mut builder = Builder { graph, known: HashMap::new() };
+    let surface = builder.surface(root);
+    let [nx, ny, nz] = builder.unit(surface.normal);
+    let distance = builder.graph.unary(Unary::Neg, surface.depth);
+    [distance, nx, ny, nz, surface.curvature]
+}
+
+struct Builder<'g> {
+    graph: &'g mut Graph,
+    known: HashMap<Node, Surface>,
+}
+
+impl Builder<'_> {
+    /// Logic nodes below the root in an order in which operands come first: no recursion, trees may be deep.
+    fn surface(&mut self, root: Node) -> Surface {
+        let mut stack = vec![root];
+        while let Some(&node) = stack.last() {
+            if self.known.contains_key(&node) {
+                stack.pop();
+                continue;
+            }
+            let operands = self.operands(node);
+            let missing: Vec<Node> =
+                operands.iter().copied().filter(|o| !self.known.contains_key(o)).collect();
+            if missing.is_empty() {
+                let surface = self.combine(node, &operands);
+                self.known.insert(node, surface);
+                stack.pop();
+            } else {
+                stack.extend(missing);
+            }
+        }
+        self.known[&root]
+    }
+
+    /// The shapes that a node is made of; none for a leaf.
+    fn operands(&self, node: Node) -> Vec<Node> {
+        if let Some((p, q)) = self.faces(node) {
+            return vec![p, q];
+        }
+        sign_operands(self.graph, node)
+    }
+
+    /// The factors of a product, both of which vary.
+    fn faces(&self, node: Node) -> Option<(Node, Node)> {
+        match self.graph.expr(node) {
+            Expr::Binary(Binary::Mul, p, q)
+                if p != q && self.graph.as_constant(p).is_none() && self.graph.as_constant(q).is_none() =>
+            {
+                Some((p, q))
+            }
+            _ => None,
+        }
+    }
+
+    fn combine(&mut self, node: Node, operands: &[Node]) -> Surface {
+        let of: Vec<Surface> = operands.iter().map(|o| self.known[o]).collect();
+        match (self.graph.expr(node), &of[..]) {
+            (Expr::Binary(Binary::Mul, ..), &[p, q]) => {
+                let both = self.nearer(p, q, Binary::Min);
+                let (p, q) = (self.negated(p), self.negated(q));
+                let neither = self.nearer(p, q, Binary::Min);
+                self.nearer(both, neither, Binary::Max)
+            }
+            (Expr::Binary(Binary::And | Binary::Min | Binary::PlainMin, ..), &[u, v]) => {
+                self.nearer(u, v, Binary::Min)
+            }
+            (Expr::Binary(Binary::Or | Binary::Max | Binary::PlainMax, ..), &[u, v]) => {
+                self.nearer(u, v, Binary::Max)
+            }
+            (Expr::Unary(Unary::Neg, _), &[u]) => self.negated(u),
+            // a positive factor moves nothing
+            (_, &[u]) => u,
+            _ => self.leaf(node),
+        }
+    }
+
+    fn negated(&mut self, s: Surface) -> Surface {
+        Surface {
+            depth: self.graph.unary(Unary::Neg, s.depth),
+            normal: s.normal.map(|n| self.graph.unary(Unary::Neg, n)),
+            curvature: self.graph.unary(Unary::Neg, s.curvature),
+        }
+    }
+
+    /// The surface that decides: weights are 1 and 0, or ½ and ½ at a tie.
+    fn nearer(&mut self, u: Surface, v: Surface, op: Binary) -> Surface {
+        let depth = self.graph.binary(op, u.depth, v.depth);
+        let weight = if op == Binary::Min { Binary::MinWeight } else { Binary::MaxWeight };
+        let (wu, wv) =
+            (self.graph.binary(weight, u.depth, v.depth), self.graph.binary(weight, v.depth, u.depth));
+        let mut mixed = |a: Node, b: Node| {
+            let (a, b) = (self.graph.binary(Binary::Mul, wu, a), self.graph.binary(Binary::Mul, wv, b));
+            self.graph.binary(Binary::Add, a, b)
+        };
+        let normal = std::array::from_fn(|i| mixed(u.normal[i], v.normal[i]));
+        Surface { depth, normal, curvature: mixed(u.curvature, v.curvature) }
+    }
+
+    fn leaf(&mut self, u: Node) -> Surface {
+        use Binary::{Add, DivOrZero, Mul, Sub};
+        let slopes = gradient(self.graph, u);
+        let g2 = self.dot(slopes, slopes);
+        let g = self.graph.unary(Unary::Sqrt, g2);
+        // ∇(½g²) = Hess u · ∇u
+        let half = self.graph.constant(0.5);
+        let half_g2 = self.graph.binary(Mul, half, g2);
+        let bent = gradient(self.graph, half_g2);
+        let along = self.dot(slopes, bent);
+        let trace = self.trace(slopes);
+        let b = self.graph.binary(DivOrZero, along, g2);
+        // where there is no normal every direction is as good: the mean second derivative
+        let has_normal = self.graph.unary(Unary::Sign, g2);
+        let one = self.graph.constant(1.0);
+        let third = self.graph.constant(1.0 / 3.0);
+        let has_none = self.graph.binary(Sub, one, has_normal);
+        let mean = self.graph.binary(Mul, third, trace);
+        let mean = self.graph.binary(Mul, has_none, mean);
+        let b = self.graph.binary(Add, b, mean);
+        let depth = self.depth(u, g, g2, b);
+        let normal = slopes.map(|slope| {
+            let inward = self.graph.binary(DivOrZero, slope, g);
+            self.graph.unary(Unary::Neg, inward)
+        });
+        // −(tr Hess u − nᵀ·Hess u·n)/2g
+        let across = self.graph.binary(Sub, b, trace);
+        let twice = self.graph.binary(Add, g, g);
+        let curvature = self.graph.binary(DivOrZero, across, twice);
+        Surface { depth, normal, curvature }
+    }
+
+    /// 2u/(g + √(g² − 2ub)), or u/g where the root is not real.
+    fn depth(&mut self, u: Node, g: Node, g2: Node, b: Node) -> Node {
+        use Binary::{Add, DivOrZero, Max, MinWeight, Mul, Sub};
+        let twice = self.graph.binary(Add, u, u);
+        let bend = self.graph.binary(Mul, twice, b);
+        let radicand = self.graph.binary(Sub, g2, bend);
+        let zero = self.graph.constant(0.0);
+        let clipped = self.graph.binary(Max, radicand, zero);
+        let root = self.graph.unary(Unary::Sqrt, clipped);
+        let unreal = self.graph.binary(MinWeight, radicand, zero);
+        let instead = self.graph.binary(Mul, unreal, g);
+        let below = self.graph.binary(Add, g, root);
+        let below = self.graph.binary(Add, below, instead);
+        self.graph.binary(DivOrZero, twice, below)
+    }
+
+    /// ∂²u/∂x² + ∂²u/∂y² + ∂²u/∂z²
+    fn trace(&mut self, slopes: [Node; 3]) -> Node {
+        let [xx, yy, zz] = std::array::from_fn(|i| gradient(self.graph, slopes[i])[i]);
+        let sum = self.graph.binary(Binary::Add, xx, yy);
+        self.graph.binary(Binary::Add, sum, zz)
+    }
+
+    fn dot(&mut self, a: [Node; 3], b: [Node; 3]) -> Node {
+        let [x, y, z] = std::array::from_fn(|i| self.graph.binary(Binary::Mul, a[i], b[i]));
+        let sum = self.graph.binary(Binary::Add, x, y);
+        self.graph.binary(Binary::Add, sum, z)
+    }
+
+    /// Of length 1, or zero where opposite normals meet.
+    fn unit(&mut self, v: [Node; 3]) -> [Node; 3] {
+        let square = self.dot(v, v);
+        let length = self.graph.unary(Unary::Sqrt, square);
+        v.map(|c| self.graph.binary(Binary::DivOrZero, c, length))
+    }
+}
