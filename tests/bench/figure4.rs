@@ -1,0 +1,218 @@
+//! The paper's figure 4, again: time of one step against the number of particles. `cargo bench --bench figure4`
+//! prints a table and writes target/figure4.svg and target/figure4.png; it takes about three minutes.
+//!
+//! The obstacle is the compiled pawn of examples/pawn.rfm. Two ways to have more particles:
+//! - *table 1*: mass and support radius stay those of the paper, so the drop grows;
+//! - *refined*: the drop stays and its particles shrink, as `-D particles=N` does.
+//!
+//! What is timed: windows of whole steps (at least 40 ms each), their median. *Falling*: from the fifth step on,
+//! before the drop touches the pawn. *Settled*: after 1.2 s, when the fluid lies around the pawn, which is where
+//! particles collide; for N up to 10 000, so that the bench stays short. Frames are not written.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use rfm::lower::Scene;
+use rfm::sph::{FluidBlock, NegativePressure, Obstacle, Parameters, Simulation, carve};
+use rfm::{Engine, Program, Solid, glam::DVec3};
+
+#[path = "figure4/plot.rs"]
+mod plot;
+
+const COUNTS: [usize; 7] = [1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000];
+const WINDOWS: usize = 7;
+const WINDOW: Duration = Duration::from_millis(40);
+const SETTLED_AFTER: f64 = 1.2;
+const LARGEST_SETTLED: usize = 10_000;
+
+/// The authors' published program, measured on another machine than yours: N, ms per step. It finds 29 neighbours
+/// per particle, ours as many as lie within the support radius.
+const PAPERS_CODE: [(f64, f64); 2] = [(10_000.0, 27.0), (100_000.0, 738.0)];
+const PAPERS_NEIGHBOURS: f64 = 29.0;
+
+/// One line of the table.
+struct Row {
+    particles: usize,
+    scene: &'static str,
+    state: &'static str,
+    threads: usize,
+    neighbours: f64,
+    milliseconds: f64,
+}
+
+impl Row {
+    fn nanoseconds_per_neighbour(&self) -> f64 {
+        self.milliseconds * 1e6 / (self.particles as f64 * self.neighbours)
+    }
+}
+
+fn main() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/pawn.rfm");
+    let program = Program::from_path(file).unwrap_or_else(|e| panic!("{e}"));
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let all = pool(processors);
+    let pools = if processors > 1 { vec![pool(1), pool(processors)] } else { vec![pool(1)] };
+    let mut rows = Vec::new();
+    println!("{}, {processors} threads\n", processor());
+    println!("| N | scene | state | neighbours | threads | ms per step | ns per particle·neighbour |");
+    println!("|--:|---|---|--:|--:|--:|--:|");
+    for count in COUNTS {
+        for scene in ["table 1", "refined"] {
+            if count == 10_000 && scene == "refined" {
+                continue; // the same scene
+            }
+            let start = rows.len();
+            run(&program, scene, count, &all, &pools, &mut rows);
+            rows[start..].iter().for_each(print);
+        }
+    }
+    for (particles, milliseconds) in PAPERS_CODE {
+        let nanoseconds = milliseconds * 1e6 / (particles * PAPERS_NEIGHBOURS);
+        println!(
+            "| {particles} | the paper's own code | elsewhere | {PAPERS_NEIGHBOURS} | 1 | {milliseconds} | {nanoseconds:.0} |"
+        );
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target");
+    let svg = plot::svg(&curves(&rows, processors), &PAPERS_CODE);
+    std::fs::write(folder.join("figure4.svg"), &svg).expect("target/ is writable");
+    plot::write_png(&svg, &folder.join("figure4.png"));
+    println!("\ndrawn in {}", folder.join("figure4.svg").display());
+}
+
+fn pool(threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started")
+}
+
+/// Falling and, if there are few enough particles, settled; with each pool.
+fn run(
+    program: &Program,
+    name: &'static str,
+    count: usize,
+    all: &rayon::ThreadPool,
+    pools: &[rayon::ThreadPool],
+    rows: &mut Vec<Row>,
+) {
+    let refined = program.with("particles", count as f64).unwrap_or_else(|e| panic!("{e}"));
+    let scene = &if name == "refined" { &refined } else { program }.module().scenes[0];
+    let pawn = program.compile("pawn", scene.obstacles[0].shape, Engine::Auto).expect("the pawn compiles");
+    let mut simulation = simulation(scene, &pawn, count);
+    let mut measure = |simulation: &mut Simulation<'_>, state| {
+        for pool in pools {
+            let milliseconds = pool.install(|| time(simulation));
+            rows.push(Row {
+                particles: simulation.particles().len(),
+                scene: name,
+                state,
+                threads: pool.current_num_threads(),
+                neighbours: simulation.stats().neighbours_per_particle,
+                milliseconds,
+            });
+        }
+    };
+    all.install(|| (0..5).for_each(|_| step(&mut simulation)));
+    measure(&mut simulation, "falling");
+    if count <= LARGEST_SETTLED {
+        all.install(|| {
+            while simulation.time() < SETTLED_AFTER {
+                step(&mut simulation);
+            }
+        });
+        measure(&mut simulation, "settled");
+    }
+    let stats = simulation.stats();
+    assert_eq!([stats.inside, stats.lost, stats.non_finite], [0; 3], "a run that is wrong is not fast");
+}
+
+/// The drop of the scene with as many particles as wanted, around the scene's centre; a drop larger than the
+/// scene's is lifted and what touches the pawn is carved off.
+fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a> {
+    let mut parameters = Parameters {
+        rest_density: scene.fluid.density,
+        particle_mass: scene.fluid.mass,
+        support_radius: scene.fluid.support_radius,
+        stiffness: scene.fluid.stiffness,
+        negative_pressure: NegativePressure::default(),
+        viscosity: scene.fluid.viscosity,
+        surface_tension: scene.fluid.surface_tension,
+        surface_threshold: scene.fluid.threshold,
+        gravity: scene.gravity,
+        wall_restitution: scene.wall_restitution,
+        time_step: 1.0,
+    };
+    let fall = (2.0 * scene.gravity.length() * scene.domain.size().z).sqrt();
+    parameters.time_step = parameters.stable_dt(fall);
+    let radius = (0.75 / std::f64::consts::PI * count as f64).cbrt() * parameters.spacing();
+    let top = scene.domain.max.z - parameters.spacing();
+    let centre = DVec3::new(1.5, 1.5, (2.2f64).max(top - radius).min(top - radius));
+    let block = FluidBlock { jitter: scene.fluid.jitter, ..FluidBlock::drop(centre, count) };
+    let mut particles = block.seed(&parameters, scene.domain).unwrap_or_else(|e| panic!("{e}"));
+    let resolution = 0.05 * parameters.support_radius;
+    let obstacles = vec![Obstacle { field: pawn, restitution: scene.obstacles[0].restitution, resolution }];
+    carve(&mut particles, &scene.domain, &obstacles, 0.5 * parameters.spacing())
+        .unwrap_or_else(|e| panic!("{e}"));
+    Simulation::new(parameters, particles, scene.domain, obstacles).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn step(simulation: &mut Simulation<'_>) {
+    simulation.step().unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// Milliseconds of a step: the median of several windows.
+fn time(simulation: &mut Simulation<'_>) -> f64 {
+    step(simulation); // the pool's threads wake up
+    let mut windows: Vec<f64> = (0..WINDOWS)
+        .map(|_| {
+            let (started, mut steps) = (Instant::now(), 0);
+            while started.elapsed() < WINDOW {
+                step(simulation);
+                steps += 1;
+            }
+            started.elapsed().as_secs_f64() * 1e3 / f64::from(steps)
+        })
+        .collect();
+    windows.sort_unstable_by(f64::total_cmp);
+    windows[WINDOWS / 2]
+}
+
+fn print(row: &Row) {
+    println!(
+        "| {} | {} | {} | {:.0} | {} | {:.2} | {:.1} |",
+        row.particles,
+        row.scene,
+        row.state,
+        row.neighbours,
+        row.threads,
+        row.milliseconds,
+        row.nanoseconds_per_neighbour()
+    );
+}
+
+/// The falling rows as curves: the 10 000 particles of both scenes are the same.
+fn curves(rows: &[Row], processors: usize) -> Vec<plot::Curve> {
+    let mut curves = Vec::new();
+    for scene in ["table 1", "refined"] {
+        for threads in [processors, 1] {
+            let of_curve = |r: &&Row| {
+                let same = r.scene == scene || (9_000..=10_000).contains(&r.particles);
+                same && r.threads == threads && r.state == "falling"
+            };
+            let points = rows.iter().filter(of_curve).map(|r| (r.particles as f64, r.milliseconds)).collect();
+            let mut name = format!("{scene}, {threads} thread");
+            let _ = if threads > 1 { name.write_str("s") } else { Ok(()) };
+            if threads > 1 || processors == 1 || scene == "table 1" || scene == "refined" {
+                curves.push(plot::Curve { name, points, refined: scene == "refined", single: threads == 1 });
+            }
+            if processors == 1 {
+                break;
+            }
+        }
+    }
+    curves
+}
+
+fn processor() -> String {
+    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let line = cpu.lines().find_map(|line| line.strip_prefix("model name"));
+    line.map_or_else(|| "unknown processor".into(), |name| name.trim_start_matches([' ', '\t', ':']).into())
+}
