@@ -13,7 +13,7 @@ pub struct Curve {
     pub name: String,
     /// N, ms per step.
     pub points: Vec<(f64, f64)>,
-    pub refined: bool,
+    pub settled: bool,
     pub single: bool,
 }
 
@@ -22,7 +22,7 @@ const HEIGHT: f64 = 480.0;
 /// Left, top, right, bottom of the axes.
 const FRAME: [f64; 4] = [66.0, 46.0, 740.0, 428.0];
 const X: [f64; 2] = [800.0, 130_000.0];
-const Y: [f64; 2] = [0.2, 1_000.0];
+const Y: [f64; 2] = [0.15, 1_000.0];
 const INK: &str = "#1c1c1c";
 const COLOURS: [&str; 2] = ["#d0671e", "#2f6ea8"];
 
@@ -36,7 +36,7 @@ pub fn svg(curves: &[Curve], paper: &[(f64, f64)]) -> String {
     let mut out = format!(
         r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="Ubuntu, 'Segoe UI', Arial, sans-serif" font-weight="300" font-size="13" fill="{INK}">
 <rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>
-<text x="{}" y="28" font-size="17">Time of one SPH step, drop on the pawn</text>
+<text x="{}" y="28" font-size="17">Time of one SPH step, a drop on the pawn</text>
 "##,
         FRAME[0]
     );
@@ -74,7 +74,7 @@ fn axes(out: &mut String) {
             if (Y[0]..=Y[1]).contains(&value) {
                 let y = place((1e3, value)).1;
                 let _ = writeln!(out, r#"<path d="M{left} {y:.1}H{right}" stroke="{colour}"/>"#);
-                if digit == 1 || digit == 2 && decade < 1.0 {
+                if digit == 1 || digit == 2 {
                     let text = thousands(value);
                     let _ = writeln!(
                         out,
@@ -126,7 +126,7 @@ fn draw(out: &mut String, curve: &Curve) {
 }
 
 fn style(curve: &Curve) -> (&'static str, &'static str) {
-    (COLOURS[usize::from(curve.refined)], if curve.single { "5 3" } else { "none" })
+    (COLOURS[usize::from(curve.settled)], if curve.single { "5 3" } else { "none" })
 }
 
 fn disc(out: &mut String, (x, y): (f64, f64), colour: &str, hollow: bool) {
