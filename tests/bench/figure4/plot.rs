@@ -150,7 +150,7 @@ fn legend(out: &mut String, curves: &[Curve]) {
     let height = 21.0 * (curves.len() + 1) as f64 + 6.0;
     let _ = writeln!(
         out,
-        r##"<rect x="{}" y="{}" width="316" height="{height}" fill="#fff" stroke="#bbb"/>"##,
+        r##"<rect x="{}" y="{}" width="330" height="{height}" fill="#fff" stroke="#bbb"/>"##,
         left - 6.0,
         y - 15.0
     );
@@ -167,7 +167,7 @@ fn legend(out: &mut String, curves: &[Curve]) {
     cross(out, (left + 17.0, y));
     let _ = writeln!(
         out,
-        r#"<text x="{}" y="{}">the paper's own code, measured elsewhere</text>"#,
+        r#"<text x="{}" y="{}">the paper's code, elsewhere; 29 neighbours</text>"#,
         left + 44.0,
         y + 4.5
     );
