@@ -218,7 +218,7 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
     let mut reports = Vec::new();
     for cells in VOLUME_CELLS {
         let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
-        match marching_cubes(solid, &grid, &|_| {}) {
+        match marching_cubes(&solid.twin(), &grid, &|_| {}) {
             Ok(mesh) => reports.push(mesh::check(&mesh, solid)),
             // a field that is not a number somewhere has no volume
             Err(_) => return Ok(facts),

@@ -91,7 +91,8 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         Some(grid) => {
             let bar = progress::bar(1000, "meshing");
             let MeshMethod::Mc = options.method;
-            let mesh = marching_cubes(&solid, &grid, &|part| bar.set_position((1000.0 * part) as u64));
+            // same surface as ω, cheaper, and normals of one face at creases
+            let mesh = marching_cubes(&solid.twin(), &grid, &|part| bar.set_position((1000.0 * part) as u64));
             bar.finish_and_clear();
             mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?
         }

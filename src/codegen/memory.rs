@@ -37,6 +37,7 @@ impl Code {
     }
 
     /// The start of the function; valid as long as `self`.
+    #[inline]
     pub fn entry(&self) -> *const u8 {
         self.entry
     }

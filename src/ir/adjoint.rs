@@ -134,8 +134,8 @@ fn binary(
     adjoint: Node,
 ) -> Option<Node> {
     use Binary::{
-        Add, And, AndWeight, Atan2, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight, Pow,
-        Sub,
+        Add, And, AndWeight, Atan2, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight,
+        PlainMax, PlainMin, Pow, Sub,
     };
     let first = side == Side::First;
     // (this operand, the other one)
@@ -155,8 +155,8 @@ fn binary(
             let quotient = graph.binary(op, product, b);
             graph.unary(Unary::Neg, quotient)
         }
-        Min => weighted(graph, MinWeight),
-        Max => weighted(graph, MaxWeight),
+        Min | PlainMin => weighted(graph, MinWeight),
+        Max | PlainMax => weighted(graph, MaxWeight),
         And => weighted(graph, AndWeight),
         Or => weighted(graph, OrWeight),
         MinWeight | MaxWeight => return None,

@@ -13,6 +13,7 @@ mod op;
 pub mod r0;
 mod range;
 mod real;
+mod twin;
 
 pub use adjoint::gradient;
 pub use dump::dump;
@@ -21,3 +22,4 @@ pub use graph::{Axis, Expr, Graph, Node};
 pub use op::{Binary, Unary};
 pub use range::RangeEvaluator;
 pub use real::Real;
+pub use twin::twin;

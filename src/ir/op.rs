@@ -32,6 +32,9 @@ pub enum Binary {
     /// The smaller operand; NaN if either is NaN.
     Min,
     Max,
+    /// The smaller operand, where both are known to be numbers: one instruction.
+    PlainMin,
+    PlainMax,
     /// ∂min(a, b)/∂a: 1, ½ or 0 where a is smaller, equal or larger.
     MinWeight,
     MaxWeight,
@@ -100,7 +103,7 @@ impl Unary {
 }
 
 impl Binary {
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::Add,
         Self::Sub,
         Self::Mul,
@@ -108,6 +111,8 @@ impl Binary {
         Self::DivOrZero,
         Self::Min,
         Self::Max,
+        Self::PlainMin,
+        Self::PlainMax,
         Self::MinWeight,
         Self::MaxWeight,
         Self::Pow,
@@ -127,6 +132,8 @@ impl Binary {
             Self::DivOrZero => "div_or_zero",
             Self::Min => "min",
             Self::Max => "max",
+            Self::PlainMin => "plain_min",
+            Self::PlainMax => "plain_max",
             Self::MinWeight => "min_weight",
             Self::MaxWeight => "max_weight",
             Self::Pow => "pow",
@@ -140,7 +147,8 @@ impl Binary {
 
     /// Whether swapping the operands gives the same bits.
     pub fn commutes(self) -> bool {
-        matches!(self, Self::Add | Self::Mul | Self::Min | Self::Max | Self::And | Self::Or)
+        use Binary::{Add, And, Max, Min, Mul, Or, PlainMax, PlainMin};
+        matches!(self, Add | Mul | Min | Max | PlainMin | PlainMax | And | Or)
     }
 
     pub fn eval<T: Real>(self, a: T, b: T) -> T {
@@ -159,6 +167,20 @@ impl Binary {
             }
             Self::Min => ordered(a < b, a, b),
             Self::Max => ordered(a > b, a, b),
+            Self::PlainMin => {
+                if a < b {
+                    a
+                } else {
+                    b
+                }
+            }
+            Self::PlainMax => {
+                if b < a {
+                    a
+                } else {
+                    b
+                }
+            }
             Self::MinWeight => weight(a < b, a, b),
             Self::MaxWeight => weight(a > b, a, b),
             Self::Pow => a.pow(b),

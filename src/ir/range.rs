@@ -52,23 +52,34 @@ impl RangeEvaluator {
 
     /// The range of ω over a box; bounds of the box may be infinite.
     pub fn eval(&self, over: &Aabb) -> Interval {
+        SCRATCH.with_borrow_mut(|values| {
+            self.fill(over, values);
+            values[self.root.index()]
+        })
+    }
+
+    /// The ranges of all nodes, in the graph's order.
+    pub fn all(&self, over: &Aabb) -> Vec<Interval> {
+        let mut values = Vec::new();
+        self.fill(over, &mut values);
+        values
+    }
+
+    fn fill(&self, over: &Aabb, values: &mut Vec<Interval>) {
         let axes = [
             Interval::new(over.min.x, over.max.x),
             Interval::new(over.min.y, over.max.y),
             Interval::new(over.min.z, over.max.z),
         ];
-        SCRATCH.with_borrow_mut(|values| {
-            values.clear();
-            for &step in &self.steps {
-                let value = match step {
-                    Step::Square(a) => values[a.index()].square(),
-                    Step::Slab { of, first, second } => slab(values[of.index()], first, second),
-                    Step::Plain(expr) => plain(expr, values, axes),
-                };
-                values.push(value);
-            }
-            values[self.root.index()]
-        })
+        values.clear();
+        for &step in &self.steps {
+            let value = match step {
+                Step::Square(a) => values[a.index()].square(),
+                Step::Slab { of, first, second } => slab(values[of.index()], first, second),
+                Step::Plain(expr) => plain(expr, values, axes),
+            };
+            values.push(value);
+        }
     }
 }
 
@@ -168,8 +179,8 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
                 a / b
             }
         }
-        Binary::Min => a.min(b),
-        Binary::Max => a.max(b),
+        Binary::Min | Binary::PlainMin => a.min(b),
+        Binary::Max | Binary::PlainMax => a.max(b),
         Binary::And => Interval::new(r0::and_scaled(a.lo, b.lo), r0::and_scaled(a.hi, b.hi)).widened(4),
         Binary::Or => Interval::new(r0::or_scaled(a.lo, b.lo), r0::or_scaled(a.hi, b.hi)).widened(4),
         Binary::MinWeight | Binary::MaxWeight => Interval { lo: 0.0, hi: 1.0 },

@@ -162,7 +162,9 @@ fn de_morgan(s: &mut Simplifier, expr: Expr, span: Option<Span>) -> Option<Node>
 /// Not for ∧ and ∨: u ∧ u = (2 − √2)·u.
 fn min_max_same(_: &mut Simplifier, expr: Expr, _: Option<Span>) -> Option<Node> {
     match expr {
-        Expr::Binary(Binary::Min | Binary::Max, a, b) if a == b => Some(a),
+        Expr::Binary(Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax, a, b) if a == b => {
+            Some(a)
+        }
         _ => None,
     }
 }

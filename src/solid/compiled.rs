@@ -22,6 +22,7 @@ pub trait Lane: Real + Default {
 impl Lane for f32 {
     const PRECISION: Precision = Precision::F32;
 
+    #[inline]
     fn compiled(programs: &Programs) -> &Compiled<Self> {
         &programs.single
     }
@@ -34,6 +35,7 @@ impl Lane for f32 {
 impl Lane for f64 {
     const PRECISION: Precision = Precision::F64;
 
+    #[inline]
     fn compiled(programs: &Programs) -> &Compiled<Self> {
         &programs.double
     }
@@ -68,6 +70,7 @@ impl<T: Lane> PointProgram<T> {
     ///
     /// # Panics
     /// If `out` is not as long as the program's outputs.
+    #[inline]
     pub fn call(&self, [x, y, z]: [T; 3], out: &mut [T]) {
         assert_eq!(out.len(), self.code.outputs, "outputs of the program");
         type Entry<T> = unsafe extern "C" fn(T, T, T, *mut T);

@@ -24,7 +24,7 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{self, Graph, Node, RangeEvaluator};
 use crate::simplify::{Applied, simplify};
-use programs::Programs;
+use programs::{Guard, Programs};
 
 /// An obstacle, compiled.
 #[derive(Clone)]
@@ -35,11 +35,44 @@ pub struct Solid {
 struct Inner {
     name: String,
     engine: Engine,
-    value: Programs,
-    range: RangeEvaluator,
-    gradient: OnceLock<Programs>,
+    omega: Function,
+    /// Same sign, no roots.
+    twin: OnceLock<Function>,
     bounds: OnceLock<Bounds>,
     applied: Applied,
+}
+
+/// One scalar function of space with all that answers questions about it.
+struct Function {
+    value: Programs,
+    guard: Guard,
+    /// The graph without guards, from which further programs are derived.
+    graph: Graph,
+    root: Node,
+    range: RangeEvaluator,
+    gradient: OnceLock<Programs>,
+}
+
+impl Function {
+    fn new(graph: Graph, root: Node, guard: Guard) -> Self {
+        Self {
+            value: Programs::new(graph.clone(), vec![root], guard),
+            guard,
+            range: RangeEvaluator::new(&graph, root),
+            graph,
+            root,
+            gradient: OnceLock::new(),
+        }
+    }
+
+    fn gradient(&self) -> &Programs {
+        self.gradient.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let [gx, gy, gz] = ir::gradient(&mut graph, self.root);
+            let (graph, roots, _) = simplify(&graph, &[self.root, gx, gy, gz]);
+            Programs::new(graph, roots, self.guard)
+        })
+    }
 }
 
 impl Solid {
@@ -55,20 +88,17 @@ impl Solid {
         engine: Engine,
     ) -> Result<Self, CodegenError> {
         let (graph, roots, applied) = simplify(graph, &[root]);
-        let range = RangeEvaluator::new(&graph, roots[0]);
-        let value = Programs::new(graph, roots);
         let inner = Inner {
             name: name.into(),
             engine,
-            value,
-            range,
-            gradient: OnceLock::new(),
+            omega: Function::new(graph, roots[0], Guard::Infinite),
+            twin: OnceLock::new(),
             bounds: OnceLock::new(),
             applied,
         };
         let solid = Self { inner: Arc::new(inner) };
         if engine == Engine::Jit {
-            solid.inner.value.require_machine_code()?;
+            solid.inner.omega.value.require_machine_code()?;
         }
         Ok(solid)
     }
@@ -89,27 +119,41 @@ impl Solid {
         &self.inner.applied
     }
 
+    #[inline]
     fn programs(&self, kind: ProgramKind) -> &Programs {
         match kind {
-            ProgramKind::Value => &self.inner.value,
-            ProgramKind::Gradient => self.inner.gradient.get_or_init(|| {
-                let mut graph = self.inner.value.graph.clone();
-                let omega = self.inner.value.outputs[0];
-                let [gx, gy, gz] = ir::gradient(&mut graph, omega);
-                let (graph, roots, _) = simplify(&graph, &[omega, gx, gy, gz]);
-                Programs::new(graph, roots)
-            }),
+            ProgramKind::Value => &self.inner.omega.value,
+            ProgramKind::Gradient => self.inner.omega.gradient(),
+            ProgramKind::Sign => &self.twin_function().value,
+            ProgramKind::SignGradient => self.twin_function().gradient(),
         }
     }
 
+    fn twin_function(&self) -> &Function {
+        self.inner.twin.get_or_init(|| {
+            let mut graph = self.inner.omega.graph.clone();
+            let root = ir::twin(&mut graph, self.inner.omega.root);
+            let (graph, roots, _) = simplify(&graph, &[root]);
+            Function::new(graph, roots[0], Guard::FarAway)
+        })
+    }
+
+    /// The min/max twin as a field of its own: the sign and zero set of ω at a fraction of the cost, and on the
+    /// surface the gradient of the one leaf that it lies on.
+    pub fn twin(&self) -> Twin {
+        Twin { solid: self.clone() }
+    }
+
     /// ω at a point.
+    #[inline]
     pub fn omega(&self, p: DVec3) -> f64 {
         let mut out = [0.0];
-        self.inner.value.point(self.inner.engine, p.to_array(), &mut out);
+        self.inner.omega.value.point(self.inner.engine, p.to_array(), &mut out);
         out[0]
     }
 
     /// ω and ∇ω at a point; at edges and corners ∇ω is one finite member of the limits.
+    #[inline]
     pub fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         let mut out = [0.0; 4];
         self.programs(ProgramKind::Gradient).point(self.inner.engine, p.to_array(), &mut out);
@@ -117,13 +161,15 @@ impl Solid {
     }
 
     /// ω in single precision throughout.
+    #[inline]
     pub fn omega_f32(&self, p: Vec3) -> f32 {
         let mut out = [0.0];
-        self.inner.value.point(self.inner.engine, p.to_array(), &mut out);
+        self.inner.omega.value.point(self.inner.engine, p.to_array(), &mut out);
         out[0]
     }
 
     /// ω and ∇ω in single precision throughout.
+    #[inline]
     pub fn omega_grad_f32(&self, p: Vec3) -> (f32, Vec3) {
         let mut out = [0.0; 4];
         self.programs(ProgramKind::Gradient).point(self.inner.engine, p.to_array(), &mut out);
@@ -135,7 +181,7 @@ impl Solid {
     /// # Panics
     /// If the columns differ in length.
     pub fn omega_many<T: Lane>(&self, points: [&[T]; 3], omega: &mut [T]) {
-        self.inner.value.batch(self.inner.engine, points, [omega]);
+        self.inner.omega.value.batch(self.inner.engine, points, [omega]);
     }
 
     /// ω and ∇ω at many points given by columns: `out` is ω, ∂x, ∂y, ∂z.
@@ -146,15 +192,26 @@ impl Solid {
         self.programs(ProgramKind::Gradient).batch(self.inner.engine, points, out);
     }
 
-    /// Inside (1), on the surface (0) or outside (−1); NaN where ω is not defined. ω in the stable form has
-    /// exactly the sign of the logic of its leaves.
+    /// Inside (1), on the surface (0) or outside (−1), exactly the logic of the leaves' signs; NaN where a leaf is
+    /// not a number, or farther than 1e77 from the origin.
+    #[inline]
     pub fn sign(&self, p: DVec3) -> f64 {
-        ir::Unary::Sign.eval(self.omega(p))
+        let mut out = [0.0];
+        self.programs(ProgramKind::Sign).point(self.inner.engine, p.to_array(), &mut out);
+        ir::Unary::Sign.eval(out[0])
+    }
+
+    /// The twin at many points: positive inside, 0 on the surface, negative outside.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn twin_many<T: Lane>(&self, points: [&[T]; 3], twin: &mut [T]) {
+        self.programs(ProgramKind::Sign).batch(self.inner.engine, points, [twin]);
     }
 
     /// An interval that contains ω of every point of a box.
     pub fn range(&self, over: &Aabb) -> Interval {
-        self.inner.range.eval(over)
+        self.inner.omega.range.eval(over)
     }
 
     /// Where the solid is; found on first use by subdivision, then kept.
@@ -164,21 +221,23 @@ impl Solid {
 
     /// Whether machine code answers, rather than the interpreter.
     pub fn is_compiled(&self) -> bool {
-        self.inner.value.is_compiled(self.inner.engine)
+        self.inner.omega.value.is_compiled(self.inner.engine)
     }
 }
 
 impl std::fmt::Debug for Solid {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Solid({:?}, {} nodes)", self.inner.name, self.inner.value.graph.len())
+        write!(f, "Solid({:?}, {} nodes)", self.inner.name, self.inner.omega.graph.len())
     }
 }
 
 impl Field for Solid {
+    #[inline]
     fn omega(&self, p: DVec3) -> f64 {
         self.omega(p)
     }
 
+    #[inline]
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         self.omega_grad(p)
     }
@@ -193,5 +252,40 @@ impl Field for Solid {
 
     fn range(&self, over: &Aabb) -> Interval {
         self.range(over)
+    }
+}
+
+/// The min/max twin of a solid, see [`Solid::twin`].
+#[derive(Debug, Clone)]
+pub struct Twin {
+    solid: Solid,
+}
+
+impl Field for Twin {
+    #[inline]
+    fn omega(&self, p: DVec3) -> f64 {
+        let mut out = [0.0];
+        self.solid.programs(ProgramKind::Sign).point(self.solid.inner.engine, p.to_array(), &mut out);
+        out[0]
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        let mut out = [0.0; 4];
+        self.solid.programs(ProgramKind::SignGradient).point(self.solid.inner.engine, p.to_array(), &mut out);
+        (out[0], DVec3::new(out[1], out[2], out[3]))
+    }
+
+    fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        self.solid.twin_many([points.x, points.y, points.z], omega);
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        let columns = [out.omega, out.x, out.y, out.z];
+        let programs = self.solid.programs(ProgramKind::SignGradient);
+        programs.batch(self.solid.inner.engine, [points.x, points.y, points.z], columns);
+    }
+
+    fn range(&self, over: &Aabb) -> Interval {
+        self.solid.twin_function().range.eval(over)
     }
 }

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::compiled::{BatchProgram, Lane, PointProgram};
 use crate::codegen::CodegenError;
-use crate::ir::{Axis, Binary, Graph, Interpreter, Node};
+use crate::ir::{Axis, Binary, Graph, Interpreter, Node, Unary};
 
 /// What evaluates a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,6 +25,19 @@ pub enum ProgramKind {
     Value,
     /// ω, ∂ω/∂x, ∂ω/∂y, ∂ω/∂z
     Gradient,
+    /// The min/max twin, which has the sign of ω
+    Sign,
+    /// The twin and its gradient, which is that of the active leaf
+    SignGradient,
+}
+
+/// Where a program gives NaN although its formula might not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Guard {
+    /// Where a coordinate is not finite: such a point is neither inside nor outside.
+    Infinite,
+    /// Also beyond the distances for which `ir::twin` has proven that leaves are numbers (f32: 4e9, f64: 1e77).
+    FarAway,
 }
 
 type Slot<P> = OnceLock<Result<P, CodegenError>>;
@@ -51,18 +64,29 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Each output becomes NaN where a coordinate is not finite: such a point is neither inside nor outside.
-    pub fn new(mut graph: Graph, outputs: Vec<Node>) -> Self {
+    pub fn new(mut graph: Graph, outputs: Vec<Node>, guard: Guard) -> Self {
         let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
-        let sum = graph.binary(Binary::Add, x, y);
-        let sum = graph.binary(Binary::Add, sum, z);
-        let guard = graph.binary(Binary::Sub, sum, sum); // 0, or NaN
+        let sum = |graph: &mut Graph, [x, y, z]: [Node; 3]| {
+            let sum = graph.binary(Binary::Add, x, y);
+            graph.binary(Binary::Add, sum, z)
+        };
+        let size = match guard {
+            Guard::Infinite => sum(&mut graph, [x, y, z]),
+            Guard::FarAway => {
+                let magnitudes = [x, y, z].map(|c| graph.unary(Unary::Abs, c));
+                let size = sum(&mut graph, magnitudes);
+                let square = graph.binary(Binary::Mul, size, size);
+                graph.binary(Binary::Mul, square, square) // overflows where it should
+            }
+        };
+        let guard = graph.binary(Binary::Sub, size, size); // 0, or NaN
         let outputs: Vec<Node> =
             outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect();
         let interpreter = Interpreter::new(&graph, &outputs);
         Self { graph, outputs, interpreter, double: Compiled::new(), single: Compiled::new() }
     }
 
+    #[inline]
     fn point_program<T: Lane>(&self) -> Result<&PointProgram<T>, CodegenError> {
         let slot = &T::compiled(self).point;
         slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs)).as_ref().map_err(Clone::clone)
@@ -83,7 +107,9 @@ impl Programs {
         engine != Engine::Interpreter && self.require_machine_code().is_ok()
     }
 
-    /// All outputs at a point.
+    /// All outputs at a point. Inlined, so that a point made of three loose numbers is not written to memory and
+    /// read back as a vector: that stalls for longer than the whole program takes.
+    #[inline]
     pub fn point<T: Lane>(&self, engine: Engine, p: [T; 3], out: &mut [T]) {
         if engine != Engine::Interpreter
             && let Ok(program) = self.point_program::<T>()

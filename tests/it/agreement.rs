@@ -1,7 +1,7 @@
 //! Machine code = interpreter bit for bit, and both = 40-digit arithmetic to a few units in the last place.
 
 use rfm::glam::{DVec3, Vec3};
-use rfm::{Engine, Program, Solid};
+use rfm::{Engine, Field, Program, Solid};
 
 fn example(name: &str) -> [Solid; 2] {
     let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
@@ -171,5 +171,43 @@ fn programs_are_shared_between_threads_and_freed() {
                 scope.spawn(move || assert_eq!(copy.omega(DVec3::ZERO), 0.5));
             }
         });
+    }
+}
+
+#[test]
+fn the_twin_has_the_sign_of_omega() {
+    let source = Program::from_source("everything.rfm", EVERYTHING).unwrap_or_else(|e| panic!("{e}"));
+    let everything =
+        [Engine::Jit, Engine::Interpreter].map(|engine| source.solid_with("everything", engine).unwrap());
+    for [jit, interpreter] in [everything, example("pawn"), example("bishop"), example("cube")] {
+        let values = awkward_coordinates();
+        let mut points = Vec::new();
+        for &x in &values {
+            for &y in &values {
+                points.extend(values.iter().map(|&z| DVec3::new(x, y, z)));
+            }
+        }
+        let column = |axis: usize| points.iter().map(|p| p[axis]).collect::<Vec<f64>>();
+        let (x, y, z) = (column(0), column(1), column(2));
+        let mut twin = vec![0.0; points.len()];
+        jit.twin_many([&x, &y, &z], &mut twin);
+        for (i, &p) in points.iter().enumerate() {
+            let sign = interpreter.sign(p);
+            assert!(same(jit.sign(p), sign), "{jit:?} at {p}");
+            assert!(same(twin[i], Field::omega(&interpreter.twin(), p)), "{jit:?} at {p}");
+            assert!(p.is_finite() || sign.is_nan(), "{jit:?} at {p}: {sign}");
+            let omega = jit.omega(p);
+            // far from the origin leaves overflow: then only one of the two may know an answer
+            if p.abs().max_element() < 1e70 && !omega.is_nan() {
+                let expected = f64::from(i8::from(omega > 0.0) - i8::from(omega < 0.0));
+                assert!(sign == expected || sign.is_nan(), "{jit:?} at {p}: sign {sign}, ω {omega}");
+            }
+            let twin = jit.twin();
+            let (a, b) = (twin.omega_grad(p), interpreter.twin().omega_grad(p));
+            assert!(
+                same(a.0, b.0) && (0..3).all(|i| same(a.1[i], b.1[i])),
+                "{jit:?} at {p}: {a:?} and {b:?}"
+            );
+        }
     }
 }

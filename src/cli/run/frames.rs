@@ -173,7 +173,7 @@ fn obstacle_mesh(options: &Run, setup: &Setup, folder: &Path) -> Result<Mesh, Fa
             Grid::filling(&over, Resolution::Cells(options.mesh_cells))
         };
         let grid = grid.map_err(Failure::usage)?;
-        let mesh = marching_cubes(solid, &grid, &|_| {}).map_err(Failure::usage)?;
+        let mesh = marching_cubes(&solid.twin(), &grid, &|_| {}).map_err(Failure::usage)?;
         if mesh.triangles.is_empty() {
             note(format!("the obstacle `{}` has no surface in the box", solid.name()));
         }

@@ -1,0 +1,154 @@
+//! The min/max twin of a graph: ∧ becomes min, ∨ becomes max.
+//!
+//! R₀ and min/max have the same sign for every sign of their operands, so the twin has exactly the sign and the
+//! zero set of ω; in floating point too, because min and max do not round. It needs no roots, and its gradient is
+//! that of one leaf. Its value away from the surface is another one.
+
+use super::graph::{Expr, Graph, Node};
+use super::op::{Binary, Unary};
+use super::range::RangeEvaluator;
+use crate::geom::Aabb;
+use glam::DVec3;
+
+/// Within these distances of the origin a leaf must be shown to be a number for the plain minimum to be used;
+/// [`Graph`] users make results beyond them NaN (see `solid::programs`). One pair for each precision: the box, and
+/// the largest value that cannot overflow.
+const PROOFS: [(f64, f64); 2] = [(5e9, 1e38), (2e77, 1e308)];
+
+/// The twin of a root, in the same graph.
+///
+/// Only the junctions that decide the sign of the root are replaced: those reached from it through ∧, ∨, ¬, min,
+/// max and multiplication by a positive constant. In `(a and b) - 0.1` the value of a ∧ b matters, not its sign, so
+/// the difference is a leaf.
+pub fn twin(graph: &mut Graph, root: Node) -> Node {
+    let logic = logic_nodes(graph, root);
+    let finite = finite_nodes(graph, root);
+    // the image of each logic node, and whether it is known to be a number
+    let mut image: Vec<Option<(Node, bool)>> = vec![None; root.index() + 1];
+    for i in 0..=root.index() {
+        if !logic[i] {
+            continue;
+        }
+        let node = graph.node(i);
+        let of = |operand: Node| image[operand.index()].unwrap_or((operand, finite[operand.index()]));
+        let span = graph.span(node);
+        let result = match (graph.expr(node), sign_operands(graph, node)) {
+            (Expr::Binary(op @ (Binary::And | Binary::Or | Binary::Min | Binary::Max), u, v), _) => {
+                let ((u, u_is_number), (v, v_is_number)) = (of(u), of(v));
+                let numbers = u_is_number && v_is_number;
+                let op = match (op, numbers) {
+                    (Binary::And | Binary::Min, true) => Binary::PlainMin,
+                    (Binary::And | Binary::Min, false) => Binary::Min,
+                    (_, true) => Binary::PlainMax,
+                    (_, false) => Binary::Max,
+                };
+                (graph.intern(Expr::Binary(op, u, v), span), numbers)
+            }
+            (expr, operands) if !operands.is_empty() => {
+                let number = operands.iter().all(|&operand| of(operand).1);
+                let mapped =
+                    expr.map(|operand| if operands.contains(&operand) { of(operand).0 } else { operand });
+                (graph.intern(mapped, span), number)
+            }
+            _ => (node, finite[i]),
+        };
+        image[i] = Some(result);
+    }
+    image[root.index()].map_or(root, |(node, _)| node)
+}
+
+/// The operands that alone decide the sign of a node; none if its value does.
+fn sign_operands(graph: &Graph, node: Node) -> Vec<Node> {
+    let positive = |node| graph.as_constant(node).is_some_and(|c| c > 0.0 && c.is_finite());
+    match graph.expr(node) {
+        Expr::Binary(Binary::And | Binary::Or | Binary::Min | Binary::Max, u, v) => vec![u, v],
+        Expr::Unary(Unary::Neg, u) => vec![u],
+        Expr::Binary(Binary::Mul, u, v) if positive(u) && u != v => vec![v],
+        Expr::Binary(Binary::Mul, u, v) if positive(v) && u != v => vec![u],
+        _ => Vec::new(),
+    }
+}
+
+/// Nodes of which only the sign matters for the sign of the root, the leaves included.
+fn logic_nodes(graph: &Graph, root: Node) -> Vec<bool> {
+    let mut logic = vec![false; root.index() + 1];
+    logic[root.index()] = true;
+    for i in (0..=root.index()).rev() {
+        if logic[i] {
+            for operand in sign_operands(graph, graph.node(i)) {
+                logic[operand.index()] = true;
+            }
+        }
+    }
+    logic
+}
+
+/// Which nodes are proven to be finite wherever the twin gives an answer.
+fn finite_nodes(graph: &Graph, root: Node) -> Vec<bool> {
+    let mut finite = vec![true; root.index() + 1];
+    let ranges = RangeEvaluator::new(graph, root);
+    for (reach, largest) in PROOFS {
+        let over = Aabb::new(DVec3::splat(-reach), DVec3::splat(reach));
+        for (flag, range) in finite.iter_mut().zip(ranges.all(&over)) {
+            *flag &= range.lo >= -largest && range.hi <= largest;
+        }
+    }
+    finite
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::{Axis, dump};
+    use crate::simplify::simplify;
+
+    #[track_caller]
+    fn check(build: impl Fn(&mut Graph, [Node; 3]) -> Node, expected: &str) {
+        let mut graph = Graph::default();
+        let coordinates = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
+        let root = build(&mut graph, coordinates);
+        let root = twin(&mut graph, root);
+        let (graph, roots, _) = simplify(&graph, &[root]);
+        assert_eq!(dump(&graph, &[("twin", roots[0])], &[]), expected);
+    }
+
+    #[test]
+    fn junctions_become_min_and_max() {
+        check(
+            |g, [x, y, z]| {
+                let both = g.binary(Binary::And, x, y);
+                let not = g.unary(Unary::Neg, both);
+                let three = g.constant(3.0);
+                let scaled = g.binary(Binary::Mul, three, not);
+                g.binary(Binary::Or, scaled, z)
+            },
+            "%0 = x\n%1 = y\n%2 = z\n%3 = 3.0\n%4 = plain_min %0 %1\n%5 = mul %3 %4\n%6 = neg %5\n\
+             %7 = plain_max %6 %2\ntwin = %7\n",
+        );
+    }
+
+    #[test]
+    fn a_junction_whose_value_matters_stays() {
+        check(
+            |g, [x, y, z]| {
+                let both = g.binary(Binary::And, x, y);
+                let tenth = g.constant(0.1);
+                let inner = g.binary(Binary::Sub, both, tenth);
+                g.binary(Binary::And, inner, z)
+            },
+            "%0 = x\n%1 = y\n%2 = z\n%3 = r0_and %0 %1\n%4 = 0.1\n%5 = sub %3 %4\n%6 = plain_min %5 %2\n\
+             twin = %6\n",
+        );
+    }
+
+    #[test]
+    fn leaves_that_may_be_nan_keep_the_careful_minimum() {
+        check(
+            |g, [x, y, _]| {
+                let root = g.unary(Unary::Sqrt, x);
+                g.binary(Binary::And, root, y)
+            },
+            "%0 = x\n%1 = y\n%2 = sqrt %0\n%3 = min %2 %1\ntwin = %3\n",
+        );
+    }
+}
