@@ -111,6 +111,35 @@ fn solid_rows<'a, T: Precision>(
             row("one point", each_value(points, one), each_value(points, one));
         }
     }
+    if !gradient {
+        rows.push(sign(name, jit, points, &truth));
+    }
+}
+
+/// The min/max twin, of which only the sign is meant: its error is 0 if no sign is wrong, otherwise 1 or 2.
+fn sign<'a, T: Precision>(
+    name: &'static str,
+    solid: &'a Solid,
+    points: &'a Columns<T>,
+    truth: &[f64],
+) -> Row<'a> {
+    let twin = move |out: &mut [T]| solid.twin_many(points.each_ref().map(|c| &c[..]), out);
+    let mut out = vec![T::default(); POINTS];
+    Row {
+        obstacle: name,
+        way: format!("jit, batch, {}, sign alone", T::NAME),
+        pass: Box::new(move || {
+            twin(&mut out);
+            black_box(&mut out);
+        }),
+        answers: Box::new(move || {
+            let mut out = vec![T::default(); POINTS];
+            twin(&mut out);
+            out.iter().map(|&w| w.into().signum()).collect()
+        }),
+        truth: truth.iter().map(|w| w.signum()).collect(),
+        nanoseconds: Vec::new(),
+    }
 }
 
 fn by_hand<'a, T: Precision>(interpreter: &'a Solid, points: &'a Columns<T>, gradient: bool) -> Row<'a> {
