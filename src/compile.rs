@@ -28,17 +28,23 @@ use crate::syntax::{self, Ast};
 pub enum Error {
     /// The file could not be read.
     File {
+        /// As it was given.
         path: String,
+        /// Why.
         error: std::io::Error,
     },
     /// The file has mistakes; prints as the compiler's own messages.
     Diagnostics(Diagnostics),
     /// The file has no solid or scene of this name.
     UnknownName {
+        /// `solid` or `scene`.
         kind: &'static str,
+        /// What was asked for.
         name: String,
+        /// What the file has instead.
         known: Vec<String>,
     },
+    /// No machine code could be made, and the interpreter was not allowed.
     Codegen(CodegenError),
 }
 
@@ -178,6 +184,9 @@ impl Program {
 
     /// Compiles any shape of the file's graph, such as the shape of a scene's fluid.
     ///
+    /// `shape` must come from this very program's [`module`](Self::module): after [`with`](Self::with) a node of
+    /// the former program names another expression.
+    ///
     /// # Errors
     /// If the engine is not to be had.
     pub fn compile(&self, name: &str, shape: Node, engine: Engine) -> Result<Solid, Error> {
@@ -189,10 +198,12 @@ impl Program {
         &self.module
     }
 
+    /// The syntax tree, as the text was read.
     pub fn ast(&self) -> &Ast {
         &self.ast
     }
 
+    /// The texts that spans point into: the file and the standard solids.
     pub fn sources(&self) -> &Arc<[Source]> {
         &self.sources
     }

@@ -12,12 +12,17 @@ use crate::{geom::Aabb, interval::Interval};
 /// Borrowed points as a structure of arrays; the three slices have one length.
 #[derive(Debug, Clone, Copy)]
 pub struct Points<'a> {
+    /// In the scene's unit of length, as `y` and `z`.
     pub x: &'a [f64],
+    /// See `x`.
     pub y: &'a [f64],
+    /// See `x`.
     pub z: &'a [f64],
 }
 
 impl<'a> Points<'a> {
+    /// Borrows three columns.
+    ///
     /// # Panics
     /// If the slices differ in length: a bug of the caller, never of a file.
     pub fn new(x: &'a [f64], y: &'a [f64], z: &'a [f64]) -> Self {
@@ -25,14 +30,17 @@ impl<'a> Points<'a> {
         Self { x, y, z }
     }
 
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.x.len()
     }
 
+    /// Whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }
 
+    /// Point `i`; panics beyond the last, as a slice does.
     pub fn get(&self, i: usize) -> DVec3 {
         DVec3::new(self.x[i], self.y[i], self.z[i])
     }
@@ -41,9 +49,13 @@ impl<'a> Points<'a> {
 /// Caller's slices for ω and ∇ω of many points, each as long as the points.
 #[derive(Debug)]
 pub struct GradientsMut<'a> {
+    /// ω, positive inside.
     pub omega: &'a mut [f64],
+    /// ∂ω/∂x, pointing inwards where ω is near zero; likewise `y` and `z`.
     pub x: &'a mut [f64],
+    /// ∂ω/∂y
     pub y: &'a mut [f64],
+    /// ∂ω/∂z
     pub z: &'a mut [f64],
 }
 
@@ -82,7 +94,9 @@ pub trait Field: Sync {
 /// A field made of two closures, for tests and for callers with formulas of their own.
 #[derive(Debug, Clone, Copy)]
 pub struct Closures<V, G> {
+    /// Point → ω.
     pub omega: V,
+    /// Point → ∇ω; finite everywhere, also where the formula has an edge.
     pub gradient: G,
 }
 

@@ -5,7 +5,9 @@ use glam::DVec3;
 /// An axis-aligned box, `min ≤ max` in each coordinate unless it is empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aabb {
+    /// The corner with the smallest coordinates.
     pub min: DVec3,
+    /// The corner with the largest coordinates; it belongs to the box.
     pub max: DVec3,
 }
 
@@ -13,10 +15,12 @@ impl Aabb {
     /// The box that holds nothing: every union with it gives the other box.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
+    /// The box between two corners; empty if `min` exceeds `max` anywhere.
     pub const fn new(min: DVec3, max: DVec3) -> Self {
         Self { min, max }
     }
 
+    /// True when no point is in the box, and for corners that are NaN. A box without thickness holds its points.
     pub fn is_empty(&self) -> bool {
         !(self.min.x <= self.max.x && self.min.y <= self.max.y && self.min.z <= self.max.z)
     }
@@ -26,14 +30,17 @@ impl Aabb {
         self.min.is_finite() && self.max.is_finite()
     }
 
+    /// Lengths of the sides; negative for an empty box.
     pub fn size(&self) -> DVec3 {
         self.max - self.min
     }
 
+    /// The middle.
     pub fn centre(&self) -> DVec3 {
         0.5 * (self.min + self.max)
     }
 
+    /// Product of the sides; 0 for an empty box.
     pub fn volume(&self) -> f64 {
         if self.is_empty() {
             return 0.0;
@@ -47,14 +54,17 @@ impl Aabb {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
+    /// The smallest box that holds both.
     pub fn union(&self, other: &Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// What both hold; empty if they do not meet.
     pub fn intersection(&self, other: &Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
+    /// The smallest box that holds this one and a point.
     pub fn including(&self, p: DVec3) -> Self {
         Self { min: self.min.min(p), max: self.max.max(p) }
     }

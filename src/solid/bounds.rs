@@ -7,12 +7,12 @@ use glam::DVec3;
 /// What is known about the extent of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bounds {
-    /// ω > 0 nowhere within [`SEARCH_RADIUS`]: proven.
+    /// ω > 0 nowhere in the cube of half-side 2²⁰ around the origin: proven.
     Empty,
     /// The solid lies in this box: proven. Each face is within a millionth of the longest side of the solid itself
     /// where the budget of the proof allowed it.
     Within(Aabb),
-    /// No such box was found within [`SEARCH_RADIUS`].
+    /// No such box was found within that cube.
     Unbounded,
 }
 

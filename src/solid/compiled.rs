@@ -9,6 +9,7 @@ use super::programs::{Compiled, Programs};
 
 /// A type that programs exist for: `f32` or `f64`.
 pub trait Lane: Real + Default {
+    /// Which of the two it is.
     const PRECISION: Precision;
 
     #[doc(hidden)]
@@ -80,6 +81,7 @@ impl<T: Lane> PointProgram<T> {
         unsafe { entry(x, y, z, out.as_mut_ptr()) }
     }
 
+    /// Bytes of machine code.
     pub fn size(&self) -> usize {
         self.code.size
     }
@@ -146,6 +148,7 @@ impl<T: Lane> BatchProgram<T> {
         unsafe { entry(columns.as_ptr(), blocks) }
     }
 
+    /// Bytes of machine code.
     pub fn size(&self) -> usize {
         self.code.size
     }

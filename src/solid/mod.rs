@@ -121,6 +121,7 @@ impl Solid {
         Ok(solid)
     }
 
+    /// As in `solid NAME = …`.
     pub fn name(&self) -> &str {
         &self.inner.name
     }

@@ -14,6 +14,7 @@ pub enum Engine {
     Auto,
     /// Machine code, or an error.
     Jit,
+    /// The interpreter: the same bits, some 12 to 13 times slower over columns of points.
     Interpreter,
 }
 
