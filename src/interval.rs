@@ -149,7 +149,9 @@ impl Neg for Interval {
 impl Add for Interval {
     type Output = Self;
     fn add(self, b: Self) -> Self {
-        Self::rounded_out(self.lo + b.lo, self.hi + b.hi)
+        let sum = Self::rounded_out(self.lo + b.lo, self.hi + b.hi);
+        // a sum of squares stays one, however it rounds
+        if self.lo >= 0.0 && b.lo >= 0.0 { Self { lo: sum.lo.max(0.0), ..sum } } else { sum }
     }
 }
 

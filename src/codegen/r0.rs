@@ -71,7 +71,7 @@ impl Emitter<'_, '_> {
         let (a2, b2) = (self.builder.ins().fmul(a, a), self.builder.ins().fmul(b, b));
         let squares = self.builder.ins().fadd(a2, b2);
         let root = self.builder.ins().sqrt(squares);
-        let h = self.max(root, magnitude);
+        let h = self.max(magnitude, root);
         let zero = self.constant(0.0);
         let (near, far, small) = match junction {
             Junction::And => (min, max, self.compare(FloatCC::LessThan, zero, sum)),

@@ -13,7 +13,7 @@ use cranelift_module::{Linkage, Module, default_libcall_names};
 
 use super::emit::Emitter;
 use super::math_calls::{self, HostFunction};
-use super::{Code, CodegenError, Precision, Request, Shape, target};
+use super::{Code, CodegenError, Precision, Request, Shape, range, target};
 use crate::ir::{Axis, Expr, Node};
 
 /// The code generator's own texts of a program.
@@ -61,6 +61,7 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
     match request.shape {
         Shape::Point => point(&mut builder, request, &hosts),
+        Shape::Range => range::emit(&mut builder, request),
         Shape::Batch => batch(&mut builder, request, &hosts, module.target_config().pointer_type()),
     }
     builder.finalize(module.target_config());
@@ -91,7 +92,7 @@ fn declare_parameters(function: &mut Function, module: &JITModule, request: Requ
     });
     function.signature.params = match request.shape {
         Shape::Point => vec![scalar, scalar, scalar, pointer],
-        Shape::Batch => vec![pointer, pointer],
+        Shape::Batch | Shape::Range => vec![pointer, pointer],
     };
 }
 

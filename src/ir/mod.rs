@@ -23,6 +23,6 @@ pub use dump::dump;
 pub use eval::Interpreter;
 pub use graph::{Axis, Expr, Graph, Node};
 pub use op::{Binary, Unary};
-pub use range::RangeEvaluator;
+pub use range::{Affine, RangeEvaluator, Step as RangeStep};
 pub use real::Real;
 pub use twin::twin;

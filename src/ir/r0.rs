@@ -40,7 +40,8 @@ fn parts<T: Real>(u: T, v: T) -> Parts<T> {
     let sum = u + v;
     let magnitude = if max > -min { max } else { -min };
     let h = (u * u + v * v).sqrt();
-    let h = if h > magnitude { h } else { magnitude };
+    // a NaN stays: value and weights are then NaN in either order of the operands
+    let h = if h < magnitude { magnitude } else { h };
     Parts { min, max, sum, h, small: sum > T::from_f64(0.0), denominator: magnitude + h }
 }
 

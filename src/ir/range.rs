@@ -13,9 +13,9 @@ use super::r0;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
-/// How the range of one node is found.
+/// How the range of one node is found; `codegen::range` does the same in machine code.
 #[derive(Debug, Clone, Copy)]
-enum Step {
+pub enum Step {
     Plain(Expr),
     Square(Node),
     /// (p·e + q)·(r·e + s) of one node e.
@@ -26,11 +26,18 @@ enum Step {
     },
 }
 
-/// slope · node + offset
+/// slope · node + offset, with slope 1 or −1
 #[derive(Debug, Clone, Copy)]
-struct Affine {
-    slope: f64,
-    offset: f64,
+pub struct Affine {
+    pub slope: f64,
+    pub offset: f64,
+}
+
+impl Step {
+    /// The way for a node of a graph.
+    pub fn of(graph: &Graph, expr: Expr) -> Self {
+        step(graph, expr)
+    }
 }
 
 /// A graph prepared for the evaluation of ranges.

@@ -5,7 +5,11 @@
 use crate::codegen::{self, Code, CodegenError, Form, Precision, Request, Shape};
 use crate::ir::{Graph, Interpreter, Node, Real};
 
+use glam::DVec3;
+
 use super::programs::{Compiled, Programs};
+use crate::geom::Aabb;
+use crate::interval::Interval;
 
 /// A type that programs exist for: `f32` or `f64`.
 pub trait Lane: Real + Default {
@@ -151,5 +155,45 @@ impl<T: Lane> BatchProgram<T> {
     /// Bytes of machine code.
     pub fn size(&self) -> usize {
         self.code.size
+    }
+}
+
+/// A compiled range program.
+#[derive(Debug)]
+pub struct RangeProgram {
+    code: Code,
+}
+
+impl RangeProgram {
+    /// # Errors
+    /// As for [`codegen::compile`]; [`CodegenError::Unsupported`] for graphs that only the interpreter knows.
+    pub fn compile(graph: &Graph, root: Node) -> Result<Self, CodegenError> {
+        if !codegen::range_is_supported(graph, root) {
+            return Err(CodegenError::Unsupported("ranges of this formula".into()));
+        }
+        let (precision, shape, form) = (Precision::F64, Shape::Range, Form::Scaled);
+        let request = Request { graph, outputs: &[root], precision, shape, form };
+        Ok(Self { code: codegen::compile(request)? })
+    }
+
+    /// The range over a box; nothing if the box reaches too far out.
+    #[inline]
+    pub fn call(&self, over: &Aabb) -> Option<Interval> {
+        let reach = codegen::RANGE_REACH;
+        let near = over.min.cmpge(DVec3::splat(-reach)).all() && over.max.cmple(DVec3::splat(reach)).all();
+        let ordered = over.min.cmple(over.max).all();
+        if !(near && ordered) {
+            return None; // NaN included
+        }
+        let (min, max) = (over.min, over.max);
+        let input = [min.x, max.x, min.y, max.y, min.z, max.z];
+        let mut out = [0.0; 2];
+        type Entry = unsafe extern "C" fn(*const f64, *mut f64);
+        // SAFETY: `compile` asked for a range program, whose entry has this signature, and `self.code` keeps it
+        // mapped while it runs.
+        let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.code.entry()) };
+        // SAFETY: the program reads six numbers and writes two.
+        unsafe { entry(input.as_ptr(), out.as_mut_ptr()) };
+        Some(Interval::new(out[0], out[1]))
     }
 }

@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 use glam::{DVec3, Vec3};
 
 pub use bounds::{Bounds, prove_empty};
-pub use compiled::{BatchProgram, Lane, PointProgram};
+pub use compiled::{BatchProgram, Lane, PointProgram, RangeProgram};
 pub use programs::{Engine, ProgramKind};
 
 use crate::codegen::{CodegenError, Form};
@@ -52,6 +52,7 @@ struct Function {
     graph: Graph,
     root: Node,
     range: RangeEvaluator,
+    range_code: OnceLock<Option<RangeProgram>>,
     gradient: OnceLock<Programs>,
 }
 
@@ -62,10 +63,22 @@ impl Function {
             guard,
             form,
             range: RangeEvaluator::new(&graph, root),
+            range_code: OnceLock::new(),
             graph,
             root,
             gradient: OnceLock::new(),
         }
+    }
+
+    #[inline]
+    fn range(&self, engine: Engine, over: &Aabb) -> Interval {
+        if engine != Engine::Interpreter {
+            let code = self.range_code.get_or_init(|| RangeProgram::compile(&self.graph, self.root).ok());
+            if let Some(range) = code.as_ref().and_then(|code| code.call(over)) {
+                return range;
+            }
+        }
+        self.range.eval(over)
     }
 
     fn gradient(&self) -> &Programs {
@@ -258,7 +271,7 @@ impl Solid {
 
     /// An interval that contains ω of every point of a box.
     pub fn range(&self, over: &Aabb) -> Interval {
-        self.inner.omega.range.eval(over)
+        self.inner.omega.range(self.inner.engine, over)
     }
 
     /// Where the solid is; found on first use by subdivision, then kept.
@@ -344,6 +357,6 @@ impl Field for Twin {
     }
 
     fn range(&self, over: &Aabb) -> Interval {
-        self.solid.twin_function().range.eval(over)
+        self.solid.twin_function().range(self.solid.inner.engine, over)
     }
 }
