@@ -14,7 +14,7 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
 use crate::geom::Aabb;
 use crate::mesh::{self, Grid, Resolution, marching_cubes};
 use crate::slice::{self, Plane, Window};
-use crate::solid::Bounds;
+use crate::solid::{Bounds, ProgramKind};
 use crate::{Program, Solid};
 
 /// Cells of the meshes that volumes are measured on; the second is for their error.
@@ -41,6 +41,9 @@ struct Message {
     help: Option<String>,
 }
 
+/// Operations of a solid that is measured, at most: a larger one would keep a person waiting for minutes.
+const MOST_MEASURED: usize = 10_000;
+
 /// What is known of a solid. Numbers that do not exist (an unbounded solid's volume) are null.
 #[derive(Serialize)]
 struct Facts {
@@ -53,6 +56,21 @@ struct Facts {
     volume_error: Option<f64>,
     area: Option<f64>,
     components: Option<usize>,
+}
+
+impl Facts {
+    fn unknown(solid: &Solid, file: &str) -> Self {
+        Self {
+            name: solid.name().to_string(),
+            file: file.to_string(),
+            empty: false,
+            bounds: None,
+            volume: None,
+            volume_error: None,
+            area: None,
+            components: None,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -178,6 +196,12 @@ fn solids(
     let mut facts = Vec::new();
     for named in &program.module().solids {
         let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
+        let operations = solid.graph(ProgramKind::Value).0.len();
+        if operations > MOST_MEASURED {
+            note(format!("solid `{}` has {operations} operations: it is not measured", named.name));
+            facts.push(Facts::unknown(&solid, file));
+            continue;
+        }
         let found = measure(&solid, file)?;
         let warning = |code, message| Diagnostic {
             severity: Severity::Warning,
@@ -203,17 +227,22 @@ fn solids(
 }
 
 fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
-    let mut facts = Facts {
-        name: solid.name().to_string(),
-        file: file.to_string(),
-        empty: *solid.bounds() == Bounds::Empty,
-        bounds: None,
-        volume: facts_of_empty(solid),
-        volume_error: facts_of_empty(solid),
-        area: facts_of_empty(solid),
-        components: facts_of_empty(solid).map(|_| 0),
+    let mut facts = Facts::unknown(solid, file);
+    let bounds = match solid.bounds() {
+        Bounds::Within(bounds) => bounds,
+        Bounds::Unbounded => return Ok(facts),
+        Bounds::Empty => {
+            let zero = Some(0.0);
+            return Ok(Facts {
+                empty: true,
+                volume: zero,
+                volume_error: zero,
+                area: zero,
+                components: Some(0),
+                ..facts
+            });
+        }
     };
-    let Bounds::Within(bounds) = solid.bounds() else { return Ok(facts) };
     facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
     let mut reports = Vec::new();
     for cells in VOLUME_CELLS {
@@ -233,10 +262,6 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
         facts.components = Some(fine.solids);
     }
     Ok(facts)
-}
-
-fn facts_of_empty(solid: &Solid) -> Option<f64> {
-    (*solid.bounds() == Bounds::Empty).then_some(0.0)
 }
 
 fn print(file: &str, program: &Program, facts: &[Facts]) {

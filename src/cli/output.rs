@@ -9,7 +9,15 @@ use super::Failure;
 
 /// Writes a file through a callback. If anything fails, the file that was there before is untouched.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
-    let failed = |error: io::Error| Failure::usage(format!("cannot write `{}`: {error}", path.display()));
+    let failed = |error: io::Error| {
+        // the temporary name that an error may carry means nothing to the reader
+        let text = error.to_string();
+        let reason = text.split(" at path ").next().unwrap_or_default();
+        Failure::usage(format!("cannot write `{}`: {reason}", path.display()))
+    };
+    if path.is_dir() {
+        return Err(Failure::usage(format!("cannot write `{}`: it is a folder", path.display())));
+    }
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -20,7 +20,10 @@ const LONGEST_FOLD: f64 = 1e7;
 const DEEPEST_EVALUATION: usize = 2000;
 
 /// Expressions evaluated for each operation of the budget: shared operations cost time though they add no node.
-const EVALUATIONS_PER_NODE: usize = 16;
+const EVALUATIONS_PER_NODE: usize = 4;
+
+/// Messages that come with a suggestion: in a file with more of them something else is wrong.
+const MOST_SUGGESTIONS: usize = 100;
 
 /// The state of a lowering.
 pub(super) struct Lowering<'a> {
@@ -312,6 +315,9 @@ impl<'a> Lowering<'a> {
                 self.fail(
                     Diagnostic::error(Code::NOT_A_FUNCTION, span, message).help(format!("write `{name}(…)`")),
                 )
+            }
+            None if self.diagnostics.len() > MOST_SUGGESTIONS => {
+                self.fail(Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`")))
             }
             None => {
                 let candidates = self.names.candidates(false);

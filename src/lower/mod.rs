@@ -199,8 +199,7 @@ impl<'a> Lowering<'a> {
         } else {
             fits = true;
         }
-        let value_now =
-            if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
+        let value_now = if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
         self.names.define(self.scope.source, &param.name, Kind::Value(value_now));
         self.module.params.push(ParamValue {
             name: param.name.text.clone(),

@@ -112,7 +112,9 @@ impl Builder {
     /// The item, unless it is nested too deeply for the stages to come.
     fn whole_item(&self, pair: Node<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Item> {
         let item = self.item(pair);
-        let Some(span) = self.cut.take().or_else(|| item.deeper_than(DEEPEST_TREE)) else { return Some(item) };
+        let Some(span) = self.cut.take().or_else(|| item.deeper_than(DEEPEST_TREE)) else {
+            return Some(item);
+        };
         diagnostics.push(
             Diagnostic::error(Code::TOO_DEEP, span, "the expression is nested too deeply")
                 .help("name a part with `let`"),

@@ -113,7 +113,12 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     if let Some(diagnostic) = familiar_slip(source, at, found, span) {
         return diagnostic;
     }
-    let what = if found.is_empty() { "end of the item".to_string() } else { format!("`{found}`") };
+    let strange = source.text[at..end.max(at)].chars().next().filter(|c| c.is_control() && found.is_empty());
+    let what = match strange {
+        Some(c) if !c.is_whitespace() => format!("character U+{:04X}", c as u32),
+        _ if found.is_empty() => "end of the item".to_string(),
+        _ => format!("`{found}`"),
+    };
     let expected = match &error.variant {
         ErrorVariant::ParsingError { positives, .. } => expectation(positives),
         ErrorVariant::CustomError { message } if message.contains("stack limit") => {
@@ -240,7 +245,17 @@ fn expectation(rules: &[Rule]) -> String {
             }
             Rule::name | Rule::parameter if !axis && !rules.contains(&Rule::number) => add("a name"),
             Rule::key | Rule::block | Rule::setting => add("a key"),
-            Rule::number | Rule::expr | Rule::sum | Rule::negation | Rule::exponent => add("an expression"),
+            Rule::number
+            | Rule::sign_op
+            | Rule::expr
+            | Rule::conjunction
+            | Rule::negation
+            | Rule::comparison
+            | Rule::sum
+            | Rule::product
+            | Rule::signed
+            | Rule::exponent
+            | Rule::postfix => add("an expression"),
             Rule::unit if !may_end => add("a unit"),
             Rule::EOI => add("the next item"),
             _ => {}
