@@ -4,7 +4,6 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use anstream::println;
 use glam::DVec2;
 use serde::Serialize;
 
@@ -266,29 +265,29 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
 
 fn print(file: &str, program: &Program, facts: &[Facts]) {
     let module = program.module();
-    println!("{file}: {} solid(s), {} scene(s)", module.solids.len(), module.scenes.len());
+    say!("{file}: {} solid(s), {} scene(s)", module.solids.len(), module.scenes.len());
     for param in &module.params {
         let range = param.range.map_or(String::new(), |(low, high)| format!(" in {low} .. {high}"));
         let doc = param.doc.as_ref().map_or(String::new(), |doc| format!("   {doc}"));
-        println!("  param {} = {}{range}{doc}", param.name, param.value);
+        say!("  param {} = {}{range}{doc}", param.name, param.value);
     }
     for solid in facts {
-        println!("  solid {}", solid.name);
+        say!("  solid {}", solid.name);
         if solid.empty {
-            println!("    empty");
+            say!("    empty");
         }
         if let Some(bounds) = &solid.bounds {
             let corner = |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", c[0], c[1], c[2]);
-            println!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
+            say!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
         } else if !solid.empty {
-            println!("    bounds      none found");
+            say!("    bounds      none found");
         }
         if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-            println!("    volume      {volume:.6} ± {error:.1e}");
+            say!("    volume      {volume:.6} ± {error:.1e}");
         }
         if let (Some(area), Some(components), false) = (solid.area, solid.components, solid.empty) {
-            println!("    area        {area:.6}");
-            println!("    components  {components}");
+            say!("    area        {area:.6}");
+            say!("    components  {components}");
         }
     }
     for scene in &module.scenes {
@@ -297,10 +296,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
         let around =
             if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
-        println!(
-            "  scene {}: {particles} of {}{around}, {} s",
-            scene.name, scene.fluid.name, scene.run.until
-        );
+        say!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
     }
 }
 
@@ -327,7 +323,7 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
     let picture = picture(&solid, plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
     if !shared.json {
-        println!("slice {plane} of {} written to {}", solid.name(), path.display());
+        say!("slice {plane} of {} written to {}", solid.name(), path.display());
     }
     Ok(())
 }

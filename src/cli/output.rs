@@ -43,6 +43,17 @@ fn readable_by_others(_: &std::fs::File) -> io::Result<()> {
     Ok(())
 }
 
+/// One line on standard output. Where nobody reads any more the process ends quietly, as other tools do.
+pub(super) fn line(words: std::fmt::Arguments<'_>) {
+    if let Err(error) = writeln!(anstream::stdout(), "{words}") {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            std::process::exit(0);
+        }
+        super::complain(&format!("cannot write to standard output: {error}"));
+        std::process::exit(2);
+    }
+}
+
 /// One JSON document on standard output.
 pub(super) fn json(document: &impl Serialize) -> Result<(), Failure> {
     let mut out = io::stdout().lock();

@@ -31,27 +31,23 @@ fn stages_of_small_files() {
     }
 }
 
-/// The graph as lowered, before simplification, without places.
+/// The graph as lowered, before simplification, as nested calls.
 fn graph(expression: &str) -> String {
     let program = program(&format!("solid s = {expression}"));
     let module = program.module();
     let (graph, roots) = module.graph.extract(&[module.solids[0].node]);
-    dump(&graph, &[("s", roots[0])], &[]).lines().map(|line| line.trim_end().to_string() + "\n").collect()
-}
-
-/// The tree of R-operations over x, y, z, 1, 2 …: `((x^y)vz)`.
-fn tree(expression: &str) -> String {
-    let text = graph(expression);
     let mut names: Vec<String> = Vec::new();
-    for line in text.lines().filter(|line| line.starts_with('%')) {
+    for line in dump(&graph, &[("s", roots[0])], &[]).lines().filter(|line| line.starts_with('%')) {
         let (_, operation) = line.split_once(" = ").unwrap();
-        let words: Vec<&str> = operation.split(' ').collect();
+        let words: Vec<&str> = operation.split_whitespace().collect();
         let operand = |i: usize| names[words[i][1..].parse::<usize>().unwrap()].clone();
-        names.push(match words[0] {
-            "r0_and" => format!("({}^{})", operand(1), operand(2)),
-            "r0_or" => format!("({}v{})", operand(1), operand(2)),
-            "neg" => format!("-{}", operand(1)),
-            other => other.trim_end_matches(".0").to_string(),
+        names.push(match words[..] {
+            ["r0_and", _, _] => format!("({}^{})", operand(1), operand(2)),
+            ["r0_or", _, _] => format!("({}v{})", operand(1), operand(2)),
+            ["neg", _] => format!("-{}", operand(1)),
+            [leaf] => leaf.trim_end_matches(".0").to_string(),
+            [name, _] => format!("{name}({})", operand(1)),
+            _ => format!("{}({}, {})", words[0], operand(1), operand(2)),
         });
     }
     names.pop().unwrap()
@@ -59,27 +55,27 @@ fn tree(expression: &str) -> String {
 
 #[test]
 fn chains_are_balanced_and_the_left_half_is_the_larger() {
-    assert_eq!(tree("x and y and z"), "((x^y)^z)");
-    assert_eq!(tree("x or y or z or 1 or 2"), "(((xvy)vz)v(1v2))");
-    assert_eq!(tree("x and y and z and 1 and 2 and 3 and 4 and 5"), "(((x^y)^(z^1))^((2^3)^(4^5)))");
-    assert_eq!(tree("all i in 0..5: i"), "(((0^1)^2)^(3^4))");
+    assert_eq!(graph("x and y and z"), "((x^y)^z)");
+    assert_eq!(graph("x or y or z or 1 or 2"), "(((xvy)vz)v(1v2))");
+    assert_eq!(graph("x and y and z and 1 and 2 and 3 and 4 and 5"), "(((x^y)^(z^1))^((2^3)^(4^5)))");
+    assert_eq!(graph("all i in 0..5: i"), "(((0^1)^2)^(3^4))");
 }
 
 #[test]
 fn parentheses_are_kept() {
-    assert_eq!(tree("x and (y and z)"), "(x^(y^z))");
-    assert_eq!(tree("(x or y) or (z or 1)"), tree("x or y or z or 1"));
-    assert_eq!(tree("x and (y and (z and 1))"), "(x^(y^(z^1)))");
+    assert_eq!(graph("x and (y and z)"), "(x^(y^z))");
+    assert_eq!(graph("(x or y) or (z or 1)"), graph("x or y or z or 1"));
+    assert_eq!(graph("x and (y and (z and 1))"), "(x^(y^(z^1)))");
 }
 
 #[test]
 fn precedence() {
-    assert_eq!(tree("x or y and z"), "(xv(y^z))");
-    assert_eq!(tree("not x and y"), "(-x^y)");
-    assert_eq!(tree("x \\ y"), "(x^-y)");
-    assert_eq!(tree("x \\ y \\ z"), "((x^-y)^-z)");
-    assert_eq!(tree("x and y \\ z"), "((x^y)^-z)");
-    assert_eq!(tree("not not x"), "x");
+    assert_eq!(graph("x or y and z"), "(xv(y^z))");
+    assert_eq!(graph("not x and y"), "(-x^y)");
+    assert_eq!(graph("x \\ y"), "(x^-y)");
+    assert_eq!(graph("x \\ y \\ z"), "((x^-y)^-z)");
+    assert_eq!(graph("x and y \\ z"), "((x^y)^-z)");
+    assert_eq!(graph("not not x"), "x");
     assert_eq!(graph("x or y >= z"), graph("x or (y >= z)"));
     assert_eq!(graph("-x^2"), graph("-(x^2)"));
     assert_eq!(graph("x - y - z"), graph("(x - y) - z"));

@@ -88,5 +88,5 @@ pub fn snapshot(topic: &str, name: &str, text: &str) {
     settings.set_snapshot_path(root().join("tests/snapshots").join(topic));
     settings.set_prepend_module_to_snapshot(false);
     settings.set_omit_expression(true);
-    settings.bind(|| insta::assert_snapshot!(name, text));
+    settings.bind(|| insta::assert_snapshot!(name.replace(' ', "_"), text));
 }
