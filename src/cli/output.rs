@@ -22,6 +22,11 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
+    if !folder.exists() {
+        let message =
+            format!("cannot write `{}`: the folder `{}` does not exist", path.display(), folder.display());
+        return Err(Failure::usage(message));
+    }
     let temporary = tempfile::Builder::new().prefix(".rfm-").tempfile_in(folder).map_err(failed)?;
     let mut writer = BufWriter::new(temporary);
     fill(&mut writer).map_err(failed)?;

@@ -43,6 +43,8 @@ pub fn rfm_reading(folder: &Path, arguments: &[&str], input: &[u8]) -> Outcome {
     let mut child = Command::new(env!("CARGO_BIN_EXE_rfm"))
         .args(arguments)
         .current_dir(folder)
+        .env_remove("COLUMNS")
+        .env_remove("CLICOLOR_FORCE")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
