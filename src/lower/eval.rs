@@ -294,7 +294,8 @@ impl<'a> Lowering<'a> {
             _ => None,
         };
         if let Some(axis) = axis {
-            return Value::Number(self.node(Operation::Coordinate(axis), span));
+            // no place: a coordinate is shared by all that is written
+            return Value::Number(self.module.graph.coordinate(axis));
         }
         match self.names.get(self.scope.source, name).map(|global| global.kind.clone()) {
             Some(Kind::Value(value) | Kind::Solid(value)) => value,
