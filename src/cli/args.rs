@@ -203,7 +203,7 @@ pub(super) struct Run {
     #[arg(long, value_name = "N", conflicts_with = "until")]
     pub steps: Option<u64>,
     /// Stop at this simulated time, seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub until: Option<f64>,
     /// Print what would be run, and run nothing
     #[arg(long)]

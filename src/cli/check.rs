@@ -4,7 +4,6 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use anstream::println;
 use glam::DVec2;
 use serde::Serialize;
 
@@ -14,7 +13,7 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
 use crate::geom::Aabb;
 use crate::mesh::{self, Grid, Resolution, marching_cubes};
 use crate::slice::{self, Plane, Window};
-use crate::solid::Bounds;
+use crate::solid::{Bounds, ProgramKind};
 use crate::{Program, Solid};
 
 /// Cells of the meshes that volumes are measured on; the second is for their error.
@@ -41,6 +40,9 @@ struct Message {
     help: Option<String>,
 }
 
+/// Operations of a solid that is measured, at most: a larger one would keep a person waiting for minutes.
+const MOST_MEASURED: usize = 10_000;
+
 /// What is known of a solid. Numbers that do not exist (an unbounded solid's volume) are null.
 #[derive(Serialize)]
 struct Facts {
@@ -55,6 +57,21 @@ struct Facts {
     components: Option<usize>,
 }
 
+impl Facts {
+    fn unknown(solid: &Solid, file: &str) -> Self {
+        Self {
+            name: solid.name().to_string(),
+            file: file.to_string(),
+            empty: false,
+            bounds: None,
+            volume: None,
+            volume_error: None,
+            area: None,
+            components: None,
+        }
+    }
+}
+
 #[derive(Serialize)]
 struct Box3 {
     min: [f64; 3],
@@ -65,6 +82,7 @@ pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
     if options.slice.is_some() && options.files.len() > 1 {
         return Err(Failure::usage("--slice plots one file at a time"));
     }
+    options.output.as_deref().map(output::Picture::of).transpose()?;
     if options.watch {
         return watch(shared, options);
     }
@@ -178,6 +196,12 @@ fn solids(
     let mut facts = Vec::new();
     for named in &program.module().solids {
         let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
+        let operations = solid.graph(ProgramKind::Value).0.len();
+        if operations > MOST_MEASURED {
+            note(format!("solid `{}` has {operations} operations: it is not measured", named.name));
+            facts.push(Facts::unknown(&solid, file));
+            continue;
+        }
         let found = measure(&solid, file)?;
         let warning = |code, message| Diagnostic {
             severity: Severity::Warning,
@@ -203,17 +227,22 @@ fn solids(
 }
 
 fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
-    let mut facts = Facts {
-        name: solid.name().to_string(),
-        file: file.to_string(),
-        empty: *solid.bounds() == Bounds::Empty,
-        bounds: None,
-        volume: facts_of_empty(solid),
-        volume_error: facts_of_empty(solid),
-        area: facts_of_empty(solid),
-        components: facts_of_empty(solid).map(|_| 0),
+    let mut facts = Facts::unknown(solid, file);
+    let bounds = match solid.bounds() {
+        Bounds::Within(bounds) => bounds,
+        Bounds::Unbounded => return Ok(facts),
+        Bounds::Empty => {
+            let zero = Some(0.0);
+            return Ok(Facts {
+                empty: true,
+                volume: zero,
+                volume_error: zero,
+                area: zero,
+                components: Some(0),
+                ..facts
+            });
+        }
     };
-    let Bounds::Within(bounds) = solid.bounds() else { return Ok(facts) };
     facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
     let mut reports = Vec::new();
     for cells in VOLUME_CELLS {
@@ -225,45 +254,45 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
         }
     }
     if let [fine, coarse] = &reports[..] {
-        // vertices lie on the surface, so errors fall as h²: a third of the difference leads to the limit
-        let rest = (fine.volume - coarse.volume) / 3.0;
-        facts.volume = Some(fine.volume + rest);
-        facts.volume_error = Some(rest.abs());
+        // vertices lie on the surface, so errors fall as h²: a third of the difference leads to the limit. Creases
+        // fall unevenly between the cells, so the whole difference is what is claimed.
+        let difference = fine.volume - coarse.volume;
+        facts.volume = Some(fine.volume + difference / 3.0);
+        facts.volume_error = Some(difference.abs());
         facts.area = Some(fine.area);
         facts.components = Some(fine.solids);
     }
     Ok(facts)
 }
 
-fn facts_of_empty(solid: &Solid) -> Option<f64> {
-    (*solid.bounds() == Bounds::Empty).then_some(0.0)
-}
-
 fn print(file: &str, program: &Program, facts: &[Facts]) {
     let module = program.module();
-    println!("{file}: {} solid(s), {} scene(s)", module.solids.len(), module.scenes.len());
+    say!("{file}: {} solid(s), {} scene(s)", module.solids.len(), module.scenes.len());
     for param in &module.params {
         let range = param.range.map_or(String::new(), |(low, high)| format!(" in {low} .. {high}"));
         let doc = param.doc.as_ref().map_or(String::new(), |doc| format!("   {doc}"));
-        println!("  param {} = {}{range}{doc}", param.name, param.value);
+        say!("  param {} = {}{range}{doc}", param.name, param.value);
     }
     for solid in facts {
-        println!("  solid {}", solid.name);
+        say!("  solid {}", solid.name);
         if solid.empty {
-            println!("    empty");
+            say!("    empty");
         }
         if let Some(bounds) = &solid.bounds {
-            let corner = |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", c[0], c[1], c[2]);
-            println!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
+            // rounded first, and without the sign of a zero
+            let round = |x: f64| (1e4 * x).round() / 1e4 + 0.0;
+            let corner =
+                |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", round(c[0]), round(c[1]), round(c[2]));
+            say!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
         } else if !solid.empty {
-            println!("    bounds      none found");
+            say!("    bounds      none found");
         }
         if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-            println!("    volume      {volume:.6} ± {error:.1e}");
+            say!("    volume      {volume:.6} ± {error:.1e}");
         }
         if let (Some(area), Some(components), false) = (solid.area, solid.components, solid.empty) {
-            println!("    area        {area:.6}");
-            println!("    components  {components}");
+            say!("    area        {area:.6}");
+            say!("    components  {components}");
         }
     }
     for scene in &module.scenes {
@@ -272,10 +301,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             scene.fluid.particles.map_or("as many particles as fit".into(), |n| format!("{n} particles"));
         let around =
             if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
-        println!(
-            "  scene {}: {particles} of {}{around}, {} s",
-            scene.name, scene.fluid.name, scene.run.until
-        );
+        say!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
     }
 }
 
@@ -302,25 +328,17 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
     let picture = picture(&solid, plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
     if !shared.json {
-        println!("slice {plane} of {} written to {}", solid.name(), path.display());
+        say!("slice {plane} of {} written to {}", solid.name(), path.display());
     }
     Ok(())
 }
 
 fn picture(solid: &Solid, plane: Plane, window: Window, path: &Path) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
-    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let samples = slice::DEFAULT_SAMPLES;
-    match ending.as_str() {
-        "svg" => slice::write_svg(solid, solid.name(), plane, window, samples, &mut bytes),
-        "png" => slice::write_png(solid, solid.name(), plane, window, samples, 2.0, &mut bytes),
-        _ => {
-            let message = format!(
-                "cannot tell the picture format of `{}`: the ending must be .svg or .png",
-                path.display()
-            );
-            return Err(Failure::Usage(message));
-        }
+    let (name, samples) = (solid.name(), slice::DEFAULT_SAMPLES);
+    match output::Picture::of(path)? {
+        output::Picture::Svg => slice::write_svg(solid, name, plane, window, samples, &mut bytes),
+        output::Picture::Png => slice::write_png(solid, name, plane, window, samples, 2.0, &mut bytes),
     }
     .map_err(Failure::usage)?;
     Ok(bytes)

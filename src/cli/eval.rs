@@ -26,7 +26,7 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
     let mut writer = Table::new(solid, options, shared.json)?;
     writer.rows(&options.at)?;
     if let Some(path) = &options.points {
-        let name = path.display().to_string();
+        let name = if path == stdin { "<stdin>".to_string() } else { path.display().to_string() };
         let reader: Box<dyn Read> = if path == stdin {
             Box::new(io::stdin().lock())
         } else {
@@ -77,6 +77,12 @@ fn read_points(
         return Err(Failure::usage(format!("`{name}` is empty; expected the header `x,y,z`")));
     }
     take(&points)
+}
+
+#[derive(serde::Serialize)]
+struct Document {
+    schema: u32,
+    points: Vec<serde_json::Value>,
 }
 
 /// The rows of the answer, written as they are known.
@@ -162,7 +168,7 @@ impl Table {
     fn finish(mut self) -> Result<(), Failure> {
         self.out.flush()?;
         match self.json {
-            Some(rows) => output::json(&serde_json::json!({ "schema": 1, "points": rows })),
+            Some(points) => output::json(&Document { schema: 1, points }),
             None => Ok(()),
         }
     }

@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use anstream::println;
-
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
 use crate::Program;
@@ -17,7 +15,7 @@ use crate::syntax;
 pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     let subject = options.subject.as_str();
     if let Some(text) = explain(subject) {
-        println!("{}\n\n{text}", subject.to_uppercase());
+        say!("{}\n\n{text}", subject.to_uppercase());
         return Ok(());
     }
     let is_code = subject.len() == 5 && subject.starts_with(['E', 'W']) && !Path::new(subject).exists();
@@ -30,7 +28,7 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     };
     let program = input::program(shared, Path::new(path))?;
     if options.show.contains(&Stage::Ast) {
-        print!("{}", syntax::print(program.ast()));
+        say!("{}", syntax::print(program.ast()).trim_end());
     }
     match name {
         Some(name) if program.module().scenes.iter().any(|s| s.name == name) => {
@@ -62,8 +60,8 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     let (written, _) = program.module().graph.extract(&[named.node]);
     let (value, value_outputs) = solid.graph(ProgramKind::Value);
     let (gradient, gradient_outputs) = solid.graph(ProgramKind::Gradient);
-    println!("solid {}", named.name);
-    println!(
+    say!("solid {}", named.name);
+    say!(
         "  operations: {} as written, {} for ω, {} for ω and ∇ω",
         written.len(),
         value.len(),
@@ -71,14 +69,14 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     );
     let rules = &solid.applied_rules().0;
     for (equation, count) in rules {
-        println!("  simplified {count:>4} ×  {equation}");
+        say!("  simplified {count:>4} ×  {equation}");
     }
-    println!("  target: {}", target_description());
+    say!("  target: {}", target_description());
     if show.contains(&Stage::Ir) {
-        println!("\nω:\n{}", dump(value, &[("omega", value_outputs[0])], program.sources()));
+        say!("\nω:\n{}", dump(value, &[("omega", value_outputs[0])], program.sources()));
         let names = ["omega", "gx", "gy", "gz"];
         let roots: Vec<_> = names.into_iter().zip(gradient_outputs.iter().copied()).collect();
-        println!("ω and ∇ω:\n{}", dump(gradient, &roots, program.sources()));
+        say!("ω and ∇ω:\n{}", dump(gradient, &roots, program.sources()));
     }
     if show.contains(&Stage::Clif) || show.contains(&Stage::Asm) {
         for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)]
@@ -92,10 +90,10 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
             };
             let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;
             if show.contains(&Stage::Clif) {
-                println!("\n{title}, f64, many points, intermediate representation:\n{}", listing.clif);
+                say!("\n{title}, f64, many points, intermediate representation:\n{}", listing.clif);
             }
             if show.contains(&Stage::Asm) {
-                println!("\n{title}, f64, many points, machine code:\n{}", listing.assembly);
+                say!("\n{title}, f64, many points, machine code:\n{}", listing.assembly);
             }
         }
     }

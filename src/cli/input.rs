@@ -54,8 +54,17 @@ pub(super) fn failure(diagnostics: &Diagnostics) -> Failure {
     Failure::Findings
 }
 
+/// Messages that a person is shown at once; `--json` lists all.
+const MOST_SHOWN: usize = 100;
+
 pub(super) fn show(diagnostics: &Diagnostics) {
     if diagnostics.list.is_empty() {
+        return;
+    }
+    if diagnostics.list.len() > MOST_SHOWN {
+        let first = diagnostics.list[..MOST_SHOWN].to_vec();
+        show(&Diagnostics { list: first, sources: diagnostics.sources.clone() });
+        super::note(format!("{} more messages are not shown", diagnostics.list.len() - MOST_SHOWN));
         return;
     }
     // anstream takes the colours out where they are not wanted; the line drawing is for terminals only

@@ -110,7 +110,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     print(&report, milliseconds);
     if let Some(path) = &options.output {
-        anstream::println!("written to {}", path.display());
+        say!("written to {}", path.display());
     }
     Ok(())
 }
@@ -144,21 +144,21 @@ fn summary(name: &str, report: &Report, milliseconds: f64) -> Summary {
 
 fn print(report: &Report, milliseconds: f64) {
     let yes = |b: bool| if b { "yes" } else { "NO" };
-    anstream::println!(
+    say!(
         "{} vertices, {} triangles in {milliseconds:.1} ms ({} evaluations of ω)",
         report.vertices,
         report.triangles,
         report.evaluations
     );
-    anstream::println!(
+    say!(
         "closed: {}, manifold: {}, components: {}, Euler characteristic: {}",
         yes(report.closed),
         yes(report.manifold),
         report.components,
         report.euler
     );
-    anstream::println!("volume: {:.9}, area: {:.9}", report.volume, report.area);
-    anstream::println!(
+    say!("volume: {:.9}, area: {:.9}", report.volume, report.area);
+    say!(
         "distance of the vertices from the surface: {:.1e} at most, {:.1e} rms",
         report.max_distance,
         report.rms_distance

@@ -3,6 +3,11 @@
 //! Data goes to standard output, messages and progress bars to standard error. Exit codes: 0 fine; 1 the input
 //! has findings; 2 usage or file error; 3 numerical failure in a run; 130 interrupted.
 
+/// One line of data on standard output.
+macro_rules! say {
+    ($($words:tt)*) => { $crate::cli::output::line(format_args!($($words)*)) };
+}
+
 mod args;
 mod check;
 mod choose;

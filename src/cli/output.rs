@@ -9,11 +9,24 @@ use super::Failure;
 
 /// Writes a file through a callback. If anything fails, the file that was there before is untouched.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
-    let failed = |error: io::Error| Failure::usage(format!("cannot write `{}`: {error}", path.display()));
+    let failed = |error: io::Error| {
+        // the temporary name that an error may carry means nothing to the reader
+        let text = error.to_string();
+        let reason = text.split(" at path ").next().unwrap_or_default();
+        Failure::usage(format!("cannot write `{}`: {reason}", path.display()))
+    };
+    if path.is_dir() {
+        return Err(Failure::usage(format!("cannot write `{}`: it is a folder", path.display())));
+    }
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
+    if !folder.exists() {
+        let message =
+            format!("cannot write `{}`: the folder `{}` does not exist", path.display(), folder.display());
+        return Err(Failure::usage(message));
+    }
     let temporary = tempfile::Builder::new().prefix(".rfm-").tempfile_in(folder).map_err(failed)?;
     let mut writer = BufWriter::new(temporary);
     fill(&mut writer).map_err(failed)?;
@@ -21,6 +34,28 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     readable_by_others(temporary.as_file()).map_err(failed)?;
     temporary.persist(path).map_err(|e| failed(e.error))?;
     Ok(())
+}
+
+/// The formats that pictures are written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Picture {
+    Svg,
+    Png,
+}
+
+impl Picture {
+    /// The format that the ending of a path names.
+    pub fn of(path: &Path) -> Result<Self, Failure> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        match ending.as_str() {
+            "svg" => Ok(Self::Svg),
+            "png" => Ok(Self::Png),
+            _ => Err(Failure::Usage(format!(
+                "cannot tell the picture format of `{}`: the ending must be .svg or .png",
+                path.display()
+            ))),
+        }
+    }
 }
 
 /// Temporary files are private; results are not.
@@ -33,6 +68,17 @@ fn readable_by_others(file: &std::fs::File) -> io::Result<()> {
 #[cfg(not(unix))]
 fn readable_by_others(_: &std::fs::File) -> io::Result<()> {
     Ok(())
+}
+
+/// One line on standard output. Where nobody reads any more the process ends quietly, as other tools do.
+pub(super) fn line(words: std::fmt::Arguments<'_>) {
+    if let Err(error) = writeln!(anstream::stdout(), "{words}") {
+        if error.kind() == io::ErrorKind::BrokenPipe {
+            std::process::exit(0);
+        }
+        super::complain(&format!("cannot write to standard output: {error}"));
+        std::process::exit(2);
+    }
 }
 
 /// One JSON document on standard output.

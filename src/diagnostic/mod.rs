@@ -94,10 +94,13 @@ impl Diagnostic {
 
 /// The candidate with the fewest typing slips from `written`: at most one slip, or one in three letters.
 pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let limit = (written.chars().count() / 3).max(1);
+    let length = written.chars().count();
+    // one letter is near to every other
+    let limit = if length == 1 { 0 } else { (length / 3).max(1) };
+    let lower = written.to_lowercase();
     candidates
         .into_iter()
-        .map(|name| (strsim::damerau_levenshtein(written, name), name))
+        .map(|name| (strsim::damerau_levenshtein(&lower, &name.to_lowercase()), name))
         .filter(|&(slips, name)| slips <= limit && slips < name.chars().count())
         .min()
         .map(|(_, name)| name)

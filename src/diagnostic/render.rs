@@ -1,5 +1,7 @@
 //! The only place where a diagnostic becomes text.
 
+use std::borrow::Cow;
+
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Renderer, Snippet, renderer::DecorStyle};
 
 use super::{Diagnostic, Diagnostics, Label, Severity, Source, Span};
@@ -14,6 +16,9 @@ pub enum Style {
 
 /// Lines longer than this are not quoted whole: a generated file may be one line of megabytes.
 const LONGEST_QUOTED_LINE: usize = 400;
+
+/// Messages longer than this, in bytes, lose their middle.
+const LONGEST_MESSAGE: usize = 400;
 
 /// All messages, one after the other, each ended by a newline.
 pub fn render(diagnostics: &Diagnostics, style: Style) -> String {
@@ -37,7 +42,8 @@ fn groups<'a>(diagnostic: &'a Diagnostic, sources: &'a [Source]) -> Vec<Group<'a
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
     };
-    let mut group = Group::with_title(level.primary_title(diagnostic.message.as_str()).id(diagnostic.code.0));
+    let message = shortened(&diagnostic.message);
+    let mut group = Group::with_title(level.primary_title(message).id(diagnostic.code.0));
     for source in sources {
         let labels: Vec<_> = std::iter::once((AnnotationKind::Primary, &diagnostic.primary))
             .chain(diagnostic.secondary.iter().map(|label| (AnnotationKind::Context, label)))
@@ -51,6 +57,16 @@ fn groups<'a>(diagnostic: &'a Diagnostic, sources: &'a [Source]) -> Vec<Group<'a
         group = group.element(Level::HELP.message(help.as_str()));
     }
     vec![group]
+}
+
+/// A message may quote a name of any length.
+fn shortened(message: &str) -> Cow<'_, str> {
+    if message.len() <= LONGEST_MESSAGE {
+        return message.into();
+    }
+    let half = LONGEST_MESSAGE / 2;
+    let (first, last) = (floor_boundary(message, half), floor_boundary(message, message.len() - half));
+    format!("{}…{}", &message[..first], &message[last..]).into()
 }
 
 /// The quoted lines that the labels touch: cut out first, so that the cost does not grow with the file.

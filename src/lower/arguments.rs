@@ -11,7 +11,8 @@ impl<'a> Lowering<'a> {
     pub fn call(&mut self, name: &Name, arguments: &[Argument], span: Span) -> Value {
         match self.names.get(self.scope.source, &name.text).map(|g| (g.kind.clone(), g.source)) {
             Some((Kind::Function(function), source)) => self.call_function(function, source, arguments, span),
-            Some((Kind::Value(_) | Kind::Solid(_), _)) if !builtins::exists(&name.text) => {
+            Some((Kind::Value(value) | Kind::Solid(value), _)) if value == Value::Failed => Value::Failed,
+            Some((Kind::Value(_) | Kind::Solid(_) | Kind::Scene, _)) if !builtins::exists(&name.text) => {
                 let message = format!("`{}` is not a function", name.text);
                 self.fail(
                     Diagnostic::error(Code::NOT_A_FUNCTION, name.span, message)
@@ -27,6 +28,10 @@ impl<'a> Lowering<'a> {
                 let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, name.span, message)
                     .at("not defined above")
                     .suggest(&name.text, candidates.iter().map(String::as_str));
+                let diagnostic = match self.names.defined_later(&name.text) {
+                    Some(later) => diagnostic.label(later, "defined here"),
+                    None => diagnostic,
+                };
                 self.fail(diagnostic)
             }
         }

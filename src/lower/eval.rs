@@ -1,5 +1,7 @@
 //! Expressions → values.
 
+use std::collections::HashSet;
+
 use super::Module;
 use super::names::{Kind, Names};
 use super::value::Value;
@@ -14,6 +16,15 @@ const DEEPEST_CALL: usize = 64;
 /// Members of a fold, at most: the node budget is checked after each member, this only bounds the empty ones.
 const LONGEST_FOLD: f64 = 1e7;
 
+/// Expressions evaluated inside one another, at most; with the limits of the parser this takes a chain of calls.
+const DEEPEST_EVALUATION: usize = 2000;
+
+/// Expressions evaluated for each operation of the budget: shared operations cost time though they add no node.
+const EVALUATIONS_PER_NODE: usize = 4;
+
+/// Messages that come with a suggestion: in a file with more of them something else is wrong.
+const MOST_SUGGESTIONS: usize = 100;
+
 /// The state of a lowering.
 pub(super) struct Lowering<'a> {
     pub module: Module,
@@ -22,6 +33,10 @@ pub(super) struct Lowering<'a> {
     pub scope: Scope,
     max_nodes: usize,
     budget_reported: bool,
+    evaluations: usize,
+    depth: usize,
+    /// Code and place of what was reported: a mistake in a function or a fold is one mistake.
+    reported: HashSet<(&'static str, Span)>,
 }
 
 /// Where an expression is evaluated: whose code it is, its local names, and the call that led there.
@@ -57,11 +72,18 @@ impl<'a> Lowering<'a> {
             scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
             max_nodes,
             budget_reported: false,
+            evaluations: 0,
+            depth: 0,
+            reported: HashSet::new(),
         }
     }
 
+    /// Says it once for each place; messages about no place in particular all come through.
     pub fn report(&mut self, diagnostic: Diagnostic) {
-        self.diagnostics.push(diagnostic);
+        let span = diagnostic.primary.span;
+        if span.range().is_empty() || self.reported.insert((diagnostic.code.0, span)) {
+            self.diagnostics.push(diagnostic);
+        }
     }
 
     /// Reports and gives the value that silences what depends on it.
@@ -81,10 +103,16 @@ impl<'a> Lowering<'a> {
 
     /// Whether the file has grown beyond its budget; reported once.
     pub fn over_budget(&mut self, span: Span) -> bool {
-        let over = self.module.graph.len() > self.max_nodes;
+        let too_many = self.module.graph.len() > self.max_nodes;
+        let most_evaluations = self.max_nodes.saturating_mul(EVALUATIONS_PER_NODE);
+        let over = too_many || self.evaluations > most_evaluations;
         if over && !self.budget_reported {
             self.budget_reported = true;
-            let message = format!("the file unrolls to more than {} operations", self.max_nodes);
+            let message = if too_many {
+                format!("the file unrolls to more than {} operations", self.max_nodes)
+            } else {
+                format!("the file evaluates more than {most_evaluations} expressions when it is unrolled")
+            };
             let span = self.user_span(span);
             self.report(
                 Diagnostic::error(Code::TOO_LARGE, span, message)
@@ -114,7 +142,18 @@ impl<'a> Lowering<'a> {
     /// A number or field; anything else is reported.
     pub fn field(&mut self, expr: &Expr) -> Option<Node> {
         let value = self.expr(expr);
-        self.as_number(&value, expr.span)
+        self.as_number(&value, self.origin(expr))
+    }
+
+    /// Where the value of an expression was written: for a parameter, the argument of the call.
+    pub fn origin(&self, expr: &Expr) -> Span {
+        let local = match &expr.kind {
+            ExprKind::Name(name) if expr.span.source == SourceId::Prelude => {
+                self.scope.locals.iter().rev().find(|local| local.name == *name)
+            }
+            _ => None,
+        };
+        local.map_or(expr.span, |local| local.span)
     }
 
     pub fn as_number(&mut self, value: &Value, span: Span) -> Option<Node> {
@@ -160,10 +199,22 @@ impl<'a> Lowering<'a> {
     }
 
     pub fn expr(&mut self, expr: &Expr) -> Value {
-        let span = expr.span;
-        if self.over_budget(span) {
+        self.evaluations += 1;
+        if self.over_budget(expr.span) {
             return Value::Failed;
         }
+        if self.depth >= DEEPEST_EVALUATION {
+            let span = self.user_span(expr.span);
+            return self.fail(Diagnostic::error(Code::TOO_DEEP, span, "the calls unroll too deeply"));
+        }
+        self.depth += 1;
+        let value = self.evaluate(expr);
+        self.depth -= 1;
+        value
+    }
+
+    fn evaluate(&mut self, expr: &Expr) -> Value {
+        let span = expr.span;
         match &expr.kind {
             ExprKind::Number(value) => Value::Number(self.constant(*value)),
             ExprKind::Quantity { value, unit } => self.quantity(*value, unit),
@@ -204,7 +255,7 @@ impl<'a> Lowering<'a> {
             ExprKind::Call { function, arguments } => self.call(function, arguments, span),
             ExprKind::Component { vector, axis } => {
                 let value = self.expr(vector);
-                self.as_vector(&value, vector.span).map_or(Value::Failed, |v| Value::Number(v[*axis]))
+                self.as_vector(&value, self.origin(vector)).map_or(Value::Failed, |v| Value::Number(v[*axis]))
             }
             ExprKind::Method { receiver, method, arguments } => {
                 self.method(receiver, method, arguments, span)
@@ -243,10 +294,15 @@ impl<'a> Lowering<'a> {
             _ => None,
         };
         if let Some(axis) = axis {
-            return Value::Number(self.node(Operation::Coordinate(axis), span));
+            // no place: a coordinate is shared by all that is written
+            return Value::Number(self.module.graph.coordinate(axis));
         }
         match self.names.get(self.scope.source, name).map(|global| global.kind.clone()) {
             Some(Kind::Value(value) | Kind::Solid(value)) => value,
+            Some(Kind::Scene) => {
+                let message = format!("`{name}` is a scene, not a value");
+                self.fail(Diagnostic::error(Code::WRONG_TYPE, span, message))
+            }
             Some(Kind::Function(_)) => {
                 let message = format!("`{name}` is a function");
                 self.fail(
@@ -261,14 +317,22 @@ impl<'a> Lowering<'a> {
                     Diagnostic::error(Code::NOT_A_FUNCTION, span, message).help(format!("write `{name}(…)`")),
                 )
             }
+            None if self.diagnostics.len() > MOST_SUGGESTIONS => {
+                self.fail(Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`")))
+            }
             None => {
                 let candidates = self.names.candidates(false);
                 let locals: Vec<String> = self.scope.locals.iter().map(|l| l.name.clone()).collect();
                 let all = candidates.iter().chain(&locals).map(String::as_str).chain(["x", "y", "z", "pi"]);
                 let diagnostic =
-                    Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"))
+                    Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"));
+                let diagnostic = match self.names.defined_later(name) {
+                    Some(later) => diagnostic
                         .at("not defined above")
-                        .suggest(name, all);
+                        .label(later, "defined here")
+                        .help("a name means what was defined above it: move this line down, or that one up"),
+                    None => diagnostic.at("not defined above").suggest(name, all),
+                };
                 self.fail(diagnostic)
             }
         }
@@ -325,7 +389,9 @@ impl<'a> Lowering<'a> {
                 let what = if op == Binary::Mul { "multiply" } else { "divide" };
                 let message = format!("cannot {what} {} by {}", a.describe(), b.describe());
                 let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
-                self.fail(diagnostic.help("`dot(a, b)` is the scalar product of two vectors"))
+                let vectors = matches!((a, b), (Value::Vector(_), Value::Vector(_)));
+                let help = "`dot(a, b)` is the scalar product of two vectors";
+                self.fail(if vectors { diagnostic.help(help) } else { diagnostic })
             }
         }
     }
@@ -371,9 +437,14 @@ impl<'a> Lowering<'a> {
     fn compare(&mut self, first: &Expr, rest: &[(Comparison, Span, Expr)], span: Span) -> Value {
         for (op, at, _) in rest {
             match op {
-                Comparison::Equal => {
+                Comparison::Equal | Comparison::NotEqual => {
+                    let message = if *op == Comparison::Equal {
+                        "`==` would be a surface of zero thickness"
+                    } else {
+                        "`!=` would leave out a surface of zero thickness"
+                    };
                     return self.fail(
-                        Diagnostic::error(Code::EQUALITY, *at, "`==` would be a surface of zero thickness")
+                        Diagnostic::error(Code::EQUALITY, *at, message)
                             .help("write a thin layer `-t <= a - b <= t`, or a half-space `a <= b`"),
                     );
                 }
@@ -462,6 +533,9 @@ impl<'a> Lowering<'a> {
                 whole,
                 format!("`{word}` over the single member {start}"),
             ));
+        }
+        if !self.may_be_local(variable) {
+            return Value::Failed;
         }
         let mut members = Vec::new();
         let mut index = start;

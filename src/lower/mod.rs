@@ -18,10 +18,10 @@ use std::sync::OnceLock;
 
 pub use scene::{Fill, Fluid, Method, Obstacle, Run, Scene};
 
-use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
+use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 use crate::ir::{Graph, Node};
 use crate::syntax::Ast;
-use crate::syntax::ast::{Definition, Item, Param};
+use crate::syntax::ast::{Definition, Function, Item, Name, Param};
 use eval::Lowering;
 use names::{Kind, RESERVED};
 use value::Value;
@@ -86,17 +86,37 @@ fn prelude() -> &'static Ast {
     })
 }
 
+/// Stack of the lowering thread: enough for the deepest evaluation in debug builds, whatever the caller's stack is.
+const STACK_BYTES: usize = 64 << 20;
+
 /// Lowers a file. The messages tell which items failed; the module holds the others.
 pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
+    std::thread::scope(|scope| {
+        let spawned = std::thread::Builder::new()
+            .name("rfm-lower".into())
+            .stack_size(STACK_BYTES)
+            .spawn_scoped(scope, || lower_here(ast, options));
+        match spawned.map(std::thread::ScopedJoinHandle::join) {
+            Ok(Ok(lowered)) => lowered,
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(_) => lower_here(ast, options), // no thread to be had
+        }
+    })
+}
+
+fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
     let mut lowering = Lowering::new(options.max_nodes);
     for item in &prelude().items {
         lowering.item(item, options);
     }
     lowering.scope.source = SourceId::File;
+    lowering.names.announce(ast.items.iter().map(Item::name));
     for item in &ast.items {
         lowering.item(item, options);
     }
-    lowering.unused();
+    if !lowering.diagnostics.iter().any(|d| d.severity == Severity::Error) {
+        lowering.unused(); // what failed may have been the use
+    }
     lowering.unknown_overrides(ast, options);
     (lowering.module, lowering.diagnostics)
 }
@@ -107,13 +127,19 @@ impl<'a> Lowering<'a> {
             Item::Param(param) => self.param(param, options),
             Item::Let(definition) => self.definition(definition),
             Item::Function(function) => {
-                if self.may_define(&function.name) {
+                if self.may_define(&function.name) && self.may_take(function) {
                     self.names.define(self.scope.source, &function.name, Kind::Function(function));
                 }
             }
             Item::Solid(definition) => self.solid(definition),
             Item::Scene(scene) => {
-                if let Some(scene) = self.scene(scene) {
+                let named = self.may_define(&scene.name);
+                if named {
+                    self.names.define(self.scope.source, &scene.name, Kind::Scene);
+                }
+                if let Some(scene) = self.scene(scene)
+                    && named
+                {
                     self.module.scenes.push(scene);
                 }
             }
@@ -140,7 +166,17 @@ impl<'a> Lowering<'a> {
             self.names.define(self.scope.source, &param.name, Kind::Value(Value::Failed));
             return;
         };
+        let mut fits = false;
         if let Some((low, high)) = range
+            && low > high
+            && let Some((first, last)) = &param.range
+        {
+            let message = format!("the range {low} .. {high} holds no number");
+            self.report(
+                Diagnostic::error(Code::OUT_OF_RANGE, first.span.to(last.span), message)
+                    .help(format!("write `{high} .. {low}`")),
+            );
+        } else if let Some((low, high)) = range
             && !(low <= value && value <= high)
         {
             let diagnostic = if overridden.is_some() {
@@ -155,11 +191,16 @@ impl<'a> Lowering<'a> {
             self.report(diagnostic);
         } else if !value.is_finite() {
             let message = format!("`{}` is {value}, which is not a finite number", param.name.text);
-            let code = if overridden.is_some() { Code::OVERRIDE } else { Code::OUT_OF_RANGE };
-            self.report(Diagnostic::error(code, param.name.span, message));
+            let (code, at) = match overridden {
+                Some(_) => (Code::OVERRIDE, param.name.span),
+                None => (Code::OUT_OF_RANGE, param.value.span),
+            };
+            self.report(Diagnostic::error(code, at, message));
+        } else {
+            fits = true;
         }
-        let node = self.module.graph.constant(value);
-        self.names.define(self.scope.source, &param.name, Kind::Value(Value::Number(node)));
+        let value_now = if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
+        self.names.define(self.scope.source, &param.name, Kind::Value(value_now));
         self.module.params.push(ParamValue {
             name: param.name.text.clone(),
             value,
@@ -189,13 +230,43 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// Reports a name that is taken or reserved.
-    fn may_define(&mut self, name: &crate::syntax::ast::Name) -> bool {
-        if RESERVED.contains(&name.text.as_str()) {
+    /// Reports parameters that share a name or have a reserved one.
+    fn may_take(&mut self, function: &Function) -> bool {
+        let mut fits = true;
+        for (i, parameter) in function.parameters.iter().enumerate() {
+            let name = &parameter.name;
+            fits &= self.may_be_local(name);
+            if let Some(first) = function.parameters[..i].iter().find(|p| p.name.text == name.text) {
+                let message = format!("`{}` has two parameters `{}`", function.name.text, name.text);
+                self.report(
+                    Diagnostic::error(Code::DUPLICATE_NAME, name.span, message)
+                        .label(first.name.span, "the first one"),
+                );
+                fits = false;
+            }
+        }
+        if !fits {
+            // calls of it would only repeat the message
+            self.names.define(self.scope.source, &function.name, Kind::Value(Value::Failed));
+        }
+        fits
+    }
+
+    /// Reports a reserved name of a parameter or of a fold's variable.
+    fn may_be_local(&mut self, name: &Name) -> bool {
+        let reserved = RESERVED.contains(&name.text.as_str());
+        if reserved {
             let message = format!("`{}` has a fixed meaning and cannot be defined", name.text);
             self.report(
                 Diagnostic::error(Code::RESERVED_NAME, name.span, message).help("choose another name"),
             );
+        }
+        !reserved
+    }
+
+    /// Reports a name that is taken or reserved.
+    fn may_define(&mut self, name: &Name) -> bool {
+        if !self.may_be_local(name) {
             return false;
         }
         if let Some(first) = self.names.defined_at(self.scope.source, &name.text) {

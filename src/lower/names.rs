@@ -14,6 +14,7 @@ pub(super) enum Kind<'a> {
     Value(Value),
     Solid(Value),
     Function(&'a Function),
+    Scene,
 }
 
 #[derive(Debug, Clone)]
@@ -29,12 +30,26 @@ pub(super) struct Global<'a> {
 pub(super) struct Names<'a> {
     prelude: HashMap<String, Global<'a>>,
     file: HashMap<String, Global<'a>>,
+    /// All names of the file, for messages about a name that is used too early.
+    all: HashMap<String, Span>,
 }
 
 impl<'a> Names<'a> {
     pub fn define(&mut self, source: SourceId, name: &Name, kind: Kind<'a>) {
         let global = Global { kind, span: name.span, source, used: false };
         self.table(source).insert(name.text.clone(), global);
+    }
+
+    /// Makes the names of a file known, before any of them is defined.
+    pub fn announce(&mut self, names: impl IntoIterator<Item = &'a Name>) {
+        for name in names {
+            self.all.entry(name.text.clone()).or_insert(name.span);
+        }
+    }
+
+    /// Where a name that is not defined yet will be.
+    pub fn defined_later(&self, name: &str) -> Option<Span> {
+        self.all.get(name).copied().filter(|_| !self.file.contains_key(name))
     }
 
     fn table(&mut self, source: SourceId) -> &mut HashMap<String, Global<'a>> {
@@ -65,7 +80,11 @@ impl<'a> Names<'a> {
 
     /// Names that can be written in the file, functions or values.
     pub fn candidates(&self, functions: bool) -> Vec<String> {
-        let fits = |g: &Global<'_>| matches!(g.kind, Kind::Function(_)) == functions;
+        let fits = |g: &Global<'_>| match g.kind {
+            Kind::Function(_) => functions,
+            Kind::Value(_) | Kind::Solid(_) => !functions,
+            Kind::Scene => false,
+        };
         let all = self.file.iter().chain(&self.prelude);
         let mut names: Vec<String> = all.filter(|(_, g)| fits(g)).map(|(name, _)| name.clone()).collect();
         names.sort_unstable();
@@ -81,7 +100,7 @@ impl<'a> Names<'a> {
             .filter_map(|(name, global)| match global.kind {
                 Kind::Value(_) => Some((name.clone(), "the name", global.span)),
                 Kind::Function(_) => Some((name.clone(), "the function", global.span)),
-                Kind::Solid(_) => None,
+                Kind::Solid(_) | Kind::Scene => None,
             })
             .collect();
         unused.sort_by_key(|(_, _, span)| span.start);

@@ -98,6 +98,8 @@ pub struct Run {
 }
 
 const SCENE_KEYS: [&str; 7] = ["units", "box", "fluid", "obstacle", "gravity", "method", "run"];
+/// Keys that open a block; all others have a value.
+const BLOCKS: [&str; 4] = ["box", "fluid", "obstacle", "run"];
 const BOX_KEYS: [&str; 3] = ["min", "max", "restitution"];
 const FLUID_KEYS: [&str; 13] = [
     "shape",
@@ -169,6 +171,9 @@ impl<'a> Lowering<'a> {
     }
 
     fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
+        if block.entries.iter().any(|entry| entry.key().text == key) {
+            return; // there, but of the wrong form, which was reported
+        }
         let message = format!("{} needs `{key}`", block.what);
         self.report(Diagnostic::error(Code::SCENE_MISSING, block.span, message).help(help));
     }
@@ -190,6 +195,15 @@ impl<'a> Lowering<'a> {
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
                 self.report(diagnostic);
+            } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
+                let (is, form) = match entry {
+                    Entry::Block { .. } => ("has a value", format!("{}: …", key.text)),
+                    Entry::Setting { .. } => ("is a block", format!("{} {{ … }}", key.text)),
+                };
+                let message = format!("`{}` {is}", key.text);
+                self.report(
+                    Diagnostic::error(Code::SCENE_KEY, key.span, message).help(format!("write `{form}`")),
+                );
             } else if let Some(first) = entries[..i].iter().find(|e| e.key().text == key.text)
                 && !repeatable.contains(&key.text.as_str())
             {

@@ -52,7 +52,7 @@ impl Lowering<'_> {
     }
 
     fn wrong_arguments(&self, method: &Name, parameters: &[&str], span: Span) -> Diagnostic {
-        let message = format!("`.{}` takes ({})", method.text, parameters.join(", "));
+        let message = format!("the arguments of `.{}` are ({})", method.text, parameters.join(", "));
         Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message)
     }
 
@@ -112,10 +112,13 @@ impl Lowering<'_> {
         if let Some(bad) = factors.iter().find(|f| !(f.is_finite() && **f > 0.0)) {
             let message = format!("a scale factor must be positive, found {bad}");
             let at = self.user_span(at);
-            self.report(
-                Diagnostic::error(Code::OUT_OF_RANGE, at, message)
-                    .help("`.mirror(normal)` turns a shape over"),
-            );
+            let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, at, message);
+            let mirrored = *bad < 0.0;
+            self.report(if mirrored {
+                diagnostic.help("`.mirror(normal)` turns a shape over")
+            } else {
+                diagnostic
+            });
             return None;
         }
         let q = std::array::from_fn(|i| {

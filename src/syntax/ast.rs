@@ -158,8 +158,9 @@ pub enum Comparison {
     /// `<`: read as `<=`, with a hint.
     Less,
     Greater,
-    /// `==` or `!=`: always an error, kept for its message.
+    /// `==` and `!=`: always errors, kept for their messages.
     Equal,
+    NotEqual,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,4 +173,77 @@ pub enum AddOp {
 pub enum MulOp {
     Multiply,
     Divide,
+}
+
+impl Item {
+    pub fn name(&self) -> &Name {
+        match self {
+            Self::Param(param) => &param.name,
+            Self::Let(definition) | Self::Solid(definition) => &definition.name,
+            Self::Function(function) => &function.name,
+            Self::Scene(scene) => &scene.name,
+        }
+    }
+
+    /// The place in its expressions that lies deeper than so many levels, if there is one.
+    pub fn deeper_than(&self, levels: usize) -> Option<Span> {
+        match self {
+            Self::Param(param) => {
+                let range = param.range.iter().flat_map(|(low, high)| [low, high]);
+                deepest(range.chain([&param.value]), levels)
+            }
+            Self::Let(definition) | Self::Solid(definition) => definition.value.deeper_than(levels),
+            Self::Function(function) => {
+                let defaults = function.parameters.iter().filter_map(|p| p.default.as_ref());
+                deepest(defaults.chain([&function.body]), levels)
+            }
+            Self::Scene(scene) => scene.entries.iter().find_map(|entry| entry.deeper_than(levels)),
+        }
+    }
+}
+
+impl Entry {
+    /// Blocks nest no deeper than brackets may, which the parser has seen to.
+    fn deeper_than(&self, levels: usize) -> Option<Span> {
+        match self {
+            Self::Setting { value, .. } => value.deeper_than(levels),
+            Self::Block { entries, .. } => entries.iter().find_map(|entry| entry.deeper_than(levels)),
+        }
+    }
+}
+
+impl Expr {
+    fn deeper_than(&self, levels: usize) -> Option<Span> {
+        if levels == 0 { Some(self.span) } else { deepest(self.children(), levels - 1) }
+    }
+
+    /// The expressions that this one is made of, in the order in which they are written.
+    pub fn children(&self) -> Vec<&Self> {
+        match &self.kind {
+            ExprKind::Number(_) | ExprKind::Quantity { .. } | ExprKind::Text(_) | ExprKind::Name(_) => vec![],
+            ExprKind::Vector(parts) | ExprKind::Logic { operands: parts, .. } => parts.iter().collect(),
+            ExprKind::Not(inner) | ExprKind::Negate(inner) | ExprKind::Component { vector: inner, .. } => {
+                vec![inner]
+            }
+            ExprKind::Compare { first, rest } => {
+                std::iter::once(&**first).chain(rest.iter().map(|(_, _, e)| e)).collect()
+            }
+            ExprKind::Sum { first, rest } => {
+                std::iter::once(&**first).chain(rest.iter().map(|(_, e)| e)).collect()
+            }
+            ExprKind::Product { first, rest } => {
+                std::iter::once(&**first).chain(rest.iter().map(|(_, e)| e)).collect()
+            }
+            ExprKind::Power { base, exponent } => vec![base, exponent],
+            ExprKind::Call { arguments, .. } => arguments.iter().map(|a| &a.value).collect(),
+            ExprKind::Method { receiver, arguments, .. } => {
+                std::iter::once(&**receiver).chain(arguments.iter().map(|a| &a.value)).collect()
+            }
+            ExprKind::Fold { start, end, body, .. } => vec![start, end, body],
+        }
+    }
+}
+
+fn deepest<'a>(exprs: impl IntoIterator<Item = &'a Expr>, levels: usize) -> Option<Span> {
+    exprs.into_iter().find_map(|expr| expr.deeper_than(levels))
 }

@@ -5,25 +5,27 @@
 
 use pest::iterators::{Pair, Pairs};
 
+use std::cell::Cell;
+
 use super::ast::{
     AddOp, Argument, Ast, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic, MulOp, Name,
     Param, Parameter, Scene,
 };
-use super::parse::{EDITION, Rule};
+use super::parse::{DEEPEST_TREE, EDITION, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
 
 type Node<'i> = Pair<'i, Rule>;
 
 /// A whole file, with its version line checked.
 pub(super) fn file(source: &Source, pairs: Pairs<'_, Rule>, diagnostics: &mut Vec<Diagnostic>) -> Ast {
-    let builder = Builder { source: source.id, offset: 0 };
+    let builder = Builder { source: source.id, offset: 0, cut: Cell::new(None) };
     let mut version = None;
-    let mut ast = Ast::default();
+    let mut items = Vec::new();
     for pair in pairs.flat_map(Pair::into_inner) {
         match pair.as_rule() {
             Rule::version => version = Some(pair),
             Rule::EOI => {}
-            _ => ast.items.push(builder.item(pair)),
+            _ => items.extend(builder.whole_item(pair, diagnostics)),
         }
     }
     match version {
@@ -47,22 +49,49 @@ pub(super) fn file(source: &Source, pairs: Pairs<'_, Rule>, diagnostics: &mut Ve
         }
         None => {}
     }
-    ast
+    Ast { items }
 }
 
 /// Items of a piece of a file that begins `offset` bytes into it.
-pub(super) fn items(source: &Source, offset: usize, pairs: Pairs<'_, Rule>) -> Vec<Item> {
-    let builder = Builder { source: source.id, offset };
+pub(super) fn items(
+    source: &Source,
+    offset: usize,
+    pairs: Pairs<'_, Rule>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<Item> {
+    let builder = Builder { source: source.id, offset, cut: Cell::new(None) };
     pairs
         .flat_map(Pair::into_inner)
         .filter(|pair| pair.as_rule() != Rule::EOI)
-        .map(|pair| builder.item(pair))
+        .filter_map(|pair| builder.whole_item(pair, diagnostics))
         .collect()
 }
+
+/// The children of a pair that mean something: punctuation is there for the messages only.
+fn parts(pair: Node<'_>) -> impl Iterator<Item = Node<'_>> {
+    pair.into_inner().filter(|part| {
+        !matches!(
+            part.as_rule(),
+            Rule::equals
+                | Rule::colon
+                | Rule::dots
+                | Rule::open
+                | Rule::close
+                | Rule::close_vector
+                | Rule::open_brace
+                | Rule::close_brace
+        )
+    })
+}
+
+/// Links of one chain of powers or methods: each is one level of the tree.
+const LONGEST_CHAIN: usize = 100;
 
 struct Builder {
     source: SourceId,
     offset: usize,
+    /// Where a chain became longer than [`LONGEST_CHAIN`]; its rest was left out.
+    cut: Cell<Option<Span>>,
 }
 
 impl Builder {
@@ -80,12 +109,25 @@ impl Builder {
         }
     }
 
+    /// The item, unless it is nested too deeply for the stages to come.
+    fn whole_item(&self, pair: Node<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Item> {
+        let item = self.item(pair);
+        let Some(span) = self.cut.take().or_else(|| item.deeper_than(DEEPEST_TREE)) else {
+            return Some(item);
+        };
+        diagnostics.push(
+            Diagnostic::error(Code::TOO_DEEP, span, "the expression is nested too deeply")
+                .help("name a part with `let`"),
+        );
+        None
+    }
+
     fn item(&self, pair: Node<'_>) -> Item {
         let rule = pair.as_rule();
         if rule == Rule::scene {
             return Item::Scene(self.scene(pair));
         }
-        let mut inner = pair.into_inner();
+        let mut inner = parts(pair);
         inner.next(); // the keyword
         let name = self.name(inner.next());
         match rule {
@@ -96,12 +138,12 @@ impl Builder {
         }
     }
 
-    fn param(&self, name: Name, mut inner: Pairs<'_, Rule>) -> Item {
+    fn param<'i>(&self, name: Name, mut inner: impl Iterator<Item = Node<'i>>) -> Item {
         let value = self.expr_or_zero(inner.next());
         let (mut range, mut doc) = (None, None);
         for pair in inner {
             if pair.as_rule() == Rule::param_range {
-                let mut bounds = pair.into_inner().filter(|p| p.as_rule() == Rule::sum);
+                let mut bounds = parts(pair).filter(|p| p.as_rule() == Rule::sum);
                 if let (Some(low), Some(high)) = (bounds.next(), bounds.next()) {
                     range = Some((self.sum(low), self.sum(high)));
                 }
@@ -112,12 +154,12 @@ impl Builder {
         Item::Param(Param { name, value, range, doc })
     }
 
-    fn function(&self, name: Name, inner: Pairs<'_, Rule>) -> Item {
+    fn function<'i>(&self, name: Name, inner: impl Iterator<Item = Node<'i>>) -> Item {
         let mut parameters = Vec::new();
         let mut body = None;
         for pair in inner {
             if pair.as_rule() == Rule::parameter {
-                let mut inner = pair.into_inner();
+                let mut inner = parts(pair);
                 let name = self.name(inner.next());
                 parameters.push(Parameter { name, default: inner.next().map(|e| self.expr(e)) });
             } else {
@@ -129,7 +171,7 @@ impl Builder {
 
     fn scene(&self, pair: Node<'_>) -> Scene {
         let span = self.span(&pair);
-        let mut inner = pair.into_inner();
+        let mut inner = parts(pair);
         inner.next();
         let name = self.name(inner.next());
         Scene { name, entries: inner.map(|e| self.entry(e)).collect(), span }
@@ -138,7 +180,7 @@ impl Builder {
     fn entry(&self, pair: Node<'_>) -> Entry {
         let span = self.span(&pair);
         let is_block = pair.as_rule() == Rule::block;
-        let mut inner = pair.into_inner().peekable();
+        let mut inner = parts(pair).peekable();
         let key = self.name(inner.next());
         if !is_block {
             return Entry::Setting { key, value: self.expr_or_zero(inner.next()) };
@@ -156,7 +198,7 @@ impl Builder {
 
     /// Runs of one operator become one n-ary node; where the operator changes, the run so far is its operand.
     fn expr(&self, pair: Node<'_>) -> Expr {
-        let operands = pair.into_inner().filter(|p| p.as_rule() == Rule::conjunction);
+        let operands = parts(pair).filter(|p| p.as_rule() == Rule::conjunction);
         let operands: Vec<_> = operands.map(|p| self.conjunction(p)).collect();
         logic(Logic::Or, operands)
     }
@@ -165,7 +207,7 @@ impl Builder {
         let mut run: Vec<Expr> = Vec::new();
         let mut run_op = Logic::And;
         let mut next_op = Logic::And;
-        for pair in pair.into_inner() {
+        for pair in parts(pair) {
             match pair.as_rule() {
                 Rule::and_op => next_op = Logic::And,
                 Rule::minus_op => next_op = Logic::Minus,
@@ -181,27 +223,32 @@ impl Builder {
         logic(run_op, run)
     }
 
+    /// An even number of `not`s cancels: the negation of ω is exact.
     fn negation(&self, pair: Node<'_>) -> Expr {
         let span = self.span(&pair);
-        let mut nots: Vec<Span> = Vec::new();
+        let (mut first, mut odd) = (None, false);
         let mut operand = None;
-        for pair in pair.into_inner() {
+        for pair in parts(pair) {
             if pair.as_rule() == Rule::not_op {
-                nots.push(self.span(&pair));
+                first.get_or_insert(self.span(&pair));
+                odd = !odd;
             } else {
                 operand = Some(self.comparison(pair));
             }
         }
         let operand = operand.unwrap_or(Expr { kind: ExprKind::Number(0.0), span });
-        nots.into_iter().rev().fold(operand, |inner, not| {
-            let span = not.to(inner.span);
-            Expr { kind: ExprKind::Not(Box::new(inner)), span }
-        })
+        match first {
+            Some(not) if odd => {
+                let span = not.to(operand.span);
+                Expr { kind: ExprKind::Not(Box::new(operand)), span }
+            }
+            _ => operand,
+        }
     }
 
     fn comparison(&self, pair: Node<'_>) -> Expr {
         let span = self.span(&pair);
-        let mut inner = pair.into_inner();
+        let mut inner = parts(pair);
         let first = inner.next().map_or(Expr { kind: ExprKind::Number(0.0), span }, |p| self.sum(p));
         let mut rest = Vec::new();
         while let (Some(op), Some(operand)) = (inner.next(), inner.next()) {
@@ -210,6 +257,7 @@ impl Builder {
                 ">=" | "≥" | "=>" => Comparison::GreaterEqual,
                 "<" => Comparison::Less,
                 ">" => Comparison::Greater,
+                "!=" => Comparison::NotEqual,
                 _ => Comparison::Equal,
             };
             rest.push((comparison, self.span(&op), self.sum(operand)));
@@ -222,7 +270,7 @@ impl Builder {
 
     fn sum(&self, pair: Node<'_>) -> Expr {
         let span = self.span(&pair);
-        let mut inner = pair.into_inner();
+        let mut inner = parts(pair);
         let first = inner.next().map_or(Expr { kind: ExprKind::Number(0.0), span }, |p| self.product(p));
         let mut rest = Vec::new();
         while let (Some(op), Some(operand)) = (inner.next(), inner.next()) {
@@ -237,7 +285,7 @@ impl Builder {
 
     fn product(&self, pair: Node<'_>) -> Expr {
         let span = self.span(&pair);
-        let mut inner = pair.into_inner();
+        let mut inner = parts(pair);
         let first = inner.next().map_or(Expr { kind: ExprKind::Number(0.0), span }, |p| self.signed(p));
         let mut rest = Vec::new();
         while let (Some(op), Some(operand)) = (inner.next(), inner.next()) {
@@ -255,7 +303,7 @@ impl Builder {
         let span = self.span(&pair);
         let mut negative = false;
         let mut operand = None;
-        for pair in pair.into_inner() {
+        for pair in parts(pair) {
             match pair.as_rule() {
                 Rule::sign_op => negative ^= pair.as_str() != "+",
                 Rule::power => operand = Some(self.power(pair)),
@@ -268,10 +316,16 @@ impl Builder {
 
     /// a^b^c is a^(b^c).
     fn power(&self, pair: Node<'_>) -> Expr {
-        let mut inner = pair.into_inner();
+        let mut inner = parts(pair);
         let Some(base) = inner.next() else { return self.expr_or_zero(None) };
         let mut operands = vec![self.postfix(base)];
-        operands.extend(inner.map(|p| self.signed(p)));
+        for pair in inner {
+            if operands.len() > LONGEST_CHAIN {
+                self.cut.set(Some(self.span(&pair)));
+                break;
+            }
+            operands.push(self.signed(pair));
+        }
         let exponents = operands.split_off(1);
         let exponent = exponents.into_iter().rev().reduce(|exponent, base| raised(base, exponent));
         let base = operands.remove(0);
@@ -282,10 +336,14 @@ impl Builder {
     }
 
     fn postfix(&self, pair: Node<'_>) -> Expr {
-        let mut inner = pair.into_inner();
+        let mut inner = parts(pair);
         let Some(primary) = inner.next() else { return self.expr_or_zero(None) };
         let mut result = self.primary(primary);
-        for pair in inner {
+        for (link, pair) in inner.enumerate() {
+            if link >= LONGEST_CHAIN {
+                self.cut.set(Some(self.span(&pair)));
+                break;
+            }
             let span = result.span.to(self.span(&pair));
             let kind = if pair.as_rule() == Rule::superscript {
                 let exponent = if pair.as_str() == "²" { 2.0 } else { 3.0 };
@@ -299,7 +357,7 @@ impl Builder {
                 };
                 ExprKind::Component { vector: Box::new(result), axis }
             } else {
-                let mut inner = pair.into_inner();
+                let mut inner = parts(pair);
                 let method = self.name(inner.next());
                 ExprKind::Method {
                     receiver: Box::new(result),
@@ -317,20 +375,20 @@ impl Builder {
         let kind = match pair.as_rule() {
             Rule::number => ExprKind::Number(number(pair.as_str())),
             Rule::quantity => {
-                let mut inner = pair.into_inner();
+                let mut inner = parts(pair);
                 let value = inner.next().map_or(0.0, |p| number(p.as_str()));
                 ExprKind::Quantity { value, unit: self.name(inner.next()) }
             }
             Rule::text => ExprKind::Text(text_of(pair)),
-            Rule::vector => ExprKind::Vector(pair.into_inner().map(|p| self.expr(p)).collect()),
+            Rule::vector => ExprKind::Vector(parts(pair).map(|p| self.expr(p)).collect()),
             Rule::name => ExprKind::Name(pair.as_str().to_string()),
             Rule::group => {
                 // the brackets belong to the span, not to the tree: grouping is the tree's own shape
-                let inner = self.expr_or_zero(pair.into_inner().next());
+                let inner = self.expr_or_zero(parts(pair).next());
                 return Expr { span, ..inner };
             }
             Rule::call => {
-                let mut inner = pair.into_inner();
+                let mut inner = parts(pair);
                 let function = self.name(inner.next());
                 ExprKind::Call { function, arguments: self.arguments(inner.next()) }
             }
@@ -342,16 +400,16 @@ impl Builder {
     fn arguments(&self, pair: Option<Node<'_>>) -> Vec<Argument> {
         let Some(pair) = pair else { return Vec::new() };
         let argument = |pair: Node<'_>| {
-            let mut inner = pair.into_inner().peekable();
+            let mut inner = parts(pair).peekable();
             let name = inner.next_if(|p| p.as_rule() == Rule::name).map(|p| self.name(Some(p)));
             Argument { name, value: self.expr_or_zero(inner.next()) }
         };
-        pair.into_inner().map(argument).collect()
+        parts(pair).map(argument).collect()
     }
 
     fn fold(&self, pair: Node<'_>) -> Expr {
         let span = self.span(&pair);
-        let mut inner = pair.into_inner().filter(|p| p.as_rule() != Rule::kw_in);
+        let mut inner = parts(pair).filter(|p| p.as_rule() != Rule::kw_in);
         let op = match inner.next().map(|p| p.as_rule()) {
             Some(Rule::kw_all) => Logic::And,
             _ => Logic::Or,

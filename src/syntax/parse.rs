@@ -18,10 +18,16 @@ pub const EDITION: u32 = 1;
 /// Brackets nested deeper than this are refused: beyond what a person writes, and well inside the stack.
 const DEEPEST_NESTING: usize = 200;
 
+/// Levels of an expression's tree, at most: what the recursive stages can take on any stack.
+pub(super) const DEEPEST_TREE: usize = 500;
+
 /// Stack of the parsing thread: the same limit on every platform, enough for [`DEEPEST_NESTING`] in debug builds.
 const STACK_BYTES: usize = 32 << 20;
 
 const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"];
+
+const KEYWORDS: [&str; 12] =
+    ["param", "let", "fn", "solid", "scene", "import", "and", "or", "not", "any", "all", "in"];
 
 /// Parses a text. Items that fit the grammar are returned even if others do not; the messages tell which.
 pub fn parse(source: &Source) -> (Ast, Vec<Diagnostic>) {
@@ -36,7 +42,7 @@ pub fn parse(source: &Source) -> (Ast, Vec<Diagnostic>) {
     let scan = Scan::of(&source.text);
     if let Some(at) = scan.too_deep {
         let span = Span::new(source.id, at, at + 1);
-        let message = format!("brackets nested more than {DEEPEST_NESTING} deep");
+        let message = format!("brackets and folds nested more than {DEEPEST_NESTING} deep");
         let diagnostic = Diagnostic::error(Code::TOO_DEEP, span, message).help("name a part with `let`");
         return (Ast::default(), vec![diagnostic]);
     }
@@ -75,7 +81,7 @@ fn recover(source: &Source, scan: &Scan, diagnostics: &mut Vec<Diagnostic>) -> A
         let rule = if i == 0 { Rule::file } else { Rule::items };
         match Grammar::parse(rule, &text[start..end]) {
             Ok(pairs) if i == 0 => ast.items.extend(build::file(source, pairs, diagnostics).items),
-            Ok(pairs) => ast.items.extend(build::items(source, start, pairs)),
+            Ok(pairs) => ast.items.extend(build::items(source, start, pairs, diagnostics)),
             Err(error) => diagnostics.push(syntax_error(source, start, end, &error)),
         }
     }
@@ -98,10 +104,21 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     let at = if at >= end { source.text[..end].trim_end().len().max(start.min(end)) } else { at };
     let found = token_at(&source.text, at, end);
     let span = Span::new(source.id, at, at + found.len());
+    let expects_name = matches!(&error.variant, ErrorVariant::ParsingError { positives, .. }
+        if positives.contains(&Rule::name) && !positives.contains(&Rule::number));
+    if expects_name && KEYWORDS.contains(&found) && !ITEM_WORDS.contains(&found) {
+        let message = format!("`{found}` is a word of the language and cannot be a name");
+        return Diagnostic::error(Code::SYNTAX, span, message).help("choose another name");
+    }
     if let Some(diagnostic) = familiar_slip(source, at, found, span) {
         return diagnostic;
     }
-    let what = if found.is_empty() { "the end of the item".to_string() } else { format!("`{found}`") };
+    let strange = source.text[at..end.max(at)].chars().next().filter(|c| c.is_control() && found.is_empty());
+    let what = match strange {
+        Some(c) if !c.is_whitespace() => format!("character U+{:04X}", c as u32),
+        _ if found.is_empty() => "end of the item".to_string(),
+        _ => format!("`{found}`"),
+    };
     let expected = match &error.variant {
         ErrorVariant::ParsingError { positives, .. } => expectation(positives),
         ErrorVariant::CustomError { message } if message.contains("stack limit") => {
@@ -118,14 +135,16 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
 fn familiar_slip(source: &Source, at: usize, found: &str, span: Span) -> Option<Diagnostic> {
     let before = source.text[..at].trim_end_matches([' ', '\t']);
     let is_word = found.chars().next().is_some_and(char::is_alphabetic);
-    if is_word && before.ends_with(|c: char| c.is_ascii_digit()) && number_ends(before) {
+    let called = source.text[at + found.len()..].starts_with('(');
+    if is_word && !called && before.ends_with(|c: char| c.is_ascii_digit()) && number_ends(before) {
         const UNITS: [&str; 14] =
             ["m", "mm", "cm", "km", "s", "ms", "min", "kg", "g", "N", "Pa", "J", "deg", "rad"];
-        return Some(
+        let number = &before[before.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len()..];
+        let unknown =
             Diagnostic::error(Code::UNKNOWN_UNIT, span, format!("unknown unit `{found}` after a number"))
                 .at("not a unit")
-                .suggest(found, UNITS),
-        );
+                .help(format!("a word after a number is its unit; to multiply, write `{number}*{found}`"));
+        return Some(unknown.suggest(found, UNITS.into_iter().filter(|_| found.chars().count() > 1)));
     }
     if found == "import" {
         return Some(
@@ -147,13 +166,24 @@ fn familiar_slip(source: &Source, at: usize, found: &str, span: Span) -> Option<
                 .help("items start with `param`, `let`, `fn`, `solid` or `scene`"),
         );
     }
-    if found == "=" && before.ends_with('=') {
-        return Some(
-            Diagnostic::error(Code::EQUALITY, span, "`==` would be a surface of zero thickness")
-                .help("write a thin layer `-t <= a - b <= t`, or a half-space `a <= b`"),
-        );
+    let after = &source.text[at + found.len()..];
+    let syntax = |message: &str| Diagnostic::error(Code::SYNTAX, span, message);
+    match found {
+        "=" if !ITEM_WORDS.iter().any(|word| before.ends_with(word)) => Some(
+            Diagnostic::error(Code::EQUALITY, span, "`=` does not compare")
+                .help("write `<=` or `>=`: each makes the part of space on one side of a surface"),
+        ),
+        "*" if before.ends_with('*') => Some(syntax("unexpected `*`").help("a power is written `x^2`")),
+        "," if before.ends_with(|c: char| c.is_ascii_digit())
+            && number_ends(before)
+            && after.starts_with(|c: char| c.is_ascii_digit()) =>
+        {
+            Some(syntax("unexpected `,`").help("decimals are written with a point: `0.5`"))
+        }
+        ";" => Some(syntax("unexpected `;`").help("leave it out: an item ends where the next one begins")),
+        "\"" => Some(syntax("the text is not closed").help("a text ends with `\"` on its own line")),
+        _ => None,
     }
-    None
 }
 
 /// Whether the text ends in a number rather than in a name such as `r2`.
@@ -182,24 +212,40 @@ fn token_at(text: &str, at: usize, end: usize) -> &str {
 /// Rule names in the words of the language, each said once.
 fn expectation(rules: &[Rule]) -> String {
     let mut words: Vec<&str> = Vec::new();
+    let mut add = |word| {
+        if !words.contains(&word) {
+            words.push(word);
+        }
+    };
+    let may_end = rules.contains(&Rule::EOI);
+    // what must come stands before what may come
     for rule in rules {
-        let word = match rule {
+        match rule {
+            Rule::equals => add("`=`"),
+            Rule::colon => add("`:`"),
+            Rule::dots => add("`..`"),
+            Rule::open => add("`(`"),
+            Rule::close => add("`)`"),
+            Rule::close_vector => add("`]`"),
+            Rule::open_brace => add("`{`"),
+            Rule::close_brace => add("`}`"),
+            Rule::kw_in if !may_end => add("`in`"),
+            Rule::version => add("`rfm 1`"),
+            Rule::edition => add("the edition of the language, as in `rfm 1`"),
+            Rule::axis => add("`x`, `y`, `z` or the name of a method"),
+            Rule::text_body => add("a text"),
+            _ => {}
+        }
+    }
+    let axis = rules.contains(&Rule::axis);
+    for rule in rules {
+        match rule {
             Rule::or_op | Rule::and_op | Rule::minus_op | Rule::compare_op | Rule::add_op | Rule::mul_op => {
-                "an operator"
+                add("an operator");
             }
-            Rule::superscript | Rule::method | Rule::component => continue,
-            Rule::kw_param | Rule::kw_let | Rule::kw_fn | Rule::kw_solid | Rule::kw_scene => "an item",
-            Rule::param | Rule::let_item | Rule::fn_item | Rule::solid | Rule::scene => "an item",
-            Rule::name => "a name",
-            Rule::key | Rule::block | Rule::setting => "a key",
+            Rule::name | Rule::parameter if !axis && !rules.contains(&Rule::number) => add("a name"),
+            Rule::key | Rule::block | Rule::setting => add("a key"),
             Rule::number
-            | Rule::quantity
-            | Rule::text
-            | Rule::vector
-            | Rule::call
-            | Rule::group
-            | Rule::fold
-            | Rule::not_op
             | Rule::sign_op
             | Rule::expr
             | Rule::conjunction
@@ -208,24 +254,11 @@ fn expectation(rules: &[Rule]) -> String {
             | Rule::sum
             | Rule::product
             | Rule::signed
-            | Rule::power
-            | Rule::postfix
             | Rule::exponent
-            | Rule::argument
-            | Rule::arguments
-            | Rule::kw_any
-            | Rule::kw_all
-            | Rule::kw_not => "an expression",
-            Rule::kw_in | Rule::param_range => "`in`",
-            Rule::kw_and | Rule::kw_or => "an operator",
-            Rule::unit => "a unit",
-            Rule::version => "`rfm 1`",
-            Rule::parameter => "a parameter",
-            Rule::EOI => "the end of the item",
-            _ => continue,
-        };
-        if !words.contains(&word) {
-            words.push(word);
+            | Rule::postfix => add("an expression"),
+            Rule::unit if !may_end => add("a unit"),
+            Rule::EOI => add("the next item"),
+            _ => {}
         }
     }
     match words.split_last() {
@@ -245,11 +278,14 @@ struct Scan {
 impl Scan {
     fn of(text: &str) -> Self {
         let mut scan = Self { too_deep: None, items: Vec::new() };
-        let (mut depth, mut braces) = (0usize, 0usize);
+        let mut nesting = Nesting::default();
         let mut line_blank = true;
+        let mut in_word = false;
         let mut chars = text.char_indices();
         while let Some((at, c)) = chars.next() {
             let comment = c == '#' || text[at..].starts_with("//");
+            let word_starts = !in_word && (c.is_alphabetic() || c == '_');
+            in_word = c.is_alphanumeric() || c == '_';
             match c {
                 '\n' => {
                     line_blank = true;
@@ -271,29 +307,62 @@ impl Scan {
                         }
                     }
                 }
-                '(' | '[' | '{' => {
-                    depth += 1;
-                    braces += usize::from(c == '{');
-                    if depth > DEEPEST_NESTING && scan.too_deep.is_none() {
-                        scan.too_deep = Some(at);
-                    }
-                }
-                ')' | ']' | '}' => {
-                    depth = depth.saturating_sub(1);
-                    braces = braces.saturating_sub(usize::from(c == '}'));
-                }
-                c if line_blank && c.is_alphabetic() && braces == 0 => {
+                '(' | '[' | '{' => nesting.open(c == '{'),
+                ')' | ']' | '}' => nesting.close(c == '}'),
+                ',' => nesting.next_part(),
+                _ if word_starts => {
                     let word = token_at(text, at, text.len());
-                    if ITEM_WORDS.contains(&word) {
+                    if line_blank && nesting.braces == 0 && ITEM_WORDS.contains(&word) {
                         scan.items.push(at);
-                        depth = 0; // an unclosed bracket of the item above is that item's error
+                        nesting = Nesting::default(); // an unclosed bracket of the item above is that item's error
+                    } else if word == "any" || word == "all" {
+                        nesting.fold();
                     }
                 }
                 _ => {}
             }
+            if nesting.depth() > DEEPEST_NESTING && scan.too_deep.is_none() {
+                scan.too_deep = Some(at);
+            }
             line_blank &= c.is_whitespace();
         }
         scan
+    }
+}
+
+/// How deep a place in the text lies: in brackets, and in folds, which take everything to their right.
+#[derive(Default)]
+struct Nesting {
+    /// Folds begun outside of all brackets.
+    outside: usize,
+    /// Folds begun in each open bracket.
+    brackets: Vec<usize>,
+    folds: usize,
+    braces: usize,
+}
+
+impl Nesting {
+    fn depth(&self) -> usize {
+        self.brackets.len() + self.folds
+    }
+
+    fn open(&mut self, brace: bool) {
+        self.brackets.push(0);
+        self.braces += usize::from(brace);
+    }
+
+    fn close(&mut self, brace: bool) {
+        self.folds -= self.brackets.pop().unwrap_or(0);
+        self.braces = self.braces.saturating_sub(usize::from(brace));
+    }
+
+    fn fold(&mut self) {
+        self.folds += 1;
+        *self.brackets.last_mut().unwrap_or(&mut self.outside) += 1;
+    }
+
+    fn next_part(&mut self) {
+        self.folds -= std::mem::take(self.brackets.last_mut().unwrap_or(&mut self.outside));
     }
 }
 

@@ -60,6 +60,7 @@ struct Document<'a> {
 }
 
 pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
+    options.output.as_deref().map(output::Picture::of).transpose()?;
     let program = input::program(shared, &options.file)?;
     let reference = choose::solid(shared, &program, options.solid.as_deref())?;
     let over = domain(&program, &reference)?;
@@ -242,7 +243,7 @@ fn range_row(solid: &Solid, points: &Points) -> Row {
     Row {
         program: "range",
         precision: "f64",
-        engine: "interp",
+        engine: if solid.is_compiled() { "jit" } else { "interp" },
         form: "stable",
         shape: "one",
         ns_per_point: ns,

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::super::Failure;
+use super::super::{Failure, output};
 use super::Row;
 use crate::slice;
 
@@ -20,18 +20,13 @@ const LEAST_ERROR: f64 = 1e-17;
 /// The plot as SVG or PNG, as the ending of the path says.
 pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
     let svg = svg(solid, rows);
-    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    match ending.as_str() {
-        "svg" => Ok(svg.into_bytes()),
-        "png" => {
+    match output::Picture::of(path)? {
+        output::Picture::Svg => Ok(svg.into_bytes()),
+        output::Picture::Png => {
             let mut bytes = Vec::new();
             slice::rasterise(&svg, 2.0, &mut bytes).map_err(Failure::usage)?;
             Ok(bytes)
         }
-        _ => Err(Failure::Usage(format!(
-            "cannot tell the picture format of `{}`: the ending must be .svg or .png",
-            path.display()
-        ))),
     }
 }
 

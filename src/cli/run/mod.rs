@@ -9,7 +9,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use anstream::println;
 use serde::Serialize;
 
 use super::args::{Run, Shared};
@@ -134,14 +133,14 @@ fn dry_run(simulation: &mut Simulation<'_>, setup: &Setup, steps: u64) -> Result
     let stats = simulation.stats();
     // state and sorted copy of every particle, its forces, and four bytes for each neighbour
     let bytes = simulation.particles().len() as f64 * (300.0 + 4.0 * stats.neighbours_per_particle);
-    println!("particles     {}", stats.particles);
-    println!("spacing       {:.4} m", setup.parameters.spacing());
-    println!("neighbours    {:.1} per particle", stats.neighbours_per_particle);
-    println!("time step     {:.3e} s ({})", setup.parameters.time_step, setup.time_step_reason);
-    println!("steps         {steps}");
-    println!("passes        {}", pass_names(simulation).join(", "));
-    println!("memory        about {:.0} MiB", bytes / f64::from(1 << 20));
-    println!(
+    say!("particles     {}", stats.particles);
+    say!("spacing       {:.4} m", setup.parameters.spacing());
+    say!("neighbours    {:.1} per particle", stats.neighbours_per_particle);
+    say!("time step     {:.3e} s ({})", setup.parameters.time_step, setup.time_step_reason);
+    say!("steps         {steps}");
+    say!("passes        {}", pass_names(simulation).join(", "));
+    say!("memory        about {:.0} MiB", bytes / f64::from(1 << 20));
+    say!(
         "time          about {:.0} s ({:.2} ms per step, without frames)",
         per_step * steps as f64,
         per_step * 1e3
@@ -230,25 +229,33 @@ impl Watch {
 }
 
 fn print(summary: &Summary, frames: &Frames) {
-    println!(
+    say!(
         "{} particles, {} steps of {:.3e} s = {:.3} s simulated",
-        summary.particles, summary.steps, summary.time_step, summary.simulated_seconds
+        summary.particles,
+        summary.steps,
+        summary.time_step,
+        summary.simulated_seconds
     );
-    println!(
+    say!(
         "{:.2} ms per step on {} thread(s), {:.1} neighbours per particle",
-        summary.milliseconds_per_step, summary.threads, summary.neighbours_per_particle
+        summary.milliseconds_per_step,
+        summary.threads,
+        summary.neighbours_per_particle
     );
-    println!(
+    say!(
         "inside the obstacle: {} (deepest {:.1e} m), outside the box: {}, not finite: {}",
-        summary.inside, summary.max_penetration, summary.lost, summary.non_finite
+        summary.inside,
+        summary.max_penetration,
+        summary.lost,
+        summary.non_finite
     );
-    println!(
+    say!(
         "energy: {:.2} J at the start, {:.2} J at the end; largest compression {:.1} %",
         summary.energy_at_start,
         summary.kinetic_energy + summary.potential_energy,
         100.0 * summary.max_density_error
     );
-    println!("written to {}: {}", frames.folder().display(), frames.describe());
+    say!("written to {}: {}", frames.folder().display(), frames.describe());
 }
 
 /// `rfm explain FILE:SCENE`: which passes run, which do not, and why.
@@ -263,15 +270,17 @@ pub(super) fn explain(program: &Program, scene: &Scene) -> Result<(), Failure> {
     let setup = Setup::of(&shared, program, scene)?;
     let (simulation, _) = setup.simulation(program, scene)?;
     let running = simulation.passes();
-    println!(
+    say!(
         "scene {}: method paper, time step {:.3e} s ({})",
-        scene.name, setup.parameters.time_step, setup.time_step_reason
+        scene.name,
+        setup.parameters.time_step,
+        setup.time_step_reason
     );
     for pass in crate::sph::Pass::ALL {
         if running.contains(&pass) {
-            println!("  runs      {pass}");
+            say!("  runs      {pass}");
         } else {
-            println!("  left out  {pass}: {}", pass.absence());
+            say!("  left out  {pass}: {}", pass.absence());
         }
     }
     Ok(())

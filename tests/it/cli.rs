@@ -1,0 +1,416 @@
+//! The commands as a contract: exit codes, what goes where, the keys of the documents, files that are whole.
+
+use std::path::Path;
+
+use crate::tool::{rfm, rfm_reading, root, snapshot};
+
+const PAWN: &str = "examples/pawn.rfm";
+
+const SMALL: &str = "rfm 1
+param r = 0.1 in 0.05 .. 0.2 \"radius of the post\"
+solid post = cylinder(r, 0.3).move([0.5, 0.5, 0])
+scene drop {
+  box { max: [1, 1, 1] }
+  fluid { shape: ball([0.5, 0.5, 0.7], 0.12), fill: middle, particles: 30, mass: 0.05, support_radius: 0.1 }
+  obstacle { solid: post }
+  run { dt: 1 ms, until: 10 ms, save_every: 5 ms }
+}
+";
+
+fn keys(value: &serde_json::Value) -> Vec<&str> {
+    value.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+/// The keys of the contract, all there; `schema` is 1 and comes first in the text.
+#[track_caller]
+fn contract(text: &str, value: &serde_json::Value, expected: &[&str]) {
+    assert!(text.trim_start().trim_start_matches('{').trim_start().starts_with("\"schema\": 1"), "{text}");
+    let found = keys(value);
+    for key in expected {
+        assert!(found.contains(key), "no `{key}` in {found:?}");
+    }
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn help_and_usage() {
+    for arguments in [
+        &["--help"][..],
+        &["check", "--help"],
+        &["eval", "--help"],
+        &["mesh", "--help"],
+        &["run", "--help"],
+        &["explain", "--help"],
+    ] {
+        let outcome = rfm(root(), arguments).expect(0);
+        assert_eq!(outcome.stderr, "");
+        snapshot("cli", &format!("help {}", arguments[0].trim_start_matches('-')), &outcome.stdout);
+    }
+    for (name, arguments) in [
+        ("no command", &[][..]),
+        ("unknown command", &["chekc", PAWN]),
+        ("unknown flag", &["check", PAWN, "--slcie", "z=1"]),
+        ("no file", &["check"]),
+        ("missing file", &["check", "examples/none.rfm"]),
+        ("folder as file", &["check", "examples"]),
+        ("param that is no number", &["check", PAWN, "-D", "cx=wide"]),
+        ("param without value", &["check", PAWN, "-D", "cx"]),
+        ("unknown param", &["check", PAWN, "-D", "cxx=1"]),
+        ("param out of range", &["check", PAWN, "-D", "cx=9"]),
+        ("param not finite", &["check", PAWN, "-D", "particles=nan"]),
+        ("unknown solid", &["mesh", PAWN, "-s", "pwan", "-o", "x.stl"]),
+        ("unknown scene", &["run", PAWN, "--scene", "drpo"]),
+        ("no scene", &["run", "examples/cube.rfm"]),
+        ("mesh without output", &["mesh", PAWN]),
+        ("mesh of an unknown format", &["mesh", PAWN, "-o", "pawn.3ds"]),
+        ("mesh with no cells", &["mesh", PAWN, "--cells", "0", "-o", "pawn.stl"]),
+        ("mesh with a cell of zero", &["mesh", PAWN, "--cell", "0", "-o", "pawn.stl"]),
+        ("mesh of an empty box", &["mesh", PAWN, "--box", "0,0,0,0,1,1", "-o", "pawn.stl"]),
+        ("slice of an unknown axis", &["check", PAWN, "--slice", "w=1"]),
+        ("slice of an unknown format", &["check", PAWN, "--slice", "z=1", "-o", "pawn.gif"]),
+        ("point of two numbers", &["eval", PAWN, "--at", "1,2"]),
+        ("no points", &["eval", PAWN]),
+        ("file and points from stdin", &["eval", "-", "--points", "-"]),
+        ("time before zero", &["run", PAWN, "--until", "-1"]),
+        ("unknown message", &["explain", "E9999"]),
+        ("unknown name to explain", &["explain", "examples/pawn.rfm:pwan"]),
+    ] {
+        let outcome = rfm(root(), arguments).expect(2);
+        let data = &outcome.stdout;
+        assert!(data.is_empty() || name == "slice of an unknown format", "{name}: {data}");
+        assert!(!outcome.stderr.is_empty());
+        snapshot(
+            "cli",
+            name,
+            &format!("rfm {}\n{}exit {}\n", arguments.join(" "), outcome.stderr, outcome.code),
+        );
+    }
+}
+
+#[test]
+fn check_prints_facts() {
+    snapshot("cli", "check", &rfm(root(), &["check", PAWN, "examples/cube.rfm"]).expect(0).transcript());
+    let outcome = rfm_reading(root(), &["check", "-", "-D", "r=0.2"], SMALL.as_bytes()).expect(0);
+    snapshot("cli", "check stdin", &outcome.transcript());
+    snapshot("cli", "explain a code", &rfm(root(), &["explain", "e0106"]).expect(0).transcript());
+    snapshot(
+        "cli",
+        "explain a scene",
+        &rfm(root(), &["explain", "examples/pawn.rfm:drop"]).expect(0).transcript(),
+    );
+}
+
+#[test]
+fn check_as_json() {
+    let outcome = rfm(root(), &["check", "--json", PAWN]).expect(0);
+    let document = outcome.json();
+    contract(&outcome.stdout, &document, &["schema", "ok", "diagnostics", "solids"]);
+    let solid = &document["solids"][0];
+    for key in ["name", "empty", "bounds", "volume", "volume_error", "area", "components"] {
+        assert!(keys(solid).contains(&key), "{solid}");
+    }
+    assert_eq!(keys(&solid["bounds"]).len(), 2);
+    // the paper's pawn: the fine reference is 0.44273 to 1e-3
+    assert!((solid["volume"].as_f64().unwrap() - 0.4427).abs() < 2e-3, "{solid}");
+
+    let outcome =
+        rfm_reading(root(), &["check", "--json", "-"], "rfm 1\nlet α = 1\nsolid s = spere(α)".as_bytes());
+    let document = outcome.expect(1).json();
+    assert_eq!(document["ok"], false);
+    let message = &document["diagnostics"][0];
+    assert_eq!(message["code"], "E0201");
+    assert_eq!(message["severity"], "error");
+    assert_eq!(message["file"], "<stdin>");
+    let place = ["line", "column", "end_line", "end_column"].map(|key| message[key].as_u64().unwrap());
+    assert_eq!(place, [3, 11, 3, 16]);
+    assert_eq!(message["help"], "did you mean `sphere`?");
+    assert!(message["message"].as_str().unwrap().contains("spere"));
+}
+
+#[test]
+fn findings_and_denied_warnings() {
+    let text = b"rfm 1\nlet spare = 1\nsolid s = sphere(1)";
+    rfm_reading(root(), &["check", "-"], text).expect(0);
+    rfm_reading(root(), &["check", "-", "--deny", "warnings"], text).expect(1);
+    rfm_reading(root(), &["eval", "-", "--at", "0,0,0"], b"rfm 1\nsolid s = q").expect(1);
+    rfm_reading(root(), &["mesh", "-", "--json"], b"rfm 1\nsolid s = q").expect(1);
+    rfm_reading(root(), &["run", "-"], b"rfm 1\nsolid s = q").expect(1);
+}
+
+#[test]
+fn slices_are_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let pawn = root().join(PAWN);
+    let pawn = pawn.to_str().unwrap();
+    rfm(folder.path(), &["check", pawn, "--slice", "y=1.5", "-o", "s.svg"]).expect(0);
+    rfm(folder.path(), &["check", pawn, "--slice", "z=0.5", "-o", "s.png"]).expect(0);
+    assert_eq!(files(folder.path()), ["s.png", "s.svg"]);
+    let svg = std::fs::read_to_string(folder.path().join("s.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>") && svg.contains("pawn"));
+    let picture = std::fs::File::open(folder.path().join("s.png")).unwrap();
+    let mut reader = png::Decoder::new(std::io::BufReader::new(picture)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    assert!(reader.next_frame(&mut pixels).unwrap().width > 300);
+    let term = rfm(folder.path(), &["check", pawn, "--slice", "y=1.5", "--term"]).expect(0);
+    assert!(term.stdout.lines().count() > 10 && !term.stdout.contains('\x1b'));
+}
+
+#[test]
+fn eval_reads_points_and_prints_seventeen_digits() {
+    let outcome =
+        rfm(root(), &["eval", PAWN, "--at", "1.5,1.5,0.5", "--at=-1e-3,0,nan", "--at", "inf,0,0"]).expect(0);
+    snapshot("cli", "eval", &outcome.transcript());
+    let all = ["eval", PAWN, "--at", "1.7,1.5,0.2", "--what", "value,gradient,sign,normal"];
+    snapshot("cli", "eval everything", &rfm(root(), &all).expect(0).transcript());
+
+    let folder = tempfile::tempdir().unwrap();
+    let csv = "name,z,y,x\r\n# a remark\n a , 0.5,1.5,1.5\n\nb,0.2,1.5,1.7\n";
+    std::fs::write(folder.path().join("p.csv"), csv).unwrap();
+    let path = folder.path().join("p.csv");
+    let from_file = rfm(root(), &["eval", PAWN, "--points", path.to_str().unwrap()]).expect(0);
+    let from_stdin = rfm_reading(root(), &["eval", PAWN, "--points", "-"], csv.as_bytes()).expect(0);
+    let from_flags = rfm(root(), &["eval", PAWN, "--at", "1.5,1.5,0.5", "--at", "1.7,1.5,0.2"]).expect(0);
+    assert_eq!(from_file.stdout, from_flags.stdout);
+    assert_eq!(from_stdin.stdout, from_flags.stdout);
+    for (points, says) in [
+        ("", "is empty"),
+        ("a,b,c\n1,2,3\n", "<stdin>:1: expected the header"),
+        ("x,y,z\n1,2\n", ":2: the row has 2 cells"),
+        ("x,y,z\n1,2,three\n", ":2: `three` is not a number"),
+    ] {
+        let outcome = rfm_reading(root(), &["eval", PAWN, "--points", "-"], points.as_bytes()).expect(2);
+        assert!(outcome.stderr.contains(says), "{}", outcome.stderr);
+    }
+    rfm(root(), &["eval", PAWN, "--points", "none.csv"]).expect(2);
+}
+
+#[test]
+fn engines_and_precisions_print_the_same() {
+    let points: String = (0..500)
+        .map(|i| {
+            format!("{},{},{}\n", 0.007 * f64::from(i), 3.0 - 0.006 * f64::from(i), 0.003 * f64::from(i))
+        })
+        .collect();
+    let points = format!("x,y,z\n{points}");
+    for precision in ["f64", "f32"] {
+        let run = |engine| {
+            let arguments = ["eval", PAWN, "--points", "-", "--precision", precision, "--engine", engine];
+            rfm_reading(root(), &arguments, points.as_bytes()).expect(0).stdout
+        };
+        let jit = run("jit");
+        assert_eq!(jit.lines().count(), 501);
+        assert_eq!(jit, run("interp"), "{precision}");
+        assert_eq!(jit, run("auto"), "{precision}");
+    }
+    let outcome = rfm(root(), &["eval", PAWN, "--json", "--at", "0,0,nan"]).expect(0);
+    contract(&outcome.stdout, &outcome.json(), &["schema", "points"]);
+}
+
+const MESH_KEYS: [&str; 12] = [
+    "schema",
+    "vertices",
+    "triangles",
+    "closed",
+    "manifold",
+    "components",
+    "euler",
+    "volume",
+    "area",
+    "max_distance",
+    "rms_distance",
+    "evaluations",
+];
+
+/// Every directed edge once, and its opposite once.
+fn closed_and_manifold(triangles: impl Iterator<Item = [usize; 3]>) {
+    let mut edges = std::collections::HashSet::new();
+    for [a, b, c] in triangles {
+        for edge in [(a, b), (b, c), (c, a)] {
+            assert!(edges.insert(edge), "the edge {edge:?} is used twice");
+        }
+    }
+    assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "there is a hole");
+}
+
+#[test]
+fn meshes_read_back_as_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let mesh = |name: &str, threads: &str| {
+        let arguments = ["mesh", PAWN, "--cells", "40", "--json", "--threads", threads, "-o", &path(name)];
+        let outcome = rfm(root(), &arguments).expect(0);
+        let document = outcome.json();
+        contract(&outcome.stdout, &document, &MESH_KEYS);
+        assert!(document["milliseconds"].is_number());
+        document
+    };
+    let report = mesh("a.stl", "1");
+    assert_eq!(report["closed"], true);
+    assert_eq!(report["manifold"], true);
+    assert_eq!(report["euler"], 2);
+    assert!(report["max_distance"].as_f64().unwrap() <= 1e-9);
+    let (vertices, triangles) = (report["vertices"].as_u64().unwrap(), report["triangles"].as_u64().unwrap());
+
+    let mut file = std::fs::File::open(path("a.stl")).unwrap();
+    let read = stl_io::read_stl(&mut file).unwrap();
+    closed_and_manifold(read.faces.iter().map(|face| face.vertices));
+    assert_eq!((read.vertices.len() as u64, read.faces.len() as u64), (vertices, triangles));
+
+    mesh("a.ply", "1");
+    let mut file = std::io::BufReader::new(std::fs::File::open(path("a.ply")).unwrap());
+    let parser = ply_rs_bw::parser::Parser::<ply_rs_bw::ply::DefaultElement>::new();
+    let ply = parser.read_ply(&mut file).unwrap();
+    assert_eq!(ply.payload["vertex"].len() as u64, vertices);
+    assert_eq!(ply.payload["face"].len() as u64, triangles);
+
+    for name in ["stl", "ply", "obj", "vtp"] {
+        mesh(&format!("one.{name}"), "1");
+        mesh(&format!("two.{name}"), "2");
+        let bytes = |which: &str| std::fs::read(path(&format!("{which}.{name}"))).unwrap();
+        assert!(bytes("one") == bytes("two"), "{name} depends on the number of threads");
+        assert!(bytes("one").len() > 1000);
+    }
+}
+
+#[test]
+fn odd_solids_are_meshed_or_refused() {
+    let mesh = |text: &str, flags: &[&str]| {
+        let arguments = [&["mesh", "-", "--cells", "20", "--json"], flags].concat();
+        rfm_reading(root(), &arguments, format!("rfm 1\nsolid s = {text}").as_bytes())
+    };
+    let empty = mesh("sphere(1) and sphere(1).move([3, 0, 0])", &[]).expect(0);
+    assert_eq!(empty.json()["triangles"], 0);
+    assert!(empty.stderr.contains("empty"), "{}", empty.stderr);
+    let unbounded = mesh("x^2 + y^2 <= 1", &[]).expect(2);
+    assert!(unbounded.stderr.contains("--box"), "{}", unbounded.stderr);
+    let cut = mesh("x^2 + y^2 <= 1", &["--box", "-2,-2,-1,2,2,1"]).expect(0).json();
+    assert_eq!((cut["closed"].as_bool(), cut["components"].as_u64()), (Some(true), Some(1)));
+    let full = mesh("1", &["--box", "0,0,0,1,1,1"]).expect(0).json();
+    assert_eq!(full["closed"], true);
+    assert_eq!(mesh("x and not x", &["--box", "-1,-1,-1,1,1,1"]).expect(0).json()["triangles"], 0);
+}
+
+const RUN_KEYS: [&str; 14] = [
+    "schema",
+    "steps",
+    "simulated_seconds",
+    "particles",
+    "milliseconds_per_step",
+    "neighbours_per_particle",
+    "max_penetration",
+    "inside",
+    "lost",
+    "non_finite",
+    "max_density_error",
+    "kinetic_energy",
+    "potential_energy",
+    "passes",
+];
+
+#[test]
+fn runs_are_the_same_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("drop.rfm"), SMALL).unwrap();
+    let mut summaries = Vec::new();
+    for threads in ["1", "2"] {
+        let out = format!("out{threads}");
+        let outcome =
+            rfm(folder.path(), &["run", "drop.rfm", "--threads", threads, "--json", "-o", &out]).expect(0);
+        let mut summary = outcome.json();
+        contract(&outcome.stdout, &summary, &RUN_KEYS);
+        for key in ["milliseconds_per_step", "threads"] {
+            summary.as_object_mut().unwrap().remove(key);
+        }
+        summaries.push(summary);
+    }
+    assert_eq!(summaries[0], summaries[1]);
+    assert_eq!(summaries[0]["steps"], 10);
+    for part in ["frames", "pictures"] {
+        let names = files(&folder.path().join("out1").join(part));
+        assert_eq!(names.len(), 3);
+        for name in names {
+            let bytes = |out: &str| std::fs::read(folder.path().join(out).join(part).join(&name)).unwrap();
+            assert!(bytes("out1") == bytes("out2"), "{part}/{name}");
+        }
+    }
+    let expected = ["frames", "obstacle.stl", "obstacle.vtp", "particles.pvd", "pictures", "summary.json"];
+    assert_eq!(files(&folder.path().join("out1")), expected);
+}
+
+#[test]
+fn run_defaults_and_flags() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("drop.rfm"), SMALL).unwrap();
+    let dry = rfm(folder.path(), &["run", "drop.rfm", "--dry-run"]).expect(0);
+    assert!(
+        dry.stdout.contains("particles     30") && dry.stdout.contains("steps         10"),
+        "{}",
+        dry.stdout
+    );
+    assert_eq!(files(folder.path()), ["drop.rfm"]);
+    rfm(folder.path(), &["run", "drop.rfm", "--steps", "2", "--no-pictures"]).expect(0);
+    assert_eq!(files(folder.path()), ["drop.out", "drop.rfm"]);
+    rfm(folder.path(), &["run", "drop.rfm", "--steps", "2", "--until", "1"]).expect(2);
+    let none = rfm(folder.path(), &["run", "drop.rfm", "--steps", "0", "--no-frames", "--json", "-o", "z"])
+        .expect(0);
+    assert_eq!(none.json()["steps"], 0);
+    assert_eq!(files(&folder.path().join("z")), ["summary.json"]);
+}
+
+#[test]
+fn unwritable_places_are_refused_and_nothing_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
+    std::fs::write(here.join("file"), "kept").unwrap();
+    std::fs::create_dir(here.join("folder.stl")).unwrap();
+    std::fs::create_dir(here.join("folder.svg")).unwrap();
+    let before = files(here);
+    for (name, arguments) in [
+        ("mesh into a missing folder", &["mesh", "drop.rfm", "--cells", "16", "-o", "none/post.stl"][..]),
+        ("mesh onto a folder", &["mesh", "drop.rfm", "--cells", "16", "-o", "folder.stl"]),
+        ("mesh below a file", &["mesh", "drop.rfm", "--cells", "16", "-o", "file/post.stl"]),
+        ("slice into a missing folder", &["check", "drop.rfm", "--slice", "z=0.1", "-o", "none/post.svg"]),
+        ("slice onto a folder", &["check", "drop.rfm", "--slice", "z=0.1", "-o", "folder.svg"]),
+        ("run into a file", &["run", "drop.rfm", "-o", "file"]),
+        ("run below a file", &["run", "drop.rfm", "-o", "file/out"]),
+    ] {
+        let outcome = rfm(here, arguments).expect(2);
+        snapshot("cli", name, &format!("rfm {}\n{}exit 2\n", arguments.join(" "), outcome.stderr));
+        assert_eq!(files(here), before, "{name}");
+    }
+    assert_eq!(std::fs::read_to_string(here.join("file")).unwrap(), "kept");
+    assert!(files(&here.join("folder.stl")).is_empty());
+}
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    use std::process::{Command, Stdio};
+    let mut child = Command::new(env!("CARGO_BIN_EXE_rfm"))
+        .args(["explain", PAWN, "--show", "ast,ir,clif,asm"])
+        .current_dir(root())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!text.contains("panicked") && output.status.code() != Some(101), "{text}");
+}
+
+#[test]
+fn explain_shows_every_stage() {
+    let outcome = rfm(root(), &["explain", "examples/cube.rfm:cube", "--show", "ast,ir,clif,asm"]).expect(0);
+    for part in ["solid cube", "compare", "r0_and", "function", "block0", "ret"] {
+        assert!(outcome.stdout.contains(part), "no `{part}`");
+    }
+}

@@ -1,0 +1,94 @@
+//! The files in examples/ are what a new user reads first: they check without a word and run well.
+
+use std::path::Path;
+
+use crate::tool::{rfm, root, stem};
+
+fn examples() -> Vec<std::path::PathBuf> {
+    let mut files: Vec<_> =
+        std::fs::read_dir(root().join("examples")).unwrap().map(|e| e.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "rfm"));
+    files.sort();
+    files
+}
+
+#[test]
+fn every_example_checks_without_a_word() {
+    assert!(examples().len() >= 3);
+    for path in examples() {
+        let name = format!("examples/{}.rfm", stem(&path));
+        let outcome = rfm(root(), &["check", "--deny", "warnings", "--json", &name]).expect(0);
+        assert_eq!(outcome.stderr, "", "{name}");
+        let document = outcome.json();
+        assert_eq!(document["ok"], true);
+        for solid in document["solids"].as_array().unwrap() {
+            assert!(solid["volume"].as_f64().unwrap() > 0.0, "{name}: {solid}");
+        }
+    }
+}
+
+/// A small drop on the piece: the invariants that the long run has too.
+#[track_caller]
+fn falls_well(name: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let file = format!("examples/{name}.rfm");
+    let arguments = [
+        "run",
+        &file,
+        "-D",
+        "particles=400",
+        "--until",
+        "0.4",
+        "--mesh-cells",
+        "32",
+        "--json",
+        "-o",
+        out.to_str().unwrap(),
+    ];
+    let outcome = rfm(root(), &arguments).expect(0);
+    let summary = outcome.json();
+    let written: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary, written);
+    for key in ["inside", "lost", "non_finite", "particles_carved"] {
+        assert_eq!(summary[key], 0, "{key}: {summary}");
+    }
+    assert_eq!(summary["particles"], 400);
+    assert!(summary["max_penetration"].as_f64().unwrap() <= 1e-9, "{summary}");
+    assert!(summary["energy_growth"].as_f64().unwrap() < 1e-3, "{summary}");
+    assert_eq!(summary["finished"], true);
+    let frames = summary["frames"].as_u64().unwrap() as usize;
+    assert!(frames >= 5, "{summary}");
+    frames_are_whole(&out, frames);
+}
+
+fn frames_are_whole(out: &Path, frames: usize) {
+    let collection = std::fs::read_to_string(out.join("particles.pvd")).unwrap();
+    assert_eq!(collection.matches("<DataSet").count(), frames);
+    for i in 0..frames {
+        let bytes = std::fs::read(out.join(format!("frames/particles_{i:06}.vtp"))).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.contains("NumberOfPoints=\"400\""));
+        assert!(["speed", "density", "pressure"].iter().all(|name| text.contains(name)));
+        assert!(text.trim_end().ends_with("</VTKFile>"));
+        let picture = std::fs::File::open(out.join(format!("pictures/frame_{i:06}.png"))).unwrap();
+        let mut reader = png::Decoder::new(std::io::BufReader::new(picture)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert!(info.width >= 320 && pixels.iter().any(|&p| p != pixels[0]));
+    }
+    for file in ["obstacle.stl", "obstacle.vtp"] {
+        assert!(std::fs::metadata(out.join(file)).unwrap().len() > 1000);
+    }
+}
+
+#[test]
+fn a_drop_falls_on_the_pawn() {
+    falls_well("pawn");
+}
+
+#[test]
+fn a_drop_falls_on_the_bishop() {
+    falls_well("bishop");
+}

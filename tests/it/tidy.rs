@@ -1,0 +1,186 @@
+//! The shape of the source: who imports whom, where `unsafe` may stand, what every module begins with.
+
+use std::path::{Path, PathBuf};
+
+use crate::tool::root;
+
+/// A module, and the modules of the crate that it may use besides itself; `*` is all.
+///
+/// Departures from the plan, with their reasons: `field` uses `interval`, the type of a guaranteed range;
+/// `simplify` and `codegen` use `diagnostic` for the spans that nodes carry; `codegen` uses `geom` for the
+/// reach of range programs; `lower` uses `geom` for the boxes of
+/// scenes; `solid` uses `simplify`, because a gradient is derived and simplified when it is first asked for;
+/// `compile` opens the file that `Program::from_path` names.
+const MAY_USE: &[(&str, &[&str])] = &[
+    ("diagnostic", &[]),
+    ("geom", &[]),
+    ("interval", &[]),
+    ("field", &["geom", "interval"]),
+    ("syntax", &["diagnostic"]),
+    ("ir", &["diagnostic", "geom", "interval"]),
+    ("lower", &["syntax", "ir", "diagnostic", "geom"]),
+    ("simplify", &["ir", "diagnostic"]),
+    ("codegen", &["ir", "diagnostic", "geom"]),
+    ("solid", &["ir", "simplify", "codegen", "field", "geom", "interval"]),
+    ("compile", &["diagnostic", "syntax", "ir", "lower", "simplify", "codegen", "solid"]),
+    ("slice", &["field", "geom", "interval"]),
+    ("mesh", &["field", "geom", "interval"]),
+    ("sph", &["field", "geom", "interval"]),
+    ("render", &["field", "geom"]),
+    ("cli", &["*"]),
+    ("lib", &["*"]),
+    ("main", &["*"]),
+];
+
+/// Names that the crate's root re-exports, and the modules they come from.
+const REEXPORTED: [(&str, &str); 5] = [
+    ("Program", "compile"),
+    ("Error", "compile"),
+    ("Solid", "solid"),
+    ("Engine", "solid"),
+    ("Field", "field"),
+];
+
+fn sources() -> Vec<(PathBuf, String)> {
+    fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(&path, found);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                found.push(path);
+            }
+        }
+    }
+    let mut paths = Vec::new();
+    for folder in ["src", "tests/it", "examples"] {
+        walk(&root().join(folder), &mut paths);
+    }
+    paths.sort();
+    let read = |path: PathBuf| {
+        let text = std::fs::read_to_string(&path).unwrap();
+        (path.strip_prefix(root()).unwrap().to_path_buf(), text)
+    };
+    paths.into_iter().map(read).collect()
+}
+
+/// The top-level module of a file under src.
+fn module(path: &Path) -> Option<String> {
+    let inside = path.strip_prefix("src").ok()?;
+    let first = inside.components().next()?.as_os_str().to_str()?;
+    Some(first.trim_end_matches(".rs").to_string())
+}
+
+/// What a line of code names of the crate: `crate::a::…`, `use crate::{a::…, b};`.
+fn uses(code: &str) -> Vec<String> {
+    let word = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let mut found = Vec::new();
+    for (at, _) in code.match_indices("crate::") {
+        let rest = &code[at + "crate::".len()..];
+        match rest.strip_prefix('{') {
+            None => found.push(word(rest)),
+            Some(list) => {
+                let mut depth = 0;
+                let mut part = String::new();
+                for c in list.chars() {
+                    match c {
+                        '{' => depth += 1,
+                        '}' if depth == 0 => break,
+                        '}' => depth -= 1,
+                        ',' if depth == 0 => {
+                            found.push(word(part.trim()));
+                            part.clear();
+                            continue;
+                        }
+                        _ => {}
+                    }
+                    part.push(c);
+                }
+                found.push(word(part.trim()));
+            }
+        }
+    }
+    found.retain(|name| !name.is_empty());
+    found
+}
+
+/// The text without comments, and without the tests at its end, which may use more.
+fn code(text: &str) -> String {
+    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    text[..end].lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn modules_use_what_they_may() {
+    let mut wrong = Vec::new();
+    for (path, text) in sources() {
+        let Some(module) = module(&path) else { continue };
+        if path.ends_with("tests.rs") {
+            continue;
+        }
+        let allowed = MAY_USE.iter().find(|(name, _)| *name == module);
+        let Some((_, allowed)) = allowed else { panic!("{}: not in the table", path.display()) };
+        for used in uses(&code(&text)) {
+            let target = REEXPORTED.iter().find(|(name, _)| *name == used).map_or(used.as_str(), |(_, m)| m);
+            if target != module && !allowed.contains(&"*") && !allowed.contains(&target) {
+                wrong.push(format!("{} uses {used}", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_module_begins_with_what_it_is_for() {
+    for (path, text) in sources() {
+        assert!(text.starts_with("//! "), "{} has no header", path.display());
+        assert!(
+            !text.lines().any(|line| line.ends_with([' ', '\t'])),
+            "{} has trailing blanks",
+            path.display()
+        );
+        assert!(text.ends_with('\n') && !text.contains('\t') && !text.contains('\r'), "{}", path.display());
+    }
+}
+
+#[test]
+fn unsafe_stands_where_machine_code_is_made_and_called() {
+    for (path, text) in sources().into_iter().filter(|(path, _)| path.starts_with("src")) {
+        let allowed = path.starts_with("src/codegen") || path == Path::new("src/solid/compiled.rs");
+        let lines: Vec<&str> = text.lines().collect();
+        for (i, line) in lines.iter().enumerate() {
+            let code = line.split("//").next().unwrap_or("");
+            if code.contains("unsafe {") || code.contains("unsafe fn") || code.contains("unsafe impl") {
+                assert!(allowed, "{}:{}: unsafe", path.display(), i + 1);
+                let said = lines[i.saturating_sub(4)..=i].iter().any(|l| l.contains("SAFETY:"));
+                assert!(said, "{}:{}: no SAFETY sentence", path.display(), i + 1);
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_unfinished_is_left() {
+    // put together here, so that this file does not find itself
+    let words =
+        [concat!("todo", "!("), concat!("unimplemented", "!("), concat!("dbg", "!("), concat!("FIX", "ME")];
+    for (path, text) in sources() {
+        for word in words {
+            assert!(!text.contains(word), "{}: {word}", path.display());
+        }
+    }
+}
+
+#[test]
+fn only_the_command_line_touches_files_clocks_and_the_terminal() {
+    let words = ["std::fs", "std::env", "Instant::now", "SystemTime", "println!", "stdin()", "stdout()"];
+    for (path, text) in sources() {
+        let Some(module) = module(&path).filter(|_| !path.ends_with("tests.rs")) else { continue };
+        let code = code(&text);
+        for word in words.iter().filter(|word| code.contains(**word)) {
+            // `Program::from_path` is the library's one door to the file system
+            let door = module == "compile" && *word == "std::fs";
+            assert!(["cli", "main"].contains(&module.as_str()) || door, "{}: {word}", path.display());
+        }
+    }
+}
