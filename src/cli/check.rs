@@ -41,7 +41,7 @@ struct Message {
 }
 
 /// Operations of a solid that is measured, at most: a larger one would keep a person waiting for minutes.
-const MOST_MEASURED: usize = 10_000;
+const MOST_MEASURED: usize = 120_000;
 
 /// What is known of a solid. Numbers that do not exist (an unbounded solid's volume) are null.
 #[derive(Serialize)]
@@ -245,10 +245,11 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
     };
     facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
     let mut reports = Vec::new();
+    let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
     for cells in VOLUME_CELLS {
         let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
-        match marching_cubes(&solid.twin(), &grid, &|_| {}) {
-            Ok(mesh) => reports.push(mesh::check(&mesh, solid)),
+        match marching_cubes(&*surface, &grid, &|_| {}) {
+            Ok(mesh) => reports.push(mesh::check(&mesh, &*surface)),
             // a field that is not a number somewhere has no volume
             Err(_) => return Ok(facts),
         }

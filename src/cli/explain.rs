@@ -87,6 +87,7 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
                 precision: Precision::F64,
                 shape: Shape::Batch,
                 form: Form::Stable,
+                parameters: false,
             };
             let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;
             if show.contains(&Stage::Clif) {

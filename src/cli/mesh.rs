@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::args::{Mesh as Options, MeshMethod, Shared};
 use super::{Failure, choose, input, note, output, progress};
 use crate::field::Field;
+use crate::geom::Aabb;
 use crate::mesh::{self, Grid, Mesh, Report, Resolution, marching_cubes};
 use crate::solid::Bounds;
 
@@ -86,19 +87,21 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         }
     };
     let started = Instant::now();
-    let mesh = match grid.transpose().map_err(Failure::usage)? {
+    // same surface as ω, cheaper, and normals of one face at creases
+    let grid = grid.transpose().map_err(Failure::usage)?;
+    let surface = solid.surface(grid.as_ref().map_or(Aabb::EMPTY, |grid| *grid.bounds()));
+    let mesh = match grid {
         None => Mesh::default(),
         Some(grid) => {
             let bar = progress::bar(1000, "meshing");
             let MeshMethod::Mc = options.method;
-            // same surface as ω, cheaper, and normals of one face at creases
-            let mesh = marching_cubes(&solid.twin(), &grid, &|part| bar.set_position((1000.0 * part) as u64));
+            let mesh = marching_cubes(&*surface, &grid, &|part| bar.set_position((1000.0 * part) as u64));
             bar.finish_and_clear();
             mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?
         }
     };
     let milliseconds = started.elapsed().as_secs_f64() * 1e3;
-    let report = mesh::check(&mesh, &solid);
+    let report = mesh::check(&mesh, &*surface);
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(&solid, bounds, options)));
     }

@@ -67,6 +67,15 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.builder.ins().splat(vector, scalar)
     }
 
+    /// A parameter in every lane; NaN if the program was given none.
+    pub fn parameter(&mut self, parameters: Option<Value>, i: u32) -> Value {
+        let Some(base) = parameters else { return self.constant(f64::NAN) };
+        let (lane, vector) = (self.lane_type(), self.vector_type());
+        let flags = MemFlagsData::trusted().with_readonly();
+        let scalar = self.builder.ins().load(lane, flags, base, (i * lane.bytes()) as i32);
+        self.builder.ins().splat(vector, scalar)
+    }
+
     pub fn unary(&mut self, op: Unary, a: Value, host: Option<FuncRef>) -> Value {
         if let Some(host) = host {
             return self.call(host, &[a]);

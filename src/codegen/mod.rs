@@ -65,6 +65,8 @@ pub struct Request<'a> {
     pub precision: Precision,
     pub shape: Shape,
     pub form: Form,
+    /// Whether the function takes one more argument, a pointer to the parameters of the graph.
+    pub parameters: bool,
 }
 
 impl Precision {

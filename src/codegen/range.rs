@@ -29,6 +29,7 @@ pub fn supports(graph: &Graph, root: Node) -> bool {
         let range = ranges[node.index()];
         let known = match expr {
             Expr::Constant(_) | Expr::Coordinate(_) => true,
+            Expr::Parameter(_) => false,
             Expr::Unary(op, _) => matches!(op, Unary::Neg | Unary::Abs | Unary::Sqrt),
             Expr::Binary(Binary::Div, _, b) => graph.as_constant(b).is_some_and(|c| c != 0.0),
             Expr::Binary(op, ..) => {
@@ -78,6 +79,7 @@ impl Ranges<'_, '_> {
             Expr::Coordinate(Axis::X) => axes[0],
             Expr::Coordinate(Axis::Y) => axes[1],
             Expr::Coordinate(Axis::Z) => axes[2],
+            Expr::Parameter(_) => self.point(f64::NAN), // `supports` refuses parameters
             Expr::Unary(Unary::Neg, a) => self.swap(values[&a]),
             Expr::Unary(Unary::Abs, a) => {
                 let (low, high) = self.magnitudes(values[&a]);

@@ -90,10 +90,14 @@ fn declare_parameters(function: &mut Function, module: &JITModule, request: Requ
         Precision::F32 => types::F32,
         Precision::F64 => types::F64,
     });
-    function.signature.params = match request.shape {
+    let mut parameters = match request.shape {
         Shape::Point => vec![scalar, scalar, scalar, pointer],
         Shape::Batch | Shape::Range => vec![pointer, pointer],
     };
+    if request.parameters {
+        parameters.push(pointer);
+    }
+    function.signature.params = parameters;
 }
 
 type Hosts = HashMap<String, FuncRef>;
@@ -135,7 +139,7 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, hosts: &Hosts)
     let vector = emitter.vector_type();
     let coordinates: [Value; 3] =
         std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
-    let values = nodes(&mut emitter, request, hosts, coordinates);
+    let values = nodes(&mut emitter, request, hosts, coordinates, parameters.get(4).copied());
     let bytes = emitter.lane_type().bytes() as i32;
     for (i, output) in request.outputs.iter().enumerate() {
         let lane = emitter.builder.ins().extractlane(values[output], 0);
@@ -153,7 +157,8 @@ fn batch(
     let [entry, body, exit] = std::array::from_fn(|_| builder.create_block());
     builder.append_block_params_for_function_params(entry);
     builder.switch_to_block(entry);
-    let (columns, blocks) = (builder.block_params(entry)[0], builder.block_params(entry)[1]);
+    let arguments = builder.block_params(entry).to_vec();
+    let (columns, blocks) = (arguments[0], arguments[1]);
     let column = |builder: &mut FunctionBuilder<'_>, i: usize| {
         let offset = i as i32 * pointer.bytes() as i32;
         builder.ins().load(pointer, MemFlagsData::trusted(), columns, offset)
@@ -174,7 +179,7 @@ fn batch(
         let address = emitter.builder.ins().iadd(base, offset);
         emitter.builder.ins().load(vector, MemFlagsData::new(), address, 0)
     });
-    let values = nodes(&mut emitter, request, hosts, coordinates);
+    let values = nodes(&mut emitter, request, hosts, coordinates, arguments.get(2).copied());
     for (output, base) in request.outputs.iter().zip(outputs) {
         let address = builder.ins().iadd(base, offset);
         builder.ins().store(MemFlagsData::new(), values[output], address, 0);
@@ -193,6 +198,7 @@ fn nodes(
     request: Request<'_>,
     hosts: &Hosts,
     coordinates: [Value; 3],
+    parameters: Option<Value>,
 ) -> HashMap<Node, Value> {
     let mut values: HashMap<Node, Value> = HashMap::with_capacity(request.graph.len());
     for (node, expr) in request.graph.nodes() {
@@ -202,6 +208,7 @@ fn nodes(
             Expr::Coordinate(Axis::X) => coordinates[0],
             Expr::Coordinate(Axis::Y) => coordinates[1],
             Expr::Coordinate(Axis::Z) => coordinates[2],
+            Expr::Parameter(i) => emitter.parameter(parameters, i),
             Expr::Unary(op, a) => emitter.unary(op, values[&a], host),
             Expr::Binary(op, a, b) => emitter.binary(op, (a, values[&a]), (b, values[&b]), host),
         };

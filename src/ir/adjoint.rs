@@ -50,7 +50,7 @@ fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> HashSet<Node> {
 fn contributions(graph: &mut Graph, node: Node, adjoint: Node, depends: &HashSet<Node>) -> Vec<(Node, Node)> {
     let mut out = Vec::with_capacity(2);
     match graph.expr(node) {
-        Expr::Constant(_) | Expr::Coordinate(_) => {}
+        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) => {}
         Expr::Unary(op, a) => {
             if depends.contains(&a) {
                 let contribution = unary(graph, op, node, a, adjoint);

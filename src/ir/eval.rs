@@ -25,15 +25,20 @@ impl Interpreter {
 
     /// All outputs at a point; `out` is as long as the outputs.
     pub fn eval_f64(&self, point: [f64; 3], out: &mut [f64]) {
-        SCRATCH_64.with_borrow_mut(|scratch| self.eval(point, scratch, out));
+        SCRATCH_64.with_borrow_mut(|scratch| self.eval(point, &[], scratch, out));
+    }
+
+    /// All outputs at a point, for a graph with parameters.
+    pub fn eval_with(&self, point: [f64; 3], parameters: &[f64], out: &mut [f64]) {
+        SCRATCH_64.with_borrow_mut(|scratch| self.eval(point, parameters, scratch, out));
     }
 
     /// All outputs, every operation carried out in `f32`.
     pub fn eval_f32(&self, point: [f32; 3], out: &mut [f32]) {
-        SCRATCH_32.with_borrow_mut(|scratch| self.eval(point, scratch, out));
+        SCRATCH_32.with_borrow_mut(|scratch| self.eval(point, &[], scratch, out));
     }
 
-    fn eval<T: Real>(&self, point: [T; 3], values: &mut Vec<T>, out: &mut [T]) {
+    fn eval<T: Real>(&self, point: [T; 3], parameters: &[T], values: &mut Vec<T>, out: &mut [T]) {
         values.clear();
         for &expr in &self.exprs {
             let value = match expr {
@@ -41,6 +46,7 @@ impl Interpreter {
                 Expr::Coordinate(Axis::X) => point[0],
                 Expr::Coordinate(Axis::Y) => point[1],
                 Expr::Coordinate(Axis::Z) => point[2],
+                Expr::Parameter(i) => parameters.get(i as usize).copied().unwrap_or(T::from_f64(f64::NAN)),
                 Expr::Unary(op, a) => op.eval(values[a.index()]),
                 Expr::Binary(op, a, b) => op.eval(values[a.index()], values[b.index()]),
             };

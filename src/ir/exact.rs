@@ -59,6 +59,7 @@ pub fn evaluate(graph: &Graph, outputs: &[Node], point: [f64; 3]) -> Option<Vec<
             Expr::Coordinate(Axis::X) => big(point[0])?,
             Expr::Coordinate(Axis::Y) => big(point[1])?,
             Expr::Coordinate(Axis::Z) => big(point[2])?,
+            Expr::Parameter(_) => return None,
             Expr::Unary(op, a) => unary(op, of(a)?)?,
             Expr::Binary(op, a, b) => binary(op, of(a)?, of(b)?)?,
         };

@@ -27,6 +27,9 @@ pub enum Expr {
     /// The bits of an `f64`: equal bits, equal constant.
     Constant(u64),
     Coordinate(Axis),
+    /// A constant that is known only when the program runs: programs of leaves that differ in their constants alone
+    /// are one program.
+    Parameter(u32),
     Unary(Unary, Node),
     Binary(Binary, Node, Node),
 }
@@ -34,7 +37,7 @@ pub enum Expr {
 impl Expr {
     pub fn operands(self) -> impl Iterator<Item = Node> {
         let (a, b) = match self {
-            Self::Constant(_) | Self::Coordinate(_) => (None, None),
+            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) => (None, None),
             Self::Unary(_, a) => (Some(a), None),
             Self::Binary(_, a, b) => (Some(a), Some(b)),
         };
@@ -44,7 +47,7 @@ impl Expr {
     /// The same operation on other operands.
     pub fn map(self, mut f: impl FnMut(Node) -> Node) -> Self {
         match self {
-            Self::Constant(_) | Self::Coordinate(_) => self,
+            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) => self,
             Self::Unary(op, a) => Self::Unary(op, f(a)),
             Self::Binary(op, a, b) => Self::Binary(op, f(a), f(b)),
         }
@@ -127,6 +130,42 @@ impl Graph {
         self.intern(Expr::Binary(op, a, b), span)
     }
 
+    /// A graph of its own for one root; the work grows with what the root uses, not with this graph.
+    pub fn extract_cone(&self, root: Node) -> (Self, Node) {
+        let mut out = Self::default();
+        let mut image: HashMap<Node, Node> = HashMap::new();
+        for node in self.cone(root) {
+            let new = out.intern(self.expr(node).map(|operand| image[&operand]), self.span(node));
+            image.insert(node, new);
+        }
+        (out, image[&root])
+    }
+
+    /// The graph with each constant replaced by a parameter of its own, numbered in the order of the graph; and the
+    /// constants. Graphs of the same shape give the same result here.
+    pub fn parametrised(&self, root: Node) -> (Self, Node, Vec<f64>) {
+        let mut out = Self::default();
+        let mut constants = Vec::new();
+        let mut image: HashMap<Node, Node> = HashMap::new();
+        for node in self.cone(root) {
+            let expr = match self.expr(node) {
+                Expr::Constant(bits) => {
+                    constants.push(f64::from_bits(bits));
+                    Expr::Parameter(constants.len() as u32 - 1)
+                }
+                expr => expr.map(|operand| image[&operand]),
+            };
+            let new = out.intern(expr, self.span(node));
+            image.insert(node, new);
+        }
+        (out, image[&root], constants)
+    }
+
+    /// The operations alone: equal for graphs of the same shape.
+    pub fn exprs(&self) -> &[Expr] {
+        &self.exprs
+    }
+
     /// The constant that a node is, if it is one.
     pub fn as_constant(&self, node: Node) -> Option<f64> {
         match self.expr(node) {
@@ -193,7 +232,7 @@ impl Graph {
         for node in self.cone(root) {
             let value = match self.expr(node) {
                 Expr::Constant(bits) => f64::from_bits(bits),
-                Expr::Coordinate(_) => return None,
+                Expr::Coordinate(_) | Expr::Parameter(_) => return None,
                 Expr::Unary(op, a) => op.eval(values[&a]),
                 Expr::Binary(op, a, b) => op.eval(values[&a], values[&b]),
             };

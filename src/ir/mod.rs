@@ -25,4 +25,4 @@ pub use graph::{Axis, Expr, Graph, Node};
 pub use op::{Binary, Unary};
 pub use range::{Affine, RangeEvaluator, Step as RangeStep};
 pub use real::Real;
-pub use twin::twin;
+pub use twin::{sign_operands, twin};

@@ -150,6 +150,7 @@ fn plain(expr: Expr, values: &[Interval], axes: [Interval; 3]) -> Interval {
         Expr::Coordinate(Axis::X) => axes[0],
         Expr::Coordinate(Axis::Y) => axes[1],
         Expr::Coordinate(Axis::Z) => axes[2],
+        Expr::Parameter(_) => Interval::ALL,
         Expr::Unary(op, a) => unary(op, values[a.index()]),
         Expr::Binary(op, a, b) => binary(op, values[a.index()], values[b.index()]),
     }

@@ -58,7 +58,7 @@ pub fn twin(graph: &mut Graph, root: Node) -> Node {
 }
 
 /// The operands that alone decide the sign of a node; none if its value does.
-pub(super) fn sign_operands(graph: &Graph, node: Node) -> Vec<Node> {
+pub fn sign_operands(graph: &Graph, node: Node) -> Vec<Node> {
     let positive = |node| graph.as_constant(node).is_some_and(|c| c > 0.0 && c.is_finite());
     match graph.expr(node) {
         Expr::Binary(

@@ -1,8 +1,12 @@
 //! Where a solid is: a box that provably contains it, made tight by subdivision with guaranteed ranges.
 
-use crate::field::Field;
-use crate::geom::Aabb;
+use std::sync::Arc;
+
 use glam::DVec3;
+
+use super::logic::{Logic, Pruned};
+use super::{Parts, Solid};
+use crate::geom::Aabb;
 
 /// What is known about the extent of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,66 +45,125 @@ impl Bounds {
     }
 }
 
+/// What tells whether a box may hold a part of the solid, the better the smaller the box.
+trait Probe {
+    /// What is known of a box, handed on to the boxes within it.
+    type Known: Clone;
+    fn everything(&self) -> Self::Known;
+    /// Nothing if the box is proven to be outside.
+    fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known>;
+    fn is_inside(&self, known: &Self::Known, p: DVec3) -> bool;
+}
+
+/// Asks for the range of the whole solid.
+struct Whole<'a>(&'a Solid);
+
+impl Probe for Whole<'_> {
+    type Known = ();
+
+    fn everything(&self) {}
+
+    fn look(&self, (): &(), cell: &Aabb) -> Option<()> {
+        // a range without a positive part proves that no point is inside
+        (self.0.range(cell).hi > 0.0).then_some(())
+    }
+
+    fn is_inside(&self, (): &(), p: DVec3) -> bool {
+        self.0.sign(p) > 0.0
+    }
+}
+
+/// Asks only for the ranges of the leaves that still matter in a box.
+struct ByLeaves<'a> {
+    parts: &'a Parts,
+}
+
+impl Probe for ByLeaves<'_> {
+    /// What is left of the solid; nothing if the box is inside it.
+    type Known = Option<Arc<Logic>>;
+
+    fn everything(&self) -> Self::Known {
+        Some(Arc::new(self.parts.logic.clone()))
+    }
+
+    fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known> {
+        let Some(logic) = known else { return Some(None) };
+        match logic.prune_in(&self.parts.leaves, cell) {
+            Pruned::Outside => None,
+            Pruned::Inside => Some(None),
+            Pruned::Near(logic) => Some(Some(Arc::new(logic))),
+        }
+    }
+
+    fn is_inside(&self, known: &Self::Known, p: DVec3) -> bool {
+        known.as_ref().is_none_or(|logic| logic.value(&self.parts.leaves, p) > 0.0)
+    }
+}
+
 /// Looks for the solid in the whole search cube.
-pub(super) fn find(field: &impl Field) -> Bounds {
+pub(super) fn find(solid: &Solid) -> Bounds {
+    match solid.parts() {
+        Some(parts) => search(&ByLeaves { parts: &parts }),
+        None => search(&Whole(solid)),
+    }
+}
+
+fn search<P: Probe>(probe: &P) -> Bounds {
     let everything = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
-    let Some(hull) = coarse_hull(field, everything) else { return Bounds::Empty };
+    let Some((hull, known)) = coarse_hull(probe, everything) else { return Bounds::Empty };
     let touches = hull.min.cmple(everything.min).any() || hull.max.cmpge(everything.max).any();
     if touches {
         return Bounds::Unbounded;
     }
-    Bounds::Within(tighten(field, hull))
+    Bounds::Within(tighten(probe, &known, hull))
 }
 
-/// Level by level: cells that may hold a part of the solid are divided, the others dropped.
-fn coarse_hull(field: &impl Field, everything: Aabb) -> Option<Aabb> {
-    let mut cells = vec![everything];
+/// Level by level: cells that may hold a part of the solid are divided, the others dropped. Also what is known of
+/// the hull.
+fn coarse_hull<P: Probe>(probe: &P, everything: Aabb) -> Option<(Aabb, P::Known)> {
+    let mut cells = vec![(everything, probe.everything())];
     loop {
-        let kept: Vec<Aabb> = cells.iter().copied().filter(|cell| may_be_inside(field, cell)).collect();
-        let hull = kept.iter().fold(Aabb::EMPTY, |hull, cell| hull.union(cell));
-        let first = kept.first()?;
+        let look = |(cell, known): &(Aabb, P::Known)| Some((*cell, probe.look(known, cell)?));
+        let kept: Vec<(Aabb, P::Known)> = cells.iter().filter_map(look).collect();
+        let hull = kept.iter().fold(Aabb::EMPTY, |hull, (cell, _)| hull.union(cell));
+        let (first, _) = kept.first()?;
         let fine = hull.size().max_element() >= ENOUGH_CELLS * first.size().max_element();
         // below this a cell is a point in double precision: a solid of no extent, or a range that never decides
         let exhausted = first.size().max_element() < 1e-12 || kept.len() > MOST_CELLS;
         if fine || exhausted {
-            return Some(hull);
+            let known = probe.look(&probe.everything(), &hull)?;
+            return Some((hull, known));
         }
+        let octants = |(cell, known): &(Aabb, P::Known)| {
+            let centre = cell.centre();
+            cell.corners().map(|corner| (Aabb::new(corner.min(centre), corner.max(centre)), known.clone()))
+        };
         cells = kept.iter().flat_map(octants).collect();
     }
 }
 
-fn octants(cell: &Aabb) -> [Aabb; 8] {
-    let centre = cell.centre();
-    cell.corners().map(|corner| Aabb::new(corner.min(centre), corner.max(centre)))
-}
-
-fn may_be_inside(field: &impl Field, cell: &Aabb) -> bool {
-    // NaN bounds cannot occur; a range without a positive part proves that no point is inside
-    field.range(cell).hi > 0.0
-}
-
-/// Whether ω > 0 nowhere in the box, as far as `budget` ranges can prove it.
-pub fn prove_empty(field: &impl Field, over: Aabb, budget: usize) -> bool {
-    let mut stack = vec![over];
-    let mut left = budget;
-    while let Some(cell) = stack.pop() {
+/// Whether no point of the box is inside, as far as a budget of looks can prove it.
+fn prove_empty<P: Probe>(probe: &P, known: &P::Known, over: Aabb) -> bool {
+    let mut stack = vec![(over, known.clone())];
+    let mut left = PROOF_BUDGET;
+    while let Some((cell, known)) = stack.pop() {
         if left == 0 {
             return false;
         }
         left -= 1;
-        if may_be_inside(field, &cell) {
+        if let Some(known) = probe.look(&known, &cell) {
             // a point inside ends the attempt at once
-            if field.omega(cell.centre()) > 0.0 {
+            if probe.is_inside(&known, cell.centre()) {
                 return false;
             }
-            stack.extend(cell.halves());
+            stack.extend(cell.halves().map(|half| (half, known.clone())));
         }
     }
     true
 }
 
 /// Moves each face inwards as far as the slab that is cut off is proven empty.
-fn tighten(field: &impl Field, hull: Aabb) -> Aabb {
+fn tighten<P: Probe>(probe: &P, known: &P::Known, hull: Aabb) -> Aabb {
     let mut bounds = hull;
     let goal = 1e-6 * hull.size().max_element();
     for axis in 0..3 {
@@ -119,7 +182,7 @@ fn tighten(field: &impl Field, hull: Aabb) -> Aabb {
                 } else {
                     slab.max[axis] = middle;
                 }
-                if prove_empty(field, slab, PROOF_BUDGET) {
+                if prove_empty(probe, known, slab) {
                     far = middle;
                     if upper {
                         bounds.max[axis] = middle;

@@ -66,7 +66,8 @@ impl<T: Lane> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
-        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point, form };
+        let request =
+            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point, form, parameters: false };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -102,7 +103,8 @@ impl<T: Lane> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
-        let request = Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch, form };
+        let request =
+            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch, form, parameters: false };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -172,7 +174,7 @@ impl RangeProgram {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
         let (precision, shape, form) = (Precision::F64, Shape::Range, Form::Scaled);
-        let request = Request { graph, outputs: &[root], precision, shape, form };
+        let request = Request { graph, outputs: &[root], precision, shape, form, parameters: false };
         Ok(Self { code: codegen::compile(request)? })
     }
 
@@ -195,5 +197,77 @@ impl RangeProgram {
         // SAFETY: the program reads six numbers and writes two.
         unsafe { entry(input.as_ptr(), out.as_mut_ptr()) };
         Some(Interval::new(out[0], out[1]))
+    }
+}
+
+/// A program of leaves that differ in their constants alone: for one point and for many, in `f64`.
+#[derive(Debug)]
+pub struct LeafProgram {
+    point: Code,
+    batch: Code,
+    parameters: usize,
+}
+
+impl LeafProgram {
+    /// # Errors
+    /// As for [`codegen::compile`].
+    pub fn compile(graph: &Graph, outputs: &[Node], parameters: usize) -> Result<Self, CodegenError> {
+        let compile = |shape| {
+            let (precision, form) = (Precision::F64, Form::Stable);
+            codegen::compile(Request { graph, outputs, precision, shape, form, parameters: true })
+        };
+        Ok(Self { point: compile(Shape::Point)?, batch: compile(Shape::Batch)?, parameters })
+    }
+
+    /// All outputs at a point.
+    ///
+    /// # Panics
+    /// If there are not as many outputs or parameters as the program has.
+    #[inline]
+    pub fn call(&self, p: DVec3, parameters: &[f64], out: &mut [f64]) {
+        assert_eq!((out.len(), parameters.len()), (self.point.outputs, self.parameters), "leaf program");
+        type Entry = unsafe extern "C" fn(f64, f64, f64, *mut f64, *const f64);
+        // SAFETY: `compile` asked for a point program with parameters in `f64`, whose entry has this signature, and
+        // `self.point` keeps it mapped while it runs.
+        let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.point.entry()) };
+        // SAFETY: the program writes the outputs and reads the parameters; both lengths were checked above.
+        unsafe { entry(p.x, p.y, p.z, out.as_mut_ptr(), parameters.as_ptr()) }
+    }
+
+    /// The one output at many points: whole blocks, then the rest through one padded block.
+    ///
+    /// # Panics
+    /// If the columns differ in length, or the program has several outputs or other parameters.
+    pub fn call_many(&self, points: [&[f64]; 3], parameters: &[f64], out: &mut [f64]) {
+        let count = out.len();
+        assert_eq!((1, parameters.len()), (self.batch.outputs, self.parameters), "leaf program");
+        assert!(points.iter().all(|c| c.len() == count), "column lengths");
+        const LANES: usize = Precision::F64.lanes();
+        let whole = count / LANES * LANES;
+        if whole > 0 {
+            self.blocks(points.map(<[f64]>::as_ptr), out.as_mut_ptr(), whole / LANES, parameters);
+        }
+        if whole < count {
+            let mut inputs = [[0.0; LANES]; 3];
+            let mut output = [0.0; LANES];
+            for (padded, column) in inputs.iter_mut().zip(points) {
+                padded[..count - whole].copy_from_slice(&column[whole..]);
+            }
+            self.blocks(inputs.each_ref().map(|c| c.as_ptr()), output.as_mut_ptr(), 1, parameters);
+            out[whole..].copy_from_slice(&output[..count - whole]);
+        }
+    }
+
+    /// The columns hold at least `blocks` whole blocks: both callers above have seen to it.
+    fn blocks(&self, [x, y, z]: [*const f64; 3], out: *mut f64, blocks: usize, parameters: &[f64]) {
+        // the program only reads the first three
+        let columns = [x.cast_mut(), y.cast_mut(), z.cast_mut(), out];
+        type Entry = unsafe extern "C" fn(*const *mut f64, usize, *const f64);
+        // SAFETY: `compile` asked for a batch program with parameters in `f64`, whose entry has this signature, and
+        // `self.batch` keeps it mapped while it runs.
+        let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.batch.entry()) };
+        // SAFETY: the program reads `blocks` blocks of three columns and its parameters, whose number was checked,
+        // and writes as many blocks to `out`, which is borrowed exclusively.
+        unsafe { entry(columns.as_ptr(), blocks, parameters.as_ptr()) }
     }
 }

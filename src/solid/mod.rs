@@ -6,7 +6,10 @@
 //! only when it is first asked for.
 
 mod bounds;
+mod cell_map;
 mod compiled;
+mod leaf;
+mod logic;
 mod programs;
 
 use std::sync::Arc;
@@ -14,7 +17,8 @@ use std::sync::OnceLock;
 
 use glam::{DVec3, Vec3};
 
-pub use bounds::{Bounds, prove_empty};
+pub use bounds::Bounds;
+pub use cell_map::{CellMap, CellStats, Place};
 pub use compiled::{BatchProgram, Lane, PointProgram, RangeProgram};
 pub use programs::{Engine, ProgramKind};
 
@@ -24,7 +28,13 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{self, Graph, Node, RangeEvaluator};
 use crate::simplify::{Applied, simplify};
+use leaf::Leaves;
+use logic::Logic;
 use programs::{Guard, Programs};
+
+/// Up to this many leaves the twin alone is cheaper than finding out which of them matter: a leaf and its share of
+/// the minima cost some 0.2 ns in a batch, a cell's look-up and call 10.
+pub const FEW_LEAVES: usize = 24;
 
 /// An obstacle, compiled.
 #[derive(Clone)]
@@ -39,8 +49,15 @@ struct Inner {
     /// Same sign, no roots.
     twin: OnceLock<Function>,
     contact: OnceLock<Programs>,
+    parts: OnceLock<Option<Arc<Parts>>>,
     bounds: OnceLock<Bounds>,
     applied: Applied,
+}
+
+/// A solid taken apart.
+struct Parts {
+    logic: Logic,
+    leaves: Leaves,
 }
 
 /// One scalar function of space with all that answers questions about it.
@@ -124,6 +141,7 @@ impl Solid {
             omega: Function::new(graph, roots[0], Guard::Infinite, form),
             twin: OnceLock::new(),
             contact: OnceLock::new(),
+            parts: OnceLock::new(),
             bounds: OnceLock::new(),
             applied,
         };
@@ -173,6 +191,32 @@ impl Solid {
             let (graph, roots, _) = simplify(&graph, &[root]);
             Function::new(graph, roots[0], Guard::FarAway, Form::Stable)
         })
+    }
+
+    /// The solid taken apart into leaves, once; nothing if that would be too large.
+    fn parts(&self) -> Option<Arc<Parts>> {
+        let take_apart = || {
+            let omega = &self.inner.omega;
+            let (logic, nodes) = Logic::of(&omega.graph, omega.root)?;
+            let leaves = Leaves::new(self.inner.engine, &omega.graph, &nodes);
+            Some(Arc::new(Parts { logic, leaves }))
+        };
+        self.inner.parts.get_or_init(take_apart).clone()
+    }
+
+    /// The cheapest field with exactly the sign, zero set and surface gradient of ω in a box: the twin for a few
+    /// leaves, a [`CellMap`] for many. Off the surface its value is another one.
+    pub fn surface(&self, over: Aabb) -> Box<dyn Field> {
+        let many = self.leaf_count().is_some_and(|leaves| leaves > FEW_LEAVES);
+        match if many { CellMap::new(self, over) } else { None } {
+            Some(map) => Box::new(map),
+            None => Box::new(self.twin()),
+        }
+    }
+
+    /// How many leaves decide the sign of the solid; nothing if it cannot be taken apart.
+    pub fn leaf_count(&self) -> Option<usize> {
+        self.parts().map(|parts| parts.leaves.len())
     }
 
     /// The min/max twin as a field of its own: the sign and zero set of ω at a fraction of the cost, and on the

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod bad_input;
+mod cells;
 mod cli;
 mod contact;
 mod diagnostics;

@@ -163,7 +163,7 @@ fn remove_old(folder: &Path, prefix: &str, suffix: &str) -> Result<(), Failure> 
 /// All obstacles as one mesh, cut off at the box; written beside the frames.
 fn obstacle_mesh(options: &Run, setup: &Setup, folder: &Path) -> Result<Mesh, Failure> {
     let mut all = Mesh::default();
-    for (solid, _) in &setup.obstacles {
+    for (solid, ..) in &setup.obstacles {
         let bounds = solid.bounds().aabb().unwrap_or(setup.domain);
         let inside = setup.domain.grown(1e-3 * setup.domain.size().max_element());
         let over = bounds.intersection(&inside);
@@ -173,7 +173,8 @@ fn obstacle_mesh(options: &Run, setup: &Setup, folder: &Path) -> Result<Mesh, Fa
             Grid::filling(&over, Resolution::Cells(options.mesh_cells))
         };
         let grid = grid.map_err(Failure::usage)?;
-        let mesh = marching_cubes(&solid.twin(), &grid, &|_| {}).map_err(Failure::usage)?;
+        let surface = solid.surface(*grid.bounds());
+        let mesh = marching_cubes(&*surface, &grid, &|_| {}).map_err(Failure::usage)?;
         if mesh.triangles.is_empty() {
             note(format!("the obstacle `{}` has no surface in the box", solid.name()));
         }

@@ -3,9 +3,10 @@
 use super::super::args::Shared;
 use super::super::{Failure, choose, input};
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
+use crate::field::Field;
 use crate::geom::Aabb;
 use crate::lower::{Fill, Scene};
-use crate::solid::Bounds;
+use crate::solid::{Bounds, FEW_LEAVES};
 use crate::sph::{
     self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
     carve,
@@ -21,7 +22,8 @@ const PATH_RESOLUTION: f64 = 0.05;
 pub(super) struct Setup {
     pub domain: Aabb,
     pub parameters: Parameters,
-    pub obstacles: Vec<(Solid, f64)>,
+    /// Solids, what answers for them in the box, and their restitution.
+    pub obstacles: Vec<(Solid, Box<dyn Field>, f64)>,
     fluid: Solid,
     pub time_step_reason: &'static str,
     /// A speed that the scene can reach by gravity, for the colours of pictures.
@@ -35,7 +37,12 @@ impl Setup {
         let fluid = compile(&scene.fluid.name, scene.fluid.shape)?;
         let mut obstacles = Vec::new();
         for obstacle in &scene.obstacles {
-            obstacles.push((compile(&obstacle.name, obstacle.shape)?, obstacle.restitution));
+            let solid = compile(&obstacle.name, obstacle.shape)?;
+            // ω itself for a few leaves; for many, only those that matter where a particle is
+            let many = solid.leaf_count().is_some_and(|leaves| leaves > FEW_LEAVES);
+            let field: Box<dyn Field> =
+                if many { solid.surface(scene.domain) } else { Box::new(solid.clone()) };
+            obstacles.push((solid, field, obstacle.restitution));
         }
         let mut parameters = Parameters {
             rest_density: scene.fluid.density,
@@ -110,7 +117,7 @@ impl Setup {
         let mut particles =
             block.seed(&self.parameters, self.domain).map_err(|e| no_fluid(program, &e, span))?;
         let obstacles: Vec<Obstacle<'_>> =
-            self.obstacles.iter().map(|(solid, e)| self.obstacle(solid, *e)).collect();
+            self.obstacles.iter().map(|(_, field, e)| self.obstacle(&**field, *e)).collect();
         let carved = self.carve(program, scene, &mut particles, &obstacles)?;
         let simulation = Simulation::new(self.parameters.clone(), particles, self.domain, obstacles);
         let simulation = simulation.map_err(|e| {
@@ -119,9 +126,9 @@ impl Setup {
         Ok((simulation, carved))
     }
 
-    fn obstacle<'a>(&self, solid: &'a Solid, restitution: f64) -> Obstacle<'a> {
+    fn obstacle<'a>(&self, field: &'a dyn Field, restitution: f64) -> Obstacle<'a> {
         let resolution = PATH_RESOLUTION * self.parameters.support_radius;
-        Obstacle { field: solid, restitution, resolution }
+        Obstacle { field, restitution, resolution }
     }
 
     fn carve(

@@ -1,0 +1,147 @@
+//! The leaves of a solid: many, of few shapes. Leaves that differ in their constants alone share one program, so
+//! that ten thousand balls are compiled as one.
+
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use super::compiled::LeafProgram;
+use super::programs::Engine;
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::{self, Expr, Graph, Interpreter, Node, RangeEvaluator};
+
+/// A shape of leaves.
+struct Shape {
+    graph: Graph,
+    root: Node,
+    parameters: usize,
+    value: OnceLock<Evaluator>,
+    gradient: OnceLock<Evaluator>,
+}
+
+struct Evaluator {
+    code: Option<LeafProgram>,
+    interpreter: Interpreter,
+}
+
+struct Leaf {
+    shape: u32,
+    /// Where its constants begin.
+    first: u32,
+    range: RangeEvaluator,
+}
+
+pub(super) struct Leaves {
+    engine: Engine,
+    shapes: Vec<Shape>,
+    leaves: Vec<Leaf>,
+    constants: Vec<f64>,
+}
+
+impl Leaves {
+    pub fn new(engine: Engine, graph: &Graph, nodes: &[Node]) -> Self {
+        let mut known: HashMap<Vec<Expr>, u32> = HashMap::new();
+        let mut out = Self { engine, shapes: Vec::new(), leaves: Vec::new(), constants: Vec::new() };
+        for &node in nodes {
+            let (shape, root, constants) = graph.parametrised(node);
+            let (own, own_roots) = graph.extract_cone(node);
+            let next = out.shapes.len() as u32;
+            let number = *known.entry(shape.exprs().to_vec()).or_insert(next);
+            if number == next {
+                let parameters = constants.len();
+                let (value, gradient) = (OnceLock::new(), OnceLock::new());
+                out.shapes.push(Shape { graph: shape, root, parameters, value, gradient });
+            }
+            let range = RangeEvaluator::new(&own, own_roots);
+            out.leaves.push(Leaf { shape: number, first: out.constants.len() as u32, range });
+            out.constants.extend(constants);
+        }
+        out
+    }
+
+    pub fn len(&self) -> usize {
+        self.leaves.len()
+    }
+
+    pub fn shapes(&self) -> usize {
+        self.shapes.len()
+    }
+
+    pub fn range(&self, leaf: u32, over: &Aabb) -> Interval {
+        self.leaves[leaf as usize].range.eval(over)
+    }
+
+    fn of(&self, leaf: u32) -> (&Shape, &[f64]) {
+        let leaf = &self.leaves[leaf as usize];
+        let shape = &self.shapes[leaf.shape as usize];
+        let first = leaf.first as usize;
+        (shape, &self.constants[first..first + shape.parameters])
+    }
+
+    #[inline]
+    pub fn value(&self, leaf: u32, p: DVec3) -> f64 {
+        let (shape, constants) = self.of(leaf);
+        let mut out = [0.0];
+        shape.value(self.engine).point(p, constants, &mut out);
+        out[0]
+    }
+
+    /// Value and gradient.
+    pub fn gradient(&self, leaf: u32, p: DVec3) -> (f64, DVec3) {
+        let (shape, constants) = self.of(leaf);
+        let mut out = [0.0; 4];
+        shape.gradient(self.engine).point(p, constants, &mut out);
+        (out[0], DVec3::new(out[1], out[2], out[3]))
+    }
+
+    pub fn values(&self, leaf: u32, points: [&[f64]; 3], out: &mut [f64]) {
+        let (shape, constants) = self.of(leaf);
+        shape.value(self.engine).many(points, constants, out);
+    }
+}
+
+impl Shape {
+    #[inline]
+    fn value(&self, engine: Engine) -> &Evaluator {
+        self.value.get_or_init(|| Evaluator::new(engine, &self.graph, &[self.root], self.parameters))
+    }
+
+    fn gradient(&self, engine: Engine) -> &Evaluator {
+        self.gradient.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let [x, y, z] = ir::gradient(&mut graph, self.root);
+            let (graph, outputs, _) = crate::simplify::simplify(&graph, &[self.root, x, y, z]);
+            Evaluator::new(engine, &graph, &outputs, self.parameters)
+        })
+    }
+}
+
+impl Evaluator {
+    fn new(engine: Engine, graph: &Graph, outputs: &[Node], parameters: usize) -> Self {
+        let code = match engine {
+            Engine::Interpreter => None,
+            Engine::Auto | Engine::Jit => LeafProgram::compile(graph, outputs, parameters).ok(),
+        };
+        Self { code, interpreter: Interpreter::new(graph, outputs) }
+    }
+
+    #[inline]
+    fn point(&self, p: DVec3, constants: &[f64], out: &mut [f64]) {
+        match &self.code {
+            Some(code) => code.call(p, constants, out),
+            None => self.interpreter.eval_with(p.to_array(), constants, out),
+        }
+    }
+
+    fn many(&self, points: [&[f64]; 3], constants: &[f64], out: &mut [f64]) {
+        if let Some(code) = &self.code {
+            return code.call_many(points, constants, out);
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            let p = points.map(|column| column[i]);
+            self.interpreter.eval_with(p, constants, std::slice::from_mut(out));
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The cell map: same sign everywhere, same gradient on the surface, same mesh, cost that does not grow with the
+//! number of primitives.
+
+use std::fmt::Write;
+
+use rfm::field::Points;
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::mesh::{Grid, Resolution, check, marching_cubes};
+use rfm::solid::{CellMap, Place};
+use rfm::{Engine, Field, Program, Solid};
+
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn point(&mut self, over: &Aabb) -> DVec3 {
+        over.min + over.size() * DVec3::new(self.unit(), self.unit(), self.unit())
+    }
+}
+
+/// A union of balls, some cut by slabs, some of them holes.
+fn many(count: usize) -> String {
+    let mut random = Random(11);
+    let mut text = "rfm 1\nsolid many = (sphere(0.01)".to_string();
+    for i in 0..count {
+        let p = random.point(&Aabb::new(DVec3::splat(0.2), DVec3::splat(2.8)));
+        let r = 0.9 * (0.05 + 0.05 * random.unit()) * (500.0 / count as f64).cbrt();
+        let _ = write!(text, "\n or ball([{}, {}, {}], {r})", p.x, p.y, p.z);
+        if i % 7 == 0 {
+            let _ = write!(text, " and z <= {}", p.z + 0.5 * r);
+        }
+    }
+    text + ") \\ ball([1.5, 1.5, 1.5], 0.6)\n"
+}
+
+fn solid(text: &str, name: &str, engine: Engine) -> Solid {
+    let program = Program::from_source("t.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    program.solid_with(name, engine).unwrap()
+}
+
+fn domain() -> Aabb {
+    Aabb::new(DVec3::ZERO, DVec3::splat(3.0))
+}
+
+fn sign(x: f64) -> i8 {
+    i8::from(x > 0.0) - i8::from(x < 0.0)
+}
+
+#[test]
+fn signs_and_surface_gradients_are_those_of_the_twin() {
+    let odd =
+        "rfm 1\nsolid odd = (sqrt(x - 1) >= 0.3 and y/(z - 1.2) <= 2 or torus(1, 0.2).move([1.5,1.5,1.5]))
+      and not (box([0,0,0],[1,1,1]) and ((x and y) >= 0.1)) or normalise(sphere(0.4)).move([2, 2, 2])\n";
+    let path = format!("{}/examples/pawn.rfm", env!("CARGO_MANIFEST_DIR"));
+    let pawn = std::fs::read_to_string(path).unwrap();
+    for (text, name) in [(many(300), "many"), (odd.to_string(), "odd"), (pawn, "pawn")] {
+        for engine in [Engine::Jit, Engine::Interpreter] {
+            let solid = solid(&text, name, engine);
+            let map = CellMap::new(&solid, domain()).unwrap();
+            let twin = solid.twin();
+            let mut random = Random(5);
+            let over = domain().grown(0.2); // some points are outside the map
+            let count = if engine == Engine::Jit { 20_000 } else { 1_000 };
+            let points: Vec<DVec3> = (0..count).map(|_| random.point(&over)).collect();
+            let column = |axis: usize| points.iter().map(|p| p[axis]).collect::<Vec<f64>>();
+            let (x, y, z) = (column(0), column(1), column(2));
+            let mut together = vec![0.0; count];
+            map.omega_many(Points::new(&x, &y, &z), &mut together);
+            for (i, &p) in points.iter().enumerate() {
+                let (a, b) = (map.omega(p), twin.omega(p));
+                assert_eq!((sign(a), a.is_nan()), (sign(b), b.is_nan()), "{name} at {p}: {a} and {b}");
+                assert_eq!(together[i].to_bits(), a.to_bits(), "{name} at {p}");
+            }
+            // at points of the surface the gradient is that of the leaf there
+            let mut found = 0;
+            for pair in points.windows(2) {
+                let (mut inside, mut outside) = (pair[0], pair[1]);
+                if !(twin.omega(inside) > 0.0 && twin.omega(outside) < 0.0) {
+                    continue;
+                }
+                for _ in 0..60 {
+                    let middle = 0.5 * (inside + outside);
+                    if twin.omega(middle) > 0.0 { inside = middle } else { outside = middle }
+                }
+                let (a, b) = (map.omega_grad(outside).1.normalize(), twin.omega_grad(outside).1.normalize());
+                if a.is_finite() && b.is_finite() {
+                    assert!((a - b).length() < 1e-6, "{name} at {outside}: {a} and {b}");
+                    found += 1;
+                }
+            }
+            assert!(found > 4, "{name}: {found} points on the surface");
+        }
+    }
+}
+
+#[test]
+fn ranges_of_the_map_hold() {
+    let solid = solid(&many(100), "many", Engine::Jit);
+    let map = CellMap::new(&solid, domain()).unwrap();
+    let mut random = Random(8);
+    let mut decided = 0;
+    for _ in 0..5_000 {
+        let corner = random.point(&domain());
+        let over = Aabb::new(corner, corner + 0.1 * random.unit());
+        let range = map.range(&over);
+        decided += i32::from(range.lo > 0.0 || range.hi < 0.0);
+        for _ in 0..5 {
+            let p = random.point(&over);
+            let omega = solid.twin().omega(p);
+            assert!(range.lo <= 0.0 || omega > 0.0, "{over:?}: {range:?}, {omega} at {p}");
+            assert!(range.hi >= 0.0 || omega < 0.0, "{over:?}: {range:?}, {omega} at {p}");
+        }
+    }
+    assert!(decided > 1_000, "{decided}");
+}
+
+#[test]
+fn the_mesh_is_the_same() {
+    let solid = solid(&many(60), "many", Engine::Jit);
+    let map = CellMap::new(&solid, domain()).unwrap();
+    let grid = Grid::filling(&domain(), Resolution::Cells(80)).unwrap();
+    let [with, without] = [&map as &dyn Field, &solid.twin()].map(|field| {
+        let mesh = marching_cubes(field, &grid, &|_| {}).unwrap();
+        check(&mesh, field)
+    });
+    assert_eq!(
+        (with.vertices, with.triangles, with.euler),
+        (without.vertices, without.triangles, without.euler)
+    );
+    assert!(with.closed && with.manifold);
+    assert!((with.volume / without.volume - 1.0).abs() < 1e-9, "{} {}", with.volume, without.volume);
+    assert!(with.max_distance < 1e-12, "{}", with.max_distance);
+}
+
+#[test]
+fn leaves_of_one_shape_share_a_program_and_far_cells_need_none() {
+    let solid = solid(&many(2_000), "many", Engine::Jit);
+    let map = CellMap::new(&solid, domain()).unwrap();
+    let stats = map.stats();
+    assert!(stats.leaves > 2_000 && stats.shapes <= 6, "{stats:?}");
+    assert!(stats.leaves_in_cells < 4 * stats.near, "{stats:?}");
+    assert_eq!(map.place_of(DVec3::splat(0.01 + 2.98)), Place::Fluid);
+    assert_eq!(map.place_of(DVec3::splat(1.5)), Place::Fluid); // in the hole
+    assert_eq!(map.place_of(DVec3::splat(9.0)), Place::Near);
+    assert!(map.omega(DVec3::NAN).is_nan());
+}
