@@ -68,7 +68,7 @@ fn help_and_usage() {
         ("param not finite", &["check", PAWN, "-D", "particles=nan"]),
         ("unknown solid", &["mesh", PAWN, "-s", "pwan", "-o", "x.stl"]),
         ("unknown scene", &["run", PAWN, "--scene", "drpo"]),
-        ("no scene", &["run", "examples/cube.rfm"]),
+        ("no scene", &["run", "tests/cases/stages/cube.rfm"]),
         ("mesh without output", &["mesh", PAWN]),
         ("mesh of an unknown format", &["mesh", PAWN, "-o", "pawn.3ds"]),
         ("mesh with no cells", &["mesh", PAWN, "--cells", "0", "-o", "pawn.stl"]),
