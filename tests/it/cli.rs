@@ -366,6 +366,38 @@ fn run_defaults_and_flags() {
 }
 
 #[test]
+fn one_document_or_none() {
+    let run = |arguments: &[&str]| rfm_reading(root(), arguments, SMALL.as_bytes());
+    let dry = run(&["run", "-", "--dry-run", "--json"]).expect(0);
+    contract(&dry.stdout, &dry.json(), &["schema", "particles", "steps", "time_step", "passes", "seconds"]);
+    run(&["check", "-", "--json", "--slice", "z=0.1", "--term"]).expect(2);
+    run(&["explain", "E0201", "--json"]).expect(2);
+    run(&["check", "-", "-s", "post"]).expect(2);
+    run(&["check", "-", "--threads", "1025"]).expect(2);
+    let thin = b"rfm 1\nsolid s = sphere(1) and -1e-4 <= x + y + 0.7*z <= 1e-4";
+    let thin = rfm_reading(root(), &["check", "-", "--json"], thin).expect(0).json();
+    assert_eq!((&thin["solids"][0]["empty"], &thin["solids"][0]["volume"]), (&false.into(), &().into()));
+}
+
+#[test]
+fn a_run_leaves_nothing_of_the_one_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
+    let run = |flags: &[&str]| rfm(here, &[&["run", "drop.rfm", "-o", "out"], flags].concat());
+    run(&[]).expect(0);
+    std::fs::write(here.join("out/frames/notes.txt"), "kept").unwrap();
+    // what is refused changes nothing
+    let before = [files(&here.join("out")), files(&here.join("out/frames"))];
+    run(&["--mesh-cells", "0"]).expect(2);
+    assert_eq!([files(&here.join("out")), files(&here.join("out/frames"))], before);
+    run(&["--no-frames", "--steps", "1"]).expect(0);
+    assert_eq!(files(&here.join("out")), ["frames", "pictures", "summary.json"]);
+    assert_eq!(files(&here.join("out/frames")), ["notes.txt"]);
+    assert!(files(&here.join("out/pictures")).is_empty());
+}
+
+#[test]
 fn unwritable_places_are_refused_and_nothing_is_left() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
