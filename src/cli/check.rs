@@ -271,7 +271,8 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
 
 fn print(file: &str, program: &Program, facts: &[Facts]) {
     let module = program.module();
-    say!("{file}: {} solid(s), {} scene(s)", module.solids.len(), module.scenes.len());
+    let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    say!("{file}: {}, {}", count(module.solids.len(), "solid"), count(module.scenes.len(), "scene"));
     for param in &module.params {
         let range = param.range.map_or(String::new(), |(low, high)| format!(" in {low} .. {high}"));
         let doc = param.doc.as_ref().map_or(String::new(), |doc| format!("   {doc}"));
@@ -322,10 +323,13 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
         None => plane.window(&around(&solid)?),
     };
     if options.term {
-        let mut out = anstream::stdout();
+        // drawn first, so that a reader who leaves early is no error of the drawing
+        let mut drawing = Vec::new();
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        slice::terminal::draw(&solid, solid.name(), plane, window, 78, colour, &mut out)
+        slice::terminal::draw(&solid, solid.name(), plane, window, 78, colour, &mut drawing)
             .map_err(Failure::usage)?;
+        let mut out = anstream::stdout();
+        out.write_all(&drawing)?;
         out.flush()?;
         if options.output.is_none() {
             return Ok(());

@@ -35,15 +35,17 @@ pub fn draw(
     let scale = Scale::for_samples(&samples);
     let (right, up) = plane.axis.right_and_up();
     let Window { min, max } = window;
+    // a caption, not a measurement: four digits behind the point and no trailing zeros
+    let short = |x: f64| (1e4 * x).round() / 1e4 + 0.0;
     writeln!(
         out,
         "{name}, {plane}   {} {} .. {} to the right, {} {} .. {} upwards",
         right.name(),
-        min.x,
-        max.x,
+        short(min.x),
+        short(max.x),
         up.name(),
-        min.y,
-        max.y
+        short(min.y),
+        short(max.y)
     )?;
     if colour {
         blocks(&samples, &scale, out)?
