@@ -26,6 +26,10 @@ const DEPTH: u32 = 6;
 const FEW_LEAVES: usize = 4;
 const MAX_DEPTH: u32 = 10;
 
+/// Below [`DEPTH`] a cell whose leaves have stayed the same for so many levels is left as it is: surfaces that lie on
+/// one another never part, and would cost time and memory as 4ⁿ.
+const LEVELS_IN_VAIN: u32 = 2;
+
 /// Points that are evaluated together.
 const RUN: usize = 64;
 
@@ -95,7 +99,8 @@ impl CellMap {
             return None;
         }
         let parts = solid.parts()?;
-        let root = divide(&parts.leaves, &parts.logic, domain, 0);
+        let all = Undivided { leaves: parts.leaves.len(), in_vain: 0, depth: 0 };
+        let root = divide(&parts.leaves, &parts.logic, domain, all);
         let leaves = &parts.leaves;
         let stats = CellStats { leaves: leaves.len(), shapes: leaves.shapes(), ..CellStats::default() };
         let (cells, programs) = (vec![Cell::Fluid], Vec::new());
@@ -324,20 +329,33 @@ fn signed(value: f64, word: u32) -> f64 {
     if word & 1 == 1 { -value } else { value }
 }
 
-fn divide(leaves: &Leaves, logic: &Logic, bounds: Aabb, depth: u32) -> Node {
+/// How a cell has come to be.
+#[derive(Debug, Clone, Copy)]
+struct Undivided {
+    depth: u32,
+    /// Leaves of the cell above.
+    leaves: usize,
+    /// Levels above since a leaf was last dropped.
+    in_vain: u32,
+}
+
+fn divide(leaves: &Leaves, logic: &Logic, bounds: Aabb, cell: Undivided) -> Node {
     let logic = match logic.prune_in(leaves, &bounds) {
         Pruned::Outside => return Node::Fluid,
         Pruned::Inside => return Node::Inside,
         Pruned::Near(logic) => logic,
     };
+    let Undivided { depth, .. } = cell;
     let mut count = 0;
     logic.for_leaves(&mut |_| count += 1);
-    if depth >= MAX_DEPTH || (depth >= DEPTH && count <= FEW_LEAVES) {
+    let in_vain = if count < cell.leaves { 0 } else { cell.in_vain + 1 };
+    if depth >= MAX_DEPTH || (depth >= DEPTH && (count <= FEW_LEAVES || in_vain >= LEVELS_IN_VAIN)) {
         return Node::Near(logic);
     }
+    let below = Undivided { depth: depth + 1, leaves: count, in_vain };
     let centre = bounds.centre();
     let child =
-        |corner: DVec3| divide(leaves, &logic, Aabb::new(corner.min(centre), corner.max(centre)), depth + 1);
+        |corner: DVec3| divide(leaves, &logic, Aabb::new(corner.min(centre), corner.max(centre)), below);
     // the upper levels in parallel; the tree is the same for any number of threads
     let children: Vec<Node> = if depth < 3 {
         bounds.corners().into_par_iter().map(child).collect()

@@ -149,3 +149,14 @@ fn leaves_of_one_shape_share_a_program_and_far_cells_need_none() {
     assert_eq!(map.place_of(DVec3::splat(9.0)), Place::Near);
     assert!(map.omega(DVec3::NAN).is_nan());
 }
+
+#[test]
+fn surfaces_that_lie_on_one_another_do_not_divide_cells_for_ever() {
+    let text = "rfm 1\nsolid s = any i in 0..30: sphere(1 + i*1e-9)";
+    let s = solid(text, "s", Engine::Auto);
+    let map = CellMap::new(&s, Aabb::new(DVec3::splat(-1.1), DVec3::splat(1.1))).unwrap();
+    let stats = map.stats();
+    // some six squares of 64² cells; divided as deep as cells go, they would be millions
+    assert!(stats.leaves == 30 && stats.near < 100_000, "{stats:?}");
+    assert_eq!((map.place_of(DVec3::ZERO), map.place_of(DVec3::ONE)), (Place::Inside, Place::Fluid));
+}
