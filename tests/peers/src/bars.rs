@@ -137,7 +137,7 @@ impl Found {
 
         let work = "compile, ms";
         bar(work, "pawn, all programs", self.compile("pawn, all programs that a run needs"), AtMost(3.0));
-        for (title, limit) in [("500 spheres, left fold", 30.0), ("10000 spheres, left fold", 500.0)] {
+        for (title, limit) in [("500 spheres, balanced", 30.0), ("10000 spheres, balanced", 500.0)] {
             for what in ["ω at one point", "ω, f32 batch", "sign, f64 batch", "contact, f64 batch"] {
                 bar(
                     work,

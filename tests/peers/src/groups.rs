@@ -2,6 +2,7 @@
 
 use fidget::jit::JitShape;
 use rfm::codegen::Form;
+use rfm::glam::DVec3;
 
 use crate::fidget::{self as peer, Joins};
 use crate::hand::{self, Width};
@@ -36,7 +37,7 @@ pub struct Obstacle {
 /// Who wrote it by hand.
 pub enum Hand {
     Pawn,
-    Spheres(Vec<scenes::Sphere>),
+    Spheres(Vec<scenes::Sphere>, Order),
     Nobody,
 }
 
@@ -62,7 +63,7 @@ pub fn obstacles() -> Vec<Obstacle> {
             title: format!("{n} spheres, {shape}"),
             text: scenes::union_text(&spheres, order),
             name: "union",
-            hand: if n == 64 && order == Order::Left { Hand::Spheres(spheres.clone()) } else { Hand::Nobody },
+            hand: if n == 64 { Hand::Spheres(spheres.clone(), order) } else { Hand::Nobody },
             tree: Box::new(move |joins| peer::union(&spheres, order, joins)),
             corners: Vec::new(),
             checked,
@@ -76,14 +77,14 @@ pub fn obstacles() -> Vec<Obstacle> {
         union(64, Order::Balanced, 100),
         union(500, Order::Left, 30),
         union(500, Order::Balanced, 30),
-        union(10_000, Order::Left, 3),
+        union(10_000, Order::Balanced, 3),
     ]
 }
 
 impl Obstacle {
-    /// How many leaves it has, about: each stands on a line of its own.
+    /// How many leaves it has, about.
     pub fn primitives(&self) -> usize {
-        if self.name == "union" { self.text.lines().count() - 1 } else { 5 }
+        if self.name == "union" { self.text.matches("(x -").count() } else { 5 }
     }
 
     pub fn points(&self) -> Points {
@@ -106,8 +107,9 @@ impl Obstacle {
                     let work = ours::by_hand::<T, _>(width, hand::Stable);
                     rows.push(Row::new(name("half-angle"), Asks::Value, against, work));
                 }
-                Hand::Spheres(spheres) => {
-                    let work = ours::by_hand::<T, _>(width, hand::Spheres(spheres.clone()));
+                Hand::Spheres(spheres, order) => {
+                    let formula = hand::Spheres { list: spheres.clone(), order: *order };
+                    let work = ours::by_hand::<T, _>(width, formula);
                     rows.push(Row::new(name("textbook"), Asks::Value, against, work));
                 }
                 Hand::Nobody => {}
@@ -196,12 +198,7 @@ pub fn points_of_the_pawn(pawn: &Obstacle) -> Group {
     let gradient = [Some("hand ω and ∇ω f64"), Some("Fidget ω and ∇ω f32")];
     let single = stable.clone();
     group.rows = vec![
-        Row::new(
-            "hand ω f64",
-            Asks::Value,
-            value,
-            ours::each(|p| [hand::pawn_at(p.to_array()), 0.0, 0.0, 0.0]),
-        ),
+        Row::new("hand ω f64", Asks::Value, value, ours::each(hand::pawn_at)),
         Row::new("Fidget ω f32", Asks::Value, value, peer::point(&shape)),
         Row::new("ours ω stable f64", Asks::Value, value, ours::point(&stable)),
         Row::new("ours ω textbook f64", Asks::Value, value, ours::point(&textbook)),
@@ -209,14 +206,9 @@ pub fn points_of_the_pawn(pawn: &Obstacle) -> Group {
             "ours ω stable f32",
             Asks::Value,
             value,
-            ours::each(move |p| [f64::from(single.omega_f32(p.as_vec3())), 0.0, 0.0, 0.0]),
+            ours::each(move |x, y, z| f64::from(single.omega_f32(DVec3::new(x, y, z).as_vec3()))),
         ),
-        Row::new(
-            "hand ω and ∇ω f64",
-            Asks::Gradient,
-            gradient,
-            ours::each(|p| hand::pawn_grad_at(p.to_array())),
-        ),
+        Row::new("hand ω and ∇ω f64", Asks::Gradient, gradient, ours::each_grad(hand::pawn_grad_at)),
         Row::new("Fidget ω and ∇ω f32", Asks::Gradient, gradient, peer::point_grad(&shape)),
         Row::new("ours ω and ∇ω stable f64", Asks::Gradient, gradient, ours::point_grad(&stable)),
         Row::new("ours ω and ∇ω textbook f64", Asks::Gradient, gradient, ours::point_grad(&textbook)),

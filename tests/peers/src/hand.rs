@@ -6,7 +6,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
-use crate::scenes::Sphere;
+use crate::scenes::{Order, Sphere};
 
 /// Some lanes of numbers; one lane is a plain number.
 pub trait Vector:
@@ -197,8 +197,12 @@ number!(f32);
 number!(f64);
 
 /// One formula for a vector of points: x, y, z → ω, ∂x, ∂y, ∂z (those that it gives; the rest is left as it was).
-pub trait Formula: Sync {
+pub trait Formula {
     const OUTPUTS: usize;
+    /// Whether it is one long chain of dependent operations.
+    fn is_chain(&self) -> bool {
+        false
+    }
     fn at<V: Vector>(&self, p: [V; 3]) -> [V; 4];
 }
 
@@ -218,6 +222,41 @@ fn leaves<V: Vector>([x, y, z]: [V; 3]) -> [V; 5] {
     ]
 }
 
+// Functions, not closures: only what is always inlined gets the instructions of the caller.
+
+#[inline(always)]
+fn and<V: Vector>(u: V, v: V) -> V {
+    u + v - (u * u + v * v).sqrt()
+}
+
+#[inline(always)]
+fn or<V: Vector>(u: V, v: V) -> V {
+    u + v + (u * u + v * v).sqrt()
+}
+
+#[inline(always)]
+fn stable_and<V: Vector>(u: V, v: V) -> V {
+    let (min, max, sum) = (u.min(v), u.max(v), u + v);
+    let magnitude = max.max(V::splat(0.0) - min);
+    let h = (u * u + v * v).sqrt().max(magnitude);
+    sum.if_positive(min - min * (min / (magnitude + h)), sum - h)
+}
+
+#[inline(always)]
+fn stable_or<V: Vector>(u: V, v: V) -> V {
+    let (min, max, sum) = (u.min(v), u.max(v), u + v);
+    let magnitude = max.max(V::splat(0.0) - min);
+    let h = (u * u + v * v).sqrt().max(magnitude);
+    (V::splat(0.0) - sum).if_positive(max + max * (max / (magnitude + h)), sum + h)
+}
+
+/// The root of the sum of squares, and its reciprocal for the weights: one division for each node.
+#[inline(always)]
+fn hypot<V: Vector>(u: V, v: V) -> (V, V) {
+    let h = (u * u + v * v).sqrt();
+    (h, V::splat(1.0) / h)
+}
+
 /// ω of the pawn as the paper prints it.
 pub struct Textbook;
 
@@ -225,8 +264,6 @@ impl Formula for Textbook {
     const OUTPUTS: usize = 1;
     #[inline(always)]
     fn at<V: Vector>(&self, p: [V; 3]) -> [V; 4] {
-        let and = |u: V, v: V| u + v - (u * u + v * v).sqrt();
-        let or = |u: V, v: V| u + v + (u * u + v * v).sqrt();
         let [cylinder, layer, waist, collar, head] = leaves(p);
         [or(and(and(cylinder, layer), waist), or(collar, head)); 4]
     }
@@ -239,21 +276,8 @@ impl Formula for Stable {
     const OUTPUTS: usize = 1;
     #[inline(always)]
     fn at<V: Vector>(&self, p: [V; 3]) -> [V; 4] {
-        let zero = V::splat(0.0);
-        let and = |u: V, v: V| {
-            let (min, max, sum) = (u.min(v), u.max(v), u + v);
-            let magnitude = max.max(zero - min);
-            let h = (u * u + v * v).sqrt().max(magnitude);
-            sum.if_positive(min - min * (min / (magnitude + h)), sum - h)
-        };
-        let or = |u: V, v: V| {
-            let (min, max, sum) = (u.min(v), u.max(v), u + v);
-            let magnitude = max.max(zero - min);
-            let h = (u * u + v * v).sqrt().max(magnitude);
-            (zero - sum).if_positive(max + max * (max / (magnitude + h)), sum + h)
-        };
         let [cylinder, layer, waist, collar, head] = leaves(p);
-        [or(and(and(cylinder, layer), waist), or(collar, head)); 4]
+        [stable_or(stable_and(stable_and(cylinder, layer), waist), stable_or(collar, head)); 4]
     }
 }
 
@@ -266,11 +290,6 @@ impl Formula for TextbookGradient {
     fn at<V: Vector>(&self, [x, y, z]: [V; 3]) -> [V; 4] {
         let k = V::splat;
         let one = k(1.0);
-        // the value, and the reciprocal of the root for the weights: one division for each node
-        let hypot = |u: V, v: V| {
-            let h = (u * u + v * v).sqrt();
-            (h, one / h)
-        };
         let [cylinder, layer, waist, collar, head] = leaves([x, y, z]);
         let (h, post_i) = hypot(cylinder, layer);
         let post = cylinder + layer - h;
@@ -292,20 +311,118 @@ impl Formula for TextbookGradient {
     }
 }
 
-/// ω of a union of spheres, from the left.
-pub struct Spheres(pub Vec<Sphere>);
+/// ω of a union of spheres: from the left, or as a balanced tree of 2ⁿ of them.
+pub struct Spheres {
+    pub list: Vec<Sphere>,
+    pub order: Order,
+}
+
+/// One leaf of such a union.
+#[inline(always)]
+fn sphere<V: Vector>([x, y, z]: [V; 3], s: &Sphere) -> V {
+    let k = V::splat;
+    let [u, v, w] = [x - k(s.centre[0]), y - k(s.centre[1]), z - k(s.centre[2])];
+    k(s.r2) - u * u - v * v - w * w
+}
 
 impl Formula for Spheres {
     const OUTPUTS: usize = 1;
+    fn is_chain(&self) -> bool {
+        self.order == Order::Left
+    }
     #[inline(always)]
-    fn at<V: Vector>(&self, [x, y, z]: [V; 3]) -> [V; 4] {
-        let k = V::splat;
-        let leaf = |s: &Sphere| {
-            let [u, v, w] = [x - k(s.centre[0]), y - k(s.centre[1]), z - k(s.centre[2])];
-            k(s.r2) - u * u - v * v - w * w
-        };
-        let first = leaf(&self.0[0]);
-        [self.0[1..].iter().map(leaf).fold(first, |u, v| u + v + (u * u + v * v).sqrt()); 4]
+    fn at<V: Vector>(&self, p: [V; 3]) -> [V; 4] {
+        let first = sphere(p, &self.list[0]);
+        if self.order == Order::Left {
+            let mut sum = first;
+            for s in &self.list[1..] {
+                sum = or(sum, sphere(p, s));
+            }
+            return [sum; 4];
+        }
+        let mut values = [first; 64];
+        let mut n = self.list.len();
+        assert!(n.is_power_of_two() && n <= 64);
+        for i in 0..n {
+            values[i] = sphere(p, &self.list[i]);
+        }
+        while n > 1 {
+            n /= 2;
+            for i in 0..n {
+                values[i] = or(values[2 * i], values[2 * i + 1]);
+            }
+        }
+        [values[0]; 4]
+    }
+}
+
+/// Four vectors side by side: a fold is one long chain, and the processor can work on several such chains at once.
+#[derive(Clone, Copy)]
+pub struct Four<V>([V; 4]);
+
+macro_rules! four {
+    ($trait:ident, $method:ident) => {
+        impl<V: Vector> $trait for Four<V> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+                Self([a.$method(e), b.$method(f), c.$method(g), d.$method(h)])
+            }
+        }
+    };
+}
+
+four!(Add, add);
+four!(Sub, sub);
+four!(Mul, mul);
+four!(Div, div);
+
+#[allow(clippy::missing_safety_doc)]
+impl<V: Vector> Vector for Four<V> {
+    type Lane = V::Lane;
+    const LANES: usize = 4 * V::LANES;
+    #[inline(always)]
+    unsafe fn load(from: *const V::Lane) -> Self {
+        let n = V::LANES;
+        unsafe {
+            Self([V::load(from), V::load(from.add(n)), V::load(from.add(2 * n)), V::load(from.add(3 * n))])
+        }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut V::Lane) {
+        let (n, [a, b, c, d]) = (V::LANES, self.0);
+        unsafe {
+            a.store(to);
+            b.store(to.add(n));
+            c.store(to.add(2 * n));
+            d.store(to.add(3 * n));
+        }
+    }
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self([V::splat(x); 4])
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        let [a, b, c, d] = self.0;
+        Self([a.sqrt(), b.sqrt(), c.sqrt(), d.sqrt()])
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+        Self([a.min(e), b.min(f), c.min(g), d.min(h)])
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+        Self([a.max(e), b.max(f), c.max(g), d.max(h)])
+    }
+    #[inline(always)]
+    fn if_positive(self, yes: Self, no: Self) -> Self {
+        let [a, b, c, d] = self.0;
+        let ([e, f, g, h], [i, j, k, l]) = (yes.0, no.0);
+        Self([a.if_positive(e, i), b.if_positive(f, j), c.if_positive(g, k), d.if_positive(h, l)])
     }
 }
 
@@ -367,11 +484,19 @@ impl Precision for f64 {
 pub fn run<T: Precision, F: Formula>(width: Width, formula: &F, points: [&[T]; 3], out: &mut [Vec<T>; 4]) {
     #[target_feature(enable = "sse4.1")]
     fn bits128<T: Precision, F: Formula>(formula: &F, points: [&[T]; 3], out: &mut [Vec<T>; 4]) {
-        each::<T::Bits128, F>(formula, points, out);
+        if formula.is_chain() {
+            each::<Four<T::Bits128>, F>(formula, points, out)
+        } else {
+            each::<T::Bits128, F>(formula, points, out)
+        }
     }
     #[target_feature(enable = "avx")]
     fn bits256<T: Precision, F: Formula>(formula: &F, points: [&[T]; 3], out: &mut [Vec<T>; 4]) {
-        each::<T::Bits256, F>(formula, points, out);
+        if formula.is_chain() {
+            each::<Four<T::Bits256>, F>(formula, points, out)
+        } else {
+            each::<T::Bits256, F>(formula, points, out)
+        }
     }
     assert!(width.is_here());
     match width {
@@ -384,12 +509,12 @@ pub fn run<T: Precision, F: Formula>(width: Width, formula: &F, points: [&[T]; 3
 
 /// ω of the pawn at one point, called as a function of its own.
 #[inline(never)]
-pub fn pawn_at(p: [f64; 3]) -> f64 {
-    Textbook.at(p)[0]
+pub fn pawn_at(x: f64, y: f64, z: f64) -> f64 {
+    Textbook.at([x, y, z])[0]
 }
 
 /// ω and ∇ω of the pawn at one point, called as a function of its own.
 #[inline(never)]
-pub fn pawn_grad_at(p: [f64; 3]) -> [f64; 4] {
-    TextbookGradient.at(p)
+pub fn pawn_grad_at(x: f64, y: f64, z: f64) -> [f64; 4] {
+    TextbookGradient.at([x, y, z])
 }

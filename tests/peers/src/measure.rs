@@ -39,11 +39,12 @@ impl Points {
         Self::new(&list)
     }
 
-    /// Pairs of operands of all magnitudes between 2⁻⁴⁰ and 2⁴⁰, and of both signs.
+    /// Pairs of operands of all magnitudes between 2⁻²⁰ and 2²⁰, and of both signs: their weights are
+    /// numbers that f32 has.
     pub fn operands(n: usize) -> Self {
         let mut random = Random(7);
         let mut number = || {
-            let size = (1.0 + random.next()) * (80.0 * random.next() - 40.0).floor().exp2();
+            let size = (1.0 + random.next()) * (40.0 * random.next() - 20.0).floor().exp2();
             if random.next() < 0.5 { -size } else { size }
         };
         let list: Vec<_> = (0..n).map(|_| [number(), number(), 0.0]).collect();

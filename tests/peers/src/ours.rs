@@ -82,13 +82,26 @@ pub fn contact<T: Precision>(solid: &Solid) -> Work {
     columns::<T, 5>(move |points, out| solid.contact_many(points, out))
 }
 
-/// One point after the other through a function of one point.
-pub fn each(one: impl Fn(DVec3) -> [f64; 4] + 'static) -> Work {
+/// ω at one point after the other through a function of three loose numbers.
+pub fn each(one: impl Fn(f64, f64, f64) -> f64 + 'static) -> Work {
     Box::new(move |points, mut keep| {
         let [x, y, z] = &points.double;
         for i in 0..x.len() {
-            let answer = one(DVec3::new(x[i], y[i], z[i]));
-            black_box(answer);
+            let omega = black_box(one(x[i], y[i], z[i]));
+            if let Some(keep) = keep.as_deref_mut() {
+                keep.push([omega, 0.0, 0.0, 0.0]);
+            }
+        }
+    })
+}
+
+/// ω and ∇ω at one point after the other.
+pub fn each_grad(one: impl Fn(f64, f64, f64) -> [f64; 4] + 'static) -> Work {
+    Box::new(move |points, mut keep| {
+        let [x, y, z] = &points.double;
+        for i in 0..x.len() {
+            // number by number: the whole array would be written and read back in other sizes, which stalls
+            let answer = one(x[i], y[i], z[i]).map(black_box);
             if let Some(keep) = keep.as_deref_mut() {
                 keep.push(answer);
             }
@@ -98,13 +111,13 @@ pub fn each(one: impl Fn(DVec3) -> [f64; 4] + 'static) -> Work {
 
 pub fn point(solid: &Solid) -> Work {
     let solid = solid.clone();
-    each(move |p| [solid.omega(p), 0.0, 0.0, 0.0])
+    each(move |x, y, z| solid.omega(DVec3::new(x, y, z)))
 }
 
 pub fn point_grad(solid: &Solid) -> Work {
     let solid = solid.clone();
-    each(move |p| {
-        let (w, g) = solid.omega_grad(p);
+    each_grad(move |x, y, z| {
+        let (w, g) = solid.omega_grad(DVec3::new(x, y, z));
         [w, g.x, g.y, g.z]
     })
 }
@@ -115,7 +128,7 @@ pub fn by_hand<T: Precision, F: hand::Formula + 'static>(width: hand::Width, for
     Box::new(move |points, keep| {
         // whole vectors only: the few corners are asked with their last point repeated
         let n = points.len();
-        let rest = n.next_multiple_of(8);
+        let rest = n.next_multiple_of(32);
         if n == rest {
             hand::run(width, &formula, T::columns(points), &mut out);
         } else {

@@ -55,7 +55,7 @@ pub fn fold<T: Clone>(list: &[T], order: Order, join: &impl Fn(T, T) -> T) -> T 
         Order::Left => list[1..].iter().cloned().fold(list[0].clone(), join),
         Order::Balanced if list.len() == 1 => list[0].clone(),
         Order::Balanced => {
-            let (a, b) = list.split_at(list.len() / 2);
+            let (a, b) = list.split_at(list.len().div_ceil(2));
             join(fold(a, order, join), fold(b, order, join))
         }
     }
@@ -67,17 +67,24 @@ pub fn union_text(spheres: &[Sphere], order: Order) -> String {
         let [a, b, c] = s.centre;
         format!("{} - (x - {a})^2 - (y - {b})^2 - (z - {c})^2", s.r2)
     };
-    let mut text = String::from("rfm 1\nsolid union = ");
+    let mut text = String::from("rfm 1\n");
+    let mut add = |part: &str, sphere: &Sphere| {
+        write!(text, "{part}{}", leaf(sphere)).expect("a string takes everything");
+    };
     match order {
+        // name by name: a chain of `or` is one operation, which is evaluated as a balanced tree
         Order::Left => {
+            let last = spheres.len() - 1;
             for (i, sphere) in spheres.iter().enumerate() {
-                let or = if i == 0 { "" } else { "\n  or " };
-                write!(text, "{or}{}", leaf(sphere)).expect("a string takes everything");
+                let item = if i == last { "solid union".to_string() } else { format!("let u{i}") };
+                let former = if i == 0 { String::new() } else { format!("u{} or ", i - 1) };
+                add(&format!("\n{item} = {former}"), sphere);
             }
         }
         Order::Balanced => {
-            let leaves: Vec<String> = spheres.iter().map(leaf).collect();
-            text += &fold(&leaves, order, &|a, b| format!("({a}\n or {b})"));
+            for (i, sphere) in spheres.iter().enumerate() {
+                add(if i == 0 { "solid union = " } else { "\n  or " }, sphere);
+            }
         }
     }
     text.push('\n');
