@@ -88,7 +88,9 @@ impl Obstacle {
     }
 
     pub fn points(&self) -> Points {
-        Points::random(crate::measure::BATCH, SIDE, 1)
+        // of very many primitives fewer points, or the contact alone would take minutes
+        let n = if self.primitives() > 1000 { 256 } else { crate::measure::BATCH };
+        Points::random(n, SIDE, 1)
     }
 
     fn hand_rows<T: Precision>(&self, rows: &mut Vec<Row>) {

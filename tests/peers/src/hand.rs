@@ -343,8 +343,8 @@ impl Formula for Spheres {
         let mut values = [first; 64];
         let mut n = self.list.len();
         assert!(n.is_power_of_two() && n <= 64);
-        for i in 0..n {
-            values[i] = sphere(p, &self.list[i]);
+        for (value, s) in values.iter_mut().zip(&self.list) {
+            *value = sphere(p, s);
         }
         while n > 1 {
             n /= 2;

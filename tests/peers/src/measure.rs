@@ -150,6 +150,9 @@ impl Group {
         let mut calls = Vec::new();
         let mut turn = Duration::ZERO;
         for row in &mut self.rows {
+            if row.asks != Asks::Other {
+                row.per_call = points.len();
+            }
             (row.work)(points, None);
             let start = Instant::now();
             (row.work)(points, None);
