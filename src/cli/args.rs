@@ -35,7 +35,7 @@ pub(super) struct Shared {
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = definition, global = true)]
     pub define: Vec<(String, f64)>,
     /// Threads to use [default: all processors]; results do not depend on it
-    #[arg(long, value_name = "N", global = true)]
+    #[arg(long, value_name = "N", value_parser = threads, global = true)]
     pub threads: Option<NonZeroUsize>,
     /// Print one JSON document on standard output instead of text
     #[arg(long, global = true)]
@@ -93,13 +93,13 @@ pub(super) struct Check {
     #[arg(long, value_name = "AXIS=VALUE", value_parser = plane)]
     pub slice: Option<Plane>,
     /// The solid to plot [default: the only one, or the first obstacle of the scene]
-    #[arg(short, long, value_name = "NAME")]
+    #[arg(short, long, value_name = "NAME", requires = "slice")]
     pub solid: Option<String>,
     /// Where the plot goes: .svg or .png [default: SOLID.AXIS=VALUE.svg]
     #[arg(short, long, value_name = "FILE", requires = "slice")]
     pub output: Option<PathBuf>,
     /// Draw the plot in the terminal
-    #[arg(long, requires = "slice")]
+    #[arg(long, requires = "slice", conflicts_with = "json")]
     pub term: bool,
     /// Part of the plane to plot: u0,v0,u1,v1 [default: around the solid]
     #[arg(long, value_name = "U0,V0,U1,V1", value_parser = window, allow_hyphen_values = true, requires = "slice")]
@@ -173,7 +173,7 @@ pub(super) struct Mesh {
     #[arg(long, value_name = "N", default_value_t = 128, conflicts_with = "cell")]
     pub cells: usize,
     /// Size of a cell instead of their number
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub cell: Option<f64>,
     /// Mesh this box instead of the solid's own bounds; the mesh is closed at its border
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = aabb, allow_hyphen_values = true)]
@@ -257,6 +257,14 @@ fn definition(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     let value = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
     Ok((name.trim().to_string(), value))
+}
+
+/// More threads than this are a slip of the keyboard, and starting them would take minutes.
+const MOST_THREADS: usize = 1024;
+
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let number = text.trim().parse().ok().filter(|n: &NonZeroUsize| n.get() <= MOST_THREADS);
+    number.ok_or_else(|| format!("expected a whole number from 1 to {MOST_THREADS}"))
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {

@@ -43,7 +43,8 @@ struct Message {
 /// Operations of a solid that is measured, at most: a larger one would keep a person waiting for minutes.
 const MOST_MEASURED: usize = 120_000;
 
-/// What is known of a solid. Numbers that do not exist (an unbounded solid's volume) are null.
+/// What is known of a solid. Numbers that do not exist (an unbounded solid's volume) or that were not found (the
+/// volume of one too thin for the grid) are null.
 #[derive(Serialize)]
 struct Facts {
     name: String,
@@ -254,7 +255,9 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
             Err(_) => return Ok(facts),
         }
     }
-    if let [fine, coarse] = &reports[..] {
+    if let [fine, coarse] = &reports[..]
+        && fine.triangles > 0
+    {
         // vertices lie on the surface, so errors fall as h²: a third of the difference leads to the limit. Creases
         // fall unevenly between the cells, so the whole difference is what is claimed.
         let difference = fine.volume - coarse.volume;
@@ -286,6 +289,12 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             let corner =
                 |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", round(c[0]), round(c[1]), round(c[2]));
             say!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
+            if solid.volume.is_none() {
+                say!(
+                    "    volume      not found: too thin for {} cells along its longest side",
+                    VOLUME_CELLS[0]
+                );
+            }
         } else if !solid.empty {
             say!("    bounds      none found");
         }

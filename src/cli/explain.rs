@@ -13,6 +13,9 @@ use crate::solid::ProgramKind;
 use crate::syntax;
 
 pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
+    if shared.json {
+        return Err(Failure::usage("explanations are for people: `rfm explain` has no --json"));
+    }
     let subject = options.subject.as_str();
     if let Some(text) = explain(subject) {
         say!("{}\n\n{text}", subject.to_uppercase());
@@ -32,7 +35,7 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     }
     match name {
         Some(name) if program.module().scenes.iter().any(|s| s.name == name) => {
-            super::run::explain(&program, choose::scene(&program, Some(name))?)
+            super::run::explain(shared, &program, choose::scene(&program, Some(name))?)
         }
         Some(name) => {
             let module = program.module();

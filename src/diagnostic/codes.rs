@@ -33,7 +33,8 @@ SYNTAX = "E0101":
     param r = 0.5
     solid ball = x² + y² + z² <= r²";
 TOO_DEEP = "E0102":
-"Brackets are nested deeper than 200 levels. Name a part with `let` and use the name.";
+"Brackets and folds are nested deeper than 200 levels, or calls of functions deeper than 64. Name a part with `let`
+and use the name.";
 TOO_LONG = "E0103":
 "The file is longer than the 256 MiB that are read at most.";
 UNKNOWN_UNIT = "E0104":
@@ -79,24 +80,30 @@ UNIT_MISMATCH = "E0212":
 "The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
 only lengths and angles are meaningful.";
 SCENE_KEY = "E0301":
-"The scene does not know this key at this place. `rfm explain E0301` lists what it knows:
+"The scene does not know this key, or this value of it, at this place. What it knows:
 
     scene name {
-      box       { min: [0,0,0], max: [3,3,3], restitution: 0.5 }
-      fluid NAME{ shape: FIELD, fill: below|middle, particles: 10000, density: 998.29 kg/m^3, mass: 0.02 kg, viscosity: 3.5 Pa·s,
-                  surface_tension: 0.0728 N/m, threshold: 7.065, stiffness: 3 J, support_radius: 0.1 m,
-                  velocity: [0,0,0] m/s-values, jitter: 0, seed: 1 }
-      obstacle  { solid: NAME, restitution: 0.5 }
+      box      { min: [0, 0, 0], max: [3, 3, 3], restitution: 0.5 }
+      fluid water {
+        shape: ball([1.5, 1.5, 2], 0.5), fill: below, particles: 10000, density: 998.29 kg/m^3, mass: 0.02 kg,
+        viscosity: 3.5 Pa·s, surface_tension: 0.0728 N/m, threshold: 7.065, stiffness: 3 J, support_radius: 0.1 m,
+        velocity: [0, 0, -1 m/s], jitter: 0, seed: 1
+      }
+      obstacle { solid: post, restitution: 0.5 }
       gravity: [0, 0, -9.81 m/s^2]
       method: paper
-      run       { dt: 2 ms, until: 5 s, save_every: 0.04 s }
-    }";
+      run      { dt: 2 ms, until: 5 s, save_every: 0.05 s }
+    }
+
+`fill` is `below` or `middle`; without `particles` the shape is filled, without `dt` a stable step is derived.";
 SCENE_MISSING = "E0302":
-"The scene lacks something without which it cannot be run: a box, one fluid with a shape, a run time.";
+"The scene lacks something without which it cannot be run: a box with its far corner `max`, a fluid with a `shape`, or
+the `solid` of an obstacle. All other keys have defaults.";
 SCENE_REPEATED = "E0303":
 "A key or block stands twice where it may stand once.";
 SCENE_NO_ROOM = "E0304":
-"The shape of the fluid, less what the obstacles take, does not hold the particles that are asked for.";
+"The fluid cannot be put where the scene says: its shape has too little room for the particles that are asked for, is
+empty or far too large, or its formula has no value somewhere. The message says which.";
 UNUSED = "W0401":
 "The item is never used. Remove it, or start its name with `_` to keep it silently.";
 EMPTY_SOLID = "W0402":
@@ -106,7 +113,7 @@ UNBOUNDED_SOLID = "W0403":
 "The solid could not be proven to end within a million units of the origin: it cannot be meshed over its own bounds.
 Intersect it with a box, or mesh it over a scene's box.";
 FOLD_OF_ONE = "W0404":
-"`any` or `all` over a range with one member, or none, is likely a slip: the range `a..b` holds a, a+1, … b−1.";
+"`any` or `all` over a range with one member is likely a slip: the range `a..b` holds a, a+1, … b−1.";
 STRICT_COMPARISON = "W0405":
 "`<` means the same as `<=` here: a comparison builds a field whose zero is the surface itself.";
 FLUID_IN_OBSTACLE = "W0501":

@@ -285,7 +285,7 @@ impl<'a> Lowering<'a> {
         let mass = number("mass", Dimension::MASS, 0.02, Positive);
         let viscosity = number("viscosity", Dimension::VISCOSITY, 3.5, NotNegative);
         let surface_tension = number("surface_tension", Dimension::TENSION, 0.0728, NotNegative);
-        let threshold = number("threshold", Dimension::NONE, 7.065, NotNegative);
+        let threshold = number("threshold", Dimension::NONE, 7.065, Positive);
         let stiffness = number("stiffness", Dimension::ENERGY, 3.0, Positive);
         let support_radius = number("support_radius", Dimension::LENGTH, 0.1, Positive);
         let jitter = number("jitter", Dimension::NONE, 0.0, Fraction);

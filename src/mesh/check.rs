@@ -65,8 +65,8 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
         component_volumes: shells.iter().map(|shell| shell.volume).collect(),
         euler: used as i64 - edges.count as i64 + mesh.triangles.len() as i64,
         degenerate: mesh.triangles.iter().filter(|t| coincide(t)).count(),
-        volume: shells.iter().map(|shell| shell.volume).sum(),
-        area: shells.iter().map(|shell| shell.area).sum(),
+        volume: shells.iter().fold(0.0, |sum, shell| sum + shell.volume), // `sum` of nothing is −0
+        area: shells.iter().fold(0.0, |sum, shell| sum + shell.area),
         max_distance,
         rms_distance,
         evaluations: mesh.work.evaluations,

@@ -68,7 +68,7 @@ fn help_and_usage() {
         ("param not finite", &["check", PAWN, "-D", "particles=nan"]),
         ("unknown solid", &["mesh", PAWN, "-s", "pwan", "-o", "x.stl"]),
         ("unknown scene", &["run", PAWN, "--scene", "drpo"]),
-        ("no scene", &["run", "examples/cube.rfm"]),
+        ("no scene", &["run", "tests/cases/stages/cube.rfm"]),
         ("mesh without output", &["mesh", PAWN]),
         ("mesh of an unknown format", &["mesh", PAWN, "-o", "pawn.3ds"]),
         ("mesh with no cells", &["mesh", PAWN, "--cells", "0", "-o", "pawn.stl"]),
@@ -363,6 +363,38 @@ fn run_defaults_and_flags() {
         .expect(0);
     assert_eq!(none.json()["steps"], 0);
     assert_eq!(files(&folder.path().join("z")), ["summary.json"]);
+}
+
+#[test]
+fn one_document_or_none() {
+    let run = |arguments: &[&str]| rfm_reading(root(), arguments, SMALL.as_bytes());
+    let dry = run(&["run", "-", "--dry-run", "--json"]).expect(0);
+    contract(&dry.stdout, &dry.json(), &["schema", "particles", "steps", "time_step", "passes", "seconds"]);
+    run(&["check", "-", "--json", "--slice", "z=0.1", "--term"]).expect(2);
+    run(&["explain", "E0201", "--json"]).expect(2);
+    run(&["check", "-", "-s", "post"]).expect(2);
+    run(&["check", "-", "--threads", "1025"]).expect(2);
+    let thin = b"rfm 1\nsolid s = sphere(1) and -1e-4 <= x + y + 0.7*z <= 1e-4";
+    let thin = rfm_reading(root(), &["check", "-", "--json"], thin).expect(0).json();
+    assert_eq!((&thin["solids"][0]["empty"], &thin["solids"][0]["volume"]), (&false.into(), &().into()));
+}
+
+#[test]
+fn a_run_leaves_nothing_of_the_one_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
+    let run = |flags: &[&str]| rfm(here, &[&["run", "drop.rfm", "-o", "out"], flags].concat());
+    run(&[]).expect(0);
+    std::fs::write(here.join("out/frames/notes.txt"), "kept").unwrap();
+    // what is refused changes nothing
+    let before = [files(&here.join("out")), files(&here.join("out/frames"))];
+    run(&["--mesh-cells", "0"]).expect(2);
+    assert_eq!([files(&here.join("out")), files(&here.join("out/frames"))], before);
+    run(&["--no-frames", "--steps", "1"]).expect(0);
+    assert_eq!(files(&here.join("out")), ["frames", "pictures", "summary.json"]);
+    assert_eq!(files(&here.join("out/frames")), ["notes.txt"]);
+    assert!(files(&here.join("out/pictures")).is_empty());
 }
 
 #[test]

@@ -92,3 +92,8 @@ fn a_drop_falls_on_the_pawn() {
 fn a_drop_falls_on_the_bishop() {
     falls_well("bishop");
 }
+
+#[test]
+fn a_drop_falls_on_the_cube() {
+    falls_well("cube");
+}

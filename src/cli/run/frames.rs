@@ -19,6 +19,7 @@ pub(super) struct Frames {
     /// Time and file of each frame, relative to the folder.
     saved: Vec<(f64, String)>,
     write_frames: bool,
+    has_obstacle: bool,
     pictures: Option<Pictures>,
     count: usize,
     last_time: f64,
@@ -34,22 +35,28 @@ struct Pictures {
 impl Frames {
     pub fn new(options: &Run, scene: &Scene, setup: &Setup) -> Result<Self, Failure> {
         let folder = options.output.clone().unwrap_or_else(|| default_folder(&options.file));
-        create(&folder)?;
         let write_frames = !options.no_frames;
+        // whatever can be refused comes before the first change to the folder
+        let obstacle = if write_frames { obstacle_mesh(options, setup)? } else { Mesh::default() };
+        let pictures = if write_frames && !options.no_pictures {
+            Some(Pictures::new(scene, setup, &obstacle)?)
+        } else {
+            None
+        };
+        create(&folder)?;
+        remove_old(&folder)?;
+        let has_obstacle = write_frames && !setup.obstacles.is_empty();
         if write_frames {
             create(&folder.join("frames"))?;
-            remove_old(&folder.join("frames"), "particles_", ".vtp")?;
         }
-        let pictures = if write_frames && !options.no_pictures {
+        if pictures.is_some() {
             create(&folder.join("pictures"))?;
-            remove_old(&folder.join("pictures"), "frame_", ".png")?;
-            true
-        } else {
-            false
-        };
-        let obstacle = if write_frames { obstacle_mesh(options, setup, &folder)? } else { Mesh::default() };
-        let pictures = if pictures { Some(Pictures::new(scene, setup, &obstacle)?) } else { None };
-        Ok(Self { folder, saved: Vec::new(), write_frames, pictures, count: 0, last_time: 0.0 })
+        }
+        if has_obstacle {
+            output::write(&folder.join("obstacle.stl"), |mut out| mesh::stl::write(&obstacle, &mut out))?;
+            output::write(&folder.join("obstacle.vtp"), |mut out| mesh::vtp::write(&obstacle, &mut out))?;
+        }
+        Ok(Self { folder, saved: Vec::new(), write_frames, has_obstacle, pictures, count: 0, last_time: 0.0 })
     }
 
     pub fn folder(&self) -> &Path {
@@ -68,10 +75,10 @@ impl Frames {
     pub fn describe(&self) -> String {
         let mut parts = vec!["summary.json".to_string()];
         if self.write_frames {
-            parts.push(format!(
-                "particles.pvd and {} frames for ParaView, obstacle.stl, obstacle.vtp",
-                self.saved.len()
-            ));
+            parts.push(format!("particles.pvd and {} frames for ParaView", self.saved.len()));
+        }
+        if self.has_obstacle {
+            parts.push("obstacle.stl, obstacle.vtp".to_string());
         }
         if let Some(pictures) = &self.pictures {
             parts.push(format!("{} pictures", pictures.count));
@@ -145,9 +152,23 @@ fn create(folder: &Path) -> Result<(), Failure> {
         .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.display())))
 }
 
-/// Removes the numbered files of an earlier run, which would mix with this one's.
-fn remove_old(folder: &Path, prefix: &str, suffix: &str) -> Result<(), Failure> {
-    let failed = |e| Failure::usage(format!("cannot clear `{}`: {e}", folder.display()));
+/// Removes the files of an earlier run, which would mix with this one's, and no others.
+fn remove_old(folder: &Path) -> Result<(), Failure> {
+    for name in ["summary.json", "particles.pvd", "obstacle.stl", "obstacle.vtp"] {
+        let path = folder.join(name);
+        if path.is_file() {
+            std::fs::remove_file(&path).map_err(|e| not_cleared(folder, &e))?;
+        }
+    }
+    remove_numbered(&folder.join("frames"), "particles_", ".vtp")?;
+    remove_numbered(&folder.join("pictures"), "frame_", ".png")
+}
+
+fn remove_numbered(folder: &Path, prefix: &str, suffix: &str) -> Result<(), Failure> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    let failed = |e| not_cleared(folder, &e);
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let name = entry.file_name();
@@ -160,8 +181,12 @@ fn remove_old(folder: &Path, prefix: &str, suffix: &str) -> Result<(), Failure> 
     Ok(())
 }
 
-/// All obstacles as one mesh, cut off at the box; written beside the frames.
-fn obstacle_mesh(options: &Run, setup: &Setup, folder: &Path) -> Result<Mesh, Failure> {
+fn not_cleared(folder: &Path, error: &std::io::Error) -> Failure {
+    Failure::usage(format!("cannot clear `{}`: {error}", folder.display()))
+}
+
+/// All obstacles as one mesh, cut off at the box.
+fn obstacle_mesh(options: &Run, setup: &Setup) -> Result<Mesh, Failure> {
     let mut all = Mesh::default();
     for (solid, ..) in &setup.obstacles {
         let bounds = solid.bounds().aabb().unwrap_or(setup.domain);
@@ -182,10 +207,6 @@ fn obstacle_mesh(options: &Run, setup: &Setup, folder: &Path) -> Result<Mesh, Fa
         all.positions.extend(mesh.positions);
         all.normals.extend(mesh.normals);
         all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
-    }
-    if !setup.obstacles.is_empty() {
-        output::write(&folder.join("obstacle.stl"), |mut out| mesh::stl::write(&all, &mut out))?;
-        output::write(&folder.join("obstacle.vtp"), |mut out| mesh::vtp::write(&all, &mut out))?;
     }
     Ok(all)
 }

@@ -39,8 +39,9 @@ struct Summary {
     kinetic_energy: f64,
     potential_energy: f64,
     energy_at_start: f64,
-    /// Largest energy of a saved instant above the one at the start, as a part of that; 0 if it only fell.
-    energy_growth: f64,
+    /// Largest energy of a saved instant above the one at the start, as a part of that; 0 if it only fell, null if
+    /// a fluid that had none at the start has some.
+    energy_growth: Option<f64>,
     max_speed: f64,
     passes: Vec<&'static str>,
     threads: usize,
@@ -61,7 +62,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         (None, until) => (until.unwrap_or(scene.run.until) / setup.parameters.time_step).round() as u64,
     };
     if options.dry_run {
-        return dry_run(&mut simulation, &setup, last);
+        return dry_run(shared, &mut simulation, &setup, last);
     }
     let mut frames = Frames::new(options, scene, &setup)?;
     let interrupted = interruption()?;
@@ -97,16 +98,18 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         serde_json::to_writer_pretty(&mut *out, &summary)?;
         writeln!(out)
     })?;
+    if shared.json {
+        output::json(&summary)?;
+    }
     if let Some(failure) = failure {
         if matches!(failure, Failure::Interrupted) {
             note(format!("interrupted after {} steps; the frames so far are kept", simulation.steps()));
         }
         return Err(failure);
     }
-    if shared.json {
-        return output::json(&summary);
+    if !shared.json {
+        print(&summary, &frames);
     }
-    print(&summary, &frames);
     Ok(())
 }
 
@@ -123,7 +126,28 @@ fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-fn dry_run(simulation: &mut Simulation<'_>, setup: &Setup, steps: u64) -> Result<(), Failure> {
+/// What `--dry-run` says.
+#[derive(Debug, Serialize)]
+struct Forecast {
+    schema: u32,
+    particles: usize,
+    spacing: f64,
+    neighbours_per_particle: f64,
+    time_step: f64,
+    time_step_reason: &'static str,
+    steps: u64,
+    passes: Vec<&'static str>,
+    bytes: f64,
+    milliseconds_per_step: f64,
+    seconds: f64,
+}
+
+fn dry_run(
+    shared: &Shared,
+    simulation: &mut Simulation<'_>,
+    setup: &Setup,
+    steps: u64,
+) -> Result<(), Failure> {
     const TRIAL: u32 = 3;
     let started = Instant::now();
     for _ in 0..TRIAL {
@@ -131,19 +155,34 @@ fn dry_run(simulation: &mut Simulation<'_>, setup: &Setup, steps: u64) -> Result
     }
     let per_step = started.elapsed().as_secs_f64() / f64::from(TRIAL);
     let stats = simulation.stats();
-    // state and sorted copy of every particle, its forces, and four bytes for each neighbour
-    let bytes = simulation.particles().len() as f64 * (300.0 + 4.0 * stats.neighbours_per_particle);
-    say!("particles     {}", stats.particles);
-    say!("spacing       {:.4} m", setup.parameters.spacing());
-    say!("neighbours    {:.1} per particle", stats.neighbours_per_particle);
-    say!("time step     {:.3e} s ({})", setup.parameters.time_step, setup.time_step_reason);
+    let forecast = Forecast {
+        schema: 1,
+        particles: stats.particles,
+        spacing: setup.parameters.spacing(),
+        neighbours_per_particle: stats.neighbours_per_particle,
+        time_step: setup.parameters.time_step,
+        time_step_reason: setup.time_step_reason,
+        steps,
+        passes: pass_names(simulation),
+        // state and sorted copy of every particle, its forces, and four bytes for each neighbour
+        bytes: stats.particles as f64 * (300.0 + 4.0 * stats.neighbours_per_particle),
+        milliseconds_per_step: per_step * 1e3,
+        seconds: per_step * steps as f64,
+    };
+    if shared.json {
+        return output::json(&forecast);
+    }
+    say!("particles     {}", forecast.particles);
+    say!("spacing       {:.4} m", forecast.spacing);
+    say!("neighbours    {:.1} per particle", forecast.neighbours_per_particle);
+    say!("time step     {:.3e} s ({})", forecast.time_step, forecast.time_step_reason);
     say!("steps         {steps}");
-    say!("passes        {}", pass_names(simulation).join(", "));
-    say!("memory        about {:.0} MiB", bytes / f64::from(1 << 20));
+    say!("passes        {}", forecast.passes.join(", "));
+    say!("memory        about {:.0} MiB", forecast.bytes / f64::from(1 << 20));
     say!(
         "time          about {:.0} s ({:.2} ms per step, without frames)",
-        per_step * steps as f64,
-        per_step * 1e3
+        forecast.seconds,
+        forecast.milliseconds_per_step
     );
     Ok(())
 }
@@ -218,7 +257,7 @@ impl Watch {
             kinetic_energy: self.now.kinetic_energy,
             potential_energy: self.now.potential_energy,
             energy_at_start: self.energy_at_start,
-            energy_growth: (self.most_energy / self.energy_at_start - 1.0).max(0.0),
+            energy_growth: growth(self.energy_at_start, self.most_energy),
             max_speed: self.worst.max_speed,
             passes: pass_names(simulation),
             threads: rayon::current_num_threads(),
@@ -226,6 +265,11 @@ impl Watch {
             finished,
         }
     }
+}
+
+/// How far `most` exceeds `start`, as a part of `start`.
+fn growth(start: f64, most: f64) -> Option<f64> {
+    if most <= start { Some(0.0) } else { Some(most / start - 1.0).filter(|part| part.is_finite()) }
 }
 
 fn print(summary: &Summary, frames: &Frames) {
@@ -259,15 +303,8 @@ fn print(summary: &Summary, frames: &Frames) {
 }
 
 /// `rfm explain FILE:SCENE`: which passes run, which do not, and why.
-pub(super) fn explain(program: &Program, scene: &Scene) -> Result<(), Failure> {
-    let shared = Shared {
-        define: Vec::new(),
-        threads: None,
-        json: false,
-        max_nodes: usize::MAX,
-        engine: super::args::Engine::Auto,
-    };
-    let setup = Setup::of(&shared, program, scene)?;
+pub(super) fn explain(shared: &Shared, program: &Program, scene: &Scene) -> Result<(), Failure> {
+    let setup = Setup::of(shared, program, scene)?;
     let (simulation, _) = setup.simulation(program, scene)?;
     let running = simulation.passes();
     say!(
