@@ -182,6 +182,8 @@ impl Emitter<'_, '_> {
     }
 
     fn hypotenuse(&mut self, a: Value, b: Value) -> Value {
+        // in one order, so that the weights of both operands share the root
+        let (a, b) = if a.as_u32() <= b.as_u32() { (a, b) } else { (b, a) };
         let (a2, b2) = (self.builder.ins().fmul(a, a), self.builder.ins().fmul(b, b));
         let squares = self.builder.ins().fadd(a2, b2);
         self.builder.ins().sqrt(squares)
