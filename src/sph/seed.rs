@@ -16,7 +16,7 @@ use crate::{field::Field, geom::Aabb};
 use super::{boundary::Obstacle, params::Parameters, particles::Particles};
 
 /// More lattice sites than this are a mistake in the scene, not a fluid.
-const MAX_SITES: f64 = 5e8;
+const MAX_SITES: f64 = 5e7;
 
 /// Which sites of a field's shape are taken when fewer particles are wanted than it has room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
