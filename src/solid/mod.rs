@@ -34,7 +34,7 @@ use programs::{Guard, Programs};
 
 /// Up to this many leaves the twin alone is cheaper than finding out which of them matter: a leaf and its share of
 /// the minima cost some 0.2 ns in a batch, a cell's look-up and call 10.
-pub const FEW_LEAVES: usize = 24;
+const TWIN_SUFFICES: usize = 24;
 
 /// An obstacle, compiled.
 #[derive(Clone)]
@@ -207,11 +207,15 @@ impl Solid {
     /// The cheapest field with exactly the sign, zero set and surface gradient of ω in a box: the twin for a few
     /// leaves, a [`CellMap`] for many. Off the surface its value is another one.
     pub fn surface(&self, over: Aabb) -> Box<dyn Field> {
-        let many = self.leaf_count().is_some_and(|leaves| leaves > FEW_LEAVES);
-        match if many { CellMap::new(self, over) } else { None } {
+        match if self.has_many_leaves() { CellMap::new(self, over) } else { None } {
             Some(map) => Box::new(map),
             None => Box::new(self.twin()),
         }
+    }
+
+    /// Whether so many leaves decide the sign that it pays to find out which of them matter at a place.
+    pub fn has_many_leaves(&self) -> bool {
+        self.leaf_count().is_some_and(|leaves| leaves > TWIN_SUFFICES)
     }
 
     /// How many leaves decide the sign of the solid; nothing if it cannot be taken apart.

@@ -6,7 +6,7 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
 use crate::field::Field;
 use crate::geom::Aabb;
 use crate::lower::{Fill, Scene};
-use crate::solid::{Bounds, FEW_LEAVES};
+use crate::solid::Bounds;
 use crate::sph::{
     self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
     carve,
@@ -39,9 +39,8 @@ impl Setup {
         for obstacle in &scene.obstacles {
             let solid = compile(&obstacle.name, obstacle.shape)?;
             // ω itself for a few leaves; for many, only those that matter where a particle is
-            let many = solid.leaf_count().is_some_and(|leaves| leaves > FEW_LEAVES);
             let field: Box<dyn Field> =
-                if many { solid.surface(scene.domain) } else { Box::new(solid.clone()) };
+                if solid.has_many_leaves() { solid.surface(scene.domain) } else { Box::new(solid.clone()) };
             obstacles.push((solid, field, obstacle.restitution));
         }
         let mut parameters = Parameters {
