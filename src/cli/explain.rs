@@ -86,6 +86,7 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
         {
             let request = Request {
                 graph,
+                inputs: &[],
                 outputs,
                 precision: Precision::F64,
                 shape: Shape::Batch,

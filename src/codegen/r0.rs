@@ -39,7 +39,7 @@ pub(super) struct Parts {
 impl Emitter<'_, '_> {
     pub fn r0_value(&mut self, u: Operand, v: Operand, junction: Junction) -> Value {
         match self.form {
-            Form::Stable => self.stable_value(u, v, junction),
+            Form::Stable | Form::Guarded => self.stable_value(u, v, junction),
             Form::Textbook => self.textbook_value(u.1, v.1, junction),
             Form::Scaled => self.scaled_value(u.1, v.1, junction),
         }
@@ -48,7 +48,7 @@ impl Emitter<'_, '_> {
     /// ∂/∂u, where u is the first operand.
     pub fn r0_weight(&mut self, u: Operand, v: Operand, junction: Junction) -> Value {
         match self.form {
-            Form::Stable => self.stable_weight(u, v, junction),
+            Form::Stable | Form::Guarded => self.stable_weight(u, v, junction),
             Form::Textbook => self.textbook_weight(u.1, v.1, junction),
             Form::Scaled => self.scaled_weight(u.1, v.1, junction),
         }

@@ -1,6 +1,6 @@
 //! A whole program: signature, loop over blocks, nodes in order, outputs; then compilation and linking.
 
-use std::collections::HashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use cranelift_codegen::Context;
 use cranelift_codegen::ir::condcodes::IntCC;
@@ -45,7 +45,8 @@ impl Listing {
 }
 
 fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), CodegenError> {
-    let isa = target(request.graph.len())?;
+    let needed = needed(request);
+    let isa = target(needed.len())?;
     let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
     let mut linker = JITBuilder::with_isa(isa, default_libcall_names());
     for function in math_calls::all(request.precision) {
@@ -56,13 +57,15 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     context.func = Function::with_name_signature(UserFuncName::user(0, 0), module.make_signature());
     declare_parameters(&mut context.func, &module, request);
 
-    let hosts = declare_hosts(&mut module, &mut context.func, request).map_err(|e| bug(&e))?;
+    let hosts = declare_hosts(&mut module, &mut context.func, request, &needed).map_err(|e| bug(&e))?;
     let mut shared = FunctionBuilderContext::new();
     let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
     match request.shape {
-        Shape::Point => point(&mut builder, request, &hosts),
+        Shape::Point => point(&mut builder, request, &needed, &hosts),
         Shape::Range => range::emit(&mut builder, request),
-        Shape::Batch => batch(&mut builder, request, &hosts, module.target_config().pointer_type()),
+        Shape::Batch => {
+            batch(&mut builder, request, &needed, &hosts, module.target_config().pointer_type());
+        }
     }
     builder.finalize(module.target_config());
 
@@ -100,16 +103,17 @@ fn declare_parameters(function: &mut Function, module: &JITModule, request: Requ
     function.signature.params = parameters;
 }
 
-type Hosts = HashMap<String, FuncRef>;
+type Hosts = FxHashMap<String, FuncRef>;
 
 fn declare_hosts(
     module: &mut JITModule,
     function: &mut Function,
     request: Request<'_>,
+    needed: &[Node],
 ) -> Result<Hosts, cranelift_module::ModuleError> {
-    let mut hosts = Hosts::new();
-    for (_, expr) in request.graph.nodes() {
-        let Some(host) = host_of(expr, request.precision) else { continue };
+    let mut hosts = Hosts::default();
+    for &node in needed {
+        let Some(host) = host_of(request.graph.expr(node), request.precision) else { continue };
         if hosts.contains_key(&host.name) {
             continue;
         }
@@ -129,7 +133,7 @@ fn host_of(expr: Expr, precision: Precision) -> Option<HostFunction> {
     }
 }
 
-fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, hosts: &Hosts) {
+fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node], hosts: &Hosts) {
     let block = builder.create_block();
     builder.append_block_params_for_function_params(block);
     builder.switch_to_block(block);
@@ -139,7 +143,8 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, hosts: &Hosts)
     let vector = emitter.vector_type();
     let coordinates: [Value; 3] =
         std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
-    let values = nodes(&mut emitter, request, hosts, coordinates, parameters.get(4).copied());
+    let given = Given { coordinates, inputs: FxHashMap::default(), parameters: parameters.get(4).copied() };
+    let values = nodes(&mut emitter, request, needed, hosts, given);
     let bytes = emitter.lane_type().bytes() as i32;
     for (i, output) in request.outputs.iter().enumerate() {
         let lane = emitter.builder.ins().extractlane(values[output], 0);
@@ -151,6 +156,7 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, hosts: &Hosts)
 fn batch(
     builder: &mut FunctionBuilder<'_>,
     request: Request<'_>,
+    needed: &[Node],
     hosts: &Hosts,
     pointer: cranelift_codegen::ir::Type,
 ) {
@@ -163,8 +169,10 @@ fn batch(
         let offset = i as i32 * pointer.bytes() as i32;
         builder.ins().load(pointer, MemFlagsData::trusted(), columns, offset)
     };
-    let inputs: [Value; 3] = std::array::from_fn(|i| column(builder, i));
-    let outputs: Vec<Value> = (0..request.outputs.len()).map(|i| column(builder, 3 + i)).collect();
+    let axes: [Value; 3] = std::array::from_fn(|i| column(builder, i));
+    let given = request.inputs.len();
+    let inputs: Vec<Value> = (0..given).map(|i| column(builder, 3 + i)).collect();
+    let outputs: Vec<Value> = (0..request.outputs.len()).map(|i| column(builder, 3 + given + i)).collect();
     let end = builder.ins().ishl_imm_u(blocks, 4); // 16 bytes a block
     let zero = builder.ins().iconst(pointer, 0);
     let any = builder.ins().icmp_imm_u(IntCC::NotEqual, blocks, 0);
@@ -175,11 +183,14 @@ fn batch(
     let mut emitter = Emitter::new(builder, request.precision, request.form, request.graph);
     let vector = emitter.vector_type();
     // columns may start anywhere, so no alignment is promised
-    let coordinates = inputs.map(|base| {
+    let mut load = |base: Value| {
         let address = emitter.builder.ins().iadd(base, offset);
         emitter.builder.ins().load(vector, MemFlagsData::new(), address, 0)
-    });
-    let values = nodes(&mut emitter, request, hosts, coordinates, arguments.get(2).copied());
+    };
+    let coordinates = axes.map(&mut load);
+    let inputs = request.inputs.iter().copied().zip(inputs.into_iter().map(load)).collect();
+    let given = Given { coordinates, inputs, parameters: arguments.get(2).copied() };
+    let values = nodes(&mut emitter, request, needed, hosts, given);
     for (output, base) in request.outputs.iter().zip(outputs) {
         let address = builder.ins().iadd(base, offset);
         builder.ins().store(MemFlagsData::new(), values[output], address, 0);
@@ -192,16 +203,25 @@ fn batch(
     builder.ins().return_(&[]);
 }
 
-/// The values of all nodes, in the graph's order.
+/// What a program is given.
+struct Given {
+    coordinates: [Value; 3],
+    inputs: FxHashMap<Node, Value>,
+    /// A pointer.
+    parameters: Option<Value>,
+}
+
+/// The values of all needed nodes, in the graph's order, beside those that were given.
 fn nodes(
     emitter: &mut Emitter<'_, '_>,
     request: Request<'_>,
+    needed: &[Node],
     hosts: &Hosts,
-    coordinates: [Value; 3],
-    parameters: Option<Value>,
-) -> HashMap<Node, Value> {
-    let mut values: HashMap<Node, Value> = HashMap::with_capacity(request.graph.len());
-    for (node, expr) in request.graph.nodes() {
+    given: Given,
+) -> FxHashMap<Node, Value> {
+    let Given { coordinates, inputs: mut values, parameters } = given;
+    for &node in needed {
+        let expr = request.graph.expr(node);
         let host = host_of(expr, request.precision).and_then(|host| hosts.get(&host.name).copied());
         let value = match expr {
             Expr::Constant(bits) => emitter.constant(f64::from_bits(bits)),
@@ -215,4 +235,24 @@ fn nodes(
         values.insert(node, value);
     }
     values
+}
+
+/// What the outputs of a program depend on, down to its inputs and without them, in the graph's order.
+fn needed(request: Request<'_>) -> Vec<Node> {
+    let known: FxHashSet<Node> = request.inputs.iter().copied().collect();
+    let mut seen: FxHashSet<Node> = FxHashSet::default();
+    let mut found: Vec<Node> = Vec::new();
+    let mut next = 0;
+    let mut visit = |node: Node, found: &mut Vec<Node>| {
+        if !known.contains(&node) && seen.insert(node) {
+            found.push(node);
+        }
+    };
+    request.outputs.iter().for_each(|&output| visit(output, &mut found));
+    while next < found.len() {
+        request.graph.expr(found[next]).operands().for_each(|operand| visit(operand, &mut found));
+        next += 1;
+    }
+    found.sort_unstable();
+    found
 }

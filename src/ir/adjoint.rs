@@ -5,7 +5,7 @@
 //! derivative is one member of the limit set: 0 for √a at a = 0 and |a| at 0, ½ and ½ for min and max at a tie,
 //! equal weights for R₀ at a corner.
 
-use std::collections::{HashMap, HashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
@@ -14,7 +14,7 @@ use super::op::{Binary, Unary};
 pub fn gradient(graph: &mut Graph, root: Node) -> [Node; 3] {
     let cone = graph.cone(root);
     let depends = depends_on_coordinates(graph, &cone);
-    let mut adjoints: HashMap<Node, Node> = HashMap::new();
+    let mut adjoints: FxHashMap<Node, Node> = FxHashMap::default();
     adjoints.insert(root, graph.constant(1.0));
     let mut partials = [None; 3];
     for &node in cone.iter().rev() {
@@ -35,8 +35,8 @@ pub fn gradient(graph: &mut Graph, root: Node) -> [Node; 3] {
 }
 
 /// Constants need no adjoint: leaving them out keeps dead multiplications out of the graph.
-fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> HashSet<Node> {
-    let mut depends = HashSet::new();
+fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> FxHashSet<Node> {
+    let mut depends = FxHashSet::default();
     for &node in cone {
         let expr = graph.expr(node);
         if matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends.contains(&o)) {
@@ -47,7 +47,12 @@ fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> HashSet<Node> {
 }
 
 /// What a node's adjoint adds to the adjoints of its operands.
-fn contributions(graph: &mut Graph, node: Node, adjoint: Node, depends: &HashSet<Node>) -> Vec<(Node, Node)> {
+fn contributions(
+    graph: &mut Graph,
+    node: Node,
+    adjoint: Node,
+    depends: &FxHashSet<Node>,
+) -> Vec<(Node, Node)> {
     let mut out = Vec::with_capacity(2);
     match graph.expr(node) {
         Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) => {}

@@ -11,7 +11,7 @@
 //! normal and curvature are those of the leaf that decides; at a tie, the mean of the two. Products of two factors
 //! are split into their faces, sign(pq) = (p∧q)∨(¬p∧¬q): the product of a slab is half the distance far away.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::adjoint::gradient;
 use super::graph::{Expr, Graph, Node};
@@ -31,7 +31,7 @@ struct Surface {
 
 /// [distance (positive in the fluid), outward unit normal x, y, z, mean curvature (1/length, convex positive)]
 pub fn contact(graph: &mut Graph, root: Node) -> [Node; 5] {
-    let mut builder = Builder { graph, known: HashMap::new() };
+    let mut builder = Builder { graph, known: FxHashMap::default() };
     let surface = builder.surface(root);
     let [nx, ny, nz] = builder.unit(surface.normal);
     let distance = builder.graph.unary(Unary::Neg, surface.depth);
@@ -40,7 +40,7 @@ pub fn contact(graph: &mut Graph, root: Node) -> [Node; 5] {
 
 struct Builder<'g> {
     graph: &'g mut Graph,
-    known: HashMap<Node, Surface>,
+    known: FxHashMap<Node, Surface>,
 }
 
 impl Builder<'_> {

@@ -1,6 +1,6 @@
 //! The graph itself: interning, spans, substitution, extraction.
 
-use std::collections::HashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::op::{Binary, Unary};
 use crate::diagnostic::Span;
@@ -67,7 +67,7 @@ impl Expr {
 pub struct Graph {
     exprs: Vec<Expr>,
     spans: Vec<Option<Span>>,
-    interned: HashMap<Expr, Node>,
+    interned: FxHashMap<Expr, Node>,
 }
 
 impl Graph {
@@ -97,6 +97,11 @@ impl Graph {
     pub fn node(&self, index: usize) -> Node {
         assert!(index < self.exprs.len(), "no node {index}");
         Node(index as u32)
+    }
+
+    /// The node of an expression, if there is one.
+    pub fn find(&self, expr: Expr) -> Option<Node> {
+        self.interned.get(&expr.key()).copied()
     }
 
     pub fn expr(&self, node: Node) -> Expr {
@@ -133,7 +138,7 @@ impl Graph {
     /// A graph of its own for one root; the work grows with what the root uses, not with this graph.
     pub fn extract_cone(&self, root: Node) -> (Self, Node) {
         let mut out = Self::default();
-        let mut image: HashMap<Node, Node> = HashMap::new();
+        let mut image: FxHashMap<Node, Node> = FxHashMap::default();
         for node in self.cone(root) {
             let new = out.intern(self.expr(node).map(|operand| image[&operand]), self.span(node));
             image.insert(node, new);
@@ -141,21 +146,42 @@ impl Graph {
         (out, image[&root])
     }
 
-    /// The graph with each constant replaced by a parameter of its own, numbered in the order of the graph; and the
-    /// constants. Graphs of the same shape give the same result here.
+    /// The graph with each use of a constant replaced by a parameter of its own; and the constants. Nodes are in the
+    /// order of a walk from the root, operands first, so that graphs of one shape give the same result here,
+    /// whatever else is in the graph they come from and whichever of their constants happen to be equal.
     pub fn parametrised(&self, root: Node) -> (Self, Node, Vec<f64>) {
         let mut out = Self::default();
         let mut constants = Vec::new();
-        let mut image: HashMap<Node, Node> = HashMap::new();
-        for node in self.cone(root) {
-            let expr = match self.expr(node) {
-                Expr::Constant(bits) => {
-                    constants.push(f64::from_bits(bits));
-                    Expr::Parameter(constants.len() as u32 - 1)
-                }
-                expr => expr.map(|operand| image[&operand]),
+        let mut image: FxHashMap<Node, Node> = FxHashMap::default();
+        let mut stack = vec![(root, false)];
+        while let Some((node, operands_done)) = stack.pop() {
+            if image.contains_key(&node) {
+                continue;
+            }
+            let expr = self.expr(node);
+            if !operands_done && node != root && matches!(expr, Expr::Constant(_)) {
+                continue; // its users make their own parameter of it
+            }
+            if !operands_done {
+                stack.push((node, true));
+                let operands: Vec<Node> = expr.operands().collect();
+                stack.extend(operands.into_iter().rev().map(|operand| (operand, false)));
+                continue;
+            }
+            let mut parameter = |out: &mut Self, bits: u64| {
+                constants.push(f64::from_bits(bits));
+                out.intern(Expr::Parameter(constants.len() as u32 - 1), self.span(node))
             };
-            let new = out.intern(expr, self.span(node));
+            let new = match expr {
+                Expr::Constant(bits) => parameter(&mut out, bits),
+                expr => {
+                    let mapped = expr.map(|operand| match self.expr(operand) {
+                        Expr::Constant(bits) => parameter(&mut out, bits),
+                        _ => image[&operand],
+                    });
+                    out.intern(mapped, self.span(node))
+                }
+            };
             image.insert(node, new);
         }
         (out, image[&root], constants)
@@ -192,7 +218,7 @@ impl Graph {
 
     /// The nodes a root depends on, in order; cheap when the root uses little of a large graph.
     pub(super) fn cone(&self, root: Node) -> Vec<Node> {
-        let mut seen = std::collections::HashSet::from([root]);
+        let mut seen = FxHashSet::from_iter([root]);
         let mut cone = vec![root];
         let mut next = 0;
         while next < cone.len() {
@@ -209,7 +235,7 @@ impl Graph {
 
     /// The node with x, y, z replaced: the same shape in other coordinates.
     pub fn substitute(&mut self, root: Node, coordinates: [Node; 3]) -> Node {
-        let mut image: HashMap<Node, Node> = HashMap::new();
+        let mut image: FxHashMap<Node, Node> = FxHashMap::default();
         for node in self.cone(root) {
             let new = match self.expr(node) {
                 Expr::Coordinate(Axis::X) => coordinates[0],
@@ -228,7 +254,7 @@ impl Graph {
 
     /// The value of a node that uses no coordinate.
     pub fn constant_value(&self, root: Node) -> Option<f64> {
-        let mut values: HashMap<Node, f64> = HashMap::new();
+        let mut values: FxHashMap<Node, f64> = FxHashMap::default();
         for node in self.cone(root) {
             let value = match self.expr(node) {
                 Expr::Constant(bits) => f64::from_bits(bits),
@@ -278,6 +304,22 @@ mod tests {
         let moved = graph.substitute(product, [one, two, z]);
         assert_eq!(graph.constant_value(moved), Some(2.0));
         assert_eq!(graph.constant_value(product), None);
+    }
+
+    #[test]
+    fn shapes_do_not_depend_on_which_constants_are_equal() {
+        let mut graph = Graph::default();
+        let (x, y) = (graph.coordinate(Axis::X), graph.coordinate(Axis::Y));
+        let mut leaf = |a: f64, b: f64| {
+            let (a, b) = (graph.constant(a), graph.constant(b));
+            let (p, q) = (graph.binary(Binary::Sub, x, a), graph.binary(Binary::Sub, y, b));
+            graph.binary(Binary::Mul, p, q)
+        };
+        // the last has constants that are in the graph already, in the other order
+        let roots = [leaf(1.0, 2.0), leaf(3.0, 3.0), leaf(2.0, 1.0)];
+        let shapes = roots.map(|root| graph.parametrised(root));
+        assert!(shapes.iter().all(|(shape, ..)| shape.exprs() == shapes[0].0.exprs()));
+        assert_eq!(shapes.map(|(.., constants)| constants), [[1.0, 2.0], [3.0, 3.0], [2.0, 1.0]]);
     }
 
     #[test]

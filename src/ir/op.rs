@@ -151,6 +151,7 @@ impl Binary {
         matches!(self, Add | Mul | Min | Max | PlainMin | PlainMax | And | Or)
     }
 
+    #[inline]
     pub fn eval<T: Real>(self, a: T, b: T) -> T {
         let zero = T::from_f64(0.0);
         match self {

@@ -34,6 +34,7 @@ struct Parts<T> {
     denominator: T,
 }
 
+#[inline(always)]
 fn parts<T: Real>(u: T, v: T) -> Parts<T> {
     let min = if u < v { u } else { v };
     let max = if u > v { u } else { v };
@@ -46,34 +47,78 @@ fn parts<T: Real>(u: T, v: T) -> Parts<T> {
 }
 
 /// R₀-conjunction u ∧ v: positive exactly where both are, zero exactly where the smaller is zero.
+// Inlined always, as all that follows: loops over columns compile these formulas for several instruction sets.
+#[inline(always)]
 pub fn and<T: Real>(u: T, v: T) -> T {
     let p = parts(u, v);
     if p.small { p.min - p.min * (p.min / p.denominator) } else { p.sum - p.h }
 }
 
 /// R₀-disjunction u ∨ v = ¬(¬u ∧ ¬v), bit for bit.
+#[inline(always)]
 pub fn or<T: Real>(u: T, v: T) -> T {
     -and(-u, -v)
 }
 
 /// (∂/∂u, ∂/∂v) of u ∧ v: non-negative, at most 2, finite for all finite operands.
 pub fn and_weights<T: Real>(u: T, v: T) -> (T, T) {
+    let (_, by_u, by_v) = and_weighted(u, v);
+    (by_u, by_v)
+}
+
+/// u ∧ v with ∂/∂u and ∂/∂v: the same bits as [`and`] and [`and_weights`].
+#[inline(always)]
+pub fn and_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
     let one = T::from_f64(1.0);
     let p = parts(u, v);
     // −τ on the big branch, so that one formula serves both
     let tau = (if p.small { p.min } else { p.max }) / p.denominator;
+    let value = if p.small { p.min - p.min * tau } else { p.sum - p.h };
     let tau = if p.denominator == T::from_f64(0.0) { T::from_f64(-SINGULAR_TAU) } else { tau };
     let square = tau * tau;
     let scale = one / (one + square);
     let lesser = (one - tau) * (one - tau) * scale; // weight of m
     let greater = (if p.small { square } else { one }) * (scale + scale); // weight of M
     // u is M on the small branch unless it is the minimum, and the other way round on the big branch
-    if p.small == (u < v) { (lesser, greater) } else { (greater, lesser) }
+    if p.small == (u < v) { (value, lesser, greater) } else { (value, greater, lesser) }
 }
 
 /// (∂/∂u, ∂/∂v) of u ∨ v.
 pub fn or_weights<T: Real>(u: T, v: T) -> (T, T) {
     and_weights(-u, -v)
+}
+
+/// u ∨ v with ∂/∂u and ∂/∂v.
+#[inline(always)]
+pub fn or_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
+    let (value, by_u, by_v) = and_weighted(-u, -v);
+    (-value, by_u, by_v)
+}
+
+/// u + v − √(u² + v²) as printed in every textbook: loses all digits of a small result between large operands.
+#[inline(always)]
+pub fn textbook_and<T: Real>(u: T, v: T) -> T {
+    u + v - (u * u + v * v).sqrt()
+}
+
+/// u + v + √(u² + v²)
+#[inline(always)]
+pub fn textbook_or<T: Real>(u: T, v: T) -> T {
+    u + v + (u * u + v * v).sqrt()
+}
+
+/// The textbook's u ∧ v with 1 − u/√(u² + v²) and 1 − v/√(u² + v²), which are NaN at a corner.
+#[inline(always)]
+pub fn textbook_and_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
+    let (one, h) = (T::from_f64(1.0), (u * u + v * v).sqrt());
+    (u + v - h, one - u / h, one - v / h)
+}
+
+/// The textbook's u ∨ v with its weights.
+#[inline(always)]
+pub fn textbook_or_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
+    let (one, h) = (T::from_f64(1.0), (u * u + v * v).sqrt());
+    (u + v + h, one + u / h, one + v / h)
 }
 
 /// u ∧ v in a form that neither overflows nor underflows where the result does not: two divisions. Used where

@@ -37,45 +37,59 @@ pub trait Real:
 macro_rules! real {
     ($t:ty, $sin:ident $cos:ident $tan:ident $asin:ident $acos:ident $atan:ident $exp:ident $log:ident $pow:ident $atan2:ident) => {
         impl Real for $t {
+            #[inline]
             fn from_f64(x: f64) -> Self {
                 x as $t
             }
+            #[inline]
             fn to_f64(self) -> f64 {
                 f64::from(self)
             }
+            #[inline]
             fn sqrt(self) -> Self {
                 <$t>::sqrt(self)
             }
+            #[inline]
             fn abs(self) -> Self {
                 <$t>::abs(self)
             }
+            #[inline]
             fn sin(self) -> Self {
                 libm::$sin(self)
             }
+            #[inline]
             fn cos(self) -> Self {
                 libm::$cos(self)
             }
+            #[inline]
             fn tan(self) -> Self {
                 libm::$tan(self)
             }
+            #[inline]
             fn asin(self) -> Self {
                 libm::$asin(self)
             }
+            #[inline]
             fn acos(self) -> Self {
                 libm::$acos(self)
             }
+            #[inline]
             fn atan(self) -> Self {
                 libm::$atan(self)
             }
+            #[inline]
             fn exp(self) -> Self {
                 libm::$exp(self)
             }
+            #[inline]
             fn ln(self) -> Self {
                 libm::$log(self)
             }
+            #[inline]
             fn pow(self, exponent: Self) -> Self {
                 libm::$pow(self, exponent)
             }
+            #[inline]
             fn atan2(self, x: Self) -> Self {
                 libm::$atan2(self, x)
             }

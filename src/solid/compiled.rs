@@ -2,17 +2,20 @@
 //!
 //! Everything unsafe about a call is checked here first: the number of outputs, the lengths of the columns.
 
+use std::cell::RefCell;
+
 use crate::codegen::{self, Code, CodegenError, Form, Precision, Request, Shape};
 use crate::ir::{Graph, Interpreter, Node, Real};
 
 use glam::DVec3;
 
+use super::blocks::{Frame, Place, Scratch, Wide};
 use super::programs::{Compiled, Programs};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
 /// A type that programs exist for: `f32` or `f64`.
-pub trait Lane: Real + Default {
+pub trait Lane: Real + Default + Wide {
     /// Which of the two it is.
     const PRECISION: Precision;
 
@@ -21,6 +24,15 @@ pub trait Lane: Real + Default {
 
     #[doc(hidden)]
     fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]);
+
+    /// Working memory of this thread.
+    #[doc(hidden)]
+    fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R;
+}
+
+thread_local! {
+    static SCRATCH_64: RefCell<Scratch<f64>> = RefCell::default();
+    static SCRATCH_32: RefCell<Scratch<f32>> = RefCell::default();
 }
 
 impl Lane for f32 {
@@ -34,6 +46,10 @@ impl Lane for f32 {
     fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]) {
         interpreter.eval_f32(point, out);
     }
+
+    fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R {
+        SCRATCH_32.with_borrow_mut(use_it)
+    }
 }
 
 impl Lane for f64 {
@@ -46,6 +62,10 @@ impl Lane for f64 {
 
     fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]) {
         interpreter.eval_f64(point, out);
+    }
+
+    fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R {
+        SCRATCH_64.with_borrow_mut(use_it)
     }
 }
 
@@ -66,8 +86,15 @@ impl<T: Lane> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
-        let request =
-            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point, form, parameters: false };
+        let request = Request {
+            graph,
+            inputs: &[],
+            outputs,
+            precision: T::PRECISION,
+            shape: Shape::Point,
+            form,
+            parameters: false,
+        };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -103,8 +130,15 @@ impl<T: Lane> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
-        let request =
-            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch, form, parameters: false };
+        let request = Request {
+            graph,
+            inputs: &[],
+            outputs,
+            precision: T::PRECISION,
+            shape: Shape::Batch,
+            form,
+            parameters: false,
+        };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -160,6 +194,71 @@ impl<T: Lane> BatchProgram<T> {
     }
 }
 
+/// A piece of a program over blocks: arithmetic that reads some columns and writes others.
+#[derive(Debug)]
+pub struct SegmentProgram<T> {
+    code: Code,
+    inputs: usize,
+    parameters: usize,
+    lane: std::marker::PhantomData<T>,
+}
+
+impl<T: Lane> SegmentProgram<T> {
+    /// # Errors
+    /// As for [`codegen::compile`].
+    pub fn compile(
+        graph: &Graph,
+        inputs: &[Node],
+        outputs: &[Node],
+        parameters: usize,
+    ) -> Result<Self, CodegenError> {
+        let (precision, shape, form) = (T::PRECISION, Shape::Batch, Form::Stable);
+        let request = Request { graph, inputs, outputs, precision, shape, form, parameters: true };
+        let code = codegen::compile(request)?;
+        Ok(Self { code, inputs: inputs.len(), parameters, lane: std::marker::PhantomData })
+    }
+
+    /// Computes the columns `writes` of a block from its points and the columns `reads`.
+    ///
+    /// # Panics
+    /// If the block is no multiple of a vector, or places or parameters are not those of the program.
+    #[inline]
+    pub fn call(&self, frame: &mut Frame<'_, '_, T>, reads: &[Place], writes: &[Place], parameters: &[T]) {
+        let (length, lanes) = (frame.len(), T::PRECISION.lanes());
+        let [inputs, outputs] = [reads, writes].map(<[Place]>::len);
+        assert!(length.is_multiple_of(lanes) && frame.points.iter().all(|c| c.len() == length), "length");
+        assert_eq!((inputs, outputs, parameters.len()), (self.inputs, self.code.outputs, self.parameters));
+        frame.pointers.clear();
+        // the program only reads the points
+        frame.pointers.extend(frame.points.iter().map(|column| column.as_ptr().cast_mut()));
+        let base = frame.columns.as_mut_ptr();
+        for &place in reads.iter().chain(writes) {
+            let pointer = match place {
+                Place::Column(column) => {
+                    let start = column as usize * frame.stride;
+                    assert!(start + length <= frame.columns.len(), "no such column");
+                    // SAFETY: within the columns, as was just checked.
+                    unsafe { base.add(start) }
+                }
+                Place::Output(i) => {
+                    let output = &mut frame.outputs[i as usize];
+                    assert_eq!(output.len(), length, "length of an output");
+                    output.as_mut_ptr()
+                }
+            };
+            frame.pointers.push(pointer);
+        }
+        type Entry<T> = unsafe extern "C" fn(*const *mut T, usize, *const T);
+        // SAFETY: `compile` asked for a batch program of this precision that takes parameters, whose entry has this
+        // signature, and `self.code` keeps it mapped while it runs.
+        let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
+        // SAFETY: the program reads and writes `length` numbers of each column, which were checked to be there, and
+        // its parameters, whose number was checked. Columns that were one would give wrong numbers, nothing worse:
+        // all pointers into `columns` come from one exclusive borrow.
+        unsafe { entry(frame.pointers.as_ptr(), length / lanes, parameters.as_ptr()) }
+    }
+}
+
 /// A compiled range program.
 #[derive(Debug)]
 pub struct RangeProgram {
@@ -174,7 +273,8 @@ impl RangeProgram {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
         let (precision, shape, form) = (Precision::F64, Shape::Range, Form::Scaled);
-        let request = Request { graph, outputs: &[root], precision, shape, form, parameters: false };
+        let request =
+            Request { graph, inputs: &[], outputs: &[root], precision, shape, form, parameters: false };
         Ok(Self { code: codegen::compile(request)? })
     }
 
@@ -214,7 +314,15 @@ impl LeafProgram {
     pub fn compile(graph: &Graph, outputs: &[Node], parameters: usize) -> Result<Self, CodegenError> {
         let compile = |shape| {
             let (precision, form) = (Precision::F64, Form::Stable);
-            codegen::compile(Request { graph, outputs, precision, shape, form, parameters: true })
+            codegen::compile(Request {
+                graph,
+                inputs: &[],
+                outputs,
+                precision,
+                shape,
+                form,
+                parameters: true,
+            })
         };
         Ok(Self { point: compile(Shape::Point)?, batch: compile(Shape::Batch)?, parameters })
     }

@@ -5,6 +5,7 @@
 //! Invariant: a [`Solid`] answers for every point, every engine gives the same bits, and a program is compiled
 //! only when it is first asked for.
 
+mod blocks;
 mod bounds;
 mod cell_map;
 mod compiled;

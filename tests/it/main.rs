@@ -2,6 +2,7 @@
 
 mod agreement;
 mod bad_input;
+mod blocks;
 mod cells;
 mod cli;
 mod contact;

@@ -1,6 +1,7 @@
 //! What the product promises about its speed, each promise beside what this run found.
 
 use crate::compile::Time;
+use crate::groups::{MAP_CONTACT, MAP_SIGN};
 use crate::measure::Group;
 
 /// One promise.
@@ -123,8 +124,14 @@ impl Found {
         }
 
         let work = "500 primitives, cell map";
-        bar(work, "Fidget / sign and contact", None, AtLeast(20.0));
-        bar(work, "10 000 / 500 primitives", None, AtMost(2.0));
+        let title = |n: usize| format!("{n} spheres, balanced: through");
+        for (what, row) in [("sign", MAP_SIGN), ("contact", MAP_CONTACT)] {
+            let few = self.time(&title(500), row);
+            let many = self.time(&title(10_000), row);
+            bar(work, &format!("Fidget / {what}"), self.ratio(&title(500), raw, row), AtLeast(20.0));
+            let growth = many.zip(few).map(|(many, few)| many / few);
+            bar(work, &format!("{what}, 10 000 / 500 primitives"), growth, AtMost(2.0));
+        }
 
         let work = "range of boxes, pawn";
         let share =

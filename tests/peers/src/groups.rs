@@ -17,6 +17,12 @@ const HAND_F32: &str = "hand textbook 128-bit f32";
 const HAND_F64: &str = "hand textbook 128-bit f64";
 const RAW: &str = "Fidget raw f32";
 
+/// From how far away the contact is asked for: a centimetre, as in the notes on distance errors.
+const REACH: f64 = 0.01;
+
+pub const MAP_SIGN: &str = "ours sign by cell map f64";
+pub const MAP_CONTACT: &str = "ours contact by cell map f64";
+
 fn hand_of<T: Precision>() -> &'static str {
     if T::NAME == "f32" { HAND_F32 } else { HAND_F64 }
 }
@@ -141,13 +147,32 @@ impl Obstacle {
     }
 
     fn our_values<T: Precision>(&self, rows: &mut Vec<Row>, against: [Option<&'static str>; 2]) {
-        let [stable, textbook] =
-            [Form::Stable, Form::Textbook].map(|form| ours::solid_lazily(&self.text, self.name, form));
+        let [stable, guarded, textbook] = [Form::Stable, Form::Guarded, Form::Textbook]
+            .map(|form| ours::solid_lazily(&self.text, self.name, form));
         let name = |what: &str| format!("ours {what} {}", T::NAME);
         rows.push(Row::new(name("stable"), Asks::Value, against, ours::value::<T>(&stable)));
+        rows.push(Row::new(name("guarded"), Asks::Value, against, ours::value::<T>(&guarded)));
         rows.push(Row::new(name("textbook"), Asks::Value, against, ours::value::<T>(&textbook)));
         rows.push(Row::new(name("sign"), Asks::Sign, against, ours::sign::<T>(&stable)));
         rows.push(Row::new(name("contact"), Asks::Distance, against, ours::contact::<T>(&stable)));
+    }
+
+    /// Sign and contact at random points through a cell map of the box.
+    pub fn through_cells(&self) -> Group {
+        let mut group = Group::new(format!("{}: through the cell map", self.title));
+        let shape = JitShape::from((self.tree)(Joins::R0));
+        let solid = ours::solid_lazily(&self.text, self.name, Form::Stable);
+        let map = ours::cell_map(&solid, REACH);
+        let against = [None, Some(RAW)];
+        group.rows = vec![
+            Row::new(RAW, Asks::Value, against, peer::raw(&shape)),
+            Row::new(MAP_SIGN, Asks::Sign, against, ours::map_sign(&map)),
+            Row::new(MAP_CONTACT, Asks::Other, against, ours::map_contact(&map)),
+        ];
+        let points = Points::random(crate::measure::BATCH, SIDE, 1);
+        group.measure(&points);
+        group.check(&solid, &points, self.checked, &[]);
+        group
     }
 
     /// ω and ∇ω at all points of a batch.

@@ -60,6 +60,9 @@ fn measure(only: &str) -> Found {
         if obstacle.primitives() <= GRADIENTS_UP_TO {
             keep(&mut found, obstacle.gradients());
         }
+        if obstacle.primitives() >= GRADIENTS_UP_TO && obstacle.title.contains("balanced") {
+            keep(&mut found, obstacle.through_cells());
+        }
         if obstacle.name == "pawn" {
             keep(&mut found, groups::points_of_the_pawn(obstacle));
             let (group, decided) = groups::ranges(obstacle);

@@ -1,15 +1,17 @@
 //! Our own programs behind the common face.
 
 use std::hint::black_box;
+use std::sync::Arc;
 
 use rfm::codegen::Form;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::solid::Lane;
+use rfm::solid::{CellMap, Lane};
 use rfm::{Engine, Field, Program, Solid};
 
 use crate::hand;
 use crate::measure::{BATCH, Points, Work};
+use crate::scenes::SIDE;
 
 /// Both precisions of everybody.
 pub trait Precision: Lane + hand::Precision + Into<f64> {
@@ -80,6 +82,22 @@ pub fn sign<T: Precision>(solid: &Solid) -> Work {
 pub fn contact<T: Precision>(solid: &Solid) -> Work {
     let solid = solid.clone();
     columns::<T, 5>(move |points, out| solid.contact_many(points, out))
+}
+
+/// The box [0, 3]³ with its cells, for contacts within a reach.
+pub fn cell_map(solid: &Solid, reach: f64) -> Arc<CellMap> {
+    let domain = Aabb::new(DVec3::ZERO, DVec3::splat(SIDE));
+    Arc::new(CellMap::with_reach(solid, domain, reach).expect("a union can be taken apart"))
+}
+
+pub fn map_sign(map: &Arc<CellMap>) -> Work {
+    let map = Arc::clone(map);
+    columns::<f64, 1>(move |[x, y, z], [out]| map.sign_many(rfm::field::Points::new(x, y, z), out))
+}
+
+pub fn map_contact(map: &Arc<CellMap>) -> Work {
+    let map = Arc::clone(map);
+    columns::<f64, 5>(move |[x, y, z], out| map.contact_many(rfm::field::Points::new(x, y, z), out))
 }
 
 /// ω at one point after the other through a function of three loose numbers.
