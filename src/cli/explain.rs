@@ -2,15 +2,19 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
-use crate::Program;
-use crate::codegen::{Form, Listing, Precision, Request, Shape, target_description};
-use crate::diagnostic::{explain, nearest};
-use crate::ir::dump;
+use crate::codegen::{CodegenError, Form, Listing, Precision, Request, Shape, target_description};
+use crate::diagnostic::{Span, explain, nearest};
+use crate::geom::Aabb;
+use crate::ir::{Node, dump};
 use crate::lower::NamedSolid;
-use crate::solid::ProgramKind;
+use crate::simplify::Exactness;
+use crate::solid::{Left, ProgramKind};
 use crate::syntax;
+use crate::{Program, Solid};
 
 pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if shared.json {
@@ -60,21 +64,15 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
 /// What became of one solid.
 fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]) -> Result<(), Failure> {
     let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
-    let (written, _) = program.module().graph.extract(&[named.node]);
+    let text = Explanation { program, solid: &solid };
+    say!("solid {}", named.name);
+    text.simplification(named);
+    text.leaves();
+    text.specialisation();
+    text.programs();
+    say!("  target: {}", target_description());
     let (value, value_outputs) = solid.graph(ProgramKind::Value);
     let (gradient, gradient_outputs) = solid.graph(ProgramKind::Gradient);
-    say!("solid {}", named.name);
-    say!(
-        "  operations: {} as written, {} for ω, {} for ω and ∇ω",
-        written.len(),
-        value.len(),
-        gradient.len()
-    );
-    let rules = &solid.applied_rules().0;
-    for (equation, count) in rules {
-        say!("  simplified {count:>4} ×  {equation}");
-    }
-    say!("  target: {}", target_description());
     if show.contains(&Stage::Ir) {
         say!("\nω:\n{}", dump(value, &[("omega", value_outputs[0])], program.sources()));
         let names = ["omega", "gx", "gy", "gz"];
@@ -82,17 +80,8 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
         say!("ω and ∇ω:\n{}", dump(gradient, &roots, program.sources()));
     }
     if show.contains(&Stage::Clif) || show.contains(&Stage::Asm) {
-        for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)]
-        {
-            let request = Request {
-                graph,
-                outputs,
-                precision: Precision::F64,
-                shape: Shape::Batch,
-                form: Form::Stable,
-                parameters: false,
-            };
-            let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;
+        for (title, kind) in [("ω", ProgramKind::Value), ("ω and ∇ω", ProgramKind::Gradient)] {
+            let listing = listing(&solid, kind).map_err(|e| Failure::usage(e.to_string()))?;
             if show.contains(&Stage::Clif) {
                 say!("\n{title}, f64, many points, intermediate representation:\n{}", listing.clif);
             }
@@ -102,4 +91,184 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
         }
     }
     Ok(())
+}
+
+/// The code generator's texts of a program for many points in `f64`.
+fn listing(solid: &Solid, kind: ProgramKind) -> Result<Listing, CodegenError> {
+    let (graph, outputs) = solid.graph(kind);
+    let (precision, shape, form) = (Precision::F64, Shape::Batch, Form::Stable);
+    Listing::of(Request { graph, outputs, precision, shape, form, parameters: false })
+}
+
+/// Leaves that are listed one by one.
+const MOST_LEAVES: usize = 24;
+
+/// Programs of more operations than this are not compiled only to be counted.
+const MOST_OPERATIONS: usize = 5_000;
+
+/// The parts of the text about one solid.
+struct Explanation<'a> {
+    program: &'a Program,
+    solid: &'a Solid,
+}
+
+impl Explanation<'_> {
+    /// `pawn.rfm:8:11` and the first line of what stands there.
+    fn place(&self, span: Span) -> String {
+        let Some(source) = self.program.sources().iter().find(|s| s.id == span.source) else {
+            return String::new();
+        };
+        let at = source.position(span.start as usize);
+        let text = source.slice(span);
+        let line = text.lines().next().unwrap_or("").trim_end();
+        let cut: String = line.chars().take(48).collect();
+        let more = if cut.len() < text.len() { " …" } else { "" };
+        format!("{}:{}:{}  `{cut}{more}`", source.name, at.line, at.column)
+    }
+
+    /// Which rules changed what, and where it stood.
+    fn simplification(&self, named: &NamedSolid) {
+        let (written, _) = self.program.module().graph.extract(&[named.node]);
+        let (graph, outputs) = self.solid.graph(ProgramKind::Value);
+        say!("  ω: {} operations as written, {} as evaluated", written.len(), graph.len());
+        let rules = &self.solid.applied_rules().0;
+        if !rules.is_empty() {
+            say!("  rewritten, {}: the value is the same at every point", Exactness::Value);
+        }
+        for (equation, uses) in rules {
+            say!("    {:>4} ×  {equation}", uses.count);
+            for &span in &uses.places {
+                say!("             {}", self.place(span));
+            }
+            if uses.count > uses.places.len() && !uses.places.is_empty() {
+                say!("             (places that were written once are named once)");
+            }
+        }
+        let mut used = vec![0usize; graph.len()];
+        graph.nodes().for_each(|(_, expr)| expr.operands().for_each(|operand| used[operand.index()] += 1));
+        outputs.iter().for_each(|output| used[output.index()] += 1);
+        let is_operation = |node: Node| graph.expr(node).operands().next().is_some();
+        let shared = graph.nodes().filter(|&(node, _)| used[node.index()] > 1 && is_operation(node));
+        for (count, (node, _)) in shared.enumerate() {
+            if count == MOST_LEAVES {
+                say!("    …");
+                break;
+            }
+            if let Some(span) = graph.span(node) {
+                say!("  computed once, used {} times: {}", used[node.index()], self.place(span));
+            }
+        }
+    }
+
+    /// The inequalities that decide the sign.
+    fn leaves(&self) {
+        let Some(leaves) = self.solid.leaves() else {
+            say!("  leaves: too many to be taken apart");
+            return;
+        };
+        let shapes = leaves.iter().map(|leaf| leaf.shape + 1).max().unwrap_or(0);
+        let s = |n: usize| if n == 1 { "" } else { "s" };
+        say!(
+            "  sign, {}: {} lea{} of {shapes} shape{}, joined by min and max in place of ∧ and ∨",
+            Exactness::ZeroSet,
+            leaves.len(),
+            if leaves.len() == 1 { "f" } else { "ves" },
+            s(shapes)
+        );
+        for (i, leaf) in leaves.iter().enumerate().take(MOST_LEAVES) {
+            let place = leaf.span.map_or(String::new(), |span| self.place(span));
+            say!(
+                "    leaf {:<3} shape {:<3} {:>3} operations  {place}",
+                i + 1,
+                leaf.shape + 1,
+                leaf.operations
+            );
+        }
+        if leaves.len() > MOST_LEAVES {
+            say!("    … and {} more", leaves.len() - MOST_LEAVES);
+        }
+    }
+
+    /// What ranges prove to be irrelevant in the solid's bounds and in their eighths.
+    fn specialisation(&self) {
+        let Some(bounds) = self.solid.bounds().aabb() else { return };
+        let corner = |p: DVec3| format!("[{:.3}, {:.3}, {:.3}]", p.x, p.y, p.z);
+        say!("  in its bounds {} to {}, {}:", corner(bounds.min), corner(bounds.max), Exactness::ZeroSet);
+        self.left("    ", &bounds, true);
+        say!("  in the eighths of its bounds:");
+        for corner in bounds.corners() {
+            let centre = bounds.centre();
+            let eighth = Aabb::new(corner.min(centre), corner.max(centre));
+            let side = |axis: usize| if eighth.min[axis] == bounds.min[axis] { '−' } else { '+' };
+            let name: String =
+                ["x", "y", "z"].iter().enumerate().map(|(i, a)| format!("{a}{}", side(i))).collect();
+            self.left(&format!("    {name} "), &eighth, false);
+        }
+    }
+
+    fn left(&self, indent: &str, over: &Aabb, reasons: bool) {
+        let (Some(left), Some(ranges)) = (self.solid.left_in(over), self.solid.leaf_ranges(over)) else {
+            return;
+        };
+        let kept = match left {
+            Left::Outside => return say!("{indent}all fluid: proven"),
+            Left::Inside => return say!("{indent}all solid: proven"),
+            Left::Leaves(kept) => kept,
+        };
+        let list = |wanted: bool| {
+            let numbers = (0..kept.len()).filter(|&i| kept[i] == wanted).map(|i| (i + 1).to_string());
+            let all: Vec<String> = numbers.collect();
+            let more = if all.len() > MOST_LEAVES { ", …" } else { "" };
+            format!("{}{more}", all[..all.len().min(MOST_LEAVES)].join(", "))
+        };
+        let dropped = kept.iter().filter(|&&kept| !kept).count();
+        if dropped == 0 {
+            say!("{indent}every leaf matters");
+            return;
+        }
+        say!("{indent}left: {}; dropped: {}", list(true), list(false));
+        for i in (0..kept.len()).filter(|&i| reasons && !kept[i]).take(MOST_LEAVES) {
+            let range = ranges[i];
+            let why = if range.lo > 0.0 {
+                "holds throughout"
+            } else if range.hi < 0.0 {
+                "holds nowhere"
+            } else {
+                "what it is joined with decides"
+            };
+            say!("{indent}  leaf {} lies between {:.3} and {:.3}: {why}", i + 1, range.lo, range.hi);
+        }
+    }
+
+    /// What each question costs.
+    fn programs(&self) {
+        say!("  programs for many points in f64, two at a time:");
+        for (name, kind) in [
+            ("ω", ProgramKind::Value),
+            ("ω and ∇ω", ProgramKind::Gradient),
+            ("sign", ProgramKind::Sign),
+            ("sign and leaf's gradient", ProgramKind::SignGradient),
+            ("distance, normal, curvature", ProgramKind::Contact),
+        ] {
+            let operations = self.solid.graph(kind).0.len();
+            let instructions = if operations > MOST_OPERATIONS {
+                "not compiled here".to_string()
+            } else {
+                match listing(self.solid, kind) {
+                    Ok(listing) => format!("{} instructions", instructions(&listing.assembly)),
+                    Err(error) => error.to_string(),
+                }
+            };
+            say!("    {name:<28} {operations:>6} operations  {instructions:>6}");
+        }
+    }
+}
+
+/// Lines of an assembly text that are instructions: neither labels nor remarks.
+fn instructions(assembly: &str) -> usize {
+    let is_instruction = |line: &&str| {
+        let line = line.trim();
+        !(line.is_empty() || line.ends_with(':') || line.starts_with([';', '.']))
+    };
+    assembly.lines().filter(is_instruction).count()
 }
