@@ -42,9 +42,18 @@ const LARGEST_OPERAND: f64 = 1e150;
 /// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
 const ULP: f64 = f64::EPSILON;
 
-/// What R₀ and products of two factors are widened by, relative: the roundings of the bound itself, at most 4.1 ulp,
-/// and those of the program whose values it must hold, at most 2.3 ulp (see `ir::r0`).
+/// What a product of two sums is widened by, relative: three roundings of the bound itself, and one and a half of the
+/// program whose values it must hold.
 const MARGIN: f64 = 8.0 * ULP;
+
+/// What R₀ is widened by, relative to |u| + |v|, which is at least √(u² + v²) and at least half of |u ∧ v| and |u ∨ v|:
+/// 3 ulp of the root, at most 2.3 ulp of the result in the program (see `ir::r0`), and in [`Rounding::Nearest`] those
+/// of the sums.
+const R0_MARGIN: f64 = 16.0 * ULP;
+
+/// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the root of
+/// what is lost.
+const R0_UNDERFLOW: f64 = 1e-147;
 
 /// Whether machine code can answer for this graph.
 pub fn supports(graph: &Graph, root: Node) -> bool {
@@ -84,8 +93,8 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, parameters: &[f64
     })
 }
 
-/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: x, y, z as pairs (low, high) in, (low, high) of the root out; with
-/// parameters, a pointer to them comes third.
+/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the root out;
+/// with parameters, a pointer to them comes third.
 pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, rounding: Rounding) {
     let block = builder.create_block();
     builder.append_block_params_for_function_params(block);
@@ -95,8 +104,15 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
     let (input, output) = (arguments[0], arguments[1]);
     let emitter = Emitter::new(builder, Precision::F64, Form::Stable, request.graph);
     let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
+    // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
     let axes: [Value; 3] = std::array::from_fn(|i| {
-        let pair = ranges.emitter.builder.ins().load(types::F64X2, MemFlagsData::new(), input, 16 * i as i32);
+        let ins = |ranges: &mut Ranges<'_, '_>, place: usize| {
+            let flags = MemFlagsData::new();
+            ranges.emitter.builder.ins().load(types::F64, flags, input, 8 * place as i32)
+        };
+        let (low, high) = (ins(&mut ranges, i), ins(&mut ranges, i + 3));
+        let low = ranges.emitter.builder.ins().scalar_to_vector(types::F64X2, low);
+        let pair = ranges.emitter.builder.ins().insertlane(low, high, 1);
         ranges.flip(pair, Lane::Low)
     });
     for (node, expr) in request.graph.nodes() {
@@ -441,40 +457,34 @@ impl Ranges<'_, '_> {
     /// The range of a ∧ b or a ∨ b: in the lane `and` the upper bound of a conjunction, in the other that of a
     /// disjunction, because −(u ∧ v) = −u ∨ −v.
     ///
-    /// With A = |u + v| + √(u² + v²), u ∧ v is 2uv/A where u + v > 0 and −A elsewhere, u ∨ v is −2uv/A where u + v < 0
-    /// and A elsewhere: no cancellation, and division and root do not wait for a choice. Everything is widened by
-    /// [`MARGIN`] before the division; constants far below any use stand in for A = 0 and hold what underflows.
+    /// The bounds are u + v ∓ √(u² + v²) as written, widened by what cancels; where hardly anything else is left the
+    /// operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m = max(u, v)
+    /// u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the program). So nothing waits
+    /// for a division after the root.
     fn r0(&mut self, a: Value, b: Value, and: Lane) -> Value {
-        let or = if and == Lane::Low { Lane::High } else { Lane::Low };
-        let least = self.emitter.constant(2f64.powi(-500));
         let sum = self.fadd(a, b);
-        let size = self.emitter.abs(sum);
-        let size = self.emitter.max(size, least);
+        let (a1, b1) = (self.emitter.abs(a), self.emitter.abs(b));
+        let size = self.fadd(a1, b1);
+        let relative = self.emitter.constant(R0_MARGIN);
+        let margin = self.fmul(size, relative);
+        let lost = self.emitter.constant(R0_UNDERFLOW);
+        let margin = self.fadd(margin, lost);
+        let sum = self.fadd(sum, margin);
+
         let (a2, b2) = (self.fmul(a, a), self.fmul(b, b));
         let squares = self.fadd(a2, b2);
         let root = self.emitter.builder.ins().sqrt(squares);
-        let size = self.fadd(size, root);
+        let root = self.flip(root, and);
+        let bound = self.fadd(sum, root);
 
-        let twice = self.fadd(a, a);
-        let product = self.fmul(twice, b);
-        let (more, less) = (1.0 + MARGIN, 1.0 - MARGIN);
-        let (more_product, less_product) = (self.signed(and, more, -more), self.signed(and, less, -less));
-        let (one, other) = (self.fmul(product, more_product), self.fmul(product, less_product));
-        let top = self.emitter.max(one, other);
-        // where A < 2⁻⁴⁵⁰ the squares may have lost all digits: more than any value there
-        let (lost_top, lost) =
-            (self.emitter.constant(2f64.powi(-890)), self.emitter.constant(2f64.powi(-440)));
-        let top = self.fadd(top, lost_top);
-        let small = self.emitter.builder.ins().fdiv(top, size);
-
-        let signs = self.signed(and, -less, more);
-        let big = self.fmul(size, signs);
-        let big = self.fadd(big, lost);
-
-        let toward_small = self.flip(sum, or);
-        let zero = self.emitter.constant(0.0);
-        let is_small = self.emitter.compare(FloatCC::LessThan, zero, toward_small);
-        let bound = self.emitter.select(is_small, small, big);
-        self.up(bound)
+        let (least, most) = (self.min(a, b), self.emitter.max(a, b));
+        let limit = match and {
+            Lane::Low => self.lanes(least, most),
+            Lane::High => self.lanes(most, least),
+        };
+        let (positive, negative) = (self.signed(and, 1.0, 4.0), self.signed(and, 1.0, 0.5));
+        let (one, other) = (self.fmul(limit, positive), self.fmul(limit, negative));
+        let limit = self.emitter.max(one, other);
+        self.min(bound, limit)
     }
 }

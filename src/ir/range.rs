@@ -258,7 +258,7 @@ fn is_infinite(a: Interval) -> bool {
 /// Operands beyond this have squares whose sum may overflow.
 const SQUARES_OVERFLOW: f64 = 6.7e153; // 2⁵¹¹
 
-/// Where all operands are below this their squares may lose digits to underflow.
+/// Results below this may have operands whose squares lose digits to underflow.
 const SQUARES_UNDERFLOW: f64 = 3.0e-151; // 2⁻⁵⁰⁰
 
 /// The range of u ∧ v: exact at the ends, and what the half-angle form of `ir::r0` makes of extreme operands.
@@ -275,12 +275,13 @@ fn conjunction(a: Interval, b: Interval) -> Interval {
         let lo = if a.lo + b.lo > 0.0 { exact.lo } else { f64::NEG_INFINITY };
         return Interval::new(lo, exact.hi.max(a.hi.min(b.hi)));
     }
-    if largest < SQUARES_UNDERFLOW {
-        // √(u² + v²) is only known to lie between the larger operand and twice that
-        let outwards = |x: f64, away: bool| if away { 2.0 * x } else { 0.5 * x };
-        return Interval::new(outwards(exact.lo, exact.lo < 0.0), outwards(exact.hi, exact.hi > 0.0));
-    }
-    exact
+    // there √(u² + v²) is only known to lie between the larger operand and twice that
+    let outwards = |x: f64, away: bool| match (x.abs() < SQUARES_UNDERFLOW, away) {
+        (false, _) => x,
+        (true, true) => 2.0 * x,
+        (true, false) => 0.5 * x,
+    };
+    Interval::new(outwards(exact.lo, exact.lo < 0.0), outwards(exact.hi, exact.hi > 0.0))
 }
 
 #[cfg(test)]

@@ -231,7 +231,7 @@ impl RangeProgram {
             return None; // NaN included
         }
         let (min, max) = (over.min, over.max);
-        let input = [min.x, max.x, min.y, max.y, min.z, max.z];
+        let input = [min.x, min.y, min.z, max.x, max.y, max.z];
         let mut out = [0.0; 2];
         match self.rounding {
             Rounding::Nearest => {

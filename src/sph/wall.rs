@@ -10,7 +10,8 @@
 //!
 //! λ of a plane is the "wall weight" that Harada et al. (2007) tabulate and Fujisawa & Miura (2015) integrate; the
 //! polynomials here are the integrals above, carried out. They are written with the factor 1 − δ and positive terms,
-//! so that nothing cancels as the particle leaves the wall.
+//! so that nothing cancels as the particle leaves the wall; the inner piece of the spline, which stays away from zero,
+//! is written out.
 //!
 //! The solver does not use them yet: its walls act on positions and velocities alone (see [`super::boundary`]), and
 //! the density of a particle at a wall is too low by the part λ. These forms are what a density with walls needs.
