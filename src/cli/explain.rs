@@ -9,10 +9,11 @@ use super::{Failure, choose, input};
 use crate::codegen::{CodegenError, Form, Listing, Precision, Request, Shape, target_description};
 use crate::diagnostic::{Span, explain, nearest};
 use crate::geom::Aabb;
+use crate::interval::Interval;
 use crate::ir::{Node, dump};
 use crate::lower::NamedSolid;
-use crate::simplify::Exactness;
-use crate::solid::{Left, ProgramKind};
+use crate::simplify::{Exactness, MOST_PLACES, simplify};
+use crate::solid::{Bounds, Left, ProgramKind};
 use crate::syntax;
 use crate::{Program, Solid};
 
@@ -119,10 +120,12 @@ impl Explanation<'_> {
             return String::new();
         };
         let at = source.position(span.start as usize);
-        let text = source.slice(span);
-        let line = text.lines().next().unwrap_or("").trim_end();
-        let cut: String = line.chars().take(48).collect();
-        let more = if cut.len() < text.len() { " …" } else { "" };
+        // without the remark and the line end that may follow an expression
+        let code: Vec<&str> =
+            source.slice(span).lines().map(|l| l.split('#').next().unwrap_or("").trim()).collect();
+        let text = code.join(" ").trim().to_string();
+        let cut: String = text.chars().take(60).collect();
+        let more = if cut.len() < text.len() { "…" } else { "" };
         format!("{}:{}:{}  `{cut}{more}`", source.name, at.line, at.column)
     }
 
@@ -130,7 +133,13 @@ impl Explanation<'_> {
     fn simplification(&self, named: &NamedSolid) {
         let (written, _) = self.program.module().graph.extract(&[named.node]);
         let (graph, outputs) = self.solid.graph(ProgramKind::Value);
-        say!("  ω: {} operations as written, {} as evaluated", written.len(), graph.len());
+        let (simplified, ..) = simplify(&self.program.module().graph, &[named.node]);
+        say!(
+            "  ω: {} operations as written, {} simplified, {} with the guard against coordinates that are not finite",
+            written.len(),
+            simplified.len(),
+            graph.len()
+        );
         let rules = &self.solid.applied_rules().0;
         if !rules.is_empty() {
             say!("  rewritten, {}: the value is the same at every point", Exactness::Value);
@@ -140,8 +149,8 @@ impl Explanation<'_> {
             for &span in &uses.places {
                 say!("             {}", self.place(span));
             }
-            if uses.count > uses.places.len() && !uses.places.is_empty() {
-                say!("             (places that were written once are named once)");
+            if uses.places.len() == MOST_PLACES {
+                say!("             …");
             }
         }
         let mut used = vec![0usize; graph.len()];
@@ -149,14 +158,19 @@ impl Explanation<'_> {
         outputs.iter().for_each(|output| used[output.index()] += 1);
         let is_operation = |node: Node| graph.expr(node).operands().next().is_some();
         let shared = graph.nodes().filter(|&(node, _)| used[node.index()] > 1 && is_operation(node));
-        for (count, (node, _)) in shared.enumerate() {
-            if count == MOST_LEAVES {
-                say!("    …");
-                break;
+        let place = |(node, _)| graph.span(node).map(|span| (used[node.index()], self.place(span)));
+        // one expression may stand for several operations
+        let mut places: Vec<(usize, String)> = Vec::new();
+        shared.filter_map(place).for_each(|found| {
+            if !places.contains(&found) {
+                places.push(found)
             }
-            if let Some(span) = graph.span(node) {
-                say!("  computed once, used {} times: {}", used[node.index()], self.place(span));
-            }
+        });
+        for (uses, place) in places.iter().take(MOST_LEAVES) {
+            say!("  computed once, used {uses} times: {place}");
+        }
+        if places.len() > MOST_LEAVES {
+            say!("  … and {} more", places.len() - MOST_LEAVES);
         }
     }
 
@@ -191,52 +205,68 @@ impl Explanation<'_> {
 
     /// What ranges prove to be irrelevant in the solid's bounds and in their eighths.
     fn specialisation(&self) {
-        let Some(bounds) = self.solid.bounds().aabb() else { return };
-        let corner = |p: DVec3| format!("[{:.3}, {:.3}, {:.3}]", p.x, p.y, p.z);
-        say!("  in its bounds {} to {}, {}:", corner(bounds.min), corner(bounds.max), Exactness::ZeroSet);
-        self.left("    ", &bounds, true);
-        say!("  in the eighths of its bounds:");
-        for corner in bounds.corners() {
-            let centre = bounds.centre();
-            let eighth = Aabb::new(corner.min(centre), corner.max(centre));
-            let side = |axis: usize| if eighth.min[axis] == bounds.min[axis] { '−' } else { '+' };
-            let name: String =
-                ["x", "y", "z"].iter().enumerate().map(|(i, a)| format!("{a}{}", side(i))).collect();
-            self.left(&format!("    {name} "), &eighth, false);
+        let bounds = match self.solid.bounds() {
+            Bounds::Within(bounds) => *bounds,
+            Bounds::Empty => return say!("  bounds: empty, proven by ranges"),
+            Bounds::Unbounded => return say!("  bounds: none within 2²⁰ of the origin"),
+        };
+        // + 0 turns −0 into 0
+        let number = |x: f64| format!("{:.3}", (1e3 * x).round() / 1e3 + 0.0);
+        let corner = |p: DVec3| format!("[{}, {}, {}]", number(p.x), number(p.y), number(p.z));
+        let shown = (corner(bounds.min), corner(bounds.max));
+        say!("  what ranges leave of it in its bounds {} to {}, {}:", shown.0, shown.1, Exactness::ZeroSet);
+        self.say_left(vec![("everywhere".to_string(), bounds)]);
+        let centre = bounds.centre();
+        let eighth = |corner: DVec3| {
+            let over = Aabb::new(corner.min(centre), corner.max(centre));
+            let side = |axis: usize| if over.min[axis] == bounds.min[axis] { '−' } else { '+' };
+            (format!("x{}y{}z{}", side(0), side(1), side(2)), over)
+        };
+        say!("  and in the eighths of its bounds, lower (−) or upper (+) along each axis:");
+        self.say_left(bounds.corners().map(eighth).into());
+    }
+
+    /// What is left in some boxes, those with the same leaves together.
+    fn say_left(&self, boxes: Vec<(String, Aabb)>) {
+        let mut groups: Vec<(Left, String, Vec<Interval>)> = Vec::new();
+        for (name, over) in boxes {
+            let (Some(left), Some(ranges)) = (self.solid.left_in(&over), self.solid.leaf_ranges(&over))
+            else {
+                return say!("    too many leaves to tell");
+            };
+            match groups.iter_mut().find(|(known, ..)| *known == left) {
+                Some((_, names, hulls)) => {
+                    names.push_str(&format!(", {name}"));
+                    hulls.iter_mut().zip(&ranges).for_each(|(hull, range)| *hull = hull.hull(*range));
+                }
+                None => groups.push((left, name, ranges)),
+            }
+        }
+        for (left, names, ranges) in groups {
+            match left {
+                Left::Outside => say!("    {names}: all fluid"),
+                Left::Inside => say!("    {names}: all solid"),
+                Left::Leaves(kept) => self.say_dropped(&names, &kept, &ranges),
+            }
         }
     }
 
-    fn left(&self, indent: &str, over: &Aabb, reasons: bool) {
-        let (Some(left), Some(ranges)) = (self.solid.left_in(over), self.solid.leaf_ranges(over)) else {
-            return;
-        };
-        let kept = match left {
-            Left::Outside => return say!("{indent}all fluid: proven"),
-            Left::Inside => return say!("{indent}all solid: proven"),
-            Left::Leaves(kept) => kept,
-        };
-        let list = |wanted: bool| {
-            let numbers = (0..kept.len()).filter(|&i| kept[i] == wanted).map(|i| (i + 1).to_string());
-            let all: Vec<String> = numbers.collect();
-            let more = if all.len() > MOST_LEAVES { ", …" } else { "" };
-            format!("{}{more}", all[..all.len().min(MOST_LEAVES)].join(", "))
-        };
-        let dropped = kept.iter().filter(|&&kept| !kept).count();
-        if dropped == 0 {
-            say!("{indent}every leaf matters");
-            return;
+    fn say_dropped(&self, names: &str, kept: &[bool], ranges: &[Interval]) {
+        let left: Vec<String> = (0..kept.len()).filter(|&i| kept[i]).map(|i| (i + 1).to_string()).collect();
+        let more = if left.len() > MOST_LEAVES { ", …" } else { "" };
+        let list = left[..left.len().min(MOST_LEAVES)].join(", ");
+        match left.len() {
+            n if n == kept.len() => return say!("    {names}: every leaf"),
+            n => say!("    {names}: {n} of {} leaves, {list}{more}", kept.len()),
         }
-        say!("{indent}left: {}; dropped: {}", list(true), list(false));
-        for i in (0..kept.len()).filter(|&i| reasons && !kept[i]).take(MOST_LEAVES) {
-            let range = ranges[i];
-            let why = if range.lo > 0.0 {
-                "holds throughout"
-            } else if range.hi < 0.0 {
-                "holds nowhere"
-            } else {
-                "what it is joined with decides"
+        for i in (0..kept.len()).filter(|&i| !kept[i]).take(MOST_LEAVES) {
+            let Interval { lo, hi } = ranges[i];
+            let why = match (lo > 0.0, hi < 0.0) {
+                (true, _) => "positive throughout",
+                (_, true) => "negative throughout",
+                _ => "the rest of its part decides without it",
             };
-            say!("{indent}  leaf {} lies between {:.3} and {:.3}: {why}", i + 1, range.lo, range.hi);
+            say!("      dropped leaf {}: from {lo:.3} to {hi:.3}, {why}", i + 1);
         }
     }
 

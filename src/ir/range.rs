@@ -237,6 +237,8 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
         Binary::Max | Binary::PlainMax => a.max(b),
         Binary::And => conjunction(a, b),
         Binary::Or => -conjunction(-a, -b),
+        // two infinite operands have no weights
+        Binary::AndWeight | Binary::OrWeight if is_infinite(a) && is_infinite(b) => Interval::ALL,
         Binary::MinWeight | Binary::MaxWeight => Interval { lo: 0.0, hi: 1.0 },
         Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() },
         Binary::Atan2 => Interval::new(-std::f64::consts::PI, std::f64::consts::PI).widened(1),

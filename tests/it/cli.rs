@@ -112,7 +112,7 @@ fn check_prints_facts() {
 #[test]
 fn explain_shows_what_was_dropped_and_why() {
     let solids = "rfm 1\nlet far = sphere(1).move([9, 0, 0])\nlet d = 0 - (x - 1)\n\
-        solid s = ((-d <= 2 and not (not z >= -1) and z <= 1) or far) and abs(y) <= 0.5 and x^2 + y^2 + z^2 <= 100\n";
+        solid s = ((-d <= 2 and not (not z >= -1) and z <= 1) or far) and abs(y) <= 0.5 and x^2 + y^2 + z^2 <= 200\n";
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("s.rfm"), solids).unwrap();
     for (name, folder, subject) in [
