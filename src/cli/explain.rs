@@ -2,15 +2,20 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
-use crate::Program;
-use crate::codegen::{Form, Listing, Precision, Request, Shape, target_description};
-use crate::diagnostic::{explain, nearest};
-use crate::ir::dump;
+use crate::codegen::{CodegenError, Form, Listing, Precision, Request, Shape, target_description};
+use crate::diagnostic::{Span, explain, nearest};
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::{Node, dump};
 use crate::lower::NamedSolid;
-use crate::solid::ProgramKind;
+use crate::simplify::{Exactness, MOST_PLACES, simplify};
+use crate::solid::{Bounds, Left, ProgramKind};
 use crate::syntax;
+use crate::{Program, Solid};
 
 pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if shared.json {
@@ -60,21 +65,15 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
 /// What became of one solid.
 fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]) -> Result<(), Failure> {
     let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
-    let (written, _) = program.module().graph.extract(&[named.node]);
+    let text = Explanation { program, solid: &solid };
+    say!("solid {}", named.name);
+    text.simplification(named);
+    text.leaves();
+    text.specialisation();
+    text.programs();
+    say!("  target: {}", target_description());
     let (value, value_outputs) = solid.graph(ProgramKind::Value);
     let (gradient, gradient_outputs) = solid.graph(ProgramKind::Gradient);
-    say!("solid {}", named.name);
-    say!(
-        "  operations: {} as written, {} for ω, {} for ω and ∇ω",
-        written.len(),
-        value.len(),
-        gradient.len()
-    );
-    let rules = &solid.applied_rules().0;
-    for (equation, count) in rules {
-        say!("  simplified {count:>4} ×  {equation}");
-    }
-    say!("  target: {}", target_description());
     if show.contains(&Stage::Ir) {
         say!("\nω:\n{}", dump(value, &[("omega", value_outputs[0])], program.sources()));
         let names = ["omega", "gx", "gy", "gz"];
@@ -82,25 +81,224 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
         say!("ω and ∇ω:\n{}", dump(gradient, &roots, program.sources()));
     }
     if show.contains(&Stage::Clif) || show.contains(&Stage::Asm) {
-        for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)]
-        {
-            let request = Request {
-                graph,
-                inputs: &[],
-                outputs,
-                precision: Precision::F64,
-                shape: Shape::Batch,
-                form: Form::Stable,
-                parameters: false,
-            };
-            let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;
+        for (title, kind) in [("ω", ProgramKind::Value), ("ω and ∇ω", ProgramKind::Gradient)] {
+            let listing = listing(&solid, kind).map_err(|e| Failure::usage(e.to_string()))?;
             if show.contains(&Stage::Clif) {
-                say!("\n{title}, f64, many points, intermediate representation:\n{}", listing.clif);
+                say!("\n{title}, f64, one point, intermediate representation:\n{}", listing.clif);
             }
             if show.contains(&Stage::Asm) {
-                say!("\n{title}, f64, many points, machine code:\n{}", listing.assembly);
+                say!("\n{title}, f64, one point, machine code:\n{}", listing.assembly);
             }
         }
     }
     Ok(())
+}
+
+/// The code generator's texts of a program for one point in `f64`.
+fn listing(solid: &Solid, kind: ProgramKind) -> Result<Listing, CodegenError> {
+    let (graph, outputs) = solid.graph(kind);
+    let (precision, shape, form) = (Precision::F64, Shape::Point, Form::Stable);
+    Listing::of(Request { graph, inputs: &[], outputs, precision, shape, form, parameters: false })
+}
+
+/// Leaves that are listed one by one.
+const MOST_LEAVES: usize = 24;
+
+/// Programs of more operations than this are not compiled only to be counted.
+const MOST_OPERATIONS: usize = 5_000;
+
+/// The parts of the text about one solid.
+struct Explanation<'a> {
+    program: &'a Program,
+    solid: &'a Solid,
+}
+
+impl Explanation<'_> {
+    /// `pawn.rfm:8:11` and the first line of what stands there.
+    fn place(&self, span: Span) -> String {
+        let Some(source) = self.program.sources().iter().find(|s| s.id == span.source) else {
+            return String::new();
+        };
+        let at = source.position(span.start as usize);
+        // without the remark and the line end that may follow an expression
+        let code: Vec<&str> =
+            source.slice(span).lines().map(|l| l.split('#').next().unwrap_or("").trim()).collect();
+        let text = code.join(" ").trim().to_string();
+        let cut: String = text.chars().take(60).collect();
+        let more = if cut.len() < text.len() { "…" } else { "" };
+        format!("{}:{}:{}  `{cut}{more}`", source.name, at.line, at.column)
+    }
+
+    /// Which rules changed what, and where it stood.
+    fn simplification(&self, named: &NamedSolid) {
+        let (written, _) = self.program.module().graph.extract(&[named.node]);
+        let (graph, outputs) = self.solid.graph(ProgramKind::Value);
+        let (simplified, ..) = simplify(&self.program.module().graph, &[named.node]);
+        say!(
+            "  ω: {} operations as written, {} simplified, {} with the guard against coordinates that are not finite",
+            written.len(),
+            simplified.len(),
+            graph.len()
+        );
+        let rules = &self.solid.applied_rules().0;
+        if !rules.is_empty() {
+            say!("  rewritten, {}: the value is the same at every point", Exactness::Value);
+        }
+        for (equation, uses) in rules {
+            say!("    {:>4} ×  {equation}", uses.count);
+            for &span in &uses.places {
+                say!("             {}", self.place(span));
+            }
+            if uses.places.len() == MOST_PLACES {
+                say!("             …");
+            }
+        }
+        let mut used = vec![0usize; graph.len()];
+        graph.nodes().for_each(|(_, expr)| expr.operands().for_each(|operand| used[operand.index()] += 1));
+        outputs.iter().for_each(|output| used[output.index()] += 1);
+        let is_operation = |node: Node| graph.expr(node).operands().next().is_some();
+        let shared = graph.nodes().filter(|&(node, _)| used[node.index()] > 1 && is_operation(node));
+        let place = |(node, _)| graph.span(node).map(|span| (used[node.index()], self.place(span)));
+        // one expression may stand for several operations
+        let mut places: Vec<(usize, String)> = Vec::new();
+        shared.filter_map(place).for_each(|found| {
+            if !places.contains(&found) {
+                places.push(found)
+            }
+        });
+        for (uses, place) in places.iter().take(MOST_LEAVES) {
+            say!("  computed once, used {uses} times: {place}");
+        }
+        if places.len() > MOST_LEAVES {
+            say!("  … and {} more", places.len() - MOST_LEAVES);
+        }
+    }
+
+    /// The inequalities that decide the sign.
+    fn leaves(&self) {
+        let Some(leaves) = self.solid.leaves() else {
+            say!("  leaves: too many to be taken apart");
+            return;
+        };
+        let shapes = leaves.iter().map(|leaf| leaf.shape + 1).max().unwrap_or(0);
+        let s = |n: usize| if n == 1 { "" } else { "s" };
+        say!(
+            "  sign, {}: {} lea{} of {shapes} shape{}, joined by min and max in place of ∧ and ∨",
+            Exactness::ZeroSet,
+            leaves.len(),
+            if leaves.len() == 1 { "f" } else { "ves" },
+            s(shapes)
+        );
+        for (i, leaf) in leaves.iter().enumerate().take(MOST_LEAVES) {
+            let place = leaf.span.map_or(String::new(), |span| self.place(span));
+            say!(
+                "    leaf {:<3} shape {:<3} {:>3} operations  {place}",
+                i + 1,
+                leaf.shape + 1,
+                leaf.operations
+            );
+        }
+        if leaves.len() > MOST_LEAVES {
+            say!("    … and {} more", leaves.len() - MOST_LEAVES);
+        }
+    }
+
+    /// What ranges prove to be irrelevant in the solid's bounds and in their eighths.
+    fn specialisation(&self) {
+        let bounds = match self.solid.bounds() {
+            Bounds::Within(bounds) => *bounds,
+            Bounds::Empty => return say!("  bounds: empty, proven by ranges"),
+            Bounds::Unbounded => return say!("  bounds: none within 2²⁰ of the origin"),
+        };
+        // + 0 turns −0 into 0
+        let number = |x: f64| format!("{:.3}", (1e3 * x).round() / 1e3 + 0.0);
+        let corner = |p: DVec3| format!("[{}, {}, {}]", number(p.x), number(p.y), number(p.z));
+        let shown = (corner(bounds.min), corner(bounds.max));
+        say!("  what ranges leave of it in its bounds {} to {}, {}:", shown.0, shown.1, Exactness::ZeroSet);
+        self.say_left(vec![("everywhere".to_string(), bounds)]);
+        let centre = bounds.centre();
+        let eighth = |corner: DVec3| {
+            let over = Aabb::new(corner.min(centre), corner.max(centre));
+            let side = |axis: usize| if over.min[axis] == bounds.min[axis] { '−' } else { '+' };
+            (format!("x{}y{}z{}", side(0), side(1), side(2)), over)
+        };
+        say!("  and in the eighths of its bounds, lower (−) or upper (+) along each axis:");
+        self.say_left(bounds.corners().map(eighth).into());
+    }
+
+    /// What is left in some boxes, those with the same leaves together.
+    fn say_left(&self, boxes: Vec<(String, Aabb)>) {
+        let mut groups: Vec<(Left, String, Vec<Interval>)> = Vec::new();
+        for (name, over) in boxes {
+            let (Some(left), Some(ranges)) = (self.solid.left_in(&over), self.solid.leaf_ranges(&over))
+            else {
+                return say!("    too many leaves to tell");
+            };
+            match groups.iter_mut().find(|(known, ..)| *known == left) {
+                Some((_, names, hulls)) => {
+                    names.push_str(&format!(", {name}"));
+                    hulls.iter_mut().zip(&ranges).for_each(|(hull, range)| *hull = hull.hull(*range));
+                }
+                None => groups.push((left, name, ranges)),
+            }
+        }
+        for (left, names, ranges) in groups {
+            match left {
+                Left::Outside => say!("    {names}: all fluid"),
+                Left::Inside => say!("    {names}: all solid"),
+                Left::Leaves(kept) => self.say_dropped(&names, &kept, &ranges),
+            }
+        }
+    }
+
+    fn say_dropped(&self, names: &str, kept: &[bool], ranges: &[Interval]) {
+        let left: Vec<String> = (0..kept.len()).filter(|&i| kept[i]).map(|i| (i + 1).to_string()).collect();
+        let more = if left.len() > MOST_LEAVES { ", …" } else { "" };
+        let list = left[..left.len().min(MOST_LEAVES)].join(", ");
+        match left.len() {
+            n if n == kept.len() => return say!("    {names}: every leaf"),
+            n => say!("    {names}: {n} of {} leaves, {list}{more}", kept.len()),
+        }
+        for i in (0..kept.len()).filter(|&i| !kept[i]).take(MOST_LEAVES) {
+            let Interval { lo, hi } = ranges[i];
+            let why = match (lo > 0.0, hi < 0.0) {
+                (true, _) => "positive throughout",
+                (_, true) => "negative throughout",
+                _ => "the rest of its part decides without it",
+            };
+            say!("      dropped leaf {}: from {lo:.3} to {hi:.3}, {why}", i + 1);
+        }
+    }
+
+    /// What each question costs.
+    fn programs(&self) {
+        say!("  programs for one point in f64:");
+        for (name, kind) in [
+            ("ω", ProgramKind::Value),
+            ("ω and ∇ω", ProgramKind::Gradient),
+            ("sign", ProgramKind::Sign),
+            ("sign and leaf's gradient", ProgramKind::SignGradient),
+            ("distance, normal, curvature", ProgramKind::Contact),
+        ] {
+            let operations = self.solid.graph(kind).0.len();
+            let instructions = if operations > MOST_OPERATIONS {
+                "not compiled here".to_string()
+            } else {
+                match listing(self.solid, kind) {
+                    Ok(listing) => format!("{} instructions", instructions(&listing.assembly)),
+                    Err(error) => error.to_string(),
+                }
+            };
+            say!("    {name:<28} {operations:>6} operations  {instructions:>6}");
+        }
+    }
+}
+
+/// Lines of an assembly text that are instructions: neither labels nor remarks.
+fn instructions(assembly: &str) -> usize {
+    let is_instruction = |line: &&str| {
+        let line = line.trim();
+        !(line.is_empty() || line.ends_with(':') || line.starts_with([';', '.']))
+    };
+    assembly.lines().filter(is_instruction).count()
 }

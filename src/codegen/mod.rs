@@ -22,7 +22,10 @@ use cranelift_codegen::isa::OwnedTargetIsa;
 use cranelift_codegen::settings::{self, Configurable};
 
 pub use memory::Code;
-pub use range::{REACH as RANGE_REACH, supports as range_is_supported};
+pub use range::{
+    REACH as RANGE_REACH, Rounding, knows as range_is_known, stays_finite as range_stays_finite,
+    supports as range_is_supported,
+};
 pub use translate::{Listing, compile};
 
 use crate::ir::{Graph, Node};
@@ -40,9 +43,9 @@ pub enum Shape {
     /// `fn(columns: *const *mut T, blocks: usize)`: columns x, y, z, then one per input and one per output, all of
     /// them `blocks` × [`Precision::lanes`] long; no alignment asked for.
     Batch,
-    /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the range of the one output over a box; `f64` only, and only
-    /// for graphs that [`range_is_supported`] names.
-    Range,
+    /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the range of the one output over a box, called with this
+    /// rounding; `f64` only, and only for graphs that [`range_is_supported`] names.
+    Range(Rounding),
 }
 
 /// How R₀ is evaluated.

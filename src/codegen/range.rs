@@ -1,10 +1,13 @@
 //! Ranges in machine code: the interval of every node in one register, as [−lo, hi].
 //!
-//! With the lower bound negated both bounds are rounded in the same direction: upwards, by adding |v|·2⁻⁵² + 2⁻¹⁰⁰⁰
-//! to a result that was rounded to nearest. The rules are those of `ir::range`; bounds may be wider by an ulp.
+//! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets the
+//! processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above the exact one
+//! after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added after each operation.
+//! The rules are those of `ir::range`; bounds may be wider by a few ulp, of R₀ by a few ulp of its larger operand.
 //!
-//! Only graphs are taken whose every node is finite over [`REACH`], so that no infinity or NaN can arise for a box
-//! within it: then min and max need not look for them. Elsewhere the interpreter answers.
+//! Only graphs are taken whose every node is finite over [`REACH`], and small enough that no square overflows: then
+//! neither infinity nor NaN can arise for a box within it, and min and max need not look for them. Elsewhere the
+//! interpreter answers.
 
 use std::collections::HashMap;
 
@@ -21,92 +24,172 @@ use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeSt
 /// Boxes within this distance of the origin are answered by machine code.
 pub const REACH: f64 = 1e9;
 
+/// How the processor rounds while a range program runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Rounding {
+    /// Towards +∞: the caller sees to it.
+    Upward,
+    /// To nearest, as everywhere else.
+    Nearest,
+}
+
+/// Values beyond this might overflow in a product or in the bound of one.
+const LARGEST: f64 = 1e300;
+
+/// Operands of R₀ beyond this might have squares that do.
+const LARGEST_OPERAND: f64 = 1e150;
+
+/// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
+const ULP: f64 = f64::EPSILON;
+
+/// What a product of two sums is widened by, relative: three roundings of the bound itself, and one and a half of the
+/// program whose values it must hold.
+const MARGIN: f64 = 8.0 * ULP;
+
+/// What R₀ is widened by, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the program (see
+/// `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of the sums.
+const R0_MARGIN: f64 = 16.0 * ULP;
+
+/// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the root of
+/// what is lost.
+const R0_UNDERFLOW: f64 = 1e-147;
+
 /// Whether machine code can answer for this graph.
 pub fn supports(graph: &Graph, root: Node) -> bool {
-    let over = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
-    let ranges = RangeEvaluator::new(graph, root).all(&over);
-    graph.nodes().all(|(node, expr)| {
-        let range = ranges[node.index()];
-        let known = match expr {
-            Expr::Constant(_) | Expr::Coordinate(_) => true,
-            Expr::Parameter(_) => false,
-            Expr::Unary(op, _) => matches!(op, Unary::Neg | Unary::Abs | Unary::Sqrt),
-            Expr::Binary(Binary::Div, _, b) => graph.as_constant(b).is_some_and(|c| c != 0.0),
-            Expr::Binary(op, ..) => {
-                use Binary::{Add, And, Max, Min, Mul, Or, PlainMax, PlainMin, Sub};
-                matches!(op, Add | Sub | Mul | Min | Max | PlainMin | PlainMax | And | Or)
-            }
-        };
-        known && range.lo.abs() < 1e300 && range.hi.abs() < 1e300
+    knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), &[])
+}
+
+/// Whether every operation of a graph is one that range programs have.
+pub fn knows(graph: &Graph) -> bool {
+    let is_number = |node| matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_));
+    graph.nodes().all(|(_, expr)| match expr {
+        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) => true,
+        Expr::Unary(op, _) => matches!(op, Unary::Neg | Unary::Abs | Unary::Sqrt),
+        Expr::Binary(Binary::Div, _, b) => is_number(b),
+        Expr::Binary(op, ..) => {
+            use Binary::{Add, And, Max, Min, Mul, Or, PlainMax, PlainMin, Sub};
+            matches!(op, Add | Sub | Mul | Min | Max | PlainMin | PlainMax | And | Or)
+        }
     })
 }
 
-/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: x, y, z as pairs (low, high) in, (low, high) of the root out.
-pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>) {
+/// Whether no bound can overflow for a box within [`REACH`], for these parameters. A quotient by zero is not finite.
+pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, parameters: &[f64]) -> bool {
+    let over = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
+    let ranges = evaluator.all_with(&over, parameters);
+    let within = |node: Node, limit: f64| {
+        let range = ranges[node.index()];
+        range.lo > -limit && range.hi < limit
+    };
+    graph.nodes().all(|(node, expr)| {
+        let operands_fit = match expr {
+            Expr::Binary(Binary::And | Binary::Or, a, b) => {
+                within(a, LARGEST_OPERAND) && within(b, LARGEST_OPERAND)
+            }
+            _ => true,
+        };
+        operands_fit && within(node, LARGEST)
+    })
+}
+
+/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the root out;
+/// with parameters, a pointer to them comes third.
+pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, rounding: Rounding) {
     let block = builder.create_block();
     builder.append_block_params_for_function_params(block);
     builder.switch_to_block(block);
     builder.seal_block(block);
-    let (input, output) = (builder.block_params(block)[0], builder.block_params(block)[1]);
-    let emitter = Emitter::new(builder, Precision::F64, Form::Scaled, request.graph);
-    let mut ranges = Ranges { emitter };
+    let arguments = builder.block_params(block).to_vec();
+    let (input, output) = (arguments[0], arguments[1]);
+    let emitter = Emitter::new(builder, Precision::F64, Form::Stable, request.graph);
+    let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
+    // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
     let axes: [Value; 3] = std::array::from_fn(|i| {
-        let pair = ranges.emitter.builder.ins().load(types::F64X2, MemFlagsData::new(), input, 16 * i as i32);
-        ranges.flip(pair)
+        let mut bound = |place: usize| {
+            let flags = MemFlagsData::new();
+            ranges.emitter.builder.ins().load(types::F64, flags, input, 8 * place as i32)
+        };
+        let (low, high) = (bound(i), bound(i + 3));
+        let low = ranges.emitter.builder.ins().splat(types::F64X2, low);
+        let pair = ranges.emitter.builder.ins().insertlane(low, high, 1);
+        ranges.flip(pair, Lane::Low)
     });
-    let mut values: HashMap<Node, Value> = HashMap::new();
     for (node, expr) in request.graph.nodes() {
         let value = match RangeStep::of(request.graph, expr) {
-            RangeStep::Square(a) => ranges.square(values[&a]),
-            RangeStep::Slab { of, first, second } => ranges.slab(values[&of], first, second),
-            RangeStep::Plain(expr) => ranges.plain(request.graph, expr, &values, axes),
+            RangeStep::Square(a) => ranges.square(ranges.values[&a]),
+            RangeStep::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
+            RangeStep::Plain(Expr::Coordinate(Axis::X)) => axes[0],
+            RangeStep::Plain(Expr::Coordinate(Axis::Y)) => axes[1],
+            RangeStep::Plain(Expr::Coordinate(Axis::Z)) => axes[2],
+            RangeStep::Plain(Expr::Constant(bits)) => {
+                ranges.number(node, Number::Constant(f64::from_bits(bits)))
+            }
+            RangeStep::Plain(Expr::Parameter(i)) => {
+                let splat = ranges.emitter.parameter(arguments.get(2).copied(), i);
+                ranges.number(node, Number::Parameter(splat))
+            }
+            RangeStep::Plain(Expr::Unary(op, a)) => ranges.unary(op, ranges.values[&a]),
+            RangeStep::Plain(Expr::Binary(op, a, b)) => ranges.binary(op, a, b),
         };
-        values.insert(node, value);
+        ranges.values.insert(node, value);
     }
-    let root = ranges.flip(values[&request.outputs[0]]);
+    let root = ranges.values[&request.outputs[0]];
+    let root = ranges.flip(root, Lane::Low);
     ranges.emitter.builder.ins().store(MemFlagsData::new(), root, output, 0);
     ranges.emitter.builder.ins().return_(&[]);
 }
 
+/// A node with one value.
+#[derive(Clone, Copy)]
+enum Number {
+    Constant(f64),
+    /// In both lanes.
+    Parameter(Value),
+}
+
+/// The lane of a register that holds −lo, or that of hi.
+#[derive(Clone, Copy, PartialEq)]
+enum Lane {
+    Low,
+    High,
+}
+
 struct Ranges<'a, 'f> {
     emitter: Emitter<'a, 'f>,
+    rounding: Rounding,
+    numbers: HashMap<Node, Number>,
+    values: HashMap<Node, Value>,
 }
 
 impl Ranges<'_, '_> {
-    fn plain(&mut self, graph: &Graph, expr: Expr, values: &HashMap<Node, Value>, axes: [Value; 3]) -> Value {
-        match expr {
-            Expr::Constant(bits) => self.point(f64::from_bits(bits)),
-            Expr::Coordinate(Axis::X) => axes[0],
-            Expr::Coordinate(Axis::Y) => axes[1],
-            Expr::Coordinate(Axis::Z) => axes[2],
-            Expr::Parameter(_) => self.point(f64::NAN), // `supports` refuses parameters
-            Expr::Unary(Unary::Neg, a) => self.swap(values[&a]),
-            Expr::Unary(Unary::Abs, a) => {
-                let (low, high) = self.magnitudes(values[&a]);
-                let plain = self.lanes(low, high);
-                self.flip(plain)
-            }
-            Expr::Unary(_, a) => self.sqrt(values[&a]),
-            Expr::Binary(op, a, b) => self.binary(graph, op, (a, values[&a]), (b, values[&b])),
+    fn unary(&mut self, op: Unary, a: Value) -> Value {
+        match op {
+            Unary::Neg => self.swap(a),
+            Unary::Abs => self.magnitudes(a),
+            _ => self.sqrt(a), // the last one that `knows` lets through
         }
     }
 
-    fn binary(&mut self, graph: &Graph, op: Binary, (u, a): (Node, Value), (v, b): (Node, Value)) -> Value {
+    fn binary(&mut self, op: Binary, u: Node, v: Node) -> Value {
+        let (a, b) = (self.values[&u], self.values[&v]);
         match op {
             Binary::Add => self.add(a, b),
             Binary::Sub => {
-                let b = self.swap(b);
+                let b = match self.numbers.get(&v) {
+                    Some(&Number::Constant(c)) => self.pair(c, -c),
+                    _ => self.swap(b),
+                };
                 self.add(a, b)
             }
-            Binary::Mul => self.multiply(a, b),
-            Binary::Div => {
-                // by a constant: see `supports`
-                let divisor = graph.as_constant(v).unwrap_or(1.0);
-                let a = if divisor < 0.0 { self.swap(a) } else { a };
-                let magnitude = self.emitter.constant(divisor.abs());
-                let quotient = self.emitter.builder.ins().fdiv(a, magnitude);
-                self.up(quotient)
-            }
+            Binary::Mul => match (self.numbers.get(&u).copied(), self.numbers.get(&v).copied()) {
+                (Some(number), _) => self.times(b, number),
+                (_, Some(number)) => self.times(a, number),
+                _ => self.multiply(a, b),
+            },
+            Binary::Div => match self.numbers.get(&v).copied() {
+                Some(number) => self.divide(a, number),
+                None => self.pair(f64::NAN, f64::NAN), // `knows` refuses
+            },
             Binary::Min | Binary::PlainMin => {
                 // −min(lo) = max(−lo)
                 let (low, high) = (self.emitter.max(a, b), self.min(a, b));
@@ -116,18 +199,17 @@ impl Ranges<'_, '_> {
                 let (low, high) = (self.min(a, b), self.emitter.max(a, b));
                 self.lanes(low, high)
             }
-            _ => {
-                // R₀ grows with each operand: both ends at once, widened by 4 ulp, zeros kept
-                let (a, b) = (self.flip(a), self.flip(b));
-                let junction =
-                    if op == Binary::And { super::r0::Junction::And } else { super::r0::Junction::Or };
-                let ends = self.emitter.r0_value((u, a), (v, b), junction);
-                let ends = self.flip(ends);
-                let magnitude = self.emitter.abs(ends);
-                let four_ulp = self.emitter.constant(2f64.powi(-50));
-                let margin = self.emitter.builder.ins().fmul(magnitude, four_ulp);
-                self.emitter.builder.ins().fadd(ends, margin)
-            }
+            Binary::And => self.r0(a, b, Lane::High),
+            _ => self.r0(a, b, Lane::Low),
+        }
+    }
+
+    /// The range of a number, which is kept for operations that are cheaper with one.
+    fn number(&mut self, node: Node, number: Number) -> Value {
+        self.numbers.insert(node, number);
+        match number {
+            Number::Constant(c) => self.pair(-c, c),
+            Number::Parameter(splat) => self.flip(splat, Lane::Low),
         }
     }
 
@@ -138,14 +220,17 @@ impl Ranges<'_, '_> {
         self.emitter.builder.ins().vconst(types::F64X2, handle)
     }
 
-    /// [−c, c]
-    fn point(&mut self, c: f64) -> Value {
-        self.pair(-c, c)
+    /// A constant with `low` in one lane and `high` in the other, whichever is meant.
+    fn signed(&mut self, lane: Lane, inside: f64, outside: f64) -> Value {
+        match lane {
+            Lane::Low => self.pair(inside, outside),
+            Lane::High => self.pair(outside, inside),
+        }
     }
 
-    /// Negates the lower lane.
-    fn flip(&mut self, v: Value) -> Value {
-        let mask = self.pair(-0.0, 0.0);
+    /// Negates one lane.
+    fn flip(&mut self, v: Value, lane: Lane) -> Value {
+        let mask = self.signed(lane, -0.0, 0.0);
         self.emitter.builder.ins().bxor(v, mask)
     }
 
@@ -173,107 +258,230 @@ impl Ranges<'_, '_> {
         self.emitter.select(less, a, b)
     }
 
-    /// Not below the neighbour above what was rounded to nearest.
+    fn fadd(&mut self, a: Value, b: Value) -> Value {
+        self.emitter.builder.ins().fadd(a, b)
+    }
+
+    fn fmul(&mut self, a: Value, b: Value) -> Value {
+        self.emitter.builder.ins().fmul(a, b)
+    }
+
+    /// A result of one operation, not below the exact one.
     fn up(&mut self, v: Value) -> Value {
+        if self.rounding == Rounding::Upward {
+            return v;
+        }
         let magnitude = self.emitter.abs(v);
-        let (ulp, least) = (self.emitter.constant(2f64.powi(-52)), self.emitter.constant(2f64.powi(-1000)));
-        let margin = self.emitter.builder.ins().fmul(magnitude, ulp);
-        let margin = self.emitter.builder.ins().fadd(margin, least);
-        self.emitter.builder.ins().fadd(v, margin)
+        let (ulp, least) = (self.emitter.constant(ULP), self.emitter.constant(2f64.powi(-1000)));
+        let margin = self.fmul(magnitude, ulp);
+        let margin = self.fadd(margin, least);
+        self.fadd(v, margin)
     }
 
     fn add(&mut self, a: Value, b: Value) -> Value {
-        let sum = self.emitter.builder.ins().fadd(a, b);
+        let sum = self.fadd(a, b);
         self.up(sum)
     }
 
-    fn multiply(&mut self, a: Value, b: Value) -> Value {
-        let (a, b) = (self.flip(a), self.flip(b));
-        let crossed = self.swap(b);
-        let (p, q) = (self.emitter.builder.ins().fmul(a, b), self.emitter.builder.ins().fmul(a, crossed));
-        let (high, low) = (self.emitter.max(p, q), self.min(p, q));
-        let (high2, low2) = (self.swap(high), self.swap(low));
-        let (high, low) = (self.emitter.max(high, high2), self.min(low, low2));
-        let plain = self.lanes(low, high);
-        let product = self.flip(plain);
+    /// A vector, or where a number is negative its lanes exchanged; and the number's magnitude in both lanes.
+    fn turned(&mut self, v: Value, number: Number) -> (Value, Value) {
+        match number {
+            Number::Constant(c) => {
+                let v = if c < 0.0 { self.swap(v) } else { v };
+                (v, self.emitter.constant(c.abs()))
+            }
+            Number::Parameter(splat) => {
+                let zero = self.emitter.constant(0.0);
+                let negative = self.emitter.compare(FloatCC::LessThan, splat, zero);
+                let swapped = self.swap(v);
+                (self.emitter.select(negative, swapped, v), self.emitter.abs(splat))
+            }
+        }
+    }
+
+    fn times(&mut self, v: Value, number: Number) -> Value {
+        let (v, magnitude) = self.turned(v, number);
+        let product = self.fmul(v, magnitude);
         self.up(product)
     }
 
-    /// Smallest and largest magnitude in an interval, each in both lanes.
-    fn magnitudes(&mut self, v: Value) -> (Value, Value) {
+    fn divide(&mut self, v: Value, number: Number) -> Value {
+        let (v, magnitude) = self.turned(v, number);
+        let quotient = self.emitter.builder.ins().fdiv(v, magnitude);
+        self.up(quotient)
+    }
+
+    /// The largest of the four products of bounds, and of their negatives.
+    fn multiply(&mut self, a: Value, b: Value) -> Value {
+        let (a_low, a_high) = (self.both(a, Lane::Low), self.both(a, Lane::High));
+        let (b_low, b_high) = (self.both(b, Lane::Low), self.both(b, Lane::High));
+        let (a_turned, b_turned) = (self.swap(a), self.swap(b));
+        let (a_low, a_high) = (self.emitter.negate(a_low), self.emitter.negate(a_high));
+        let products = [(a, b_high), (a_turned, b_low), (b, a_low), (b_turned, a_high)];
+        let [p, q, r, s] = products.map(|(one, other)| self.fmul(one, other));
+        let (pq, rs) = (self.emitter.max(p, q), self.emitter.max(r, s));
+        let largest = self.emitter.max(pq, rs);
+        self.up(largest)
+    }
+
+    /// One lane in both.
+    fn both(&mut self, v: Value, lane: Lane) -> Value {
+        let first = if lane == Lane::Low { 0 } else { 8 };
+        self.shuffle(v, v, std::array::from_fn(|i| first + i as u8 % 8))
+    }
+
+    /// [−smallest, largest] magnitude in an interval.
+    fn magnitudes(&mut self, v: Value) -> Value {
         let turned = self.swap(v);
         let largest = self.emitter.max(v, turned);
         let nearest = self.min(v, turned);
-        let nearest = self.emitter.negate(nearest);
         let zero = self.emitter.constant(0.0);
-        (self.emitter.max(nearest, zero), largest)
+        let nearest = self.min(nearest, zero);
+        self.lanes(nearest, largest)
     }
 
     fn square(&mut self, v: Value) -> Value {
-        let (low, high) = self.magnitudes(v);
-        let ends = self.lanes(low, high);
-        let squares = self.emitter.builder.ins().fmul(ends, ends);
-        let signed = self.flip(squares);
-        let wide = self.up(signed);
+        let ends = self.magnitudes(v);
+        let magnitudes = self.emitter.abs(ends);
+        let squares = self.fmul(ends, magnitudes);
+        let wide = self.up(squares);
         self.not_negative(wide)
     }
 
-    /// Cuts off what rounding put below zero: −lo ≤ 0.
+    /// Cuts off what rounding to nearest and widening put below zero: −lo ≤ 0.
     fn not_negative(&mut self, v: Value) -> Value {
+        if self.rounding == Rounding::Upward {
+            return v;
+        }
         let limit = self.pair(0.0, f64::MAX);
         self.min(v, limit)
     }
 
     fn sqrt(&mut self, v: Value) -> Value {
-        // `supports` has shown that the operand is not negative, but rounding here may be an ulp wider
-        let v = self.not_negative(v);
+        // `stays_finite` has shown that the operand is not negative, but rounding here may be a little wider
+        let limit = self.pair(-0.0, f64::MAX);
+        let v = self.min(v, limit);
         let magnitude = self.emitter.abs(v);
         let root = self.emitter.builder.ins().sqrt(magnitude);
-        let signed = self.flip(root);
-        let wide = self.up(signed);
+        // downwards by a factor, because the root itself was rounded upwards
+        let signs = self.pair(-(1.0 - 2.0 * ULP), 1.0);
+        let ends = self.fmul(root, signs);
+        let wide = self.up(ends);
         self.not_negative(wide)
     }
 
-    /// (p·e + q)·(r·e + s) of one node e: at both ends of e, and at its vertex if e contains it.
+    /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1: from the values at the ends of e, and at the point t of
+    /// e nearest to the vertex.
     fn slab(&mut self, e: Value, first: Affine, second: Affine) -> Value {
-        let plain = self.flip(e);
-        // the ends as two point intervals: [−a, a]
+        let plain = self.flip(e, Lane::Low);
         let turned = self.swap(plain);
-        let (both_low, both_high) = (self.lanes(plain, turned), self.lanes(turned, plain));
-        let (low, high) = (self.flip(both_low), self.flip(both_high));
-        let (at_low, at_high) = (self.slab_at(low, first, second), self.slab_at(high, first, second));
-        let ends = self.emitter.max(at_low, at_high);
-        // the vertex lies halfway between the roots; widened by its own rounding, then clamped into e: outside e it
-        // becomes the nearer end, which counts already
-        let middle = -0.5 * (first.offset * first.slope + second.offset * second.slope);
-        let vertex = self.point(middle);
-        let vertex = self.up(vertex);
-        let vertex = self.up(vertex);
-        let clamped = self.clamp(vertex, e);
-        let at_vertex = self.slab_at(clamped, first, second);
-        self.emitter.max(ends, at_vertex)
-    }
-
-    /// The part of an interval nearest to another: its intersection, or the nearer end of the other.
-    fn clamp(&mut self, v: Value, within: Value) -> Value {
-        let (v, within) = (self.flip(v), self.flip(within));
-        let turned = self.swap(within);
-        let (low, high) = (self.lanes(within, turned), self.lanes(turned, within));
-        let at_least = self.emitter.max(v, low);
-        let clamped = self.min(at_least, high);
-        self.flip(clamped)
-    }
-
-    fn slab_at(&mut self, e: Value, first: Affine, second: Affine) -> Value {
-        let mut factor = |affine: Affine| {
-            let signed = if affine.slope < 0.0 { self.swap(e) } else { e };
-            if affine.offset == 0.0 {
-                return signed;
-            }
-            let offset = self.point(affine.offset);
-            self.add(signed, offset)
+        // a concave product has its largest value at t and its least at an end: [lo, t] and [hi, t] are looked at; a
+        // convex one is looked at at [t, lo] and [t, hi]
+        let concave = first.slope != second.slope;
+        let (at_vertex, near, far) =
+            if concave { (Lane::High, turned, plain) } else { (Lane::Low, plain, turned) };
+        let (middle, slack) = self.vertex(first, second, at_vertex);
+        let (above, below) = (self.emitter.max(near, middle), self.min(far, middle));
+        let places = [self.min(above, far), self.emitter.max(below, near)];
+        let [f, g] = places.map(|at| {
+            let (p, q) = (self.factor(at, first), self.factor(at, second));
+            let p = self.flip(p, Lane::Low);
+            self.fmul(p, q)
+        });
+        let range = self.emitter.max(f, g);
+        let magnitude = self.emitter.abs(range);
+        let margin = self.emitter.constant(MARGIN);
+        let margin = self.fmul(magnitude, margin);
+        let margin = match slack {
+            Some(slack) => self.fadd(margin, slack),
+            None => margin,
         };
-        let (p, q) = (factor(first), factor(second));
-        self.multiply(p, q)
+        self.add(range, margin)
+    }
+
+    /// slope · e ± offset for one value of e in each lane.
+    fn factor(&mut self, e: Value, affine: Affine) -> Value {
+        let Some(offset) = affine.offset else {
+            return if affine.slope < 0.0 { self.emitter.negate(e) } else { e };
+        };
+        let offset = self.splat(offset);
+        match (affine.slope < 0.0, affine.minus) {
+            (false, false) => self.fadd(e, offset),
+            (false, true) => self.emitter.builder.ins().fsub(e, offset),
+            _ => self.emitter.builder.ins().fsub(offset, e),
+        }
+    }
+
+    /// A number in both lanes.
+    fn splat(&mut self, node: Node) -> Value {
+        match self.numbers.get(&node).copied() {
+            Some(Number::Constant(c)) => self.emitter.constant(c),
+            Some(Number::Parameter(splat)) => splat,
+            None => self.emitter.constant(f64::NAN), // offsets are numbers: see `ir::range`
+        }
+    }
+
+    /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d, also d² in
+    /// the lane of the value there, which misses the extreme value by so much.
+    fn vertex(&mut self, first: Affine, second: Affine, at_vertex: Lane) -> (Value, Option<Value>) {
+        // the root of slope·e ± offset is ∓slope·offset
+        let sign = |affine: Affine| if affine.minus { affine.slope } else { -affine.slope };
+        let known = |affine: Affine| match affine.offset {
+            None => Some(0.0),
+            Some(node) => match self.numbers.get(&node) {
+                Some(Number::Constant(c)) => Some(sign(affine) * c),
+                _ => None,
+            },
+        };
+        if let (Some(p), Some(q)) = (known(first), known(second)) {
+            let sum = p + q;
+            // the error of the sum, exactly (Knuth 1969)
+            let (q_part, p_part) = (sum - p, sum - (sum - p));
+            let exact = (p - p_part) + (q - q_part) == 0.0;
+            let d = ULP * (p.abs() + q.abs());
+            let slack = (!exact).then(|| self.signed(at_vertex, d * d, 0.0));
+            return (self.emitter.constant(0.5 * sum), slack);
+        }
+        let mut roots = [first, second].map(|affine| match affine.offset {
+            None => self.emitter.constant(0.0),
+            Some(node) => {
+                let splat = self.splat(node);
+                if sign(affine) < 0.0 { self.emitter.negate(splat) } else { splat }
+            }
+        });
+        let (sum, half) = (self.fadd(roots[0], roots[1]), self.emitter.constant(0.5));
+        roots = roots.map(|root| self.emitter.abs(root));
+        let (size, ulp) = (self.fadd(roots[0], roots[1]), self.signed(at_vertex, ULP, 0.0));
+        let d = self.fmul(size, ulp);
+        (self.fmul(sum, half), Some(self.fmul(d, d)))
+    }
+
+    /// The range of a ∧ b or a ∨ b: in the lane `and` the upper bound of a conjunction, in the other that of a
+    /// disjunction, because −(u ∧ v) = −u ∨ −v.
+    ///
+    /// The bounds are u + v ∓ √(u² + v²) as written, widened by what cancels; where hardly anything else is left the
+    /// operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m = max(u, v)
+    /// u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the program). So nothing waits
+    /// for a division after the root.
+    fn r0(&mut self, a: Value, b: Value, and: Lane) -> Value {
+        let lost = self.emitter.constant(R0_UNDERFLOW);
+        let sum = self.fadd(a, b);
+        let sum = self.fadd(sum, lost);
+        let (a2, b2) = (self.fmul(a, a), self.fmul(b, b));
+        let squares = self.fadd(a2, b2);
+        let root = self.emitter.builder.ins().sqrt(squares);
+        let signs = self.signed(and, R0_MARGIN - 1.0, R0_MARGIN + 1.0);
+        let root = self.fmul(root, signs);
+        let bound = self.fadd(sum, root);
+
+        let (least, most) = (self.min(a, b), self.emitter.max(a, b));
+        let limit = match and {
+            Lane::Low => self.lanes(least, most),
+            Lane::High => self.lanes(most, least),
+        };
+        let (positive, negative) = (self.signed(and, 1.0, 4.0), self.signed(and, 1.0, 0.5));
+        let (one, other) = (self.fmul(limit, positive), self.fmul(limit, negative));
+        let limit = self.emitter.max(one, other);
+        self.min(bound, limit)
     }
 }

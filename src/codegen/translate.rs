@@ -62,7 +62,7 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
     match request.shape {
         Shape::Point => point(&mut builder, request, &needed, &hosts),
-        Shape::Range => range::emit(&mut builder, request),
+        Shape::Range(rounding) => range::emit(&mut builder, request, rounding),
         Shape::Batch => {
             batch(&mut builder, request, &needed, &hosts, module.target_config().pointer_type());
         }
@@ -95,7 +95,7 @@ fn declare_parameters(function: &mut Function, module: &JITModule, request: Requ
     });
     let mut parameters = match request.shape {
         Shape::Point => vec![scalar, scalar, scalar, pointer],
-        Shape::Batch | Shape::Range => vec![pointer, pointer],
+        Shape::Batch | Shape::Range(_) => vec![pointer, pointer],
     };
     if request.parameters {
         parameters.push(pointer);

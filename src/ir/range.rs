@@ -4,6 +4,11 @@
 //! evaluations, widened by four ulp for their rounding (which cannot change their signs). Squares and products of
 //! two linear functions of one node (slabs) get their exact range too; elsewhere a node that occurs twice is
 //! taken as two independent ones, which is safe but wider.
+//!
+//! A range holds the exact values of the formula over the reals and, of every node, also the values that programs in
+//! `f64` find: rounding never leaves bounds that were rounded outwards, and where squares overflow or underflow R₀ is
+//! widened to what its floating-point form then gives. A node that may not be a number has [`Interval::ALL`], and so
+//! has every node that uses it. Points whose coordinates are not finite belong to no box.
 
 use std::cell::RefCell;
 
@@ -26,11 +31,13 @@ pub enum Step {
     },
 }
 
-/// slope · node + offset, with slope 1 or −1
+/// slope · node ± offset, with slope 1 or −1; the offset is a constant or a parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct Affine {
     pub slope: f64,
-    pub offset: f64,
+    pub offset: Option<Node>,
+    /// Whether the offset is subtracted.
+    pub minus: bool,
 }
 
 impl Step {
@@ -59,20 +66,30 @@ impl RangeEvaluator {
 
     /// The range of ω over a box; bounds of the box may be infinite.
     pub fn eval(&self, over: &Aabb) -> Interval {
+        self.eval_with(over, &[])
+    }
+
+    /// The range over a box, for a graph with parameters.
+    pub fn eval_with(&self, over: &Aabb, parameters: &[f64]) -> Interval {
         SCRATCH.with_borrow_mut(|values| {
-            self.fill(over, values);
+            self.fill(over, parameters, values);
             values[self.root.index()]
         })
     }
 
     /// The ranges of all nodes, in the graph's order.
     pub fn all(&self, over: &Aabb) -> Vec<Interval> {
+        self.all_with(over, &[])
+    }
+
+    /// The ranges of all nodes of a graph with parameters.
+    pub fn all_with(&self, over: &Aabb, parameters: &[f64]) -> Vec<Interval> {
         let mut values = Vec::new();
-        self.fill(over, &mut values);
+        self.fill(over, parameters, &mut values);
         values
     }
 
-    fn fill(&self, over: &Aabb, values: &mut Vec<Interval>) {
+    fn fill(&self, over: &Aabb, parameters: &[f64], values: &mut Vec<Interval>) {
         let axes = [
             Interval::new(over.min.x, over.max.x),
             Interval::new(over.min.y, over.max.y),
@@ -80,10 +97,20 @@ impl RangeEvaluator {
         ];
         values.clear();
         for &step in &self.steps {
+            // a coordinate is always a number, even if nothing else is known of it
+            let unknown = |node: Node| {
+                let is_coordinate = matches!(self.steps[node.index()], Step::Plain(Expr::Coordinate(_)));
+                values[node.index()] == Interval::ALL && !is_coordinate
+            };
             let value = match step {
+                Step::Square(a) | Step::Slab { of: a, .. } if unknown(a) => Interval::ALL,
                 Step::Square(a) => values[a.index()].square(),
-                Step::Slab { of, first, second } => slab(values[of.index()], first, second),
-                Step::Plain(expr) => plain(expr, values, axes),
+                Step::Slab { of, first, second } => {
+                    let number = |affine: Affine| offset(affine, values);
+                    slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
+                }
+                Step::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
+                Step::Plain(expr) => plain(expr, values, axes, parameters),
             };
             values.push(value);
         }
@@ -96,44 +123,55 @@ fn step(graph: &Graph, expr: Expr) -> Step {
             return Step::Square(a);
         }
         let ((of, first), (other, second)) = (affine(graph, a), affine(graph, b));
-        if of == other && graph.as_constant(of).is_none() {
+        if of == other && !is_number(graph, of) {
             return Step::Slab { of, first, second };
         }
     }
     Step::Plain(expr)
 }
 
+/// Whether a node has one value: a constant or a parameter.
+fn is_number(graph: &Graph, node: Node) -> bool {
+    matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_))
+}
+
 /// Reads a node as slope · (another node) + offset; only slopes ±1, for which the rounding of the written sum is
-/// that of the written sum. Anything else is 1 · itself + 0.
+/// that of the written sum. Anything else is 1 · itself.
 fn affine(graph: &Graph, node: Node) -> (Node, Affine) {
-    let itself = (node, Affine { slope: 1.0, offset: 0.0 });
+    let with = |slope, offset, minus| Affine { slope, offset, minus };
+    let number = |node| is_number(graph, node);
     match graph.expr(node) {
-        Expr::Binary(Binary::Add, a, b) => match (graph.as_constant(a), graph.as_constant(b)) {
-            (None, Some(offset)) => (a, Affine { slope: 1.0, offset }),
-            (Some(offset), None) => (b, Affine { slope: 1.0, offset }),
-            _ => itself,
-        },
-        Expr::Binary(Binary::Sub, a, b) => match (graph.as_constant(a), graph.as_constant(b)) {
-            (None, Some(offset)) => (a, Affine { slope: 1.0, offset: -offset }),
-            (Some(offset), None) => (b, Affine { slope: -1.0, offset }),
-            _ => itself,
-        },
-        Expr::Unary(Unary::Neg, a) => (a, Affine { slope: -1.0, offset: 0.0 }),
-        _ => itself,
+        Expr::Binary(Binary::Add, a, b) if !number(a) && number(b) => (a, with(1.0, Some(b), false)),
+        Expr::Binary(Binary::Add, a, b) if number(a) && !number(b) => (b, with(1.0, Some(a), false)),
+        Expr::Binary(Binary::Sub, a, b) if !number(a) && number(b) => (a, with(1.0, Some(b), true)),
+        Expr::Binary(Binary::Sub, a, b) if number(a) && !number(b) => (b, with(-1.0, Some(a), false)),
+        Expr::Unary(Unary::Neg, a) => (a, with(-1.0, None, false)),
+        _ => (node, with(1.0, None, false)),
     }
 }
 
-fn at(affine: Affine, e: Interval) -> Interval {
-    let signed = if affine.slope < 0.0 { -e } else { e };
-    if affine.offset == 0.0 { signed } else { signed + Interval::point(affine.offset) }
+/// The number that is added; NaN if it is not known.
+fn offset(affine: Affine, values: &[Interval]) -> f64 {
+    let Some(node) = affine.offset else { return 0.0 };
+    let Interval { lo, hi } = values[node.index()];
+    let number = if lo == hi { lo } else { f64::NAN };
+    if affine.minus { -number } else { number }
+}
+
+fn at((slope, offset): (f64, f64), e: Interval) -> Interval {
+    let signed = if slope < 0.0 { -e } else { e };
+    if offset == 0.0 { signed } else { signed + Interval::point(offset) }
 }
 
 /// A product of two linear functions of e has its extremes at the ends of e and at its vertex.
-fn slab(e: Interval, first: Affine, second: Affine) -> Interval {
+fn slab(e: Interval, first: (f64, f64), second: (f64, f64)) -> Interval {
+    if first.1.is_nan() || second.1.is_nan() {
+        return Interval::ALL;
+    }
     let value = |e: Interval| at(first, e) * at(second, e);
     let mut range = value(Interval::point(e.lo)).hull(value(Interval::point(e.hi)));
     // vertex halfway between the roots −offset/slope
-    let roots = (-first.offset * first.slope, -second.offset * second.slope);
+    let roots = (-first.1 * first.0, -second.1 * second.0);
     let vertex = Interval::point(0.5 * roots.0 + 0.5 * roots.1).widened(4);
     if vertex.hi >= e.lo && vertex.lo <= e.hi {
         range = range.hull(value(vertex));
@@ -141,7 +179,7 @@ fn slab(e: Interval, first: Affine, second: Affine) -> Interval {
     range
 }
 
-fn plain(expr: Expr, values: &[Interval], axes: [Interval; 3]) -> Interval {
+fn plain(expr: Expr, values: &[Interval], axes: [Interval; 3], parameters: &[f64]) -> Interval {
     match expr {
         Expr::Constant(bits) => {
             let value = f64::from_bits(bits);
@@ -150,7 +188,9 @@ fn plain(expr: Expr, values: &[Interval], axes: [Interval; 3]) -> Interval {
         Expr::Coordinate(Axis::X) => axes[0],
         Expr::Coordinate(Axis::Y) => axes[1],
         Expr::Coordinate(Axis::Z) => axes[2],
-        Expr::Parameter(_) => Interval::ALL,
+        Expr::Parameter(i) => {
+            parameters.get(i as usize).map_or(Interval::ALL, |&value| Interval::new(value, value))
+        }
         Expr::Unary(op, a) => unary(op, values[a.index()]),
         Expr::Binary(op, a, b) => binary(op, values[a.index()], values[b.index()]),
     }
@@ -162,6 +202,8 @@ fn unary(op: Unary, a: Interval) -> Interval {
         Unary::Abs => a.abs(),
         Unary::Sqrt => a.sqrt(),
         Unary::Sign => Interval { lo: Unary::Sign.eval(a.lo), hi: Unary::Sign.eval(a.hi) },
+        // of what may have overflowed, sine and cosine are not numbers
+        Unary::Sin | Unary::Cos if a.lo == f64::NEG_INFINITY || a.hi == f64::INFINITY => Interval::ALL,
         Unary::Sin => a.sin(),
         Unary::Cos => a.cos(),
         Unary::Atan => a.increasing(libm::atan),
@@ -178,6 +220,10 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
     match op {
         Binary::Add => a + b,
         Binary::Sub => a - b,
+        // 0·∞, where the one that is infinite has overflowed
+        Binary::Mul if a.contains(0.0) && is_infinite(b) || b.contains(0.0) && is_infinite(a) => {
+            Interval::ALL
+        }
         Binary::Mul => a * b,
         Binary::Div => a / b,
         Binary::DivOrZero => {
@@ -189,8 +235,10 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
         }
         Binary::Min | Binary::PlainMin => a.min(b),
         Binary::Max | Binary::PlainMax => a.max(b),
-        Binary::And => Interval::new(r0::and_scaled(a.lo, b.lo), r0::and_scaled(a.hi, b.hi)).widened(4),
-        Binary::Or => Interval::new(r0::or_scaled(a.lo, b.lo), r0::or_scaled(a.hi, b.hi)).widened(4),
+        Binary::And => conjunction(a, b),
+        Binary::Or => -conjunction(-a, -b),
+        // two infinite operands have no weights
+        Binary::AndWeight | Binary::OrWeight if is_infinite(a) && is_infinite(b) => Interval::ALL,
         Binary::MinWeight | Binary::MaxWeight => Interval { lo: 0.0, hi: 1.0 },
         Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() },
         Binary::Atan2 => Interval::new(-std::f64::consts::PI, std::f64::consts::PI).widened(1),
@@ -203,6 +251,39 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
         }
         Binary::Pow => Interval::ALL,
     }
+}
+
+fn is_infinite(a: Interval) -> bool {
+    a.lo == f64::NEG_INFINITY || a.hi == f64::INFINITY
+}
+
+/// Operands beyond this have squares whose sum may overflow.
+const SQUARES_OVERFLOW: f64 = 6.7e153; // 2⁵¹¹
+
+/// Results below this may have operands whose squares lose digits to underflow.
+const SQUARES_UNDERFLOW: f64 = 3.0e-151; // 2⁻⁵⁰⁰
+
+/// The range of u ∧ v: exact at the ends, and what the half-angle form of `ir::r0` makes of extreme operands.
+fn conjunction(a: Interval, b: Interval) -> Interval {
+    let exact = Interval::new(r0::and_scaled(a.lo, b.lo), r0::and_scaled(a.hi, b.hi)).widened(4);
+    let largest = [a.lo, a.hi, b.lo, b.hi].into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if largest > SQUARES_OVERFLOW {
+        // √(u² + v²) = ∞: the small branch gives the smaller operand, the other one −∞; ∞ − ∞ and ∞/∞ are NaN
+        let opposite = a.hi == f64::INFINITY && b.lo == f64::NEG_INFINITY
+            || b.hi == f64::INFINITY && a.lo == f64::NEG_INFINITY;
+        if opposite || a.hi == f64::INFINITY && b.hi == f64::INFINITY {
+            return Interval::ALL;
+        }
+        let lo = if a.lo + b.lo > 0.0 { exact.lo } else { f64::NEG_INFINITY };
+        return Interval::new(lo, exact.hi.max(a.hi.min(b.hi)));
+    }
+    // there √(u² + v²) is only known to lie between the larger operand and twice that
+    let outwards = |x: f64, away: bool| match (x.abs() < SQUARES_UNDERFLOW, away) {
+        (false, _) => x,
+        (true, true) => 2.0 * x,
+        (true, false) => 0.5 * x,
+    };
+    Interval::new(outwards(exact.lo, exact.lo < 0.0), outwards(exact.hi, exact.hi > 0.0))
 }
 
 #[cfg(test)]

@@ -10,13 +10,53 @@
 mod rules;
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use crate::diagnostic::Span;
 use crate::ir::{Expr, Graph, Node};
 
-/// What simplification did: how often each rule was applied, by its equation.
+/// What a step of the compiler keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exactness {
+    /// The value at every point: all rules of this module.
+    Value,
+    /// Where ω is positive, zero and negative, and no more: min for ∧, leaves that are dropped in a box.
+    ZeroSet,
+}
+
+impl fmt::Display for Exactness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Value => "value-exact",
+            Self::ZeroSet => "zero-set-exact",
+        })
+    }
+}
+
+/// What simplification did: the use of each rule, by its equation.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Applied(pub BTreeMap<&'static str, usize>);
+pub struct Applied(pub BTreeMap<&'static str, Uses>);
+
+/// The uses of one rule.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Uses {
+    pub count: usize,
+    /// Where what was rewritten stands: the first [`MOST_PLACES`] different places, in the order of the graph.
+    pub places: Vec<Span>,
+}
+
+/// Places that are kept of each rule.
+pub const MOST_PLACES: usize = 8;
+
+impl Uses {
+    fn note(&mut self, span: Option<Span>) {
+        self.count += 1;
+        if let Some(span) = span.filter(|span| !self.places.contains(span) && self.places.len() < MOST_PLACES)
+        {
+            self.places.push(span);
+        }
+    }
+}
 
 /// The roots and what they use, simplified.
 pub fn simplify(graph: &Graph, roots: &[Node]) -> (Graph, Vec<Node>, Applied) {
@@ -43,7 +83,7 @@ impl Simplifier {
     fn make(&mut self, expr: Expr, span: Option<Span>) -> Node {
         for rule in rules::ALL {
             if let Some(result) = (rule.apply)(self, expr, span) {
-                *self.applied.0.entry(rule.equation).or_default() += 1;
+                self.applied.0.entry(rule.equation).or_default().note(span);
                 return result;
             }
         }
@@ -126,8 +166,8 @@ mod tests {
         let unchanged = |build: &dyn Fn(&mut Graph) -> Node| {
             let mut graph = Graph::default();
             let root = build(&mut graph);
-            let (small, ..) = simplify(&graph, &[root]);
-            assert_eq!(small.len(), graph.len());
+            let (small, roots, _) = simplify(&graph, &[root]);
+            assert_eq!(dump(&small, &[("w", roots[0])], &[]), dump(&graph, &[("w", root)], &[]));
         };
         unchanged(&|g| {
             let x = g.coordinate(Axis::X);
@@ -138,6 +178,25 @@ mod tests {
             let million = g.constant(1e6);
             let d = g.binary(Binary::Sub, x, million);
             g.binary(Binary::Mul, d, d)
+        });
+        // 1 − (x² − y²) keeps its difference, (x − y)·(x + y) its factors
+        unchanged(&|g| {
+            let [x, y, _] = coordinates(g);
+            let (difference, sum) = (g.binary(Binary::Sub, x, y), g.binary(Binary::Add, x, y));
+            g.binary(Binary::Mul, difference, sum)
+        });
+        unchanged(&|g| {
+            let [x, y, _] = coordinates(g);
+            let (a, b) = (g.binary(Binary::Mul, x, x), g.binary(Binary::Mul, y, y));
+            g.binary(Binary::Sub, a, b)
+        });
+        // 3·x + 3·y keeps both products, (x + y) + z its order
+        unchanged(&|g| {
+            let [x, y, z] = coordinates(g);
+            let three = g.constant(3.0);
+            let (a, b) = (g.binary(Binary::Mul, three, x), g.binary(Binary::Mul, three, y));
+            let sum = g.binary(Binary::Add, a, b);
+            g.binary(Binary::Add, sum, z)
         });
         unchanged(&|g| {
             let x = g.coordinate(Axis::X);

@@ -4,7 +4,7 @@
 
 use std::cell::RefCell;
 
-use crate::codegen::{self, Code, CodegenError, Form, Precision, Request, Shape};
+use crate::codegen::{self, Code, CodegenError, Form, Precision, Request, Rounding, Shape};
 use crate::ir::{Graph, Interpreter, Node, Real};
 
 use glam::DVec3;
@@ -260,27 +260,71 @@ impl<T: Lane> SegmentProgram<T> {
 }
 
 /// A compiled range program.
+/// How range programs are called: rounding upwards where this file knows how to ask the processor for it.
+const ROUNDING: Rounding =
+    if cfg!(all(target_arch = "x86_64", unix)) { Rounding::Upward } else { Rounding::Nearest };
+
+/// A compiled range program, with parameters or without.
 #[derive(Debug)]
 pub struct RangeProgram {
     code: Code,
+    rounding: Rounding,
+    parameters: usize,
 }
 
 impl RangeProgram {
     /// # Errors
     /// As for [`codegen::compile`]; [`CodegenError::Unsupported`] for graphs that only the interpreter knows.
     pub fn compile(graph: &Graph, root: Node) -> Result<Self, CodegenError> {
+        Self::with_rounding(graph, root, ROUNDING)
+    }
+
+    /// For a processor that rounds in this way; rounding upwards is asked for where [`RangeProgram::compile`] does.
+    ///
+    /// # Errors
+    /// As for [`RangeProgram::compile`].
+    pub fn with_rounding(graph: &Graph, root: Node, rounding: Rounding) -> Result<Self, CodegenError> {
         if !codegen::range_is_supported(graph, root) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        let (precision, shape, form) = (Precision::F64, Shape::Range, Form::Scaled);
+        Self::new(graph, root, rounding, None)
+    }
+
+    /// A program that takes its constants as parameters. It may be called with those for which
+    /// [`codegen::range_stays_finite`].
+    ///
+    /// # Errors
+    /// As for [`RangeProgram::compile`].
+    pub fn with_parameters(graph: &Graph, root: Node, parameters: usize) -> Result<Self, CodegenError> {
+        if !codegen::range_is_known(graph) {
+            return Err(CodegenError::Unsupported("ranges of this formula".into()));
+        }
+        Self::new(graph, root, ROUNDING, Some(parameters))
+    }
+
+    fn new(
+        graph: &Graph,
+        root: Node,
+        rounding: Rounding,
+        parameters: Option<usize>,
+    ) -> Result<Self, CodegenError> {
+        if rounding == Rounding::Upward && ROUNDING != Rounding::Upward {
+            return Err(CodegenError::Unsupported("rounding upwards".into()));
+        }
+        let (precision, shape, form) = (Precision::F64, Shape::Range(rounding), Form::Stable);
+        let (outputs, with_parameters) = (&[root], parameters.is_some());
         let request =
-            Request { graph, inputs: &[], outputs: &[root], precision, shape, form, parameters: false };
-        Ok(Self { code: codegen::compile(request)? })
+            Request { graph, inputs: &[], outputs, precision, shape, form, parameters: with_parameters };
+        Ok(Self { code: codegen::compile(request)?, rounding, parameters: parameters.unwrap_or(0) })
     }
 
     /// The range over a box; nothing if the box reaches too far out.
+    ///
+    /// # Panics
+    /// If there are not as many parameters as the program has.
     #[inline]
-    pub fn call(&self, over: &Aabb) -> Option<Interval> {
+    pub fn call(&self, over: &Aabb, parameters: &[f64]) -> Option<Interval> {
+        assert_eq!(parameters.len(), self.parameters, "parameters of the range program");
         let reach = codegen::RANGE_REACH;
         let near = over.min.cmpge(DVec3::splat(-reach)).all() && over.max.cmple(DVec3::splat(reach)).all();
         let ordered = over.min.cmple(over.max).all();
@@ -288,15 +332,54 @@ impl RangeProgram {
             return None; // NaN included
         }
         let (min, max) = (over.min, over.max);
-        let input = [min.x, max.x, min.y, max.y, min.z, max.z];
+        let input = [min.x, min.y, min.z, max.x, max.y, max.z];
         let mut out = [0.0; 2];
-        type Entry = unsafe extern "C" fn(*const f64, *mut f64);
-        // SAFETY: `compile` asked for a range program, whose entry has this signature, and `self.code` keeps it
-        // mapped while it runs.
-        let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.code.entry()) };
-        // SAFETY: the program reads six numbers and writes two.
-        unsafe { entry(input.as_ptr(), out.as_mut_ptr()) };
+        match self.rounding {
+            Rounding::Nearest => {
+                type Entry = unsafe extern "C" fn(*const f64, *mut f64, *const f64);
+                // SAFETY: `new` asked for a range program, whose entry has this signature (the last argument is
+                // unused without parameters), and `self.code` keeps it mapped while it runs.
+                let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.code.entry()) };
+                // SAFETY: the program reads six numbers and its parameters, checked above, and writes two.
+                unsafe { entry(input.as_ptr(), out.as_mut_ptr(), parameters.as_ptr()) };
+            }
+            Rounding::Upward => self.call_rounding_upwards(&input, &mut out, parameters),
+        }
         Some(Interval::new(out[0], out[1]))
+    }
+
+    /// The call as one block of assembly, so that no code of Rust runs in a rounding mode that it does not expect.
+    #[cfg(all(target_arch = "x86_64", unix))]
+    #[inline]
+    fn call_rounding_upwards(&self, input: &[f64; 6], out: &mut [f64; 2], parameters: &[f64]) {
+        /// The state at the start of every program (all exceptions masked), but rounding towards +∞ (bits 13, 14).
+        static UPWARDS: u32 = 0x1f80 | 0x4000;
+        // SAFETY: `new` asked for a range program, whose entry follows the C convention of this system with these
+        // three pointers (the last is unused without parameters); `self.code` keeps it mapped while it runs; it reads
+        // six numbers and its parameters, checked by the caller, writes two, and calls nothing. The stack is aligned
+        // at the start of the block, stays so, and is put back, as is the control register, before its end.
+        unsafe {
+            std::arch::asm!(
+                "sub rsp, 16",
+                "stmxcsr [rsp]",
+                "ldmxcsr [{upwards}]",
+                "call {entry}",
+                "ldmxcsr [rsp]",
+                "add rsp, 16",
+                upwards = in(reg) &raw const UPWARDS,
+                entry = in(reg) self.code.entry(),
+                in("rdi") input.as_ptr(),
+                in("rsi") out.as_mut_ptr(),
+                in("rdx") parameters.as_ptr(),
+                clobber_abi("C"),
+            );
+        }
+    }
+
+    /// Never called here: `new` refuses such programs.
+    #[cfg(not(all(target_arch = "x86_64", unix)))]
+    fn call_rounding_upwards(&self, _: &[f64; 6], out: &mut [f64; 2], _: &[f64]) {
+        *out = [f64::NEG_INFINITY, f64::INFINITY];
     }
 }
 

@@ -6,17 +6,26 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::compiled::LeafProgram;
+use super::compiled::{LeafProgram, RangeProgram};
 use super::programs::Engine;
+use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{self, Expr, Graph, Interpreter, Node, RangeEvaluator};
+
+/// From so many leaves of one shape on, their ranges come from machine code: making it costs as much time as some
+/// thousand ranges by the interpreter. Their number decides, not that of the calls, so that the bounds of one leaf
+/// never depend on what was asked before.
+const MANY_LEAVES: usize = 8;
 
 /// A shape of leaves.
 struct Shape {
     graph: Graph,
     root: Node,
     parameters: usize,
+    leaves: usize,
+    range: RangeEvaluator,
+    range_code: OnceLock<Option<RangeProgram>>,
     value: OnceLock<Evaluator>,
     gradient: OnceLock<Evaluator>,
 }
@@ -30,7 +39,8 @@ struct Leaf {
     shape: u32,
     /// Where its constants begin.
     first: u32,
-    range: RangeEvaluator,
+    /// Whether machine code may answer for its range.
+    tame: bool,
 }
 
 pub(super) struct Leaves {
@@ -46,16 +56,15 @@ impl Leaves {
         let mut out = Self { engine, shapes: Vec::new(), leaves: Vec::new(), constants: Vec::new() };
         for &node in nodes {
             let (shape, root, constants) = graph.parametrised(node);
-            let (own, own_roots) = graph.extract_cone(node);
             let next = out.shapes.len() as u32;
             let number = *known.entry(shape.exprs().to_vec()).or_insert(next);
             if number == next {
-                let parameters = constants.len();
-                let (value, gradient) = (OnceLock::new(), OnceLock::new());
-                out.shapes.push(Shape { graph: shape, root, parameters, value, gradient });
+                out.shapes.push(Shape::new(shape, root, constants.len()));
             }
-            let range = RangeEvaluator::new(&own, own_roots);
-            out.leaves.push(Leaf { shape: number, first: out.constants.len() as u32, range });
+            let shape = &mut out.shapes[number as usize];
+            shape.leaves += 1;
+            let tame = codegen::range_stays_finite(&shape.graph, &shape.range, &constants);
+            out.leaves.push(Leaf { shape: number, first: out.constants.len() as u32, tame });
             out.constants.extend(constants);
         }
         out
@@ -69,8 +78,25 @@ impl Leaves {
         self.shapes.len()
     }
 
+    /// Which shape a leaf has.
+    pub fn shape_of(&self, leaf: u32) -> usize {
+        self.leaves[leaf as usize].shape as usize
+    }
+
+    /// Operations of a leaf's formula, constants and coordinates not counted.
+    pub fn operations(&self, leaf: u32) -> usize {
+        let (shape, _) = self.of(leaf);
+        shape.graph.nodes().filter(|(_, expr)| expr.operands().next().is_some()).count()
+    }
+
+    /// An interval that contains the leaf's value at every point of a box.
     pub fn range(&self, leaf: u32, over: &Aabb) -> Interval {
-        self.leaves[leaf as usize].range.eval(over)
+        let (shape, constants) = self.of(leaf);
+        let by_code = self.engine != Engine::Interpreter && self.leaves[leaf as usize].tame;
+        if by_code && let Some(range) = shape.range_code().and_then(|code| code.call(over, constants)) {
+            return range;
+        }
+        shape.range.eval_with(over, constants)
     }
 
     fn of(&self, leaf: u32) -> (&Shape, &[f64]) {
@@ -103,6 +129,21 @@ impl Leaves {
 }
 
 impl Shape {
+    fn new(graph: Graph, root: Node, parameters: usize) -> Self {
+        let range = RangeEvaluator::new(&graph, root);
+        let (range_code, value, gradient) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        Self { graph, root, parameters, leaves: 0, range, range_code, value, gradient }
+    }
+
+    #[inline]
+    fn range_code(&self) -> Option<&RangeProgram> {
+        if self.leaves < MANY_LEAVES {
+            return None;
+        }
+        let compile = || RangeProgram::with_parameters(&self.graph, self.root, self.parameters).ok();
+        self.range_code.get_or_init(compile).as_ref()
+    }
+
     #[inline]
     fn value(&self, engine: Engine) -> &Evaluator {
         self.value.get_or_init(|| Evaluator::new(engine, &self.graph, &[self.root], self.parameters))

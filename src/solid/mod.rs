@@ -9,6 +9,7 @@ mod blocks;
 mod bounds;
 mod cell_map;
 mod compiled;
+mod dissect;
 mod leaf;
 mod logic;
 mod programs;
@@ -21,6 +22,7 @@ use glam::{DVec3, Vec3};
 pub use bounds::Bounds;
 pub use cell_map::{CellMap, CellStats, Place};
 pub use compiled::{BatchProgram, Lane, PointProgram, RangeProgram};
+pub use dissect::{LeafInfo, Left};
 pub use programs::{Engine, ProgramKind};
 
 use crate::codegen::{CodegenError, Form};
@@ -92,7 +94,7 @@ impl Function {
     fn range(&self, engine: Engine, over: &Aabb) -> Interval {
         if engine != Engine::Interpreter {
             let code = self.range_code.get_or_init(|| RangeProgram::compile(&self.graph, self.root).ok());
-            if let Some(range) = code.as_ref().and_then(|code| code.call(over)) {
+            if let Some(range) = code.as_ref().and_then(|code| code.call(over, &[])) {
                 return range;
             }
         }
@@ -164,7 +166,7 @@ impl Solid {
         (&programs.graph, &programs.outputs)
     }
 
-    /// How often each simplification rule was applied.
+    /// What the simplification rules did.
     pub fn applied_rules(&self) -> &Applied {
         &self.inner.applied
     }
@@ -318,7 +320,9 @@ impl Solid {
         self.programs(ProgramKind::Sign).batch(self.inner.engine, points, [twin]);
     }
 
-    /// An interval that contains ω of every point of a box.
+    /// An interval that contains ω of every point of a box: the exact value and the one that [`Solid::omega`] gives,
+    /// also where that overflows. [`Interval::ALL`] where ω may not be a number; points at which it is none because
+    /// of their coordinates (not finite, or so large that their sum is not) are not spoken of.
     pub fn range(&self, over: &Aabb) -> Interval {
         self.inner.omega.range(self.inner.engine, over)
     }

@@ -50,6 +50,7 @@ mod seed;
 mod simulation;
 mod stats;
 mod vtp;
+mod wall;
 
 #[cfg(test)]
 mod scenes;
@@ -65,3 +66,4 @@ pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::{Pass, Stats};
 pub use vtp::{write_pvd, write_vtp};
+pub use wall::WallKernel;

@@ -108,6 +108,30 @@ fn check_prints_facts() {
     );
 }
 
+/// What depends on the processor is masked: its name, and how many instructions it needs.
+#[test]
+fn explain_shows_what_was_dropped_and_why() {
+    let solids = "rfm 1\nlet far = sphere(1).move([9, 0, 0])\nlet d = 0 - (x - 1)\n\
+        solid s = ((-d <= 2 and not (not z >= -1) and z <= 1) or far) and abs(y) <= 0.5 and x^2 + y^2 + z^2 <= 200\n";
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.rfm"), solids).unwrap();
+    for (name, folder, subject) in [
+        ("explain a solid", root(), "examples/pawn.rfm:pawn"),
+        ("explain what is dropped", folder.path(), "s.rfm:s"),
+    ] {
+        let outcome = rfm(folder, &["explain", subject]).expect(0);
+        let mask = |line: &str| match (line.find("operations"), line.contains("instructions")) {
+            (Some(at), true) => format!("{}operations  # instructions\n", &line[..at]),
+            _ if line.trim_start().starts_with("target:") => "  target: #\n".to_string(),
+            _ => format!("{line}\n"),
+        };
+        let text: String = outcome.stdout.lines().map(mask).collect();
+        let counts = outcome.stdout.matches(" instructions").count();
+        assert_eq!(counts, 5, "{}", outcome.stdout);
+        snapshot("cli", name, &text);
+    }
+}
+
 #[test]
 fn check_as_json() {
     let outcome = rfm(root(), &["check", "--json", PAWN]).expect(0);

@@ -8,6 +8,7 @@ mod cli;
 mod contact;
 mod diagnostics;
 mod examples;
+mod hard_cases;
 mod numbers;
 mod pipeline;
 mod properties;

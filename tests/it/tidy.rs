@@ -7,7 +7,7 @@ use crate::tool::root;
 /// A module, and the modules of the crate that it may use besides itself; `*` is all.
 ///
 /// Departures from the plan, with their reasons: `field` uses `interval`, the type of a guaranteed range;
-/// `simplify` and `codegen` use `diagnostic` for the spans that nodes carry; `codegen` uses `geom` for the
+/// `simplify`, `codegen` and `solid` use `diagnostic` for the spans that nodes carry; `codegen` uses `geom` for the
 /// reach of range programs; `lower` uses `geom` for the boxes of
 /// scenes; `solid` uses `simplify`, because a gradient is derived and simplified when it is first asked for;
 /// `compile` opens the file that `Program::from_path` names.
@@ -21,7 +21,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("lower", &["syntax", "ir", "diagnostic", "geom"]),
     ("simplify", &["ir", "diagnostic"]),
     ("codegen", &["ir", "diagnostic", "geom"]),
-    ("solid", &["ir", "simplify", "codegen", "field", "geom", "interval"]),
+    ("solid", &["diagnostic", "ir", "simplify", "codegen", "field", "geom", "interval"]),
     ("compile", &["diagnostic", "syntax", "ir", "lower", "simplify", "codegen", "solid"]),
     ("slice", &["field", "geom", "interval"]),
     ("mesh", &["field", "geom", "interval"]),

@@ -45,7 +45,8 @@ fn main() {
 
 fn assembly(solid: &Solid, kind: ProgramKind, form: Form, precision: Precision) -> String {
     let (graph, outputs) = solid.graph(kind);
-    let request = Request { graph, outputs, precision, shape: Shape::Batch, form };
+    let (shape, inputs) = (Shape::Point, &[][..]);
+    let request = Request { graph, inputs, outputs, precision, shape, form, parameters: false };
     Listing::of(request).unwrap_or_else(|e| panic!("{e}")).assembly
 }
 

@@ -1,0 +1,64 @@
+//! A solid as a person may look at it: its leaves, and what is left of it in a box.
+
+use super::Solid;
+use super::logic::{Logic, Pruned};
+use crate::diagnostic::Span;
+use crate::geom::Aabb;
+use crate::interval::Interval;
+
+/// One of the inequalities that a solid consists of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeafInfo {
+    /// Where it was written first.
+    pub span: Option<Span>,
+    /// Leaves of one shape, numbered from 0, differ in their constants alone and share one program.
+    pub shape: usize,
+    /// Of its formula.
+    pub operations: usize,
+}
+
+/// What is left of a solid in a box.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Left {
+    /// No point of the box is in the solid: proven.
+    Outside,
+    /// Every point is: proven.
+    Inside,
+    /// These leaves still matter, in the order of [`Solid::leaves`]; the sign is that of the rest of the tree.
+    Leaves(Vec<bool>),
+}
+
+impl Solid {
+    /// The leaves of the solid; nothing if it is too large to be taken apart.
+    pub fn leaves(&self) -> Option<Vec<LeafInfo>> {
+        let omega = &self.inner.omega;
+        let parts = self.parts()?;
+        let (_, nodes) = Logic::of(&omega.graph, omega.root)?;
+        let info = |(leaf, &node): (usize, _)| LeafInfo {
+            span: omega.graph.span(node),
+            shape: parts.leaves.shape_of(leaf as u32),
+            operations: parts.leaves.operations(leaf as u32),
+        };
+        Some(nodes.iter().enumerate().map(info).collect())
+    }
+
+    /// What a cell map would keep of the solid in this box.
+    pub fn left_in(&self, over: &Aabb) -> Option<Left> {
+        let parts = self.parts()?;
+        Some(match parts.logic.prune_in(&parts.leaves, over) {
+            Pruned::Outside => Left::Outside,
+            Pruned::Inside => Left::Inside,
+            Pruned::Near(logic) => {
+                let mut kept = vec![false; parts.leaves.len()];
+                logic.for_leaves(&mut |leaf| kept[leaf as usize] = true);
+                Left::Leaves(kept)
+            }
+        })
+    }
+
+    /// The range of each leaf over a box.
+    pub fn leaf_ranges(&self, over: &Aabb) -> Option<Vec<Interval>> {
+        let parts = self.parts()?;
+        Some((0..parts.leaves.len() as u32).map(|leaf| parts.leaves.range(leaf, over)).collect())
+    }
+}
