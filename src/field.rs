@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use crate::{geom::Aabb, interval::Interval};
 
-pub use sweep::{Entry, Normals, Path, last_outside};
+pub use sweep::{Entry, Normals, Path, last_outside, search_path};
 
 /// Borrowed points as a structure of arrays; the three slices have one length.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +99,7 @@ pub trait Field: Sync {
     /// The default halves the path until [`Field::range`] proves its parts to be in the fluid, down to 1e-9 of its
     /// length; a field that knows nothing of its range is sampled, see [`Path::resolution`].
     fn first_entry(&self, path: &Path) -> Option<Entry> {
-        sweep::first_entry(self, path)
+        search_path(self, path)
     }
 }
 

@@ -104,7 +104,8 @@ impl Entry {
             let w = field.omega(path.at(t));
             (w >= 0.0 || w.is_nan()).then_some((t, w))
         };
-        look(self.t).or_else(|| path.samples(self.t, middle).chain(path.samples(middle, self.until)).find_map(look))
+        look(self.t)
+            .or_else(|| path.samples(self.t, middle).chain(path.samples(middle, self.until)).find_map(look))
     }
 }
 
@@ -145,8 +146,9 @@ impl Normals {
     }
 }
 
-/// The first entry found by a field's ranges, or by samples if it has none.
-pub(super) fn first_entry<F: Field + ?Sized>(field: &F, path: &Path) -> Option<Entry> {
+/// The first entry found by a field's ranges, or by samples if it has none: what [`Field::first_entry`] does unless a
+/// field knows better.
+pub fn search_path<F: Field + ?Sized>(field: &F, path: &Path) -> Option<Entry> {
     let knows = |t0, t1| field.range(&path.hull(t0, t1)) != Interval::ALL;
     let found = if knows(path.start, 1.0) || knows(path.start, path.start) {
         by_ranges(field, path)
@@ -275,7 +277,8 @@ mod tests {
         assert!(hit.certain && (hit.t - 0.3).abs() < 1e-8, "{hit:?}");
         assert!((hit.normals.mean().unwrap() - DVec3::new(-0.8, 0.6, 0.0)).length() < 1e-7);
         assert_eq!(Ball.first_entry(&path(1.001)), None);
-        let closures = Closures { omega: |p: DVec3| Ball.omega(p), gradient: |p: DVec3| Ball.omega_grad(p).1 };
+        let closures =
+            Closures { omega: |p: DVec3| Ball.omega(p), gradient: |p: DVec3| Ball.omega_grad(p).1 };
         assert_eq!(closures.first_entry(&path(0.6)), None);
         let closely = Path { resolution: 0.1, ..path(0.6) };
         let hit = closures.first_entry(&closely).unwrap();

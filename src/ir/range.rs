@@ -38,6 +38,15 @@ impl Step {
     pub fn of(graph: &Graph, expr: Expr) -> Self {
         step(graph, expr)
     }
+
+    /// The range of a square or a slab from that of the node it is made of; nothing for other steps.
+    pub(super) fn over(&self, range: impl Fn(Node) -> Interval) -> Option<Interval> {
+        match *self {
+            Self::Square(a) => Some(range(a).square()),
+            Self::Slab { of, first, second } => Some(slab(range(of), first, second)),
+            Self::Plain(_) => None,
+        }
+    }
 }
 
 /// A graph prepared for the evaluation of ranges.
@@ -156,7 +165,7 @@ fn plain(expr: Expr, values: &[Interval], axes: [Interval; 3]) -> Interval {
     }
 }
 
-fn unary(op: Unary, a: Interval) -> Interval {
+pub(super) fn unary(op: Unary, a: Interval) -> Interval {
     match op {
         Unary::Neg => -a,
         Unary::Abs => a.abs(),
@@ -174,7 +183,7 @@ fn unary(op: Unary, a: Interval) -> Interval {
     }
 }
 
-fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
+pub(super) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
     match op {
         Binary::Add => a + b,
         Binary::Sub => a - b,

@@ -14,8 +14,9 @@ use rayon::prelude::*;
 
 use super::leaf::Leaves;
 use super::logic::{Logic, Pruned};
+use super::prefix::{Word, encode};
 use super::{Parts, Solid, Twin};
-use crate::field::{Field, Points};
+use crate::field::{Entry, Field, Path, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
@@ -54,7 +55,7 @@ pub struct CellMap {
     domain: Aabb,
     /// Eight children in a row for each divided cell; the root is the first.
     cells: Vec<Cell>,
-    /// What is left of the solid in near cells, each different one once: see [`encode`].
+    /// What is left of the solid in near cells, each different one once, in prefix form.
     programs: Vec<u32>,
     stats: CellStats,
 }
@@ -185,14 +186,15 @@ impl CellMap {
     fn run(&self, at: &mut usize, p: DVec3) -> (f64, u32) {
         let word = self.programs[*at];
         *at += 1;
-        let (kind, payload) = (word >> KIND_SHIFT, word & PAYLOAD);
-        if kind == LEAF {
-            return (signed(self.parts.leaves.value(payload >> 1, p), word), word);
-        }
+        let (parts, all) = match Word::read(word) {
+            Word::Leaf { leaf, negated } => return (signed(self.parts.leaves.value(leaf, p), negated), word),
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
         let mut best = self.run(at, p);
-        for _ in 1..payload {
+        for _ in 1..parts {
             let next = self.run(at, p);
-            let wins = if kind == ALL { next.0 < best.0 } else { next.0 > best.0 };
+            let wins = if all { next.0 < best.0 } else { next.0 > best.0 };
             if wins || next.0.is_nan() {
                 best = next;
             }
@@ -204,21 +206,21 @@ impl CellMap {
     fn run_many(&self, at: &mut usize, points: [&[f64]; 3], out: &mut [f64]) {
         let word = self.programs[*at];
         *at += 1;
-        let (kind, payload) = (word >> KIND_SHIFT, word & PAYLOAD);
-        if kind == LEAF {
-            self.parts.leaves.values(payload >> 1, points, out);
-            if word & 1 == 1 {
-                out.iter_mut().for_each(|v| *v = -*v);
+        let (parts, all) = match Word::read(word) {
+            Word::Leaf { leaf, negated } => {
+                self.parts.leaves.values(leaf, points, out);
+                return out.iter_mut().for_each(|v| *v = signed(*v, negated));
             }
-            return;
-        }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
         self.run_many(at, points, out);
         let mut other = [0.0; RUN];
         let other = &mut other[..out.len()];
-        for _ in 1..payload {
+        for _ in 1..parts {
             self.run_many(at, points, other);
             for (best, next) in out.iter_mut().zip(&*other) {
-                let wins = if kind == ALL { *next < *best } else { *next > *best };
+                let wins = if all { *next < *best } else { *next > *best };
                 if wins || next.is_nan() {
                     *best = *next;
                 }
@@ -267,8 +269,9 @@ impl Field for CellMap {
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         let Some((Cell::Near(program), _)) = self.find(p) else { return self.twin.omega_grad(p) };
         let (value, word) = self.run(&mut (program as usize), p);
-        let gradient = self.parts.leaves.gradient((word & PAYLOAD) >> 1, p).1;
-        (value, if word & 1 == 1 { -gradient } else { gradient })
+        let Word::Leaf { leaf, negated } = Word::read(word) else { return self.twin.omega_grad(p) };
+        let gradient = self.parts.leaves.gradient(leaf, p).1;
+        (value, if negated { -gradient } else { gradient })
     }
 
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
@@ -305,28 +308,14 @@ impl Field for CellMap {
         }
         self.range_in(self.cells[0], self.domain, over)
     }
+
+    fn first_entry(&self, path: &Path) -> Option<Entry> {
+        self.twin.first_entry(path)
+    }
 }
 
-// A program is a tree in prefix form: a word for each node, its kind above, below it the number of parts, or the
-// number of the leaf and whether it is negated.
-const KIND_SHIFT: u32 = 30;
-const PAYLOAD: u32 = (1 << KIND_SHIFT) - 1;
-const LEAF: u32 = 0;
-const ALL: u32 = 1;
-const ANY: u32 = 2;
-
-fn encode(logic: &Logic, out: &mut Vec<u32>) {
-    let (kind, parts) = match logic {
-        Logic::Leaf { leaf, negated } => return out.push(leaf << 1 | u32::from(*negated)),
-        Logic::All(parts) => (ALL, parts),
-        Logic::Any(parts) => (ANY, parts),
-    };
-    out.push(kind << KIND_SHIFT | parts.len() as u32);
-    parts.iter().for_each(|part| encode(part, out));
-}
-
-fn signed(value: f64, word: u32) -> f64 {
-    if word & 1 == 1 { -value } else { value }
+fn signed(value: f64, negated: bool) -> f64 {
+    if negated { -value } else { value }
 }
 
 /// How a cell has come to be.

@@ -8,9 +8,12 @@ use glam::DVec3;
 
 use super::compiled::LeafProgram;
 use super::programs::Engine;
+use smallvec::SmallVec;
+
+use crate::field::Path;
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{self, Expr, Graph, Interpreter, Node, RangeEvaluator};
+use crate::ir::{self, Enclosure, Expr, Graph, Interpreter, Node, RangeEvaluator, TaylorEvaluator};
 
 /// A shape of leaves.
 struct Shape {
@@ -19,6 +22,9 @@ struct Shape {
     parameters: usize,
     value: OnceLock<Evaluator>,
     gradient: OnceLock<Evaluator>,
+    /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
+    along: OnceLock<Option<Evaluator>>,
+    taylor: OnceLock<TaylorEvaluator>,
 }
 
 struct Evaluator {
@@ -51,8 +57,7 @@ impl Leaves {
             let number = *known.entry(shape.exprs().to_vec()).or_insert(next);
             if number == next {
                 let parameters = constants.len();
-                let (value, gradient) = (OnceLock::new(), OnceLock::new());
-                out.shapes.push(Shape { graph: shape, root, parameters, value, gradient });
+                out.shapes.push(Shape::new(shape, root, parameters));
             }
             let range = RangeEvaluator::new(&own, own_roots);
             out.leaves.push(Leaf { shape: number, first: out.constants.len() as u32, range });
@@ -100,9 +105,57 @@ impl Leaves {
         let (shape, constants) = self.of(leaf);
         shape.value(self.engine).many(points, constants, out);
     }
+
+    /// What a leaf is along the whole path, if it is a polynomial of degree two at most.
+    pub fn along(&self, leaf: u32, negated: bool, from: DVec3, to: DVec3) -> Option<Enclosure> {
+        let (shape, constants) = self.of(leaf);
+        let program = shape.along(self.engine)?;
+        let mut parameters: SmallVec<[f64; 16]> = SmallVec::from_slice(constants);
+        parameters.extend_from_slice(&(to - from).to_array());
+        let mut out = [0.0; 6];
+        program.point(from, &parameters, &mut out);
+        let [a, b, c, d, e, f] = out;
+        let coefficients = [(a, d), (b, e), (c, f)].map(|(value, error)| {
+            let value = if negated { -value } else { value };
+            // an error of zero says that the value is exact
+            if error == 0.0 {
+                Interval::new(value, value)
+            } else {
+                Interval::new((value - error).next_down(), (value + error).next_up())
+            }
+        });
+        Some(Enclosure { coefficients, range: Interval::ALL })
+    }
+
+    /// An enclosure of a leaf over a part of a path.
+    pub fn enclose(&self, leaf: u32, negated: bool, path: &Path, stretch: (f64, f64)) -> Enclosure {
+        let (shape, constants) = self.of(leaf);
+        let taylor = shape.taylor.get_or_init(|| TaylorEvaluator::new(&shape.graph, shape.root));
+        let found = taylor.enclose(path.from.to_array(), path.to.to_array(), stretch, constants);
+        if negated {
+            Enclosure { coefficients: found.coefficients.map(|c| -c), range: -found.range }
+        } else {
+            found
+        }
+    }
 }
 
 impl Shape {
+    fn new(graph: Graph, root: Node, parameters: usize) -> Self {
+        let (value, gradient) = (OnceLock::new(), OnceLock::new());
+        Self { graph, root, parameters, value, gradient, along: OnceLock::new(), taylor: OnceLock::new() }
+    }
+
+    fn along(&self, engine: Engine) -> Option<&Evaluator> {
+        let make = || {
+            let mut graph = self.graph.clone();
+            let outputs = ir::along(&mut graph, self.root, self.parameters as u32)?;
+            let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
+            Some(Evaluator::new(engine, &graph, &outputs, self.parameters + 3))
+        };
+        self.along.get_or_init(make).as_ref()
+    }
+
     #[inline]
     fn value(&self, engine: Engine) -> &Evaluator {
         self.value.get_or_init(|| Evaluator::new(engine, &self.graph, &[self.root], self.parameters))

@@ -11,5 +11,6 @@ mod numbers;
 mod pipeline;
 mod properties;
 mod ranges;
+mod sweep;
 mod tidy;
 mod tool;
