@@ -14,3 +14,4 @@ mod ranges;
 mod sweep;
 mod tidy;
 mod tool;
+mod walls;
