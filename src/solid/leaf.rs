@@ -22,6 +22,7 @@ struct Shape {
     parameters: usize,
     value: OnceLock<Evaluator>,
     gradient: OnceLock<Evaluator>,
+    contact: OnceLock<Evaluator>,
     /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
     along: OnceLock<Option<Evaluator>>,
     taylor: OnceLock<TaylorEvaluator>,
@@ -101,6 +102,15 @@ impl Leaves {
         (out[0], DVec3::new(out[1], out[2], out[3]))
     }
 
+    /// Distance, outward normal and mean curvature, see `ir::contact`.
+    #[inline]
+    pub fn contact(&self, leaf: u32, p: DVec3) -> [f64; 5] {
+        let (shape, constants) = self.of(leaf);
+        let mut out = [0.0; 5];
+        shape.contact(self.engine).point(p, constants, &mut out);
+        out
+    }
+
     pub fn values(&self, leaf: u32, points: [&[f64]; 3], out: &mut [f64]) {
         let (shape, constants) = self.of(leaf);
         shape.value(self.engine).many(points, constants, out);
@@ -142,8 +152,19 @@ impl Leaves {
 
 impl Shape {
     fn new(graph: Graph, root: Node, parameters: usize) -> Self {
-        let (value, gradient) = (OnceLock::new(), OnceLock::new());
-        Self { graph, root, parameters, value, gradient, along: OnceLock::new(), taylor: OnceLock::new() }
+        let (value, gradient, contact) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        let (along, taylor) = (OnceLock::new(), OnceLock::new());
+        Self { graph, root, parameters, value, gradient, contact, along, taylor }
+    }
+
+    #[inline]
+    fn contact(&self, engine: Engine) -> &Evaluator {
+        self.contact.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let outputs = ir::contact(&mut graph, self.root);
+            let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
+            Evaluator::new(engine, &graph, &outputs, self.parameters)
+        })
     }
 
     fn along(&self, engine: Engine) -> Option<&Evaluator> {

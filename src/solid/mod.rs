@@ -7,6 +7,7 @@
 
 mod bounds;
 mod cell_map;
+mod cells;
 mod compiled;
 mod leaf;
 mod logic;

@@ -4,6 +4,7 @@
 //! negated.
 
 use super::logic::Logic;
+use crate::interval::Interval;
 
 const KIND_SHIFT: u32 = 30;
 const PAYLOAD: u32 = (1 << KIND_SHIFT) - 1;
@@ -57,4 +58,95 @@ pub(super) fn skip(words: &[u32], at: &mut usize) {
         }
         *at += 1;
     }
+}
+
+/// What a region knows of a tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Verdict {
+    Inside,
+    Outside,
+    /// A part still matters there.
+    Near,
+}
+
+/// A tree in a region where each leaf has a known range; `left` receives the part that still matters there.
+///
+/// A leaf that may vanish in the region stays. One that is positive throughout drops out of "all of" and decides "any
+/// of"; one that is negative throughout the other way round: the tree that is left has the sign of the whole at every
+/// point of the region, and so the same surface. A leaf of which nothing is known may be NaN: it stays, and nothing is
+/// concluded past it.
+pub(super) fn prune(words: &[u32], range: &mut impl FnMut(u32) -> Interval, left: &mut Vec<u32>) -> Verdict {
+    Pruning { words, range, left }.tree(&mut 0).0
+}
+
+struct Pruning<'a, F> {
+    words: &'a [u32],
+    range: &'a mut F,
+    left: &'a mut Vec<u32>,
+}
+
+impl<F: FnMut(u32) -> Interval> Pruning<'_, F> {
+    /// Also whether a leaf that is left may be NaN.
+    fn tree(&mut self, at: &mut usize) -> (Verdict, bool) {
+        let begin = *at;
+        let code = self.words[begin];
+        *at += 1;
+        // the verdict on a part that settles the whole
+        let (parts, decisive, neutral) = match Word::read(code) {
+            Word::Leaf { leaf, negated } => {
+                let range = (self.range)(leaf);
+                let (lo, hi) = if negated { (-range.hi, -range.lo) } else { (range.lo, range.hi) };
+                if lo > 0.0 {
+                    return (Verdict::Inside, false);
+                } else if hi < 0.0 {
+                    return (Verdict::Outside, false);
+                }
+                self.left.push(code);
+                return (Verdict::Near, range == Interval::ALL);
+            }
+            Word::All(parts) => (parts, Verdict::Outside, Verdict::Inside),
+            Word::Any(parts) => (parts, Verdict::Inside, Verdict::Outside),
+        };
+        let start = self.left.len();
+        self.left.push(code);
+        let (mut count, mut decided, mut unknown) = (0, false, false);
+        for _ in 0..parts {
+            match self.tree(at) {
+                (Verdict::Near, may_be_nan) => {
+                    count += 1;
+                    unknown |= may_be_nan;
+                }
+                (verdict, _) => decided |= verdict == decisive,
+            }
+        }
+        match (decided, unknown, count) {
+            (true, false, _) => {
+                self.left.truncate(start);
+                (decisive, false)
+            }
+            (true, true, _) => {
+                // only NaN can still change the answer: keep everything
+                self.left.truncate(start);
+                self.left.extend_from_slice(&self.words[begin..*at]);
+                (Verdict::Near, true)
+            }
+            (false, _, 0) => {
+                self.left.truncate(start);
+                (neutral, false)
+            }
+            (false, _, 1) => {
+                self.left.remove(start);
+                (Verdict::Near, unknown)
+            }
+            (false, _, _) => {
+                self.left[start] = code & !PAYLOAD | count;
+                (Verdict::Near, unknown)
+            }
+        }
+    }
+}
+
+/// Leaves of a list of trees.
+pub(super) fn leaf_count(words: &[u32]) -> usize {
+    words.iter().filter(|&&word| word >> KIND_SHIFT == LEAF).count()
 }

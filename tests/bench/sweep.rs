@@ -1,6 +1,6 @@
 //! How long a swept contact takes, against sampling the path: `cargo bench --bench sweep`.
 //!
-//! Random paths in the pawn's box, one thread, medians; both ways take turns in one run. Sampling looks every 5 mm, a
+//! Random paths in the pawn's box, one thread, the best of several passes; all ways take turns in one run. Sampling looks every 5 mm, a
 //! twentieth of the paper's support radius, and misses what lies between two samples.
 
 use std::hint::black_box;
@@ -25,7 +25,7 @@ fn main() {
     let map = CellMap::new(&pawn, domain).unwrap_or_else(|| panic!("the pawn can be taken apart"));
     let ways: [(&str, &dyn Field); 3] = [("swept", &twin), ("swept, cell map", &map), ("sampled", &sampled)];
     println!(
-        "\npawn, {PATHS} paths, ns per path (median of {ROUNDS}); missed: hits that only the sweep finds\n"
+        "\npawn, {PATHS} paths, ns per path (best of {ROUNDS}); missed: hits that only the sweep finds\n"
     );
     println!("| step | way | all paths | hits alone | hits | missed |");
     println!("|--:|---|--:|--:|--:|--:|");
@@ -39,12 +39,9 @@ fn main() {
                 times[1].push(time(*field, &hits));
             }
         }
-        for (times, (way, field)) in times.iter_mut().zip(&ways) {
+        for (times, (way, field)) in times.iter().zip(&ways) {
             let found = hits.iter().filter(|path| field.first_entry(path).is_some()).count();
-            let [all, hit] = times.each_mut().map(|t| {
-                t.sort_unstable_by(f64::total_cmp);
-                t[t.len() / 2]
-            });
+            let [all, hit] = times.each_ref().map(|t| t.iter().copied().fold(f64::INFINITY, f64::min));
             println!("| {length} | {way} | {all:.0} | {hit:.0} | {} | {} |", hits.len(), hits.len() - found);
         }
     }
