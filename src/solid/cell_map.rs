@@ -286,7 +286,7 @@ impl CellMap {
             let bounds = self.cells.bounds_at(path.at(t), depth).grown(beyond);
             let side = DVec3::select(step.cmpgt(DVec3::ZERO), bounds.max, bounds.min);
             // a component that does not move never leaves: its quotient is infinite or NaN
-            let leave = ((side - path.from) / step).to_array().into_iter().filter(|t| !t.is_nan());
+            let leave = ((side - path.from) / step).to_array().into_iter().filter(|t| t.is_finite());
             let end = leave.fold(1.0, f64::min).max(t);
             match cell {
                 Cell::Inside => return Some(Entry::new(path, (t, end), true, Normals::default())),
