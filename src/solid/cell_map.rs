@@ -125,7 +125,7 @@ impl CellMap {
         match self.cells.find(p).map(|found| found.cell) {
             Some(Cell::Fluid) => -1.0,
             Some(Cell::Inside) => 1.0,
-            Some(Cell::Near(program)) => Unary::Sign.eval(self.run(&mut (program as usize), p).0),
+            Some(Cell::Near(program)) => Unary::Sign.eval(self.run(program, p).0),
             _ => self.solid.sign(p),
         }
     }
@@ -169,26 +169,10 @@ impl CellMap {
         }
     }
 
-    /// The value of a program at a point, and the leaf that decides, with whether it is negated. NaN if any leaf is.
-    fn run(&self, at: &mut usize, p: DVec3) -> (f64, (u32, bool)) {
-        let word = Word::read(self.cells.programs[*at]);
-        *at += 1;
-        let (parts, all) = match word {
-            Word::Leaf { leaf, negated } => {
-                return (signed(self.parts.leaves.value(leaf, p), negated), (leaf, negated));
-            }
-            Word::All(parts) => (parts, true),
-            Word::Any(parts) => (parts, false),
-        };
-        let mut best = self.run(at, p);
-        for _ in 1..parts {
-            let next = self.run(at, p);
-            let wins = if all { next.0 < best.0 } else { next.0 > best.0 };
-            if wins || next.0.is_nan() {
-                best = next;
-            }
-        }
-        best
+    /// The value of a program at a point, and the leaf that decides.
+    #[inline]
+    fn run(&self, program: u32, p: DVec3) -> (f64, (u32, bool)) {
+        self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
     }
 
     /// The value of a program at up to [`RUN`] points.
@@ -268,7 +252,7 @@ impl CellMap {
                     self.run_many(&mut (program as usize), columns, &mut omega[run]);
                 } else {
                     for i in run {
-                        omega[i] = self.run(&mut (program as usize), points.get(i)).0;
+                        omega[i] = self.run(program, points.get(i)).0;
                     }
                 }
                 k += length;
@@ -342,7 +326,7 @@ impl Field for CellMap {
         match self.cells.find(p) {
             Some(Found { cell: Cell::Fluid, depth, .. }) => -self.cells.shortest_side(depth),
             Some(Found { cell: Cell::Inside, depth, .. }) => self.cells.shortest_side(depth),
-            Some(Found { cell: Cell::Near(program), .. }) => self.run(&mut (program as usize), p).0,
+            Some(Found { cell: Cell::Near(program), .. }) => self.run(program, p).0,
             _ => self.twin.omega(p),
         }
     }
@@ -351,7 +335,7 @@ impl Field for CellMap {
         let Some(Found { cell: Cell::Near(program), .. }) = self.cells.find(p) else {
             return self.twin.omega_grad(p);
         };
-        let (value, (leaf, negated)) = self.run(&mut (program as usize), p);
+        let (value, (leaf, negated)) = self.run(program, p);
         let gradient = self.parts.leaves.gradient(leaf, p).1;
         (value, if negated { -gradient } else { gradient })
     }

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use super::compiled::LeafProgram;
+use super::prefix::Word;
 use super::programs::Engine;
 use smallvec::SmallVec;
 
@@ -100,6 +101,30 @@ impl Leaves {
         let mut out = [0.0; 4];
         shape.gradient(self.engine).point(p, constants, &mut out);
         (out[0], DVec3::new(out[1], out[2], out[3]))
+    }
+
+    /// The smallest or largest leaf of a tree in prefix form, as it says, and which it is, with whether it is negated;
+    /// NaN if any leaf is.
+    pub fn decide(&self, words: &[u32], at: &mut usize, p: DVec3) -> (f64, (u32, bool)) {
+        let word = Word::read(words[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                let value = self.value(leaf, p);
+                return (if negated { -value } else { value }, (leaf, negated));
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let mut best = self.decide(words, at, p);
+        for _ in 1..parts {
+            let next = self.decide(words, at, p);
+            let wins = if all { next.0 < best.0 } else { next.0 > best.0 };
+            if wins || next.0.is_nan() {
+                best = next;
+            }
+        }
+        best
     }
 
     /// Distance, outward normal and mean curvature, see `ir::contact`.

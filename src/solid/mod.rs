@@ -61,9 +61,8 @@ struct Inner {
 
 /// A solid taken apart.
 struct Parts {
-    logic: Logic,
     leaves: Leaves,
-    /// The logic in prefix form.
+    /// How they are joined, in prefix form.
     words: Vec<u32>,
 }
 
@@ -208,7 +207,7 @@ impl Solid {
             let leaves = Leaves::new(self.inner.engine, &omega.graph, &nodes);
             let mut words = Vec::new();
             prefix::encode(&logic, &mut words);
-            Some(Arc::new(Parts { logic, leaves, words }))
+            Some(Arc::new(Parts { leaves, words }))
         };
         self.inner.parts.get_or_init(take_apart).clone()
     }

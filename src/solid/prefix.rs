@@ -150,3 +150,48 @@ impl<F: FnMut(u32) -> Interval> Pruning<'_, F> {
 pub(super) fn leaf_count(words: &[u32]) -> usize {
     words.iter().filter(|&&word| word >> KIND_SHIFT == LEAF).count()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn leaf(leaf: u32, negated: bool) -> Logic {
+        Logic::Leaf { leaf, negated }
+    }
+
+    #[track_caller]
+    fn check(tree: &Logic, ranges: &[(f64, f64)], expected: (Verdict, Option<Logic>)) {
+        let (mut words, mut left, mut wanted) = (Vec::new(), Vec::new(), Vec::new());
+        encode(tree, &mut words);
+        let mut end = 0;
+        skip(&words, &mut end);
+        assert_eq!(end, words.len());
+        let range = |leaf: u32| Interval { lo: ranges[leaf as usize].0, hi: ranges[leaf as usize].1 };
+        let verdict = prune(&words, &mut { range }, &mut left);
+        if let Some(tree) = &expected.1 {
+            encode(tree, &mut wanted);
+        }
+        assert_eq!((verdict, left), (expected.0, wanted));
+    }
+
+    #[test]
+    fn what_is_decided_drops_out() {
+        use Verdict::{Inside, Near, Outside};
+        let (inside, outside, near) = ((1.0, 2.0), (-2.0, -1.0), (-1.0, 1.0));
+        let unknown = (f64::NEG_INFINITY, f64::INFINITY);
+        // (0 and 1) or not 2
+        let both = Logic::All(vec![leaf(0, false), leaf(1, false)]);
+        let tree = Logic::Any(vec![both.clone(), leaf(2, true)]);
+        check(&tree, &[inside, inside, near], (Inside, None));
+        check(&tree, &[outside, near, inside], (Outside, None));
+        check(&tree, &[inside, near, inside], (Near, Some(leaf(1, false))));
+        check(&tree, &[near, near, inside], (Near, Some(both)));
+        check(&tree, &[near, near, near], (Near, Some(tree.clone())));
+        check(&tree, &[outside, near, near], (Near, Some(leaf(2, true))));
+        // a surface through the end of a range stays
+        check(&tree, &[(0.0, 1.0), inside, inside], (Near, Some(leaf(0, false))));
+        // nothing is concluded past a leaf that may be NaN
+        check(&tree, &[unknown, outside, near], (Near, Some(tree.clone())));
+        check(&tree, &[unknown, inside, outside], (Near, Some(tree.clone())));
+    }
+}
