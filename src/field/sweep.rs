@@ -84,8 +84,8 @@ impl Path {
     /// Places after t0 up to t1 at which to look when nothing is known.
     fn samples(&self, t0: f64, t1: f64) -> impl Iterator<Item = f64> + use<> {
         let parts = (self.from.distance(self.to) * (t1 - t0) / self.resolution).ceil();
-        // NaN becomes 1
-        let count = parts.min(MOST_SAMPLES).max(1.0) as usize;
+        // NaN becomes 0, and then 1
+        let count = (parts.clamp(1.0, MOST_SAMPLES) as usize).max(1);
         (1..=count).map(move |k| if k == count { t1 } else { t0 + (t1 - t0) * (k as f64 / count as f64) })
     }
 }

@@ -248,7 +248,8 @@ mod tests {
             if let Some(root) = double {
                 // a(s − root)²: the discriminant vanishes
                 let (a, root) = ((c[2] % 8) << 20, root << 10);
-                c = [(((a as i128 * root as i128) >> 20) * root as i128 >> 20) as i64, -2 * (a >> 10) * (root >> 10), a];
+                let square = (((i128::from(a) * i128::from(root)) >> 20) * i128::from(root)) >> 20;
+                c = [square as i64, -2 * (a >> 10) * (root >> 10), a];
             }
             let unit = 1.0 / f64::from(1 << 20);
             let coefficients = c.map(|c| c as f64 * unit);

@@ -1,7 +1,7 @@
 //! What a cell map costs, for sign and contact at random points: `cargo bench --bench cells`.
 //!
-//! Unions of balls in [0, 3]³, the volume they take up the same for any number of them; one thread, the best of several
-//! passes. The solid itself, which evaluates every leaf at every point, is asked for fewer points in the same run.
+//! Unions of balls in [0, 3]³, the volume they take up the same for any number of them; one thread. The points are
+//! taken in portions; the best of several passes counts for each, so that a busy machine disturbs less. The solid itself, which evaluates every leaf at every point, is asked for fewer points in the same run.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -14,7 +14,9 @@ use rfm::solid::{CellMap, Place};
 use rfm::{Program, Solid};
 
 const POINTS: usize = 100_000;
-const ROUNDS: usize = 9;
+const ROUNDS: usize = 25;
+/// Points of one portion: a few tens of microseconds.
+const PORTION: usize = 4_000;
 
 fn main() {
     let mut random = Random(1);
@@ -28,13 +30,17 @@ fn main() {
     println!("|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
     for balls in [500, 10_000] {
         let solid = union(balls);
-        let few = if balls > 1_000 { 1_000 } else { 10_000 };
-        let [mut sign, mut out] = [vec![0.0; few], vec![0.0; 5 * few]];
-        let part = [&points[0][..few], &points[1][..few], &points[2][..few]];
-        let plain_sign = best(few, 3, || solid.twin_many(part, &mut sign));
-        let plain_contact = best(few, 3, || {
-            let mut columns = out.chunks_exact_mut(few);
-            solid.contact_many(part, std::array::from_fn(|_| columns.next().unwrap_or_default()));
+        // some milliseconds for each pass over all leaves
+        let few = if balls > 1_000 { 20 } else { 400 };
+        let mut sign = vec![0.0; few];
+        let plain_sign = best(few, few, 9, &mut |i, n| {
+            let part = [&points[0][i..i + n], &points[1][i..i + n], &points[2][i..i + n]];
+            solid.twin_many(part, &mut sign[..n]);
+        });
+        let mut columns: [Vec<f64>; 5] = std::array::from_fn(|_| vec![0.0; few]);
+        let plain_contact = best(few, few, 9, &mut |i, n| {
+            let part = [&points[0][i..i + n], &points[1][i..i + n], &points[2][i..i + n]];
+            solid.contact_many(part, columns.each_mut().map(|c| &mut c[..n]));
         });
         for reach in [0.0, 0.01, 0.03] {
             let started = Instant::now();
@@ -42,11 +48,13 @@ fn main() {
                 .unwrap_or_else(|| panic!("balls can be taken apart"));
             let build = started.elapsed().as_secs_f64() * 1e3;
             let near = (0..POINTS).filter(|&i| map.place_of(all.get(i)) == Place::Near).count();
-            let mut signs = vec![0.0; POINTS];
-            let sign = best(POINTS, ROUNDS, || map.sign_many(all, &mut signs));
-            let mut columns: [Vec<f64>; 5] = std::array::from_fn(|_| vec![0.0; POINTS]);
-            let contact =
-                best(POINTS, ROUNDS, || map.contact_many(all, columns.each_mut().map(|c| &mut c[..])));
+            let part = |i: usize, n: usize| Points::new(&all.x[i..i + n], &all.y[i..i + n], &all.z[i..i + n]);
+            let mut signs = vec![0.0; PORTION];
+            let sign = best(POINTS, PORTION, ROUNDS, &mut |i, n| map.sign_many(part(i, n), &mut signs[..n]));
+            let mut columns: [Vec<f64>; 5] = std::array::from_fn(|_| vec![0.0; PORTION]);
+            let contact = best(POINTS, PORTION, ROUNDS, &mut |i, n| {
+                map.contact_many(part(i, n), columns.each_mut().map(|c| &mut c[..n]));
+            });
             let stats = map.stats();
             println!(
                 "| {balls} | {reach} | {build:.0} | {:.1} | {:.1} | {sign:.1} | {contact:.1} | {plain_sign:.0} | \
@@ -80,13 +88,16 @@ fn union(balls: usize) -> Solid {
     program.and_then(|program| program.solid("s")).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Nanoseconds for each point.
-fn best(points: usize, rounds: usize, mut pass: impl FnMut()) -> f64 {
-    pass();
-    let time = |_| {
-        let started = Instant::now();
-        pass();
-        started.elapsed().as_secs_f64() * 1e9 / points as f64
-    };
-    (0..rounds).map(time).fold(f64::INFINITY, f64::min)
+/// Nanoseconds for each point; the pass is given where a portion begins and how long it is.
+fn best(points: usize, portion: usize, rounds: usize, pass: &mut dyn FnMut(usize, usize)) -> f64 {
+    let mut best = vec![f64::INFINITY; points.div_ceil(portion)];
+    for _ in 0..=rounds {
+        for (k, best) in best.iter_mut().enumerate() {
+            let first = k * portion;
+            let started = Instant::now();
+            pass(first, portion.min(points - first));
+            *best = best.min(started.elapsed().as_secs_f64() * 1e9);
+        }
+    }
+    best.iter().sum::<f64>() / points as f64
 }
