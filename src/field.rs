@@ -5,9 +5,13 @@
 //!
 //! Invariant: nothing here knows that a compiler exists, so a closure can stand in for a compiled solid.
 
+mod sweep;
+
 use glam::DVec3;
 
 use crate::{geom::Aabb, interval::Interval};
+
+pub use sweep::{Entry, Normals, Path, last_outside, search_path};
 
 /// Borrowed points as a structure of arrays; the three slices have one length.
 #[derive(Debug, Clone, Copy)]
@@ -88,6 +92,14 @@ pub trait Field: Sync {
     /// An interval that contains ω of every point of the box; the default knows nothing.
     fn range(&self, _over: &Aabb) -> Interval {
         Interval::ALL
+    }
+
+    /// Where a path first meets the obstacle, from [`Path::start`] on; ω = 0 counts as met.
+    ///
+    /// The default halves the path until [`Field::range`] proves its parts to be in the fluid, down to 1e-9 of its
+    /// length; a field that knows nothing of its range is sampled, see [`Path::resolution`].
+    fn first_entry(&self, path: &Path) -> Option<Entry> {
+        search_path(self, path)
     }
 }
 

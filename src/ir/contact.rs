@@ -76,12 +76,9 @@ impl Builder<'_> {
 
     /// The factors of a product, both of which vary.
     fn faces(&self, node: Node) -> Option<(Node, Node)> {
+        let varies = |factor| !matches!(self.graph.expr(factor), Expr::Constant(_) | Expr::Parameter(_));
         match self.graph.expr(node) {
-            Expr::Binary(Binary::Mul, p, q)
-                if p != q && self.graph.as_constant(p).is_none() && self.graph.as_constant(q).is_none() =>
-            {
-                Some((p, q))
-            }
+            Expr::Binary(Binary::Mul, p, q) if p != q && varies(p) && varies(q) => Some((p, q)),
             _ => None,
         }
     }

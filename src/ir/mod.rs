@@ -6,6 +6,7 @@
 //! Invariant: nothing here knows the syntax or the code generator; equal expressions have equal [`Node`]s.
 
 mod adjoint;
+mod along;
 mod contact;
 mod dump;
 mod eval;
@@ -15,9 +16,11 @@ mod op;
 pub mod r0;
 mod range;
 mod real;
+mod taylor;
 mod twin;
 
 pub use adjoint::gradient;
+pub use along::along;
 pub use contact::contact;
 pub use dump::dump;
 pub use eval::Interpreter;
@@ -25,4 +28,5 @@ pub use graph::{Axis, Expr, Graph, Node};
 pub use op::{Binary, Unary};
 pub use range::{Affine, RangeEvaluator, Step as RangeStep};
 pub use real::Real;
+pub use taylor::{Enclosure, TaylorEvaluator};
 pub use twin::{sign_operands, twin};

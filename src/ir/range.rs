@@ -45,6 +45,18 @@ impl Step {
     pub fn of(graph: &Graph, expr: Expr) -> Self {
         step(graph, expr)
     }
+
+    /// The range of a square or a slab from that of the node it is made of; nothing for other steps.
+    pub(super) fn over(&self, range: impl Fn(Node) -> Interval) -> Option<Interval> {
+        match *self {
+            Self::Square(a) => Some(range(a).square()),
+            Self::Slab { of, first, second } => {
+                let line = |affine: Affine| (affine.slope, offset(affine, &range));
+                Some(slab(range(of), line(first), line(second)))
+            }
+            Self::Plain(_) => None,
+        }
+    }
 }
 
 /// A graph prepared for the evaluation of ranges.
@@ -106,7 +118,7 @@ impl RangeEvaluator {
                 Step::Square(a) | Step::Slab { of: a, .. } if unknown(a) => Interval::ALL,
                 Step::Square(a) => values[a.index()].square(),
                 Step::Slab { of, first, second } => {
-                    let number = |affine: Affine| offset(affine, values);
+                    let number = |affine: Affine| offset(affine, |node| values[node.index()]);
                     slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
                 }
                 Step::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
@@ -151,9 +163,9 @@ fn affine(graph: &Graph, node: Node) -> (Node, Affine) {
 }
 
 /// The number that is added; NaN if it is not known.
-fn offset(affine: Affine, values: &[Interval]) -> f64 {
+fn offset(affine: Affine, range: impl Fn(Node) -> Interval) -> f64 {
     let Some(node) = affine.offset else { return 0.0 };
-    let Interval { lo, hi } = values[node.index()];
+    let Interval { lo, hi } = range(node);
     let number = if lo == hi { lo } else { f64::NAN };
     if affine.minus { -number } else { number }
 }
@@ -196,7 +208,7 @@ fn plain(expr: Expr, values: &[Interval], axes: [Interval; 3], parameters: &[f64
     }
 }
 
-fn unary(op: Unary, a: Interval) -> Interval {
+pub(super) fn unary(op: Unary, a: Interval) -> Interval {
     match op {
         Unary::Neg => -a,
         Unary::Abs => a.abs(),
@@ -216,7 +228,7 @@ fn unary(op: Unary, a: Interval) -> Interval {
     }
 }
 
-fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
+pub(super) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
     match op {
         Binary::Add => a + b,
         Binary::Sub => a - b,

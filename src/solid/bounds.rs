@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::logic::{Logic, Pruned};
+use super::prefix::{Verdict, prune};
 use super::{Parts, Solid};
 use crate::geom::Aabb;
 
@@ -80,23 +80,24 @@ struct ByLeaves<'a> {
 
 impl Probe for ByLeaves<'_> {
     /// What is left of the solid; nothing if the box is inside it.
-    type Known = Option<Arc<Logic>>;
+    type Known = Option<Arc<[u32]>>;
 
     fn everything(&self) -> Self::Known {
-        Some(Arc::new(self.parts.logic.clone()))
+        Some(self.parts.words.as_slice().into())
     }
 
     fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known> {
-        let Some(logic) = known else { return Some(None) };
-        match logic.prune_in(&self.parts.leaves, cell) {
-            Pruned::Outside => None,
-            Pruned::Inside => Some(None),
-            Pruned::Near(logic) => Some(Some(Arc::new(logic))),
+        let Some(words) = known else { return Some(None) };
+        let mut left = Vec::new();
+        match prune(words, &mut |leaf| self.parts.leaves.range(leaf, cell), &mut left) {
+            Verdict::Outside => None,
+            Verdict::Inside => Some(None),
+            Verdict::Near => Some(Some(left.into())),
         }
     }
 
     fn is_inside(&self, known: &Self::Known, p: DVec3) -> bool {
-        known.as_ref().is_none_or(|logic| logic.value(&self.parts.leaves, p) > 0.0)
+        known.as_ref().is_none_or(|words| self.parts.leaves.decide(words, &mut 0, p).0 > 0.0)
     }
 }
 

@@ -1,62 +1,53 @@
 //! A box divided into cells that know what matters in them: fluid, inside, or the few leaves of a surface nearby.
 //!
-//! Cells are found by the ranges of the leaves, recursively: where a part is proven to be outside or inside it is
-//! dropped from the cell and from all cells within it. A point far from every surface then costs one look-up, and one
-//! near a surface the evaluation of the leaves that are left there, however many the solid has. Sign, zero set and
-//! the gradient on the surface are exactly those of the twin; the value off the surface is that of the leaf that
-//! decides in the cell, and jumps between cells.
+//! Where a part is proven to be outside or inside it is dropped from the cell and from all cells within it. A point far
+//! from every surface then costs one look-up, and one near a surface the evaluation of the leaves that are left there,
+//! however many the solid has. Sign, zero set and the gradient on the surface are exactly those of the twin; the value
+//! off the surface is that of the leaf that decides in the cell, and jumps between cells. A map with a reach also
+//! answers for distance, normal and curvature up to that distance from the surface.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::leaf::Leaves;
-use super::logic::{Logic, Pruned};
-use super::{Parts, Solid, Twin};
-use crate::field::{Field, Points};
+use super::cells::{Cell, Cells, Found, SIDE};
+use super::prefix::Word;
+use super::sweep::Sweep;
+use super::{Contact, Parts, Solid, Twin};
+use crate::field::{Entry, Field, Normals, Path, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::ir::Unary;
 
-/// Cells are divided to this depth wherever there may be a surface: 2⁶ along a side.
-const DEPTH: u32 = 6;
-
-/// Deeper, up to [`MAX_DEPTH`], only where more leaves than this are left.
-const FEW_LEAVES: usize = 4;
-const MAX_DEPTH: u32 = 10;
-
-/// Below [`DEPTH`] a cell whose leaves have stayed the same for so many levels is left as it is: surfaces that lie on
-/// one another never part, and would cost time and memory as 4ⁿ.
-const LEVELS_IN_VAIN: u32 = 2;
-
-/// Points that are evaluated together.
+/// Points that are looked up together.
 const RUN: usize = 64;
 
 /// Neighbouring points in one cell from which their joint evaluation pays.
 const SHORTEST_RUN: usize = 4;
 
+/// Cells that are looked at one by one for a range; for larger boxes the twin answers.
+const MOST_TOUCHED: usize = 4096;
+
 /// What a place is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Proven to be outside.
+    /// Proven to be outside, farther than the reach from every surface.
     Fluid,
-    /// Proven to be inside.
+    /// Proven to be inside, farther than the reach from every surface.
     Inside,
-    /// There may be a surface.
+    /// There may be a surface within the reach.
     Near,
 }
 
 /// A solid specialised to the cells of a box.
 pub struct CellMap {
+    solid: Solid,
     twin: Twin,
     parts: Arc<Parts>,
-    domain: Aabb,
-    /// Eight children in a row for each divided cell; the root is the first.
-    cells: Vec<Cell>,
-    /// What is left of the solid in near cells, each different one once: see [`encode`].
-    programs: Vec<u32>,
-    stats: CellStats,
+    cells: Cells,
+    reach: f64,
+    /// By how much cells were grown, reach included: points that rounding puts into the next cell are still right.
+    margin: f64,
 }
 
 /// Counts of a cell map.
@@ -74,151 +65,135 @@ pub struct CellStats {
     pub leaves_in_cells: usize,
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Cell {
-    Fluid,
-    Inside,
-    /// Where its program begins.
-    Near(u32),
-    /// Its first child.
-    Divided(u32),
-}
-
-/// A cell while the map is built.
-enum Node {
-    Fluid,
-    Inside,
-    Near(Logic),
-    Divided(Box<[Node; 8]>),
+/// The surface that decides so far.
+#[derive(Clone, Copy)]
+struct Nearest {
+    distance: f64,
+    normal: DVec3,
+    mean_curvature: f64,
+    /// Whether the normal is the mean of several.
+    tied: bool,
 }
 
 impl CellMap {
     /// Divides a box. Nothing if the solid cannot be taken apart, or the box is not finite.
     pub fn new(solid: &Solid, domain: Aabb) -> Option<Self> {
-        if domain.is_empty() || !domain.is_finite() {
+        Self::with_reach(solid, domain, 0.0)
+    }
+
+    /// A map that also knows the surface from up to `reach` away, see [`CellMap::contact`]. Cells within reach of
+    /// several parts keep them all: a large reach costs time and memory.
+    ///
+    /// Nothing if the solid cannot be taken apart, or the box or the reach is not finite.
+    pub fn with_reach(solid: &Solid, domain: Aabb, reach: f64) -> Option<Self> {
+        if domain.is_empty() || !domain.is_finite() || !(reach >= 0.0 && reach.is_finite()) {
             return None;
         }
         let parts = solid.parts()?;
-        let all = Undivided { leaves: parts.leaves.len(), in_vain: 0, depth: 0 };
-        let root = divide(&parts.leaves, &parts.logic, domain, all);
-        let leaves = &parts.leaves;
-        let stats = CellStats { leaves: leaves.len(), shapes: leaves.shapes(), ..CellStats::default() };
-        let (cells, programs) = (vec![Cell::Fluid], Vec::new());
-        let mut map = Self { twin: solid.twin(), parts, domain, cells, programs, stats };
-        map.place(0, root, &mut HashMap::new());
-        Some(map)
+        let largest = domain.min.abs().max(domain.max.abs()).max_element();
+        let cell = domain.size().max_element() / f64::from(SIDE);
+        let margin = reach * (1.0 + 1e-9) + 1e-9 * cell + 64.0 * f64::EPSILON * largest;
+        let cells = Cells::new(&parts, domain, margin);
+        Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin })
     }
 
     pub fn stats(&self) -> CellStats {
-        self.stats
+        let (leaves, counts) = (&self.parts.leaves, self.cells.counts);
+        CellStats {
+            leaves: leaves.len(),
+            shapes: leaves.shapes(),
+            fluid: counts.fluid,
+            inside: counts.inside,
+            near: counts.near,
+            programs: counts.programs,
+            leaves_in_cells: counts.leaves_in_cells,
+        }
     }
 
     /// What is known of a place; near for points outside the box.
     pub fn place_of(&self, p: DVec3) -> Place {
-        match self.find(p) {
-            Some((Cell::Fluid, _)) => Place::Fluid,
-            Some((Cell::Inside, _)) => Place::Inside,
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) => Place::Fluid,
+            Some(Cell::Inside) => Place::Inside,
             _ => Place::Near,
         }
     }
 
-    /// Writes a finished cell to its place, and its children behind all cells.
-    fn place(&mut self, at: usize, node: Node, known: &mut HashMap<Vec<u32>, u32>) {
-        let cell = match node {
-            Node::Fluid => {
-                self.stats.fluid += 1;
-                Cell::Fluid
-            }
-            Node::Inside => {
-                self.stats.inside += 1;
-                Cell::Inside
-            }
-            Node::Near(logic) => {
-                let mut code = Vec::new();
-                encode(&logic, &mut code);
-                self.stats.near += 1;
-                logic.for_leaves(&mut |_| self.stats.leaves_in_cells += 1);
-                let start = *known.entry(code).or_insert_with_key(|code| {
-                    self.stats.programs += 1;
-                    let start = self.programs.len() as u32;
-                    self.programs.extend(code);
-                    start
-                });
-                Cell::Near(start)
-            }
-            Node::Divided(children) => {
-                let first = self.cells.len();
-                self.cells.resize(first + 8, Cell::Fluid);
-                for (i, child) in children.into_iter().enumerate() {
-                    self.place(first + i, child, known);
-                }
-                Cell::Divided(first as u32)
-            }
+    /// As [`Solid::sign`]: inside (1), on the surface (0) or outside (−1); NaN where a leaf is not a number.
+    #[inline]
+    pub fn sign(&self, p: DVec3) -> f64 {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) => -1.0,
+            Some(Cell::Inside) => 1.0,
+            Some(Cell::Near(program)) => Unary::Sign.eval(self.run(program, p).0),
+            _ => self.solid.sign(p),
+        }
+    }
+
+    /// [`CellMap::sign`] of many points.
+    ///
+    /// # Panics
+    /// If `sign` is not as long as the points.
+    pub fn sign_many(&self, points: Points<'_>, sign: &mut [f64]) {
+        self.evaluate(points, sign, |_| 1.0);
+        sign.iter_mut().for_each(|s| *s = Unary::Sign.eval(*s));
+    }
+
+    /// What a particle needs to know of the surface, if that is nearer than the reach; otherwise an infinite distance,
+    /// positive in the fluid and negative inside, without normal and curvature.
+    ///
+    /// As [`Solid::contact`], except that leaves without a zero within reach are left out, which estimates of their
+    /// distance may not show.
+    #[inline]
+    pub fn contact(&self, p: DVec3) -> Contact {
+        let beyond =
+            |sign: f64| Contact { distance: sign * f64::INFINITY, normal: DVec3::ZERO, mean_curvature: 0.0 };
+        let found = match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) => return beyond(1.0),
+            Some(Cell::Inside) => return beyond(-1.0),
+            Some(Cell::Near(program)) => self.nearest(&mut (program as usize), p).contact(),
+            _ => self.solid.contact(p),
         };
-        self.cells[at] = cell;
+        if found.distance.abs() >= self.reach { beyond(found.distance.signum()) } else { found }
     }
 
-    /// The undivided cell of a point, with its box.
-    fn find(&self, p: DVec3) -> Option<(Cell, Aabb)> {
-        if !self.domain.contains(p) {
-            return None; // NaN included
+    /// [`CellMap::contact`] of many points: distance, normal x, y, z and mean curvature.
+    ///
+    /// # Panics
+    /// If a column is shorter than the points.
+    pub fn contact_many(&self, points: Points<'_>, [distance, x, y, z, curvature]: [&mut [f64]; 5]) {
+        for i in 0..points.len() {
+            let found = self.contact(points.get(i));
+            (distance[i], curvature[i]) = (found.distance, found.mean_curvature);
+            (x[i], y[i], z[i]) = (found.normal.x, found.normal.y, found.normal.z);
         }
-        let (mut cell, mut bounds) = (self.cells[0], self.domain);
-        while let Cell::Divided(first) = cell {
-            let centre = bounds.centre();
-            let upper = p.cmpge(centre);
-            cell = self.cells[first as usize + upper.bitmask() as usize];
-            bounds = Aabb {
-                min: DVec3::select(upper, centre, bounds.min),
-                max: DVec3::select(upper, bounds.max, centre),
-            };
-        }
-        Some((cell, bounds))
     }
 
-    /// What stands for ω where only its sign is known: about the distance that is known to be free.
-    fn stand_in(bounds: &Aabb) -> f64 {
-        bounds.size().min_element()
-    }
-
-    /// The value of a program at a point, and the word of the leaf that decides. NaN if any leaf is.
-    fn run(&self, at: &mut usize, p: DVec3) -> (f64, u32) {
-        let word = self.programs[*at];
-        *at += 1;
-        let (kind, payload) = (word >> KIND_SHIFT, word & PAYLOAD);
-        if kind == LEAF {
-            return (signed(self.parts.leaves.value(payload >> 1, p), word), word);
-        }
-        let mut best = self.run(at, p);
-        for _ in 1..payload {
-            let next = self.run(at, p);
-            let wins = if kind == ALL { next.0 < best.0 } else { next.0 > best.0 };
-            if wins || next.0.is_nan() {
-                best = next;
-            }
-        }
-        best
+    /// The value of a program at a point, and the leaf that decides.
+    #[inline]
+    fn run(&self, program: u32, p: DVec3) -> (f64, (u32, bool)) {
+        self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
     }
 
     /// The value of a program at up to [`RUN`] points.
     fn run_many(&self, at: &mut usize, points: [&[f64]; 3], out: &mut [f64]) {
-        let word = self.programs[*at];
+        let word = Word::read(self.cells.programs[*at]);
         *at += 1;
-        let (kind, payload) = (word >> KIND_SHIFT, word & PAYLOAD);
-        if kind == LEAF {
-            self.parts.leaves.values(payload >> 1, points, out);
-            if word & 1 == 1 {
-                out.iter_mut().for_each(|v| *v = -*v);
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                self.parts.leaves.values(leaf, points, out);
+                return out.iter_mut().for_each(|v| *v = signed(*v, negated));
             }
-            return;
-        }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
         self.run_many(at, points, out);
         let mut other = [0.0; RUN];
         let other = &mut other[..out.len()];
-        for _ in 1..payload {
+        for _ in 1..parts {
             self.run_many(at, points, other);
             for (best, next) in out.iter_mut().zip(&*other) {
-                let wins = if kind == ALL { *next < *best } else { *next > *best };
+                let wins = if all { *next < *best } else { *next > *best };
                 if wins || next.is_nan() {
                     *best = *next;
                 }
@@ -226,144 +201,175 @@ impl CellMap {
         }
     }
 
-    /// The hull of what is known over a box that lies in a cell.
-    fn range_in(&self, cell: Cell, bounds: Aabb, over: &Aabb) -> Interval {
-        match cell {
-            Cell::Fluid => Interval::point(-Self::stand_in(&bounds)),
-            Cell::Inside => Interval::point(Self::stand_in(&bounds)),
-            Cell::Near(_) => Interval::ALL,
-            Cell::Divided(first) => {
-                let centre = bounds.centre();
-                let mut range: Option<Interval> = None;
-                for (i, corner) in bounds.corners().into_iter().enumerate() {
-                    let child = Aabb::new(corner.min(centre), corner.max(centre));
-                    if child.intersection(over).is_empty() {
-                        continue;
-                    }
-                    let part = self.range_in(self.cells[first as usize + i], child, over);
-                    let hull = range.map_or(part, |so_far| so_far.hull(part));
-                    if hull.lo <= 0.0 && hull.hi >= 0.0 {
-                        return Interval::ALL; // undecided already
-                    }
-                    range = Some(hull);
-                }
-                range.unwrap_or(Interval::ALL)
+    /// The surface nearest to a point, as a program says: the distance to "all of" is the largest, to "any of" the
+    /// smallest.
+    fn nearest(&self, at: &mut usize, p: DVec3) -> Nearest {
+        let word = Word::read(self.cells.programs[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => return Nearest::of(self.parts.leaves.contact(leaf, p), negated),
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let mut best = self.nearest(at, p);
+        for _ in 1..parts {
+            let next = self.nearest(at, p);
+            let wins = if all { next.distance > best.distance } else { next.distance < best.distance };
+            if wins || next.distance.is_nan() {
+                best = next;
+            } else if next.distance == best.distance {
+                best = best.mean(&next);
             }
         }
+        best
+    }
+
+    /// The value at many points: `free` gives its magnitude where there is no surface, from the cell's depth.
+    fn evaluate(&self, points: Points<'_>, omega: &mut [f64], free: impl Fn(u32) -> f64) {
+        let mut found: [Option<Found>; RUN] = [None; RUN];
+        for first in (0..points.len()).step_by(RUN) {
+            let count = RUN.min(points.len() - first);
+            for (k, found) in found[..count].iter_mut().enumerate() {
+                *found = self.cells.find(points.get(first + k));
+            }
+            let mut k = 0;
+            while k < count {
+                let Some(Found { cell, depth, place }) = found[k] else {
+                    omega[first + k] = self.twin.omega(points.get(first + k));
+                    k += 1;
+                    continue;
+                };
+                let Cell::Near(program) = cell else {
+                    omega[first + k] = if cell == Cell::Inside { free(depth) } else { -free(depth) };
+                    k += 1;
+                    continue;
+                };
+                let same = |other: &&Option<Found>| other.is_some_and(|other| other.place == place);
+                let length = found[k..count].iter().take_while(same).count();
+                let run = first + k..first + k + length;
+                if length >= SHORTEST_RUN {
+                    let columns = [points.x, points.y, points.z].map(|c| &c[run.clone()]);
+                    self.run_many(&mut (program as usize), columns, &mut omega[run]);
+                } else {
+                    for i in run {
+                        omega[i] = self.run(program, points.get(i)).0;
+                    }
+                }
+                k += length;
+            }
+        }
+    }
+
+    /// The first entry on a path within the box, cell by cell.
+    fn walk(&self, path: &Path) -> Option<Entry> {
+        // half of what the cells were grown by: the next look-up is then surely in the next cell
+        let beyond = 0.5 * (self.margin - self.reach);
+        let step = path.to - path.from;
+        let mut t = path.start;
+        while let Some(Found { cell, depth, .. }) = self.cells.find(path.at(t)) {
+            let bounds = self.cells.bounds_at(path.at(t), depth).grown(beyond);
+            let side = DVec3::select(step.cmpgt(DVec3::ZERO), bounds.max, bounds.min);
+            // a component that does not move never leaves: its quotient is infinite or NaN
+            let leave = ((side - path.from) / step).to_array().into_iter().filter(|t| t.is_finite());
+            let end = leave.fold(1.0, f64::min).max(t);
+            match cell {
+                Cell::Inside => return Some(Entry::new(path, (t, end), true, Normals::default())),
+                Cell::Near(program) => {
+                    let words = &self.cells.programs[program as usize..];
+                    let entry = Sweep::new(&self.parts.leaves, path).first_entry(words, (t, end));
+                    match entry {
+                        // the border of the cell has cut off what would decide it
+                        Some(entry) if !entry.certain && entry.until >= end && end < 1.0 => {
+                            return self.twin.first_entry(&Path { start: entry.t, ..*path });
+                        }
+                        Some(_) => return entry,
+                        None => {}
+                    }
+                }
+                Cell::Fluid | Cell::Divided(_) => {}
+            }
+            if end >= 1.0 {
+                return None;
+            }
+            if end <= t {
+                break; // the path is shorter than its rounding errors
+            }
+            t = end;
+        }
+        self.twin.first_entry(&Path { start: t, ..*path })
+    }
+}
+
+impl Nearest {
+    #[inline]
+    fn of([distance, x, y, z, mean_curvature]: [f64; 5], negated: bool) -> Self {
+        let sign = if negated { -1.0 } else { 1.0 };
+        let normal = sign * DVec3::new(x, y, z);
+        Self { distance: sign * distance, normal, mean_curvature: sign * mean_curvature, tied: false }
+    }
+
+    fn mean(&self, other: &Self) -> Self {
+        let normal = 0.5 * (self.normal + other.normal);
+        let mean_curvature = 0.5 * (self.mean_curvature + other.mean_curvature);
+        Self { distance: self.distance, normal, mean_curvature, tied: true }
+    }
+
+    #[inline]
+    fn contact(self) -> Contact {
+        let normal = if self.tied { self.normal.normalize_or_zero() } else { self.normal };
+        Contact { distance: self.distance, normal, mean_curvature: self.mean_curvature }
     }
 }
 
 impl Field for CellMap {
     fn omega(&self, p: DVec3) -> f64 {
-        match self.find(p) {
-            None => self.twin.omega(p),
-            Some((Cell::Fluid, bounds)) => -Self::stand_in(&bounds),
-            Some((Cell::Inside, bounds)) => Self::stand_in(&bounds),
-            Some((Cell::Near(program), _)) => self.run(&mut (program as usize), p).0,
-            Some((Cell::Divided(_), _)) => f64::NAN, // `find` ends at undivided cells
+        match self.cells.find(p) {
+            Some(Found { cell: Cell::Fluid, depth, .. }) => -self.cells.shortest_side(depth),
+            Some(Found { cell: Cell::Inside, depth, .. }) => self.cells.shortest_side(depth),
+            Some(Found { cell: Cell::Near(program), .. }) => self.run(program, p).0,
+            _ => self.twin.omega(p),
         }
     }
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let Some((Cell::Near(program), _)) = self.find(p) else { return self.twin.omega_grad(p) };
-        let (value, word) = self.run(&mut (program as usize), p);
-        let gradient = self.parts.leaves.gradient((word & PAYLOAD) >> 1, p).1;
-        (value, if word & 1 == 1 { -gradient } else { gradient })
+        let Some(Found { cell: Cell::Near(program), .. }) = self.cells.find(p) else {
+            return self.twin.omega_grad(p);
+        };
+        let (value, (leaf, negated)) = self.run(program, p);
+        let gradient = self.parts.leaves.gradient(leaf, p).1;
+        (value, if negated { -gradient } else { gradient })
     }
 
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
-        let mut i = 0;
-        while i < points.len() {
-            let Some((cell, bounds)) = self.find(points.get(i)) else {
-                omega[i] = self.twin.omega(points.get(i));
-                i += 1;
-                continue;
-            };
-            let end = (i + RUN).min(points.len());
-            let length = (i + 1..end).take_while(|&j| bounds.contains(points.get(j))).count() + 1;
-            let run = i..i + length;
-            match cell {
-                Cell::Near(program) if length >= SHORTEST_RUN => {
-                    let columns = [points.x, points.y, points.z].map(|c| &c[run.clone()]);
-                    self.run_many(&mut (program as usize), columns, &mut omega[run]);
-                }
-                Cell::Near(program) => {
-                    for j in run {
-                        omega[j] = self.run(&mut (program as usize), points.get(j)).0;
-                    }
-                }
-                Cell::Inside => omega[run].fill(Self::stand_in(&bounds)),
-                Cell::Fluid | Cell::Divided(_) => omega[run].fill(-Self::stand_in(&bounds)),
-            }
-            i += length;
-        }
+        self.evaluate(points, omega, |depth| self.cells.shortest_side(depth));
     }
 
     fn range(&self, over: &Aabb) -> Interval {
-        if self.domain.union(over) != self.domain {
+        let domain = self.cells.domain;
+        if domain.union(over) != domain || over.is_empty() {
             return self.twin.range(over);
         }
-        self.range_in(self.cells[0], self.domain, over)
+        let Some(mut touched) = self.cells.touched(over, MOST_TOUCHED) else { return self.twin.range(over) };
+        // what stands for ω where only its sign is known
+        let free = self.cells.shortest_side(SIDE.ilog2());
+        match touched.next() {
+            Some(Cell::Fluid) if touched.all(|cell| cell == Cell::Fluid) => Interval::point(-free),
+            Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Interval::point(free),
+            _ => Interval::ALL,
+        }
+    }
+
+    fn first_entry(&self, path: &Path) -> Option<Entry> {
+        let domain = self.cells.domain;
+        if domain.contains(path.from) && domain.contains(path.to) {
+            self.walk(path)
+        } else {
+            self.twin.first_entry(path)
+        }
     }
 }
 
-// A program is a tree in prefix form: a word for each node, its kind above, below it the number of parts, or the
-// number of the leaf and whether it is negated.
-const KIND_SHIFT: u32 = 30;
-const PAYLOAD: u32 = (1 << KIND_SHIFT) - 1;
-const LEAF: u32 = 0;
-const ALL: u32 = 1;
-const ANY: u32 = 2;
-
-fn encode(logic: &Logic, out: &mut Vec<u32>) {
-    let (kind, parts) = match logic {
-        Logic::Leaf { leaf, negated } => return out.push(leaf << 1 | u32::from(*negated)),
-        Logic::All(parts) => (ALL, parts),
-        Logic::Any(parts) => (ANY, parts),
-    };
-    out.push(kind << KIND_SHIFT | parts.len() as u32);
-    parts.iter().for_each(|part| encode(part, out));
-}
-
-fn signed(value: f64, word: u32) -> f64 {
-    if word & 1 == 1 { -value } else { value }
-}
-
-/// How a cell has come to be.
-#[derive(Debug, Clone, Copy)]
-struct Undivided {
-    depth: u32,
-    /// Leaves of the cell above.
-    leaves: usize,
-    /// Levels above since a leaf was last dropped.
-    in_vain: u32,
-}
-
-fn divide(leaves: &Leaves, logic: &Logic, bounds: Aabb, cell: Undivided) -> Node {
-    let logic = match logic.prune_in(leaves, &bounds) {
-        Pruned::Outside => return Node::Fluid,
-        Pruned::Inside => return Node::Inside,
-        Pruned::Near(logic) => logic,
-    };
-    let Undivided { depth, .. } = cell;
-    let mut count = 0;
-    logic.for_leaves(&mut |_| count += 1);
-    let in_vain = if count < cell.leaves { 0 } else { cell.in_vain + 1 };
-    if depth >= MAX_DEPTH || (depth >= DEPTH && (count <= FEW_LEAVES || in_vain >= LEVELS_IN_VAIN)) {
-        return Node::Near(logic);
-    }
-    let below = Undivided { depth: depth + 1, leaves: count, in_vain };
-    let centre = bounds.centre();
-    let child =
-        |corner: DVec3| divide(leaves, &logic, Aabb::new(corner.min(centre), corner.max(centre)), below);
-    // the upper levels in parallel; the tree is the same for any number of threads
-    let children: Vec<Node> = if depth < 3 {
-        bounds.corners().into_par_iter().map(child).collect()
-    } else {
-        bounds.corners().into_iter().map(child).collect()
-    };
-    match children.try_into() {
-        Ok(children) => Node::Divided(Box::new(children)),
-        Err(_) => Node::Near(logic), // a box has eight corners
-    }
+#[inline]
+fn signed(value: f64, negated: bool) -> f64 {
+    if negated { -value } else { value }
 }

@@ -1,7 +1,8 @@
 //! A solid as a person may look at it: its leaves, and what is left of it in a box.
 
 use super::Solid;
-use super::logic::{Logic, Pruned};
+use super::logic::Logic;
+use super::prefix::{Verdict, Word, prune};
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -45,12 +46,18 @@ impl Solid {
     /// What a cell map would keep of the solid in this box.
     pub fn left_in(&self, over: &Aabb) -> Option<Left> {
         let parts = self.parts()?;
-        Some(match parts.logic.prune_in(&parts.leaves, over) {
-            Pruned::Outside => Left::Outside,
-            Pruned::Inside => Left::Inside,
-            Pruned::Near(logic) => {
+        let mut words = Vec::new();
+        let verdict = prune(&parts.words, &mut |leaf| parts.leaves.range(leaf, over), &mut words);
+        Some(match verdict {
+            Verdict::Outside => Left::Outside,
+            Verdict::Inside => Left::Inside,
+            Verdict::Near => {
                 let mut kept = vec![false; parts.leaves.len()];
-                logic.for_leaves(&mut |leaf| kept[leaf as usize] = true);
+                for word in words {
+                    if let Word::Leaf { leaf, .. } = Word::read(word) {
+                        kept[leaf as usize] = true;
+                    }
+                }
                 Left::Leaves(kept)
             }
         })

@@ -6,12 +6,16 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
+use smallvec::SmallVec;
+
 use super::compiled::{LeafProgram, RangeProgram};
+use super::prefix::Word;
 use super::programs::Engine;
 use crate::codegen;
+use crate::field::Path;
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{self, Expr, Graph, Interpreter, Node, RangeEvaluator};
+use crate::ir::{self, Enclosure, Expr, Graph, Interpreter, Node, RangeEvaluator, TaylorEvaluator};
 
 /// From so many leaves of one shape on, their ranges come from machine code: making it costs as much time as some
 /// thousand ranges by the interpreter. Their number decides, not that of the calls, so that the bounds of one leaf
@@ -28,6 +32,10 @@ struct Shape {
     range_code: OnceLock<Option<RangeProgram>>,
     value: OnceLock<Evaluator>,
     gradient: OnceLock<Evaluator>,
+    contact: OnceLock<Evaluator>,
+    /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
+    along: OnceLock<Option<Evaluator>>,
+    taylor: OnceLock<TaylorEvaluator>,
 }
 
 struct Evaluator {
@@ -122,9 +130,75 @@ impl Leaves {
         (out[0], DVec3::new(out[1], out[2], out[3]))
     }
 
+    /// The smallest or largest leaf of a tree in prefix form, as it says, and which it is, with whether it is negated;
+    /// NaN if any leaf is.
+    pub fn decide(&self, words: &[u32], at: &mut usize, p: DVec3) -> (f64, (u32, bool)) {
+        let word = Word::read(words[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                let value = self.value(leaf, p);
+                return (if negated { -value } else { value }, (leaf, negated));
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let mut best = self.decide(words, at, p);
+        for _ in 1..parts {
+            let next = self.decide(words, at, p);
+            let wins = if all { next.0 < best.0 } else { next.0 > best.0 };
+            if wins || next.0.is_nan() {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// Distance, outward normal and mean curvature, see `ir::contact`.
+    #[inline]
+    pub fn contact(&self, leaf: u32, p: DVec3) -> [f64; 5] {
+        let (shape, constants) = self.of(leaf);
+        let mut out = [0.0; 5];
+        shape.contact(self.engine).point(p, constants, &mut out);
+        out
+    }
+
     pub fn values(&self, leaf: u32, points: [&[f64]; 3], out: &mut [f64]) {
         let (shape, constants) = self.of(leaf);
         shape.value(self.engine).many(points, constants, out);
+    }
+
+    /// What a leaf is along the whole path, if it is a polynomial of degree two at most.
+    pub fn along(&self, leaf: u32, negated: bool, from: DVec3, to: DVec3) -> Option<Enclosure> {
+        let (shape, constants) = self.of(leaf);
+        let program = shape.along(self.engine)?;
+        let mut parameters: SmallVec<[f64; 16]> = SmallVec::from_slice(constants);
+        parameters.extend_from_slice(&(to - from).to_array());
+        let mut out = [0.0; 6];
+        program.point(from, &parameters, &mut out);
+        let [a, b, c, d, e, f] = out;
+        let coefficients = [(a, d), (b, e), (c, f)].map(|(value, error)| {
+            let value = if negated { -value } else { value };
+            // an error of zero says that the value is exact
+            if error == 0.0 {
+                Interval::new(value, value)
+            } else {
+                Interval::new((value - error).next_down(), (value + error).next_up())
+            }
+        });
+        Some(Enclosure { coefficients, range: Interval::ALL })
+    }
+
+    /// An enclosure of a leaf over a part of a path.
+    pub fn enclose(&self, leaf: u32, negated: bool, path: &Path, stretch: (f64, f64)) -> Enclosure {
+        let (shape, constants) = self.of(leaf);
+        let taylor = shape.taylor.get_or_init(|| TaylorEvaluator::new(&shape.graph, shape.root));
+        let found = taylor.enclose(path.from.to_array(), path.to.to_array(), stretch, constants);
+        if negated {
+            Enclosure { coefficients: found.coefficients.map(|c| -c), range: -found.range }
+        } else {
+            found
+        }
     }
 }
 
@@ -132,7 +206,20 @@ impl Shape {
     fn new(graph: Graph, root: Node, parameters: usize) -> Self {
         let range = RangeEvaluator::new(&graph, root);
         let (range_code, value, gradient) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
-        Self { graph, root, parameters, leaves: 0, range, range_code, value, gradient }
+        let (contact, along, taylor) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        Self {
+            graph,
+            root,
+            parameters,
+            leaves: 0,
+            range,
+            range_code,
+            value,
+            gradient,
+            contact,
+            along,
+            taylor,
+        }
     }
 
     #[inline]
@@ -142,6 +229,26 @@ impl Shape {
         }
         let compile = || RangeProgram::with_parameters(&self.graph, self.root, self.parameters).ok();
         self.range_code.get_or_init(compile).as_ref()
+    }
+
+    #[inline]
+    fn contact(&self, engine: Engine) -> &Evaluator {
+        self.contact.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let outputs = ir::contact(&mut graph, self.root);
+            let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
+            Evaluator::new(engine, &graph, &outputs, self.parameters)
+        })
+    }
+
+    fn along(&self, engine: Engine) -> Option<&Evaluator> {
+        let make = || {
+            let mut graph = self.graph.clone();
+            let outputs = ir::along(&mut graph, self.root, self.parameters as u32)?;
+            let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
+            Some(Evaluator::new(engine, &graph, &outputs, self.parameters + 3))
+        };
+        self.along.get_or_init(make).as_ref()
     }
 
     #[inline]

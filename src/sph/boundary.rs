@@ -1,8 +1,7 @@
 //! Collision: particles that a step has carried into an obstacle or out of the box are put back.
 //!
 //! A block of particles asks the field for its range over all its paths first; a block that is surely in the
-//! fluid costs that one call. Otherwise ω is sampled along the paths, all samples of a block in one batch, and
-//! only paths with a sample that is not in the fluid are looked at one by one.
+//! fluid costs that one call. Otherwise each path is swept.
 //!
 //! At a contact the particle stops on the surface, its velocity is reflected, and the rest of its path goes on
 //! along the surface: without that, a particle that slides would touch at once in every step and never move.
@@ -20,12 +19,12 @@ use rayon::prelude::*;
 use glam::DVec3;
 
 use crate::{
-    field::{Field, Points},
+    field::{Field, Path},
     geom::Aabb,
 };
 
 use super::{
-    contact::{Contact, Undefined, first_contact, push_out, reflect, samples},
+    contact::{Contact, Undefined, first_contact, push_out, reflect, turn_back},
     neighbours::BLOCK,
     particles::Vectors,
 };
@@ -40,8 +39,9 @@ pub struct Obstacle<'a> {
     pub field: &'a dyn Field,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
-    /// Thickness in metres of the thinnest part that must hold whatever the speed; paths are sampled this
-    /// closely. A twentieth of the support radius is a good value; thinner costs more samples per step.
+    /// Thickness in metres of the thinnest part that must hold whatever the speed, for fields that do not know their
+    /// range (closures): their paths are sampled this closely. A twentieth of the support radius is a good value;
+    /// thinner costs more samples per step. Compiled solids hold however thin they are.
     pub resolution: f64,
 }
 
@@ -51,16 +51,8 @@ pub(super) struct Boundary<'a> {
     pub domain: Aabb,
     pub wall_restitution: f64,
     pub obstacles: Vec<Obstacle<'a>>,
-}
-
-/// Buffers of a block.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Scratch {
-    points: Vectors,
-    omega: Vec<f64>,
-    /// Samples of each particle in `points`.
-    counts: Vec<u32>,
-    touched: Vec<bool>,
+    /// Distance from an obstacle's surface, m, at which particles stop.
+    pub clearance: f64,
 }
 
 /// A particle (index) for which a field had no value.
@@ -80,50 +72,37 @@ impl Boundary<'_> {
         position: &Vectors,
         target: &mut Vectors,
         velocity: &mut Vectors,
-        scratch: &mut Vec<Scratch>,
     ) -> Result<(), Fault> {
-        scratch.resize_with(position.len().div_ceil(BLOCK), Scratch::default);
         let [tx, ty, tz] = target.components_mut().map(|c| c.par_chunks_mut(BLOCK));
         let [vx, vy, vz] = velocity.components_mut().map(|c| c.par_chunks_mut(BLOCK));
         let fault = tx
             .zip(ty)
             .zip(tz)
             .zip(vx.zip(vy).zip(vz))
-            .zip(scratch)
             .enumerate()
-            .filter_map(|(b, ((((x, y), z), ((u, v), w)), scratch))| {
+            .filter_map(|(b, (((x, y), z), ((u, v), w)))| {
                 let mut block = Block { first: b * BLOCK, position, target: [x, y, z], velocity: [u, v, w] };
-                self.collide_block(&mut block, scratch).err()
+                self.collide_block(&mut block).err()
             })
             .min_by_key(|fault| fault.index);
         fault.map_or(Ok(()), Err)
     }
 
-    fn collide_block(&self, block: &mut Block<'_>, scratch: &mut Scratch) -> Result<(), Fault> {
-        scratch.touched.clear();
-        scratch.touched.resize(block.len(), false);
+    fn collide_block(&self, block: &mut Block<'_>) -> Result<(), Fault> {
         let mut swept = Aabb::EMPTY;
         for k in 0..block.len() {
             let (target, velocity) = self.hold_in_box(block.target(k), block.velocity(k));
             block.put(k, target, velocity);
             swept = swept.including(block.from(k)).including(target);
         }
-        let mut any = false;
-        for obstacle in &self.obstacles {
-            if obstacle.field.range(&swept).hi < 0.0 {
-                continue;
-            }
-            any |= scratch.sample(block, obstacle)?;
+        if self.obstacles.iter().all(|obstacle| obstacle.field.range(&swept).hi < 0.0) {
+            return Ok(());
         }
-        if any {
-            for k in 0..block.len() {
-                if scratch.touched[k] {
-                    let (at, velocity) = self
-                        .resolve(block.from(k), block.target(k), block.velocity(k))
-                        .map_err(|undefined| block.fault(k, undefined))?;
-                    block.put(k, at, velocity);
-                }
-            }
+        for k in 0..block.len() {
+            let (at, velocity) = self
+                .resolve(block.from(k), block.target(k), block.velocity(k))
+                .map_err(|undefined| block.fault(k, undefined))?;
+            block.put(k, at, velocity);
         }
         Ok(())
     }
@@ -156,14 +135,14 @@ impl Boundary<'_> {
             let Some((obstacle, contact)) = self.nearest_contact(here, target)? else {
                 return Ok((target, velocity));
             };
-            velocity = reflect(velocity, contact.normal, obstacle.restitution);
+            velocity = turn_back(velocity, &contact, obstacle.restitution);
             let rest = target - contact.point;
-            let slide = reflect(rest, contact.normal, 0.0);
+            let slide = turn_back(rest, &contact, 0.0);
             here = contact.point;
             target = here + slide;
             // A tangent enters a hollow surface, and by rounding a flat one: lift its end out again.
             if obstacle.field.omega(target) >= 0.0
-                && let Some(lifted) = push_out(obstacle.field, target, slide.length())?
+                && let Some(lifted) = push_out(obstacle.field, target, slide.length(), self.clearance)?
             {
                 target = lifted.point;
                 velocity = reflect(velocity, lifted.normal, obstacle.restitution);
@@ -175,46 +154,14 @@ impl Boundary<'_> {
     fn nearest_contact(&self, from: DVec3, to: DVec3) -> Result<Option<(&Obstacle<'_>, Contact)>, Undefined> {
         let mut nearest: Option<(&Obstacle<'_>, Contact)> = None;
         for obstacle in &self.obstacles {
-            if let Some(contact) = first_contact(obstacle.field, from, to, obstacle.resolution)?
+            let path = Path::new(from, to, obstacle.resolution);
+            if let Some(contact) = first_contact(obstacle.field, &path, self.clearance)?
                 && nearest.is_none_or(|(_, other)| contact.fraction < other.fraction)
             {
                 nearest = Some((obstacle, contact));
             }
         }
         Ok(nearest)
-    }
-}
-
-impl Scratch {
-    /// Marks the particles whose paths are not surely in the fluid; true if there is one.
-    fn sample(&mut self, block: &Block<'_>, obstacle: &Obstacle<'_>) -> Result<bool, Fault> {
-        self.points.clear();
-        self.counts.clear();
-        for k in 0..block.len() {
-            let (from, to) = (block.from(k), block.target(k));
-            let count = samples(from.distance(to), obstacle.resolution);
-            self.counts.push(count as u32);
-            for s in 1..count {
-                self.points.push(from.lerp(to, s as f64 / count as f64));
-            }
-            self.points.push(to);
-        }
-        self.omega.resize(self.points.len(), 0.0);
-        let points = Points::new(&self.points.x, &self.points.y, &self.points.z);
-        obstacle.field.omega_many(points, &mut self.omega);
-
-        let (mut any, mut start) = (false, 0);
-        for (k, &count) in self.counts.iter().enumerate() {
-            let end = start + count as usize;
-            if let Some(s) = (start..end).find(|&s| self.omega[s].is_nan()) {
-                return Err(block.fault(k, Undefined { at: self.points.get(s) }));
-            }
-            let touched = self.omega[start..end].iter().any(|&w| w >= 0.0);
-            self.touched[k] |= touched;
-            any |= touched;
-            start = end;
-        }
-        Ok(any)
     }
 }
 

@@ -1,8 +1,11 @@
 //! One path against one field: where it first meets the obstacle, and the way out for a point inside.
 //!
-//! The field is only sampled. A part of an obstacle that a path crosses between two samples is not seen: the
-//! `resolution` is the thinnest wall that surely holds. A swept query with guarantees can replace
-//! [`first_contact`] without any other change.
+//! The field finds the meeting itself ([`Field::first_entry`]): for compiled solids it is proven that no wall is passed,
+//! however thin; a closure, of whose range nothing is known, is sampled, and its `resolution` is the thinnest wall that
+//! surely holds.
+//!
+//! A particle stops a little before the surface, so that its next path does not begin within the rounding errors of
+//! the obstacle's formula.
 //!
 //! Invariant: a point returned here is in the fluid (ω < 0, strictly) and no division is by an unguarded |∇ω|.
 //! ω = 0 counts as contact: an obstacle that stands on the container's floor has ω = 0 all over its
@@ -10,23 +13,25 @@
 
 use glam::DVec3;
 
-use crate::field::Field;
-
-/// Samples of one path at most; only a runaway particle needs more.
-const MAX_SAMPLES: f64 = 4096.0;
+use crate::field::{Entry, Field, Normals, Path, last_outside};
 
 /// A bracket shorter than this part of the coordinates' size is a point.
 const POINT: f64 = 4.0 * f64::EPSILON;
+
+/// Stretches of a path in which the field cannot say whether it is met, and samples say that it is not.
+const MOST_DOUBTS: usize = 16;
 
 /// Where a path meets an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Part of the path before the contact, 0 to 1.
     pub fraction: f64,
-    /// The last point of the path in the fluid: on the surface to rounding, with ω < 0.
+    /// A point of the path in the fluid (ω < 0), the clearance away from the surface, or its beginning.
     pub point: DVec3,
-    /// Outward unit normal there.
+    /// Outward unit normal there; at edges and corners that of the faces that meet.
     pub normal: DVec3,
+    /// All of those faces; none where the gradient vanishes.
+    pub faces: Normals,
 }
 
 /// The field has no finite value or gradient at a point.
@@ -35,47 +40,85 @@ pub struct Undefined {
     pub at: DVec3,
 }
 
-/// Number of samples after the start that a path of this length needs.
-pub(super) fn samples(length: f64, resolution: f64) -> usize {
-    (length / resolution).ceil().clamp(1.0, MAX_SAMPLES) as usize
-}
-
-/// First contact of the path `from → to`, sampled every `resolution` metres; `from` lies in the fluid.
+/// First contact of a path that begins in the fluid; the contact's point is `clearance` metres before the surface,
+/// measured along its normal.
 ///
 /// # Errors
-/// [`Undefined`] where a sample of ω is NaN, or ∇ω at the contact is not finite.
-pub fn first_contact(
-    field: &dyn Field,
-    from: DVec3,
-    to: DVec3,
-    resolution: f64,
-) -> Result<Option<Contact>, Undefined> {
-    let count = samples(from.distance(to), resolution);
-    let mut before = (0.0, omega(field, from)?);
-    for k in 1..=count {
-        let t = k as f64 / count as f64;
-        let after = (t, omega(field, from.lerp(to, t))?);
-        if after.1 >= 0.0 {
-            let fraction = last_outside(field, from, to, before, after)?;
-            let point = from.lerp(to, fraction);
-            return Ok(Some(Contact { fraction, point, normal: normal(field, point, from - to)? }));
+/// [`Undefined`] where ω is NaN, or ∇ω at the contact is not finite.
+pub fn first_contact(field: &dyn Field, path: &Path, clearance: f64) -> Result<Option<Contact>, Undefined> {
+    let mut rest = *path;
+    for _ in 0..MOST_DOUBTS {
+        let Some(entry) = field.first_entry(&rest) else {
+            // the field's own value at the end has the last word: it decides whether a particle is inside
+            return match omega(field, path.to)? {
+                w if w < 0.0 => Ok(None),
+                _ => stop(field, path, &Entry::new(path, (1.0, 1.0), true, Normals::default()), clearance)
+                    .map(Some),
+            };
+        };
+        if entry.certain {
+            return stop(field, path, &entry, clearance).map(Some);
         }
-        before = after;
+        if let Some((t, w)) = entry.first_sample_met(field, path).filter(|(t, w)| w.is_nan() || *t > 0.0) {
+            if w.is_nan() {
+                return Err(Undefined { at: path.at(t) });
+            }
+            return stop(field, path, &entry, clearance).map(Some);
+        }
+        if entry.until >= 1.0 {
+            return Ok(None); // its last sample was the end
+        }
+        rest.start = entry.until.next_up();
     }
-    Ok(None)
+    let entry = Entry::new(path, (rest.start, 1.0), true, Normals::default());
+    stop(field, path, &entry, clearance).map(Some)
+}
+
+/// The place to stop before an entry.
+fn stop(field: &dyn Field, path: &Path, entry: &Entry, clearance: f64) -> Result<Contact, Undefined> {
+    let step = path.to - path.from;
+    let normal = match entry.normals.mean() {
+        Some(normal) => normal,
+        None => normal(field, entry.point, -step)?,
+    };
+    let approach = -step.dot(normal);
+    // a path that hardly approaches goes back to its beginning, and loses nothing: the rest of it goes on from there
+    let back = clearance / if approach > 0.0 { approach } else { step.length() };
+    let mut fraction = if back.is_finite() { (entry.t - back).max(0.0) } else { 0.0 };
+    let mut less = POINT * (1.0 + path.from.abs().max(path.to.abs()).max_element() / step.length());
+    while fraction > 0.0 && omega(field, path.at(fraction))? >= 0.0 {
+        fraction = (fraction - less).max(0.0);
+        less *= 4.0;
+    }
+    let fraction = if fraction.is_nan() { 0.0 } else { fraction };
+    let point = if fraction == 0.0 { path.from } else { path.at(fraction) };
+    Ok(Contact { fraction, point, normal, faces: entry.normals })
 }
 
 /// The nearest place in the fluid for a point inside, at most `reach` away: Newton steps of ω/|∇ω| along the
-/// outward normal, or, where the gradient gives no answer, the shortest way along an axis. `None`: no way out.
+/// outward normal, or, where the gradient gives no answer, the shortest way along an axis; then `clearance` farther,
+/// if that is in the fluid. `None`: no way out.
 ///
 /// # Errors
 /// [`Undefined`] where ω is NaN.
-pub fn push_out(field: &dyn Field, inside: DVec3, reach: f64) -> Result<Option<Contact>, Undefined> {
+pub fn push_out(
+    field: &dyn Field,
+    inside: DVec3,
+    reach: f64,
+    clearance: f64,
+) -> Result<Option<Contact>, Undefined> {
     let contact = |from: DVec3, to: DVec3| -> Result<Contact, Undefined> {
         let (outer, inner) = (omega(field, to)?, omega(field, from)?);
-        let fraction = last_outside(field, to, from, (0.0, outer), (1.0, inner))?;
-        let point = to.lerp(from, fraction);
-        Ok(Contact { fraction, point, normal: normal(field, point, to - from)? })
+        let path = Path::new(to, from, f64::INFINITY);
+        let fraction = last_outside(field, &path, (0.0, outer), (1.0, inner));
+        let point = path.at(fraction);
+        let mut faces = Normals::default();
+        let normal = normal(field, point, to - from)?;
+        faces.add(normal);
+        // a little farther, so that the next path does not begin on the surface itself
+        let lifted = point + clearance * normal;
+        let point = if omega(field, lifted)? < 0.0 { lifted } else { point };
+        Ok(Contact { fraction, point, normal, faces })
     };
 
     let mut here = inside;
@@ -109,6 +152,21 @@ pub fn push_out(field: &dyn Field, inside: DVec3, reach: f64) -> Result<Option<C
     Ok(None)
 }
 
+/// A velocity (or a way) turned back by each of several faces that it goes into, one after the other.
+pub(super) fn turn_back(mut velocity: DVec3, contact: &Contact, restitution: f64) -> DVec3 {
+    if contact.faces.len() < 2 {
+        return reflect(velocity, contact.normal, restitution);
+    }
+    for normal in contact.faces.iter() {
+        velocity = reflect(velocity, normal, restitution);
+    }
+    // what the later faces have turned into the earlier ones
+    for normal in contact.faces.iter() {
+        velocity = reflect(velocity, normal, 0.0);
+    }
+    velocity
+}
+
 /// v − (1 + c_R)(v·n)n for a velocity into the obstacle; one that leaves it is kept. The paper prints
 /// (1 − c_R), which for c_R = 1 would let the particle through.
 pub(super) fn reflect(velocity: DVec3, normal: DVec3, restitution: f64) -> DVec3 {
@@ -132,37 +190,6 @@ fn normal(field: &dyn Field, at: DVec3, backward: DVec3) -> Result<DVec3, Undefi
     Ok((-scaled).try_normalize().or_else(|| backward.try_normalize()).unwrap_or(DVec3::Z))
 }
 
-/// Largest known t with ω < 0 on the path, between a sample (t, ω) in the fluid and a later one that is not:
-/// secant steps, every third a bisection.
-fn last_outside(
-    field: &dyn Field,
-    from: DVec3,
-    to: DVec3,
-    (mut low, mut w_low): (f64, f64),
-    (mut high, mut w_high): (f64, f64),
-) -> Result<f64, Undefined> {
-    let size = from.abs().max(to.abs()).max_element();
-    let tolerance = POINT * (size / from.distance(to)).max(1.0);
-    for k in 0..120 {
-        let width = high - low;
-        if width <= tolerance {
-            break;
-        }
-        // nearer to either end than half the tolerance teaches nothing
-        let margin = (0.5 * tolerance / width).min(0.5);
-        let secant = w_low / (w_low - w_high);
-        let part = if k % 3 == 2 || !secant.is_finite() { 0.5 } else { secant.clamp(margin, 1.0 - margin) };
-        let t = low + part * width;
-        let w = omega(field, from.lerp(to, t))?;
-        if w < 0.0 {
-            (low, w_low) = (t, w);
-        } else {
-            (high, w_high) = (t, w);
-        }
-    }
-    Ok(low)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,7 +207,8 @@ mod tests {
     #[test]
     fn contact_with_a_sphere_is_exact_and_outside() {
         let sphere = scenes::sphere(DVec3::ZERO, 1.0);
-        let hit = first_contact(&sphere, DVec3::X * 2.0, DVec3::X * 0.2, 0.1).unwrap().unwrap();
+        let path = Path::new(DVec3::X * 2.0, DVec3::X * 0.2, 0.1);
+        let hit = first_contact(&sphere, &path, 0.0).unwrap().unwrap();
         assert!((hit.point.x - 1.0).abs() < 1e-14 && sphere.omega(hit.point) < 0.0);
         assert!((hit.fraction - 1.0 / 1.8).abs() < 1e-14);
         assert!((hit.normal - DVec3::X).length() < 1e-14);
@@ -192,27 +220,28 @@ mod tests {
             omega: |p: DVec3| 0.005 - p.x.abs(),
             gradient: |p: DVec3| DVec3::new(-p.x.signum(), 0.0, 0.0),
         };
-        let hit = first_contact(&plate, DVec3::X * 0.5, -DVec3::X * 0.5, 0.009).unwrap().unwrap();
-        assert!((hit.point.x - 0.005).abs() < 1e-14);
+        let path = Path::new(DVec3::X * 0.5, -DVec3::X * 0.5, 0.009);
+        let hit = first_contact(&plate, &path, 1e-6).unwrap().unwrap();
+        assert!((hit.point.x - 0.005 - 1e-6).abs() < 1e-14);
     }
 
     #[test]
     fn push_out_finds_the_surface_even_from_the_centre() {
         let sphere = scenes::sphere(DVec3::ONE, 0.5);
         for start in [DVec3::ONE, DVec3::new(1.0, 1.1, 1.0), DVec3::new(1.0, 1.0, 1.499)] {
-            let out = push_out(&sphere, start, 2.0).unwrap().unwrap();
+            let out = push_out(&sphere, start, 2.0, 0.0).unwrap().unwrap();
             assert!((out.point.distance(DVec3::ONE) - 0.5).abs() < 1e-12, "{out:?}");
             assert!(sphere.omega(out.point) < 0.0 && out.normal.is_normalized());
         }
         let everywhere = Closures { omega: |_: DVec3| 1.0, gradient: |_: DVec3| DVec3::ZERO };
-        assert_eq!(push_out(&everywhere, DVec3::ZERO, 2.0), Ok(None));
-        assert_eq!(push_out(&everywhere, DVec3::ZERO, 0.0), Ok(None));
+        assert_eq!(push_out(&everywhere, DVec3::ZERO, 2.0, 0.0), Ok(None));
+        assert_eq!(push_out(&everywhere, DVec3::ZERO, 0.0, 0.0), Ok(None));
     }
 
     #[test]
     fn undefined_fields_are_errors() {
         let hole = Closures { omega: |_: DVec3| f64::NAN, gradient: |_: DVec3| DVec3::NAN };
-        assert!(first_contact(&hole, DVec3::ZERO, DVec3::X, 0.1).is_err());
-        assert!(push_out(&hole, DVec3::ZERO, 1.0).is_err());
+        assert!(first_contact(&hole, &Path::new(DVec3::ZERO, DVec3::X, 0.1), 0.0).is_err());
+        assert!(push_out(&hole, DVec3::ZERO, 1.0, 0.0).is_err());
     }
 }

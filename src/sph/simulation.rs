@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::geom::Aabb;
 
 use super::{
-    boundary::{Boundary, Obstacle, Scratch},
+    boundary::{Boundary, Obstacle},
     density::{find_density, find_pressure},
     forces::{Record, find_accelerations},
     grid::CellGrid,
@@ -25,6 +25,9 @@ use super::{
     particles::{Particles, Vectors},
     stats::{Pass, Stats},
 };
+
+/// Particles stop this part of the support radius before an obstacle.
+const CLEARANCE: f64 = 1e-6;
 
 /// A simulation that cannot be started.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,7 +139,6 @@ struct Buffers {
     target: Vectors,
     predicted: Vectors,
     records: Vec<Record>,
-    collisions: Vec<Scratch>,
 }
 
 impl<'a> Simulation<'a> {
@@ -151,7 +153,9 @@ impl<'a> Simulation<'a> {
         obstacles: Vec<Obstacle<'a>>,
     ) -> Result<Self, SetupError> {
         parameters.validate().map_err(SetupError::Parameter)?;
-        let boundary = Boundary { domain, wall_restitution: parameters.wall_restitution, obstacles };
+        let clearance = CLEARANCE * parameters.support_radius;
+        let boundary =
+            Boundary { domain, wall_restitution: parameters.wall_restitution, obstacles, clearance };
         check_setup(&boundary, &particles)?;
         let mut simulation = Self {
             kernels: Kernels::new(parameters.support_radius),
@@ -258,14 +262,14 @@ impl<'a> Simulation<'a> {
             return Err(self.non_finite(i, Quantity::Position));
         }
         let Particles { position, velocity, .. } = &mut self.particles;
-        self.boundary
-            .collide(position, &mut self.buffers.target, velocity, &mut self.buffers.collisions)
-            .map_err(|fault| StepError::NonFinite {
+        self.boundary.collide(position, &mut self.buffers.target, velocity).map_err(|fault| {
+            StepError::NonFinite {
                 step: self.steps,
                 id: self.particles.id[fault.index],
                 quantity: Quantity::Omega,
                 cause: Cause::FieldUndefined { at: fault.at },
-            })?;
+            }
+        })?;
         std::mem::swap(&mut self.particles.position, &mut self.buffers.target);
         Ok(())
     }

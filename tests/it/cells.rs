@@ -150,6 +150,78 @@ fn leaves_of_one_shape_share_a_program_and_far_cells_need_none() {
     assert!(map.omega(DVec3::NAN).is_nan());
 }
 
+/// Distances of [`Solid::contact`] that are less than the reach are found, by the same surface, and no others.
+#[test]
+fn contacts_are_those_of_the_solid() {
+    let example = |name: &str| {
+        let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
+        Program::from_path(path).unwrap_or_else(|e| panic!("{e}")).solid(name).unwrap()
+    };
+    let reach = 0.05;
+    for (solid, name) in [
+        (solid(&many(500), "many", Engine::Auto), "500 balls"),
+        (example("pawn"), "pawn"),
+        (example("bishop"), "bishop"),
+        (example("cube"), "cube"),
+    ] {
+        let map = CellMap::with_reach(&solid, domain(), reach).unwrap();
+        let mut random = Random(21);
+        let (mut near, mut other) = (0, 0);
+        let mut points = Vec::new();
+        while near < 20_000 {
+            let p = random.point(&domain().grown(0.01));
+            let found = map.contact(p);
+            points.push((p, found));
+            if map.place_of(p) != Place::Near && points.len() % 10 != 0 {
+                continue;
+            }
+            let truth = solid.contact(p);
+            assert_eq!(map.sign(p), solid.sign(p), "{name} at {p}");
+            assert!(found.distance.signum() * solid.sign(p) <= 0.0, "{name} at {p}: {found:?}");
+            if map.place_of(p) == Place::Fluid || map.place_of(p) == Place::Inside {
+                assert_eq!(found.distance.abs(), f64::INFINITY);
+            }
+            if found.distance.is_infinite() && truth.distance.abs() >= reach {
+                continue;
+            }
+            near += 1;
+            // one ulp: the solid's program joins leaves in another order
+            let same = (found.distance - truth.distance).abs() <= 1e-15
+                && (found.normal - truth.normal).length() <= 1e-12
+                && (found.mean_curvature - truth.mean_curvature).abs()
+                    <= 1e-9 * (1.0 + truth.mean_curvature.abs());
+            if !same {
+                // a leaf that has no zero within reach, but whose estimated distance says it has
+                assert!(found.distance.abs() > truth.distance.abs(), "{name} at {p}: {found:?}, {truth:?}");
+                other += 1;
+            }
+        }
+        assert!(other * 1000 <= near, "{name}: {other} of {near} differ");
+        let column = |axis: usize| points.iter().map(|(p, _)| p[axis]).collect::<Vec<f64>>();
+        let (x, y, z) = (column(0), column(1), column(2));
+        let mut columns: [Vec<f64>; 5] = std::array::from_fn(|_| vec![0.0; points.len()]);
+        map.contact_many(Points::new(&x, &y, &z), columns.each_mut().map(|c| &mut c[..]));
+        let mut signs = vec![0.0; points.len()];
+        map.sign_many(Points::new(&x, &y, &z), &mut signs);
+        for (i, (p, found)) in points.iter().enumerate() {
+            assert_eq!((columns[0][i], columns[3][i]), (found.distance, found.normal.z));
+            assert_eq!(signs[i], map.sign(*p), "{name} at {p}");
+        }
+    }
+}
+
+#[test]
+fn no_scene_makes_a_map_explode() {
+    // 3000 spheres on one another: no cell at the surface can drop any of them
+    let text = "rfm 1\nsolid s = any i in 0..3000: sphere(1 + i*1e-9)";
+    let s = solid(text, "s", Engine::Auto);
+    let map = CellMap::new(&s, Aabb::new(DVec3::splat(-1.1), DVec3::splat(1.1))).unwrap();
+    let stats = map.stats();
+    assert!(stats.leaves_in_cells < 1 << 24, "{stats:?}");
+    assert_eq!((map.place_of(DVec3::ZERO), map.place_of(DVec3::ONE)), (Place::Inside, Place::Fluid));
+    assert_eq!((map.sign(DVec3::X * 1.01), map.sign(DVec3::X * 0.99)), (-1.0, 1.0));
+}
+
 #[test]
 fn surfaces_that_lie_on_one_another_do_not_divide_cells_for_ever() {
     let text = "rfm 1\nsolid s = any i in 0..30: sphere(1 + i*1e-9)";

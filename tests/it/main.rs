@@ -13,5 +13,7 @@ mod numbers;
 mod pipeline;
 mod properties;
 mod ranges;
+mod sweep;
 mod tidy;
 mod tool;
+mod walls;

@@ -16,7 +16,8 @@ use crate::{Program, Solid};
 /// Particles start at least this part of the spacing away from an obstacle.
 const CLEARANCE: f64 = 0.5;
 
-/// Obstacles are watched along a particle's path in steps of this part of the support radius.
+/// Obstacles of which no range is known would be sampled in steps of this part of the support radius; compiled ones
+/// are swept.
 const PATH_RESOLUTION: f64 = 0.05;
 
 pub(super) struct Setup {

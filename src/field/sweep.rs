@@ -1,0 +1,299 @@
+//! The first meeting of a straight path with an obstacle, for fields that know their range and for those that do not.
+//!
+//! Invariant: where a field knows its range, nothing of the path before an [`Entry`] touches the obstacle, and a path
+//! without one does not touch it at all. A field that knows nothing is sampled, and what lies between two samples is
+//! not seen.
+
+use glam::DVec3;
+
+use super::Field;
+use crate::geom::Aabb;
+use crate::interval::Interval;
+
+/// A straight path, passed from t = 0 to t = 1, and how closely it is to be looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Path {
+    /// The place at t = 0.
+    pub from: DVec3,
+    /// The place at t = 1.
+    pub to: DVec3,
+    /// Where the search begins, 0 to 1; what lies before is not looked at.
+    pub start: f64,
+    /// Distance of samples, in the scene's unit of length, for fields that know nothing of their range: the thinnest
+    /// part that they surely show. Others do not need it.
+    pub resolution: f64,
+}
+
+/// Where a path first meets an obstacle; ω = 0 counts as met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// Part of the path before it, 0 to 1.
+    pub t: f64,
+    /// Between `t` and this the path may be in the obstacle; after it there is a part that is not.
+    pub until: f64,
+    /// Whether a point between is surely not in the fluid. Otherwise the path grazes the surface within the rounding
+    /// errors of the formula, or the search has spent its budget.
+    pub certain: bool,
+    /// The place at `t`.
+    pub point: DVec3,
+    /// Outward unit normals of the surfaces that decide there.
+    pub normals: Normals,
+}
+
+/// Up to four different unit normals: one on a face, several at edges and corners, none where the gradient vanishes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Normals {
+    count: usize,
+    list: [DVec3; 4],
+}
+
+/// Samples of one path at most; only a runaway needs more.
+const MOST_SAMPLES: f64 = 4096.0;
+
+/// Parts of a path shorter than this are not divided further.
+const SHORTEST: f64 = 1e-9;
+
+/// Ranges asked for on one path at most; what is then undecided is said to be so.
+const MOST_RANGES: usize = 2_000;
+
+/// A bracket shorter than this part of the coordinates' size is a point.
+const POINT: f64 = 4.0 * f64::EPSILON;
+
+impl Path {
+    /// A whole path; `resolution` as for [`Path::resolution`].
+    pub fn new(from: DVec3, to: DVec3, resolution: f64) -> Self {
+        Self { from, to, start: 0.0, resolution }
+    }
+
+    /// The place at a part t of the path.
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.from.lerp(self.to, t)
+    }
+
+    /// The box around the part of the path between t0 and t1.
+    pub fn hull(&self, t0: f64, t1: f64) -> Aabb {
+        let (a, b) = (self.at(t0), self.at(t1));
+        let whole = Aabb::new(a.min(b), a.max(b));
+        if t0 == 0.0 && t1 == 1.0 {
+            return whole;
+        }
+        // the ends are rounded
+        whole.grown(POINT * a.abs().max(b.abs()).max_element())
+    }
+
+    /// Places after t0 up to t1 at which to look when nothing is known.
+    fn samples(&self, t0: f64, t1: f64) -> impl Iterator<Item = f64> + use<> {
+        let parts = (self.from.distance(self.to) * (t1 - t0) / self.resolution).ceil();
+        // NaN becomes 0, and then 1
+        let count = (parts.clamp(1.0, MOST_SAMPLES) as usize).max(1);
+        (1..=count).map(move |k| if k == count { t1 } else { t0 + (t1 - t0) * (k as f64 / count as f64) })
+    }
+}
+
+impl Entry {
+    /// An entry between t and `until`, with the normals at t.
+    pub fn new(path: &Path, (t, until): (f64, f64), certain: bool, normals: Normals) -> Self {
+        Self { t, until, certain, point: path.at(t), normals }
+    }
+
+    /// Looks at ω itself where the entry is uncertain: the first sample between `t` and `until` that is not in the
+    /// fluid, NaN included.
+    pub fn first_sample_met<F: Field + ?Sized>(&self, field: &F, path: &Path) -> Option<(f64, f64)> {
+        let middle = 0.5 * (self.t + self.until);
+        let look = |t: f64| {
+            let w = field.omega(path.at(t));
+            (w >= 0.0 || w.is_nan()).then_some((t, w))
+        };
+        look(self.t)
+            .or_else(|| path.samples(self.t, middle).chain(path.samples(middle, self.until)).find_map(look))
+    }
+}
+
+impl Normals {
+    /// Adds a direction unless it is known, has no length, or there are four.
+    pub fn add(&mut self, direction: DVec3) {
+        // scaled first, so that neither a tiny nor a huge gradient is lost in its square
+        let scaled = direction / direction.abs().max_element();
+        if let Some(normal) = scaled.try_normalize()
+            && self.count < self.list.len()
+            && !self.iter().any(|known| known.dot(normal) > 1.0 - 1e-12)
+        {
+            self.list[self.count] = normal;
+            self.count += 1;
+        }
+    }
+
+    /// The normals, in the order in which they were found.
+    pub fn iter(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.list[..self.count].iter().copied()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The direction between them; nothing if there are none, or opposite ones.
+    pub fn mean(&self) -> Option<DVec3> {
+        let sum: DVec3 = self.iter().sum();
+        // opposite normals leave rounding errors, which have no direction
+        if sum.length() > 1e-9 { sum.try_normalize() } else { None }
+    }
+}
+
+/// The first entry found by a field's ranges, or by samples if it has none: what [`Field::first_entry`] does unless a
+/// field knows better.
+pub fn search_path<F: Field + ?Sized>(field: &F, path: &Path) -> Option<Entry> {
+    let knows = |t0, t1| field.range(&path.hull(t0, t1)) != Interval::ALL;
+    let found = if knows(path.start, 1.0) || knows(path.start, path.start) {
+        by_ranges(field, path)
+    } else {
+        by_samples(field, path)
+    };
+    found.map(|(stretch, certain)| {
+        let mut normals = Normals::default();
+        normals.add(-field.omega_grad(path.at(stretch.0)).1);
+        Entry::new(path, stretch, certain, normals)
+    })
+}
+
+/// Halves the path, the earlier half first, until a range proves a part to be in the fluid or it is too short to be
+/// divided; parts that cannot be decided and follow one another are one.
+fn by_ranges<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), bool)> {
+    let mut stack = vec![(path.start, 1.0)];
+    let mut left = MOST_RANGES;
+    let mut open: Option<(f64, f64)> = None;
+    while let Some((t0, t1)) = stack.pop() {
+        let range = field.range(&path.hull(t0, t1));
+        if range.hi < 0.0 {
+            if open.is_some() {
+                break;
+            }
+            continue;
+        }
+        left = left.saturating_sub(1);
+        if left == 0 {
+            return Some(((open.map_or(t0, |o| o.0), 1.0), false));
+        }
+        if range.lo >= 0.0 && range != Interval::ALL {
+            return Some(((open.map_or(t0, |o| o.0), t1), true));
+        }
+        if t1 - t0 > SHORTEST {
+            let middle = 0.5 * (t0 + t1);
+            stack.extend([(middle, t1), (t0, middle)]);
+        } else {
+            let begin = open.map_or(t0, |o| o.0);
+            if field.omega(path.at(t1)) >= 0.0 {
+                return Some(((begin, t1), true));
+            }
+            open = Some((begin, t1));
+        }
+    }
+    open.map(|stretch| (stretch, false))
+}
+
+/// The first sample that is not in the fluid, and the last place before it that is.
+fn by_samples<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), bool)> {
+    let start = field.omega(path.at(path.start));
+    if start >= 0.0 || start.is_nan() {
+        return Some(((path.start, path.start), start >= 0.0));
+    }
+    let mut before = (path.start, start);
+    for t in path.samples(path.start, 1.0) {
+        let after = (t, field.omega(path.at(t)));
+        if after.1.is_nan() {
+            return Some(((before.0, t), false));
+        }
+        if after.1 >= 0.0 {
+            return Some(((last_outside(field, path, before, after), t), true));
+        }
+        before = after;
+    }
+    None
+}
+
+/// Largest known t with ω < 0 on a path, between one (t, ω) in the fluid and a later one that is not: secant steps,
+/// every third a bisection.
+pub fn last_outside<F: Field + ?Sized>(
+    field: &F,
+    path: &Path,
+    (mut low, mut w_low): (f64, f64),
+    (mut high, mut w_high): (f64, f64),
+) -> f64 {
+    let size = path.from.abs().max(path.to.abs()).max_element();
+    let tolerance = POINT * (size / path.from.distance(path.to)).max(1.0);
+    for k in 0..120 {
+        let width = high - low;
+        if width <= tolerance {
+            break;
+        }
+        // nearer to either end than half the tolerance teaches nothing
+        let margin = (0.5 * tolerance / width).min(0.5);
+        let secant = w_low / (w_low - w_high);
+        let part = if k % 3 == 2 || !secant.is_finite() { 0.5 } else { secant.clamp(margin, 1.0 - margin) };
+        let t = low + part * width;
+        let w = field.omega(path.at(t));
+        if w < 0.0 {
+            (low, w_low) = (t, w);
+        } else {
+            (high, w_high) = (t, w); // NaN is not in the fluid
+        }
+    }
+    low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Closures;
+
+    /// A ball of radius 1 whose range is known from the distance of the box's centre.
+    struct Ball;
+
+    impl Field for Ball {
+        fn omega(&self, p: DVec3) -> f64 {
+            1.0 - p.length()
+        }
+
+        fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+            (self.omega(p), -p.normalize_or_zero())
+        }
+
+        fn range(&self, over: &Aabb) -> Interval {
+            let (middle, reach) = (self.omega(over.centre()), 0.5 * over.size().length() + 1e-15);
+            Interval::new(middle - reach, middle + reach)
+        }
+    }
+
+    #[test]
+    fn ranges_find_what_samples_miss() {
+        let path = |y: f64| Path::new(DVec3::new(-2.0, y, 0.0), DVec3::new(2.0, y, 0.0), 10.0);
+        let hit = Ball.first_entry(&path(0.6)).unwrap();
+        assert!(hit.certain && (hit.t - 0.3).abs() < 1e-8, "{hit:?}");
+        assert!((hit.normals.mean().unwrap() - DVec3::new(-0.8, 0.6, 0.0)).length() < 1e-7);
+        assert_eq!(Ball.first_entry(&path(1.001)), None);
+        let closures =
+            Closures { omega: |p: DVec3| Ball.omega(p), gradient: |p: DVec3| Ball.omega_grad(p).1 };
+        assert_eq!(closures.first_entry(&path(0.6)), None);
+        let closely = Path { resolution: 0.1, ..path(0.6) };
+        let hit = closures.first_entry(&closely).unwrap();
+        assert!((hit.t - 0.3).abs() < 1e-14 && hit.certain && Ball.omega(hit.point) < 0.0, "{hit:?}");
+    }
+
+    #[test]
+    fn normals_are_different_and_few() {
+        let mut normals = Normals::default();
+        for direction in [DVec3::X, 1e-200 * DVec3::X, DVec3::ZERO, DVec3::NAN, 1e200 * DVec3::Y] {
+            normals.add(direction);
+        }
+        assert_eq!(normals.iter().collect::<Vec<_>>(), [DVec3::X, DVec3::Y]);
+        normals.add(-DVec3::X);
+        normals.add(-DVec3::Y);
+        assert!(normals.mean().is_none() && normals.len() == 4);
+    }
+}
