@@ -5,7 +5,7 @@ use std::path::Path;
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
 use crate::Program;
-use crate::codegen::{Form, Listing, Precision, Request, Shape, target_description};
+use crate::codegen::{Form, Forms, Listing, Precision, Request, Shape, target_description};
 use crate::diagnostic::{explain, nearest};
 use crate::ir::dump;
 use crate::lower::NamedSolid;
@@ -89,7 +89,7 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
                 outputs,
                 precision: Precision::F64,
                 shape: Shape::Batch,
-                form: Form::Stable,
+                forms: &Forms::all(Form::Stable),
                 parameters: false,
             };
             let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;

@@ -25,6 +25,7 @@ pub use memory::Code;
 pub use range::{REACH as RANGE_REACH, supports as range_is_supported};
 pub use translate::{Listing, compile};
 
+pub use crate::ir::{Form, Forms};
 use crate::ir::{Graph, Node};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -45,18 +46,6 @@ pub enum Shape {
     Range,
 }
 
-/// How R₀ is evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Form {
-    /// Half-angle form: ≤ 2 ulp, exact sign for all finite operands, finite gradient at corners.
-    #[default]
-    Stable,
-    /// u + v ∓ √(u² + v²) as written: cheapest, loses digits and at worst the sign where operands cancel.
-    Textbook,
-    /// The stable form on m/M: neither overflows nor underflows before its result does; one more division.
-    Scaled,
-}
-
 /// What is to be compiled.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
@@ -64,7 +53,7 @@ pub struct Request<'a> {
     pub outputs: &'a [Node],
     pub precision: Precision,
     pub shape: Shape,
-    pub form: Form,
+    pub forms: &'a Forms,
     /// Whether the function takes one more argument, a pointer to the parameters of the graph.
     pub parameters: bool,
 }

@@ -14,7 +14,7 @@ use cranelift_frontend::FunctionBuilder;
 use glam::DVec3;
 
 use super::emit::Emitter;
-use super::{Form, Precision, Request};
+use super::{Precision, Request};
 use crate::geom::Aabb;
 use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeStep, Unary};
 
@@ -48,7 +48,7 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>) {
     builder.switch_to_block(block);
     builder.seal_block(block);
     let (input, output) = (builder.block_params(block)[0], builder.block_params(block)[1]);
-    let emitter = Emitter::new(builder, Precision::F64, Form::Scaled, request.graph);
+    let emitter = Emitter::new(builder, Precision::F64, request.forms, request.graph);
     let mut ranges = Ranges { emitter };
     let axes: [Value; 3] = std::array::from_fn(|i| {
         let pair = ranges.emitter.builder.ins().load(types::F64X2, MemFlagsData::new(), input, 16 * i as i32);

@@ -189,8 +189,8 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
         }
         Binary::Min | Binary::PlainMin => a.min(b),
         Binary::Max | Binary::PlainMax => a.max(b),
-        Binary::And => Interval::new(r0::and_scaled(a.lo, b.lo), r0::and_scaled(a.hi, b.hi)).widened(4),
-        Binary::Or => Interval::new(r0::or_scaled(a.lo, b.lo), r0::or_scaled(a.hi, b.hi)).widened(4),
+        Binary::And => Interval::new(r0::and_of_bounds(a.lo, b.lo), r0::and_of_bounds(a.hi, b.hi)).widened(4),
+        Binary::Or => Interval::new(r0::or_of_bounds(a.lo, b.lo), r0::or_of_bounds(a.hi, b.hi)).widened(4),
         Binary::MinWeight | Binary::MaxWeight => Interval { lo: 0.0, hi: 1.0 },
         Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() },
         Binary::Atan2 => Interval::new(-std::f64::consts::PI, std::f64::consts::PI).widened(1),

@@ -2,7 +2,7 @@
 //!
 //! Everything unsafe about a call is checked here first: the number of outputs, the lengths of the columns.
 
-use crate::codegen::{self, Code, CodegenError, Form, Precision, Request, Shape};
+use crate::codegen::{self, Code, CodegenError, Form, Forms, Precision, Request, Shape};
 use crate::ir::{Graph, Interpreter, Node, Real};
 
 use glam::DVec3;
@@ -65,9 +65,9 @@ pub struct PointProgram<T> {
 impl<T: Lane> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
-    pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
+    pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
         let request =
-            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point, form, parameters: false };
+            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point, forms, parameters: false };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -102,9 +102,9 @@ pub struct BatchProgram<T> {
 impl<T: Lane> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
-    pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
+    pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
         let request =
-            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch, form, parameters: false };
+            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch, forms, parameters: false };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -173,8 +173,8 @@ impl RangeProgram {
         if !codegen::range_is_supported(graph, root) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        let (precision, shape, form) = (Precision::F64, Shape::Range, Form::Scaled);
-        let request = Request { graph, outputs: &[root], precision, shape, form, parameters: false };
+        let (precision, shape, forms) = (Precision::F64, Shape::Range, &Forms::all(Form::Scaled));
+        let request = Request { graph, outputs: &[root], precision, shape, forms, parameters: false };
         Ok(Self { code: codegen::compile(request)? })
     }
 
@@ -213,8 +213,8 @@ impl LeafProgram {
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], parameters: usize) -> Result<Self, CodegenError> {
         let compile = |shape| {
-            let (precision, form) = (Precision::F64, Form::Stable);
-            codegen::compile(Request { graph, outputs, precision, shape, form, parameters: true })
+            let (precision, forms) = (Precision::F64, &Forms::all(Form::Stable));
+            codegen::compile(Request { graph, outputs, precision, shape, forms, parameters: true })
         };
         Ok(Self { point: compile(Shape::Point)?, batch: compile(Shape::Batch)?, parameters })
     }

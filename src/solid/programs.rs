@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 
 use super::compiled::{BatchProgram, Lane, PointProgram};
-use crate::codegen::{CodegenError, Form};
-use crate::ir::{Axis, Binary, Graph, Interpreter, Node, Unary};
+use crate::codegen::{CodegenError, Form, Forms, Precision};
+use crate::ir::{Axis, Binary, FloatType, Graph, Growth, Interpreter, Node, Unary};
 
 /// What evaluates a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,6 +42,15 @@ pub enum Guard {
     FarAway,
 }
 
+/// The forms of `f64` and of `f32`: the stable one gives way to the scaled one where squares may leave the range.
+fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
+    if form != Form::Stable {
+        return [Forms::all(form), Forms::all(form)];
+    }
+    let growth = Growth::within_reach(graph);
+    [FloatType::F64, FloatType::F32].map(|float| growth.forms(graph, form, float))
+}
+
 type Slot<P> = OnceLock<Result<P, CodegenError>>;
 
 /// The compiled programs of one precision.
@@ -60,8 +69,8 @@ impl<T> Compiled<T> {
 pub struct Programs {
     pub graph: Graph,
     pub outputs: Vec<Node>,
-    /// Of machine code; the interpreter always uses the stable form.
-    form: Form,
+    /// Of R₀ in `f64` and in `f32`.
+    forms: [Forms; 2],
     pub interpreter: Interpreter,
     pub double: Compiled<f64>,
     pub single: Compiled<f32>,
@@ -86,21 +95,30 @@ impl Programs {
         let guard = graph.binary(Binary::Sub, size, size); // 0, or NaN
         let outputs: Vec<Node> =
             outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect();
-        let interpreter = Interpreter::new(&graph, &outputs);
-        Self { graph, outputs, form, interpreter, double: Compiled::new(), single: Compiled::new() }
+        let forms = forms(&graph, form);
+        let interpreter = Interpreter::with_forms(&graph, &outputs, forms.each_ref());
+        Self { graph, outputs, forms, interpreter, double: Compiled::new(), single: Compiled::new() }
+    }
+
+    /// The forms of R₀ in one precision.
+    pub fn forms<T: Lane>(&self) -> &Forms {
+        match T::PRECISION {
+            Precision::F64 => &self.forms[0],
+            Precision::F32 => &self.forms[1],
+        }
     }
 
     #[inline]
     fn point_program<T: Lane>(&self) -> Result<&PointProgram<T>, CodegenError> {
         let slot = &T::compiled(self).point;
-        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs, self.form))
+        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs, self.forms::<T>()))
             .as_ref()
             .map_err(Clone::clone)
     }
 
     fn batch_program<T: Lane>(&self) -> Result<&BatchProgram<T>, CodegenError> {
         let slot = &T::compiled(self).batch;
-        slot.get_or_init(|| BatchProgram::compile(&self.graph, &self.outputs, self.form))
+        slot.get_or_init(|| BatchProgram::compile(&self.graph, &self.outputs, self.forms::<T>()))
             .as_ref()
             .map_err(Clone::clone)
     }
