@@ -5,7 +5,7 @@ use std::path::Path;
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
 use crate::Program;
-use crate::codegen::{Form, Forms, Listing, Precision, Request, Shape, target_description};
+use crate::codegen::{Listing, Precision, Request, Shape, target_description};
 use crate::diagnostic::{explain, nearest};
 use crate::ir::dump;
 use crate::lower::NamedSolid;
@@ -82,14 +82,14 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
         say!("ω and ∇ω:\n{}", dump(gradient, &roots, program.sources()));
     }
     if show.contains(&Stage::Clif) || show.contains(&Stage::Asm) {
-        for (title, graph, outputs) in [("ω", value, value_outputs), ("ω and ∇ω", gradient, gradient_outputs)]
-        {
+        for (title, kind) in [("ω", ProgramKind::Value), ("ω and ∇ω", ProgramKind::Gradient)] {
+            let (graph, outputs) = solid.graph(kind);
             let request = Request {
                 graph,
                 outputs,
                 precision: Precision::F64,
                 shape: Shape::Batch,
-                forms: &Forms::all(Form::Stable),
+                forms: solid.forms(kind, Precision::F64),
                 parameters: false,
             };
             let listing = Listing::of(request).map_err(|e| Failure::usage(e.to_string()))?;

@@ -22,7 +22,7 @@ pub use cell_map::{CellMap, CellStats, Place};
 pub use compiled::{BatchProgram, Lane, PointProgram, RangeProgram};
 pub use programs::{Engine, ProgramKind};
 
-use crate::codegen::{CodegenError, Form};
+use crate::codegen::{CodegenError, Form, Forms, Precision};
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -161,6 +161,16 @@ impl Solid {
     pub fn graph(&self, kind: ProgramKind) -> (&Graph, &[Node]) {
         let programs = self.programs(kind);
         (&programs.graph, &programs.outputs)
+    }
+
+    /// ω as one expression: the simplified graph without the guards of its programs.
+    pub fn formula(&self) -> (&Graph, Node) {
+        (&self.inner.omega.graph, self.inner.omega.root)
+    }
+
+    /// The forms in which the programs of one kind evaluate R₀.
+    pub fn forms(&self, kind: ProgramKind, precision: Precision) -> &Forms {
+        self.programs(kind).forms(precision)
     }
 
     /// How often each simplification rule was applied.

@@ -101,8 +101,8 @@ impl Programs {
     }
 
     /// The forms of R₀ in one precision.
-    pub fn forms<T: Lane>(&self) -> &Forms {
-        match T::PRECISION {
+    pub fn forms(&self, precision: Precision) -> &Forms {
+        match precision {
             Precision::F64 => &self.forms[0],
             Precision::F32 => &self.forms[1],
         }
@@ -111,14 +111,14 @@ impl Programs {
     #[inline]
     fn point_program<T: Lane>(&self) -> Result<&PointProgram<T>, CodegenError> {
         let slot = &T::compiled(self).point;
-        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs, self.forms::<T>()))
+        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION)))
             .as_ref()
             .map_err(Clone::clone)
     }
 
     fn batch_program<T: Lane>(&self) -> Result<&BatchProgram<T>, CodegenError> {
         let slot = &T::compiled(self).batch;
-        slot.get_or_init(|| BatchProgram::compile(&self.graph, &self.outputs, self.forms::<T>()))
+        slot.get_or_init(|| BatchProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION)))
             .as_ref()
             .map_err(Clone::clone)
     }

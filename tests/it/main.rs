@@ -3,6 +3,7 @@
 mod agreement;
 mod bad_input;
 mod cells;
+mod certificates;
 mod cli;
 mod contact;
 mod diagnostics;
