@@ -6,6 +6,7 @@
 //! only when it is first asked for.
 
 mod bounds;
+mod budget;
 mod cell_map;
 mod compiled;
 mod leaf;
@@ -18,6 +19,7 @@ use std::sync::OnceLock;
 use glam::{DVec3, Vec3};
 
 pub use bounds::Bounds;
+pub use budget::{Chosen, OutOfBudget, Plan};
 pub use cell_map::{CellMap, CellStats, Place};
 pub use compiled::{BatchProgram, Lane, PointProgram, RangeProgram};
 pub use programs::{Engine, ProgramKind};

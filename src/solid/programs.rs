@@ -77,7 +77,13 @@ pub struct Programs {
 }
 
 impl Programs {
-    pub fn new(mut graph: Graph, outputs: Vec<Node>, guard: Guard, form: Form) -> Self {
+    pub fn new(graph: Graph, outputs: Vec<Node>, guard: Guard, form: Form) -> Self {
+        let forms = forms(&graph, form);
+        Self::with_forms(graph, outputs, guard, forms)
+    }
+
+    /// With the forms of R₀ in `f64` and in `f32`.
+    pub fn with_forms(mut graph: Graph, outputs: Vec<Node>, guard: Guard, forms: [Forms; 2]) -> Self {
         let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
         let sum = |graph: &mut Graph, [x, y, z]: [Node; 3]| {
             let sum = graph.binary(Binary::Add, x, y);
@@ -95,7 +101,6 @@ impl Programs {
         let guard = graph.binary(Binary::Sub, size, size); // 0, or NaN
         let outputs: Vec<Node> =
             outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect();
-        let forms = forms(&graph, form);
         let interpreter = Interpreter::with_forms(&graph, &outputs, forms.each_ref());
         Self { graph, outputs, forms, interpreter, double: Compiled::new(), single: Compiled::new() }
     }
