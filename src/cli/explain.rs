@@ -74,6 +74,16 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     for (equation, count) in rules {
         say!("  simplified {count:>4} ×  {equation}");
     }
+    for (precision, name) in [(Precision::F64, "f64"), (Precision::F32, "f32")] {
+        let scaled = solid.forms(ProgramKind::Value, precision).exceptions();
+        if scaled > 0 {
+            say!("  scaled: {scaled} operations in {name}, where squares may leave the range");
+        }
+    }
+    if let Some(chosen) = choose::within_tolerance(program, &solid)? {
+        let over = chosen.over();
+        say!("  values of ω: {}, to {:.1e} in {:.3} … {:.3}", chosen.plan().name(), chosen.bound(), over.min, over.max);
+    }
     say!("  target: {}", target_description());
     if show.contains(&Stage::Ir) {
         say!("\nω:\n{}", dump(value, &[("omega", value_outputs[0])], program.sources()));

@@ -113,12 +113,10 @@ impl Solid {
                 return Ok(Chosen { solid: self.clone(), plan, over, bound, candidate });
             }
         }
-        let best = |best: OutOfBudget, plan| {
-            let bound = self.error_bound(plan, &over);
-            if bound < best.bound { OutOfBudget { bound, plan } } else { best }
-        };
-        let none = OutOfBudget { bound: f64::INFINITY, plan: Plan::STANDARD };
-        Err(Plan::BY_COST.into_iter().rev().take(2).fold(none, best))
+        let [.., dearest] = Plan::BY_COST;
+        let [standard, scaled] = [Plan::STANDARD, dearest]
+            .map(|plan| OutOfBudget { bound: self.error_bound(plan, &over), plan });
+        Err(if scaled.bound < standard.bound { scaled } else { standard })
     }
 
     /// A certified bound of |computed ω − exact ω| of one program over a box; infinite where there is none.
@@ -136,7 +134,8 @@ impl Candidate {
         let (graph, root) =
             if plan.local { ir::localised(graph, root, origin) } else { (graph.clone(), root) };
         let over = if plan.local { shifted(over, origin) } else { *over };
-        let forms = if plan == Plan::STANDARD {
+        // the solid's own program, unless it was compiled in another form for comparison
+        let forms = if plan == Plan::STANDARD && solid.inner.omega.form == Form::Stable {
             solid.inner.omega.value.forms(Precision::F64).clone()
         } else {
             Growth::over(&graph, &over).forms(&graph, plan.form, float)
@@ -150,7 +149,9 @@ impl Candidate {
     }
 
     fn certify(&self, enough: f64) -> f64 {
-        if !self.over.is_finite() || self.over.is_empty() {
+        // programs add the coordinates up to see whether they are finite
+        let reach = self.over.min.abs().max(self.over.max.abs()).element_sum();
+        if self.over.is_empty() || !(4.0 * reach < self.float.largest) {
             return f64::INFINITY;
         }
         let arithmetic = Arithmetic { float: self.float, forms: &self.forms, inputs: self.inputs };
@@ -158,7 +159,6 @@ impl Candidate {
     }
 
     fn with_programs(mut self, solid: &Solid, plan: Plan) -> Self {
-        // the solid's own, unless it was compiled in another form for comparison
         if plan != Plan::STANDARD || solid.inner.omega.form != Form::Stable {
             let forms = [self.forms.clone(), self.forms.clone()];
             let programs =

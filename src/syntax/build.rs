@@ -147,7 +147,12 @@ impl Builder {
     fn attribute(&self, pair: Node<'_>) -> Attribute {
         let span = self.span(&pair);
         let mut inner = parts(pair);
-        let name = self.name(inner.next());
+        let Name { text, span: whole } = self.name(inner.next());
+        // without the sign that makes it an attribute
+        let name = Name {
+            text: text.trim_start_matches('@').to_string(),
+            span: Span::new(self.source, whole.range().start + 1, whole.range().end),
+        };
         Attribute { name, arguments: self.arguments(inner.next()), span }
     }
 

@@ -228,7 +228,7 @@ fn expectation(rules: &[Rule]) -> String {
             Rule::close => add("`)`"),
             Rule::close_vector => add("`]`"),
             Rule::open_brace => add("`{`"),
-            Rule::kw_solid if rules.contains(&Rule::attribute) && !may_end => add("`solid`"),
+            Rule::kw_solid if rules.contains(&Rule::attribute_name) && !may_end => add("`solid`"),
             Rule::close_brace => add("`}`"),
             Rule::kw_in if !may_end => add("`in`"),
             Rule::version => add("`rfm 1`"),

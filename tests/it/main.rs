@@ -2,6 +2,7 @@
 
 mod agreement;
 mod bad_input;
+mod budget;
 mod cells;
 mod certificates;
 mod cli;
