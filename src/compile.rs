@@ -241,9 +241,7 @@ impl Program {
                 best.bound,
                 best.plan.name()
             )),
-            Err(_) => {
-                refused(format!("no bound of the error is known in {:.3} … {:.3}", over.min, over.max))
-            },
+            Err(_) => refused(format!("no bound of the error is known in {:.3} … {:.3}", over.min, over.max)),
         }
     }
 

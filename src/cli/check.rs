@@ -392,7 +392,13 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
     Ok(())
 }
 
-fn picture(field: &dyn Field, name: &str, plane: Plane, window: Window, path: &Path) -> Result<Vec<u8>, Failure> {
+fn picture(
+    field: &dyn Field,
+    name: &str,
+    plane: Plane,
+    window: Window,
+    path: &Path,
+) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     let samples = slice::DEFAULT_SAMPLES;
     match output::Picture::of(path)? {

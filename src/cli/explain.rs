@@ -82,7 +82,13 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     }
     if let Some(chosen) = choose::within_tolerance(program, &solid)? {
         let over = chosen.over();
-        say!("  values of ω: {}, to {:.1e} in {:.3} … {:.3}", chosen.plan().name(), chosen.bound(), over.min, over.max);
+        say!(
+            "  values of ω: {}, to {:.1e} in {:.3} … {:.3}",
+            chosen.plan().name(),
+            chosen.bound(),
+            over.min,
+            over.max
+        );
     }
     say!("  target: {}", target_description());
     if show.contains(&Stage::Ir) {

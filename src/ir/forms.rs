@@ -94,7 +94,10 @@ mod tests {
         let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
         let mut forms = Forms::default();
         forms.set(y, x, Form::Scaled);
-        assert_eq!((forms.of(x, y), forms.of(y, x), forms.of(x, z)), (Form::Scaled, Form::Scaled, Form::Stable));
+        assert_eq!(
+            (forms.of(x, y), forms.of(y, x), forms.of(x, z)),
+            (Form::Scaled, Form::Scaled, Form::Stable)
+        );
         forms.set(x, y, Form::Stable);
         assert_eq!(forms, Forms::all(Form::Stable));
     }

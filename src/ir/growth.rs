@@ -84,9 +84,8 @@ impl Growth {
     /// The first operation ∧ or ∨ whose value may leave the range of the type although its operands do not.
     pub fn overflow(&self, graph: &Graph, float: FloatType) -> Option<Node> {
         let fits = |node| self.exponent(node) < float.largest.log2();
-        let found = junctions(graph).find(|&(node, u, v)| {
-            self.exponent(node).is_finite() && !fits(node) && fits(u) && fits(v)
-        });
+        let found = junctions(graph)
+            .find(|&(node, u, v)| self.exponent(node).is_finite() && !fits(node) && fits(u) && fits(v));
         found.map(|(node, ..)| node)
     }
 }

@@ -50,7 +50,7 @@ pub fn localised(graph: &Graph, root: Node, origin: DVec3) -> (Graph, Node) {
         images.insert(node, image);
     }
     let root = written(&mut out, images[&root]);
-    (out, root)
+    out.extract_cone(root) // without the constants that were folded
 }
 
 /// A coordinate with a constant added, taken from one, or negated; nothing if the constant cannot be folded to the

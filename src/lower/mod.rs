@@ -251,7 +251,9 @@ impl<'a> Lowering<'a> {
                 let message = format!("unknown attribute `@{}`", name.text);
                 let diagnostic = Diagnostic::error(Code::ATTRIBUTE, name.span, message);
                 self.report(
-                    diagnostic.help(format!("attributes are @{}", KNOWN.join(", @"))).suggest(&name.text, KNOWN),
+                    diagnostic
+                        .help(format!("attributes are @{}", KNOWN.join(", @")))
+                        .suggest(&name.text, KNOWN),
                 );
             } else if let Some(first) = attributes[..i].iter().find(|a| a.name.text == name.text) {
                 let message = format!("`@{}` stands twice", name.text);

@@ -100,8 +100,7 @@ pub struct Run {
     pub save_every: f64,
 }
 
-const SCENE_KEYS: [&str; 8] =
-    ["units", "box", "fluid", "obstacle", "gravity", "method", "run", "tolerance"];
+const SCENE_KEYS: [&str; 8] = ["units", "box", "fluid", "obstacle", "gravity", "method", "run", "tolerance"];
 /// Keys that open a block; all others have a value.
 const BLOCKS: [&str; 4] = ["box", "fluid", "obstacle", "run"];
 const BOX_KEYS: [&str; 3] = ["min", "max", "restitution"];

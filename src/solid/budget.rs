@@ -114,8 +114,8 @@ impl Solid {
             }
         }
         let [.., dearest] = Plan::BY_COST;
-        let [standard, scaled] = [Plan::STANDARD, dearest]
-            .map(|plan| OutOfBudget { bound: self.error_bound(plan, &over), plan });
+        let [standard, scaled] =
+            [Plan::STANDARD, dearest].map(|plan| OutOfBudget { bound: self.error_bound(plan, &over), plan });
         Err(if scaled.bound < standard.bound { scaled } else { standard })
     }
 
@@ -161,8 +161,7 @@ impl Candidate {
     fn with_programs(mut self, solid: &Solid, plan: Plan) -> Self {
         if plan != Plan::STANDARD || solid.inner.omega.form != Form::Stable {
             let forms = [self.forms.clone(), self.forms.clone()];
-            let programs =
-                Programs::with_forms(self.graph.clone(), vec![self.root], Guard::Infinite, forms);
+            let programs = Programs::with_forms(self.graph.clone(), vec![self.root], Guard::Infinite, forms);
             self.programs = Some(programs);
         }
         self

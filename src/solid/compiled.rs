@@ -66,8 +66,14 @@ impl<T: Lane> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
-        let request =
-            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Point, forms, parameters: false };
+        let request = Request {
+            graph,
+            outputs,
+            precision: T::PRECISION,
+            shape: Shape::Point,
+            forms,
+            parameters: false,
+        };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 
@@ -103,8 +109,14 @@ impl<T: Lane> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
-        let request =
-            Request { graph, outputs, precision: T::PRECISION, shape: Shape::Batch, forms, parameters: false };
+        let request = Request {
+            graph,
+            outputs,
+            precision: T::PRECISION,
+            shape: Shape::Batch,
+            forms,
+            parameters: false,
+        };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
     }
 

@@ -8,8 +8,8 @@ use pest::iterators::{Pair, Pairs};
 use std::cell::Cell;
 
 use super::ast::{
-    AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic, MulOp, Name,
-    Param, Parameter, Scene,
+    AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic,
+    MulOp, Name, Param, Parameter, Scene,
 };
 use super::parse::{DEEPEST_TREE, EDITION, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};

@@ -1,7 +1,7 @@
 //! Machine code = interpreter bit for bit, and both = 40-digit arithmetic to a few units in the last place.
 
-use rfm::glam::{DVec3, Vec3};
 use rfm::codegen::Form;
+use rfm::glam::{DVec3, Vec3};
 use rfm::{Engine, Field, Program, Solid};
 
 fn example(name: &str) -> [Solid; 2] {
@@ -117,9 +117,8 @@ fn machine_code_is_the_interpreter() {
     let folds = [Engine::Jit, Engine::Interpreter].map(|engine| fold.solid_with("fold", engine).unwrap());
     let node = source.module().solids[0].node;
     let [textbook, scaled] = [Form::Textbook, Form::Scaled].map(|form| {
-        [Engine::Jit, Engine::Interpreter].map(|engine| {
-            Solid::with_form("everything", &source.module().graph, node, engine, form).unwrap()
-        })
+        [Engine::Jit, Engine::Interpreter]
+            .map(|engine| Solid::with_form("everything", &source.module().graph, node, engine, form).unwrap())
     });
     let pieces = [example("pawn"), example("bishop"), example("cube")];
     for [jit, interpreter] in [everything, textbook, scaled, folds].into_iter().chain(pieces) {

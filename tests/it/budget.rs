@@ -115,7 +115,11 @@ fn nothing_changes_without_a_tolerance() {
 
 #[test]
 fn commands_say_which_program_it_is() {
-    snapshot("cli", "check tolerances", &rfm_reading(root(), &["check", "-"], THREE.as_bytes()).expect(0).transcript());
+    snapshot(
+        "cli",
+        "check tolerances",
+        &rfm_reading(root(), &["check", "-"], THREE.as_bytes()).expect(0).transcript(),
+    );
     let document = rfm_reading(root(), &["check", "--json", "-"], THREE.as_bytes()).expect(0).json();
     let (rough, plain) = (&document["solids"][0], &document["solids"][3]);
     assert_eq!((rough["program"].as_str(), rough["tolerance"].as_f64()), (Some("f32 textbook"), Some(1e-3)));

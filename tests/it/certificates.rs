@@ -4,8 +4,8 @@ use proptest::prelude::*;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::{
-    Arithmetic, Axis, Binary, ErrorAnalysis, FloatType, Form, Forms, Graph, Growth, Inputs, Interpreter, Node,
-    Unary, exact, localised,
+    Arithmetic, Axis, Binary, ErrorAnalysis, FloatType, Form, Forms, Graph, Growth, Inputs, Interpreter,
+    Node, Unary, exact, localised,
 };
 use rfm::{Engine, Program, Solid};
 
@@ -174,8 +174,15 @@ fn certificates_of_ordinary_solids_are_useful() {
                 let p = (over.min + over.size() * at).as_vec3().as_dvec3();
                 attained = attained.max(analysis.bound(&Aabb::new(p, p)));
             }
-            println!("{name} {:.1e} {form:?}: {largest:.1e} of {bound:.1e} {attained:.1e}, {:.1} times", float.unit, bound / largest);
-            assert!(largest <= bound && bound <= 100.0 * largest, "{name} {form:?}: {largest:e} of {bound:e}");
+            println!(
+                "{name} {:.1e} {form:?}: {largest:.1e} of {bound:.1e} {attained:.1e}, {:.1} times",
+                float.unit,
+                bound / largest
+            );
+            assert!(
+                largest <= bound && bound <= 100.0 * largest,
+                "{name} {form:?}: {largest:e} of {bound:e}"
+            );
         }
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! The expected numbers come from 40-digit arithmetic; tolerances are in units of the last place (ulp).
 
-use rfm::glam::{DVec3, Vec3};
 use rfm::codegen::{Form, Forms, Precision};
+use rfm::glam::{DVec3, Vec3};
 use rfm::solid::ProgramKind;
 use rfm::{Engine, Program, Solid};
 
@@ -272,7 +272,8 @@ fn ordinary_solids_need_no_other_form() {
         let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
         Program::from_path(path).unwrap().solid(name).unwrap()
     };
-    let many = Program::from_source("m.rfm", "rfm 1\nsolid s = any i in 0..1000: ball([i, 0, 0], 0.4)").unwrap();
+    let many =
+        Program::from_source("m.rfm", "rfm 1\nsolid s = any i in 0..1000: ball([i, 0, 0], 0.4)").unwrap();
     for solid in [example("pawn"), example("bishop"), example("cube"), many.solid("s").unwrap()] {
         for precision in [Precision::F32, Precision::F64] {
             for kind in [ProgramKind::Value, ProgramKind::Gradient] {
