@@ -29,8 +29,8 @@ impl Plan {
     pub const STANDARD: Self = Self::new(Precision::F64, Form::Stable, false);
 
     /// From the cheapest to the dearest: the order in which they are tried. Twice as many `f32` as `f64` fit into a
-    /// vector, which outweighs the conversion of coordinates; the stable form costs 1.6 times the textbook's, the
-    /// scaled one another division.
+    /// vector, which outweighs the conversion of coordinates; the stable form costs about twice the textbook's,
+    /// the scaled one another division.
     pub const BY_COST: [Self; 6] = [
         Self::new(Precision::F32, Form::Textbook, false),
         Self::new(Precision::F32, Form::Stable, false),
@@ -151,7 +151,8 @@ impl Candidate {
     fn certify(&self, enough: f64) -> f64 {
         // programs add the coordinates up to see whether they are finite
         let reach = self.over.min.abs().max(self.over.max.abs()).element_sum();
-        if self.over.is_empty() || !(4.0 * reach < self.float.largest) {
+        let finite = 4.0 * reach < self.float.largest;
+        if self.over.is_empty() || !finite {
             return f64::INFINITY;
         }
         let arithmetic = Arithmetic { float: self.float, forms: &self.forms, inputs: self.inputs };

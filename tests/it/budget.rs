@@ -137,6 +137,23 @@ fn commands_say_which_program_it_is() {
 }
 
 #[test]
+fn the_report_sets_certificates_beside_measured_errors() {
+    let document = rfm(root(), &["report", "--json", "examples/pawn.rfm"]).expect(0).json();
+    let mut certified = 0;
+    for row in document["rows"].as_array().unwrap() {
+        let bound = row["certified_error"].as_f64();
+        assert_eq!(bound.is_some(), row["program"] == "value", "{row}");
+        if let Some(bound) = bound {
+            let measured = row["max_abs_error"].as_f64().unwrap();
+            assert!(measured <= bound && bound <= 100.0 * measured, "{row}");
+            certified += 1;
+        }
+    }
+    // three forms and the interpreter in two precisions, and single points in three forms
+    assert_eq!(certified, 11);
+}
+
+#[test]
 fn values_are_computed_by_the_chosen_program() {
     let omega = |extra: &[&str]| {
         let arguments = ["eval", "-", "-s", "rough", "--at", "0.1,0.2,0.3", "--what", "value,sign"];

@@ -86,7 +86,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1500))]
+    #![proptest_config(ProptestConfig { cases: 1500, max_global_rejects: 20_000, ..ProptestConfig::default() })]
 
     #[test]
     fn no_error_exceeds_its_certificate(
@@ -97,15 +97,19 @@ proptest! {
         form in prop_oneof![Just(Form::Stable), Just(Form::Textbook), Just(Form::Scaled)],
         inputs in prop_oneof![Just(Inputs::Exact), Just(Inputs::Rounded), Just(Inputs::Shifted)],
         double in any::<bool>(),
+        scale in prop_oneof![6 => Just(1.0), 1 => Just(1e-160), 1 => Just(1e-22), 1 => Just(1e18), 1 => Just(1e150)],
     ) {
+        // the sine of 1e150 takes 120-digit arithmetic too long
+        prop_assume!(scale == 1.0 || steps.iter().all(|step| ![21, 22, 24].contains(&step.0)));
         let (graph, root) = build(&steps);
-        let over = Aabb::new(DVec3::from_array(lo), DVec3::from_array(lo) + DVec3::from_array(size));
+        let lo = scale * DVec3::from_array(lo);
+        let over = Aabb::new(lo, lo + scale * DVec3::from_array(size));
         let inputs = if double { Inputs::Exact } else { inputs };
         let float = if double { FloatType::F64 } else { FloatType::F32 };
         let origin = if inputs == Inputs::Shifted { over.centre() } else { DVec3::ZERO };
         let (program, start) =
             if inputs == Inputs::Shifted { localised(&graph, root, origin) } else { (graph.clone(), root) };
-        let local = Aabb::new(over.min - origin, over.max - origin).grown(1e-12);
+        let local = Aabb::new(over.min - origin, over.max - origin).grown(1e-12 * scale);
         let forms = Growth::over(&program, &local).forms(&program, form, float);
         let analysis = ErrorAnalysis::new(&program, start, Arithmetic { float, forms: &forms, inputs });
         let (whole, divided) = (analysis.bound(&local), analysis.certify(&local, 0.0));
@@ -167,18 +171,6 @@ fn certificates_of_ordinary_solids_are_useful() {
                 let Some(truth) = exact::evaluate(graph, &[root], p.to_array()) else { continue };
                 largest = largest.max(error(&program, float, p, &truth[0]));
             }
-            let mut attained: f64 = 0.0;
-            let analysis = ErrorAnalysis::new(graph, root, arithmetic);
-            for _ in 0..3000 {
-                let at = DVec3::new(random(), random(), random());
-                let p = (over.min + over.size() * at).as_vec3().as_dvec3();
-                attained = attained.max(analysis.bound(&Aabb::new(p, p)));
-            }
-            println!(
-                "{name} {:.1e} {form:?}: {largest:.1e} of {bound:.1e} {attained:.1e}, {:.1} times",
-                float.unit,
-                bound / largest
-            );
             assert!(
                 largest <= bound && bound <= 100.0 * largest,
                 "{name} {form:?}: {largest:e} of {bound:e}"
