@@ -211,7 +211,8 @@ fn solids(
         let operations = solid.graph(ProgramKind::Value).0.len();
         if operations > MOST_MEASURED {
             note(format!("solid `{}` has {operations} operations: it is not measured", named.name));
-            facts.push(Facts::unknown(&solid, file));
+            let tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
+            facts.push(Facts { tolerance, ..Facts::unknown(&solid, file) });
             continue;
         }
         let mut found = measure(&solid, file)?;

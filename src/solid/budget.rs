@@ -28,9 +28,9 @@ impl Plan {
     /// What solids are compiled to when nothing is asked for.
     pub const STANDARD: Self = Self::new(Precision::F64, Form::Stable, false);
 
-    /// From the cheapest to the dearest: the order in which they are tried. Twice as many `f32` as `f64` fit into a
-    /// vector, which outweighs the conversion of coordinates; the stable form costs about twice the textbook's,
-    /// the scaled one another division.
+    /// From the cheapest to the dearest: the order in which they are tried. The pawn's ω in columns of `f64`, conversion
+    /// included: 4.7, 7.5, 7.5, 7.3, 10.9 ns, and scaled another fifth. With more operations to a point the conversion
+    /// weighs less, and the `f32` programs move away from the `f64` ones.
     pub const BY_COST: [Self; 6] = [
         Self::new(Precision::F32, Form::Textbook, false),
         Self::new(Precision::F32, Form::Stable, false),
@@ -99,7 +99,8 @@ struct Candidate {
 const BLOCK: usize = 256;
 
 impl Solid {
-    /// The cheapest program whose certified |computed ω − exact ω| is at most `tolerance` everywhere in a box.
+    /// The cheapest program whose certified |computed ω − exact ω| is at most `tolerance` everywhere in a box. Exact is
+    /// the value of the simplified formula, whose constants are doubles, at the given point, whose coordinates are.
     ///
     /// # Errors
     /// If no program is certified to keep it.

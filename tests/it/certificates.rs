@@ -80,6 +80,14 @@ fn error(program: &Interpreter, float: FloatType, input: DVec3, exact: &exact::E
     }
 }
 
+/// With R₀ in place of all operations that are not of degree 1: between 1e150 and a constant or a square of it even
+/// 120 digits cancel, and its sine takes too long.
+fn homogeneous(steps: &[Step]) -> Vec<Step> {
+    let not_of_degree_one = |op: u8| matches!(op, 4..=7 | 21.. );
+    let replaced = |op| if not_of_degree_one(op) { 8 + op % 8 } else { op };
+    steps.iter().map(|&(op, a, b, c)| (replaced(op), a, b, c)).collect()
+}
+
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let constant = prop_oneof![-3.0..3.0f64, Just(0.0), Just(1.5), Just(-1e-3), Just(40.0)];
     prop::collection::vec((0u8..25, 0usize..6, 0usize..9, constant), 1..24)
@@ -99,8 +107,7 @@ proptest! {
         double in any::<bool>(),
         scale in prop_oneof![6 => Just(1.0), 1 => Just(1e-160), 1 => Just(1e-22), 1 => Just(1e18), 1 => Just(1e150)],
     ) {
-        // the sine of 1e150 takes 120-digit arithmetic too long
-        prop_assume!(scale == 1.0 || steps.iter().all(|step| ![21, 22, 24].contains(&step.0)));
+        let steps = if scale == 1.0 { steps } else { homogeneous(&steps) };
         let (graph, root) = build(&steps);
         let lo = scale * DVec3::from_array(lo);
         let over = Aabb::new(lo, lo + scale * DVec3::from_array(size));

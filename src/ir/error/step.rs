@@ -105,7 +105,15 @@ impl Step<'_> {
     /// The smaller of both bounds; nothing where the range or the type is left.
     fn settled(&self, error: Error) -> Error {
         let largest = magnitude(self.range);
-        let absolute = error.absolute.min(add(mul(error.relative, largest), error.remainder));
+        // after a shift the relative bound is one of the written formula's value, itself within it of the graph's
+        let scale = match self.arithmetic.inputs {
+            Inputs::Shifted if error.relative <= 0.5 => {
+                div(add(largest, error.remainder), (1.0 - error.relative).next_down())
+            }
+            Inputs::Shifted => f64::INFINITY,
+            Inputs::Exact | Inputs::Rounded => largest,
+        };
+        let absolute = error.absolute.min(add(mul(error.relative, scale), error.remainder));
         if add(largest, absolute) < self.arithmetic.float.largest {
             Error { absolute, ..error }
         } else {
@@ -305,7 +313,7 @@ impl Step<'_> {
         let propagated = through_weights(u, v, e.absolute, f.absolute);
         let computed = add(magnitude(self.range), mul(2.0, propagated));
         let (larger, both) = (magnitude(u).max(magnitude(v)), add(magnitude(u), magnitude(v)));
-        let squares_fit = mul(mul(2.0, larger), larger) < self.arithmetic.float.largest;
+        let squares_fit = mul(mul(2.1, larger), larger) < self.arithmetic.float.largest;
         // what squares lose where they underflow, in h and so in the result
         let underflow = mul(4.0, root(tiny));
         let (own, own_relative, own_remainder) = match form {
