@@ -120,7 +120,8 @@ proptest! {
         let forms = Growth::over(&program, &local).forms(&program, form, float);
         let analysis = ErrorAnalysis::new(&program, start, Arithmetic { float, forms: &forms, inputs });
         let (whole, divided) = (analysis.bound(&local), analysis.certify(&local, 0.0));
-        prop_assert!(divided <= whole);
+        // up to the rounding of the bounds themselves
+        prop_assert!(divided <= whole * (1.0 + 1e-9), "{divided:e} {whole:e}");
         prop_assume!(divided.is_finite());
         let interpreter = Interpreter::with_forms(&program, &[start], [&forms, &forms]);
         for p in points(&over, &inside) {

@@ -36,10 +36,12 @@ fn holds_ray(u: Interval, v: Interval, e: f64, f: f64) -> bool {
 fn largest_weight(u: Interval, v: Interval) -> f64 {
     let across = v.abs();
     let v = if u.lo >= 0.0 { across.hi } else { across.lo };
-    let h = (u.lo * u.lo + v * v).sqrt();
+    let plain = (u.lo * u.lo + v * v).sqrt();
+    // squares may leave the range
+    let h = if (1e-140..1e150).contains(&plain) { plain } else { libm::hypot(u.lo, v) };
     let cosine = u.lo / h;
-    // a corner, or squares that leave the range
-    if !cosine.is_finite() || !(1e-140..1e150).contains(&h) {
+    // a corner, an infinite bound
+    if !cosine.is_finite() || !(1e-290..f64::MAX).contains(&h) {
         return 2.0;
     }
     // the cosine and the difference are good to five roundings
