@@ -17,10 +17,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::codegen::CodegenError;
-use crate::diagnostic::{Diagnostic, Diagnostics, Severity, Source, nearest};
+use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source, nearest};
+use crate::geom::Aabb;
 use crate::ir::Node;
-use crate::lower::{self, Module, Options};
-use crate::solid::{Engine, Solid};
+use crate::lower::{self, Module, Options, Scene, Tolerance};
+use crate::solid::{Bounds, Chosen, Engine, Solid};
 use crate::syntax::{self, Ast};
 
 /// Why a file gives no solid.
@@ -135,7 +136,6 @@ impl Program {
         let (module, messages) = lower::lower(&ast, &options);
         // names of items that do not parse are missing: what follows from that would mislead
         let follows = |d: &Diagnostic| {
-            use crate::diagnostic::Code;
             [Code::UNKNOWN_NAME, Code::OVERRIDE, Code::UNUSED, Code::SCENE_MISSING].contains(&d.code)
         };
         list.extend(messages.into_iter().filter(|d| !(broken && follows(d))));
@@ -191,6 +191,58 @@ impl Program {
     /// If the engine is not to be had.
     pub fn compile(&self, name: &str, shape: Node, engine: Engine) -> Result<Solid, Error> {
         Ok(Solid::new(name, &self.module.graph, shape, engine)?)
+    }
+
+    /// The box in which a solid is looked at: that of the first scene with it as an obstacle, or of the only scene;
+    /// without a scene the solid's bounds and half their longest side around them.
+    pub fn domain(&self, solid: &Solid) -> Option<Aabb> {
+        let scenes = &self.module.scenes;
+        let used = scenes.iter().find(|scene| scene.obstacles.iter().any(|o| o.name == solid.name()));
+        let only = if let [only] = &scenes[..] { Some(only) } else { None };
+        match used.or(only) {
+            Some(scene) => Some(scene.domain),
+            None => solid.bounds().aabb().map(|bounds| bounds.grown(0.5 * bounds.size().max_element())),
+        }
+    }
+
+    /// The tolerance that the file states for a solid: its own, or that of the first scene with it as an obstacle.
+    pub fn tolerance(&self, solid: &str) -> Option<Tolerance> {
+        let named = self.module.solids.iter().find(|named| named.name == solid);
+        let uses = |scene: &&Scene| scene.obstacles.iter().any(|o| o.name == solid);
+        let of_scene = || self.module.scenes.iter().find(uses).and_then(|scene| scene.tolerance);
+        named.and_then(|named| named.tolerance).or_else(of_scene)
+    }
+
+    /// The cheapest program that keeps the tolerance of a solid in its [`domain`](Self::domain); nothing if the file
+    /// states no tolerance for it, or it is empty.
+    ///
+    /// # Errors
+    /// If no program is certified to keep it.
+    pub fn within_tolerance(&self, solid: &Solid) -> Option<Result<Chosen, Box<Diagnostic>>> {
+        let tolerance = self.tolerance(solid.name())?;
+        let refused = |help: String| {
+            let message = format!(
+                "no program of `{}` is certified to keep the tolerance {:e}",
+                solid.name(),
+                tolerance.value
+            );
+            Some(Err(Box::new(Diagnostic::error(Code::TOLERANCE, tolerance.span, message).help(help))))
+        };
+        let Some(over) = self.domain(solid) else {
+            let why = "the solid has no bounds and the file no scene: there is no box to keep it in";
+            return if *solid.bounds() == Bounds::Empty { None } else { refused(why.into()) };
+        };
+        match solid.within(tolerance.value, over) {
+            Ok(chosen) => Some(Ok(chosen)),
+            Err(best) if best.bound.is_finite() => refused(format!(
+                "the smallest bound of the error in {:.3} … {:.3} is {:.1e}, by {}",
+                over.min,
+                over.max,
+                best.bound,
+                best.plan.name()
+            )),
+            Err(_) => refused(format!("no bound of the error is known in {:.3} … {:.3}", over.min, over.max)),
+        }
     }
 
     /// What the file defines.

@@ -133,9 +133,9 @@ pub(super) struct Eval {
     /// Columns to print
     #[arg(long, value_enum, value_delimiter = ',', default_value = "value,gradient")]
     pub what: Vec<What>,
-    /// Width of all arithmetic
-    #[arg(long, value_enum, default_value_t = Precision::F64)]
-    pub precision: Precision,
+    /// Width of all arithmetic [default: f64, or what the solid's tolerance allows for ω]
+    #[arg(long, value_enum)]
+    pub precision: Option<Precision>,
 }
 
 /// In the order of their columns.

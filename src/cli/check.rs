@@ -10,7 +10,10 @@ use serde::Serialize;
 use super::args::{Check, Deny, Shared};
 use super::{Failure, choose, input, note, output};
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
+use crate::field::Field;
 use crate::geom::Aabb;
+use crate::ir::{FloatType, Growth};
+use crate::lower::NamedSolid;
 use crate::mesh::{self, Grid, Resolution, marching_cubes};
 use crate::slice::{self, Plane, Window};
 use crate::solid::{Bounds, ProgramKind};
@@ -56,6 +59,10 @@ struct Facts {
     volume_error: Option<f64>,
     area: Option<f64>,
     components: Option<usize>,
+    /// What the file asks of the error of ω, the program that keeps it, and its certified bound.
+    tolerance: Option<f64>,
+    program: Option<String>,
+    error_bound: Option<f64>,
 }
 
 impl Facts {
@@ -69,6 +76,9 @@ impl Facts {
             volume_error: None,
             area: None,
             components: None,
+            tolerance: None,
+            program: None,
+            error_bound: None,
         }
     }
 }
@@ -132,7 +142,8 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
             Ok(program) => {
                 let mut diagnostics = program.warnings();
                 let facts = solids(shared, &program, &file, &mut diagnostics)?;
-                if options.deny == Some(Deny::Warnings) && !diagnostics.list.is_empty() {
+                let denied = options.deny == Some(Deny::Warnings) && !diagnostics.list.is_empty();
+                if denied || diagnostics.has_errors() {
                     document.ok = false;
                 }
                 show(shared, &mut document, &diagnostics);
@@ -200,10 +211,21 @@ fn solids(
         let operations = solid.graph(ProgramKind::Value).0.len();
         if operations > MOST_MEASURED {
             note(format!("solid `{}` has {operations} operations: it is not measured", named.name));
-            facts.push(Facts::unknown(&solid, file));
+            let tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
+            facts.push(Facts { tolerance, ..Facts::unknown(&solid, file) });
             continue;
         }
-        let found = measure(&solid, file)?;
+        let mut found = measure(&solid, file)?;
+        diagnostics.list.extend(overflow(program, named, &solid));
+        found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
+        match program.within_tolerance(&solid) {
+            Some(Ok(chosen)) => {
+                found.program = Some(chosen.plan().name());
+                found.error_bound = Some(chosen.bound());
+            }
+            Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),
+            None => {}
+        }
         let warning = |code, message| Diagnostic {
             severity: Severity::Warning,
             ..Diagnostic::error(code, named.span, message)
@@ -225,6 +247,22 @@ fn solids(
         facts.push(found);
     }
     Ok(facts)
+}
+
+/// A warning if ω may leave the range of numbers although its leaves do not.
+fn overflow(program: &Program, named: &NamedSolid, solid: &Solid) -> Option<Diagnostic> {
+    let (graph, _) = program.module().graph.extract_cone(named.node);
+    let growth = match program.domain(solid) {
+        Some(over) => Growth::over(&graph, &over),
+        None => Growth::within_reach(&graph),
+    };
+    let node = growth.overflow(&graph, FloatType::F64)?;
+    let message = format!(
+        "ω of solid `{}` may leave the range of numbers here: it doubles with each operation inside the next",
+        named.name
+    );
+    let warning = Diagnostic::warning(Code::OVERFLOW, graph.span(node).unwrap_or(named.span), message);
+    Some(warning.help("write it as one chain: it is evaluated as a balanced tree"))
 }
 
 fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
@@ -305,6 +343,11 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             say!("    area        {area:.6}");
             say!("    components  {components}");
         }
+        if let (Some(name), Some(bound), Some(tolerance)) =
+            (&solid.program, solid.error_bound, solid.tolerance)
+        {
+            say!("    program     {name}: ω to {bound:.1e}, tolerance {tolerance:e}");
+        }
     }
     for scene in &module.scenes {
         let obstacles: Vec<&str> = scene.obstacles.iter().map(|o| o.name.as_str()).collect();
@@ -322,11 +365,14 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
         Some([u0, v0, u1, v1]) => Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)),
         None => plane.window(&around(&solid)?),
     };
+    // without a program that keeps the tolerance, which was reported, the picture is still worth seeing
+    let chosen = program.within_tolerance(&solid).and_then(Result::ok);
+    let field: &dyn Field = chosen.as_ref().map_or(&solid as &dyn Field, |chosen| chosen);
     if options.term {
         // drawn first, so that a reader who leaves early is no error of the drawing
         let mut drawing = Vec::new();
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        slice::terminal::draw(&solid, solid.name(), plane, window, 78, colour, &mut drawing)
+        slice::terminal::draw(field, solid.name(), plane, window, 78, colour, &mut drawing)
             .map_err(Failure::usage)?;
         let mut out = anstream::stdout();
         out.write_all(&drawing)?;
@@ -339,7 +385,7 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
         Some(path) => path.clone(),
         None => PathBuf::from(format!("{}.{}.svg", solid.name(), plane.to_string().replace(' ', ""))),
     };
-    let picture = picture(&solid, plane, window, &path)?;
+    let picture = picture(field, solid.name(), plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
     if !shared.json {
         say!("slice {plane} of {} written to {}", solid.name(), path.display());
@@ -347,12 +393,18 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
     Ok(())
 }
 
-fn picture(solid: &Solid, plane: Plane, window: Window, path: &Path) -> Result<Vec<u8>, Failure> {
+fn picture(
+    field: &dyn Field,
+    name: &str,
+    plane: Plane,
+    window: Window,
+    path: &Path,
+) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
-    let (name, samples) = (solid.name(), slice::DEFAULT_SAMPLES);
+    let samples = slice::DEFAULT_SAMPLES;
     match output::Picture::of(path)? {
-        output::Picture::Svg => slice::write_svg(solid, name, plane, window, samples, &mut bytes),
-        output::Picture::Png => slice::write_png(solid, name, plane, window, samples, 2.0, &mut bytes),
+        output::Picture::Svg => slice::write_svg(field, name, plane, window, samples, &mut bytes),
+        output::Picture::Png => slice::write_png(field, name, plane, window, samples, 2.0, &mut bytes),
     }
     .map_err(Failure::usage)?;
     Ok(bytes)

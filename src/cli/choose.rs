@@ -1,8 +1,10 @@
 //! Which solid or scene of a file is meant.
 
-use super::Failure;
 use super::args::Shared;
+use super::{Failure, input};
+use crate::diagnostic::Diagnostics;
 use crate::lower::{NamedSolid, Scene};
+use crate::solid::Chosen;
 use crate::{Error, Program, Solid};
 
 /// The solid by name; without one, the only solid, or the first obstacle of the only scene.
@@ -31,6 +33,15 @@ fn default_solid(program: &Program) -> Result<&NamedSolid, Failure> {
             )))
         }
     }
+}
+
+/// The cheap program for values of ω, if the file states a tolerance; shows why if there is none.
+pub(super) fn within_tolerance(program: &Program, solid: &Solid) -> Result<Option<Chosen>, Failure> {
+    program.within_tolerance(solid).transpose().map_err(|diagnostic| {
+        let list = vec![*diagnostic];
+        input::show(&Diagnostics { list, sources: program.sources().clone() });
+        Failure::Findings
+    })
 }
 
 /// The scene by name; without one, the only scene.

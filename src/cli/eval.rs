@@ -7,8 +7,9 @@ use glam::DVec3;
 
 use super::args::{Eval, Precision, Shared, What};
 use super::{Failure, choose, input, output};
-use crate::Solid;
 use crate::ir::Unary;
+use crate::solid::Chosen;
+use crate::{Field, Solid};
 
 /// Points evaluated at a time: memory stays small for any number of points.
 const CHUNK: usize = 4096;
@@ -23,7 +24,11 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
     }
     let program = input::program(shared, &options.file)?;
     let solid = choose::solid(shared, &program, options.solid.as_deref())?;
-    let mut writer = Table::new(solid, options, shared.json)?;
+    let chosen = match options.precision {
+        None => choose::within_tolerance(&program, &solid)?,
+        Some(_) => None, // asked for by hand
+    };
+    let mut writer = Table::new(solid, chosen, options, shared.json)?;
     writer.rows(&options.at)?;
     if let Some(path) = &options.points {
         let name = if path == stdin { "<stdin>".to_string() } else { path.display().to_string() };
@@ -88,6 +93,8 @@ struct Document {
 /// The rows of the answer, written as they are known.
 struct Table {
     solid: Solid,
+    /// What computes ω where it is asked for alone and the file states a tolerance.
+    chosen: Option<Chosen>,
     what: Vec<What>,
     precision: Precision,
     /// Rows are collected for JSON, which is one document.
@@ -97,7 +104,7 @@ struct Table {
 }
 
 impl Table {
-    fn new(solid: Solid, options: &Eval, json: bool) -> Result<Self, Failure> {
+    fn new(solid: Solid, chosen: Option<Chosen>, options: &Eval, json: bool) -> Result<Self, Failure> {
         let mut asked = options.what.clone();
         asked.sort_unstable();
         asked.dedup();
@@ -115,7 +122,8 @@ impl Table {
         if !json {
             writeln!(out, "{}", names.join(","))?;
         }
-        Ok(Self { solid, what: asked, precision: options.precision, json: json.then(Vec::new), names, out })
+        let precision = options.precision.unwrap_or(Precision::F64);
+        Ok(Self { solid, chosen, what: asked, precision, json: json.then(Vec::new), names, out })
     }
 
     fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {
@@ -141,7 +149,10 @@ impl Table {
         let needs_gradient = self.what.iter().any(|w| matches!(w, What::Gradient | What::Normal));
         let (omega, gradient) = match (self.precision, needs_gradient) {
             (Precision::F64, true) => self.solid.omega_grad(p),
-            (Precision::F64, false) => (self.solid.omega(p), DVec3::NAN),
+            (Precision::F64, false) => {
+                let omega = self.chosen.as_ref().map_or_else(|| self.solid.omega(p), |c| c.omega(p));
+                (omega, DVec3::NAN)
+            }
             (Precision::F32, true) => {
                 let (omega, gradient) = self.solid.omega_grad_f32(p.as_vec3());
                 (omega.into(), gradient.as_dvec3())
@@ -153,6 +164,8 @@ impl Table {
             match what {
                 What::Value => row.push(omega),
                 What::Gradient => row.extend(gradient.to_array()),
+                // a tolerance is one of values: the twin knows the sign
+                What::Sign if self.chosen.is_some() => row.push(self.solid.sign(p)),
                 What::Sign => row.push(Unary::Sign.eval(omega)),
                 What::Distance => row.push(match self.precision {
                     Precision::F64 => self.solid.contact(p).distance,

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
-use crate::codegen::{CodegenError, Form, Listing, Precision, Request, Shape, target_description};
+use crate::codegen::{CodegenError, Listing, Precision, Request, Shape, target_description};
 use crate::diagnostic::{Span, explain, nearest};
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -71,9 +71,25 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     text.leaves();
     text.specialisation();
     text.programs();
-    say!("  target: {}", target_description());
     let (value, value_outputs) = solid.graph(ProgramKind::Value);
     let (gradient, gradient_outputs) = solid.graph(ProgramKind::Gradient);
+    for (precision, name) in [(Precision::F64, "f64"), (Precision::F32, "f32")] {
+        let scaled = solid.forms(ProgramKind::Value, precision).exceptions();
+        if scaled > 0 {
+            say!("  scaled: {scaled} operations in {name}, where squares may leave the range");
+        }
+    }
+    if let Some(chosen) = choose::within_tolerance(program, &solid)? {
+        let over = chosen.over();
+        say!(
+            "  values of ω: {}, to {:.1e} in {:.3} … {:.3}",
+            chosen.plan().name(),
+            chosen.bound(),
+            over.min,
+            over.max
+        );
+    }
+    say!("  target: {}", target_description());
     if show.contains(&Stage::Ir) {
         say!("\nω:\n{}", dump(value, &[("omega", value_outputs[0])], program.sources()));
         let names = ["omega", "gx", "gy", "gz"];
@@ -97,8 +113,8 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
 /// The code generator's texts of a program for one point in `f64`.
 fn listing(solid: &Solid, kind: ProgramKind) -> Result<Listing, CodegenError> {
     let (graph, outputs) = solid.graph(kind);
-    let (precision, shape, form) = (Precision::F64, Shape::Point, Form::Stable);
-    Listing::of(Request { graph, inputs: &[], outputs, precision, shape, form, parameters: false })
+    let (precision, shape, forms) = (Precision::F64, Shape::Point, solid.forms(kind, Precision::F64));
+    Listing::of(Request { graph, inputs: &[], outputs, precision, shape, forms, parameters: false })
 }
 
 /// Leaves that are listed one by one.

@@ -11,14 +11,14 @@ use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, typ
 use cranelift_frontend::FunctionBuilder;
 
 use super::r0::{Junction, Parts};
-use super::{Form, Precision};
+use super::{Forms, Precision};
 use crate::ir::{Binary, Expr, Graph, Node, Unary};
 
 /// Emits operations into one function.
 pub(super) struct Emitter<'a, 'f> {
     pub builder: &'a mut FunctionBuilder<'f>,
     pub precision: Precision,
-    pub form: Form,
+    pub forms: &'a Forms,
     /// Intermediate results of R₀ for a pair of operands: value and weights share them.
     pub(super) parts: HashMap<(Node, Node, Junction), Parts>,
     /// Pairs whose weights will be asked for: their value uses the same quotient.
@@ -32,7 +32,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
     pub fn new(
         builder: &'a mut FunctionBuilder<'f>,
         precision: Precision,
-        form: Form,
+        forms: &'a Forms,
         graph: &Graph,
     ) -> Self {
         let weights = graph.nodes().filter_map(|(_, expr)| match expr {
@@ -41,7 +41,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
             _ => None,
         });
         let weighted = weights.flat_map(|(u, v, junction)| [(u, v, junction), (v, u, junction)]).collect();
-        Self { builder, precision, form, parts: HashMap::new(), weighted }
+        Self { builder, precision, forms, parts: HashMap::new(), weighted }
     }
 
     pub fn lane_type(&self) -> Type {

@@ -28,6 +28,7 @@ pub use range::{
 };
 pub use translate::{Listing, compile};
 
+pub use crate::ir::{Form, Forms};
 use crate::ir::{Graph, Node};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -48,21 +49,6 @@ pub enum Shape {
     Range(Rounding),
 }
 
-/// How R₀ is evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Form {
-    /// Half-angle form: ≤ 2 ulp, exact sign for all finite operands, finite gradient at corners.
-    #[default]
-    Stable,
-    /// The textbook's formula where it loses at most four bits, the stable form for the run of 16 points in which it
-    /// loses more: ≤ 14 ulp. Over blocks only; a single point gets the stable form.
-    Guarded,
-    /// u + v ∓ √(u² + v²) as written: cheapest, loses digits and at worst the sign where operands cancel.
-    Textbook,
-    /// The stable form on m/M: neither overflows nor underflows before its result does; one more division.
-    Scaled,
-}
-
 /// What is to be compiled.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
@@ -72,7 +58,7 @@ pub struct Request<'a> {
     pub outputs: &'a [Node],
     pub precision: Precision,
     pub shape: Shape,
-    pub form: Form,
+    pub forms: &'a Forms,
     /// Whether the function takes one more argument, a pointer to the parameters of the graph.
     pub parameters: bool,
 }

@@ -1,5 +1,4 @@
-//! R₀ in its forms. The stable one is that of `ir::r0`, bit for bit; the others are for comparison, and for where a
-//! certificate allows them.
+//! R₀ in its forms: the operations of `ir::r0`, bit for bit.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{InstBuilder, Value};
@@ -38,7 +37,7 @@ pub(super) struct Parts {
 
 impl Emitter<'_, '_> {
     pub fn r0_value(&mut self, u: Operand, v: Operand, junction: Junction) -> Value {
-        match self.form {
+        match self.forms.of(u.0, v.0) {
             Form::Stable | Form::Guarded => self.stable_value(u, v, junction),
             Form::Textbook => self.textbook_value(u.1, v.1, junction),
             Form::Scaled => self.scaled_value(u.1, v.1, junction),
@@ -47,7 +46,7 @@ impl Emitter<'_, '_> {
 
     /// ∂/∂u, where u is the first operand.
     pub fn r0_weight(&mut self, u: Operand, v: Operand, junction: Junction) -> Value {
-        match self.form {
+        match self.forms.of(u.0, v.0) {
             Form::Stable | Form::Guarded => self.stable_weight(u, v, junction),
             Form::Textbook => self.textbook_weight(u.1, v.1, junction),
             Form::Scaled => self.scaled_weight(u.1, v.1, junction),
@@ -203,8 +202,9 @@ impl Emitter<'_, '_> {
         // on the small branch the operand that the result is near to is the smaller in magnitude
         let (m, big) = (self.select(small, near, far), self.select(small, far, near));
         let ratio = self.builder.ins().fdiv(m, big);
-        let corner = self.compare(FloatCC::Equal, big, zero);
-        let q = self.select(corner, one, ratio);
+        // exact at a tie, and a number at 0/0 and ∞/∞
+        let tie = self.compare(FloatCC::Equal, m, big);
+        let q = self.select(tie, one, ratio);
         let q2 = self.builder.ins().fmul(q, q);
         let below = self.builder.ins().fadd(one, q2);
         let k = self.builder.ins().sqrt(below);

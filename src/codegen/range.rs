@@ -17,7 +17,7 @@ use cranelift_frontend::FunctionBuilder;
 use glam::DVec3;
 
 use super::emit::Emitter;
-use super::{Form, Precision, Request};
+use super::{Precision, Request};
 use crate::geom::Aabb;
 use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeStep, Unary};
 
@@ -101,7 +101,7 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
     builder.seal_block(block);
     let arguments = builder.block_params(block).to_vec();
     let (input, output) = (arguments[0], arguments[1]);
-    let emitter = Emitter::new(builder, Precision::F64, Form::Stable, request.graph);
+    let emitter = Emitter::new(builder, Precision::F64, request.forms, request.graph);
     let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
     // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
     let axes: [Value; 3] = std::array::from_fn(|i| {

@@ -139,7 +139,7 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node
     builder.switch_to_block(block);
     builder.seal_block(block);
     let parameters = builder.block_params(block).to_vec();
-    let mut emitter = Emitter::new(builder, request.precision, request.form, request.graph);
+    let mut emitter = Emitter::new(builder, request.precision, request.forms, request.graph);
     let vector = emitter.vector_type();
     let coordinates: [Value; 3] =
         std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
@@ -180,7 +180,7 @@ fn batch(
 
     let offset = builder.append_block_param(body, pointer);
     builder.switch_to_block(body);
-    let mut emitter = Emitter::new(builder, request.precision, request.form, request.graph);
+    let mut emitter = Emitter::new(builder, request.precision, request.forms, request.graph);
     let vector = emitter.vector_type();
     // columns may start anywhere, so no alignment is promised
     let mut load = |base: Value| {

@@ -79,6 +79,14 @@ the range that the declaration states.";
 UNIT_MISMATCH = "E0212":
 "The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
 only lengths and angles are meaningful.";
+ATTRIBUTE = "E0213":
+"An attribute stands before a solid and says what is wanted of it beside its shape. There is one: `@tolerance(1e-6)`,
+the largest |computed ω − exact ω| that is accepted, over the box of the scene that uses the solid or, without a scene,
+over the solid's bounds and half their longest side around them. The cheapest program that is certified to keep it is
+then used for values of ω; `rfm check` prints which one.
+
+    @tolerance(1e-6)
+    solid post = x² + y² <= 0.25 and 0 <= z <= 1";
 SCENE_KEY = "E0301":
 "The scene does not know this key, or this value of it, at this place. What it knows:
 
@@ -93,6 +101,7 @@ SCENE_KEY = "E0301":
       gravity: [0, 0, -9.81 m/s^2]
       method: paper
       run      { dt: 2 ms, until: 5 s, save_every: 0.05 s }
+      tolerance: 1e-6
     }
 
 `fill` is `below` or `middle`; without `particles` the shape is filled, without `dt` a stable step is derived.";
@@ -116,6 +125,16 @@ FOLD_OF_ONE = "W0404":
 "`any` or `all` over a range with one member is likely a slip: the range `a..b` holds a, a+1, … b−1.";
 STRICT_COMPARISON = "W0405":
 "`<` means the same as `<=` here: a comparison builds a field whose zero is the surface itself.";
+OVERFLOW = "W0406":
+"A chain of `or` or `and` written by hand, one operation inside the next, can double ω with every member: after about a
+thousand equal members it is larger than the largest number, 1.8e308, and becomes infinite. Its sign stays right; its
+value and gradient are lost. Written as one chain `a or b or c or …`, or as a fold `any i in 0..n: …`, it is evaluated
+as a balanced tree, in which ω grows with the logarithm of the number of members.";
+TOLERANCE = "E0407":
+"No program of the solid is certified to keep the tolerance that is asked for: the bound of |computed ω − exact ω| over
+the box is larger in every arithmetic that there is, single and double precision. The message names the smallest bound
+that can be had. If there is none at all, a formula in the box may divide by zero, take the root of a negative number
+or leave the range of numbers; or the solid has neither bounds nor a scene with a box.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";

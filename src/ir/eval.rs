@@ -2,13 +2,15 @@
 
 use std::cell::RefCell;
 
+use super::forms::{Form, Forms};
 use super::graph::{Axis, Expr, Graph, Node};
 use super::real::Real;
 
 /// A graph with its outputs, evaluated operation by operation in `f64` or `f32`.
 #[derive(Debug, Clone)]
 pub struct Interpreter {
-    exprs: Vec<Expr>,
+    /// Operations, and the form of each in `f64` and in `f32`.
+    steps: Vec<(Expr, [Form; 2])>,
     outputs: Vec<Node>,
 }
 
@@ -19,28 +21,46 @@ thread_local! {
 }
 
 impl Interpreter {
+    /// With R₀ in its stable form.
     pub fn new(graph: &Graph, outputs: &[Node]) -> Self {
-        Self { exprs: graph.nodes().map(|(_, expr)| expr).collect(), outputs: outputs.to_vec() }
+        let stable = Forms::all(Form::Stable);
+        Self::with_forms(graph, outputs, [&stable, &stable])
+    }
+
+    /// With R₀ in the forms given for `f64` and for `f32`.
+    pub fn with_forms(graph: &Graph, outputs: &[Node], forms: [&Forms; 2]) -> Self {
+        let step = |expr| match expr {
+            Expr::Binary(_, a, b) => (expr, forms.map(|forms| forms.of(a, b))),
+            _ => (expr, [Form::Stable; 2]),
+        };
+        Self { steps: graph.nodes().map(|(_, expr)| step(expr)).collect(), outputs: outputs.to_vec() }
     }
 
     /// All outputs at a point; `out` is as long as the outputs.
     pub fn eval_f64(&self, point: [f64; 3], out: &mut [f64]) {
-        SCRATCH_64.with_borrow_mut(|scratch| self.eval(point, &[], scratch, out));
+        SCRATCH_64.with_borrow_mut(|scratch| self.eval(0, point, &[], scratch, out));
     }
 
     /// All outputs at a point, for a graph with parameters.
     pub fn eval_with(&self, point: [f64; 3], parameters: &[f64], out: &mut [f64]) {
-        SCRATCH_64.with_borrow_mut(|scratch| self.eval(point, parameters, scratch, out));
+        SCRATCH_64.with_borrow_mut(|scratch| self.eval(0, point, parameters, scratch, out));
     }
 
     /// All outputs, every operation carried out in `f32`.
     pub fn eval_f32(&self, point: [f32; 3], out: &mut [f32]) {
-        SCRATCH_32.with_borrow_mut(|scratch| self.eval(point, &[], scratch, out));
+        SCRATCH_32.with_borrow_mut(|scratch| self.eval(1, point, &[], scratch, out));
     }
 
-    fn eval<T: Real>(&self, point: [T; 3], parameters: &[T], values: &mut Vec<T>, out: &mut [T]) {
+    fn eval<T: Real>(
+        &self,
+        precision: usize,
+        point: [T; 3],
+        parameters: &[T],
+        values: &mut Vec<T>,
+        out: &mut [T],
+    ) {
         values.clear();
-        for &expr in &self.exprs {
+        for &(expr, forms) in &self.steps {
             let value = match expr {
                 Expr::Constant(bits) => T::from_f64(f64::from_bits(bits)),
                 Expr::Coordinate(Axis::X) => point[0],
@@ -48,7 +68,7 @@ impl Interpreter {
                 Expr::Coordinate(Axis::Z) => point[2],
                 Expr::Parameter(i) => parameters.get(i as usize).copied().unwrap_or(T::from_f64(f64::NAN)),
                 Expr::Unary(op, a) => op.eval(values[a.index()]),
-                Expr::Binary(op, a, b) => op.eval(values[a.index()], values[b.index()]),
+                Expr::Binary(op, a, b) => forms[precision].eval(op, values[a.index()], values[b.index()]),
             };
             values.push(value);
         }

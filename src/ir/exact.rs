@@ -63,7 +63,8 @@ pub fn evaluate(graph: &Graph, outputs: &[Node], point: [f64; 3]) -> Option<Vec<
             Expr::Unary(op, a) => unary(op, of(a)?)?,
             Expr::Binary(op, a, b) => binary(op, of(a)?, of(b)?)?,
         };
-        values.push(Some(value));
+        // a zero may have come out with unlimited digits, of which no sine can be taken
+        values.push(Some(value.with_precision(PRECISION).value()));
     }
     outputs.iter().map(|output| values[output.index()].clone().map(Exact)).collect()
 }

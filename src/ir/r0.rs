@@ -69,18 +69,25 @@ pub fn and_weights<T: Real>(u: T, v: T) -> (T, T) {
 /// u ∧ v with ∂/∂u and ∂/∂v: the same bits as [`and`] and [`and_weights`].
 #[inline(always)]
 pub fn and_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
-    let one = T::from_f64(1.0);
     let p = parts(u, v);
     // −τ on the big branch, so that one formula serves both
     let tau = (if p.small { p.min } else { p.max }) / p.denominator;
     let value = if p.small { p.min - p.min * tau } else { p.sum - p.h };
     let tau = if p.denominator == T::from_f64(0.0) { T::from_f64(-SINGULAR_TAU) } else { tau };
+    let (by_u, by_v) = weights_of_tau(tau, p.small, u < v);
+    (value, by_u, by_v)
+}
+
+/// The weights from τ, which has the opposite sign on the big branch; `less`: u < v.
+#[inline(always)]
+fn weights_of_tau<T: Real>(tau: T, small: bool, less: bool) -> (T, T) {
+    let one = T::from_f64(1.0);
     let square = tau * tau;
     let scale = one / (one + square);
     let lesser = (one - tau) * (one - tau) * scale; // weight of m
-    let greater = (if p.small { square } else { one }) * (scale + scale); // weight of M
+    let greater = (if small { square } else { one }) * (scale + scale); // weight of M
     // u is M on the small branch unless it is the minimum, and the other way round on the big branch
-    if p.small == (u < v) { (value, lesser, greater) } else { (value, greater, lesser) }
+    if small == less { (lesser, greater) } else { (greater, lesser) }
 }
 
 /// (∂/∂u, ∂/∂v) of u ∨ v.
@@ -95,53 +102,124 @@ pub fn or_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
     (-value, by_u, by_v)
 }
 
-/// u + v − √(u² + v²) as printed in every textbook: loses all digits of a small result between large operands.
-#[inline(always)]
-pub fn textbook_and<T: Real>(u: T, v: T) -> T {
-    u + v - (u * u + v * v).sqrt()
+/// Intermediate results of the scaled form of ∧.
+struct Scaled<T> {
+    /// The operand of smaller magnitude, and the other one.
+    m: T,
+    big: T,
+    /// m/M
+    q: T,
+    /// 1 + √(1 + q²)
+    k1: T,
+    small: bool,
 }
 
-/// u + v + √(u² + v²)
 #[inline(always)]
-pub fn textbook_or<T: Real>(u: T, v: T) -> T {
-    u + v + (u * u + v * v).sqrt()
+fn scaled<T: Real>(u: T, v: T) -> Scaled<T> {
+    let one = T::from_f64(1.0);
+    let min = if u < v { u } else { v };
+    let max = if u > v { u } else { v };
+    let small = u + v > T::from_f64(0.0); // the sign of a rounded sum is exact, and it may overflow
+    let (m, big) = if small { (min, max) } else { (max, min) };
+    // exact at a tie, and a number at 0/0 and ∞/∞
+    let q = if m == big { one } else { m / big };
+    let k1 = one + (one + q * q).sqrt();
+    Scaled { m, big, q, k1, small }
 }
 
-/// The textbook's u ∧ v with 1 − u/√(u² + v²) and 1 − v/√(u² + v²), which are NaN at a corner.
+/// u ∧ v in a form that neither overflows nor underflows where the result does not: squares only of the ratio
+/// q = m/M; two divisions. For operands whose squares leave the range of the type.
 #[inline(always)]
-pub fn textbook_and_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
-    let (one, h) = (T::from_f64(1.0), (u * u + v * v).sqrt());
-    (u + v - h, one - u / h, one - v / h)
+pub fn and_scaled<T: Real>(u: T, v: T) -> T {
+    let s = scaled(u, v);
+    if s.small { s.m - s.m * (s.q / s.k1) } else { s.big * (s.k1 + s.q) }
 }
 
-/// The textbook's u ∨ v with its weights.
+/// u ∨ v in the scaled form.
 #[inline(always)]
-pub fn textbook_or_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
-    let (one, h) = (T::from_f64(1.0), (u * u + v * v).sqrt());
-    (u + v + h, one + u / h, one + v / h)
+pub fn or_scaled<T: Real>(u: T, v: T) -> T {
+    -and_scaled(-u, -v)
 }
 
-/// u ∧ v in a form that neither overflows nor underflows where the result does not: two divisions. Used where
-/// operands span the whole exponent range, above all for bounds of intervals, which may be infinite.
-pub fn and_scaled(u: f64, v: f64) -> f64 {
+/// (∂/∂u, ∂/∂v) of u ∧ v in the scaled form.
+pub fn and_weights_scaled<T: Real>(u: T, v: T) -> (T, T) {
+    let (_, by_u, by_v) = and_weighted_scaled(u, v);
+    (by_u, by_v)
+}
+
+/// u ∧ v with ∂/∂u and ∂/∂v in the scaled form.
+#[inline(always)]
+pub fn and_weighted_scaled<T: Real>(u: T, v: T) -> (T, T, T) {
+    let s = scaled(u, v);
+    let tau = s.q / s.k1;
+    let value = if s.small { s.m - s.m * tau } else { s.big * (s.k1 + s.q) };
+    let (by_u, by_v) = weights_of_tau(if s.small { tau } else { -tau }, s.small, u < v);
+    (value, by_u, by_v)
+}
+
+/// u ∨ v with ∂/∂u and ∂/∂v in the scaled form.
+#[inline(always)]
+pub fn or_weighted_scaled<T: Real>(u: T, v: T) -> (T, T, T) {
+    let (value, by_u, by_v) = and_weighted_scaled(-u, -v);
+    (-value, by_u, by_v)
+}
+
+/// (∂/∂u, ∂/∂v) of u ∨ v in the scaled form.
+pub fn or_weights_scaled<T: Real>(u: T, v: T) -> (T, T) {
+    and_weights_scaled(-u, -v)
+}
+
+/// u + v − √(u² + v²) as every textbook prints it: cheapest; loses the digits of a small result between large
+/// operands, at worst its sign.
+#[inline(always)]
+pub fn and_textbook<T: Real>(u: T, v: T) -> T {
+    (u + v) - (u * u + v * v).sqrt()
+}
+
+/// u ∨ v in the textbook form.
+#[inline(always)]
+pub fn or_textbook<T: Real>(u: T, v: T) -> T {
+    (u + v) + (u * u + v * v).sqrt()
+}
+
+/// 1 − u/√(u² + v²), the weight of u in u ∧ v; NaN at a corner.
+#[inline(always)]
+pub fn and_weight_textbook<T: Real>(u: T, v: T) -> T {
+    T::from_f64(1.0) - u / (u * u + v * v).sqrt()
+}
+
+/// 1 + u/√(u² + v²), the weight of u in u ∨ v; NaN at a corner.
+#[inline(always)]
+pub fn or_weight_textbook<T: Real>(u: T, v: T) -> T {
+    T::from_f64(1.0) + u / (u * u + v * v).sqrt()
+}
+
+/// u ∧ v with ∂/∂u and ∂/∂v in the textbook form.
+#[inline(always)]
+pub fn and_weighted_textbook<T: Real>(u: T, v: T) -> (T, T, T) {
+    (and_textbook(u, v), and_weight_textbook(u, v), and_weight_textbook(v, u))
+}
+
+/// u ∨ v with ∂/∂u and ∂/∂v in the textbook form.
+#[inline(always)]
+pub fn or_weighted_textbook<T: Real>(u: T, v: T) -> (T, T, T) {
+    (or_textbook(u, v), or_weight_textbook(u, v), or_weight_textbook(v, u))
+}
+
+/// u ∧ v for bounds of intervals, which may be infinite: the scaled form with its limits.
+pub fn and_of_bounds(u: f64, v: f64) -> f64 {
     if u == f64::NEG_INFINITY || v == f64::NEG_INFINITY {
         return f64::NEG_INFINITY;
     }
     if u == f64::INFINITY || v == f64::INFINITY {
         return u.min(v); // the limit of m·(1 − τ) as τ → 0
     }
-    let (small, large) = if u.abs() < v.abs() || (u.abs() == v.abs() && u > v) { (u, v) } else { (v, u) };
-    if large == 0.0 {
-        return 0.0;
-    }
-    let q = small / large;
-    let k = (1.0 + q * q).sqrt();
-    if large > 0.0 { small - small * (q / (1.0 + k)) } else { large * ((1.0 + k) + q) }
+    and_scaled(u, v)
 }
 
-/// u ∨ v in the scaled form.
-pub fn or_scaled(u: f64, v: f64) -> f64 {
-    -and_scaled(-u, -v)
+/// u ∨ v for bounds of intervals.
+pub fn or_of_bounds(u: f64, v: f64) -> f64 {
+    -and_of_bounds(-u, -v)
 }
 
 #[cfg(test)]
@@ -229,6 +307,7 @@ mod tests {
             prop_assume!(u.is_finite() && v.is_finite());
             prop_assert_eq!(sign(and(u, v).into()), sign(u.min(v).into()));
             prop_assert_eq!(sign(or(u, v).into()), sign(u.max(v).into()));
+            prop_assert_eq!(sign(or_scaled(u, v).into()), sign(u.max(v).into()));
         }
 
         #[test]
@@ -243,7 +322,7 @@ mod tests {
         #[test]
         fn weights_are_finite_and_not_negative(u in any::<f64>(), v in any::<f64>()) {
             prop_assume!(u.is_finite() && v.is_finite());
-            for w in [and_weights(u, v), or_weights(u, v)] {
+            for w in [and_weights(u, v), or_weights(u, v), and_weights_scaled(u, v), or_weights_scaled(u, v)] {
                 prop_assert!(w.0 >= 0.0 && w.1 >= 0.0 && w.0 <= 2.0001 && w.1 <= 2.0001, "{:?}", w);
             }
         }
@@ -252,6 +331,9 @@ mod tests {
         fn scaled_and_plain_forms_agree(u in -1e6..1e6f64, v in -1e6..1e6f64) {
             let (a, b) = (and(u, v), and_scaled(u, v));
             prop_assert!((a - b).abs() <= 5.0 * f64::EPSILON * a.abs(), "{} {}", a, b);
+            let (a, b) = (and_weights(u, v), and_weights_scaled(u, v));
+            prop_assert!((a.0 - b.0).abs() <= 8.0 * f64::EPSILON * a.0, "{:?} {:?}", a, b);
+            prop_assert!((a.1 - b.1).abs() <= 8.0 * f64::EPSILON * a.1, "{:?} {:?}", a, b);
         }
     }
 }

@@ -21,7 +21,7 @@ pub use scene::{Fill, Fluid, Method, Obstacle, Run, Scene};
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 use crate::ir::{Graph, Node};
 use crate::syntax::Ast;
-use crate::syntax::ast::{Definition, Function, Item, Name, Param};
+use crate::syntax::ast::{Argument, Attribute, Definition, Function, Item, Name, Param};
 use eval::Lowering;
 use names::{Kind, RESERVED};
 use value::Value;
@@ -49,7 +49,17 @@ pub struct ParamValue {
 pub struct NamedSolid {
     pub name: String,
     pub node: Node,
+    /// The largest error of ω that its user accepts, as `@tolerance(…)` states it.
+    pub tolerance: Option<Tolerance>,
     /// Of the name in its definition.
+    pub span: Span,
+}
+
+/// The largest |computed ω − exact ω| that is accepted; positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    pub value: f64,
+    /// Where it is stated.
     pub span: Span,
 }
 
@@ -218,6 +228,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn solid(&mut self, definition: &'a Definition) {
+        let tolerance = self.attributes(&definition.attributes);
         let node = self.field(&definition.value);
         if !self.may_define(&definition.name) {
             return;
@@ -226,8 +237,41 @@ impl<'a> Lowering<'a> {
         self.names.define(self.scope.source, &definition.name, Kind::Solid(value));
         if let Some(node) = node {
             let name = definition.name.text.clone();
-            self.module.solids.push(NamedSolid { name, node, span: definition.name.span });
+            self.module.solids.push(NamedSolid { name, node, tolerance, span: definition.name.span });
         }
+    }
+
+    /// The attributes of a solid; one so far.
+    fn attributes(&mut self, attributes: &'a [Attribute]) -> Option<Tolerance> {
+        const KNOWN: [&str; 1] = ["tolerance"];
+        let mut tolerance = None;
+        for (i, attribute) in attributes.iter().enumerate() {
+            let name = &attribute.name;
+            if !KNOWN.contains(&name.text.as_str()) {
+                let message = format!("unknown attribute `@{}`", name.text);
+                let diagnostic = Diagnostic::error(Code::ATTRIBUTE, name.span, message);
+                self.report(
+                    diagnostic
+                        .help(format!("attributes are @{}", KNOWN.join(", @")))
+                        .suggest(&name.text, KNOWN),
+                );
+            } else if let Some(first) = attributes[..i].iter().find(|a| a.name.text == name.text) {
+                let message = format!("`@{}` stands twice", name.text);
+                self.report(
+                    Diagnostic::error(Code::ATTRIBUTE, name.span, message)
+                        .label(first.name.span, "first stated here"),
+                );
+            } else if let [Argument { name: None, value }] = &attribute.arguments[..] {
+                tolerance = self.tolerance(value);
+            } else {
+                let message = format!("`@{}` takes one number", name.text);
+                self.report(
+                    Diagnostic::error(Code::ATTRIBUTE, attribute.span, message)
+                        .help(format!("write `@{}(1e-6)`", name.text)),
+                );
+            }
+        }
+        tolerance
     }
 
     /// Reports parameters that share a name or have a reserved one.

@@ -4,6 +4,7 @@
 
 use glam::DVec3;
 
+use super::Tolerance;
 use super::eval::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -28,6 +29,8 @@ pub struct Scene {
     pub gravity: DVec3,
     pub method: Method,
     pub run: Run,
+    /// The largest error of ω that is accepted of its obstacles in the box, if one is stated.
+    pub tolerance: Option<Tolerance>,
 }
 
 /// The defaults are table 1 of the paper.
@@ -97,7 +100,7 @@ pub struct Run {
     pub save_every: f64,
 }
 
-const SCENE_KEYS: [&str; 7] = ["units", "box", "fluid", "obstacle", "gravity", "method", "run"];
+const SCENE_KEYS: [&str; 8] = ["units", "box", "fluid", "obstacle", "gravity", "method", "run", "tolerance"];
 /// Keys that open a block; all others have a value.
 const BLOCKS: [&str; 4] = ["box", "fluid", "obstacle", "run"];
 const BOX_KEYS: [&str; 3] = ["min", "max", "restitution"];
@@ -148,6 +151,7 @@ impl<'a> Lowering<'a> {
             self.vector_key(&block, "gravity", Dimension::ACCELERATION, DVec3::new(0.0, 0.0, -9.81));
         let method = self.word_key(&block, "method", &[("paper", Method::Paper)]);
         let run = self.run(&block);
+        let tolerance = block.setting("tolerance").and_then(|(_, value)| self.tolerance(value));
         if self.errors() > errors_before {
             return None;
         }
@@ -163,7 +167,19 @@ impl<'a> Lowering<'a> {
             gravity: gravity?,
             method: method?,
             run: run?,
+            tolerance,
         })
+    }
+
+    /// A tolerance of ω; what it may not be is reported.
+    pub fn tolerance(&mut self, value: &Expr) -> Option<Tolerance> {
+        let number = self.quantity_expr(value, Dimension::NONE, "tolerance")?;
+        if number > 0.0 && number.is_finite() {
+            return Some(Tolerance { value: number, span: value.span });
+        }
+        let message = format!("`tolerance` must be positive and finite, found {number}");
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
+        None
     }
 
     fn errors(&self) -> usize {

@@ -4,7 +4,7 @@
 
 use std::cell::RefCell;
 
-use crate::codegen::{self, Code, CodegenError, Form, Precision, Request, Rounding, Shape};
+use crate::codegen::{self, Code, CodegenError, Form, Forms, Precision, Request, Rounding, Shape};
 use crate::ir::{Graph, Interpreter, Node, Real};
 
 use glam::DVec3;
@@ -85,14 +85,14 @@ pub struct PointProgram<T> {
 impl<T: Lane> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
-    pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
+    pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
         let request = Request {
             graph,
             inputs: &[],
             outputs,
             precision: T::PRECISION,
             shape: Shape::Point,
-            form,
+            forms,
             parameters: false,
         };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
@@ -129,14 +129,14 @@ pub struct BatchProgram<T> {
 impl<T: Lane> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
-    pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Self, CodegenError> {
+    pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
         let request = Request {
             graph,
             inputs: &[],
             outputs,
             precision: T::PRECISION,
             shape: Shape::Batch,
-            form,
+            forms,
             parameters: false,
         };
         Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
@@ -212,8 +212,8 @@ impl<T: Lane> SegmentProgram<T> {
         outputs: &[Node],
         parameters: usize,
     ) -> Result<Self, CodegenError> {
-        let (precision, shape, form) = (T::PRECISION, Shape::Batch, Form::Stable);
-        let request = Request { graph, inputs, outputs, precision, shape, form, parameters: true };
+        let (precision, shape, forms) = (T::PRECISION, Shape::Batch, &Forms::all(Form::Stable));
+        let request = Request { graph, inputs, outputs, precision, shape, forms, parameters: true };
         let code = codegen::compile(request)?;
         Ok(Self { code, inputs: inputs.len(), parameters, lane: std::marker::PhantomData })
     }
@@ -311,10 +311,10 @@ impl RangeProgram {
         if rounding == Rounding::Upward && ROUNDING != Rounding::Upward {
             return Err(CodegenError::Unsupported("rounding upwards".into()));
         }
-        let (precision, shape, form) = (Precision::F64, Shape::Range(rounding), Form::Stable);
+        let (precision, shape, forms) = (Precision::F64, Shape::Range(rounding), &Forms::all(Form::Stable));
         let (outputs, with_parameters) = (&[root], parameters.is_some());
         let request =
-            Request { graph, inputs: &[], outputs, precision, shape, form, parameters: with_parameters };
+            Request { graph, inputs: &[], outputs, precision, shape, forms, parameters: with_parameters };
         Ok(Self { code: codegen::compile(request)?, rounding, parameters: parameters.unwrap_or(0) })
     }
 
@@ -396,14 +396,14 @@ impl LeafProgram {
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], parameters: usize) -> Result<Self, CodegenError> {
         let compile = |shape| {
-            let (precision, form) = (Precision::F64, Form::Stable);
+            let (precision, forms) = (Precision::F64, &Forms::all(Form::Stable));
             codegen::compile(Request {
                 graph,
                 inputs: &[],
                 outputs,
                 precision,
                 shape,
-                form,
+                forms,
                 parameters: true,
             })
         };

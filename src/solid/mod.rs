@@ -7,6 +7,7 @@
 
 mod blocks;
 mod bounds;
+mod budget;
 mod cell_map;
 mod cells;
 mod compiled;
@@ -24,12 +25,13 @@ use std::sync::OnceLock;
 use glam::{DVec3, Vec3};
 
 pub use bounds::Bounds;
+pub use budget::{Chosen, OutOfBudget, Plan};
 pub use cell_map::{CellMap, CellStats, Place};
 pub use compiled::{BatchProgram, Lane, PointProgram, RangeProgram};
 pub use dissect::{LeafInfo, Left};
 pub use programs::{Engine, ProgramKind};
 
-use crate::codegen::{CodegenError, Form};
+use crate::codegen::{CodegenError, Form, Forms, Precision};
 use crate::field::{self, Entry, Field, GradientsMut, Path, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -170,6 +172,16 @@ impl Solid {
     pub fn graph(&self, kind: ProgramKind) -> (&Graph, &[Node]) {
         let programs = self.programs(kind);
         (&programs.graph, &programs.outputs)
+    }
+
+    /// ω as one expression: the simplified graph without the guards of its programs.
+    pub fn formula(&self) -> (&Graph, Node) {
+        (&self.inner.omega.graph, self.inner.omega.root)
+    }
+
+    /// The forms in which the programs of one kind evaluate R₀.
+    pub fn forms(&self, kind: ProgramKind, precision: Precision) -> &Forms {
+        self.programs(kind).forms(precision)
     }
 
     /// What the simplification rules did.

@@ -4,8 +4,8 @@ use std::sync::OnceLock;
 
 use super::blocks::BlockProgram;
 use super::compiled::{BatchProgram, Lane, PointProgram};
-use crate::codegen::{CodegenError, Form};
-use crate::ir::{Axis, Binary, Expr, Graph, Interpreter, Node, Unary};
+use crate::codegen::{CodegenError, Form, Forms, Precision};
+use crate::ir::{Axis, Binary, Expr, FloatType, Graph, Growth, Interpreter, Node, Unary};
 
 /// What evaluates a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,6 +43,15 @@ pub enum Guard {
     FarAway,
 }
 
+/// The forms of `f64` and of `f32`: the stable one gives way to the scaled one where squares may leave the range.
+fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
+    if form != Form::Stable {
+        return [Forms::all(form), Forms::all(form)];
+    }
+    let growth = Growth::within_reach(graph);
+    [FloatType::F64, FloatType::F32].map(|float| growth.forms(graph, form, float))
+}
+
 type Slot<P> = OnceLock<Result<P, CodegenError>>;
 
 /// Graphs with more nodes than this are answered by their program over blocks for single points too: making one
@@ -73,15 +82,21 @@ impl<T> Compiled<T> {
 pub struct Programs {
     pub graph: Graph,
     pub outputs: Vec<Node>,
-    /// Of machine code; the interpreter always uses the stable form.
-    form: Form,
+    /// Of R₀ in `f64` and in `f32`.
+    forms: [Forms; 2],
     pub interpreter: Interpreter,
     pub double: Compiled<f64>,
     pub single: Compiled<f32>,
 }
 
 impl Programs {
-    pub fn new(mut graph: Graph, outputs: Vec<Node>, guard: Guard, form: Form) -> Self {
+    pub fn new(graph: Graph, outputs: Vec<Node>, guard: Guard, form: Form) -> Self {
+        let forms = forms(&graph, form);
+        Self::with_forms(graph, outputs, guard, forms)
+    }
+
+    /// With the forms of R₀ in `f64` and in `f32`.
+    pub fn with_forms(mut graph: Graph, outputs: Vec<Node>, guard: Guard, mut forms: [Forms; 2]) -> Self {
         let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
         let sum = |graph: &mut Graph, [x, y, z]: [Node; 3]| {
             let sum = graph.binary(Binary::Add, x, y);
@@ -98,25 +113,35 @@ impl Programs {
         };
         let guard = graph.binary(Binary::Sub, size, size); // 0, or NaN
         let outputs: Vec<Node> = match outputs[..] {
-            [root] => vec![guarded(&mut graph, root, guard)],
+            [root] => vec![guarded(&mut graph, root, guard, &mut forms)],
             _ => outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect(),
         };
-        let interpreter = Interpreter::new(&graph, &outputs);
-        Self { graph, outputs, form, interpreter, double: Compiled::new(), single: Compiled::new() }
+        let interpreter = Interpreter::with_forms(&graph, &outputs, forms.each_ref());
+        Self { graph, outputs, forms, interpreter, double: Compiled::new(), single: Compiled::new() }
+    }
+
+    /// The forms of R₀ in one precision.
+    pub fn forms(&self, precision: Precision) -> &Forms {
+        match precision {
+            Precision::F64 => &self.forms[0],
+            Precision::F32 => &self.forms[1],
+        }
     }
 
     #[inline]
     fn point_program<T: Lane>(&self) -> Result<&PointProgram<T>, CodegenError> {
         let slot = &T::compiled(self).point;
-        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs, self.form))
+        slot.get_or_init(|| PointProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION)))
             .as_ref()
             .map_err(Clone::clone)
     }
 
     fn batch_program<T: Lane>(&self) -> Result<&Many<T>, CodegenError> {
-        let compile = || match BlockProgram::compile(&self.graph, &self.outputs, self.form)? {
+        let compile = || match BlockProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION))? {
             Some(program) => Ok(Many::Blocks(program)),
-            None => BatchProgram::compile(&self.graph, &self.outputs, self.form).map(Many::Loop),
+            None => {
+                BatchProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION)).map(Many::Loop)
+            }
         };
         T::compiled(self).batch.get_or_init(compile).as_ref().map_err(Clone::clone)
     }
@@ -183,14 +208,17 @@ impl Programs {
 }
 
 /// The root with a guard, 0 or NaN, in it. Below R₀, which hands a NaN on from either operand, adding it to one leaf
-/// costs less than adding it to the result.
-fn guarded(graph: &mut Graph, root: Node, guard: Node) -> Node {
+/// costs less than adding it to the result. Pairs of operands that become others keep their forms.
+fn guarded(graph: &mut Graph, root: Node, guard: Node, forms: &mut [Forms; 2]) -> Node {
     let mut above = Vec::new();
     let mut node = root;
     while let Expr::Binary(op @ (Binary::And | Binary::Or), first, second) = graph.expr(node) {
-        above.push((op, second));
+        above.push((op, second, forms.each_ref().map(|forms| forms.of(first, second))));
         node = first;
     }
     let leaf = graph.binary(Binary::Add, node, guard);
-    above.into_iter().rev().fold(leaf, |below, (op, other)| graph.binary(op, below, other))
+    above.into_iter().rev().fold(leaf, |below, (op, other, form)| {
+        forms.iter_mut().zip(form).for_each(|(forms, form)| forms.set(below, other, form));
+        graph.binary(op, below, other)
+    })
 }

@@ -31,11 +31,21 @@ pub struct Param {
     pub doc: Option<String>,
 }
 
-/// `let name = value` or `solid name = value`
+/// `let name = value` or `@attribute(…) solid name = value`
 #[derive(Debug, Clone, PartialEq)]
 pub struct Definition {
+    /// Of solids only.
+    pub attributes: Vec<Attribute>,
     pub name: Name,
     pub value: Expr,
+}
+
+/// `@name(arguments)`: what is wanted of a solid, beside its shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attribute {
+    pub name: Name,
+    pub arguments: Vec<Argument>,
+    pub span: Span,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -192,7 +202,10 @@ impl Item {
                 let range = param.range.iter().flat_map(|(low, high)| [low, high]);
                 deepest(range.chain([&param.value]), levels)
             }
-            Self::Let(definition) | Self::Solid(definition) => definition.value.deeper_than(levels),
+            Self::Let(definition) | Self::Solid(definition) => {
+                let arguments = definition.attributes.iter().flat_map(|a| &a.arguments).map(|a| &a.value);
+                deepest(arguments.chain([&definition.value]), levels)
+            }
             Self::Function(function) => {
                 let defaults = function.parameters.iter().filter_map(|p| p.default.as_ref());
                 deepest(defaults.chain([&function.body]), levels)

@@ -8,8 +8,8 @@ use pest::iterators::{Pair, Pairs};
 use std::cell::Cell;
 
 use super::ast::{
-    AddOp, Argument, Ast, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic, MulOp, Name,
-    Param, Parameter, Scene,
+    AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic,
+    MulOp, Name, Param, Parameter, Scene,
 };
 use super::parse::{DEEPEST_TREE, EDITION, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
@@ -127,15 +127,33 @@ impl Builder {
         if rule == Rule::scene {
             return Item::Scene(self.scene(pair));
         }
-        let mut inner = parts(pair);
+        let mut inner = parts(pair).peekable();
+        let mut attributes = Vec::new();
+        while let Some(pair) = inner.next_if(|part| part.as_rule() == Rule::attribute) {
+            attributes.push(self.attribute(pair));
+        }
         inner.next(); // the keyword
         let name = self.name(inner.next());
         match rule {
             Rule::param => self.param(name, inner),
             Rule::fn_item => self.function(name, inner),
-            Rule::solid => Item::Solid(Definition { name, value: self.expr_or_zero(inner.next()) }),
-            _ => Item::Let(Definition { name, value: self.expr_or_zero(inner.next()) }),
+            Rule::solid => {
+                Item::Solid(Definition { attributes, name, value: self.expr_or_zero(inner.next()) })
+            }
+            _ => Item::Let(Definition { attributes, name, value: self.expr_or_zero(inner.next()) }),
         }
+    }
+
+    fn attribute(&self, pair: Node<'_>) -> Attribute {
+        let span = self.span(&pair);
+        let mut inner = parts(pair);
+        let Name { text, span: whole } = self.name(inner.next());
+        // without the sign that makes it an attribute
+        let name = Name {
+            text: text.trim_start_matches('@').to_string(),
+            span: Span::new(self.source, whole.range().start + 1, whole.range().end),
+        };
+        Attribute { name, arguments: self.arguments(inner.next()), span }
     }
 
     fn param<'i>(&self, name: Name, mut inner: impl Iterator<Item = Node<'i>>) -> Item {

@@ -228,6 +228,7 @@ fn expectation(rules: &[Rule]) -> String {
             Rule::close => add("`)`"),
             Rule::close_vector => add("`]`"),
             Rule::open_brace => add("`{`"),
+            Rule::kw_solid if rules.contains(&Rule::attribute_name) && !may_end => add("`solid`"),
             Rule::close_brace => add("`}`"),
             Rule::kw_in if !may_end => add("`in`"),
             Rule::version => add("`rfm 1`"),
@@ -281,6 +282,8 @@ impl Scan {
         let mut nesting = Nesting::default();
         let mut line_blank = true;
         let mut in_word = false;
+        // after an attribute, before the item that it belongs to
+        let mut attributed = false;
         let mut chars = text.char_indices();
         while let Some((at, c)) = chars.next() {
             let comment = c == '#' || text[at..].starts_with("//");
@@ -307,12 +310,21 @@ impl Scan {
                         }
                     }
                 }
+                '@' if line_blank && nesting.braces == 0 => {
+                    if !attributed {
+                        scan.items.push(at);
+                    }
+                    attributed = true;
+                }
                 '(' | '[' | '{' => nesting.open(c == '{'),
                 ')' | ']' | '}' => nesting.close(c == '}'),
                 ',' => nesting.next_part(),
                 _ if word_starts => {
                     let word = token_at(text, at, text.len());
-                    if line_blank && nesting.braces == 0 && ITEM_WORDS.contains(&word) {
+                    if attributed && nesting.depth() == 0 && ITEM_WORDS.contains(&word) {
+                        attributed = false; // the item began with its attribute
+                    } else if line_blank && nesting.braces == 0 && ITEM_WORDS.contains(&word) {
+                        attributed = false;
                         scan.items.push(at);
                         nesting = Nesting::default(); // an unclosed bracket of the item above is that item's error
                     } else if word == "any" || word == "all" {
@@ -397,6 +409,19 @@ mod tests {
         let text = tree("let a = any i in 0..6: ball(i).move([1., 0, .5])\nlet b = 2.move(1)");
         assert!(text.contains("fold Or i\n    0\n    6\n"), "{text}");
         assert!(text.contains("method move\n    2\n"), "{text}");
+    }
+
+    #[test]
+    fn attributes_belong_to_the_solid_below() {
+        let text = "solid a = x\n@tolerance(1e-6)\nsolid b = y";
+        assert_eq!(tree(text), "solid a\n  x\n@tolerance\n  0.000001\nsolid b\n  y\n");
+        // the slip above it does not take it along
+        let source = Source::file("t.rfm", "rfm 1\nlet c = 2 +\n@tolerance(1e-6)\nsolid b = y");
+        let (ast, diagnostics) = parse(&source);
+        assert_eq!((print(&ast).as_str(), diagnostics.len()), ("@tolerance\n  0.000001\nsolid b\n  y\n", 1));
+        let source = Source::file("t.rfm", "rfm 1\n@tolerance(1e-6)\nlet c = 2\nsolid b = y");
+        let (ast, diagnostics) = parse(&source);
+        assert_eq!((ast.items.len(), diagnostics[0].message.as_str()), (1, "unexpected `let`"));
     }
 
     #[test]

@@ -45,6 +45,11 @@ impl Printer {
             }),
             Item::Let(item) => self.nested(format_args!("let {}", item.name.text), |p| p.expr(&item.value)),
             Item::Solid(item) => {
+                for attribute in &item.attributes {
+                    self.nested(format_args!("@{}", attribute.name.text), |p| {
+                        p.arguments(&attribute.arguments);
+                    });
+                }
                 self.nested(format_args!("solid {}", item.name.text), |p| p.expr(&item.value))
             }
             Item::Function(function) => self.nested(format_args!("fn {}", function.name.text), |p| {

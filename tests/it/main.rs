@@ -3,7 +3,9 @@
 mod agreement;
 mod bad_input;
 mod blocks;
+mod budget;
 mod cells;
+mod certificates;
 mod cli;
 mod contact;
 mod diagnostics;

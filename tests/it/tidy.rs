@@ -10,7 +10,7 @@ use crate::tool::root;
 /// `simplify`, `codegen` and `solid` use `diagnostic` for the spans that nodes carry; `codegen` uses `geom` for the
 /// reach of range programs; `lower` uses `geom` for the boxes of
 /// scenes; `solid` uses `simplify`, because a gradient is derived and simplified when it is first asked for;
-/// `compile` opens the file that `Program::from_path` names.
+/// `compile` opens the file that `Program::from_path` names, and uses `geom` for the box of a tolerance.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("diagnostic", &[]),
     ("geom", &[]),
@@ -22,7 +22,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("simplify", &["ir", "diagnostic"]),
     ("codegen", &["ir", "diagnostic", "geom"]),
     ("solid", &["diagnostic", "ir", "simplify", "codegen", "field", "geom", "interval"]),
-    ("compile", &["diagnostic", "syntax", "ir", "lower", "simplify", "codegen", "solid"]),
+    ("compile", &["diagnostic", "geom", "syntax", "ir", "lower", "simplify", "codegen", "solid"]),
     ("slice", &["field", "geom", "interval"]),
     ("mesh", &["field", "geom", "interval"]),
     ("sph", &["field", "geom", "interval"]),

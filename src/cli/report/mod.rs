@@ -18,7 +18,7 @@ use super::{Failure, choose, input, output, progress};
 use crate::codegen::{Form, target_description};
 use crate::geom::Aabb;
 use crate::ir::exact::{self, Exact};
-use crate::ir::{Graph, Node};
+use crate::ir::{Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Node};
 use crate::solid::{Lane, ProgramKind};
 use crate::{Engine, Program, Solid};
 use points::Points;
@@ -41,6 +41,8 @@ struct Row {
     /// Over random points of the box.
     max_abs_error: Option<f64>,
     max_rel_error: Option<f64>,
+    /// What the error of ω is certified not to exceed anywhere in the box, for coordinates of the row's precision.
+    certified_error: Option<f64>,
     /// Over random points and points on the surface.
     sign_mismatches: Option<usize>,
     /// How far the surface is displaced: |error of ω|/|∇ω| on it.
@@ -63,7 +65,8 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
     options.output.as_deref().map(output::Picture::of).transpose()?;
     let program = input::program(shared, &options.file)?;
     let reference = choose::solid(shared, &program, options.solid.as_deref())?;
-    let over = domain(&program, &reference)?;
+    let nowhere = || Failure::usage("the solid has no bounds and the file no scene: nowhere to measure");
+    let over = program.domain(&reference).ok_or_else(nowhere)?;
     let bar = progress::bar(4, "measuring");
     let points = Points::choose(&reference, over);
     bar.inc(1);
@@ -100,17 +103,6 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
         println!("plot written to {}", path.display());
     }
     Ok(())
-}
-
-/// The box of the only scene, or the solid's bounds and as much around them.
-fn domain(program: &Program, solid: &Solid) -> Result<Aabb, Failure> {
-    if let [scene] = &program.module().scenes[..] {
-        return Ok(scene.domain);
-    }
-    match solid.bounds().aabb() {
-        Some(bounds) => Ok(bounds.grown(0.5 * bounds.size().max_element())),
-        None => Err(Failure::usage("the solid has no bounds and the file no scene: nowhere to measure")),
-    }
 }
 
 /// The same solid in every form and on every engine.
@@ -159,6 +151,7 @@ fn measure<T: Lane>(
     let judged: Vec<DVec3> = points.judged(single).collect();
     let surface_from = points.random_judged;
     let columns = Columns::<T>::of(points.random.iter().copied());
+    let certified = certified::<T>(solid, points.over);
     let row = |program, shape, ns, errors: Errors| Row {
         program,
         precision,
@@ -168,6 +161,7 @@ fn measure<T: Lane>(
         ns_per_point: ns,
         max_abs_error: errors.absolute,
         max_rel_error: errors.relative,
+        certified_error: if program == "value" { certified } else { None },
         sign_mismatches: errors.signs,
         max_distance_error: errors.distance,
     };
@@ -227,6 +221,17 @@ fn measure<T: Lane>(
     rows
 }
 
+/// The certificate of a program over the box and what rounding its points to the type adds to it.
+fn certified<T: Lane>(solid: &Solid, over: Aabb) -> Option<f64> {
+    let float = if size_of::<T>() == 4 { FloatType::F32 } else { FloatType::F64 };
+    let forms = solid.forms(ProgramKind::Value, T::PRECISION);
+    let (graph, root) = solid.formula();
+    let margin = 2.0 * float.unit * over.min.abs().max(over.max.abs()).max_element();
+    let arithmetic = Arithmetic { float, forms, inputs: Inputs::Exact };
+    let bound = ErrorAnalysis::new(graph, root, arithmetic).certify(&over.grown(margin), 0.0);
+    bound.is_finite().then_some(bound)
+}
+
 /// Ranges of small boxes around the points: a violation is a point whose exact ω is not in the range.
 fn range_row(solid: &Solid, points: &Points) -> Row {
     let half = 0.02 * points.over.size();
@@ -249,6 +254,7 @@ fn range_row(solid: &Solid, points: &Points) -> Row {
         ns_per_point: ns,
         max_abs_error: None,
         max_rel_error: None,
+        certified_error: None,
         sign_mismatches: Some(violations),
         max_distance_error: None,
     }
@@ -363,7 +369,7 @@ fn print(solid: &Solid, points: &Points, over: Aabb, rows: &[Row]) {
         points.surface.len()
     );
     println!(
-        "{:<9} {:<5} {:<7} {:<9} {:<5} {:>9} {:>10} {:>10} {:>6} {:>11}",
+        "{:<9} {:<5} {:<7} {:<9} {:<5} {:>9} {:>10} {:>10} {:>10} {:>6} {:>11}",
         "program",
         "prec",
         "engine",
@@ -371,6 +377,7 @@ fn print(solid: &Solid, points: &Points, over: Aabb, rows: &[Row]) {
         "shape",
         "ns/point",
         "abs error",
+        "certified",
         "rel error",
         "signs",
         "surface, m"
@@ -378,7 +385,7 @@ fn print(solid: &Solid, points: &Points, over: Aabb, rows: &[Row]) {
     for row in rows {
         let number = |x: Option<f64>| x.map_or("–".to_string(), |x| format!("{x:.1e}"));
         println!(
-            "{:<9} {:<5} {:<7} {:<9} {:<5} {:>9.2} {:>10} {:>10} {:>6} {:>11}",
+            "{:<9} {:<5} {:<7} {:<9} {:<5} {:>9.2} {:>10} {:>10} {:>10} {:>6} {:>11}",
             row.program,
             row.precision,
             row.engine,
@@ -386,6 +393,7 @@ fn print(solid: &Solid, points: &Points, over: Aabb, rows: &[Row]) {
             row.shape,
             row.ns_per_point,
             number(row.max_abs_error),
+            number(row.certified_error),
             number(row.max_rel_error),
             row.sign_mismatches.map_or("–".to_string(), |n| n.to_string()),
             number(row.max_distance_error),

@@ -137,10 +137,10 @@ macro_rules! wide {
 
             value!(and, $t, r0::and);
             value!(or, $t, r0::or);
-            value!(textbook_and, $t, r0::textbook_and);
-            value!(textbook_or, $t, r0::textbook_or);
-            guarded!(guarded_and, $t, r0::textbook_and, r0::and);
-            guarded!(guarded_or, $t, r0::textbook_or, r0::or);
+            value!(textbook_and, $t, r0::and_textbook);
+            value!(textbook_or, $t, r0::or_textbook);
+            guarded!(guarded_and, $t, r0::and_textbook, r0::and);
+            guarded!(guarded_or, $t, r0::or_textbook, r0::or);
             value!(negate, $t, plain::negate);
             value!(add, $t, plain::add);
             value!(sub, $t, plain::sub);
@@ -151,10 +151,14 @@ macro_rules! wide {
             value!(max, $t, plain::max);
             value!(plain_min, $t, plain::plain_min);
             value!(plain_max, $t, plain::plain_max);
+            value!(scaled_and, $t, r0::and_scaled);
+            value!(scaled_or, $t, r0::or_scaled);
+            weighted!(scaled_and_weighted, $t, r0::and_weighted_scaled);
+            weighted!(scaled_or_weighted, $t, r0::or_weighted_scaled);
             weighted!(and_weighted, $t, r0::and_weighted);
             weighted!(or_weighted, $t, r0::or_weighted);
-            weighted!(textbook_and_weighted, $t, r0::textbook_and_weighted);
-            weighted!(textbook_or_weighted, $t, r0::textbook_or_weighted);
+            weighted!(textbook_and_weighted, $t, r0::and_weighted_textbook);
+            weighted!(textbook_or_weighted, $t, r0::or_weighted_textbook);
         }
 
         impl Wide for $t {
@@ -164,6 +168,8 @@ macro_rules! wide {
                     (Binary::Or, Form::Stable) => $module::or,
                     (Binary::And, Form::Textbook) => $module::textbook_and,
                     (Binary::Or, Form::Textbook) => $module::textbook_or,
+                    (Binary::And, Form::Scaled) => $module::scaled_and,
+                    (Binary::Or, Form::Scaled) => $module::scaled_or,
                     (Binary::And, Form::Guarded) => $module::guarded_and,
                     (Binary::Or, Form::Guarded) => $module::guarded_or,
                     (Binary::Add, _) => $module::add,
@@ -187,6 +193,8 @@ macro_rules! wide {
                 Some(match (op, form) {
                     (Binary::And, Form::Stable | Form::Guarded) => $module::and_weighted,
                     (Binary::Or, Form::Stable | Form::Guarded) => $module::or_weighted,
+                    (Binary::And, Form::Scaled) => $module::scaled_and_weighted,
+                    (Binary::Or, Form::Scaled) => $module::scaled_or_weighted,
                     (Binary::And, Form::Textbook) => $module::textbook_and_weighted,
                     (Binary::Or, Form::Textbook) => $module::textbook_or_weighted,
                     _ => return None,
@@ -245,13 +253,17 @@ mod tests {
                 assert!(error <= 16.0, "{op:?} of {u:?}, {v:?}: {error} ulp");
                 assert!(found.to_f64().signum() == expected.signum());
             }
-            let mut weights = [out.clone(), out.clone(), out.clone()];
-            T::weighted_kernel(op, Form::Stable).unwrap()(&u, &v, weights.each_mut().map(|c| &mut c[..]));
             let weight = if op == Binary::And { Binary::AndWeight } else { Binary::OrWeight };
-            for (i, (&u, &v)) in u.iter().zip(&v).enumerate() {
-                let expected = [op.eval(u, v), weight.eval(u, v), weight.eval(v, u)];
-                let found = weights.each_ref().map(|column| column[i]);
-                assert!(found == expected, "{op:?} of {u:?}, {v:?}: {found:?}, not {expected:?}");
+            for form in [Form::Stable, Form::Textbook, Form::Scaled] {
+                T::kernel(op, form).unwrap()(&u, &v, &mut out);
+                let mut all = [out.clone(), out.clone(), out.clone()];
+                T::weighted_kernel(op, form).unwrap()(&u, &v, all.each_mut().map(|c| &mut c[..]));
+                for (i, (&u, &v)) in u.iter().zip(&v).enumerate() {
+                    let expected = [form.eval(op, u, v), form.eval(weight, u, v), form.eval(weight, v, u)];
+                    let found = all.each_ref().map(|column| column[i]);
+                    assert!(found == expected, "{op:?} of {u:?}, {v:?}: {found:?}, not {expected:?}");
+                    assert!(out[i] == expected[0]);
+                }
             }
         }
     }

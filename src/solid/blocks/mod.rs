@@ -11,7 +11,7 @@ mod junctions;
 mod plan;
 
 use super::compiled::{Lane, SegmentProgram};
-use crate::codegen::{CodegenError, Form};
+use crate::codegen::{CodegenError, Forms};
 use crate::ir::{Graph, Node};
 pub use junctions::Wide;
 use junctions::{Kernel, WeightedKernel};
@@ -73,11 +73,11 @@ impl<T: Lane> BlockProgram<T> {
     ///
     /// # Errors
     /// As for [`crate::codegen::compile`].
-    pub fn compile(graph: &Graph, outputs: &[Node], form: Form) -> Result<Option<Self>, CodegenError> {
-        let Some(plan) = Plan::new(graph, outputs) else { return Ok(None) };
+    pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Option<Self>, CodegenError> {
+        let Some(plan) = Plan::new(graph, outputs, forms) else { return Ok(None) };
         let mut steps = Vec::with_capacity(plan.steps.len());
         for step in plan.steps {
-            let Some(run) = Run::of(step, form) else { return Ok(None) };
+            let Some(run) = Run::of(step) else { return Ok(None) };
             steps.push(run);
         }
         let piece = |piece: &plan::Piece| {
@@ -158,19 +158,19 @@ impl<T: Lane> BlockProgram<T> {
 
 impl<T: Lane> Run<T> {
     /// Nothing for a junction that there is no loop for.
-    fn of(step: Step, form: Form) -> Option<Self> {
+    fn of(step: Step) -> Option<Self> {
         Some(match step {
             Step::Arithmetic { program: piece, parameters, reads, writes } => {
                 Self::Arithmetic { piece, parameters, reads, writes }
             }
-            Step::Junction { op, operands, value, weights: None } => {
+            Step::Junction { op, form, operands, value, weights: None } => {
                 let kernel = match op {
                     Operation::Binary(op) => T::kernel(op, form)?,
                     Operation::Negate => T::negation(),
                 };
                 Self::Junction { kernel, operands, value }
             }
-            Step::Junction { op, operands, value, weights: Some([by_u, by_v]) } => {
+            Step::Junction { op, form, operands, value, weights: Some([by_u, by_v]) } => {
                 let Operation::Binary(op) = op else { return None };
                 let kernel = T::weighted_kernel(op, form)?;
                 Self::Weighted { kernel, operands, results: [value, by_u, by_v] }

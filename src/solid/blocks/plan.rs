@@ -11,7 +11,7 @@
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
-use crate::ir::{Binary, Expr, Graph, Node, Unary};
+use crate::ir::{Binary, Expr, Form, Forms, Graph, Node, Unary};
 
 /// Up to this many pieces one program computes them all: it shares what they have in common, such as x² + y².
 const FEW_PIECES: usize = 16;
@@ -38,6 +38,8 @@ pub enum Step<P = Place> {
     },
     Junction {
         op: Operation,
+        /// Of R₀.
+        form: Form,
         /// Twice the same for an operation of one operand.
         operands: [P; 2],
         value: P,
@@ -79,7 +81,7 @@ pub struct Plan {
 
 impl Plan {
     /// A plan; nothing where it would not pay: no R₀, and not many junctions of another kind.
-    pub fn new(graph: &Graph, outputs: &[Node]) -> Option<Self> {
+    pub fn new(graph: &Graph, outputs: &[Node], forms: &Forms) -> Option<Self> {
         let used = graph.reachable(outputs);
         let count = |is: fn(Binary) -> bool| {
             let binary = |(node, expr): (Node, Expr)| match expr {
@@ -93,7 +95,8 @@ impl Plan {
             return None;
         }
         let parts = Parts::new(graph, outputs, &used, many);
-        let mut planner = Planner { parts, pieces: Vec::new(), constants: Vec::new(), steps: Vec::new() };
+        let mut planner =
+            Planner { parts, forms, pieces: Vec::new(), constants: Vec::new(), steps: Vec::new() };
         planner.schedule(outputs);
         let Planner { pieces, constants, steps, .. } = planner;
         let (steps, columns) = allocate(steps, outputs);
@@ -222,6 +225,7 @@ impl<'g> Parts<'g> {
 
 struct Planner<'g> {
     parts: Parts<'g>,
+    forms: &'g Forms,
     pieces: Vec<Piece>,
     constants: Vec<f64>,
     steps: Vec<Step<Slot>>,
@@ -313,12 +317,17 @@ impl Planner<'_> {
         let made: Vec<Node> = [value, by_u, by_v].into_iter().flatten().collect();
         let weights = Some([by_u, if u == v { None } else { by_v }]);
         let op = Operation::Binary(value_op);
-        self.steps.push(Step::Junction { op, operands, value, weights });
+        let form = self.forms.of(u, v);
+        self.steps.push(Step::Junction { op, form, operands, value, weights });
         made
     }
 
     fn push_junction(&mut self, op: Operation, operands: [Slot; 2], node: Node) -> Vec<Node> {
-        self.steps.push(Step::Junction { op, operands, value: Some(node), weights: None });
+        let form = match operands {
+            [Some(u), Some(v)] => self.forms.of(u, v),
+            _ => Form::Stable,
+        };
+        self.steps.push(Step::Junction { op, form, operands, value: Some(node), weights: None });
         vec![node]
     }
 }
@@ -427,8 +436,9 @@ impl Step<Slot> {
                 reads: reads.into_iter().map(&mut place).collect(),
                 writes: writes.into_iter().map(&mut place).collect(),
             },
-            Self::Junction { op, operands, value, weights } => Step::Junction {
+            Self::Junction { op, form, operands, value, weights } => Step::Junction {
                 op,
+                form,
                 operands: operands.map(&mut place),
                 value: place(value),
                 weights: weights.map(|both| both.map(&mut place)),
@@ -481,7 +491,7 @@ mod tests {
         let mut graph = Graph::default();
         let balls: Vec<Node> = (0..1000).map(|i| ball(&mut graph, i)).collect();
         let root = union(&mut graph, &balls);
-        let plan = Plan::new(&graph, &[root]).unwrap();
+        let plan = Plan::new(&graph, &[root], &Forms::default()).unwrap();
         assert_eq!(plan.pieces.len(), 1);
         assert_eq!(plan.constants.len(), 1000 * plan.pieces[0].parameters);
         assert_eq!(plan.steps.len(), 1000 + 999);
@@ -497,7 +507,7 @@ mod tests {
         let root = union(&mut graph, &balls);
         let mut outputs = vec![root];
         outputs.extend(crate::ir::gradient(&mut graph, root));
-        let plan = Plan::new(&graph, &outputs).unwrap();
+        let plan = Plan::new(&graph, &outputs, &Forms::default()).unwrap();
         for step in &plan.steps {
             if let Step::Junction { operands, value, weights, .. } = step {
                 let results: Vec<Place> =
@@ -512,10 +522,10 @@ mod tests {
     fn plain_arithmetic_and_small_twins_need_no_plan() {
         let mut graph = Graph::default();
         let (a, b) = (ball(&mut graph, 0), ball(&mut graph, 1));
-        let least = graph.binary(Binary::PlainMin, a, b);
-        assert!(Plan::new(&graph, &[least]).is_none() && Plan::new(&graph, &[a]).is_none());
+        let (least, forms) = (graph.binary(Binary::PlainMin, a, b), Forms::default());
+        assert!(Plan::new(&graph, &[least], &forms).is_none() && Plan::new(&graph, &[a], &forms).is_none());
         let both = graph.binary(Binary::And, a, b);
-        assert!(Plan::new(&graph, &[both]).is_some());
+        assert!(Plan::new(&graph, &[both], &forms).is_some());
     }
 
     #[test]
@@ -523,7 +533,7 @@ mod tests {
         let mut graph = Graph::default();
         let (a, b) = (ball(&mut graph, 0), ball(&mut graph, 1));
         let both = graph.binary(Binary::And, a, b);
-        let plan = Plan::new(&graph, &[both, a, both]).unwrap();
+        let plan = Plan::new(&graph, &[both, a, both], &Forms::default()).unwrap();
         let written = |i| places(&plan).iter().filter(|p| **p == Place::Output(i)).count();
         assert_eq!([written(0), written(1), written(2)], [1, 1, 1]);
     }

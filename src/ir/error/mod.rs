@@ -1,0 +1,238 @@
+//! Certified rounding errors: a bound of |computed ω − exact ω| for every point of a box.
+//!
+//! Forward analysis, one operation after the other. Each node has a range of its exact values (`ir::range`) and an
+//! [`Error`]: an absolute bound, and beside it a relative one with a tiny remainder for underflow,
+//! |computed − exact| ≤ ρ·|exact| + α, which alone survives products, sums of squares and their roots near zero. An
+//! operation hands on the errors of its operands through its derivatives over the box and adds its own rounding:
+//!
+//! - R₀ hands them on through its weights, 1 ∓ u/√(u² + v²), which lie in [0, 2] and depend on the direction of
+//!   (u, v) only, so the worst over two ranges is known from the directions of their corners; and because R₀ is homogeneous of degree 1 with
+//!   Σ wᵢ|uᵢ| ≤ √2·|ω|, relative errors grow by √2 at most.
+//! - R₀'s own rounding, with u the unit roundoff: stable form 4u·|ω|, scaled form 7u·|ω| (from the error bounds of
+//!   the factors of m·(1 − τ), of s + H and of M·(1 + k + q), Higham 2002, chapter 3), textbook form
+//!   u·|s| + 2u·h + u·|ω|; where squares underflow, √(2η) more.
+//! - Functions of the mathematical library err by at most one unit in the last place (the tests of the `libm`
+//!   crate hold them to that); two are charged.
+//!
+//! What is not known — a root that may meet a negative number, a divisor that may vanish, an overflow — is ∞.
+//! All bounds are computed with every operation rounded upwards. Ranges of a whole box add up worst cases of
+//! different places, so a box is divided where its bound is largest, until no point would do much better.
+
+mod step;
+mod upper;
+mod weights;
+
+use std::collections::BinaryHeap;
+
+use super::forms::Forms;
+use super::graph::{Expr, Graph, Node};
+use super::growth::FloatType;
+use super::op::Binary;
+use super::range::RangeEvaluator;
+use crate::geom::Aabb;
+use step::{Operand, Step};
+
+/// How the coordinates of a point reach the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Inputs {
+    /// They are numbers of the program's type.
+    Exact,
+    /// They are rounded to it once.
+    Rounded,
+    /// An origin is subtracted in `f64` before; the constants of the graph were folded with it, see
+    /// [`localised`](super::localised).
+    Shifted,
+}
+
+/// One way to compute a node.
+#[derive(Debug, Clone, Copy)]
+pub struct Arithmetic<'a> {
+    pub float: FloatType,
+    pub forms: &'a Forms,
+    pub inputs: Inputs,
+}
+
+/// |computed − exact| ≤ `absolute`, and ≤ `relative`·|exact| + `remainder`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Error {
+    pub absolute: f64,
+    pub relative: f64,
+    pub remainder: f64,
+}
+
+/// Relative error of a constant that was folded with an origin, see [`localised`](super::localised).
+pub const FOLDING: f64 = 1.0 / (1u64 << 50) as f64;
+
+/// Boxes that are looked at for one certificate, and operations in them.
+const MOST_BOXES: usize = 4000;
+const MOST_OPERATIONS: usize = 3_000_000;
+
+/// A bound this much above that of some single point is tight enough.
+const TIGHT: f64 = 1.25;
+
+/// A graph prepared for certificates of one arithmetic.
+pub struct ErrorAnalysis<'a> {
+    graph: &'a Graph,
+    root: Node,
+    arithmetic: Arithmetic<'a>,
+    ranges: RangeEvaluator,
+}
+
+impl<'a> ErrorAnalysis<'a> {
+    pub fn new(graph: &'a Graph, root: Node, arithmetic: Arithmetic<'a>) -> Self {
+        Self { graph, root, arithmetic, ranges: RangeEvaluator::new(graph, root) }
+    }
+
+    /// A bound of |computed − exact| of the root at every point of a box; ∞ where there is none. The box is divided
+    /// until the bound is at most `enough`, cannot become so, or would not become much smaller.
+    ///
+    /// With [`Inputs::Shifted`] the box is one of shifted coordinates.
+    pub fn certify(&self, over: &Aabb, enough: f64) -> f64 {
+        let whole = Part { bound: self.bound(over), over: *over };
+        let mut parts = BinaryHeap::from([whole]);
+        let most = MOST_BOXES.min(MOST_OPERATIONS / self.graph.len().max(1)).max(16);
+        // no division of the box gives less than this
+        let mut attained: f64 = 0.0;
+        for _ in 0..most {
+            let Some(worst) = parts.peek() else { break };
+            let centre = worst.over.centre();
+            attained = attained.max(self.bound(&Aabb::new(centre, centre)));
+            let tight = attained > enough.max(worst.bound / TIGHT) || attained.is_infinite();
+            if worst.bound <= enough || tight {
+                break;
+            }
+            let Some(worst) = parts.pop() else { break };
+            parts.extend(worst.over.halves().map(|over| Part { bound: self.bound(&over), over }));
+        }
+        parts.peek().map_or(f64::INFINITY, |worst| worst.bound)
+    }
+
+    /// The bound for a box in one piece.
+    pub fn bound(&self, over: &Aabb) -> f64 {
+        self.errors(over)[self.root.index()].absolute
+    }
+
+    /// The errors of all nodes over a box, in the graph's order.
+    pub fn errors(&self, over: &Aabb) -> Vec<Error> {
+        let ranges = self.ranges.all(over);
+        let mut known: Vec<Operand> = Vec::with_capacity(ranges.len());
+        for ((_, expr), range) in std::iter::zip(self.graph.nodes(), ranges) {
+            // the ends of R₀'s ranges are R₀ of the operands' ends, rounded
+            let rounded = matches!(expr, Expr::Binary(Binary::And | Binary::Or, ..));
+            let range = if rounded { range.widened(4) } else { range };
+            let step = Step { arithmetic: self.arithmetic, known: &known, range };
+            let (error, not_negative) = step.of(expr);
+            known.push(Operand { error, range, not_negative });
+        }
+        known.into_iter().map(|operand| operand.error).collect()
+    }
+}
+
+/// A part of the box, the one with the largest bound first.
+struct Part {
+    bound: f64,
+    over: Aabb,
+}
+
+impl Ord for Part {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.bound.total_cmp(&other.bound)
+    }
+}
+
+impl PartialOrd for Part {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Part {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Part {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::{Axis, Form, Unary};
+    use glam::DVec3;
+
+    const UNIT: f64 = 0.5 * f64::EPSILON;
+
+    fn bound(graph: &Graph, root: Node, form: Form, over: Aabb) -> f64 {
+        let forms = Forms::all(form);
+        let arithmetic = Arithmetic { float: FloatType::F64, forms: &forms, inputs: Inputs::Exact };
+        ErrorAnalysis::new(graph, root, arithmetic).bound(&over)
+    }
+
+    #[track_caller]
+    fn near(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} is not {expected:e}");
+    }
+
+    fn cube(lo: f64, hi: f64) -> Aabb {
+        Aabb::new(DVec3::splat(lo), DVec3::splat(hi))
+    }
+
+    #[test]
+    fn sums_products_and_roots_by_hand() {
+        let mut graph = Graph::default();
+        let [x, y] = [Axis::X, Axis::Y].map(|axis| graph.coordinate(axis));
+        let over = cube(0.0, 2.0);
+        // one rounding of a sum of at most 4
+        let sum = graph.binary(Binary::Add, x, y);
+        near(bound(&graph, sum, Form::Stable, over), 4.0 * UNIT);
+        // (1 + u)²(1 + u) − 1 of at most 16, and the underflow
+        let square = graph.binary(Binary::Mul, sum, sum);
+        near(bound(&graph, square, Form::Stable, over), 48.0 * UNIT);
+        // of x² + y²: squares u, sum u, halved by the root, root u
+        let (x2, y2) = (graph.binary(Binary::Mul, x, x), graph.binary(Binary::Mul, y, y));
+        let squares = graph.binary(Binary::Add, x2, y2);
+        let rho = graph.unary(Unary::Sqrt, squares);
+        near(bound(&graph, rho, Form::Stable, over), 2.0 * UNIT * 8f64.sqrt());
+        // the divisor may vanish
+        let quotient = graph.binary(Binary::Div, y, x);
+        assert_eq!(bound(&graph, quotient, Form::Stable, over), f64::INFINITY);
+        near(bound(&graph, quotient, Form::Stable, cube(1.0, 2.0)), 2.0 * UNIT);
+    }
+
+    #[test]
+    fn forms_of_r0_by_hand() {
+        let mut graph = Graph::default();
+        let [x, y] = [Axis::X, Axis::Y].map(|axis| graph.coordinate(axis));
+        let and = graph.binary(Binary::And, x, y);
+        // exact operands: 1 ∧ 1 … 2 ∧ 2 = 2·(2 − √2)
+        let (over, value) = (cube(1.0, 2.0), 2.0 * (2.0 - 2f64.sqrt()));
+        let close = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-3, "{found:e}");
+        close(bound(&graph, and, Form::Stable, over), 4.0 * UNIT * value);
+        close(bound(&graph, and, Form::Scaled, over), 7.0 * UNIT * value);
+        let textbook = UNIT * 4.0 + 2.01 * UNIT * 8f64.sqrt() + 1.01 * UNIT * value;
+        close(bound(&graph, and, Form::Textbook, over), textbook);
+        // squares of 1e200 overflow, their scaled form does not
+        assert_eq!(bound(&graph, and, Form::Stable, cube(1.0, 1e200)), f64::INFINITY);
+        assert!(bound(&graph, and, Form::Scaled, cube(1.0, 1e200)) < 1e185);
+    }
+
+    #[test]
+    fn dividing_the_box_tightens_the_bound_and_stops_where_nothing_is_known() {
+        // (x ∨ y) ∧ (¬x ∨ ¬y): in no place are both operands large, but over the whole box either may be
+        let mut graph = Graph::default();
+        let [x, y] = [Axis::X, Axis::Y].map(|axis| graph.coordinate(axis));
+        let [not_x, not_y] = [x, y].map(|node| graph.unary(Unary::Neg, node));
+        let (either, neither) = (graph.binary(Binary::Or, x, y), graph.binary(Binary::Or, not_x, not_y));
+        let root = graph.binary(Binary::And, either, neither);
+        let undefined = graph.unary(Unary::Sqrt, y);
+        let forms = Forms::all(Form::Stable);
+        let arithmetic = Arithmetic { float: FloatType::F64, forms: &forms, inputs: Inputs::Exact };
+        let analysis = ErrorAnalysis::new(&graph, root, arithmetic);
+        let over = cube(-1.0, 1.0);
+        let (whole, divided) = (analysis.bound(&over), analysis.certify(&over, 0.0));
+        assert!(divided < 0.7 * whole && divided > UNIT, "{divided:e} {whole:e}");
+        assert_eq!(analysis.certify(&over, whole), whole);
+        let analysis = ErrorAnalysis::new(&graph, undefined, arithmetic);
+        assert_eq!(analysis.certify(&over, 0.0), f64::INFINITY);
+    }
+}

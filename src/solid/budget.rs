@@ -1,0 +1,290 @@
+//! The cheapest program whose certified error keeps a tolerance, see `ir::ErrorAnalysis`.
+//!
+//! The tolerance bounds |computed ω − exact ω| over a box. Only values are computed the cheap way, and only in the box:
+//! gradients, ranges and points beyond it get the solid's own program, signs and surfaces the exact twin.
+
+use glam::DVec3;
+
+use super::Solid;
+use super::programs::{Guard, Programs};
+use crate::codegen::{Form, Forms, Precision};
+use crate::field::{Field, GradientsMut, Points};
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Growth, Inputs, Node};
+
+/// One way to compute ω.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Width of the arithmetic.
+    pub precision: Precision,
+    /// Of R₀; scaled where the squares of its operands leave the range.
+    pub form: Form,
+    /// Whether the centre of the box is subtracted in `f64` first.
+    pub local: bool,
+}
+
+impl Plan {
+    /// What solids are compiled to when nothing is asked for.
+    pub const STANDARD: Self = Self::new(Precision::F64, Form::Stable, false);
+
+    /// From the cheapest to the dearest: the order in which they are tried. The pawn's ω in columns of `f64`, conversion
+    /// included: 4.7, 7.5, 7.5, 7.3, 10.9 ns, and scaled another fifth. With more operations to a point the conversion
+    /// weighs less, and the `f32` programs move away from the `f64` ones.
+    pub const BY_COST: [Self; 6] = [
+        Self::new(Precision::F32, Form::Textbook, false),
+        Self::new(Precision::F32, Form::Stable, false),
+        Self::new(Precision::F32, Form::Stable, true),
+        Self::new(Precision::F64, Form::Textbook, false),
+        Self::STANDARD,
+        Self::new(Precision::F64, Form::Scaled, false),
+    ];
+
+    const fn new(precision: Precision, form: Form, local: bool) -> Self {
+        Self { precision, form, local }
+    }
+
+    /// `f32 stable in local coordinates`
+    pub fn name(self) -> String {
+        let precision = match self.precision {
+            Precision::F32 => "f32",
+            Precision::F64 => "f64",
+        };
+        let local = if self.local { " in local coordinates" } else { "" };
+        format!("{precision} {}{local}", self.form.name())
+    }
+
+    fn float(self) -> FloatType {
+        match self.precision {
+            Precision::F32 => FloatType::F32,
+            Precision::F64 => FloatType::F64,
+        }
+    }
+}
+
+/// No program keeps the tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutOfBudget {
+    /// The smallest bound that can be had; infinite if there is none.
+    pub bound: f64,
+    /// The program that has it.
+    pub plan: Plan,
+}
+
+/// A solid whose ω is computed by the cheapest program that keeps a tolerance in a box.
+#[derive(Clone)]
+pub struct Chosen {
+    solid: Solid,
+    plan: Plan,
+    over: Aabb,
+    bound: f64,
+    candidate: std::sync::Arc<Candidate>,
+}
+
+/// A program with what its certificate needs.
+struct Candidate {
+    graph: Graph,
+    root: Node,
+    origin: DVec3,
+    /// The solid's own if there are none.
+    programs: Option<Programs>,
+    forms: Forms,
+    inputs: Inputs,
+    /// In the coordinates of the program.
+    over: Aabb,
+    float: FloatType,
+}
+
+/// Points that are converted at a time.
+const BLOCK: usize = 256;
+
+impl Solid {
+    /// The cheapest program whose certified |computed ω − exact ω| is at most `tolerance` everywhere in a box. Exact is
+    /// the value of the simplified formula, whose constants are doubles, at the given point, whose coordinates are.
+    ///
+    /// # Errors
+    /// If no program is certified to keep it.
+    pub fn within(&self, tolerance: f64, over: Aabb) -> Result<Chosen, OutOfBudget> {
+        for plan in Plan::BY_COST {
+            let candidate = Candidate::new(self, plan, &over);
+            let enough = candidate.certify(tolerance);
+            if enough <= tolerance {
+                let bound = enough.min(candidate.certify(0.0));
+                let candidate = candidate.with_programs(self, plan).into();
+                return Ok(Chosen { solid: self.clone(), plan, over, bound, candidate });
+            }
+        }
+        let [.., dearest] = Plan::BY_COST;
+        let [standard, scaled] =
+            [Plan::STANDARD, dearest].map(|plan| OutOfBudget { bound: self.error_bound(plan, &over), plan });
+        Err(if scaled.bound < standard.bound { scaled } else { standard })
+    }
+
+    /// A certified bound of |computed ω − exact ω| of one program over a box; infinite where there is none.
+    pub fn error_bound(&self, plan: Plan, over: &Aabb) -> f64 {
+        Candidate::new(self, plan, over).certify(0.0)
+    }
+}
+
+impl Candidate {
+    fn new(solid: &Solid, plan: Plan, over: &Aabb) -> Self {
+        let (graph, root) = solid.formula();
+        let float = plan.float();
+        // few digits, so that constants fold without error
+        let origin = if plan.local { over.centre().as_vec3().as_dvec3() } else { DVec3::ZERO };
+        let (graph, root) =
+            if plan.local { ir::localised(graph, root, origin) } else { (graph.clone(), root) };
+        let over = if plan.local { shifted(over, origin) } else { *over };
+        // the solid's own program, unless it was compiled in another form for comparison
+        let forms = if plan == Plan::STANDARD && solid.inner.omega.form == Form::Stable {
+            solid.inner.omega.value.forms(Precision::F64).clone()
+        } else {
+            Growth::over(&graph, &over).forms(&graph, plan.form, float)
+        };
+        let inputs = match (plan.precision, plan.local) {
+            (Precision::F64, _) => Inputs::Exact,
+            (Precision::F32, false) => Inputs::Rounded,
+            (Precision::F32, true) => Inputs::Shifted,
+        };
+        Self { graph, root, origin, programs: None, forms, inputs, over, float }
+    }
+
+    fn certify(&self, enough: f64) -> f64 {
+        // programs add the coordinates up to see whether they are finite
+        let reach = self.over.min.abs().max(self.over.max.abs()).element_sum();
+        let finite = 4.0 * reach < self.float.largest;
+        if self.over.is_empty() || !finite {
+            return f64::INFINITY;
+        }
+        let arithmetic = Arithmetic { float: self.float, forms: &self.forms, inputs: self.inputs };
+        ErrorAnalysis::new(&self.graph, self.root, arithmetic).certify(&self.over, enough)
+    }
+
+    fn with_programs(mut self, solid: &Solid, plan: Plan) -> Self {
+        if plan != Plan::STANDARD || solid.inner.omega.form != Form::Stable {
+            let forms = [self.forms.clone(), self.forms.clone()];
+            let programs = Programs::with_forms(self.graph.clone(), vec![self.root], Guard::Infinite, forms);
+            self.programs = Some(programs);
+        }
+        self
+    }
+}
+
+/// A box in coordinates relative to an origin, rounded outwards.
+fn shifted(over: &Aabb, origin: DVec3) -> Aabb {
+    let axes: [Interval; 3] = std::array::from_fn(|axis| {
+        Interval::new(over.min[axis], over.max[axis]) - Interval::point(origin[axis])
+    });
+    Aabb::new(DVec3::from_array(axes.map(|a| a.lo)), DVec3::from_array(axes.map(|a| a.hi)))
+}
+
+impl Chosen {
+    /// Which program it is.
+    pub fn plan(&self) -> Plan {
+        self.plan
+    }
+
+    /// Certified: |computed ω − exact ω| is nowhere larger in the box.
+    pub fn bound(&self) -> f64 {
+        self.bound
+    }
+
+    /// Where the bound holds.
+    pub fn over(&self) -> &Aabb {
+        &self.over
+    }
+
+    /// The solid itself.
+    pub fn solid(&self) -> &Solid {
+        &self.solid
+    }
+
+    /// The program's value at a point of the box.
+    fn value(&self, programs: &Programs, p: DVec3) -> f64 {
+        let engine = self.solid.inner.engine;
+        match self.plan.precision {
+            Precision::F64 => {
+                let mut out = [0.0];
+                programs.point(engine, p.to_array(), &mut out);
+                out[0]
+            }
+            Precision::F32 => {
+                let mut out = [0f32];
+                programs.point(engine, (p - self.candidate.origin).as_vec3().to_array(), &mut out);
+                out[0].into()
+            }
+        }
+    }
+
+    /// The program's values at points that are rounded to `f32`, a block at a time.
+    fn values_f32(&self, programs: &Programs, points: Points<'_>, omega: &mut [f64]) {
+        let columns = [points.x, points.y, points.z];
+        let origin = self.candidate.origin.to_array();
+        let mut start = 0;
+        for out in omega.chunks_mut(BLOCK) {
+            let mut inputs = [[0f32; BLOCK]; 3];
+            for ((input, column), origin) in inputs.iter_mut().zip(columns).zip(origin) {
+                for (x, from) in input.iter_mut().zip(&column[start..start + out.len()]) {
+                    *x = (from - origin) as f32;
+                }
+            }
+            let mut values = [0f32; BLOCK];
+            let values = &mut values[..out.len()];
+            programs.batch(
+                self.solid.inner.engine,
+                inputs.each_ref().map(|input| &input[..out.len()]),
+                [&mut *values],
+            );
+            for (out, value) in out.iter_mut().zip(values) {
+                *out = f64::from(*value);
+            }
+            start += out.len();
+        }
+    }
+}
+
+impl Field for Chosen {
+    fn omega(&self, p: DVec3) -> f64 {
+        match &self.candidate.programs {
+            Some(programs) if self.over.contains(p) => self.value(programs, p),
+            _ => self.solid.omega(p),
+        }
+    }
+
+    /// By the solid's own program: certificates are about values.
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        self.solid.omega_grad(p)
+    }
+
+    fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        let Some(programs) = &self.candidate.programs else {
+            return Field::omega_many(&self.solid, points, omega);
+        };
+        match self.plan.precision {
+            Precision::F32 => self.values_f32(programs, points, omega),
+            Precision::F64 => {
+                programs.batch(self.solid.inner.engine, [points.x, points.y, points.z], [&mut *omega]);
+            }
+        }
+        for (i, value) in omega.iter_mut().enumerate() {
+            let p = points.get(i);
+            if !self.over.contains(p) {
+                *value = self.solid.omega(p);
+            }
+        }
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        Field::omega_grad_many(&self.solid, points, out);
+    }
+
+    fn range(&self, over: &Aabb) -> Interval {
+        self.solid.range(over)
+    }
+}
+
+impl std::fmt::Debug for Chosen {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Chosen({:?}, {}, ± {:e})", self.solid.name(), self.plan.name(), self.bound)
+    }
+}
