@@ -14,8 +14,8 @@ use super::Mesh;
 /// A vertex that lies exactly on a node of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct AtNode {
-    /// The node's extended indices.
-    pub node: [u32; 3],
+    /// The node's number, see `Lattice::key`.
+    pub node: u64,
     pub vertex: u32,
 }
 
@@ -158,6 +158,8 @@ fn compact(mesh: &mut Mesh, is_lost: &[bool], is_dead: &[bool]) {
     mesh.triangles.iter_mut().for_each(|t| *t = t.map(|v| numbers[v as usize]));
     let mut lost = is_lost.iter();
     mesh.positions.retain(|_| lost.next() == Some(&false));
+    let mut lost = is_lost.iter();
+    mesh.normals.retain(|_| lost.next() == Some(&false));
     mesh.caps.retain(|&v| !is_lost[v as usize]);
     mesh.caps.iter_mut().for_each(|v| *v = numbers[*v as usize]);
 }

@@ -29,13 +29,13 @@ mod check;
 mod collapse;
 mod extract;
 mod grid;
-mod layer;
 mod normals;
 pub mod obj;
 pub mod ply;
 mod prune;
 mod roots;
 mod shells;
+mod signs;
 pub mod stl;
 pub mod vtp;
 
