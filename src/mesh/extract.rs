@@ -16,6 +16,7 @@ use super::{
     cases::{CASES, EDGES, edge},
     collapse::{self, AtNode},
     normals::{self, Gradients},
+    patches,
     prune::{BRICK, Bricks, Lattice},
     roots::{Edges, RootFinder},
     signs::{Brick, Samples, Signs, VertexTable, crossed_cells, edge_slot, inside_corners, set_positions},
@@ -47,7 +48,7 @@ pub fn marching_cubes(
 
     let mut mesh = Mesh::default();
     let signs = sample(field, &lattice, &near, &mut mesh.work.evaluations, &advance)?;
-    let (bricks, found) = number(&near, &signs);
+    let (bricks, found) = number(field, &lattice, &near, &signs, &mut mesh.work.evaluations);
     if found > Mesh::MAX_VERTICES {
         return Err(MeshError::TooManyVertices { found });
     }
@@ -98,16 +99,32 @@ fn sample(
     Ok(found)
 }
 
-/// Crossed edges of all near bricks, with the numbers of their vertices, and how many there are.
-fn number(near: &Bricks, signs: &[Signs]) -> (Vec<Brick>, usize) {
+/// Crossed edges of all near bricks and the cells that need values, with the numbers of their vertices, and how many
+/// there are.
+fn number(
+    field: &dyn Field,
+    lattice: &Lattice,
+    near: &Bricks,
+    signs: &[Signs],
+    evaluations: &mut u64,
+) -> (Vec<Brick>, usize) {
     let numbers = (0..near.near.len()).into_par_iter().with_min_len(BRICKS_PER_TASK);
-    let mut bricks: Vec<Brick> = numbers.map(|number| Brick::new(near, signs, number)).collect();
+    let made: Vec<(Brick, u64)> = numbers
+        .map(|number| {
+            let mut brick = Brick::new(near, signs, number);
+            let mut count = 0;
+            brick.patches = patches::find(field, lattice, brick.low, &brick.around(signs, number), &mut count);
+            (brick, count)
+        })
+        .collect();
     let mut found = 0;
-    for brick in &mut bricks {
+    let numbered = made.into_iter().map(|(mut brick, count)| {
         brick.first = found as u32; // too many are refused before the numbers are used
-        found += brick.crossings() as usize;
-    }
-    (bricks, found)
+        found += brick.vertices();
+        *evaluations += count;
+        brick
+    });
+    (numbered.collect(), found)
 }
 
 /// A task: some bricks, and where their vertices go.
@@ -121,7 +138,7 @@ fn jobs<'a>(bricks: &[Brick], mut positions: &'a mut [DVec3], mut normals: &'a m
     let mut jobs = Vec::with_capacity(bricks.len().div_ceil(BRICKS_PER_TASK));
     for (i, task) in bricks.chunks(BRICKS_PER_TASK).enumerate() {
         let first = i * BRICKS_PER_TASK;
-        let count: usize = task.iter().map(|brick| brick.crossings() as usize).sum();
+        let count: usize = task.iter().map(Brick::vertices).sum();
         let (own_positions, other_positions) = positions.split_at_mut(count);
         let (own_normals, other_normals) = normals.split_at_mut(count);
         (positions, normals) = (other_positions, other_normals);
@@ -238,6 +255,10 @@ impl Scene<'_> {
                 }
                 vertex += 1;
             });
+            for inner in brick.patches.iter().flat_map(|patch| &patch.inner) {
+                positions[(vertex - first) as usize] = *inner;
+                vertex += 1;
+            }
         }
         for (axis, edges) in edges.iter().enumerate() {
             roots.clear();
@@ -273,9 +294,20 @@ impl Scene<'_> {
             for cell in set_positions(cells) {
                 let base = edge_slot(0, [cell % BRICK, cell / BRICK, z]);
                 let of_cell = CASES.triangles(inside_corners(&corners, cell));
-                triangles
-                    .extend(of_cell.iter().map(|t| t.map(|e| vertices[base + SLOT_OF_EDGE[usize::from(e)]])));
+                let vertex = |e: u8| vertices[base + SLOT_OF_EDGE[usize::from(e)]];
+                triangles.extend(of_cell.iter().map(|t| t.map(vertex)));
             }
+        }
+        let mut next = brick.first + brick.vertices() as u32;
+        for patch in brick.patches.iter().rev() {
+            next -= patch.inner.len() as u32;
+            let (z, bit) = patch.cell;
+            let base = edge_slot(0, [bit % BRICK, bit / BRICK, z]);
+            let vertex = |e: u8| match usize::from(e) {
+                e if e < EDGES => vertices[base + SLOT_OF_EDGE[e]],
+                inner => next + (inner - EDGES) as u32,
+            };
+            triangles.extend(patch.triangles.iter().map(|t| t.map(vertex)));
         }
     }
 }

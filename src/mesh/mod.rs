@@ -24,6 +24,7 @@
 //!
 //! Invariant: this module knows nothing of a compiler; it sees only [`Field`](crate::field::Field).
 
+mod ambiguity;
 mod cases;
 mod check;
 mod collapse;
@@ -31,6 +32,7 @@ mod extract;
 mod grid;
 mod normals;
 pub mod obj;
+mod patches;
 pub mod ply;
 mod prune;
 mod roots;

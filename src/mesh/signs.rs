@@ -8,6 +8,7 @@
 
 use super::{
     MeshError,
+    patches::CellPatch,
     prune::{BRICK, Bricks, Lattice, NearBrick, Place},
 };
 use crate::field::{Field, Points};
@@ -91,8 +92,10 @@ pub(super) struct Brick {
     before: [[u16; BRICK]; 3],
     /// The bricks above: at i − 1 the one that is higher on the axes whose bits are set in i.
     upper: [Place; 7],
-    /// The number of its first vertex.
+    /// The number of its first vertex: those on edges come first, then the inner ones of `patches`.
     pub first: u32,
+    /// Cells that signs alone do not decide.
+    pub patches: Vec<CellPatch>,
 }
 
 /// Vertices on edges of a brick and on those of the bricks above that its cells use, by [`edge_slot`].
@@ -118,6 +121,7 @@ impl Brick {
             before: [[0; BRICK]; 3],
             upper,
             first: 0,
+            patches: Vec::new(),
         };
         let around = brick.around(signs, number);
         for z in 0..BRICK {
@@ -137,8 +141,13 @@ impl Brick {
     }
 
     /// Number of crossed edges.
-    pub(super) fn crossings(&self) -> u32 {
+    fn crossings(&self) -> u32 {
         u32::from(self.before[2][BRICK - 1]) + self.edges[2][BRICK - 1].count_ones()
+    }
+
+    /// Number of vertices, on edges and within cells.
+    pub(super) fn vertices(&self) -> usize {
+        self.crossings() as usize + self.patches.iter().map(|patch| patch.inner.len()).sum::<usize>()
     }
 
     /// Calls `visit(axis, node)` for each crossed edge in the order of vertices; nodes count from the brick's first.
