@@ -73,9 +73,8 @@ impl Waist {
         for (axis, sides) in sides.iter_mut().enumerate() {
             *sides = degenerate_slices(corners, axis)?;
         }
-        let value = |corner: usize| {
-            trilinear(corners, [0, 1, 2].map(|axis: usize| sides[axis][corner >> axis & 1]))
-        };
+        let value =
+            |corner: usize| trilinear(corners, [0, 1, 2].map(|axis: usize| sides[axis][corner >> axis & 1]));
         let size = |corner: usize| value(corner).abs() + value(7 - corner).abs();
         // rounding leaves the other six corners at almost zero
         let end = (0..4).max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
@@ -86,7 +85,9 @@ impl Waist {
     /// The six corners besides P and Q, each a neighbour of the next.
     fn hexagon(&self) -> [[f64; 3]; 6] {
         let turned = [0b001, 0b011, 0b010, 0b110, 0b100, 0b101];
-        turned.map(|turn: usize| [0, 1, 2].map(|axis: usize| self.sides[axis][self.end[axis] ^ (turn >> axis & 1)]))
+        turned.map(|turn: usize| {
+            [0, 1, 2].map(|axis: usize| self.sides[axis][self.end[axis] ^ (turn >> axis & 1)])
+        })
     }
 
     /// The loop that the lines beyond the hexagon's corners next to one end of the tunnel meet.
@@ -151,7 +152,8 @@ fn loop_on_face(face: usize, at: [f64; 3], corners: &Corners, loops: &[Vec<usize
     // each of two segments cuts off a corner, and lies on that corner's side of the hyperbola's asymptotes
     let axes = [(face / 2 + 1) % 3, (face / 2 + 2) % 3];
     let base = (face % 2) << (face / 2);
-    let [f00, f10, f01, f11] = [0, 1, 2, 3].map(|i: usize| corners[base | (i & 1) << axes[0] | (i >> 1) << axes[1]]);
+    let [f00, f10, f01, f11] =
+        [0, 1, 2, 3].map(|i: usize| corners[base | (i & 1) << axes[0] | (i >> 1) << axes[1]]);
     let twist = f00 + f11 - f10 - f01;
     let saddle = [(f00 - f01) / twist, (f00 - f10) / twist];
     let beyond = [0, 1].map(|i| at[axes[i]] - saddle[i]);
@@ -238,61 +240,64 @@ mod tests {
                 }
             }
         }
-        let (euler, solids) = joined_along_axes(&positive, side, true);
-        let (fluid_euler, fluids) = joined_along_axes(&positive, side, false);
-        let across = [true, false].map(|of| parts_across_corners(&positive, side, of));
+        let [solid, fluid] = [true, false].map(|kind| parts(&positive, side, kind));
         // the complement of a solid in space has the solid's characteristic, plus one for the ball at infinity
-        let agree = euler == fluid_euler - 1 && across == [solids, fluids];
-        agree.then_some(Topology { euler, solids, fluids })
+        let agree =
+            solid.euler == fluid.euler - 1 && [solid, fluid].iter().all(|p| p.along_axes == p.across_corners);
+        agree.then_some(Topology { euler: solid.euler, solids: solid.along_axes, fluids: fluid.along_axes })
     }
 
-    /// Euler characteristic and number of parts of the points of one kind.
-    fn joined_along_axes(positive: &[bool], side: usize, kind: bool) -> (i64, usize) {
+    /// Points of one kind.
+    #[derive(Debug, Clone, Copy)]
+    struct Parts {
+        /// Of points, edges, filled squares and filled cubes.
+        euler: i64,
+        /// Parts that hang together along the axes, and across corners as well.
+        along_axes: usize,
+        across_corners: usize,
+    }
+
+    fn parts(positive: &[bool], side: usize, kind: bool) -> Parts {
         let steps = [1, side, side * side];
-        let is = |at: usize| positive.get(at).is_some_and(|p| *p == kind);
-        let inner = |at: usize, axis: usize| at / steps[axis] % side + 1 < side;
+        let is = |at: usize| positive[at] == kind;
         let mut parent: Vec<u32> = (0..positive.len() as u32).collect();
         let mut euler = 0;
-        for at in (0..positive.len()).filter(|&at| is(at)) {
+        let mut mixed = Vec::new();
+        for at in 0..positive.len() {
+            let inner = [0, 1, 2].map(|axis: usize| at / steps[axis] % side + 1 < side);
+            let mut corners = [false; 8];
+            for (c, corner) in corners.iter_mut().enumerate() {
+                let within = (0..3).all(|axis| c >> axis & 1 == 0 || inner[axis]);
+                *corner = within && is(at + (0..3).map(|axis| (c >> axis & 1) * steps[axis]).sum::<usize>());
+            }
+            if inner == [true; 3] && corners.contains(&true) && corners.contains(&false) {
+                mixed.push(at);
+            }
+            if !corners[0] {
+                continue;
+            }
             euler += 1;
-            let mut along = [false; 3];
             for axis in 0..3 {
-                along[axis] = inner(at, axis) && is(at + steps[axis]);
-                if along[axis] {
+                let (a, u, v) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+                if corners[a] {
                     euler -= 1;
                     unite(&mut parent, at, at + steps[axis]);
                 }
+                euler += i64::from(corners[u] && corners[v] && corners[u | v]);
             }
-            let mut square = [false; 3];
-            for axis in 0..3 {
-                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-                square[axis] = along[u] && along[v] && is(at + steps[u] + steps[v]);
-                euler += i64::from(square[axis]);
-            }
-            let far = steps[2] + steps[1] + steps[0];
-            let cube = square == [true; 3]
-                && (0..3).all(|axis| is(at + far - steps[axis]))
-                && is(at + far);
-            euler -= i64::from(cube);
+            euler -= i64::from(corners == [true; 8]);
         }
-        (euler, roots(&mut parent, |at| is(at)))
-    }
-
-    fn parts_across_corners(positive: &[bool], side: usize, kind: bool) -> usize {
-        let mut parent: Vec<u32> = (0..positive.len() as u32).collect();
-        for k in 0..side - 1 {
-            for j in 0..side - 1 {
-                for i in 0..side - 1 {
-                    let at = (k * side + j) * side + i;
-                    let corner = |c: usize| at + (c & 1) + (c >> 1 & 1) * side + (c >> 2) * side * side;
-                    let mut first = None;
-                    for c in (0..8).map(corner).filter(|&c| positive[c] == kind) {
-                        unite(&mut parent, *first.get_or_insert(c), c);
-                    }
-                }
+        let count =
+            |parent: &[u32]| (0..parent.len()).filter(|&at| is(at) && parent[at] as usize == at).count();
+        let along_axes = count(&parent);
+        for at in mixed {
+            let corner = |c: usize| at + (0..3).map(|axis| (c >> axis & 1) * steps[axis]).sum::<usize>();
+            let mut alike = (0..8).map(corner).filter(|&c| is(c));
+            if let Some(first) = alike.next() {
+                alike.for_each(|other| unite(&mut parent, first, other));
             }
         }
-        roots(&mut parent, |at| positive[at] == kind)
+        Parts { euler, along_axes, across_corners: count(&parent) }
     }
 
     fn find(parent: &mut [u32], mut at: usize) -> usize {
@@ -308,50 +313,55 @@ mod tests {
         parent[a.max(b)] = a.min(b) as u32;
     }
 
-    fn roots(parent: &mut [u32], is: impl Fn(usize) -> bool) -> usize {
-        (0..parent.len()).filter(|&at| is(at) && parent[at] as usize == at).count()
-    }
-
-    /// Refines until two resolutions in a row agree; nothing for fields too near to a change of topology.
-    fn true_topology(values: &Values, finest: usize) -> Option<Topology> {
-        let mut before = None;
-        let mut per_cell = 6;
-        while per_cell <= finest {
+    /// Refines until some resolutions in a row agree; nothing for fields too near to a change of topology.
+    fn true_topology(values: &Values, resolutions: &[usize], in_a_row: usize) -> Option<Topology> {
+        let mut agreeing: Vec<Topology> = Vec::new();
+        for &per_cell in resolutions {
             let found = sampled(values, per_cell);
-            if found.is_some() && found == before {
+            agreeing.retain(|before| Some(*before) == found);
+            agreeing.extend(found);
+            if agreeing.len() == in_a_row {
                 return found;
             }
-            before = found;
-            per_cell = per_cell * 8 / 5;
         }
         None
     }
 
-    /// Meshes a random grid; `Some(true)` if the topology is right, none if it could not be told.
-    fn is_right(n: usize, seed: u64, finest: usize) -> Option<bool> {
+    /// Meshes a random grid; whether the topology is right, none if it could not be told. Two resolutions may agree and
+    /// still miss a tunnel between their points, so the mesh is called wrong only if three finer ones agree against it.
+    fn is_right(n: usize, seed: u64) -> Option<bool> {
         let values = Values::random(n, seed);
-        let truth = true_topology(&values, finest)?;
+        let truth = true_topology(&values, &[6, 9, 14, 21], 2)?;
         let field = Closures { omega: |p: DVec3| values.value(p), gradient: |_| DVec3::X };
         let domain = Aabb::new(DVec3::ZERO, DVec3::splat((n - 1) as f64));
         let grid = Grid::filling(&domain, Resolution::Spacing(1.0)).unwrap();
         let mesh = marching_cubes(&field, &grid, &|_| ()).unwrap();
         let report = check(&mesh, &field);
         assert!(report.closed && report.manifold && report.degenerate == 0, "grid {n}³ {seed}: {report:?}");
-        let expected = (2 * truth.euler, truth.solids + truth.fluids - 1, truth.solids);
-        let found = (report.euler, report.components, report.solids);
-        if found != expected {
-            println!("grid {n}³ number {seed}: found {found:?}, expected {expected:?}");
+        let matches = |truth: Topology| {
+            let expected = (2 * truth.euler, truth.solids + truth.fluids - 1, truth.solids);
+            (report.euler, report.components, report.solids) == expected
+        };
+        if matches(truth) {
+            return Some(true);
         }
-        Some(found == expected)
+        let truth = true_topology(&values, &[31, 47, 70, 105], 3)?;
+        if !matches(truth) {
+            println!("grid {n}³ number {seed}: found {report:?}, expected {truth:?}");
+        }
+        Some(matches(truth))
     }
 
-    fn check_random_grids(count: u64, finest: usize) {
-        for n in [2, 3, 4, 5, 6] {
+    fn check_random_grids(counts: [(usize, u64); 5]) {
+        for (n, count) in counts {
             let results: Vec<Option<bool>> =
-                (0..count).into_par_iter().map(|seed| is_right(n, seed, finest)).collect();
+                (0..count).into_par_iter().map(|seed| is_right(n, seed)).collect();
             let right = results.iter().filter(|r| **r == Some(true)).count();
             let unknown = results.iter().filter(|r| r.is_none()).count();
-            println!("{n}³ nodes: {right} right of {}, {unknown} near a change of topology", results.len() - unknown);
+            println!(
+                "{n}³ nodes: {right} right of {}, {unknown} too near a change of topology to tell",
+                results.len() - unknown
+            );
             assert_eq!(right + unknown, results.len(), "{n}³ nodes");
             assert!(unknown * 4 < results.len(), "{n}³ nodes: the oracle must know most grids");
         }
@@ -361,14 +371,13 @@ mod tests {
     /// force on ever finer points.
     #[test]
     fn random_grids_have_the_topology_of_the_interpolant() {
-        check_random_grids(60, 64);
+        check_random_grids([(2, 1000), (3, 400), (4, 150), (5, 50), (6, 20)]);
     }
 
-    /// The same for thousands: `cargo test --release --lib thousands -- --ignored --nocapture`, some minutes.
+    /// The same for more: `cargo test --release --lib thousands -- --ignored --nocapture`, some minutes.
     #[test]
     #[ignore = "takes minutes"]
     fn thousands_of_random_grids_have_the_topology_of_the_interpolant() {
-        let count = std::env::var("GRIDS").ok().and_then(|n| n.parse().ok()).unwrap_or(2000);
-        check_random_grids(count, 100);
+        check_random_grids([(2, 20_000), (3, 5000), (4, 3000), (5, 2000), (6, 1000)]);
     }
 }

@@ -47,7 +47,8 @@ impl Cases {
                 // of no consequence here
                 let polygons = loops(inside, [Ambiguous::JoinSolid; FACES]);
                 let without_face_diagonals = polygons.iter().map(|polygon| triangulate(polygon));
-                triangles.extend(without_face_diagonals.flat_map(|found| found.expect("every such loop has one")));
+                triangles
+                    .extend(without_face_diagonals.flat_map(|found| found.expect("every such loop has one")));
             }
             first[usize::from(inside) + 1] = triangles.len();
         }
@@ -104,7 +105,9 @@ impl Patch {
         let mut patch = Self { triangles: Vec::new(), inner: Vec::new() };
         for (number, polygon) in loops.iter().enumerate() {
             match tunnel {
-                Some(Tunnel { loops: [a, b], waist }) if number == b => patch.add_tunnel(&loops[a], polygon, &waist),
+                Some(Tunnel { loops: [a, b], waist }) if number == b => {
+                    patch.add_tunnel(&loops[a], polygon, &waist)
+                }
                 Some(Tunnel { loops: [a, _], .. }) if number == a => {}
                 _ => patch.add_disc(polygon),
             }
@@ -311,7 +314,8 @@ fn shortest_walk(
     best[0][0][0] = Some((0, true, 0));
     for i in 1..=m {
         for j in 0..=n {
-            let along_a = |run: usize| best[i - 1][j][run].filter(|_| j < n).map(|(sum, ..)| (sum, true, run));
+            let along_a =
+                |run: usize| best[i - 1][j][run].filter(|_| j < n).map(|(sum, ..)| (sum, true, run));
             let reached = match j {
                 0 => [along_a(0), None, None],
                 _ => {
@@ -321,7 +325,8 @@ fn shortest_walk(
                 }
             };
             let here = cost(a[i % m], b[j % n]);
-            best[i][j] = reached.map(|found| found.and_then(|(sum, step, run)| Some((sum + here?, step, run))));
+            best[i][j] =
+                reached.map(|found| found.and_then(|(sum, step, run)| Some((sum + here?, step, run))));
         }
     }
     let (sum, ..) = best[m][n][2]?;
@@ -365,7 +370,8 @@ mod tests {
         };
         let free = (0..FACES).filter(|&face| is_ambiguous(face)).fold(0, |mask, face| mask | 1 << face);
         (0..64_u8).filter(move |choice| choice & !free == 0).map(|choice| {
-            let pick = |f: usize| if choice >> f & 1 == 1 { Ambiguous::JoinSolid } else { Ambiguous::PartSolid };
+            let pick =
+                |f: usize| if choice >> f & 1 == 1 { Ambiguous::JoinSolid } else { Ambiguous::PartSolid };
             std::array::from_fn(pick)
         })
     }
@@ -423,14 +429,24 @@ mod tests {
                 let patch = Patch::new(&polygons, None);
                 check_triangles(inside, faces, &patch.triangles);
                 assert_eq!(euler(&patch.triangles), polygons.len() as i32);
-                assert!(patch.inner.len() <= 1 && polygons.iter().all(|l| l.len() >= 8 || triangulate(l).is_some()));
+                assert!(
+                    patch.inner.len() <= 1
+                        && polygons.iter().all(|l| l.len() >= 8 || triangulate(l).is_some())
+                );
             }
         }
     }
 
     #[test]
     fn any_two_loops_can_be_joined_by_a_tunnel() {
-        let waist = [[0.6, 0.4, 0.4], [0.6, 0.6, 0.4], [0.4, 0.6, 0.4], [0.4, 0.6, 0.6], [0.4, 0.4, 0.6], [0.6, 0.4, 0.6]];
+        let waist = [
+            [0.6, 0.4, 0.4],
+            [0.6, 0.6, 0.4],
+            [0.4, 0.6, 0.4],
+            [0.4, 0.6, 0.6],
+            [0.4, 0.4, 0.6],
+            [0.6, 0.4, 0.6],
+        ];
         // one far from both loops as well
         let waists = [waist, waist.map(|p| p.map(|c| 0.01 * c))];
         let (mut direct, mut at_waist) = (0, 0);

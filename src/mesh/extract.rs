@@ -113,7 +113,8 @@ fn number(
         .map(|number| {
             let mut brick = Brick::new(near, signs, number);
             let mut count = 0;
-            brick.patches = patches::find(field, lattice, brick.low, &brick.around(signs, number), &mut count);
+            brick.patches =
+                patches::find(field, lattice, brick.low, &brick.around(signs, number), &mut count);
             (brick, count)
         })
         .collect();

@@ -42,7 +42,8 @@ pub(super) fn find(
             let cell = Cell::new(field, lattice, cell);
             *evaluations += 8;
             let Patch { triangles, inner } = cell.patch();
-            let inner = inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
+            let inner =
+                inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
             found.push(CellPatch { cell: (z, bit), triangles, inner });
         }
     }
@@ -59,8 +60,7 @@ pub(super) fn undecided_cells(corners: &[u64; 8]) -> u64 {
     }
     for first in 0..4 {
         let others = (0..8).filter(|&c| c != first && c != 7 - first);
-        let (some, all) =
-            others.fold((0, u64::MAX), |(some, all), c| (some | corners[c], all & corners[c]));
+        let (some, all) = others.fold((0, u64::MAX), |(some, all), c| (some | corners[c], all & corners[c]));
         let (a, b) = (corners[first], corners[7 - first]);
         found |= (a & b & !some) | (!a & !b & all);
     }
@@ -102,7 +102,9 @@ impl Cell {
     fn place(&self, inner: &Inner) -> DVec3 {
         match inner {
             Inner::At(share) => self.low + DVec3::from_array(*share) * (self.high - self.low),
-            Inner::Amidst(edges) => edges.iter().map(|&e| self.on_edge(e)).sum::<DVec3>() / edges.len() as f64,
+            Inner::Amidst(edges) => {
+                edges.iter().map(|&e| self.on_edge(e)).sum::<DVec3>() / edges.len() as f64
+            }
         }
     }
 
@@ -137,7 +139,13 @@ impl Cell {
 }
 
 /// The point between `from` and `to` at which the sign of ω changes, by halving until no number lies between.
-fn bisect(field: &dyn Field, mut from: DVec3, mut to: DVec3, from_is_inside: bool, evaluations: &mut u64) -> DVec3 {
+fn bisect(
+    field: &dyn Field,
+    mut from: DVec3,
+    mut to: DVec3,
+    from_is_inside: bool,
+    evaluations: &mut u64,
+) -> DVec3 {
     loop {
         let middle = from.midpoint(to);
         if middle == from || middle == to {
@@ -156,9 +164,8 @@ mod tests {
     #[test]
     fn many_cells_at_once_are_judged_like_one() {
         for first in (0..256_usize).step_by(64) {
-            let corners: [u64; 8] = std::array::from_fn(|c| {
-                (0..64).fold(0, |bits, i| bits | ((first + i) as u64 >> c & 1) << i)
-            });
+            let corners: [u64; 8] =
+                std::array::from_fn(|c| (0..64).fold(0, |bits, i| bits | ((first + i) as u64 >> c & 1) << i));
             let found = undecided_cells(&corners);
             for i in 0..64 {
                 assert_eq!(found >> i & 1 == 1, needs_values((first + i) as u8), "case {:08b}", first + i);
