@@ -116,6 +116,10 @@ FOLD_OF_ONE = "W0404":
 "`any` or `all` over a range with one member is likely a slip: the range `a..b` holds a, a+1, … b−1.";
 STRICT_COMPARISON = "W0405":
 "`<` means the same as `<=` here: a comparison builds a field whose zero is the surface itself.";
+THIN_PARTS = "W0407":
+"Parts of the solid, or gaps in it, are thinner than the cells of the grid that it was measured on, and pass between
+its nodes: they are missing from its volume, and from a mesh with as many cells. The box tells where. Such cells are
+found by the ranges of ω over an eighth of a cell, so surfaces that only touch, as in `a and not a`, count as well.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";

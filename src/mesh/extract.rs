@@ -71,8 +71,11 @@ pub fn marching_cubes(
     Ok(mesh)
 }
 
-/// Signs at the nodes of all near bricks.
-fn sample(
+/// Signs at the nodes of all near bricks; adds to the number of evaluations, and calls `advance` after each task.
+///
+/// # Errors
+/// [`MeshError::NotANumber`] at the first NaN.
+pub(super) fn sample(
     field: &dyn Field,
     lattice: &Lattice,
     bricks: &Bricks,

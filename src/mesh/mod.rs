@@ -39,6 +39,7 @@ mod roots;
 mod shells;
 mod signs;
 pub mod stl;
+mod thin;
 pub mod vtp;
 
 #[cfg(test)]
@@ -52,6 +53,7 @@ pub use check::{Report, check};
 pub use extract::marching_cubes;
 pub use grid::{Grid, GridError, Resolution};
 pub use shells::{Shell, shells};
+pub use thin::{ThinCells, thin_cells};
 
 /// Triangles over shared vertices.
 #[derive(Debug, Clone, Default, PartialEq)]
