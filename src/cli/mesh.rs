@@ -98,7 +98,12 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
             let MeshMethod::Mc = options.method;
             let mesh = marching_cubes(&*surface, grid, &|part| bar.set_position((1000.0 * part) as u64));
             bar.finish_and_clear();
-            mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?
+            let mut mesh =
+                mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?;
+            if options.no_slivers {
+                mesh::remove_slivers(&mut mesh);
+            }
+            mesh
         }
     };
     let milliseconds = started.elapsed().as_secs_f64() * 1e3;
