@@ -19,7 +19,10 @@ use super::{
     patches,
     prune::{BRICK, Bricks, Lattice},
     roots::{Edges, RootFinder},
-    signs::{Brick, Samples, Signs, VertexTable, crossed_cells, edge_slot, inside_corners, set_positions},
+    signs::{
+        Brick, CrossedBricks, Samples, Signs, VertexTable, crossed_cells, edge_slot, inside_corners,
+        set_positions,
+    },
 };
 use crate::field::Field;
 
@@ -42,12 +45,9 @@ pub fn marching_cubes(
 ) -> Result<Mesh, MeshError> {
     let lattice = Lattice::new(grid);
     let near = Bricks::classify(field, &lattice);
-    let tasks = 2 * near.near.len().div_ceil(BRICKS_PER_TASK);
-    let done = AtomicUsize::new(0);
-    let advance = || progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / tasks as f64);
-
     let mut mesh = Mesh::default();
-    let signs = sample(field, &lattice, &near, &mut mesh.work.evaluations, &advance)?;
+    let sampling = Stage::new(near.near.len(), 0.0, progress);
+    let signs = sample(field, &lattice, &near, &mut mesh.work.evaluations, &|| sampling.advance())?;
     let (bricks, found) = number(field, &lattice, &near, &signs, &mut mesh.work.evaluations);
     if found > Mesh::MAX_VERTICES {
         return Err(MeshError::TooManyVertices { found });
@@ -55,12 +55,13 @@ pub fn marching_cubes(
     mesh.positions = vec![DVec3::ZERO; found];
     mesh.normals = vec![DVec3::ZERO; found];
     let scene = Scene { field, lattice: &lattice, signs: &signs, bricks: &bricks };
-    let jobs = jobs(&bricks, &mut mesh.positions, &mut mesh.normals);
+    let jobs = jobs(&bricks.list, &mut mesh.positions, &mut mesh.normals);
+    let marching = Stage::new(bricks.list.len(), 0.5, progress);
     let parts: Vec<Result<Part, MeshError>> = jobs
         .into_par_iter()
         .map_init(Scratch::default, |scratch, job| {
             let part = scene.extract(job, scratch);
-            advance();
+            marching.advance();
             part
         })
         .collect();
@@ -69,6 +70,26 @@ pub fn marching_cubes(
     collapse::merge_coincident(&mut mesh, at_nodes);
     normals::fill_missing(&mut mesh);
     Ok(mesh)
+}
+
+/// One of the two halves of the work, for who waits for it.
+struct Stage<'a> {
+    tasks: usize,
+    done: AtomicUsize,
+    /// The share done before it.
+    before: f64,
+    progress: &'a (dyn Fn(f64) + Sync),
+}
+
+impl<'a> Stage<'a> {
+    fn new(bricks: usize, before: f64, progress: &'a (dyn Fn(f64) + Sync)) -> Self {
+        Self { tasks: bricks.div_ceil(BRICKS_PER_TASK), done: AtomicUsize::new(0), before, progress }
+    }
+
+    fn advance(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.progress)(self.before + 0.5 * done as f64 / self.tasks as f64);
+    }
 }
 
 /// Signs at the nodes of all near bricks; adds to the number of evaluations, and calls `advance` after each task.
@@ -110,25 +131,34 @@ fn number(
     near: &Bricks,
     signs: &[Signs],
     evaluations: &mut u64,
-) -> (Vec<Brick>, usize) {
-    let numbers = (0..near.near.len()).into_par_iter().with_min_len(BRICKS_PER_TASK);
-    let made: Vec<(Brick, u64)> = numbers
-        .map(|number| {
-            let mut brick = Brick::new(near, signs, number);
-            let mut count = 0;
-            brick.patches =
-                patches::find(field, lattice, brick.low, &brick.around(signs, number), &mut count);
-            (brick, count)
+) -> (CrossedBricks, usize) {
+    let count = near.near.len();
+    let tasks = (0..count.div_ceil(BRICKS_PER_TASK)).into_par_iter();
+    let made: Vec<(Vec<Brick>, u64)> = tasks
+        .map(|task| {
+            let first = task * BRICKS_PER_TASK;
+            let bricks =
+                (first..count.min(first + BRICKS_PER_TASK)).map(|number| Brick::new(near, signs, number));
+            let mut crossed: Vec<Brick> = bricks.filter(|brick| brick.is_crossed(signs)).collect();
+            let mut evaluations = 0;
+            for brick in &mut crossed {
+                let around = brick.around(signs);
+                brick.patches = patches::find(field, lattice, brick.low, &around, &mut evaluations);
+            }
+            (crossed, evaluations)
         })
         .collect();
     let mut found = 0;
-    let numbered = made.into_iter().map(|(mut brick, count)| {
-        brick.first = found as u32; // too many are refused before the numbers are used
-        found += brick.vertices();
+    let mut bricks = Vec::with_capacity(made.iter().map(|(bricks, _)| bricks.len()).sum());
+    for (crossed, count) in made {
         *evaluations += count;
-        brick
-    });
-    (numbered.collect(), found)
+        for mut brick in crossed {
+            brick.first = found as u32; // too many are refused before the numbers are used
+            found += brick.vertices();
+            bricks.push(brick);
+        }
+    }
+    (CrossedBricks::new(bricks, count), found)
 }
 
 /// A task: some bricks, and where their vertices go.
@@ -180,7 +210,7 @@ struct Scene<'a> {
     field: &'a dyn Field,
     lattice: &'a Lattice,
     signs: &'a [Signs],
-    bricks: &'a [Brick],
+    bricks: &'a CrossedBricks,
 }
 
 /// Memory that a thread keeps from task to task.
@@ -214,7 +244,7 @@ impl Scene<'_> {
         self.place_vertices(&job.bricks, job.positions, scratch, &mut part)?;
         part.gradients = job.positions.len() as u64;
         scratch.gradients.normals(self.field, job.positions, job.normals);
-        let first = self.bricks.get(job.bricks.start).map_or(0, |brick| brick.first);
+        let first = self.bricks.list.get(job.bricks.start).map_or(0, |brick| brick.first);
         for &cap in &part.caps {
             job.normals[(cap - first) as usize] = DVec3::ZERO;
         }
@@ -236,9 +266,9 @@ impl Scene<'_> {
         let Scratch { edges, ends, roots, finder, .. } = scratch;
         edges.iter_mut().for_each(Edges::clear);
         ends.iter_mut().for_each(Vec::clear);
-        let first = self.bricks.get(bricks.start).map_or(0, |brick| brick.first);
+        let first = self.bricks.list.get(bricks.start).map_or(0, |brick| brick.first);
         let mut vertex = first;
-        for brick in &self.bricks[bricks.clone()] {
+        for brick in &self.bricks.list[bricks.clone()] {
             brick.for_each_edge(|axis, node| {
                 let low = [0, 1, 2].map(|a| brick.low[a] + node[a]);
                 let mut high = low;
@@ -285,8 +315,8 @@ impl Scene<'_> {
 
     /// Triangles of all cells of a brick.
     fn add_triangles(&self, number: usize, vertices: &mut VertexTable, triangles: &mut Vec<[u32; 3]>) {
-        let brick = &self.bricks[number];
-        let around = brick.around(self.signs, number);
+        let brick = &self.bricks.list[number];
+        let around = brick.around(self.signs);
         let mut is_numbered = false;
         for z in 0..BRICK {
             let corners = around.corners(z);

@@ -84,6 +84,8 @@ impl Samples {
 /// A near brick with its crossed edges.
 #[derive(Debug, Clone)]
 pub(super) struct Brick {
+    /// Its number among the near bricks.
+    pub number: usize,
     /// Extended indices of its first node.
     pub low: [usize; 3],
     /// Crossed edges by axis and plane.
@@ -96,6 +98,33 @@ pub(super) struct Brick {
     pub first: u32,
     /// Cells that signs alone do not decide.
     pub patches: Vec<CellPatch>,
+}
+
+/// The near bricks that have a crossed cell: those without hold no crossed edge either, whose other cells would be
+/// crossed too.
+#[derive(Debug)]
+pub(super) struct CrossedBricks {
+    pub list: Vec<Brick>,
+    /// For each near brick its place in the list, or [`Self::NONE`].
+    places: Vec<u32>,
+}
+
+impl CrossedBricks {
+    const NONE: u32 = u32::MAX;
+
+    /// Takes crossed bricks out of `near` near ones.
+    pub(super) fn new(list: Vec<Brick>, near: usize) -> Self {
+        let mut places = vec![Self::NONE; near];
+        for (place, brick) in list.iter().enumerate() {
+            places[brick.number] = place as u32;
+        }
+        Self { list, places }
+    }
+
+    /// A near brick by its number.
+    fn get(&self, number: u32) -> Option<&Brick> {
+        self.list.get(self.places[number as usize] as usize)
+    }
 }
 
 /// Vertices on edges of a brick and on those of the bricks above that its cells use, by [`edge_slot`].
@@ -116,6 +145,7 @@ impl Brick {
         let upper = [1, 2, 3, 4, 5, 6, 7]
             .map(|i| bricks.place([0, 1, 2].map(|axis: usize| at[axis] + (i >> axis & 1))));
         let mut brick = Self {
+            number,
             low: at.map(|b| b * BRICK),
             edges: [[0; BRICK]; 3],
             before: [[0; BRICK]; 3],
@@ -123,7 +153,7 @@ impl Brick {
             first: 0,
             patches: Vec::new(),
         };
-        let around = brick.around(signs, number);
+        let around = brick.around(signs);
         for z in 0..BRICK {
             let corners = around.corners(z);
             brick.edges[0][z] = corners[0] ^ corners[1];
@@ -145,6 +175,12 @@ impl Brick {
         u32::from(self.before[2][BRICK - 1]) + self.edges[2][BRICK - 1].count_ones()
     }
 
+    /// Whether the surface passes through any of its cells.
+    pub(super) fn is_crossed(&self, signs: &[Signs]) -> bool {
+        let around = self.around(signs);
+        (0..BRICK).any(|z| crossed_cells(&around.corners(z)) != 0)
+    }
+
     /// Number of vertices, on edges and within cells.
     pub(super) fn vertices(&self) -> usize {
         self.crossings() as usize + self.patches.iter().map(|patch| patch.inner.len()).sum::<usize>()
@@ -162,7 +198,7 @@ impl Brick {
     }
 
     /// Signs of the brick and of the nodes above that its cells use.
-    pub(super) fn around(&self, signs: &[Signs], number: usize) -> Around {
+    pub(super) fn around(&self, signs: &[Signs]) -> Around {
         let above = |i: usize, z: usize| match self.upper[i - 1] {
             Place::Solid => u64::MAX,
             Place::Fluid => 0,
@@ -170,7 +206,7 @@ impl Brick {
         };
         let mut around = Around { planes: [[0; BRICK + 1]; 4] };
         for z in 0..BRICK {
-            around.planes[0][z] = signs[number][z];
+            around.planes[0][z] = signs[self.number][z];
             (1..4).for_each(|i| around.planes[i][z] = above(i, z));
         }
         (0..4).for_each(|i| around.planes[i][BRICK] = above(i + 4, 0));
@@ -178,7 +214,7 @@ impl Brick {
     }
 
     /// Writes the numbers of all vertices that the brick's cells may use.
-    pub(super) fn number_vertices(&self, bricks: &[Self], table: &mut VertexTable) {
+    pub(super) fn number_vertices(&self, bricks: &CrossedBricks, table: &mut VertexTable) {
         let mut next = self.first;
         self.for_each_edge(|axis, node| {
             table[edge_slot(axis, node)] = next;
@@ -186,7 +222,7 @@ impl Brick {
         });
         for (i, place) in (1..8_usize).zip(self.upper) {
             let Place::Near(neighbour) = place else { continue };
-            let neighbour = &bricks[neighbour as usize];
+            let Some(neighbour) = bricks.get(neighbour) else { continue };
             let offset = [0, 1, 2].map(|axis: usize| (i >> axis & 1) * BRICK);
             let mut touching = u64::MAX;
             touching &= if i & 1 == 0 { u64::MAX } else { FIRST_COLUMN };

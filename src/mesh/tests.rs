@@ -346,8 +346,9 @@ fn progress_ends_at_one() {
         .unwrap();
     let seen = seen.into_inner().unwrap();
     assert_eq!(seen.iter().copied().fold(0.0, f64::max), 1.0);
-    // without ranges all 6³ bricks are near: 14 tasks that take samples, and 14 that make triangles
-    assert_eq!(seen.len(), 28);
+    // without ranges all 6³ bricks are near: 14 tasks that take samples, and then those that make triangles
+    assert!((15..=28).contains(&seen.len()), "{}", seen.len());
+    assert_eq!(seen.iter().filter(|share| **share <= 0.5).count(), 14);
 }
 
 /// A ball with an exact range.

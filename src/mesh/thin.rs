@@ -51,7 +51,7 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
     let crossed: Vec<Signs> = (0..near.near.len())
         .into_par_iter()
         .map(|number| {
-            let around = Brick::new(&near, &signs, number).around(&signs, number);
+            let around = Brick::new(&near, &signs, number).around(&signs);
             std::array::from_fn(|z| crossed_cells(&around.corners(z)))
         })
         .collect();

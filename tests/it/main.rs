@@ -7,6 +7,7 @@ mod cli;
 mod contact;
 mod diagnostics;
 mod examples;
+mod meshes;
 mod numbers;
 mod pipeline;
 mod properties;
