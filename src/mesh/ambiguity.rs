@@ -115,7 +115,7 @@ fn degenerate_slices(corners: &Corners, axis: usize) -> Option<[f64; 2]> {
     let linear = a.0 * c.1 + a.1 * c.0 - b.0 * d.1 - b.1 * d.0;
     let square = a.1 * c.1 - b.1 * d.1;
     let discriminant = linear * linear - 4.0 * square * constant;
-    if !(discriminant > 0.0) {
+    if discriminant.is_nan() || discriminant <= 0.0 {
         return None;
     }
     let far = -0.5 * (linear + discriminant.sqrt().copysign(linear));
@@ -277,11 +277,11 @@ mod tests {
                 continue;
             }
             euler += 1;
-            for axis in 0..3 {
+            for (axis, step) in steps.into_iter().enumerate() {
                 let (a, u, v) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
                 if corners[a] {
                     euler -= 1;
-                    unite(&mut parent, at, at + steps[axis]);
+                    unite(&mut parent, at, at + step);
                 }
                 euler += i64::from(corners[u] && corners[v] && corners[u | v]);
             }

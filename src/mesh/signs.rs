@@ -205,9 +205,9 @@ impl Brick {
             Place::Near(neighbour) => signs[neighbour as usize][z],
         };
         let mut around = Around { planes: [[0; BRICK + 1]; 4] };
-        for z in 0..BRICK {
-            around.planes[0][z] = signs[self.number][z];
-            (1..4).for_each(|i| around.planes[i][z] = above(i, z));
+        around.planes[0][..BRICK].copy_from_slice(&signs[self.number]);
+        for (i, planes) in (1..4).zip(&mut around.planes[1..]) {
+            (0..BRICK).for_each(|z| planes[z] = above(i, z));
         }
         (0..4).for_each(|i| around.planes[i][BRICK] = above(i + 4, 0));
         around
