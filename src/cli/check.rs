@@ -227,7 +227,7 @@ fn solids(
         }
         if thin.count > 0 {
             let message = format!(
-                "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {} and {}",
+                "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
                 named.name, VOLUME_CELLS[0], thin.count, thin.bounds.min, thin.bounds.max
             );
             diagnostics.list.push(

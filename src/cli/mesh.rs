@@ -113,7 +113,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         .map_err(Failure::usage)?;
     if thin.count > 0 {
         note(format!(
-            "{} cells away from the mesh hide parts of the surface that are thinner than a cell, between {} and {}; \
+            "{} cells away from the mesh hide parts of the surface that are thinner than a cell, between {:.3} and {:.3}; \
              try more cells",
             thin.count, thin.bounds.min, thin.bounds.max
         ));

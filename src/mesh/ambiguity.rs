@@ -15,8 +15,8 @@
 //! to Q. A tunnel lies in the cell where its waist does. The lines go on beyond the hexagon's corners, those next to P
 //! towards the faces on the side of P: the loops that they meet there are the tunnel's ends.
 //!
-//! The values are those of the field that is meshed, at the grid's nodes; for a solid these are the min/max twin's, whose
-//! sign is ω's. Ties count as outside, as ω = 0 does everywhere.
+//! The values are those of [`crate::field::Field::continuous`] at the grid's nodes; for a solid these are the min/max
+//! twin's, whose sign is ω's, with a cell map or without. Ties count as outside, as ω = 0 does everywhere.
 //!
 //! Invariant: a decision about a face depends on its four values alone and not on their order, so both cells there come
 //! to the same.

@@ -9,7 +9,7 @@ use super::{
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, set_positions},
 };
-use crate::field::{Field, Points};
+use crate::field::Field;
 
 /// Triangles of one cell of a brick.
 #[derive(Debug, Clone)]
@@ -79,9 +79,7 @@ impl Cell {
         let ends = [low, low.map(|n| n + 1)];
         let at = |corner: usize| [0, 1, 2].map(|axis: usize| ends[corner >> axis & 1][axis]);
         let positions: [DVec3; 8] = std::array::from_fn(|corner| lattice.position(at(corner)));
-        let columns = [0, 1, 2].map(|axis: usize| positions.map(|p| p[axis]));
-        let mut values = [0.0; 8];
-        field.omega_many(Points::new(&columns[0], &columns[1], &columns[2]), &mut values);
+        let mut values = positions.map(|p| field.continuous(p));
         for (corner, value) in values.iter_mut().enumerate() {
             if (0..3).any(|axis| lattice.is_ring(axis, at(corner)[axis])) {
                 *value = f64::NEG_INFINITY;

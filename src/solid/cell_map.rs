@@ -271,6 +271,10 @@ impl Field for CellMap {
         (value, if word & 1 == 1 { -gradient } else { gradient })
     }
 
+    fn continuous(&self, p: DVec3) -> f64 {
+        self.twin.omega(p)
+    }
+
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
         let mut i = 0;
         while i < points.len() {
