@@ -89,6 +89,12 @@ pub trait Field: Sync {
         }
     }
 
+    /// ω at a point, continuous in space. Differs from `omega` only where an implementation keeps nothing but the sign
+    /// and the zero set of ω there, which does for roots but not for interpolation; the sign is the same.
+    fn continuous(&self, p: DVec3) -> f64 {
+        self.omega(p)
+    }
+
     /// An interval that contains ω of every point of the box; the default knows nothing.
     fn range(&self, _over: &Aabb) -> Interval {
         Interval::ALL

@@ -181,6 +181,9 @@ pub(super) struct Mesh {
     /// How the surface is found
     #[arg(long, value_enum, default_value_t = MeshMethod::Mc)]
     pub method: MeshMethod,
+    /// Contract thin triangles; all vertices stay on the surface
+    #[arg(long)]
+    pub no_slivers: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -14,7 +14,7 @@ use crate::field::Field;
 use crate::geom::Aabb;
 use crate::ir::{FloatType, Growth};
 use crate::lower::NamedSolid;
-use crate::mesh::{self, Grid, Resolution, marching_cubes};
+use crate::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
 use crate::slice::{self, Plane, Window};
 use crate::solid::{Bounds, ProgramKind};
 use crate::{Program, Solid};
@@ -63,6 +63,8 @@ struct Facts {
     tolerance: Option<f64>,
     program: Option<String>,
     error_bound: Option<f64>,
+    /// Cells of the finer measuring grid in which parts of the surface hide, see `mesh::thin_cells`.
+    thin_cells: Option<usize>,
 }
 
 impl Facts {
@@ -79,6 +81,7 @@ impl Facts {
             tolerance: None,
             program: None,
             error_bound: None,
+            thin_cells: None,
         }
     }
 }
@@ -215,7 +218,7 @@ fn solids(
             facts.push(Facts { tolerance, ..Facts::unknown(&solid, file) });
             continue;
         }
-        let mut found = measure(&solid, file)?;
+        let (mut found, thin) = measure(&solid, file)?;
         diagnostics.list.extend(overflow(program, named, &solid));
         found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
         match program.within_tolerance(&solid) {
@@ -244,6 +247,15 @@ fn solids(
             }
             Bounds::Within(_) => {}
         }
+        if thin.count > 0 {
+            let message = format!(
+                "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
+                named.name, VOLUME_CELLS[0], thin.count, thin.bounds.min, thin.bounds.max
+            );
+            diagnostics.list.push(
+                warning(Code::THIN_PARTS, message).help("mesh it with more --cells, until `thin_cells` is 0"),
+            );
+        }
         facts.push(found);
     }
     Ok(facts)
@@ -265,32 +277,38 @@ fn overflow(program: &Program, named: &NamedSolid, solid: &Solid) -> Option<Diag
     Some(warning.help("write it as one chain: it is evaluated as a balanced tree"))
 }
 
-fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
+fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
     let mut facts = Facts::unknown(solid, file);
     let bounds = match solid.bounds() {
         Bounds::Within(bounds) => bounds,
-        Bounds::Unbounded => return Ok(facts),
+        Bounds::Unbounded => return Ok((facts, ThinCells::NONE)),
         Bounds::Empty => {
             let zero = Some(0.0);
-            return Ok(Facts {
+            let facts = Facts {
                 empty: true,
                 volume: zero,
                 volume_error: zero,
                 area: zero,
                 components: Some(0),
+                thin_cells: Some(0),
                 ..facts
-            });
+            };
+            return Ok((facts, ThinCells::NONE));
         }
     };
     facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
     let mut reports = Vec::new();
+    let mut thin = ThinCells::NONE;
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
     for cells in VOLUME_CELLS {
         let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
+        if cells == VOLUME_CELLS[0] {
+            thin = mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE);
+        }
         match marching_cubes(&*surface, &grid, &|_| {}) {
             Ok(mesh) => reports.push(mesh::check(&mesh, &*surface)),
             // a field that is not a number somewhere has no volume
-            Err(_) => return Ok(facts),
+            Err(_) => return Ok((facts, ThinCells::NONE)),
         }
     }
     if let [fine, coarse] = &reports[..]
@@ -304,7 +322,8 @@ fn measure(solid: &Solid, file: &str) -> Result<Facts, Failure> {
         facts.area = Some(fine.area);
         facts.components = Some(fine.solids);
     }
-    Ok(facts)
+    facts.thin_cells = Some(thin.count);
+    Ok((facts, thin))
 }
 
 fn print(file: &str, program: &Program, facts: &[Facts]) {

@@ -10,7 +10,7 @@ use super::args::{Mesh as Options, MeshMethod, Shared};
 use super::{Failure, choose, input, note, output, progress};
 use crate::field::Field;
 use crate::geom::Aabb;
-use crate::mesh::{self, Grid, Mesh, Report, Resolution, marching_cubes};
+use crate::mesh::{self, Grid, Mesh, Report, Resolution, ThinCells, marching_cubes};
 use crate::solid::Bounds;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +60,7 @@ struct Summary {
     area: f64,
     max_distance: f64,
     rms_distance: f64,
+    thin_cells: usize,
     evaluations: u64,
     milliseconds: f64,
 }
@@ -92,16 +93,31 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let surface = solid.surface(grid.as_ref().map_or(Aabb::EMPTY, |grid| *grid.bounds()));
     let mesh = match grid {
         None => Mesh::default(),
-        Some(grid) => {
+        Some(ref grid) => {
             let bar = progress::bar(1000, "meshing");
             let MeshMethod::Mc = options.method;
-            let mesh = marching_cubes(&*surface, &grid, &|part| bar.set_position((1000.0 * part) as u64));
+            let mesh = marching_cubes(&*surface, grid, &|part| bar.set_position((1000.0 * part) as u64));
             bar.finish_and_clear();
-            mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?
+            let mut mesh =
+                mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?;
+            if options.no_slivers {
+                mesh::remove_slivers(&mut mesh);
+            }
+            mesh
         }
     };
     let milliseconds = started.elapsed().as_secs_f64() * 1e3;
     let report = mesh::check(&mesh, &*surface);
+    let thin = grid
+        .map_or(Ok(ThinCells::NONE), |grid| mesh::thin_cells(&*surface, &grid))
+        .map_err(Failure::usage)?;
+    if thin.count > 0 {
+        note(format!(
+            "{} cells away from the mesh hide parts of the surface that are thinner than a cell, between {:.3} and {:.3}; \
+             try more cells",
+            thin.count, thin.bounds.min, thin.bounds.max
+        ));
+    }
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(&solid, bounds, options)));
     }
@@ -109,7 +125,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         output::write(path, |out| format.write(&mesh, out))?;
     }
     if shared.json {
-        return output::json(&summary(solid.name(), &report, milliseconds));
+        return output::json(&summary(solid.name(), &report, thin.count, milliseconds));
     }
     print(&report, milliseconds);
     if let Some(path) = &options.output {
@@ -126,7 +142,7 @@ fn why_empty(solid: &impl Field, bounds: Bounds, options: &Options) -> String {
     }
 }
 
-fn summary(name: &str, report: &Report, milliseconds: f64) -> Summary {
+fn summary(name: &str, report: &Report, thin_cells: usize, milliseconds: f64) -> Summary {
     Summary {
         schema: 1,
         solid: name.to_string(),
@@ -140,6 +156,7 @@ fn summary(name: &str, report: &Report, milliseconds: f64) -> Summary {
         area: report.area,
         max_distance: report.max_distance,
         rms_distance: report.rms_distance,
+        thin_cells,
         evaluations: report.evaluations,
         milliseconds,
     }

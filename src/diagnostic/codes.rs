@@ -135,6 +135,10 @@ TOLERANCE = "E0407":
 the box is larger in every arithmetic that there is, single and double precision. The message names the smallest bound
 that can be had. If there is none at all, a formula in the box may divide by zero, take the root of a negative number
 or leave the range of numbers; or the solid has neither bounds nor a scene with a box.";
+THIN_PARTS = "W0408":
+"Parts of the solid, or gaps in it, are thinner than the cells of the grid that it was measured on, and pass between
+its nodes: they are missing from its volume, and from a mesh with as many cells. The box tells where. Such cells are
+found by the ranges of ω over an eighth of a cell, so surfaces that only touch, as in `a and not a`, count as well.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";

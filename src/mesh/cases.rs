@@ -17,20 +17,19 @@ use std::sync::LazyLock;
 /// Edges of a cell.
 pub(super) const EDGES: usize = 12;
 
+/// Faces of a cell.
+pub(super) const FACES: usize = 6;
+
 /// What happens on a face whose inside corners lie on one diagonal and whose outside corners on the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ambiguous {
     /// Solid on both sides of a strip of fluid.
-    #[cfg_attr(not(test), expect(dead_code, reason = "waits for a decision from the field's values"))]
     PartSolid,
     /// A strip of solid between two parts of fluid.
     JoinSolid,
 }
 
-/// The rule in force. A wall about as thin as a cell then stays connected and does not leak.
-const RULE: Ambiguous = Ambiguous::JoinSolid;
-
-/// Triangles of all cases, as edges of the cell, counter-clockwise seen from the fluid.
+/// Triangles of all cells that the signs alone decide, as edges of the cell, counter-clockwise seen from the fluid.
 pub(super) struct Cases {
     triangles: Vec<[u8; 3]>,
     first: [usize; 257],
@@ -44,20 +43,110 @@ impl Cases {
         let mut triangles = Vec::new();
         let mut first = [0; 257];
         for inside in 0..=255_u8 {
-            for polygon in loops(inside, [RULE; 6]) {
-                let without_face_diagonals = triangulate(&polygon);
+            if !needs_values(inside) {
+                // of no consequence here
+                let polygons = loops(inside, [Ambiguous::JoinSolid; FACES]);
+                let without_face_diagonals = polygons.iter().map(|polygon| triangulate(polygon));
                 triangles
-                    .extend(without_face_diagonals.expect("under one rule for all faces every loop has one"));
+                    .extend(without_face_diagonals.flat_map(|found| found.expect("every such loop has one")));
             }
             first[usize::from(inside) + 1] = triangles.len();
         }
         Self { triangles, first }
     }
 
-    /// Triangles of a cell; bit c of `inside` tells that corner c has ω > 0.
+    /// Triangles of a cell; bit c of `inside` tells that corner c has ω > 0. None for those that need values.
     pub(super) fn triangles(&self, inside: u8) -> &[[u8; 3]] {
         let case = usize::from(inside);
         &self.triangles[self.first[case]..self.first[case + 1]]
+    }
+}
+
+/// Whether the signs leave a choice: on a face, or between two corners that are alike and opposite in the cell, which a
+/// tunnel may join.
+pub(super) fn needs_values(inside: u8) -> bool {
+    let is_inside = |corner: usize| inside >> corner & 1 == 1;
+    let ambiguous = |face: usize| {
+        let [a, b, c, d] = face_corners(face).map(is_inside);
+        a == c && b == d && a != b
+    };
+    let opposite = |mask: u8| mask.count_ones() == 2 && mask == mask.reverse_bits();
+    (0..FACES).any(ambiguous) || opposite(inside) || opposite(!inside)
+}
+
+/// Two loops that bound a tunnel, and the closed line around its waist.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tunnel {
+    pub loops: [usize; 2],
+    /// Corners of the line in the cell [0, 1]³.
+    pub waist: [[f64; 3]; 6],
+}
+
+/// Where a vertex within the cell belongs, before it is put on the surface.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Inner {
+    /// In the middle of the vertices on these edges.
+    Amidst(Vec<usize>),
+    /// At a point of the cell [0, 1]³.
+    At([f64; 3]),
+}
+
+/// Triangles of one cell whose corners' values had to be asked.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Patch {
+    /// Edges of the cell, and from [`EDGES`] on inner vertices.
+    pub triangles: Vec<[u8; 3]>,
+    pub inner: Vec<Inner>,
+}
+
+impl Patch {
+    /// Discs for all loops but the two that bound a tunnel.
+    pub(super) fn new(loops: &[Vec<usize>], tunnel: Option<Tunnel>) -> Self {
+        let mut patch = Self { triangles: Vec::new(), inner: Vec::new() };
+        for (number, polygon) in loops.iter().enumerate() {
+            match tunnel {
+                Some(Tunnel { loops: [a, b], waist }) if number == b => {
+                    patch.add_tunnel(&loops[a], polygon, &waist)
+                }
+                Some(Tunnel { loops: [a, _], .. }) if number == a => {}
+                _ => patch.add_disc(polygon),
+            }
+        }
+        patch
+    }
+
+    /// A disc without inner vertices, or else a fan around one.
+    fn add_disc(&mut self, polygon: &[usize]) {
+        match triangulate(polygon) {
+            Some(triangles) => self.triangles.extend(triangles),
+            None => {
+                let centre = (EDGES + self.inner.len()) as u8;
+                let next = polygon.iter().cycle().skip(1);
+                self.triangles.extend(polygon.iter().zip(next).map(|(&a, &b)| [a as u8, b as u8, centre]));
+                self.inner.push(Inner::Amidst(polygon.to_vec()));
+            }
+        }
+    }
+
+    /// A tube between two loops, or else one from either loop to the waist.
+    fn add_tunnel(&mut self, a: &[usize], b: &[usize], waist: &[[f64; 3]; 6]) {
+        let first = EDGES + self.inner.len();
+        let place = |v: usize| if v < EDGES { midpoint(v) } else { waist[v - first] };
+        if let Some((_, triangles)) = tube(a, b, &place) {
+            self.triangles.extend(triangles);
+            return;
+        }
+        // no cross edge to the waist lies in a face, so both tubes exist; of its two directions the shorter tubes' one
+        let ring: Vec<usize> = (first..first + waist.len()).collect();
+        let back: Vec<usize> = ring.iter().rev().copied().collect();
+        let tubes = [(&ring, &back), (&back, &ring)].into_iter().filter_map(|(one, other)| {
+            let (one, other) = (tube(a, one, &place)?, tube(other, b, &place)?);
+            Some((one.0 + other.0, [one.1, other.1]))
+        });
+        if let Some((_, both)) = tubes.min_by_key(|(cost, _)| *cost) {
+            self.inner.extend(waist.map(Inner::At));
+            self.triangles.extend(both.into_iter().flatten());
+        }
     }
 }
 
@@ -68,14 +157,14 @@ pub(super) const fn edge(e: usize) -> (usize, usize) {
 }
 
 /// The edge between two neighbouring corners.
-fn edge_between(a: usize, b: usize) -> usize {
+pub(super) fn edge_between(a: usize, b: usize) -> usize {
     let axis = (a ^ b).trailing_zeros() as usize;
     let low = a & b;
     4 * axis + (low >> ((axis + 1) % 3) & 1) + 2 * (low >> ((axis + 2) % 3) & 1)
 }
 
 /// Corners of a face, counter-clockwise seen from outside the cell.
-fn face_corners(face: usize) -> [usize; 4] {
+pub(super) fn face_corners(face: usize) -> [usize; 4] {
     let (axis, side) = (face / 2, face % 2);
     let corner = |u: usize, v: usize| side << axis | u << ((axis + 1) % 3) | v << ((axis + 2) % 3);
     if side == 1 {
@@ -101,7 +190,7 @@ fn face_segments(inside: u8, face: usize, ambiguous: Ambiguous) -> Vec<(usize, u
 }
 
 /// Closed loops of crossed edges, given the decision for each face.
-fn loops(inside: u8, ambiguous: [Ambiguous; 6]) -> Vec<Vec<usize>> {
+pub(super) fn loops(inside: u8, ambiguous: [Ambiguous; FACES]) -> Vec<Vec<usize>> {
     let mut next = [None; EDGES];
     for (face, decision) in ambiguous.into_iter().enumerate() {
         for (from, to) in face_segments(inside, face, decision) {
@@ -132,14 +221,16 @@ fn share_a_face(a: usize, b: usize) -> bool {
     })
 }
 
-/// Twice the squared distance between the midpoints of two edges, in cell sides.
+/// The middle of an edge in the cell [0, 1]³.
+fn midpoint(e: usize) -> [f64; 3] {
+    let (axis, low) = edge(e);
+    std::array::from_fn(|i| if i == axis { 0.5 } else { (low >> i & 1) as f64 })
+}
+
+/// Four times the squared distance between the midpoints of two edges, in cell sides.
 fn midpoint_distance(a: usize, b: usize) -> u32 {
-    let doubled = |e: usize| -> [i32; 3] {
-        let (axis, low) = edge(e);
-        std::array::from_fn(|i| if i == axis { 1 } else { 2 * (low >> i & 1) as i32 })
-    };
-    let (p, q) = (doubled(a), doubled(b));
-    (0..3).map(|i| (p[i] - q[i]).pow(2) as u32).sum()
+    let (p, q) = (midpoint(a), midpoint(b));
+    (0..3).map(|i| (4.0 * (p[i] - q[i]).powi(2)) as u32).sum()
 }
 
 /// The triangulation of a loop with the shortest diagonals, none of them in a face; `None` if there is none.
@@ -175,8 +266,86 @@ fn triangulate(polygon: &[usize]) -> Option<Vec<[u8; 3]>> {
     Some(triangles)
 }
 
+/// The tube with the shortest cross edges, none of them in a face, between two loops that run around it in opposite
+/// directions, and its cost; `None` if there is none. Vertices from [`EDGES`] on lie within the cell.
+///
+/// A tube is a walk around both loops at once: from the cross edge at (i, j), corner i of `a` and corner j of the
+/// reversed `b`, a triangle leads to (i + 1, j) or to (i, j + 1).
+fn tube(a: &[usize], b: &[usize], place: &impl Fn(usize) -> [f64; 3]) -> Option<(u32, Vec<[u8; 3]>)> {
+    let cost = |p: usize, q: usize| {
+        let (from, to) = (place(p), place(q));
+        let squared: f64 = (0..3).map(|i| (from[i] - to[i]).powi(2)).sum();
+        let in_face = p < EDGES && q < EDGES && share_a_face(p, q);
+        (!in_face).then_some((4096.0 * squared) as u32) // whole numbers compare the same everywhere
+    };
+    let walks = (0..b.len()).filter_map(|start| {
+        let back: Vec<usize> = b.iter().rev().cycle().skip(start).take(b.len()).copied().collect();
+        let (cost, steps) = shortest_walk(a, &back, &cost)?;
+        Some((cost, start, back, steps))
+    });
+    let (cost, _, b, steps) = walks.min_by_key(|&(cost, start, ..)| (cost, start))?;
+    let (mut i, mut j) = (0, 0);
+    let mut triangles = Vec::with_capacity(steps.len());
+    for along_a in steps {
+        let (p, q) = (a[i % a.len()], b[j % b.len()]);
+        if along_a {
+            i += 1;
+            triangles.push([p, a[i % a.len()], q].map(|e| e as u8));
+        } else {
+            j += 1;
+            triangles.push([b[j % b.len()], q, p].map(|e| e as u8));
+        }
+    }
+    Some((cost, triangles))
+}
+
+/// The cheapest walk from (0, 0) once around both loops, as steps along `a` or not, with its cost. It begins with a step
+/// along `a` and ends with one along `b`, as every tube does from one of its cross edges; and it turns more than once,
+/// for all the way around one loop at a single corner of the other would meet that cross edge twice.
+fn shortest_walk(
+    a: &[usize],
+    b: &[usize],
+    cost: &impl Fn(usize, usize) -> Option<u32>,
+) -> Option<(u32, Vec<bool>)> {
+    let (m, n) = (a.len(), b.len());
+    cost(a[0], b[0])?;
+    // least cost to (i, j) in the first run along a, in the first along b, and later; with the step there and from where
+    let mut best = vec![vec![[None::<(u32, bool, usize)>; 3]; n + 1]; m + 1];
+    best[0][0][0] = Some((0, true, 0));
+    for i in 1..=m {
+        for j in 0..=n {
+            let along_a =
+                |run: usize| best[i - 1][j][run].filter(|_| j < n).map(|(sum, ..)| (sum, true, run));
+            let reached = match j {
+                0 => [along_a(0), None, None],
+                _ => {
+                    let along_b = |run: usize| best[i][j - 1][run].map(|(sum, ..)| (sum, false, run));
+                    let second = along_b(0).into_iter().chain(along_b(1)).min();
+                    [along_a(0), second, [along_a(1), along_a(2), along_b(2)].into_iter().flatten().min()]
+                }
+            };
+            let here = cost(a[i % m], b[j % n]);
+            best[i][j] =
+                reached.map(|found| found.and_then(|(sum, step, run)| Some((sum + here?, step, run))));
+        }
+    }
+    let (sum, ..) = best[m][n][2]?;
+    let (mut i, mut j, mut run) = (m, n, 2);
+    let mut steps = Vec::with_capacity(m + n);
+    while (i, j) != (0, 0) {
+        let (_, along_a, from) = best[i][j][run]?;
+        steps.push(along_a);
+        run = from;
+        if along_a { i -= 1 } else { j -= 1 }
+    }
+    steps.reverse();
+    Some((sum, steps))
+}
+
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     fn crossed(inside: u8, e: usize) -> bool {
@@ -192,46 +361,109 @@ mod tests {
         }
     }
 
+    /// All decisions about faces that matter for a case: those on faces that are not ambiguous are left alone.
+    fn choices(inside: u8) -> impl Iterator<Item = [Ambiguous; FACES]> {
+        let is_inside = move |corner: usize| inside >> corner & 1 == 1;
+        let is_ambiguous = move |face: usize| {
+            let [a, b, c, d] = face_corners(face).map(is_inside);
+            a == c && b == d && a != b
+        };
+        let free = (0..FACES).filter(|&face| is_ambiguous(face)).fold(0, |mask, face| mask | 1 << face);
+        (0..64_u8).filter(move |choice| choice & !free == 0).map(|choice| {
+            let pick =
+                |f: usize| if choice >> f & 1 == 1 { Ambiguous::JoinSolid } else { Ambiguous::PartSolid };
+            std::array::from_fn(pick)
+        })
+    }
+
     /// The border of a cell's triangles must be the face segments, each once, in their direction: that, and
-    /// segments agreeing between neighbours, makes any mesh closed and each of its edges shared by two.
+    /// segments agreeing between neighbours, makes any mesh closed and each of its edges shared by two. Within the cell
+    /// too each side must have one partner.
+    #[track_caller]
+    fn check_triangles(inside: u8, faces: [Ambiguous; FACES], triangles: &[[u8; 3]]) {
+        let side = |t: &[u8; 3], i: usize| (usize::from(t[i]), usize::from(t[(i + 1) % 3]));
+        let mut sides: Vec<_> = triangles.iter().flat_map(|t| (0..3).map(move |i| side(t, i))).collect();
+        sides.sort_unstable();
+        assert!(sides.windows(2).all(|pair| pair[0] != pair[1]), "case {inside:08b}: a side met twice");
+        let mut segments: Vec<_> = (0..FACES).flat_map(|f| face_segments(inside, f, faces[f])).collect();
+        segments.sort_unstable();
+        for &(a, b) in &sides {
+            let is_segment = segments.contains(&(a, b));
+            let inner = a >= EDGES || b >= EDGES;
+            assert!(is_segment || inner || !share_a_face(a, b), "case {inside:08b}, side {a}-{b}");
+        }
+        let reversed: Vec<_> = sides.iter().map(|&(a, b)| (b, a)).collect();
+        sides.retain(|side| !reversed.contains(side));
+        assert_eq!(sides, segments, "case {inside:08b}");
+        for e in 0..EDGES {
+            let used = triangles.iter().flatten().any(|&v| usize::from(v) == e);
+            assert_eq!(used, crossed(inside, e), "case {inside:08b}, edge {e}");
+        }
+    }
+
+    /// Vertices − edges + triangles, the border included.
+    fn euler(triangles: &[[u8; 3]]) -> i32 {
+        let vertices: BTreeSet<u8> = triangles.iter().flatten().copied().collect();
+        let edges: BTreeSet<(u8, u8)> = triangles
+            .iter()
+            .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
+            .map(|(a, b)| (a.min(b), a.max(b)))
+            .collect();
+        vertices.len() as i32 - edges.len() as i32 + triangles.len() as i32
+    }
+
     #[test]
-    fn border_of_every_case_is_its_face_segments() {
-        for inside in 0..=255_u8 {
-            let mut sides: Vec<(usize, usize)> = CASES
-                .triangles(inside)
-                .iter()
-                .flat_map(|t| (0..3).map(|i| (usize::from(t[i]), usize::from(t[(i + 1) % 3]))))
-                .collect();
-            let reversed: Vec<_> = sides.iter().map(|&(a, b)| (b, a)).collect();
-            sides.retain(|side| !reversed.contains(side));
-            sides.sort_unstable();
-            let mut segments: Vec<_> = (0..6).flat_map(|face| face_segments(inside, face, RULE)).collect();
-            segments.sort_unstable();
-            assert_eq!(sides, segments, "case {inside:08b}");
+    fn cases_that_signs_decide_are_bounded_by_their_face_segments() {
+        for inside in (0..=255).filter(|&inside| !needs_values(inside)) {
+            let faces = [Ambiguous::PartSolid; FACES];
+            check_triangles(inside, faces, CASES.triangles(inside));
+            assert!(CASES.triangles(inside).len() <= 5, "case {inside:08b}");
         }
     }
 
     #[test]
-    fn inner_sides_never_lie_in_a_face() {
+    fn patches_of_discs_are_bounded_by_their_face_segments_for_any_choice() {
         for inside in 0..=255_u8 {
-            let segments: Vec<_> = (0..6).flat_map(|face| face_segments(inside, face, RULE)).collect();
-            for t in CASES.triangles(inside) {
-                for i in 0..3 {
-                    let (a, b) = (usize::from(t[i]), usize::from(t[(i + 1) % 3]));
-                    let is_segment = segments.contains(&(a, b));
-                    assert!(is_segment || !share_a_face(a, b), "case {inside:08b}, side {a}-{b}");
-                }
+            for faces in choices(inside) {
+                let polygons = loops(inside, faces);
+                let patch = Patch::new(&polygons, None);
+                check_triangles(inside, faces, &patch.triangles);
+                assert_eq!(euler(&patch.triangles), polygons.len() as i32);
+                assert!(
+                    patch.inner.len() <= 1
+                        && polygons.iter().all(|l| l.len() >= 8 || triangulate(l).is_some())
+                );
             }
         }
     }
 
     #[test]
-    fn every_crossed_edge_is_used_and_no_other() {
+    fn any_two_loops_can_be_joined_by_a_tunnel() {
+        let waist = [
+            [0.6, 0.4, 0.4],
+            [0.6, 0.6, 0.4],
+            [0.4, 0.6, 0.4],
+            [0.4, 0.6, 0.6],
+            [0.4, 0.4, 0.6],
+            [0.6, 0.4, 0.6],
+        ];
+        // one far from both loops as well
+        let waists = [waist, waist.map(|p| p.map(|c| 0.01 * c))];
+        let (mut direct, mut at_waist) = (0, 0);
         for inside in 0..=255_u8 {
-            let used = |e| CASES.triangles(inside).iter().flatten().any(|&v| usize::from(v) == e);
-            assert!((0..EDGES).all(|e| used(e) == crossed(inside, e)), "case {inside:08b}");
-            assert!(CASES.triangles(inside).len() <= 5, "case {inside:08b}");
+            for faces in choices(inside) {
+                let polygons = loops(inside, faces);
+                for (a, b) in (0..polygons.len()).flat_map(|b| (0..b).map(move |a| (a, b))) {
+                    let (loops, choice) = ([a, b], usize::from(inside) % 2);
+                    let patch = Patch::new(&polygons, Some(Tunnel { loops, waist: waists[choice] }));
+                    check_triangles(inside, faces, &patch.triangles);
+                    assert_eq!(euler(&patch.triangles), polygons.len() as i32 - 2);
+                    let ring = patch.inner.iter().any(|inner| matches!(inner, Inner::At(_)));
+                    *(if ring { &mut at_waist } else { &mut direct }) += 1;
+                }
+            }
         }
+        assert!(direct > 0 && at_waist > 0, "{direct} {at_waist}");
     }
 
     #[test]
@@ -269,20 +501,5 @@ mod tests {
         let smallest = a.min(b).min(c);
         let turned = [[a, b, c], [b, c, a], [c, a, b]].into_iter().find(|t| t[0] == smallest).unwrap();
         assert_eq!(turned, [0, 4, 8], "x, y, z edges of corner 0 in right-handed order");
-    }
-
-    /// Loops exist for each free choice on the faces; those with no plain triangulation need an inner vertex.
-    #[test]
-    fn free_choice_of_faces_gives_loops_that_need_inner_vertices_only_when_long() {
-        for inside in 0..=255_u8 {
-            for choice in 0..64 {
-                let pick =
-                    |f: usize| if choice >> f & 1 == 1 { Ambiguous::JoinSolid } else { Ambiguous::PartSolid };
-                let found = loops(inside, std::array::from_fn(pick));
-                let crossed_edges = (0..EDGES).filter(|&e| crossed(inside, e)).count();
-                assert_eq!(found.iter().map(Vec::len).sum::<usize>(), crossed_edges);
-                assert!(found.iter().all(|l| l.len() >= 8 || triangulate(l).is_some()));
-            }
-        }
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     Mesh,
-    normals::{gradients, unit},
+    normals::{Gradients, unit},
     shells::{Roots, shells},
 };
 use crate::field::Field;
@@ -150,9 +150,11 @@ const NEWTON_STEPS: usize = 8;
 fn project(field: &dyn Field, points: &[DVec3]) -> Vec<f64> {
     let mut at = points.to_vec();
     let mut directions = vec![DVec3::ZERO; points.len()];
+    let mut gradients = Gradients::default();
     for step in 0..NEWTON_STEPS {
         let mut moved = false;
-        for (i, (omega, gradient)) in gradients(field, &at).into_iter().enumerate() {
+        let found: Vec<(f64, DVec3)> = gradients.at(field, &at).collect();
+        for (i, (omega, gradient)) in found.into_iter().enumerate() {
             let direction = unit(gradient).unwrap_or(DVec3::ZERO);
             if step == 0 {
                 directions[i] = direction;
@@ -167,7 +169,7 @@ fn project(field: &dyn Field, points: &[DVec3]) -> Vec<f64> {
             break;
         }
     }
-    let residuals = gradients(field, &at);
+    let residuals: Vec<(f64, DVec3)> = gradients.at(field, &at).collect();
     (0..points.len())
         .map(|i| {
             let way = at[i].distance(points[i]);

@@ -14,8 +14,8 @@ use super::Mesh;
 /// A vertex that lies exactly on a node of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct AtNode {
-    /// The node's extended indices.
-    pub node: [u32; 3],
+    /// The node's number, see `Lattice::key`.
+    pub node: u64,
     pub vertex: u32,
 }
 
@@ -41,15 +41,17 @@ pub(super) fn merge_coincident(mesh: &mut Mesh, mut at_nodes: Vec<AtNode>) {
 }
 
 /// The triangles around each vertex that may be merged.
-struct Fans<'a> {
-    mesh: &'a mut Mesh,
+pub(super) struct Fans<'a> {
+    pub mesh: &'a mut Mesh,
     fans: BTreeMap<u32, Vec<u32>>,
-    is_dead: Vec<bool>,
-    is_lost: Vec<bool>,
+    /// Triangles that are gone.
+    pub is_dead: Vec<bool>,
+    /// Vertices that are gone.
+    pub is_lost: Vec<bool>,
 }
 
 impl<'a> Fans<'a> {
-    fn new(mesh: &'a mut Mesh, vertices: impl Iterator<Item = u32>) -> Self {
+    pub(super) fn new(mesh: &'a mut Mesh, vertices: impl Iterator<Item = u32>) -> Self {
         let mut is_wanted = vec![false; mesh.positions.len()];
         vertices.for_each(|v| is_wanted[v as usize] = true);
         let mut fans: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -63,13 +65,13 @@ impl<'a> Fans<'a> {
     }
 
     /// Living triangles around a vertex.
-    fn fan(&self, v: u32) -> impl Iterator<Item = u32> {
+    pub(super) fn fan(&self, v: u32) -> impl Iterator<Item = u32> {
         let listed = self.fans.get(&v).map_or(&[][..], Vec::as_slice);
         listed.iter().copied().filter(|&t| !self.is_dead[t as usize])
     }
 
     /// Vertices joined to `v` by an edge, ascending.
-    fn neighbours(&self, v: u32) -> Vec<u32> {
+    pub(super) fn neighbours(&self, v: u32) -> Vec<u32> {
         let mut found: Vec<u32> =
             self.fan(v).flat_map(|t| self.mesh.triangles[t as usize]).filter(|&u| u != v).collect();
         found.sort_unstable();
@@ -93,13 +95,13 @@ impl<'a> Fans<'a> {
     }
 
     /// True if contracting the edge keeps the topology: two common neighbours, and not a tetrahedron.
-    fn meets_link_condition(&self, b: u32, around_a: &[u32]) -> bool {
+    pub(super) fn meets_link_condition(&self, b: u32, around_a: &[u32]) -> bool {
         let around_b = self.neighbours(b);
         let common = around_b.iter().filter(|v| around_a.binary_search(v).is_ok()).count();
         common == 2 && (around_a.len() > 3 || around_b.len() > 3)
     }
 
-    fn contract(&mut self, kept: u32, lost: u32) {
+    pub(super) fn contract(&mut self, kept: u32, lost: u32) {
         let fan: Vec<u32> = self.fan(lost).collect();
         for &t in &fan {
             let triangle = &mut self.mesh.triangles[t as usize];
@@ -144,7 +146,7 @@ impl<'a> Fans<'a> {
 }
 
 /// Removes lost vertices and dead triangles and renumbers the rest in order.
-fn compact(mesh: &mut Mesh, is_lost: &[bool], is_dead: &[bool]) {
+pub(super) fn compact(mesh: &mut Mesh, is_lost: &[bool], is_dead: &[bool]) {
     let mut number = 0;
     let numbers: Vec<u32> = is_lost
         .iter()
@@ -158,6 +160,8 @@ fn compact(mesh: &mut Mesh, is_lost: &[bool], is_dead: &[bool]) {
     mesh.triangles.iter_mut().for_each(|t| *t = t.map(|v| numbers[v as usize]));
     let mut lost = is_lost.iter();
     mesh.positions.retain(|_| lost.next() == Some(&false));
+    let mut lost = is_lost.iter();
+    mesh.normals.retain(|_| lost.next() == Some(&false));
     mesh.caps.retain(|&v| !is_lost[v as usize]);
     mesh.caps.iter_mut().for_each(|v| *v = numbers[*v as usize]);
 }

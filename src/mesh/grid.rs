@@ -74,7 +74,7 @@ const BOTH_MARGINS: f64 = 1.370_818_339_168_115;
 impl Grid {
     /// Fewer cells along the longest side leave no room for the margins.
     pub const MIN_CELLS: usize = 2;
-    /// Two layers of samples of an 8192² grid take 1 GiB on each thread.
+    /// A surface across 8192² cells has some 10⁸ vertices, a fifth of those that a mesh can have.
     pub const MAX_CELLS: usize = 8192;
 
     /// A grid of cubic cells around a solid's own bounds, padded so that its surface stays off the border.

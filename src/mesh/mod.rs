@@ -1,13 +1,16 @@
 //! From a field to a closed triangle mesh of its surface ω = 0, and what can be said about that mesh.
 //!
-//! [`Grid`] lays nodes → [`marching_cubes`] samples ω layer by layer, connects crossed edges by the case table,
-//! puts each vertex on the surface by a root search on ω itself, merges vertices that coincide in a node and
-//! adds normals −∇ω/|∇ω| → [`check`] reports topology, volume and distance → `stl`, `ply`, `obj`, `vtp` write.
+//! [`Grid`] lays nodes → [`marching_cubes`] samples ω in the bricks of cells that ranges do not exclude, connects
+//! crossed edges by the case table, or by the corners' values where the table leaves a choice, puts each vertex on the
+//! surface by a root search on ω itself, merges vertices that coincide in a node and adds normals −∇ω/|∇ω| →
+//! [`remove_slivers`] if asked → [`check`] reports topology, volume and distance, [`thin_cells`] what the grid cannot
+//! see → `stl`, `ply`, `obj`, `vtp` write.
 //!
 //! Promises: the mesh is closed, every edge lies in exactly two triangles that run along it in opposite
-//! directions, triangles are counter-clockwise seen from the fluid, and the same field and grid give the same
-//! bits on any number of threads. Not promised: creases between nodes are cut, features thinner than a cell
-//! may be missed, and where the field touches zero without a change of sign there is no surface.
+//! directions, triangles are counter-clockwise seen from the fluid, its topology is that of the trilinear interpolant
+//! of ω at the nodes, and the same field and grid give the same bits on any number of threads. Not promised: creases
+//! between nodes are cut, features thinner than a cell may be missed (but are counted), and where the field touches
+//! zero without a change of sign there is no surface.
 //!
 //! ```
 //! use rfm::{field::Closures, geom::Aabb, glam::DVec3, mesh};
@@ -24,19 +27,23 @@
 //!
 //! Invariant: this module knows nothing of a compiler; it sees only [`Field`](crate::field::Field).
 
+mod ambiguity;
 mod cases;
 mod check;
 mod collapse;
 mod extract;
 mod grid;
-mod layer;
 mod normals;
 pub mod obj;
+mod patches;
 pub mod ply;
 mod prune;
 mod roots;
 mod shells;
+mod signs;
+mod slivers;
 pub mod stl;
+mod thin;
 pub mod vtp;
 
 #[cfg(test)]
@@ -50,6 +57,8 @@ pub use check::{Report, check};
 pub use extract::marching_cubes;
 pub use grid::{Grid, GridError, Resolution};
 pub use shells::{Shell, shells};
+pub use slivers::{SLIVER, quality, remove_slivers};
+pub use thin::{ThinCells, thin_cells};
 
 /// Triangles over shared vertices.
 #[derive(Debug, Clone, Default, PartialEq)]

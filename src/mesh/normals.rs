@@ -3,43 +3,49 @@
 //! Invariant: every normal is a finite unit vector.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::Mesh;
 use crate::field::{Field, GradientsMut, Points};
 
-/// Vertices evaluated together.
-const BATCH: usize = 1024;
-
-/// Computes `mesh.normals`. Cap vertices lie inside the solid, where ∇ω says nothing about the cap: they take
-/// the mean of the triangles around.
-pub(super) fn add(field: &dyn Field, mesh: &mut Mesh) {
-    mesh.normals = vec![DVec3::ZERO; mesh.positions.len()];
-    mesh.normals.par_chunks_mut(BATCH).zip(mesh.positions.par_chunks(BATCH)).for_each(
-        |(normals, positions)| {
-            let gradients = gradients(field, positions);
-            for (normal, (_, gradient)) in normals.iter_mut().zip(gradients) {
-                *normal = unit(-gradient).unwrap_or(DVec3::ZERO);
-            }
-        },
-    );
-    mesh.work.gradients += mesh.positions.len() as u64;
-    for &v in &mesh.caps {
-        mesh.normals[v as usize] = DVec3::ZERO;
-    }
-    if mesh.normals.contains(&DVec3::ZERO) {
-        fill_from_triangles(mesh);
-    }
+/// Columns for gradients at many points, kept from one call to the next.
+#[derive(Debug, Default)]
+pub(super) struct Gradients {
+    points: [Vec<f64>; 3],
+    /// ω and its derivatives.
+    found: [Vec<f64>; 4],
 }
 
-/// ω and ∇ω at each position.
-pub(super) fn gradients(field: &dyn Field, positions: &[DVec3]) -> Vec<(f64, DVec3)> {
-    let coordinates = |axis: usize| positions.iter().map(|p| p[axis]).collect::<Vec<f64>>();
-    let (x, y, z) = (coordinates(0), coordinates(1), coordinates(2));
-    let [mut omega, mut gx, mut gy, mut gz] = [(); 4].map(|()| vec![0.0; positions.len()]);
-    let out = GradientsMut { omega: &mut omega, x: &mut gx, y: &mut gy, z: &mut gz };
-    field.omega_grad_many(Points::new(&x, &y, &z), out);
-    (0..positions.len()).map(|i| (omega[i], DVec3::new(gx[i], gy[i], gz[i]))).collect()
+impl Gradients {
+    /// Writes −∇ω/|∇ω| at each position, zero where the field gives no direction.
+    pub(super) fn normals(&mut self, field: &dyn Field, positions: &[DVec3], normals: &mut [DVec3]) {
+        self.evaluate(field, positions);
+        let [_, x, y, z] = &self.found;
+        for (i, normal) in normals.iter_mut().enumerate() {
+            *normal = unit(DVec3::new(-x[i], -y[i], -z[i])).unwrap_or(DVec3::ZERO);
+        }
+    }
+
+    /// ω and ∇ω at each position.
+    pub(super) fn at(
+        &mut self,
+        field: &dyn Field,
+        positions: &[DVec3],
+    ) -> impl Iterator<Item = (f64, DVec3)> {
+        self.evaluate(field, positions);
+        let [omega, x, y, z] = &self.found;
+        (0..omega.len()).map(|i| (omega[i], DVec3::new(x[i], y[i], z[i])))
+    }
+
+    fn evaluate(&mut self, field: &dyn Field, positions: &[DVec3]) {
+        for (axis, column) in self.points.iter_mut().enumerate() {
+            column.clear();
+            column.extend(positions.iter().map(|p| p[axis]));
+        }
+        self.found.iter_mut().for_each(|column| column.resize(positions.len(), 0.0));
+        let [x, y, z] = &self.points;
+        let [omega, gx, gy, gz] = &mut self.found;
+        field.omega_grad_many(Points::new(x, y, z), GradientsMut { omega, x: gx, y: gy, z: gz });
+    }
 }
 
 /// The unit vector along `v`, also where |v|² would underflow; none for zero, infinite and NaN vectors.
@@ -51,8 +57,12 @@ pub(super) fn unit(v: DVec3) -> Option<DVec3> {
     Some((v / largest).normalize()).filter(|n| n.is_finite())
 }
 
-/// Replaces each zero normal by the area-weighted mean of the triangles around, or by +z if these cancel.
-fn fill_from_triangles(mesh: &mut Mesh) {
+/// Replaces each zero normal by the area-weighted mean of the triangles around, or by +z if these cancel. Cap vertices
+/// lie inside the solid, where ∇ω says nothing about the cap: they too are left to this.
+pub(super) fn fill_missing(mesh: &mut Mesh) {
+    if !mesh.normals.contains(&DVec3::ZERO) {
+        return;
+    }
     let is_missing: Vec<bool> = mesh.normals.iter().map(|n| *n == DVec3::ZERO).collect();
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);

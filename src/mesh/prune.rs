@@ -1,123 +1,202 @@
-//! Which bricks of cells may hold the surface, as proven by the field's range over them.
+//! Which bricks of cells may hold the surface, as proven by the field's range over them: an octree of bricks.
 //!
-//! Invariant: a brick is called solid or fluid only if the range excludes every other sign and NaN, so the
-//! nodes of such a brick need no sample. A field that knows no ranges makes every brick `Near`.
+//! Extended indices: a ring of virtual nodes that count as outside surrounds the grid, so node i of the grid has
+//! extended index i + 1 and a surface that leaves the grid is closed there without special cases. A brick owns
+//! [`BRICK`]³ extended nodes, from its low corner on, and the cells and edges that begin in them.
+//!
+//! Invariant: a brick is called solid or fluid only if the range excludes every other sign and NaN in its closed
+//! box, so its nodes need no sample and none of its edges is crossed. A field that knows no ranges makes every brick
+//! near.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use super::Grid;
 use crate::{field::Field, geom::Aabb};
 
-/// Cells along a brick's side. On a ball with exact ranges in 100³ cells, bricks of 8 take 41 % of the full
-/// grid's evaluations and bricks of 4 take 29 %, but rows are then sampled in pieces too short for vector code.
+/// Cells along a brick's side: the inside bits of one plane of its nodes fill a word.
 pub(super) const BRICK: usize = 8;
 
-/// What is known of the closed box of a brick.
+/// Boxes whose ranges are asked for in one task.
+const BOXES_PER_TASK: usize = 64;
+
+/// What is known of a brick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Brick {
+pub(super) enum Place {
     /// ω > 0 throughout.
     Solid,
     /// ω ≤ 0 throughout.
     Fluid,
-    /// Samples must decide.
-    Near,
+    /// Samples must decide; its number among the near bricks.
+    Near(u32),
 }
 
-/// The bricks over some layers of cells.
+/// A brick that the surface may pass through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct NearBrick {
+    /// Its place among the bricks.
+    pub at: [usize; 3],
+    /// ω > 0 is proven at all of its nodes in the grid: the surface only closes the solid at the grid's border.
+    pub solid: bool,
+}
+
+/// The grid's nodes and its division into bricks.
+#[derive(Debug)]
+pub(super) struct Lattice {
+    /// Coordinates of the grid's nodes on each axis.
+    nodes: [Vec<f64>; 3],
+}
+
+impl Lattice {
+    pub(super) fn new(grid: &Grid) -> Self {
+        Self { nodes: [0, 1, 2].map(|axis| grid.nodes(axis)) }
+    }
+
+    /// Bricks on each axis.
+    fn counts(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| (self.nodes[axis].len() + 2).div_ceil(BRICK))
+    }
+
+    /// True for the ring's nodes.
+    pub(super) fn is_ring(&self, axis: usize, extended: usize) -> bool {
+        extended == 0 || extended > self.nodes[axis].len()
+    }
+
+    /// The coordinate of an extended node; the ring's nodes have no place of their own and lie on the border.
+    pub(super) fn coordinate(&self, axis: usize, extended: usize) -> f64 {
+        self.nodes[axis][extended.clamp(1, self.nodes[axis].len()) - 1]
+    }
+
+    /// The place of an extended node.
+    pub(super) fn position(&self, extended: [usize; 3]) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|axis| self.coordinate(axis, extended[axis])))
+    }
+
+    /// The part of a brick's nodes on one axis that lies in the grid, counted from the brick's first.
+    pub(super) fn own_nodes(&self, axis: usize, brick: usize) -> std::ops::Range<usize> {
+        let first = brick * BRICK;
+        let end = (self.nodes[axis].len() + 1).saturating_sub(first).min(BRICK);
+        usize::from(first == 0).min(end)..end
+    }
+
+    /// A number of an extended node of its own.
+    pub(super) fn key(&self, extended: [usize; 3]) -> u64 {
+        let [nx, ny, _] = [0, 1, 2].map(|axis| self.nodes[axis].len() as u64 + 2);
+        (extended[2] as u64 * ny + extended[1] as u64) * nx + extended[0] as u64
+    }
+
+    /// The closed box of extended nodes from `low` to `high` and whether all of it lies in the grid; nothing if none
+    /// of it does.
+    fn bounds(&self, low: [usize; 3], high: [usize; 3]) -> Option<(Aabb, bool)> {
+        let in_grid = |axis: usize| low[axis] > 0 && high[axis] <= self.nodes[axis].len();
+        let beyond = (0..3).any(|axis| low[axis] > self.nodes[axis].len());
+        (!beyond).then(|| (Aabb::new(self.position(low), self.position(high)), (0..3).all(in_grid)))
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Cell {
+    Solid,
+    Fluid,
+    Near(u32),
+    /// Its first child.
+    Divided(u32),
+}
+
+/// All bricks of a grid.
+#[derive(Debug)]
 pub(super) struct Bricks {
-    counts: [usize; 3],
-    first_layer: usize,
-    bricks: Vec<Brick>,
+    /// Eight children in a row for each divided cell; the root is the first.
+    cells: Vec<Cell>,
+    /// Bricks along the root's side are two to this power.
+    levels: u32,
+    /// Near bricks, neighbours close to one another in the list.
+    pub near: Vec<NearBrick>,
+}
+
+/// What a range says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Finding {
+    Solid,
+    /// Proven to be solid as far as it lies in the grid, but it reaches beyond.
+    SolidAtBorder,
+    Fluid,
+    Undecided,
 }
 
 impl Bricks {
-    /// Classifies the bricks over the layers of cells `first_layer..end_layer`; `nodes` are the grid's
-    /// coordinates on each axis.
-    pub(super) fn classify(
-        field: &dyn Field,
-        nodes: &[Vec<f64>; 3],
-        first_layer: usize,
-        end_layer: usize,
-    ) -> Self {
-        let cells = [nodes[0].len() - 1, nodes[1].len() - 1, end_layer - first_layer];
-        let counts = cells.map(|n| n.div_ceil(BRICK));
-        let mut found = Self { counts, first_layer, bricks: vec![Brick::Near; counts.iter().product()] };
-        let bounds_of = |low: [usize; 3], high: [usize; 3]| {
-            let offset = [0, 0, first_layer];
-            let at = |axis: usize, brick: usize| nodes[axis][offset[axis] + (brick * BRICK).min(cells[axis])];
-            Aabb::new(
-                DVec3::new(at(0, low[0]), at(1, low[1]), at(2, low[2])),
-                DVec3::new(at(0, high[0]), at(1, high[1]), at(2, high[2])),
-            )
-        };
-        // Halve boxes of bricks until the sign is proven or one brick is left.
-        let mut boxes = vec![([0; 3], counts)];
-        while let Some((low, high)) = boxes.pop() {
-            let range = field.range(&bounds_of(low, high));
-            if range.lo > 0.0 {
-                found.fill(low, high, Brick::Solid);
-            } else if range.hi <= 0.0 {
-                found.fill(low, high, Brick::Fluid);
-            } else if let Some(axis) = longest_axis(low, high) {
-                let middle = low[axis] + (high[axis] - low[axis]) / 2;
-                let (mut below, mut above) = (high, low);
-                below[axis] = middle;
-                above[axis] = middle;
-                boxes.extend([(low, below), (above, high)]);
+    /// Divides the grid, level by level, until the sign is proven or a single brick is left.
+    pub(super) fn classify(field: &dyn Field, lattice: &Lattice) -> Self {
+        let most = lattice.counts().into_iter().max().unwrap_or(1);
+        let levels = most.next_power_of_two().trailing_zeros();
+        let mut found = Self { cells: vec![Cell::Fluid], levels, near: Vec::new() };
+        let mut open = vec![(0_usize, [0_usize; 3])];
+        for level in (0..=levels).rev() {
+            let size = 1_usize << level;
+            let look = |&(_, at): &(usize, [usize; 3])| {
+                let low = at.map(|b| b * BRICK);
+                let Some((bounds, in_grid)) = lattice.bounds(low, low.map(|n| n + size * BRICK)) else {
+                    return Finding::Fluid;
+                };
+                let range = field.range(&bounds);
+                match (range.lo > 0.0, in_grid) {
+                    (true, true) => Finding::Solid,
+                    (true, false) => Finding::SolidAtBorder,
+                    _ if range.hi <= 0.0 => Finding::Fluid,
+                    _ => Finding::Undecided,
+                }
+            };
+            let findings: Vec<Finding> = open.par_iter().with_min_len(BOXES_PER_TASK).map(look).collect();
+            let mut next = Vec::new();
+            for ((slot, at), finding) in open.into_iter().zip(findings) {
+                found.cells[slot] = match finding {
+                    Finding::Solid => Cell::Solid,
+                    Finding::Fluid => Cell::Fluid,
+                    _ if level == 0 => {
+                        found.near.push(NearBrick { at, solid: finding == Finding::SolidAtBorder });
+                        Cell::Near(found.near.len() as u32 - 1)
+                    }
+                    _ => {
+                        let first = found.cells.len();
+                        found.cells.resize(first + 8, Cell::Fluid);
+                        let child = |i: usize| [0, 1, 2].map(|axis| at[axis] + (i >> axis & 1) * size / 2);
+                        next.extend((0..8).map(|i| (first + i, child(i))));
+                        Cell::Divided(first as u32)
+                    }
+                };
             }
+            open = next;
         }
         found
     }
 
-    /// Bricks along x.
-    pub(super) fn per_row(&self) -> usize {
-        self.counts[0]
-    }
-
-    /// What holds of the part of brick column `column` in the row of nodes (`row`, `plane`): near if any of the
-    /// up to four bricks around that line of nodes is.
-    pub(super) fn touching(&self, column: usize, row: usize, plane: usize) -> Brick {
-        let mut found = None;
-        for layer in around(plane - self.first_layer, self.counts[2]) {
-            for row in around(row, self.counts[1]) {
-                match self.bricks[self.index(column, row, layer)] {
-                    Brick::Near => return Brick::Near,
-                    proven => found = Some(proven),
+    /// What is known of a brick; fluid beyond the grid.
+    pub(super) fn place(&self, at: [usize; 3]) -> Place {
+        if at.iter().any(|b| b >> self.levels != 0) {
+            return Place::Fluid;
+        }
+        let mut cell = self.cells[0];
+        let mut level = self.levels;
+        loop {
+            match cell {
+                Cell::Solid => return Place::Solid,
+                Cell::Fluid => return Place::Fluid,
+                Cell::Near(number) => return Place::Near(number),
+                Cell::Divided(first) => {
+                    level -= 1;
+                    let [x, y, z] = at.map(|b| b >> level & 1);
+                    cell = self.cells[first as usize + (z << 2 | y << 1 | x)];
                 }
             }
         }
-        found.unwrap_or(Brick::Near)
     }
-
-    fn index(&self, column: usize, row: usize, layer: usize) -> usize {
-        (layer * self.counts[1] + row) * self.counts[0] + column
-    }
-
-    fn fill(&mut self, low: [usize; 3], high: [usize; 3], brick: Brick) {
-        for layer in low[2]..high[2] {
-            for row in low[1]..high[1] {
-                let (first, end) = (self.index(low[0], row, layer), self.index(high[0], row, layer));
-                self.bricks[first..end].fill(brick);
-            }
-        }
-    }
-}
-
-/// The bricks at a node along one axis: two where it lies between them.
-fn around(node: usize, bricks: usize) -> std::ops::RangeInclusive<usize> {
-    let above = (node / BRICK).min(bricks - 1);
-    let below = (node.max(1) - 1) / BRICK;
-    below..=above
-}
-
-/// The axis with most bricks; none when a single brick is left.
-fn longest_axis(low: [usize; 3], high: [usize; 3]) -> Option<usize> {
-    (0..3).filter(|&axis| high[axis] - low[axis] > 1).max_by_key(|&axis| high[axis] - low[axis])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::interval::Interval;
+    use crate::mesh::Resolution;
 
     /// ω = x − 1 with its exact range.
     struct HalfSpace;
@@ -135,15 +214,33 @@ mod tests {
     }
 
     #[test]
-    fn only_bricks_that_meet_the_plane_stay_near() {
-        let nodes = [0, 1, 2].map(|_| (0..=32).map(|i| f64::from(i) * 0.0625 + 0.01).collect::<Vec<_>>());
-        let bricks = Bricks::classify(&HalfSpace, &nodes, 16, 32);
-        for plane in 16..=32 {
-            for row in 0..=32 {
-                let found = [0, 1, 2, 3].map(|column| bricks.touching(column, row, plane));
-                assert_eq!(found, [Brick::Fluid, Brick::Near, Brick::Solid, Brick::Solid]);
-            }
+    fn bricks_that_meet_neither_the_plane_nor_the_border_are_decided() {
+        let domain = Aabb::new(DVec3::splat(-0.01), DVec3::splat(2.99));
+        let lattice = Lattice::new(&Grid::filling(&domain, Resolution::Cells(48)).unwrap());
+        assert_eq!(lattice.counts(), [7; 3]);
+        let bricks = Bricks::classify(&HalfSpace, &lattice);
+        // the plane lies between nodes 16 and 17 of the grid, which is extended node 17 and 18
+        let found = [0, 1, 2, 3, 5, 6, 7].map(|x| bricks.place([x, 3, 3]));
+        let near = |place| matches!(place, Place::Near(_));
+        assert_eq!(found.map(near), [false, false, true, false, false, true, false]);
+        assert_eq!([found[0], found[3], found[6]], [Place::Fluid, Place::Solid, Place::Fluid]);
+        // at the border nothing is sampled, but the solid is closed there
+        let solid = bricks.near.iter().filter(|brick| brick.solid).count();
+        let border = 7 * 7 + 3 * (7 * 7 - 5 * 5);
+        assert_eq!((solid, bricks.near.len()), (border, border + 49));
+        for (i, brick) in bricks.near.iter().enumerate() {
+            assert_eq!(bricks.place(brick.at), Place::Near(i as u32));
         }
-        assert_eq!([0, 8, 9, 32].map(|node| around(node, 4)), [0..=0, 0..=1, 1..=1, 3..=3]);
+    }
+
+    #[test]
+    fn bricks_own_each_node_of_the_grid_once() {
+        for cells in [1, 5, 6, 13, 14, 15] {
+            let domain = Aabb::new(DVec3::ZERO, DVec3::new(1.0, 1.0, 20.0));
+            let grid = Grid::filling(&domain, Resolution::Spacing(1.0 / cells as f64)).unwrap();
+            let lattice = Lattice::new(&grid);
+            let owned: usize = (0..lattice.counts()[0]).map(|b| lattice.own_nodes(0, b).len()).sum();
+            assert_eq!(owned, cells + 1);
+        }
     }
 }

@@ -1,35 +1,28 @@
 //! Where ω changes sign along an edge of the grid, to the last digits, for many edges at a time.
 //!
-//! Chandrupatla's method (Adv. Eng. Software 28, 1997): inverse quadratic interpolation where three points show
-//! that it is safe, else bisection. R0 fields bend sharply near creases and may be flat, so a bracket is always
-//! kept and bisection bounds the number of steps.
+//! On most edges ω is one leaf, and most leaves are quadratic along a line: three values determine the root, a step
+//! across it confirms it. What this does not settle (creases, other leaves) is left to Chandrupatla's method (Adv. Eng.
+//! Software 28, 1997): inverse quadratic interpolation where three points show that it is safe, else bisection. R0
+//! fields bend sharply near creases and may be flat, so a bracket is always kept and bisection bounds the number of
+//! steps.
 //!
 //! Invariant: the result lies in the closed edge and is one of two points at most [`BRACKET`] apart of which one
 //! has ω > 0 and the other does not: the one with the smaller |ω|.
 
-use glam::DVec3;
+use std::ops::Range;
 
 use super::MeshError;
 use crate::field::{Field, Points};
 
-/// An edge with ω > 0 at exactly one end.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bracket {
-    pub axis: usize,
-    /// The low end.
-    pub from: DVec3,
-    /// The high end's coordinate on `axis`.
-    pub to: f64,
-    /// ω at the low and at the high end.
-    pub omega: [f64; 2],
+/// Edges along one axis, with ω > 0 at exactly one end of each.
+#[derive(Debug, Default, Clone)]
+pub(super) struct Edges {
+    /// Coordinates of the ends on the axis.
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+    /// Coordinates on the next axis and on the one after, cyclically.
+    pub across: [Vec<f64>; 2],
 }
-
-/// Edges solved together: enough to fill vector code, few enough to stay in the nearest cache.
-const BATCH: usize = 512;
-
-/// Interpolation halves a bracket at least every other step in practice; after this many steps only bisection
-/// is used, which ends within 60 more.
-const MAX_INTERPOLATIONS: usize = 40;
 
 /// The width of the final bracket relative to the edge's coordinates: a few times the rounding of an R0 field
 /// divided by its slope. Narrower ones make the search wander in that rounding: 13 evaluations for each edge of
@@ -44,23 +37,235 @@ const FIRST_STEP: f64 = 0.25;
 /// could show.
 const STEP_GROWTH: f64 = 4.0;
 
-/// Appends the surface's coordinate on each edge to `roots`; returns the number of evaluations.
+/// The least distance of the third value from the edge's ends, as a share of the edge: nearer, rounding would decide
+/// about the curvature.
+const LEAST_SHARE: f64 = 1.0 / 64.0;
+
+/// Interpolation halves a bracket at least every other step in practice; after this many steps only bisection
+/// is used, which ends within 60 more.
+const MAX_INTERPOLATIONS: usize = 40;
+
+/// Edges in a batch: enough to fill vector code, few enough to stay in the nearest cache.
+const BATCH: usize = 512;
+
+impl Edges {
+    pub(super) fn clear(&mut self) {
+        self.low.clear();
+        self.high.clear();
+        self.across.iter_mut().for_each(Vec::clear);
+    }
+
+    fn largest_coordinate(&self, edge: usize) -> f64 {
+        self.low[edge].abs().max(self.high[edge].abs())
+    }
+
+    /// The bracket width that ends a search.
+    fn tolerance(&self, edge: usize) -> f64 {
+        BRACKET * self.largest_coordinate(edge)
+    }
+
+    fn snapped(&self, edge: usize, root: f64) -> f64 {
+        let reach = self.tolerance(edge);
+        match root {
+            _ if root - self.low[edge] <= reach => self.low[edge],
+            _ if self.high[edge] - root <= reach => self.high[edge],
+            _ => root,
+        }
+    }
+}
+
+/// Points on edges along an axis, one on each, as columns.
+fn on_axis<'a>(axis: usize, along: &'a [f64], across: [&'a [f64]; 2]) -> Points<'a> {
+    match axis {
+        0 => Points::new(along, across[0], across[1]),
+        1 => Points::new(across[1], along, across[0]),
+        _ => Points::new(across[0], across[1], along),
+    }
+}
+
+/// Finds roots, keeping its memory from one call to the next.
+#[derive(Debug, Default)]
+pub(super) struct RootFinder {
+    /// ω at both ends of each edge, then where the straight line, the parabola and the step across it led.
+    omega: [Vec<f64>; 5],
+    tried: [Vec<f64>; 3],
+    /// dω/dt of the parabola at its root.
+    slopes: Vec<f64>,
+    searches: Vec<Search>,
+    columns: [Vec<f64>; 3],
+}
+
+impl RootFinder {
+    /// Appends the surface's coordinate on each edge along `axis` to `roots`; returns the number of evaluations.
+    ///
+    /// # Errors
+    /// [`MeshError::NotANumber`] at the first NaN found.
+    pub(super) fn solve(
+        &mut self,
+        field: &dyn Field,
+        axis: usize,
+        edges: &Edges,
+        roots: &mut Vec<f64>,
+    ) -> Result<u64, MeshError> {
+        let mut evaluations = 0;
+        for first in (0..edges.low.len()).step_by(BATCH) {
+            let batch = first..(first + BATCH).min(edges.low.len());
+            evaluations += self.fit_parabolas(field, axis, edges, batch.clone())?;
+            self.confirm(edges, batch, roots);
+            evaluations += self.search(field, axis, edges, roots)?;
+        }
+        Ok(evaluations)
+    }
+
+    /// Fills `tried` and `omega` for a batch of edges.
+    fn fit_parabolas(
+        &mut self,
+        field: &dyn Field,
+        axis: usize,
+        edges: &Edges,
+        batch: Range<usize>,
+    ) -> Result<u64, MeshError> {
+        let across = edges.across.each_ref().map(|column| &column[batch.clone()]);
+        let (low, high) = (&edges.low[batch.clone()], &edges.high[batch]);
+        let [at_low, at_high, at_line, at_parabola, at_step] = &mut self.omega;
+        let [line, parabola, step] = &mut self.tried;
+        let mut evaluations = evaluate(field, on_axis(axis, low, across), at_low)?;
+        evaluations += evaluate(field, on_axis(axis, high, across), at_high)?;
+
+        let count = low.len();
+        let (f0, f1) = (&at_low[..count], &at_high[..count]);
+        line.clear();
+        line.extend((0..count).map(|i| low[i] + line_share(f0[i], f1[i]) * (high[i] - low[i])));
+        evaluations += evaluate(field, on_axis(axis, line, across), at_line)?;
+
+        parabola.clear();
+        self.slopes.clear();
+        for (i, &f) in at_line[..count].iter().enumerate() {
+            let (share, slope) = parabola_root(f0[i], f1[i], line_share(f0[i], f1[i]), f);
+            parabola.push(low[i] + share * (high[i] - low[i]));
+            self.slopes.push(slope / (high[i] - low[i]));
+        }
+        evaluations += evaluate(field, on_axis(axis, parabola, across), at_parabola)?;
+
+        step.clear();
+        for (i, &f) in at_parabola[..count].iter().enumerate() {
+            // ω = 0 counts as outside: the step then leads to the end that is inside
+            let towards_high = (f > 0.0) == (f0[i] > 0.0);
+            let least = FIRST_STEP * BRACKET * low[i].abs().max(high[i].abs());
+            let way = (f / self.slopes[i]).abs() + least;
+            let next = if towards_high { parabola[i] + way } else { parabola[i] - way };
+            // infinite and NaN ways lead to an end
+            step.push(if towards_high { next.min(high[i]) } else { next.max(low[i]) });
+        }
+        evaluations += evaluate(field, on_axis(axis, step, across), at_step)?;
+        Ok(evaluations)
+    }
+
+    /// Takes the roots that lie between the parabola's and the step; lists searches for the others.
+    fn confirm(&mut self, edges: &Edges, batch: Range<usize>, roots: &mut Vec<f64>) {
+        self.searches.clear();
+        for (i, edge) in batch.enumerate() {
+            let at = |k: usize| (self.tried[k][i], self.omega[k + 2][i]);
+            let (parabola, step) = (at(1), at(2));
+            let is_across = (parabola.1 > 0.0) != (step.1 > 0.0);
+            if is_across && (parabola.0 - step.0).abs() <= edges.tolerance(edge) {
+                let nearest = if parabola.1.abs() <= step.1.abs() { parabola } else { step };
+                roots.push(edges.snapped(edge, nearest.0));
+                continue;
+            }
+            let (low, high) = ((edges.low[edge], self.omega[0][i]), (edges.high[edge], self.omega[1][i]));
+            let same_as_low = (step.1 > 0.0) == (low.1 > 0.0);
+            let (other, previous) = match is_across {
+                true => (parabola, if same_as_low { low } else { high }),
+                false if same_as_low => (high, parabola),
+                false => (low, parabola),
+            };
+            roots.push(f64::NAN);
+            self.searches.push(Search::new(
+                edge,
+                roots.len() - 1,
+                [step, other, previous],
+                edges.tolerance(edge),
+            ));
+        }
+    }
+
+    /// Ends the listed searches.
+    fn search(
+        &mut self,
+        field: &dyn Field,
+        axis: usize,
+        edges: &Edges,
+        roots: &mut [f64],
+    ) -> Result<u64, MeshError> {
+        let mut evaluations = 0;
+        let mut steps = 0;
+        while !self.searches.is_empty() {
+            let [along, first, second] = &mut self.columns;
+            along.clear();
+            along.extend(self.searches.iter().map(|search| search.next));
+            for (column, across) in [first, second].into_iter().zip(&edges.across) {
+                column.clear();
+                column.extend(self.searches.iter().map(|search| across[search.edge]));
+            }
+            let [along, first, second] = &self.columns;
+            let omega = &mut self.omega[0];
+            evaluations += evaluate(field, on_axis(axis, along, [first, second]), omega)?;
+            steps += 1;
+            let mut values = omega.iter();
+            self.searches.retain_mut(|search| {
+                let omega = values.next().copied().unwrap_or(f64::NAN);
+                let root = search.advance(omega, steps < MAX_INTERPOLATIONS);
+                if let Some(root) = root {
+                    roots[search.slot] = edges.snapped(search.edge, root);
+                }
+                root.is_none()
+            });
+        }
+        Ok(evaluations)
+    }
+}
+
+/// ω at many points.
 ///
 /// # Errors
-/// [`MeshError::NotANumber`] at the first NaN found.
-pub(super) fn solve(field: &dyn Field, brackets: &[Bracket], roots: &mut Vec<f64>) -> Result<u64, MeshError> {
-    let mut evaluations = 0;
-    let mut batch = Batch::default();
-    for edges in brackets.chunks(BATCH) {
-        evaluations += batch.solve(field, edges, roots)?;
+/// [`MeshError::NotANumber`] at the first NaN.
+fn evaluate(field: &dyn Field, points: Points<'_>, omega: &mut Vec<f64>) -> Result<u64, MeshError> {
+    omega.resize(points.len(), 0.0);
+    field.omega_many(points, omega);
+    if omega.iter().fold(false, |any, w| any | w.is_nan()) {
+        let first = omega.iter().position(|w| w.is_nan()).unwrap_or(0);
+        return Err(MeshError::NotANumber { at: points.get(first) });
     }
-    Ok(evaluations)
+    Ok(points.len() as u64)
+}
+
+/// The share of an edge at which the straight line through the values at its ends is zero; kept off the ends.
+fn line_share(f0: f64, f1: f64) -> f64 {
+    let share = f0 / (f0 - f1);
+    // not a number when an end is infinite
+    if share.is_nan() { 0.5 } else { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) }
+}
+
+/// The root in [0, 1] of the parabola through (0, f0), (1, f1) and (s, f), and the parabola's slope there; f0 and f1
+/// differ in sign, so there is exactly one.
+fn parabola_root(f0: f64, f1: f64, s: f64, f: f64) -> (f64, f64) {
+    let rise = f1 - f0;
+    // f0 + b·t + c·t²
+    let c = (f - f0 - s * rise) / (s * (s - 1.0));
+    let b = rise - c;
+    let slope = (b * b - 4.0 * c * f0).max(0.0).sqrt().copysign(rise);
+    // of the two equal forms the one that adds numbers of one sign
+    let share = if b * slope >= 0.0 { -2.0 * f0 / (b + slope) } else { (slope - b) / (2.0 * c) };
+    (if share.is_nan() { 0.5 } else { share.clamp(0.0, 1.0) }, slope)
 }
 
 /// One edge's search. `newest` and `other` bracket the root, `previous` is the point last given up.
 #[derive(Debug, Clone, Copy)]
 struct Search {
     edge: usize,
+    /// Where the root is written.
+    slot: usize,
     newest: (f64, f64),
     other: (f64, f64),
     previous: (f64, f64),
@@ -72,93 +277,12 @@ struct Search {
     next: f64,
 }
 
-#[derive(Debug, Default)]
-struct Batch {
-    searches: Vec<Search>,
-    x: Vec<f64>,
-    y: Vec<f64>,
-    z: Vec<f64>,
-    omega: Vec<f64>,
-}
-
-impl Batch {
-    fn solve(
-        &mut self,
-        field: &dyn Field,
-        edges: &[Bracket],
-        roots: &mut Vec<f64>,
-    ) -> Result<u64, MeshError> {
-        let first = roots.len();
-        roots.resize(first + edges.len(), f64::NAN);
-        let roots = &mut roots[first..];
-        self.searches.clear();
-        self.searches.extend(edges.iter().enumerate().map(|(i, edge)| Search::new(i, edge)));
-        let mut evaluations = 0;
-        let mut steps = 0;
-        while !self.searches.is_empty() {
-            self.evaluate(field, edges)?;
-            evaluations += self.searches.len() as u64;
-            steps += 1;
-            let mut values = self.omega.iter();
-            self.searches.retain_mut(|search| {
-                let omega = values.next().copied().unwrap_or(f64::NAN);
-                let root = search.advance(omega, steps < MAX_INTERPOLATIONS);
-                if let Some(root) = root {
-                    roots[search.edge] = edges[search.edge].snapped(root);
-                }
-                root.is_none()
-            });
-        }
-        Ok(evaluations)
-    }
-
-    fn evaluate(&mut self, field: &dyn Field, edges: &[Bracket]) -> Result<(), MeshError> {
-        self.x.clear();
-        self.y.clear();
-        self.z.clear();
-        for search in &self.searches {
-            let mut at = edges[search.edge].from;
-            at[edges[search.edge].axis] = search.next;
-            self.x.push(at.x);
-            self.y.push(at.y);
-            self.z.push(at.z);
-        }
-        self.omega.resize(self.x.len(), 0.0);
-        let points = Points::new(&self.x, &self.y, &self.z);
-        field.omega_many(points, &mut self.omega);
-        match self.omega.iter().position(|w| w.is_nan()) {
-            Some(i) => Err(MeshError::NotANumber { at: points.get(i) }),
-            None => Ok(()),
-        }
-    }
-}
-
-impl Bracket {
-    fn largest_coordinate(&self) -> f64 {
-        self.from[self.axis].abs().max(self.to.abs())
-    }
-
-    fn snapped(&self, root: f64) -> f64 {
-        let (low, reach) = (self.from[self.axis], BRACKET * self.largest_coordinate());
-        match root {
-            _ if root - low <= reach => low,
-            _ if self.to - root <= reach => self.to,
-            _ => root,
-        }
-    }
-}
-
 impl Search {
-    fn new(edge: usize, bracket: &Bracket) -> Self {
-        let low = (bracket.from[bracket.axis], bracket.omega[0]);
-        let high = (bracket.to, bracket.omega[1]);
-        let tolerance = BRACKET * bracket.largest_coordinate();
+    /// Goes on from the newest point, the one that brackets the root with it, and the one given up.
+    fn new(edge: usize, slot: usize, [newest, other, previous]: [(f64, f64); 3], tolerance: f64) -> Self {
         let least_step = FIRST_STEP * tolerance;
-        let mut search =
-            Self { edge, newest: low, other: high, previous: high, tolerance, least_step, next: 0.0 };
-        // The straight line's root; not a number when an end is infinite.
-        let share = low.1 / (low.1 - high.1);
-        search.next = search.at_share(if share.is_finite() { share } else { 0.5 });
+        let mut search = Self { edge, slot, newest, other, previous, tolerance, least_step, next: 0.0 };
+        search.next = search.at_share(search.quadratic_share().unwrap_or(0.5));
         search
     }
 
@@ -207,16 +331,24 @@ impl Search {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::field::Closures;
 
     /// Solves f = 0 on [0, 1] along y at x = 2, z = 3; returns the root and the number of evaluations.
     fn root_of(f: impl Fn(f64) -> f64 + Sync) -> (f64, u64) {
         let field = Closures { omega: |p: DVec3| f(p.y), gradient: |_| DVec3::Y };
-        let edge = Bracket { axis: 1, from: DVec3::new(2.0, 0.0, 3.0), to: 1.0, omega: [f(0.0), f(1.0)] };
-        let mut roots = Vec::new();
-        let evaluations = solve(&field, &[edge], &mut roots).unwrap();
+        let (roots, evaluations) = solve(&field, 1).unwrap();
         (roots[0], evaluations)
+    }
+
+    fn solve(field: &dyn Field, count: usize) -> Result<(Vec<f64>, u64), MeshError> {
+        let column = |value| vec![value; count];
+        let edges = Edges { low: column(0.0), high: column(1.0), across: [column(3.0), column(2.0)] };
+        let mut roots = Vec::new();
+        let evaluations = RootFinder::default().solve(field, 1, &edges, &mut roots)?;
+        Ok((roots, evaluations))
     }
 
     #[track_caller]
@@ -227,10 +359,12 @@ mod tests {
     }
 
     #[test]
-    fn smooth_functions_take_few_steps() {
-        check_root(|y| y - 0.3, 0.3, 3);
-        check_root(|y| 0.25 - y * y, 0.5, 9);
+    fn parabolas_take_five_evaluations_and_smooth_functions_a_few_more() {
+        check_root(|y| y - 0.3, 0.3, 5);
+        check_root(|y| 0.25 - y * y, 0.5, 5);
+        check_root(|y| (y - 0.75) * (y + 3.0), 0.75, 5);
         check_root(|y| y.exp() - 2.0, std::f64::consts::LN_2, 9);
+        check_root(|y| (1.0 + 4.0 * y).sqrt() - 2.0, 0.75, 9);
     }
 
     #[test]
@@ -250,11 +384,20 @@ mod tests {
 
     #[test]
     fn nan_on_the_way_is_an_error() {
-        let field = Closures { omega: |p: DVec3| (p.x - 0.5).sqrt(), gradient: |_| DVec3::X };
-        let edge = Bracket { axis: 0, from: DVec3::ZERO, to: 1.0, omega: [-1.0, 1.0] };
-        let found = solve(&field, &[edge; 3], &mut Vec::new());
-        assert!(matches!(found, Err(MeshError::NotANumber { .. })) || found.is_ok());
-        let nowhere = Closures { omega: |_| f64::NAN, gradient: |_| DVec3::X };
-        assert!(matches!(solve(&nowhere, &[edge], &mut Vec::new()), Err(MeshError::NotANumber { .. })));
+        let some = Closures { omega: |p: DVec3| (p.y - 0.5).sqrt(), gradient: |_| DVec3::X };
+        assert!(matches!(solve(&some, 3), Err(MeshError::NotANumber { .. })));
+    }
+
+    #[test]
+    fn edges_along_each_axis_keep_their_other_coordinates() {
+        let field = Closures { omega: |p: DVec3| 14.0 - p.length_squared(), gradient: |p: DVec3| -2.0 * p };
+        let at = DVec3::new(1.0, 2.0, 3.0);
+        for axis in 0..3 {
+            let across = [1, 2].map(|next| vec![at[(axis + next) % 3]]);
+            let edges = Edges { low: vec![0.0], high: vec![5.0], across };
+            let mut roots = Vec::new();
+            RootFinder::default().solve(&field, axis, &edges, &mut roots).unwrap();
+            assert!((roots[0] - at[axis]).abs() < 1e-14, "axis {axis}: {}", roots[0]);
+        }
     }
 }

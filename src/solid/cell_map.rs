@@ -340,6 +340,10 @@ impl Field for CellMap {
         (value, if negated { -gradient } else { gradient })
     }
 
+    fn continuous(&self, p: DVec3) -> f64 {
+        self.twin.omega(p)
+    }
+
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
         self.evaluate(points, omega, |depth| self.cells.shortest_side(depth));
     }

@@ -138,7 +138,7 @@ fn check_as_json() {
     let document = outcome.json();
     contract(&outcome.stdout, &document, &["schema", "ok", "diagnostics", "solids"]);
     let solid = &document["solids"][0];
-    for key in ["name", "empty", "bounds", "volume", "volume_error", "area", "components"] {
+    for key in ["name", "empty", "bounds", "volume", "volume_error", "area", "components", "thin_cells"] {
         assert!(keys(solid).contains(&key), "{solid}");
     }
     assert_eq!(keys(&solid["bounds"]).len(), 2);
@@ -238,7 +238,7 @@ fn engines_and_precisions_print_the_same() {
     contract(&outcome.stdout, &outcome.json(), &["schema", "points"]);
 }
 
-const MESH_KEYS: [&str; 12] = [
+const MESH_KEYS: [&str; 13] = [
     "schema",
     "vertices",
     "triangles",
@@ -250,6 +250,7 @@ const MESH_KEYS: [&str; 12] = [
     "area",
     "max_distance",
     "rms_distance",
+    "thin_cells",
     "evaluations",
 ];
 

@@ -11,6 +11,7 @@ mod contact;
 mod diagnostics;
 mod examples;
 mod hard_cases;
+mod meshes;
 mod numbers;
 mod pipeline;
 mod properties;

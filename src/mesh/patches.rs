@@ -1,0 +1,173 @@
+//! Cells that signs alone do not decide: their corners' values are asked, and their triangles made one by one. They
+//! are few on smooth surfaces.
+
+use glam::DVec3;
+
+use super::{
+    ambiguity,
+    cases::{Inner, Patch, edge, face_corners, loops},
+    prune::{BRICK, Lattice},
+    signs::{Around, crossed_cells, set_positions},
+};
+use crate::field::Field;
+
+/// Triangles of one cell of a brick.
+#[derive(Debug, Clone)]
+pub(super) struct CellPatch {
+    /// The cell's plane, and its bit there.
+    pub cell: (usize, usize),
+    /// Edges of the cell, and from `cases::EDGES` on inner vertices.
+    pub triangles: Vec<[u8; 3]>,
+    /// Places of the inner vertices, on ω = 0.
+    pub inner: Vec<DVec3>,
+}
+
+/// Patches for the cells of a brick that need them, in the order of planes and bits; `low` are the extended indices of
+/// its first node. Adds to the number of evaluations.
+pub(super) fn find(
+    field: &dyn Field,
+    lattice: &Lattice,
+    low: [usize; 3],
+    around: &Around,
+    evaluations: &mut u64,
+) -> Vec<CellPatch> {
+    let mut found = Vec::new();
+    for z in 0..BRICK {
+        let corners = around.corners(z);
+        if crossed_cells(&corners) == 0 {
+            continue;
+        }
+        for bit in set_positions(undecided_cells(&corners)) {
+            let cell = [low[0] + bit % BRICK, low[1] + bit / BRICK, low[2] + z];
+            let cell = Cell::new(field, lattice, cell);
+            *evaluations += 8;
+            let Patch { triangles, inner } = cell.patch();
+            let inner =
+                inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
+            found.push(CellPatch { cell: (z, bit), triangles, inner });
+        }
+    }
+    found
+}
+
+/// Cells with an ambiguous face, or with two opposite corners that differ from all others: `cases::needs_values` for
+/// 64 cells at once.
+pub(super) fn undecided_cells(corners: &[u64; 8]) -> u64 {
+    let mut found = 0;
+    for face in 0..6 {
+        let [a, b, c, d] = face_corners(face).map(|corner| corners[corner]);
+        found |= !(a ^ c) & !(b ^ d) & (a ^ b);
+    }
+    for first in 0..4 {
+        let others = (0..8).filter(|&c| c != first && c != 7 - first);
+        let (some, all) = others.fold((0, u64::MAX), |(some, all), c| (some | corners[c], all & corners[c]));
+        let (a, b) = (corners[first], corners[7 - first]);
+        found |= (a & b & !some) | (!a & !b & all);
+    }
+    found
+}
+
+/// A cell with the values at its corners.
+struct Cell {
+    low: DVec3,
+    high: DVec3,
+    values: ambiguity::Corners,
+}
+
+impl Cell {
+    fn new(field: &dyn Field, lattice: &Lattice, low: [usize; 3]) -> Self {
+        let ends = [low, low.map(|n| n + 1)];
+        let at = |corner: usize| [0, 1, 2].map(|axis: usize| ends[corner >> axis & 1][axis]);
+        let positions: [DVec3; 8] = std::array::from_fn(|corner| lattice.position(at(corner)));
+        let mut values = positions.map(|p| field.continuous(p));
+        for (corner, value) in values.iter_mut().enumerate() {
+            if (0..3).any(|axis| lattice.is_ring(axis, at(corner)[axis])) {
+                *value = f64::NEG_INFINITY;
+            }
+        }
+        Self { low: positions[0], high: positions[7], values }
+    }
+
+    fn patch(&self) -> Patch {
+        let polygons = loops(ambiguity::inside(&self.values), ambiguity::faces(&self.values));
+        Patch::new(&polygons, ambiguity::tunnel(&self.values, &polygons))
+    }
+
+    fn corner(&self, corner: usize) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|axis: usize| [self.low, self.high][corner >> axis & 1][axis]))
+    }
+
+    fn place(&self, inner: &Inner) -> DVec3 {
+        match inner {
+            Inner::At(share) => self.low + DVec3::from_array(*share) * (self.high - self.low),
+            Inner::Amidst(edges) => {
+                edges.iter().map(|&e| self.on_edge(e)).sum::<DVec3>() / edges.len() as f64
+            }
+        }
+    }
+
+    /// Where the straight line between the ends' values is zero.
+    fn on_edge(&self, e: usize) -> DVec3 {
+        let (axis, low) = edge(e);
+        let (f0, f1) = (self.values[low], self.values[low | 1 << axis]);
+        let share = f0 / (f0 - f1);
+        self.corner(low).lerp(self.corner(low | 1 << axis), if share.is_finite() { share } else { 0.5 })
+    }
+
+    /// A point of ω = 0 near a point of the cell.
+    fn on_surface(&self, field: &dyn Field, middle: DVec3, evaluations: &mut u64) -> DVec3 {
+        *evaluations += 1;
+        let value = field.omega(middle);
+        // along the axes to the faces, and to the corners, of which some lie on the other side
+        let to_face = |i: usize| {
+            let mut end = middle;
+            end[i % 3] = [self.low, self.high][i / 3][i % 3];
+            end
+        };
+        let ends = (0..6).map(to_face).chain((0..8).map(|corner| self.corner(corner)));
+        let across = ends.filter_map(|end| {
+            *evaluations += 1;
+            let other = field.omega(end);
+            let distance = middle.distance(end) * value.abs() / (value.abs() + other.abs());
+            ((other > 0.0) != (value > 0.0)).then_some((distance, end))
+        });
+        let nearest = across.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.map_or(middle, |(_, end)| bisect(field, middle, end, value > 0.0, evaluations))
+    }
+}
+
+/// The point between `from` and `to` at which the sign of ω changes, by halving until no number lies between.
+fn bisect(
+    field: &dyn Field,
+    mut from: DVec3,
+    mut to: DVec3,
+    from_is_inside: bool,
+    evaluations: &mut u64,
+) -> DVec3 {
+    loop {
+        let middle = from.midpoint(to);
+        if middle == from || middle == to {
+            return from;
+        }
+        *evaluations += 1;
+        if (field.omega(middle) > 0.0) == from_is_inside { from = middle } else { to = middle }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cases::needs_values;
+    use super::*;
+
+    #[test]
+    fn many_cells_at_once_are_judged_like_one() {
+        for first in (0..256_usize).step_by(64) {
+            let corners: [u64; 8] =
+                std::array::from_fn(|c| (0..64).fold(0, |bits, i| bits | ((first + i) as u64 >> c & 1) << i));
+            let found = undecided_cells(&corners);
+            for i in 0..64 {
+                assert_eq!(found >> i & 1 == 1, needs_values((first + i) as u8), "case {:08b}", first + i);
+            }
+        }
+    }
+}

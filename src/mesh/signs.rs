@@ -1,0 +1,291 @@
+//! The signs at a brick's nodes, one bit each, and what follows from them: crossed edges, their numbers, cells that
+//! the surface passes through.
+//!
+//! A plane of a brick's nodes is a word: bit x + 8·y tells whether node (x, y) lies inside. Edges belong to the brick
+//! of their low end, cells to that of their low corner; both may reach into the seven bricks above.
+//!
+//! Invariant: a bit is set exactly where ω > 0, whether sampled or proven; the ring's bits are zero.
+
+use super::{
+    MeshError,
+    patches::CellPatch,
+    prune::{BRICK, Bricks, Lattice, NearBrick, Place},
+};
+use crate::field::{Field, Points};
+
+/// Inside bits of a brick's nodes, plane by plane.
+pub(super) type Signs = [u64; BRICK];
+
+/// Bits of the nodes with x = 0, and of those with y = 0.
+const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
+const FIRST_ROW: u64 = 0xff;
+
+/// Points of a brick, and ω there.
+#[derive(Debug, Default)]
+pub(super) struct Samples {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    z: Vec<f64>,
+    omega: Vec<f64>,
+}
+
+impl Samples {
+    /// Samples a brick's own nodes, or takes their proven sign; adds to the number of evaluations.
+    ///
+    /// # Errors
+    /// [`MeshError::NotANumber`] at the first NaN.
+    pub(super) fn take(
+        &mut self,
+        field: &dyn Field,
+        lattice: &Lattice,
+        brick: &NearBrick,
+        evaluations: &mut u64,
+    ) -> Result<Signs, MeshError> {
+        let [columns, rows, planes] = [0, 1, 2].map(|axis| lattice.own_nodes(axis, brick.at[axis]));
+        let coordinate = |axis: usize, i: usize| lattice.coordinate(axis, brick.at[axis] * BRICK + i);
+        let mut signs = [0; BRICK];
+        if brick.solid {
+            let row = (1_u64 << columns.end) - (1 << columns.start);
+            let plane = rows.fold(0, |plane, y| plane | row << (BRICK * y));
+            planes.for_each(|z| signs[z] = plane);
+            return Ok(signs);
+        }
+        self.x.clear();
+        self.y.clear();
+        self.z.clear();
+        for z in planes.clone() {
+            for y in rows.clone() {
+                self.x.extend(columns.clone().map(|x| coordinate(0, x)));
+                self.y.resize(self.x.len(), coordinate(1, y));
+            }
+            self.z.resize(self.x.len(), coordinate(2, z));
+        }
+        let points = Points::new(&self.x, &self.y, &self.z);
+        self.omega.resize(points.len(), 0.0);
+        field.omega_many(points, &mut self.omega);
+        *evaluations += points.len() as u64;
+        // a pass of its own without a way out in the middle becomes vector code
+        if self.omega.iter().fold(false, |any, w| any | w.is_nan()) {
+            let first = self.omega.iter().position(|w| w.is_nan()).unwrap_or(0);
+            return Err(MeshError::NotANumber { at: points.get(first) });
+        }
+        let mut values = self.omega.chunks_exact(columns.len().max(1));
+        for z in planes {
+            for y in rows.clone() {
+                let row = values.next().unwrap_or(&[]);
+                let bits = row.iter().rev().fold(0_u64, |bits, &w| bits << 1 | u64::from(w > 0.0));
+                signs[z] |= bits << (BRICK * y + columns.start);
+            }
+        }
+        Ok(signs)
+    }
+}
+
+/// A near brick with its crossed edges.
+#[derive(Debug, Clone)]
+pub(super) struct Brick {
+    /// Its number among the near bricks.
+    pub number: usize,
+    /// Extended indices of its first node.
+    pub low: [usize; 3],
+    /// Crossed edges by axis and plane.
+    pub edges: [Signs; 3],
+    /// How many crossed edges come before each word of `edges`.
+    before: [[u16; BRICK]; 3],
+    /// The bricks above: at i − 1 the one that is higher on the axes whose bits are set in i.
+    upper: [Place; 7],
+    /// The number of its first vertex: those on edges come first, then the inner ones of `patches`.
+    pub first: u32,
+    /// Cells that signs alone do not decide.
+    pub patches: Vec<CellPatch>,
+}
+
+/// The near bricks that have a crossed cell: those without hold no crossed edge either, whose other cells would be
+/// crossed too.
+#[derive(Debug)]
+pub(super) struct CrossedBricks {
+    pub list: Vec<Brick>,
+    /// For each near brick its place in the list, or [`Self::NONE`].
+    places: Vec<u32>,
+}
+
+impl CrossedBricks {
+    const NONE: u32 = u32::MAX;
+
+    /// Takes crossed bricks out of `near` near ones.
+    pub(super) fn new(list: Vec<Brick>, near: usize) -> Self {
+        let mut places = vec![Self::NONE; near];
+        for (place, brick) in list.iter().enumerate() {
+            places[brick.number] = place as u32;
+        }
+        Self { list, places }
+    }
+
+    /// A near brick by its number.
+    fn get(&self, number: u32) -> Option<&Brick> {
+        self.list.get(self.places[number as usize] as usize)
+    }
+}
+
+/// Vertices on edges of a brick and on those of the bricks above that its cells use, by [`edge_slot`].
+pub(super) type VertexTable = [u32; 3 * SLOTS];
+
+const SLOTS_ALONG: usize = BRICK + 1;
+const SLOTS: usize = SLOTS_ALONG.pow(3);
+
+/// Where the vertex of an edge stands in the table: the edge along `axis` from a node, counted from the brick's first.
+pub(super) const fn edge_slot(axis: usize, [x, y, z]: [usize; 3]) -> usize {
+    axis * SLOTS + (z * SLOTS_ALONG + y) * SLOTS_ALONG + x
+}
+
+impl Brick {
+    /// Finds a brick's neighbours and crossed edges.
+    pub(super) fn new(bricks: &Bricks, signs: &[Signs], number: usize) -> Self {
+        let at = bricks.near[number].at;
+        let upper = [1, 2, 3, 4, 5, 6, 7]
+            .map(|i| bricks.place([0, 1, 2].map(|axis: usize| at[axis] + (i >> axis & 1))));
+        let mut brick = Self {
+            number,
+            low: at.map(|b| b * BRICK),
+            edges: [[0; BRICK]; 3],
+            before: [[0; BRICK]; 3],
+            upper,
+            first: 0,
+            patches: Vec::new(),
+        };
+        let around = brick.around(signs);
+        for z in 0..BRICK {
+            let corners = around.corners(z);
+            brick.edges[0][z] = corners[0] ^ corners[1];
+            brick.edges[1][z] = corners[0] ^ corners[2];
+            brick.edges[2][z] = corners[0] ^ corners[4];
+        }
+        let mut count = 0;
+        for (edges, before) in brick.edges.iter().zip(&mut brick.before) {
+            for (word, before) in edges.iter().zip(before) {
+                *before = count;
+                count += word.count_ones() as u16;
+            }
+        }
+        brick
+    }
+
+    /// Number of crossed edges.
+    fn crossings(&self) -> u32 {
+        u32::from(self.before[2][BRICK - 1]) + self.edges[2][BRICK - 1].count_ones()
+    }
+
+    /// Whether the surface passes through any of its cells.
+    pub(super) fn is_crossed(&self, signs: &[Signs]) -> bool {
+        let around = self.around(signs);
+        (0..BRICK).any(|z| crossed_cells(&around.corners(z)) != 0)
+    }
+
+    /// Number of vertices, on edges and within cells.
+    pub(super) fn vertices(&self) -> usize {
+        self.crossings() as usize + self.patches.iter().map(|patch| patch.inner.len()).sum::<usize>()
+    }
+
+    /// Calls `visit(axis, node)` for each crossed edge in the order of vertices; nodes count from the brick's first.
+    pub(super) fn for_each_edge(&self, mut visit: impl FnMut(usize, [usize; 3])) {
+        for (axis, planes) in self.edges.iter().enumerate() {
+            for (z, &word) in planes.iter().enumerate() {
+                for bit in set_positions(word) {
+                    visit(axis, [bit % BRICK, bit / BRICK, z]);
+                }
+            }
+        }
+    }
+
+    /// Signs of the brick and of the nodes above that its cells use.
+    pub(super) fn around(&self, signs: &[Signs]) -> Around {
+        let above = |i: usize, z: usize| match self.upper[i - 1] {
+            Place::Solid => u64::MAX,
+            Place::Fluid => 0,
+            Place::Near(neighbour) => signs[neighbour as usize][z],
+        };
+        let mut around = Around { planes: [[0; BRICK + 1]; 4] };
+        around.planes[0][..BRICK].copy_from_slice(&signs[self.number]);
+        for (i, planes) in (1..4).zip(&mut around.planes[1..]) {
+            (0..BRICK).for_each(|z| planes[z] = above(i, z));
+        }
+        (0..4).for_each(|i| around.planes[i][BRICK] = above(i + 4, 0));
+        around
+    }
+
+    /// Writes the numbers of all vertices that the brick's cells may use.
+    pub(super) fn number_vertices(&self, bricks: &CrossedBricks, table: &mut VertexTable) {
+        let mut next = self.first;
+        self.for_each_edge(|axis, node| {
+            table[edge_slot(axis, node)] = next;
+            next += 1;
+        });
+        for (i, place) in (1..8_usize).zip(self.upper) {
+            let Place::Near(neighbour) = place else { continue };
+            let Some(neighbour) = bricks.get(neighbour) else { continue };
+            let offset = [0, 1, 2].map(|axis: usize| (i >> axis & 1) * BRICK);
+            let mut touching = u64::MAX;
+            touching &= if i & 1 == 0 { u64::MAX } else { FIRST_COLUMN };
+            touching &= if i & 2 == 0 { u64::MAX } else { FIRST_ROW };
+            let planes = if i & 4 == 0 { BRICK } else { 1 };
+            // an edge along an axis on which the neighbour is higher leads away from the brick
+            for axis in (0..3).filter(|axis| i >> axis & 1 == 0) {
+                for z in 0..planes {
+                    let word = neighbour.edges[axis][z];
+                    for bit in set_positions(word & touching) {
+                        let place =
+                            u32::from(neighbour.before[axis][z]) + (word & ((1 << bit) - 1)).count_ones();
+                        let node = [bit % BRICK + offset[0], bit / BRICK + offset[1], z + offset[2]];
+                        table[edge_slot(axis, node)] = neighbour.first + place;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Signs of a brick's nodes, and of the nodes of the bricks above that its cells use.
+#[derive(Debug)]
+pub(super) struct Around {
+    /// Planes of the brick itself, of the one above on x, on y, and on both; the last plane is that of the four bricks
+    /// above on z.
+    planes: [[u64; BRICK + 1]; 4],
+}
+
+impl Around {
+    /// For each cell of plane `z`, bit x + 8·y, whether its corner c is inside; c as in `cases`.
+    pub(super) fn corners(&self, z: usize) -> [u64; 8] {
+        let [a, b, c, d] = self.corners_below(z);
+        let [e, f, g, h] = self.corners_below(z + 1);
+        [a, b, c, d, e, f, g, h]
+    }
+
+    fn corners_below(&self, z: usize) -> [u64; 4] {
+        let [own, x, y, xy] = [0, 1, 2, 3].map(|i| self.planes[i][z]);
+        let along_x = |own: u64, next: u64| own >> 1 & !(FIRST_COLUMN << 7) | (next & FIRST_COLUMN) << 7;
+        let along_y = |own: u64, next: u64| own >> 8 | next << 56;
+        let shifted = along_x(own, x);
+        [own, shifted, along_y(own, y), along_y(shifted, along_x(y, xy))]
+    }
+}
+
+/// Cells that the surface passes through: their corners have both signs.
+pub(super) fn crossed_cells(corners: &[u64; 8]) -> u64 {
+    let some = corners.iter().fold(0, |bits, c| bits | c);
+    let all = corners.iter().fold(u64::MAX, |bits, c| bits & c);
+    some & !all
+}
+
+/// The corners of one cell: bit c tells whether corner c is inside.
+pub(super) fn inside_corners(corners: &[u64; 8], cell: usize) -> u8 {
+    (0..8).fold(0, |inside, c| inside | ((corners[c] >> cell & 1) as u8) << c)
+}
+
+/// Positions of the set bits, ascending.
+pub(super) fn set_positions(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (word != 0).then(|| word.trailing_zeros() as usize)?;
+        word &= word - 1;
+        Some(bit)
+    })
+}

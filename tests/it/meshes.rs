@@ -1,0 +1,81 @@
+//! Meshes of compiled solids: vertices on the surface, normals, volumes, hidden parts.
+
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::mesh::{Grid, Mesh, Resolution, check, marching_cubes, thin_cells};
+use rfm::{Engine, Program, Solid};
+
+fn solid(text: &str, name: &str) -> Solid {
+    let program = Program::from_source("t.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    program.solid_with(name, Engine::Auto).unwrap()
+}
+
+fn example(name: &str) -> Solid {
+    let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
+    solid(&std::fs::read_to_string(path).unwrap(), name)
+}
+
+fn mesh(solid: &Solid, grid: &Grid) -> Mesh {
+    marching_cubes(&*solid.surface(*grid.bounds()), grid, &|_| {}).unwrap()
+}
+
+fn around(solid: &Solid, cells: usize) -> Grid {
+    Grid::around(&solid.bounds().aabb().unwrap(), Resolution::Cells(cells)).unwrap()
+}
+
+/// The contact program knows nothing of the mesher. At an edge it gives the mean of two normals, the mesher one of them.
+#[test]
+fn vertices_lie_on_the_surface_and_normals_are_those_of_the_contact_program() {
+    for name in ["pawn", "bishop"] {
+        let solid = example(name);
+        let mesh = mesh(&solid, &around(&solid, 64));
+        let mut at_edges = 0;
+        for (p, n) in mesh.positions.iter().zip(&mesh.normals) {
+            let contact = solid.contact(*p);
+            assert!(
+                contact.distance.abs() <= 1e-12 * p.abs().max_element(),
+                "{name} at {p}: {}",
+                contact.distance
+            );
+            at_edges += usize::from((contact.normal - *n).length() > 1e-9);
+        }
+        assert!(at_edges * 20 < mesh.positions.len(), "{name}: {at_edges} of {}", mesh.positions.len());
+    }
+}
+
+/// True volumes by quadrature of the profiles, independent of this program.
+#[test]
+fn volumes_of_pawn_and_bishop_converge_with_the_square_of_the_cell() {
+    for (name, truth) in [("pawn", 0.442701), ("bishop", 0.601689)] {
+        let solid = example(name);
+        let error = |cells| {
+            let grid = around(&solid, cells);
+            (check(&mesh(&solid, &grid), &solid.twin()).volume / truth - 1.0).abs()
+        };
+        let [coarse, fine] = [64, 256].map(error);
+        println!("{name}: {coarse:.2e} at 64 cells, {fine:.2e} at 256");
+        assert!(fine <= 5e-4, "{name}: {fine}");
+        // sixteen times smaller, less what creases do between nodes
+        assert!(coarse > 10.0 * fine, "{name}: {coarse} and {fine}");
+    }
+}
+
+#[test]
+fn walls_and_gaps_thinner_than_a_cell_are_counted_and_thick_ones_are_not() {
+    let thin = |text: &str, cells: usize| {
+        let solid = solid(&format!("rfm 1\nsolid s = {text}"), "s");
+        let domain = Aabb::new(DVec3::splat(-1.53), DVec3::splat(1.57));
+        let grid = Grid::filling(&domain, Resolution::Cells(cells)).unwrap();
+        thin_cells(&*solid.surface(domain), &grid).unwrap().count
+    };
+    assert_eq!(thin("sphere(1)", 40), 0);
+    assert_eq!(thin("sphere(1) and -0.5 <= z <= 0.5", 40), 0);
+    let plate = "sphere(1) and 0 <= z <= 0.001";
+    assert!(thin(plate, 40) > 100, "a plate between two planes of nodes");
+    assert!(thin("sphere(1) and not (x <= 0.001 and x >= 0)", 40) > 100, "a gap");
+    assert!(thin("sphere(1) or not sphere(1)", 40) > 100, "a crack without width");
+    for name in ["pawn", "bishop"] {
+        let solid = example(name);
+        assert_eq!(thin_cells(&solid.twin(), &around(&solid, 96)).unwrap().count, 0, "{name}");
+    }
+}
