@@ -187,6 +187,8 @@ pub(super) struct Mesh {
 pub(super) enum MeshMethod {
     /// Marching cubes with vertices on the exact surface
     Mc,
+    /// Dual contouring: also edges and corners are exact
+    Dc,
 }
 
 #[derive(Debug, Args)]

@@ -10,7 +10,7 @@ use super::args::{Mesh as Options, MeshMethod, Shared};
 use super::{Failure, choose, input, note, output, progress};
 use crate::field::Field;
 use crate::geom::Aabb;
-use crate::mesh::{self, Grid, Mesh, Report, Resolution, marching_cubes};
+use crate::mesh::{self, Grid, Mesh, Report, Resolution, dual_contouring, marching_cubes};
 use crate::solid::Bounds;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,8 +94,11 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         None => Mesh::default(),
         Some(grid) => {
             let bar = progress::bar(1000, "meshing");
-            let MeshMethod::Mc = options.method;
-            let mesh = marching_cubes(&*surface, &grid, &|part| bar.set_position((1000.0 * part) as u64));
+            let progress = |part| bar.set_position((1000.0 * part) as u64);
+            let mesh = match options.method {
+                MeshMethod::Mc => marching_cubes(&*surface, &grid, &progress),
+                MeshMethod::Dc => dual_contouring(&*surface, &grid, &progress),
+            };
             bar.finish_and_clear();
             mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?
         }

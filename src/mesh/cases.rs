@@ -28,7 +28,7 @@ pub(super) enum Ambiguous {
 }
 
 /// The rule in force. A wall about as thin as a cell then stays connected and does not leak.
-const RULE: Ambiguous = Ambiguous::JoinSolid;
+pub(super) const RULE: Ambiguous = Ambiguous::JoinSolid;
 
 /// Triangles of all cases, as edges of the cell, counter-clockwise seen from the fluid.
 pub(super) struct Cases {
@@ -101,7 +101,7 @@ fn face_segments(inside: u8, face: usize, ambiguous: Ambiguous) -> Vec<(usize, u
 }
 
 /// Closed loops of crossed edges, given the decision for each face.
-fn loops(inside: u8, ambiguous: [Ambiguous; 6]) -> Vec<Vec<usize>> {
+pub(super) fn loops(inside: u8, ambiguous: [Ambiguous; 6]) -> Vec<Vec<usize>> {
     let mut next = [None; EDGES];
     for (face, decision) in ambiguous.into_iter().enumerate() {
         for (from, to) in face_segments(inside, face, decision) {

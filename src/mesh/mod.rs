@@ -27,6 +27,7 @@
 mod cases;
 mod check;
 mod collapse;
+mod dual;
 mod extract;
 mod grid;
 mod layer;
@@ -34,6 +35,7 @@ mod normals;
 pub mod obj;
 pub mod ply;
 mod prune;
+mod quality;
 mod roots;
 mod shells;
 pub mod stl;
@@ -47,8 +49,10 @@ use std::fmt;
 use glam::DVec3;
 
 pub use check::{Report, check};
+pub use dual::dual_contouring;
 pub use extract::marching_cubes;
 pub use grid::{Grid, GridError, Resolution};
+pub use quality::{Distances, Quality, measure};
 pub use shells::{Shell, shells};
 
 /// Triangles over shared vertices.
