@@ -2,11 +2,12 @@
 //!
 //! [`Grid`] lays nodes → [`marching_cubes`] samples ω layer by layer, connects crossed edges by the case table,
 //! puts each vertex on the surface by a root search on ω itself, merges vertices that coincide in a node and
-//! adds normals −∇ω/|∇ω| → [`check`] reports topology, volume and distance → `stl`, `ply`, `obj`, `vtp` write.
+//! adds normals −∇ω/|∇ω| → [`check`] reports topology, volume and distance, [`measure`] the distance both ways → the
+//! [`formats`] write. [`dual_contouring`] does what [`marching_cubes`] does, with sharp creases.
 //!
 //! Promises: the mesh is closed, every edge lies in exactly two triangles that run along it in opposite
 //! directions, triangles are counter-clockwise seen from the fluid, and the same field and grid give the same
-//! bits on any number of threads. Not promised: creases between nodes are cut, features thinner than a cell
+//! bits on any number of threads. Not promised: marching cubes cut creases between nodes, features thinner than a cell
 //! may be missed, and where the field touches zero without a change of sign there is no surface.
 //!
 //! ```
@@ -29,17 +30,14 @@ mod check;
 mod collapse;
 mod dual;
 mod extract;
+pub mod formats;
 mod grid;
 mod layer;
 mod normals;
-pub mod obj;
-pub mod ply;
 mod prune;
 mod quality;
 mod roots;
 mod shells;
-pub mod stl;
-pub mod vtp;
 
 #[cfg(test)]
 mod tests;
@@ -51,6 +49,7 @@ use glam::DVec3;
 pub use check::{Report, check};
 pub use dual::dual_contouring;
 pub use extract::marching_cubes;
+pub use formats::{glb, obj, ply, stl, threemf, vtp};
 pub use grid::{Grid, GridError, Resolution};
 pub use quality::{Distances, Quality, measure};
 pub use shells::{Shell, shells};

@@ -14,6 +14,7 @@ use rstar::{AABB, PointDistance, RTree, RTreeObject};
 use super::{
     Grid, Mesh, MeshError, Resolution, dual_contouring,
     normals::{gradients, unit},
+    shells,
 };
 use crate::field::Field;
 
@@ -34,8 +35,12 @@ pub struct Quality {
     pub to_surface: Distances,
     /// From points of the surface to the mesh.
     pub from_surface: Distances,
-    /// Angle between a triangle and the surface below its points, in degrees.
+    /// Angle between a triangle and the surface below its middle, in degrees.
     pub normal_error: Distances,
+    /// Volume and area less those of a mesh in half the cells, as a share: that mesh's own error is about a quarter of
+    /// what dual contouring has in these cells.
+    pub volume_error: f64,
+    pub area_error: f64,
     /// Triangles that face the other way than the surface below their middles.
     pub flipped: usize,
     /// Smallest angle of any triangle, in degrees.
@@ -63,19 +68,34 @@ const BATCH: usize = 256;
 /// Below this radius ratio a triangle faces nowhere.
 const NO_DIRECTION: f64 = 1e-6;
 
-/// Measures a mesh that was made from `field` in `grid`.
+/// Measures a mesh of `field` in `grid`. `distance` has the same surface, and near it ω is the distance from it or
+/// nearly so: Newton's method then finds the nearest face, where parts of unlike scale would mislead it.
 ///
 /// # Errors
 /// Those of meshing the finer grid that gives points of the surface.
-pub fn measure(mesh: &Mesh, field: &dyn Field, grid: &Grid) -> Result<Quality, MeshError> {
+pub fn measure(
+    mesh: &Mesh,
+    field: &dyn Field,
+    distance: &dyn Field,
+    grid: &Grid,
+) -> Result<Quality, MeshError> {
+    let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
+    let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
     let mut quality = shapes(mesh);
     if mesh.triangles.is_empty() {
         return Ok(quality);
     }
-    mesh_to_surface(mesh, field, &mut quality);
-    let points = surface_points(field, grid)?;
-    quality.from_surface = surface_to_mesh(mesh, &points);
+    let (own, reference) = (extent(mesh), extent(&finer));
+    quality.volume_error = own.0 / reference.0 - 1.0;
+    quality.area_error = own.1 / reference.1 - 1.0;
+    mesh_to_surface(mesh, distance, &mut quality);
+    quality.from_surface = surface_to_mesh(mesh, &surface_points(&finer, distance, grid));
     Ok(quality)
+}
+
+/// Volume and area.
+fn extent(mesh: &Mesh) -> (f64, f64) {
+    shells(mesh).iter().fold((0.0, 0.0), |sum, shell| (sum.0 + shell.volume, sum.1 + shell.area))
 }
 
 fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 3] {
@@ -213,11 +233,8 @@ fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
     feet
 }
 
-/// Points all over the surface, about half a cell apart, on its creases and corners too.
-fn surface_points(field: &dyn Field, grid: &Grid) -> Result<Vec<DVec3>, MeshError> {
-    let side = 0.5 * grid.spacing().min_element();
-    let finer = Grid::filling(grid.bounds(), Resolution::Spacing(side));
-    let mesh = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
+/// Points all over the surface, about half a cell apart, on its creases and corners too, from a mesh of it.
+fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid) -> Vec<DVec3> {
     let mut points = Vec::with_capacity(2 * mesh.positions.len());
     let caps: std::collections::HashSet<u32> = mesh.caps.iter().copied().collect();
     points.extend((0_u32..).zip(&mesh.positions).filter(|(v, _)| !caps.contains(v)).map(|(_, p)| *p));
@@ -225,13 +242,13 @@ fn surface_points(field: &dyn Field, grid: &Grid) -> Result<Vec<DVec3>, MeshErro
         .triangles
         .iter()
         .filter(|t| !t.iter().any(|v| caps.contains(v)))
-        .map(|&t| corners(&mesh, t).iter().sum::<DVec3>() / 3.0)
+        .map(|&t| corners(mesh, t).iter().sum::<DVec3>() / 3.0)
         .collect();
-    let parts: Vec<Vec<Foot>> = middles.par_chunks(BATCH).map(|part| feet(field, part)).collect();
+    let parts: Vec<Vec<Foot>> = middles.par_chunks(BATCH).map(|part| feet(distance, part)).collect();
     points.extend(parts.iter().flatten().map(|foot| foot.position));
     // a point that Newton's method lost says nothing
     points.retain(|p| p.is_finite() && grid.bounds().contains(*p));
-    Ok(points)
+    points
 }
 
 /// A triangle in the index.
@@ -331,12 +348,14 @@ mod tests {
         let bounds = Aabb::new(DVec3::NEG_ONE, DVec3::ONE);
         let grid = Grid::around(&bounds, Resolution::Cells(40)).unwrap();
         let mesh = marching_cubes(&ball(0.9), &grid, &|_| ()).unwrap();
-        let quality = measure(&mesh, &ball(1.0), &grid).unwrap();
+        let quality = measure(&mesh, &ball(1.0), &ball(1.0), &grid).unwrap();
         let chord = 3.0 * grid.spacing().x.powi(2) / 8.0 / 0.9;
         for found in [quality.to_surface, quality.from_surface] {
             assert!(found.max >= 0.1 && found.max <= 0.1 + chord, "{found:?}");
             assert!(found.rms >= 0.1 && found.rms < found.max && found.samples > 1000, "{found:?}");
         }
+        assert!((quality.volume_error - (0.9_f64.powi(3) - 1.0)).abs() < 0.01, "{quality:?}");
+        assert!((quality.area_error - (0.9_f64.powi(2) - 1.0)).abs() < 0.01, "{quality:?}");
         assert_eq!(quality.flipped, 0);
         assert!(quality.normal_error.max < 90.0 && quality.slivers < 0.2, "{quality:?}");
     }
@@ -355,7 +374,7 @@ mod tests {
         let bounds = Aabb::new(DVec3::splat(-0.4), DVec3::new(1.4, 0.4, 0.4));
         let grid = Grid::filling(&bounds, Resolution::Cells(45)).unwrap();
         let mesh = marching_cubes(&one, &grid, &|_| ()).unwrap();
-        let quality = measure(&mesh, &two, &grid).unwrap();
+        let quality = measure(&mesh, &two, &two, &grid).unwrap();
         assert!(quality.to_surface.max < 0.01, "{quality:?}");
         assert!((quality.from_surface.max - 1.0).abs() < 0.02, "{quality:?}");
         assert!(quality.hausdorff() == quality.from_surface.max);
@@ -368,6 +387,6 @@ mod tests {
         let mut mesh = marching_cubes(&ball, &grid, &|_| ()).unwrap();
         mesh.triangles[7].swap(0, 1);
         mesh.triangles[100].swap(1, 2);
-        assert_eq!(measure(&mesh, &ball, &grid).unwrap().flipped, 2);
+        assert_eq!(measure(&mesh, &ball, &ball, &grid).unwrap().flipped, 2);
     }
 }
