@@ -51,7 +51,9 @@ impl Format {
         match (format, options.ascii) {
             (Some(Self::Stl), true) => Ok(Some(Self::StlText)),
             (format, false) => Ok(format),
-            _ => Err(Failure::usage("--ascii is for .stl files: the other formats are text or binary by themselves")),
+            _ => Err(Failure::usage(
+                "--ascii is for .stl files: the other formats are text or binary by themselves",
+            )),
         }
     }
 
@@ -215,8 +217,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         None => Mesh::default(),
         Some(grid) => {
             let bar = progress::bar(1000, "meshing");
-            let mesh =
-                options.method.mesh(&*surface, grid, &|part| bar.set_position((1000.0 * part) as u64));
+            let mesh = options.method.mesh(&*surface, grid, &|part| bar.set_position((1000.0 * part) as u64));
             bar.finish_and_clear();
             mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?
         }

@@ -103,8 +103,11 @@ fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 3] {
 }
 
 fn shapes(mesh: &Mesh) -> Quality {
-    let shapes: Vec<(f64, f64)> =
-        mesh.triangles.par_iter().map(|&t| (radius_ratio(corners(mesh, t)), min_angle(corners(mesh, t)))).collect();
+    let shapes: Vec<(f64, f64)> = mesh
+        .triangles
+        .par_iter()
+        .map(|&t| (radius_ratio(corners(mesh, t)), min_angle(corners(mesh, t))))
+        .collect();
     let count = shapes.len().max(1) as f64;
     Quality {
         min_angle: shapes.iter().fold(60.0, |min, shape| min.min(shape.1)),
@@ -153,7 +156,11 @@ impl Sums {
             squares: all.squares + part.squares,
             samples: all.samples + part.samples,
         });
-        Distances { max: all.max, rms: (all.squares / all.samples.max(1) as f64).sqrt(), samples: all.samples }
+        Distances {
+            max: all.max,
+            rms: (all.squares / all.samples.max(1) as f64).sqrt(),
+            samples: all.samples,
+        }
     }
 }
 
@@ -224,7 +231,8 @@ fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
             let foot = &mut feet[i];
             foot.position -= step;
             foot.normal = unit(-gradient);
-            step.length() > 1e-9 * foot.position.distance(points[i]) + f64::EPSILON * points[i].abs().max_element()
+            step.length()
+                > 1e-9 * foot.position.distance(points[i]) + f64::EPSILON * points[i].abs().max_element()
         });
         if moving.is_empty() {
             break;
@@ -370,7 +378,8 @@ mod tests {
                 -nearer.normalize_or(DVec3::X)
             },
         };
-        let one = Closures { omega: |p: DVec3| 0.3 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
+        let one =
+            Closures { omega: |p: DVec3| 0.3 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
         let bounds = Aabb::new(DVec3::splat(-0.4), DVec3::new(1.4, 0.4, 0.4));
         let grid = Grid::filling(&bounds, Resolution::Cells(45)).unwrap();
         let mesh = marching_cubes(&one, &grid, &|_| ()).unwrap();
@@ -382,7 +391,8 @@ mod tests {
 
     #[test]
     fn triangles_that_face_inwards_are_counted() {
-        let ball = Closures { omega: |p: DVec3| 0.8 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
+        let ball =
+            Closures { omega: |p: DVec3| 0.8 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
         let grid = Grid::around(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE), Resolution::Cells(16)).unwrap();
         let mut mesh = marching_cubes(&ball, &grid, &|_| ()).unwrap();
         mesh.triangles[7].swap(0, 1);

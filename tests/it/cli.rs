@@ -286,7 +286,19 @@ fn quality_and_sharp_creases() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pawn.stl").to_str().unwrap().to_string();
     let measured = |method: &str| {
-        let arguments = ["mesh", PAWN, "--cells", "48", "--method", method, "--quality", "--ascii", "--json", "-o", &path];
+        let arguments = [
+            "mesh",
+            PAWN,
+            "--cells",
+            "48",
+            "--method",
+            method,
+            "--quality",
+            "--ascii",
+            "--json",
+            "-o",
+            &path,
+        ];
         let outcome = rfm(root(), &arguments).expect(0);
         let document = outcome.json();
         contract(&outcome.stdout, &document, &MESH_KEYS);

@@ -98,10 +98,23 @@ pub(super) fn print(rows: &[Row]) {
     if rows.is_empty() {
         return println!("no meshes: the solid has no bounds");
     }
-    println!("meshes; lengths in metres; the order is log2 of the error's ratio to that in half as many cells");
+    println!(
+        "meshes; lengths in metres; the order is log2 of the error's ratio to that in half as many cells"
+    );
     println!(
         "{:<7} {:>5} {:>9} {:>9} {:>10} {:>6} {:>9} {:>6} {:>9} {:>8} {:>8} {:>7}",
-        "method", "cells", "triangles", "ms", "Hausdorff", "order", "rms", "order", "volume", "normals", "slivers", "flipped"
+        "method",
+        "cells",
+        "triangles",
+        "ms",
+        "Hausdorff",
+        "order",
+        "rms",
+        "order",
+        "volume",
+        "normals",
+        "slivers",
+        "flipped"
     );
     for row in rows {
         let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));

@@ -176,7 +176,13 @@ impl Default for Samples {
 }
 
 impl Samples {
-    fn take(&mut self, field: &dyn Field, frame: &Frame, low: UVec3, size: [usize; 3]) -> Result<(), MeshError> {
+    fn take(
+        &mut self,
+        field: &dyn Field,
+        frame: &Frame,
+        low: UVec3,
+        size: [usize; 3],
+    ) -> Result<(), MeshError> {
         let count = size.iter().product();
         let mut at = 0;
         let [x, y, z] = [0, 1, 2].map(|axis| &frame.coordinates[axis][low[axis] as usize..][..size[axis]]);

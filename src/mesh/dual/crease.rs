@@ -25,7 +25,7 @@ pub(super) struct Face {
 /// The distances δ of the probes from the crease, in sizes. Each is much larger than the error that the one before
 /// leaves (κ·size is below 1 where a grid resolves the surface at all), so that probes fall on their own faces; the last
 /// leaves less than rounding.
-const DISTANCES: [f64; 4] = [0.2, 0.02, 1e-3, 1e-5];
+const DISTANCES: [f64; 4] = [0.2, 0.02, 1e-3, 1e-6];
 
 /// Faces whose normals differ by less than this make no crease (cosine of 2.5°).
 const SMOOTH: f64 = 0.999;

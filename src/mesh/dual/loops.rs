@@ -17,8 +17,9 @@ pub(super) struct Loop {
 }
 
 /// The loops of all cases.
-pub(super) static LOOPS: LazyLock<Vec<Vec<Loop>>> =
-    LazyLock::new(|| (0..=255).map(|inside| loops(inside, [RULE; 6]).into_iter().map(Loop::of).collect()).collect());
+pub(super) static LOOPS: LazyLock<Vec<Vec<Loop>>> = LazyLock::new(|| {
+    (0..=255).map(|inside| loops(inside, [RULE; 6]).into_iter().map(Loop::of).collect()).collect()
+});
 
 impl Loop {
     fn of(edges: Vec<usize>) -> Self {

@@ -133,7 +133,9 @@ fn merge(vertices: &mut Vec<Vertex>, triangles: &mut Vec<[u32; 3]>, size: f64) -
     }
     let at_nodes = (0..)
         .zip(groups)
-        .flat_map(|(place, group)| group.into_iter().map(move |vertex| AtNode { node: [place, 0, 0], vertex }))
+        .flat_map(|(place, group)| {
+            group.into_iter().map(move |vertex| AtNode { node: [place, 0, 0], vertex })
+        })
         .collect();
     let positions = vertices.iter().map(|v| v.position).collect();
     let mut mesh = Mesh { positions, triangles: std::mem::take(triangles), ..Mesh::default() };

@@ -205,7 +205,12 @@ impl Placed {
         let free = DVec3::select(cell.size().cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO);
         let size = cell.size().max_element();
         let settled = self.settle(field, mean, free, size).filter(|(p, _)| clamped(*p) == *p);
-        Vertex { position: settled.map_or(mean, |(p, _)| p), normal: DVec3::ZERO, kind: Kind::Sharp, fallback: mean }
+        Vertex {
+            position: settled.map_or(mean, |(p, _)| p),
+            normal: DVec3::ZERO,
+            kind: Kind::Sharp,
+            fallback: mean,
+        }
     }
 
     /// The surface near a point by Newton's method along the free axes, with its normal.

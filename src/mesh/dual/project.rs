@@ -51,6 +51,9 @@ pub(super) fn along(
     size: f64,
     count: &mut u64,
 ) -> Option<Face> {
+    if !(size > 0.0 && size.is_finite()) {
+        return None; // steps of no length would never end
+    }
     let mut omega = |t: f64| {
         *count += 1;
         field.omega(start + t * normal)
@@ -145,13 +148,17 @@ mod tests {
 
     #[test]
     fn a_line_finds_curved_flat_and_jumping_surfaces_from_both_sides() {
-        for omega in [|z: f64| 1.0 - z * z, |z: f64| (1.0 - z).powi(3), |z: f64| if z < 1.0 { 1e6 } else { -1e-6 }] {
+        for omega in
+            [|z: f64| 1.0 - z * z, |z: f64| (1.0 - z).powi(3), |z: f64| if z < 1.0 { 1e6 } else { -1e-6 }]
+        {
             let field = Closures { omega: move |p: DVec3| omega(p.z), gradient: |_| -DVec3::Z };
             for from in [0.7, 1.25] {
                 let found = along(&field, from * DVec3::Z, DVec3::Z, 0.5, &mut 0).unwrap();
                 assert!((found.point.z - 1.0).abs() < 1e-5, "{found:?}");
             }
             assert_eq!(along(&field, 0.3 * DVec3::Z, DVec3::Z, 0.5, &mut 0), None);
+            assert_eq!(along(&field, 0.7 * DVec3::Z, DVec3::Z, 0.0, &mut 0), None);
+            assert_eq!(along(&field, 0.7 * DVec3::Z, DVec3::NAN, 0.5, &mut 0), None);
         }
     }
 }

@@ -104,7 +104,7 @@ mod tests {
         let tip = DVec3::new(0.1, -0.2, 0.3);
         let planes = (0..7).map(|i| {
             let (sin, cos) = f64::from(i).sin_cos();
-            (tip - DVec3::new(cos, sin, 1.0), DVec3::new(cos, sin, 1.0).normalize())
+            (tip + DVec3::new(cos, sin, -1.0), DVec3::new(cos, sin, 1.0).normalize())
         });
         let (found, rank) = minimiser(planes, DVec3::ZERO);
         assert!(found.distance(tip) < 1e-14 && rank == 3, "{found}");

@@ -75,8 +75,10 @@ impl Quads {
     /// Cuts all quads.
     pub fn cut(&self, field: &dyn Field, bricks: &[Brick], vertices: &mut Vec<Vertex>) -> Cut {
         let known: &[Vertex] = vertices;
-        let parts: Vec<Part> =
-            (0..bricks.len()).into_par_iter().map(|slot| self.cut_brick(field, bricks, known, slot)).collect();
+        let parts: Vec<Part> = (0..bricks.len())
+            .into_par_iter()
+            .map(|slot| self.cut_brick(field, bricks, known, slot))
+            .collect();
         let mut cut = Cut::default();
         for part in parts {
             cut.triangles.extend(part.cut.triangles);
@@ -84,7 +86,12 @@ impl Quads {
             cut.gradients += part.cut.gradients;
             for (rim, hit) in part.fans {
                 let centre = vertices.len() as u32;
-                let vertex = Vertex { position: hit.position, normal: hit.normal, kind: Kind::Sharp, fallback: hit.position };
+                let vertex = Vertex {
+                    position: hit.position,
+                    normal: hit.normal,
+                    kind: Kind::Sharp,
+                    fallback: hit.position,
+                };
                 vertices.push(vertex);
                 let next = rim.iter().cycle().skip(1);
                 cut.triangles.extend(rim.iter().zip(next).map(|(&a, &b)| [centre, a, b]));

@@ -78,9 +78,11 @@ fn cuts(
             let mut count = middles.len() as u64;
             let found = gradients(field, &middles).into_iter();
             let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
-            let cut = edges.iter().zip(found).filter(|(_, found)| off(*found)).filter_map(|(edge, _)| {
-                Some((*edge, middle(field, ends(edge), tolerance, &mut count)?))
-            });
+            let cut = edges
+                .iter()
+                .zip(found)
+                .filter(|(_, found)| off(*found))
+                .filter_map(|(edge, _)| Some((*edge, middle(field, ends(edge), tolerance, &mut count)?)));
             (cut.collect(), count)
         })
         .collect();
@@ -93,6 +95,8 @@ fn may_bulge(vertices: &[Vertex], edge: [u32; 2], tolerance: f64) -> bool {
     let [a, b] = edge.map(|v| &vertices[v as usize]);
     let chord = b.position - a.position;
     match (a.kind, b.kind) {
+        // sheets that touch
+        _ if chord == DVec3::ZERO => false,
         // a cap is no part of ω = 0
         (Kind::Cap, _) | (_, Kind::Cap) => false,
         (Kind::Smooth, Kind::Smooth) => (b.normal - a.normal).dot(chord).abs() > 4.0 * tolerance,
@@ -109,8 +113,12 @@ fn middle(field: &dyn Field, [a, b]: [&Vertex; 2], tolerance: f64, count: &mut u
         Some(normal) => project::onto_face(field, p, normal, length, count),
         None => project::newton(field, p, length, count),
     };
-    let faces = [face(a.position.lerp(b.position, BESIDE), a.normal), face(b.position.lerp(a.position, BESIDE), b.normal)];
-    let near = faces.into_iter().flatten().any(|f| project::is_within(field, start, f.normal, tolerance, count));
+    let faces = [
+        face(a.position.lerp(b.position, BESIDE), a.normal),
+        face(b.position.lerp(a.position, BESIDE), b.normal),
+    ];
+    let near =
+        faces.into_iter().flatten().any(|f| project::is_within(field, start, f.normal, tolerance, count));
     if near {
         return None;
     }
@@ -155,7 +163,9 @@ fn divided(vertices: &[Vertex], triangles: &[[u32; 3]], middles: &[([u32; 2], u3
         };
         let [a, b, c] = turns[turn];
         match [cuts[turn], cuts[(turn + 1) % 3], cuts[(turn + 2) % 3]] {
-            [Some(ab), Some(bc), Some(ca)] => out.extend([[a, ab, ca], [ab, b, bc], [bc, c, ca], [ab, bc, ca]]),
+            [Some(ab), Some(bc), Some(ca)] => {
+                out.extend([[a, ab, ca], [ab, b, bc], [bc, c, ca], [ab, bc, ca]])
+            }
             [Some(ab), Some(bc), None] if distance(ab, c) <= distance(a, bc) => {
                 out.extend([[ab, b, bc], [ab, bc, c], [a, ab, c]]);
             }
@@ -173,7 +183,8 @@ mod tests {
 
     #[test]
     fn every_choice_of_cut_sides_tiles_the_triangle() {
-        let places = [DVec3::ZERO, DVec3::X, DVec3::Y, 0.5 * DVec3::X, DVec3::new(0.5, 0.5, 0.0), 0.5 * DVec3::Y];
+        let places =
+            [DVec3::ZERO, DVec3::X, DVec3::Y, 0.5 * DVec3::X, DVec3::new(0.5, 0.5, 0.0), 0.5 * DVec3::Y];
         let vertices = places.map(|position| Vertex {
             position,
             normal: DVec3::Z,

@@ -39,9 +39,10 @@ fn agreement(field: &dyn Field, vertices: &[Vertex], triangle: [u32; 3], count: 
 fn folded(field: &dyn Field, vertices: &[Vertex], triangles: &[[u32; 3]], count: &mut u64) -> Vec<usize> {
     let is_sharp = |v: &u32| vertices[*v as usize].kind == Kind::Sharp;
     let is_cap = |v: &u32| vertices[*v as usize].kind == Kind::Cap;
-    let suspects = triangles.iter().enumerate().filter(|(_, t)| {
-        t.iter().filter(|v| is_sharp(v)).count() >= 2 && !t.iter().any(is_cap)
-    });
+    let suspects = triangles
+        .iter()
+        .enumerate()
+        .filter(|(_, t)| t.iter().filter(|v| is_sharp(v)).count() >= 2 && !t.iter().any(is_cap));
     suspects.filter(|(_, t)| agreement(field, vertices, **t, count) < 0.0).map(|(i, _)| i).collect()
 }
 
@@ -53,7 +54,8 @@ fn turn(
     folded: &[usize],
     count: &mut u64,
 ) -> bool {
-    let mut fans: BTreeMap<u32, Vec<usize>> = folded.iter().flat_map(|&t| triangles[t]).map(|v| (v, Vec::new())).collect();
+    let mut fans: BTreeMap<u32, Vec<usize>> =
+        folded.iter().flat_map(|&t| triangles[t]).map(|v| (v, Vec::new())).collect();
     for (i, triangle) in triangles.iter().enumerate() {
         for v in triangle {
             if let Some(fan) = fans.get_mut(v) {

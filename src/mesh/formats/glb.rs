@@ -2,7 +2,7 @@
 //!
 //! glTF has y up; the one node of the file is turned so that our z is up there.
 //!
-//! Invariant: a mesh without triangles becomes an empty scene, since glTF knows no empty mesh.
+//! Invariant: a mesh without triangles becomes a file without a scene, since glTF knows no empty mesh.
 
 use std::io::{self, Write};
 
@@ -55,11 +55,12 @@ fn chunk(out: &mut impl Write, kind: &[u8; 4], data: &[u8], length: u32) -> io::
 fn document(mesh: &Mesh) -> Value {
     let asset = json!({ "version": "2.0", "generator": "rfm" });
     if mesh.triangles.is_empty() {
-        return json!({ "asset": asset, "scene": 0, "scenes": [{}] });
+        return json!({ "asset": asset });
     }
     let (vertices, indices) = (mesh.positions.len(), 3 * mesh.triangles.len());
     let rounded = || mesh.positions.iter().map(|p| p.as_vec3());
-    let (min, max) = (rounded().fold(Vec3::INFINITY, Vec3::min), rounded().fold(Vec3::NEG_INFINITY, Vec3::max));
+    let (min, max) =
+        (rounded().fold(Vec3::INFINITY, Vec3::min), rounded().fold(Vec3::NEG_INFINITY, Vec3::max));
     let half_turn = std::f32::consts::FRAC_1_SQRT_2;
     json!({
         "asset": asset,
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_an_empty_scene() {
+    fn nothing_is_a_file_without_a_scene() {
         let mut bytes = Vec::new();
         write(&Mesh::default(), &mut bytes).unwrap();
         assert_eq!(gltf::Gltf::from_slice(&bytes).unwrap().meshes().count(), 0);

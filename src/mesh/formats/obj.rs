@@ -42,10 +42,13 @@ mod tests {
         });
         let (models, _) = load.unwrap();
         let [model] = &models[..] else { panic!("{} models", models.len()) };
-        let as_vectors = |flat: &[f64]| flat.chunks(3).map(DVec3::from_slice).collect::<Vec<_>>();
-        assert_eq!(as_vectors(&model.mesh.positions), mesh.positions);
-        assert_eq!(as_vectors(&model.mesh.normals), mesh.normals);
-        assert_eq!(model.mesh.indices, mesh.triangles.concat());
-        assert_eq!(model.mesh.normal_indices, mesh.triangles.concat());
+        // the reader numbers vertices anew in the order of faces
+        let corner = |flat: &[f64], index: u32| DVec3::from_slice(&flat[3 * index as usize..]);
+        assert_eq!(model.mesh.indices.len(), 3 * mesh.triangles.len());
+        for (i, v) in mesh.triangles.iter().flatten().enumerate() {
+            let (place, normal) = (model.mesh.indices[i], model.mesh.normal_indices[i]);
+            assert_eq!(corner(&model.mesh.positions, place), mesh.positions[*v as usize]);
+            assert_eq!(corner(&model.mesh.normals, normal), mesh.normals[*v as usize]);
+        }
     }
 }

@@ -51,7 +51,10 @@ mod tests {
         let document = roxmltree::Document::parse(&text).unwrap();
         let piece = document.descendants().find(|n| n.has_tag_name("Piece")).unwrap();
         let count = |name: &str| piece.attribute(name).unwrap().parse::<usize>().unwrap();
-        assert_eq!((count("NumberOfPoints"), count("NumberOfPolys")), (mesh.positions.len(), mesh.triangles.len()));
+        assert_eq!(
+            (count("NumberOfPoints"), count("NumberOfPolys")),
+            (mesh.positions.len(), mesh.triangles.len())
+        );
         let array = |name: &str| -> Vec<f64> {
             let found = piece.descendants().find(|n| n.attribute("Name") == Some(name)).unwrap();
             found.text().unwrap().split_whitespace().map(|n| n.parse().unwrap()).collect()
