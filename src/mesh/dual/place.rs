@@ -5,7 +5,8 @@
 //! it lies on the surface already (plane faces, tips of cones), the crease of the two or three faces that the hits
 //! show, the minimiser moved onto the surface, the mean of the hits.
 //!
-//! Invariant: a vertex lies within [`REACH`] of its cell, on the border if its cell is in the ring.
+//! Invariant: a vertex lies within [`SLIDE`] of its cell or of the mean of its hits, on the border if its cell is in the
+//! ring.
 
 use glam::{DVec3, UVec3};
 
@@ -184,10 +185,9 @@ impl Placed {
         }
         let inside = least.clamp(cell.min, cell.max);
         for start in [inside, mean] {
-            if let Some((position, normal)) = self.settle(field, start, DVec3::ONE, size) {
-                if lies_within(position, SLIDE) {
-                    return Vertex { position, normal, kind: Kind::Sharp, fallback: mean };
-                }
+            let settled = self.settle(field, start, DVec3::ONE, size);
+            if let Some((position, normal)) = settled.filter(|(p, _)| lies_within(*p, SLIDE)) {
+                return Vertex { position, normal, kind: Kind::Sharp, fallback: mean };
             }
         }
         sharp(mean)

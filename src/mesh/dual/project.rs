@@ -33,7 +33,7 @@ pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64
         let (omega, gradient) = field.omega_grad(at);
         let step = gradient * (omega / gradient.length_squared());
         at -= step;
-        if !(at.distance(start) <= size) {
+        if at.is_nan() || at.distance(start) > size {
             return None;
         }
         if step.length() <= LAST_STEP * size {
@@ -91,12 +91,12 @@ pub(super) fn along(
             near.1 *= 0.5;
         }
     }
-    // the steeper value was halved: compare distances by fresh ones
+    // the values may have been halved
     let ends = [near.0, far.0].map(|t| (omega(t).abs(), t));
     let t = if ends[0].0 <= ends[1].0 { ends[0].1 } else { ends[1].1 };
     *count += 1;
-    let normal = unit(-field.omega_grad(start + t * normal).1).map(|found| (found, start + t * normal))?;
-    Some(Face { point: normal.1, normal: normal.0 })
+    let point = start + t * normal;
+    Some(Face { point, normal: unit(-field.omega_grad(point).1)? })
 }
 
 /// The surface near `start` where it faces about as `normal` does.

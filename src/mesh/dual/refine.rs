@@ -15,8 +15,8 @@ use super::place::{Kind, Vertex};
 use super::project;
 use crate::field::Field;
 
-/// The distance of an edge's middle from the surface above which it is cut, in cells. The pawn at 256³ cells: 0.025
-/// cuts 3 % of the edges and leaves a Hausdorff distance of 0.03 cells.
+/// The distance of an edge's middle from the surface above which it is cut, in cells. It bounds what is left: the pawn
+/// in [0, 3]³ at 256³ cells has a Hausdorff distance of 0.024 cells, where chords across its collar alone make 0.08.
 const TOLERANCE: f64 = 0.025;
 
 /// Each round quarters what is left.
@@ -57,19 +57,22 @@ pub(super) fn refine(
     evaluations
 }
 
-/// The edges to cut, ascending by their ends, each with its middle.
+/// An edge's ends, ascending, and the vertex that cuts it.
+type EdgeCut = ([u32; 2], Vertex);
+
+/// The edges to cut, ascending by their ends.
 fn cuts(
     field: &dyn Field,
     vertices: &[Vertex],
     triangles: &[[u32; 3]],
     tolerance: f64,
-) -> (Vec<([u32; 2], Vertex)>, u64) {
+) -> (Vec<EdgeCut>, u64) {
     // each edge of a closed mesh is run along once in ascending order
     let sides = triangles.par_iter().flat_map_iter(|t| (0..3).map(|i| [t[i], t[(i + 1) % 3]]));
     let mut edges: Vec<[u32; 2]> =
         sides.filter(|&[a, b]| a < b && may_bulge(vertices, [a, b], tolerance)).collect();
     edges.par_sort_unstable();
-    let parts: Vec<(Vec<([u32; 2], Vertex)>, u64)> = edges
+    let parts: Vec<(Vec<EdgeCut>, u64)> = edges
         .par_chunks(BATCH)
         .map(|edges| {
             let ends = |edge: &[u32; 2]| edge.map(|v| &vertices[v as usize]);

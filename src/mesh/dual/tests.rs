@@ -205,7 +205,7 @@ fn threads_change_no_bit() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
 
     /// Noise: every case, every neighbourhood of cases, faces passed twice, every way to meet the border.
     #[test]
