@@ -78,7 +78,7 @@ pub(super) enum Command {
     Mesh(Mesh),
     /// Simulate the fluid of a scene around its obstacles
     Run(Run),
-    /// Measure speed against error for every program of a solid
+    /// Measure speed against error for every program of a solid, and for its meshes
     Report(Report),
     /// Explain a message, or show what a stage of the compiler makes of a file
     Explain(Explain),
@@ -166,7 +166,7 @@ pub(super) struct Mesh {
     /// The solid [default: the only one, or the first obstacle of the scene]
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
-    /// Where the mesh goes; the ending chooses the format: .stl .ply .obj .vtp
+    /// Where the mesh goes; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Cells along the longest side
@@ -184,12 +184,20 @@ pub(super) struct Mesh {
     /// Contract thin triangles; all vertices stay on the surface
     #[arg(long)]
     pub no_slivers: bool,
+    /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
+    #[arg(long)]
+    pub quality: bool,
+    /// Write .stl as text
+    #[arg(long)]
+    pub ascii: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum MeshMethod {
     /// Marching cubes with vertices on the exact surface
     Mc,
+    /// Dual contouring: also edges and corners are exact
+    Dc,
 }
 
 #[derive(Debug, Args)]
@@ -232,6 +240,12 @@ pub(super) struct Report {
     /// Plot speed against error: .svg or .png
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Plot the error of meshes against their cells: .svg or .png
+    #[arg(long, value_name = "FILE")]
+    pub mesh_plot: Option<PathBuf>,
+    /// Cells along the longest side of the finest mesh; the others have half as many each
+    #[arg(long, value_name = "N", default_value_t = 128)]
+    pub mesh_cells: usize,
 }
 
 #[derive(Debug, Args)]

@@ -4,13 +4,17 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::time::Instant;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::args::{Mesh as Options, MeshMethod, Shared};
 use super::{Failure, choose, input, note, output, progress};
-use crate::field::Field;
+use crate::Solid;
+use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
-use crate::mesh::{self, Grid, Mesh, Report, Resolution, ThinCells, marching_cubes};
+use crate::mesh::{
+    self, Grid, Mesh, MeshError, Quality, Report, Resolution, ThinCells, dual_contouring, marching_cubes,
+};
 use crate::solid::Bounds;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +23,9 @@ pub(super) enum Format {
     Ply,
     Obj,
     Vtp,
+    Glb,
+    ThreeMf,
+    StlText,
 }
 
 impl Format {
@@ -29,10 +36,24 @@ impl Format {
             "ply" => Ok(Self::Ply),
             "obj" => Ok(Self::Obj),
             "vtp" => Ok(Self::Vtp),
+            "glb" => Ok(Self::Glb),
+            "3mf" => Ok(Self::ThreeMf),
             _ => Err(Failure::usage(format!(
-                "cannot tell the mesh format of `{}`: the ending must be .stl, .ply, .obj or .vtp",
+                "cannot tell the mesh format of `{}`: the ending must be .stl, .ply, .obj, .vtp, .glb or .3mf",
                 path.display()
             ))),
+        }
+    }
+
+    /// The format that the options ask for.
+    fn chosen(options: &Options) -> Result<Option<Self>, Failure> {
+        let format = options.output.as_deref().map(Self::of).transpose()?;
+        match (format, options.ascii) {
+            (Some(Self::Stl), true) => Ok(Some(Self::StlText)),
+            (format, false) => Ok(format),
+            _ => Err(Failure::usage(
+                "--ascii is for .stl files: the other formats are text or binary by themselves",
+            )),
         }
     }
 
@@ -42,6 +63,9 @@ impl Format {
             Self::Ply => mesh::ply::write(mesh, &mut out),
             Self::Obj => mesh::obj::write(mesh, &mut out),
             Self::Vtp => mesh::vtp::write(mesh, &mut out),
+            Self::Glb => mesh::glb::write(mesh, &mut out),
+            Self::ThreeMf => mesh::threemf::write(mesh, &mut out),
+            Self::StlText => mesh::stl::write_ascii(mesh, &mut out),
         }
     }
 }
@@ -63,13 +87,112 @@ struct Summary {
     thin_cells: usize,
     evaluations: u64,
     milliseconds: f64,
+    method: &'static str,
+    /// With `--quality` only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quality: Option<Figures>,
+}
+
+/// How far a mesh is from the surface, lengths in metres, angles in degrees.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Figures {
+    pub hausdorff: f64,
+    pub mesh_to_surface_max: f64,
+    pub mesh_to_surface_rms: f64,
+    pub surface_to_mesh_max: f64,
+    pub surface_to_mesh_rms: f64,
+    pub samples: usize,
+    pub normal_error_max: f64,
+    pub normal_error_rms: f64,
+    pub volume_error: f64,
+    pub area_error: f64,
+    pub flipped: usize,
+    pub min_angle: f64,
+    pub min_radius_ratio: f64,
+    pub mean_radius_ratio: f64,
+    pub slivers: f64,
+}
+
+impl From<Quality> for Figures {
+    fn from(quality: Quality) -> Self {
+        Self {
+            hausdorff: quality.hausdorff(),
+            mesh_to_surface_max: quality.to_surface.max,
+            mesh_to_surface_rms: quality.to_surface.rms,
+            surface_to_mesh_max: quality.from_surface.max,
+            surface_to_mesh_rms: quality.from_surface.rms,
+            samples: quality.to_surface.samples + quality.from_surface.samples,
+            normal_error_max: quality.normal_error.max,
+            normal_error_rms: quality.normal_error.rms,
+            volume_error: quality.volume_error,
+            area_error: quality.area_error,
+            flipped: quality.flipped,
+            min_angle: quality.min_angle,
+            min_radius_ratio: quality.min_radius_ratio,
+            mean_radius_ratio: quality.mean_radius_ratio,
+            slivers: quality.slivers,
+        }
+    }
+}
+
+impl MeshMethod {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mc => "mc",
+            Self::Dc => "dc",
+        }
+    }
+
+    /// Meshes a field by this method.
+    pub fn mesh(
+        self,
+        field: &dyn Field,
+        grid: &Grid,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Mesh, MeshError> {
+        match self {
+            Self::Mc => marching_cubes(field, grid, progress),
+            Self::Dc => dual_contouring(field, grid, progress),
+        }
+    }
+}
+
+/// A solid as its distance, positive inside: exact near quadrics, whatever the scales of the leaves.
+pub(super) struct Depth<'a>(pub &'a Solid);
+
+impl Field for Depth<'_> {
+    fn omega(&self, p: DVec3) -> f64 {
+        -self.0.contact(p).distance
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        let contact = self.0.contact(p);
+        (-contact.distance, -contact.normal)
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        const RUN: usize = 256;
+        let mut unused = [0.0; RUN];
+        let GradientsMut { omega, x, y, z } = out;
+        for start in (0..points.len()).step_by(RUN) {
+            let run = start..points.len().min(start + RUN);
+            let at = [points.x, points.y, points.z].map(|column| &column[run.clone()]);
+            let curvature = &mut unused[..run.len()];
+            let (omega, x) = (&mut omega[run.clone()], &mut x[run.clone()]);
+            let (y, z) = (&mut y[run.clone()], &mut z[run.clone()]);
+            self.0.contact_many(at, [omega, x, y, z, curvature]);
+        }
+        for column in [omega, x, y, z] {
+            column.iter_mut().for_each(|value| *value = -*value);
+        }
+    }
 }
 
 pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
-    let format = options.output.as_deref().map(Format::of).transpose()?;
+    let format = Format::chosen(options)?;
     if format.is_none() && !shared.json {
         return Err(Failure::usage(
-            "no output: give -o FILE.stl (or .ply, .obj, .vtp), or --json for the figures alone",
+            "no output: give -o FILE.stl (or .ply, .obj, .vtp, .glb, .3mf), or --json for the figures alone",
         ));
     }
     let program = input::program(shared, &options.file)?;
@@ -91,12 +214,11 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     // same surface as ω, cheaper, and normals of one face at creases
     let grid = grid.transpose().map_err(Failure::usage)?;
     let surface = solid.surface(grid.as_ref().map_or(Aabb::EMPTY, |grid| *grid.bounds()));
-    let mesh = match grid {
+    let mesh = match &grid {
         None => Mesh::default(),
-        Some(ref grid) => {
+        Some(grid) => {
             let bar = progress::bar(1000, "meshing");
-            let MeshMethod::Mc = options.method;
-            let mesh = marching_cubes(&*surface, grid, &|part| bar.set_position((1000.0 * part) as u64));
+            let mesh = options.method.mesh(&*surface, grid, &|part| bar.set_position((1000.0 * part) as u64));
             bar.finish_and_clear();
             let mut mesh =
                 mesh.map_err(|error| Failure::usage(format!("cannot mesh `{}`: {error}", solid.name())))?;
@@ -109,7 +231,8 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let milliseconds = started.elapsed().as_secs_f64() * 1e3;
     let report = mesh::check(&mesh, &*surface);
     let thin = grid
-        .map_or(Ok(ThinCells::NONE), |grid| mesh::thin_cells(&*surface, &grid))
+        .as_ref()
+        .map_or(Ok(ThinCells::NONE), |grid| mesh::thin_cells(&*surface, grid))
         .map_err(Failure::usage)?;
     if thin.count > 0 {
         note(format!(
@@ -118,6 +241,15 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
             thin.count, thin.bounds.min, thin.bounds.max
         ));
     }
+    let quality = match grid.as_ref().filter(|_| options.quality) {
+        None => None,
+        Some(grid) => {
+            let bar = progress::spinner("measuring");
+            let quality = mesh::measure(&mesh, &*surface, &Depth(&solid), grid).map_err(Failure::usage)?;
+            bar.finish_and_clear();
+            Some(quality)
+        }
+    };
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(&solid, bounds, options)));
     }
@@ -125,9 +257,20 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         output::write(path, |out| format.write(&mesh, out))?;
     }
     if shared.json {
-        return output::json(&summary(solid.name(), &report, thin.count, milliseconds));
+        let figures = quality.map(Figures::from);
+        return output::json(&summary(
+            solid.name(),
+            options.method,
+            &report,
+            thin.count,
+            figures,
+            milliseconds,
+        ));
     }
     print(&report, milliseconds);
+    if let Some(quality) = &quality {
+        print_quality(quality);
+    }
     if let Some(path) = &options.output {
         say!("written to {}", path.display());
     }
@@ -142,7 +285,14 @@ fn why_empty(solid: &impl Field, bounds: Bounds, options: &Options) -> String {
     }
 }
 
-fn summary(name: &str, report: &Report, thin_cells: usize, milliseconds: f64) -> Summary {
+fn summary(
+    name: &str,
+    method: MeshMethod,
+    report: &Report,
+    thin_cells: usize,
+    quality: Option<Figures>,
+    milliseconds: f64,
+) -> Summary {
     Summary {
         schema: 1,
         solid: name.to_string(),
@@ -159,6 +309,8 @@ fn summary(name: &str, report: &Report, thin_cells: usize, milliseconds: f64) ->
         thin_cells,
         evaluations: report.evaluations,
         milliseconds,
+        method: method.name(),
+        quality,
     }
 }
 
@@ -182,5 +334,29 @@ fn print(report: &Report, milliseconds: f64) {
         "distance of the vertices from the surface: {:.1e} at most, {:.1e} rms",
         report.max_distance,
         report.rms_distance
+    );
+}
+
+fn print_quality(quality: &Quality) {
+    say!(
+        "Hausdorff distance: {:.2e} (mesh to surface {:.2e}, rms {:.1e}; surface to mesh {:.2e}, rms {:.1e})",
+        quality.hausdorff(),
+        quality.to_surface.max,
+        quality.to_surface.rms,
+        quality.from_surface.max,
+        quality.from_surface.rms
+    );
+    say!(
+        "volume error: {:+.1e}, area error: {:+.1e}, normals off by {:.2}° rms, {} triangles upside down",
+        quality.volume_error,
+        quality.area_error,
+        quality.normal_error.rms,
+        quality.flipped
+    );
+    say!(
+        "triangles: least angle {:.2}°, mean radius ratio {:.3}, {:.2} % slivers",
+        quality.min_angle,
+        quality.mean_radius_ratio,
+        100.0 * quality.slivers
     );
 }

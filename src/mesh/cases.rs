@@ -29,6 +29,9 @@ pub(super) enum Ambiguous {
     JoinSolid,
 }
 
+/// The rule in force. A wall about as thin as a cell then stays connected and does not leak.
+pub(super) const RULE: Ambiguous = Ambiguous::JoinSolid;
+
 /// Triangles of all cells that the signs alone decide, as edges of the cell, counter-clockwise seen from the fluid.
 pub(super) struct Cases {
     triangles: Vec<[u8; 3]>,

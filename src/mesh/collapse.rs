@@ -19,13 +19,14 @@ pub(super) struct AtNode {
     pub vertex: u32,
 }
 
-/// Contracts the edges of zero length among the listed vertices and drops what vanishes.
-pub(super) fn merge_coincident(mesh: &mut Mesh, mut at_nodes: Vec<AtNode>) {
+/// Contracts the edges of zero length among the listed vertices and drops what vanishes. Tells which of the vertices
+/// were lost, if any.
+pub(super) fn merge_coincident(mesh: &mut Mesh, mut at_nodes: Vec<AtNode>) -> Option<Vec<bool>> {
     at_nodes.sort_unstable();
     let groups: Vec<&[AtNode]> =
         at_nodes.chunk_by(|a, b| a.node == b.node).filter(|group| group.len() > 1).collect();
     if groups.is_empty() {
-        return;
+        return None;
     }
     let mut fans = Fans::new(mesh, groups.iter().copied().flatten().map(|at| at.vertex));
     for group in groups {
@@ -38,6 +39,7 @@ pub(super) fn merge_coincident(mesh: &mut Mesh, mut at_nodes: Vec<AtNode>) {
     }
     let Fans { is_lost, is_dead, .. } = fans;
     compact(mesh, &is_lost, &is_dead);
+    Some(is_lost)
 }
 
 /// The triangles around each vertex that may be merged.

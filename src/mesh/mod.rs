@@ -4,12 +4,13 @@
 //! crossed edges by the case table, or by the corners' values where the table leaves a choice, puts each vertex on the
 //! surface by a root search on ω itself, merges vertices that coincide in a node and adds normals −∇ω/|∇ω| →
 //! [`remove_slivers`] if asked → [`check`] reports topology, volume and distance, [`thin_cells`] what the grid cannot
-//! see → `stl`, `ply`, `obj`, `vtp` write.
+//! see, [`measure`] the distance both ways → the [`formats`] write. [`dual_contouring`] does what [`marching_cubes`]
+//! does, with sharp creases.
 //!
 //! Promises: the mesh is closed, every edge lies in exactly two triangles that run along it in opposite
 //! directions, triangles are counter-clockwise seen from the fluid, its topology is that of the trilinear interpolant
-//! of ω at the nodes, and the same field and grid give the same bits on any number of threads. Not promised: creases
-//! between nodes are cut, features thinner than a cell may be missed (but are counted), and where the field touches
+//! of ω at the nodes, and the same field and grid give the same bits on any number of threads. Not promised: marching
+//! cubes cut creases between nodes, features thinner than a cell may be missed (but are counted), and where the field touches
 //! zero without a change of sign there is no surface.
 //!
 //! ```
@@ -31,20 +32,19 @@ mod ambiguity;
 mod cases;
 mod check;
 mod collapse;
+mod dual;
 mod extract;
+pub mod formats;
 mod grid;
 mod normals;
-pub mod obj;
 mod patches;
-pub mod ply;
 mod prune;
+mod quality;
 mod roots;
 mod shells;
 mod signs;
 mod slivers;
-pub mod stl;
 mod thin;
-pub mod vtp;
 
 #[cfg(test)]
 mod tests;
@@ -54,8 +54,11 @@ use std::fmt;
 use glam::DVec3;
 
 pub use check::{Report, check};
+pub use dual::dual_contouring;
 pub use extract::marching_cubes;
+pub use formats::{glb, obj, ply, stl, threemf, vtp};
 pub use grid::{Grid, GridError, Resolution};
+pub use quality::{Distances, Quality, measure};
 pub use shells::{Shell, shells};
 pub use slivers::{SLIVER, quality, remove_slivers};
 pub use thin::{ThinCells, thin_cells};

@@ -3,6 +3,7 @@
 //! Invariant: every normal is a finite unit vector.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::Mesh;
 use crate::field::{Field, GradientsMut, Points};
@@ -46,6 +47,28 @@ impl Gradients {
         let [omega, gx, gy, gz] = &mut self.found;
         field.omega_grad_many(Points::new(x, y, z), GradientsMut { omega, x: gx, y: gy, z: gz });
     }
+}
+
+/// ω and ∇ω at each position.
+pub(super) fn gradients(field: &dyn Field, positions: &[DVec3]) -> Vec<(f64, DVec3)> {
+    Gradients::default().at(field, positions).collect()
+}
+
+/// Vertices evaluated together.
+const BATCH: usize = 1024;
+
+/// Computes `mesh.normals`.
+pub(super) fn add(field: &dyn Field, mesh: &mut Mesh) {
+    mesh.normals = vec![DVec3::ZERO; mesh.positions.len()];
+    let batches = mesh.normals.par_chunks_mut(BATCH).zip(mesh.positions.par_chunks(BATCH));
+    batches.for_each_init(Gradients::default, |gradients, (normals, positions)| {
+        gradients.normals(field, positions, normals);
+    });
+    mesh.work.gradients += mesh.positions.len() as u64;
+    for &v in &mesh.caps {
+        mesh.normals[v as usize] = DVec3::ZERO;
+    }
+    fill_missing(mesh);
 }
 
 /// The unit vector along `v`, also where |v|² would underflow; none for zero, infinite and NaN vectors.

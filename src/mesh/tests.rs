@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// A field from ω alone; ∇ω by central differences, good enough for normals and Newton steps.
-struct Formula<F>(F);
+pub(super) struct Formula<F>(pub F);
 
 impl<F: Fn(DVec3) -> f64 + Sync> Field for Formula<F> {
     fn omega(&self, p: DVec3) -> f64 {
@@ -27,16 +27,16 @@ impl<F: Fn(DVec3) -> f64 + Sync> Field for Formula<F> {
     }
 }
 
-fn r0_and(u: f64, v: f64) -> f64 {
+pub(super) fn r0_and(u: f64, v: f64) -> f64 {
     u + v - (u * u + v * v).sqrt()
 }
 
-fn r0_or(u: f64, v: f64) -> f64 {
+pub(super) fn r0_or(u: f64, v: f64) -> f64 {
     u + v + (u * u + v * v).sqrt()
 }
 
 /// The paper's pawn, in the box [0, 3]³.
-fn pawn(p: DVec3) -> f64 {
+pub(super) fn pawn(p: DVec3) -> f64 {
     let r2 = (p.x - 1.5).powi(2) + (p.y - 1.5).powi(2);
     let z = p.z;
     let w1 = 0.25 - r2;
@@ -50,7 +50,7 @@ fn pawn(p: DVec3) -> f64 {
 /// The pawn's volume by quadrature of its profile, independent of this program.
 const PAWN_VOLUME: f64 = 0.442701;
 
-fn ball(centre: DVec3, radius: f64) -> impl Fn(DVec3) -> f64 {
+pub(super) fn ball(centre: DVec3, radius: f64) -> impl Fn(DVec3) -> f64 {
     move |p| radius * radius - p.distance_squared(centre)
 }
 
@@ -59,7 +59,7 @@ fn cuboid(p: DVec3, half: DVec3) -> f64 {
     (half - p.abs()).min_element()
 }
 
-fn cube(half_side: f64) -> Aabb {
+pub(super) fn cube(half_side: f64) -> Aabb {
     Aabb::new(DVec3::splat(-half_side), DVec3::splat(half_side))
 }
 
@@ -382,7 +382,7 @@ fn proven_bricks_save_samples_and_change_no_bit() {
 }
 
 /// ω interpolated between given values at the nodes of a grid in [0, n]³, trilinear in each cell.
-fn trilinear(values: Vec<f64>, n: usize) -> impl Fn(DVec3) -> f64 {
+pub(super) fn trilinear(values: Vec<f64>, n: usize) -> impl Fn(DVec3) -> f64 {
     move |p| {
         let cell = p.floor().clamp(DVec3::ZERO, DVec3::splat((n - 1) as f64));
         let t = p - cell;

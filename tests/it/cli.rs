@@ -73,6 +73,7 @@ fn help_and_usage() {
         ("mesh of an unknown format", &["mesh", PAWN, "-o", "pawn.3ds"]),
         ("mesh with no cells", &["mesh", PAWN, "--cells", "0", "-o", "pawn.stl"]),
         ("mesh with a cell of zero", &["mesh", PAWN, "--cell", "0", "-o", "pawn.stl"]),
+        ("text of a format that has none", &["mesh", PAWN, "--ascii", "-o", "pawn.glb"]),
         ("mesh of an empty box", &["mesh", PAWN, "--box", "0,0,0,0,1,1", "-o", "pawn.stl"]),
         ("slice of an unknown axis", &["check", PAWN, "--slice", "w=1"]),
         ("slice of an unknown format", &["check", PAWN, "--slice", "z=1", "-o", "pawn.gif"]),
@@ -296,13 +297,74 @@ fn meshes_read_back_as_reported() {
     assert_eq!(ply.payload["vertex"].len() as u64, vertices);
     assert_eq!(ply.payload["face"].len() as u64, triangles);
 
-    for name in ["stl", "ply", "obj", "vtp"] {
+    for name in ["stl", "ply", "obj", "vtp", "glb", "3mf"] {
         mesh(&format!("one.{name}"), "1");
         mesh(&format!("two.{name}"), "2");
         let bytes = |which: &str| std::fs::read(path(&format!("{which}.{name}"))).unwrap();
         assert!(bytes("one") == bytes("two"), "{name} depends on the number of threads");
         assert!(bytes("one").len() > 1000);
     }
+}
+
+#[test]
+fn quality_and_sharp_creases() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pawn.stl").to_str().unwrap().to_string();
+    let measured = |method: &str| {
+        let arguments = [
+            "mesh",
+            PAWN,
+            "--cells",
+            "48",
+            "--method",
+            method,
+            "--quality",
+            "--ascii",
+            "--json",
+            "-o",
+            &path,
+        ];
+        let outcome = rfm(root(), &arguments).expect(0);
+        let document = outcome.json();
+        contract(&outcome.stdout, &document, &MESH_KEYS);
+        assert_eq!((&document["method"], &document["closed"]), (&method.into(), &true.into()));
+        let mut file = std::fs::File::open(&path).unwrap();
+        let read = stl_io::read_stl(&mut file).unwrap();
+        closed_and_manifold(read.faces.iter().map(|face| face.vertices));
+        document["quality"].clone()
+    };
+    let number = |quality: &serde_json::Value, key: &str| quality[key].as_f64().unwrap();
+    let (cut, sharp) = (measured("mc"), measured("dc"));
+    for key in ["hausdorff", "mesh_to_surface_rms", "surface_to_mesh_max", "normal_error_rms", "slivers"] {
+        assert!(number(&sharp, key) < 0.6 * number(&cut, key), "{key}: {sharp} {cut}");
+    }
+    assert_eq!(sharp["flipped"], 0);
+    // 48 cells of the pawn's 1.47 m
+    assert!(number(&sharp, "hausdorff") < 0.5 * 1.5 / 48.0, "{sharp}");
+    let without = rfm(root(), &["mesh", PAWN, "--cells", "24", "--json"]).expect(0).json();
+    assert!(without.get("quality").is_none());
+}
+
+#[test]
+fn reports_measure_meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    let plot = folder.path().join("meshes.svg").to_str().unwrap().to_string();
+    let arguments = ["report", "examples/cube.rfm", "--mesh-cells", "32", "--mesh-plot", &plot, "--json"];
+    let outcome = rfm(root(), &arguments).expect(0);
+    let document = outcome.json();
+    contract(&outcome.stdout, &document, &["schema", "rows", "meshes"]);
+    let rows = document["meshes"].as_array().unwrap();
+    let methods: Vec<&str> = rows.iter().map(|row| row["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["mc", "mc", "mc", "mc", "dc", "dc", "dc", "dc"]);
+    for row in rows {
+        assert!(row["closed"] == true && row["manifold"] == true, "{row}");
+        // a cube has plane faces: dual contouring leaves no error at all
+        let hausdorff = row["hausdorff"].as_f64().unwrap();
+        assert_eq!(row["method"] == "dc", hausdorff < 1e-9, "{row}");
+    }
+    assert!(rows[3]["order"].as_f64().unwrap() > 0.5, "{}", rows[3]);
+    let text = std::fs::read_to_string(&plot).unwrap();
+    assert!(text.starts_with("<svg") && text.contains("dual contouring") && text.contains("polyline"));
 }
 
 #[test]

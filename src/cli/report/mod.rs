@@ -1,8 +1,10 @@
 //! `rfm report`: speed against error, for every program of a solid that there is.
 //!
 //! Errors are measured against 120-digit arithmetic at random points of the box and at points on the surface;
-//! times are medians over batches of random points on one thread.
+//! times are medians over batches of random points on one thread. Then the meshes: error and time of each method against
+//! the number of cells, with the order of convergence that they show.
 
+mod meshes;
 mod plot;
 mod points;
 
@@ -59,10 +61,13 @@ struct Document<'a> {
     points: usize,
     surface_points: usize,
     rows: &'a [Row],
+    meshes: &'a [meshes::Row],
 }
 
 pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
-    options.output.as_deref().map(output::Picture::of).transpose()?;
+    for path in options.output.iter().chain(&options.mesh_plot) {
+        output::Picture::of(path)?;
+    }
     let program = input::program(shared, &options.file)?;
     let reference = choose::solid(shared, &program, options.solid.as_deref())?;
     let nowhere = || Failure::usage("the solid has no bounds and the file no scene: nowhere to measure");
@@ -81,9 +86,14 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
     }
     rows.push(range_row(&reference, &points));
     bar.finish_and_clear();
+    let meshes = meshes::measure(&reference, options.mesh_cells)?;
     rows.sort_by_key(|row| (row.program, row.shape));
     if let Some(path) = &options.output {
         let picture = plot::draw(reference.name(), &rows, path)?;
+        output::write(path, |out| out.write_all(&picture))?;
+    }
+    if let Some(path) = &options.mesh_plot {
+        let picture = meshes::draw(reference.name(), &meshes, path)?;
         output::write(path, |out| out.write_all(&picture))?;
     }
     if shared.json {
@@ -96,10 +106,12 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
             points: points.random.len(),
             surface_points: points.surface.len(),
             rows: &rows,
+            meshes: &meshes,
         });
     }
     print(&reference, &points, over, &rows);
-    if let Some(path) = &options.output {
+    meshes::print(&meshes);
+    for path in options.output.iter().chain(&options.mesh_plot) {
         println!("plot written to {}", path.display());
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Speed against error as a picture: one mark for each program.
+//! Speed against error as a picture: one mark for each program; and what other pictures of the report share.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -7,19 +7,32 @@ use super::super::{Failure, output};
 use super::Row;
 use crate::slice;
 
-const WIDTH: f64 = 760.0;
-const HEIGHT: f64 = 520.0;
-const LEFT: f64 = 80.0;
-const RIGHT: f64 = 190.0;
-const TOP: f64 = 50.0;
-const BOTTOM: f64 = 60.0;
+pub(super) const WIDTH: f64 = 760.0;
+pub(super) const HEIGHT: f64 = 520.0;
+pub(super) const LEFT: f64 = 80.0;
+pub(super) const RIGHT: f64 = 190.0;
+pub(super) const TOP: f64 = 50.0;
+pub(super) const BOTTOM: f64 = 60.0;
 
 /// Errors below this are drawn at it: an exact answer has no place on a logarithmic axis.
 const LEAST_ERROR: f64 = 1e-17;
 
 /// The plot as SVG or PNG, as the ending of the path says.
 pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
-    let svg = svg(solid, rows);
+    end(svg(solid, rows), path)
+}
+
+/// The beginning of a plot: the white ground and the title.
+pub(super) fn begin(title: &str) -> String {
+    format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="Ubuntu" font-size="13"><rect width="100%" height="100%" fill="#ffffff"/><text x="{LEFT}" y="28" font-size="17">{}</text>"##,
+        slice::escaped(title)
+    )
+}
+
+/// The finished plot as SVG or PNG, as the ending of the path says.
+pub(super) fn end(mut svg: String, path: &Path) -> Result<Vec<u8>, Failure> {
+    svg.push_str("</svg>\n");
     match output::Picture::of(path)? {
         output::Picture::Svg => Ok(svg.into_bytes()),
         output::Picture::Png => {
@@ -31,7 +44,7 @@ pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Fa
 }
 
 /// A logarithmic axis over whole powers of ten.
-struct Axis {
+pub(super) struct Axis {
     low: i32,
     high: i32,
     from: f64,
@@ -39,7 +52,7 @@ struct Axis {
 }
 
 impl Axis {
-    fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+    pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (mut low, mut high) = (i32::MAX, i32::MIN);
         for value in values {
             low = low.min(value.log10().floor() as i32);
@@ -51,7 +64,7 @@ impl Axis {
         Self { low, high, from, to }
     }
 
-    fn at(&self, value: f64) -> f64 {
+    pub fn at(&self, value: f64) -> f64 {
         let share = (value.log10() - f64::from(self.low)) / f64::from(self.high - self.low);
         self.from + share * (self.to - self.from)
     }
@@ -65,27 +78,18 @@ fn svg(solid: &str, rows: &[Row]) -> String {
         .collect();
     let x = Axis::over(marks.iter().map(|(row, _)| row.ns_per_point), LEFT, WIDTH - RIGHT);
     let y = Axis::over(marks.iter().map(|(_, error)| *error), HEIGHT - BOTTOM, TOP);
-    let mut out = String::new();
-    // writing to a String cannot fail
-    let _ = write!(
-        out,
-        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="Ubuntu" font-size="13"><rect width="100%" height="100%" fill="#ffffff"/>"##
-    );
-    let _ = write!(
-        out,
-        r##"<text x="{LEFT}" y="28" font-size="17">{}: speed against error</text>"##,
-        slice::escaped(solid)
-    );
-    grid(&mut out, &x, &y);
+    let mut out = begin(&format!("{solid}: speed against error"));
+    grid(&mut out, &x, &y, ["ns per point, one thread", "largest relative error"]);
     for (row, error) in &marks {
         mark(&mut out, row, x.at(row.ns_per_point), y.at(*error));
     }
     legend(&mut out, &marks);
-    out.push_str("</svg>\n");
     out
 }
 
-fn grid(out: &mut String, x: &Axis, y: &Axis) {
+/// Lines at the whole powers of ten, and what the axes are.
+pub(super) fn grid(out: &mut String, x: &Axis, y: &Axis, [along, up]: [&str; 2]) {
+    // writing to a String cannot fail
     for power in x.low..=x.high {
         let at = x.at(10f64.powi(power));
         let _ = write!(
@@ -109,7 +113,7 @@ fn grid(out: &mut String, x: &Axis, y: &Axis) {
     let middle = 0.5 * (TOP + HEIGHT - BOTTOM);
     let _ = write!(
         out,
-        r##"<text x="{:.1}" y="{:.1}" text-anchor="middle">ns per point, one thread</text><text x="20" y="{middle:.1}" text-anchor="middle" transform="rotate(-90 20 {middle:.1})">largest relative error</text>"##,
+        r##"<text x="{:.1}" y="{:.1}" text-anchor="middle">{along}</text><text x="20" y="{middle:.1}" text-anchor="middle" transform="rotate(-90 20 {middle:.1})">{up}</text>"##,
         0.5 * (LEFT + WIDTH - RIGHT),
         HEIGHT - 14.0
     );

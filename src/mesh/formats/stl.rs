@@ -1,4 +1,4 @@
-//! Binary STL: triangles with their own normals, all in `f32`.
+//! STL: triangles with their own normals, in `f32` as records or as text.
 //!
 //! Invariant: normals come from the triangles in `f64`, before their corners are rounded, so slivers keep a
 //! direction; a triangle without area gets the zero normal, which readers take as "compute it".
@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use glam::DVec3;
 
-use super::{Mesh, normals::unit};
+use super::super::{Mesh, normals::unit};
 
 /// Writes a mesh as binary STL.
 ///
@@ -22,17 +22,37 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     let count = u32::try_from(mesh.triangles.len()).map_err(io::Error::other)?;
     out.write_all(&count.to_le_bytes())?;
     for triangle in &mesh.triangles {
-        let corners = triangle.map(|v| mesh.positions[v as usize]);
-        let [a, b, c] = corners;
-        let normal = unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO);
         let mut record = [0; 50];
-        let numbers = [normal, a, b, c].into_iter().flat_map(|v: DVec3| v.to_array());
+        let numbers = facet(mesh, *triangle).into_iter().flat_map(|v: DVec3| v.to_array());
         for (bytes, number) in record.chunks_exact_mut(4).zip(numbers) {
             bytes.copy_from_slice(&(number as f32).to_le_bytes());
         }
         out.write_all(&record)?;
     }
     Ok(())
+}
+
+/// Writes a mesh as STL text: ten times as large, for readers and people that want it.
+///
+/// # Errors
+/// What the writer reports.
+pub fn write_ascii(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "solid rfm")?;
+    for triangle in &mesh.triangles {
+        let [n, a, b, c] = facet(mesh, *triangle).map(|v| v.as_vec3());
+        writeln!(out, "facet normal {:e} {:e} {:e}\nouter loop", n.x, n.y, n.z)?;
+        for p in [a, b, c] {
+            writeln!(out, "vertex {:e} {:e} {:e}", p.x, p.y, p.z)?;
+        }
+        writeln!(out, "endloop\nendfacet")?;
+    }
+    writeln!(out, "endsolid rfm")
+}
+
+/// Normal and corners of a triangle.
+fn facet(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 4] {
+    let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
+    [unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO), a, b, c]
 }
 
 #[cfg(test)]
@@ -46,6 +66,14 @@ mod tests {
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();
         assert_eq!(bytes.len(), 84 + 50 * mesh.triangles.len());
+        same_when_read(&mesh, bytes);
+        let mut text = Vec::new();
+        write_ascii(&mesh, &mut text).unwrap();
+        assert!(text.starts_with(b"solid rfm\nfacet normal "));
+        same_when_read(&mesh, text);
+    }
+
+    fn same_when_read(mesh: &Mesh, bytes: Vec<u8>) {
         let read = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).unwrap();
         assert_eq!((read.faces.len(), read.vertices.len()), (mesh.triangles.len(), mesh.positions.len()));
         for (face, triangle) in read.faces.iter().zip(&mesh.triangles) {

@@ -7,7 +7,7 @@
 
 use std::io::{self, Write};
 
-use super::Mesh;
+use super::super::Mesh;
 
 /// Writes a mesh as PLY.
 ///

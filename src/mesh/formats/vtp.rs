@@ -4,7 +4,7 @@
 
 use std::io::{self, Write};
 
-use super::Mesh;
+use super::super::Mesh;
 
 /// Writes a mesh as ASCII VTP with one normal for each vertex.
 ///
@@ -48,11 +48,16 @@ mod tests {
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let piece = document.descendants().find(|n| n.has_tag_name("Piece")).unwrap();
+        let count = |name: &str| piece.attribute(name).unwrap().parse::<usize>().unwrap();
+        assert_eq!(
+            (count("NumberOfPoints"), count("NumberOfPolys")),
+            (mesh.positions.len(), mesh.triangles.len())
+        );
         let array = |name: &str| -> Vec<f64> {
-            let (_, rest) = text.split_once(&format!("Name=\"{name}\"")).unwrap();
-            let (_, rest) = rest.split_once('>').unwrap();
-            let (data, _) = rest.split_once("</DataArray>").unwrap();
-            data.split_whitespace().map(|n| n.parse().unwrap()).collect()
+            let found = piece.descendants().find(|n| n.attribute("Name") == Some(name)).unwrap();
+            found.text().unwrap().split_whitespace().map(|n| n.parse().unwrap()).collect()
         };
         let flat: Vec<f64> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
         assert_eq!(array("points"), flat);

@@ -1,0 +1,183 @@
+//! Error and time of both ways of meshing against the number of cells.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use anstream::println;
+use serde::Serialize;
+
+use super::super::args::MeshMethod;
+use super::super::mesh::{Depth, Figures};
+use super::super::{Failure, progress};
+use super::plot::{self, Axis};
+use crate::Solid;
+use crate::mesh::{self, Grid, Resolution};
+
+/// Resolutions of each method, each twice as fine as the one before.
+const RESOLUTIONS: u32 = 4;
+
+/// Timed repetitions of which the fastest counts.
+const REPETITIONS: usize = 3;
+
+/// One mesh.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Row {
+    method: &'static str,
+    cells: usize,
+    /// Side of a cell.
+    spacing: f64,
+    triangles: usize,
+    closed: bool,
+    manifold: bool,
+    #[serde(flatten)]
+    figures: Figures,
+    evaluations: u64,
+    gradients: u64,
+    milliseconds: f64,
+    /// log₂ of how much smaller the Hausdorff distance is than with half the cells.
+    order: Option<f64>,
+    /// The same for the root mean square from the mesh to the surface.
+    order_rms: Option<f64>,
+}
+
+/// Meshes a solid by each method with up to `finest` cells. Nothing for a solid without bounds.
+pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<Row>, Failure> {
+    let Some(bounds) = solid.bounds().aabb() else { return Ok(Vec::new()) };
+    let bar = progress::bar(u64::from(2 * RESOLUTIONS), "meshing");
+    let mut rows: Vec<Row> = Vec::new();
+    for method in [MeshMethod::Mc, MeshMethod::Dc] {
+        for halvings in (0..RESOLUTIONS).rev() {
+            let cells = (finest >> halvings).max(Grid::MIN_CELLS);
+            let grid = Grid::around(&bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
+            let mut row = row(solid, method, cells, &grid)?;
+            if let Some(coarser) = rows.last().filter(|r| r.method == row.method && 2 * r.cells == cells) {
+                row.order = order(coarser.figures.hausdorff, row.figures.hausdorff);
+                row.order_rms = order(coarser.figures.mesh_to_surface_rms, row.figures.mesh_to_surface_rms);
+            }
+            rows.push(row);
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    Ok(rows)
+}
+
+fn order(coarse: f64, fine: f64) -> Option<f64> {
+    Some((coarse / fine).log2()).filter(|order| order.is_finite())
+}
+
+fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<Row, Failure> {
+    let surface = solid.surface(*grid.bounds());
+    let mut fastest = f64::INFINITY;
+    let mut mesh = mesh::Mesh::default();
+    for _ in 0..REPETITIONS {
+        let started = Instant::now();
+        mesh = method.mesh(&*surface, grid, &|_| ()).map_err(Failure::usage)?;
+        fastest = fastest.min(started.elapsed().as_secs_f64() * 1e3);
+    }
+    let report = mesh::check(&mesh, &*surface);
+    let quality = mesh::measure(&mesh, &*surface, &Depth(solid), grid).map_err(Failure::usage)?;
+    Ok(Row {
+        method: method.name(),
+        cells,
+        spacing: grid.spacing().min_element(),
+        triangles: report.triangles,
+        closed: report.closed,
+        manifold: report.manifold,
+        figures: quality.into(),
+        evaluations: mesh.work.evaluations,
+        gradients: mesh.work.gradients,
+        milliseconds: fastest,
+        order: None,
+        order_rms: None,
+    })
+}
+
+pub(super) fn print(rows: &[Row]) {
+    if rows.is_empty() {
+        return println!("no meshes: the solid has no bounds");
+    }
+    println!(
+        "meshes; lengths in metres; the order is log2 of the error's ratio to that in half as many cells"
+    );
+    println!(
+        "{:<7} {:>5} {:>9} {:>9} {:>10} {:>6} {:>9} {:>6} {:>9} {:>8} {:>8} {:>7}",
+        "method",
+        "cells",
+        "triangles",
+        "ms",
+        "Hausdorff",
+        "order",
+        "rms",
+        "order",
+        "volume",
+        "normals",
+        "slivers",
+        "flipped"
+    );
+    for row in rows {
+        let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));
+        let figures = &row.figures;
+        println!(
+            "{:<7} {:>5} {:>9} {:>9.2} {:>10.2e} {:>6} {:>9.1e} {:>6} {:>+9.1e} {:>7.2}° {:>6.2} % {:>7}",
+            row.method,
+            row.cells,
+            row.triangles,
+            row.milliseconds,
+            figures.hausdorff,
+            order(row.order),
+            figures.mesh_to_surface_rms,
+            order(row.order_rms),
+            figures.volume_error,
+            figures.normal_error_rms,
+            100.0 * figures.slivers,
+            figures.flipped,
+        );
+    }
+}
+
+/// Hausdorff distance against cells, a line for each method, as SVG or PNG.
+pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
+    let marks: Vec<(&Row, f64)> = rows
+        .iter()
+        .map(|row| (row, row.figures.hausdorff))
+        .filter(|(_, error)| *error > 0.0 && error.is_finite())
+        .collect();
+    let x = Axis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);
+    let y = Axis::over(marks.iter().map(|(_, error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
+    let mut out = plot::begin(&format!("{solid}: error of its meshes"));
+    plot::grid(&mut out, &x, &y, ["cells along the longest side", "Hausdorff distance"]);
+    let legend = plot::WIDTH - plot::RIGHT + 22.0;
+    for (i, (method, name, colour)) in
+        [("mc", "marching cubes", "#1b6ca8"), ("dc", "dual contouring", "#c05621")].into_iter().enumerate()
+    {
+        let own = || marks.iter().filter(|(row, _)| row.method == method);
+        let points: Vec<String> =
+            own().map(|(row, error)| format!("{:.1},{:.1}", x.at(row.cells as f64), y.at(*error))).collect();
+        // writing to a String cannot fail
+        let _ = write!(
+            out,
+            r##"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="2"/>"##,
+            points.join(" ")
+        );
+        for (row, error) in own() {
+            let (x, y) = (x.at(row.cells as f64), y.at(*error));
+            let _ = write!(
+                out,
+                r##"<circle cx="{x:.1}" cy="{y:.1}" r="4.5" fill="{colour}"/><text x="{:.1}" y="{:.1}" font-size="11">{:.1} ms</text>"##,
+                x + 7.0,
+                y - 6.0,
+                row.milliseconds
+            );
+        }
+        let at = plot::TOP + 12.0 + 21.0 * i as f64;
+        let _ = write!(
+            out,
+            r##"<rect x="{legend:.1}" y="{:.1}" width="11" height="11" fill="{colour}"/><text x="{:.1}" y="{at:.1}">{name}</text>"##,
+            at - 10.0,
+            legend + 18.0
+        );
+    }
+    plot::end(out, path)
+}

@@ -1,0 +1,402 @@
+//! How far a mesh is from the surface it stands for, both ways, how its triangles face and how well they are shaped.
+//!
+//! Mesh → surface: points spread over every triangle, each moved to the surface by Newton's method; the way it goes is
+//! at least its distance. Surface → mesh: points of the surface found in a grid of half the cells, those on creases and
+//! corners among them, each with its exact distance from the nearest triangle. The larger of the two maxima is the
+//! Hausdorff distance, as far as samples tell.
+//!
+//! Invariant: the samples depend on the mesh, the field and the grid alone; sums are taken in their order.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use rstar::{AABB, PointDistance, RTree, RTreeObject};
+
+use super::{
+    Grid, Mesh, MeshError, Resolution, dual_contouring,
+    normals::{gradients, unit},
+    shells,
+};
+use crate::field::Field;
+
+/// Distances of many samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Distances {
+    /// In the scene's unit (metres).
+    pub max: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    pub samples: usize,
+}
+
+/// The figures of a mesh over its field.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Quality {
+    /// From points of the mesh to the surface; caps at the grid's border left out.
+    pub to_surface: Distances,
+    /// From points of the surface to the mesh.
+    pub from_surface: Distances,
+    /// Angle between a triangle and the surface below its middle, in degrees.
+    pub normal_error: Distances,
+    /// Volume and area less those of a mesh in half the cells, as a share: that mesh's own error is about a quarter of
+    /// what dual contouring has in these cells.
+    pub volume_error: f64,
+    pub area_error: f64,
+    /// Triangles that face the other way than the surface below their middles.
+    pub flipped: usize,
+    /// Smallest angle of any triangle, in degrees.
+    pub min_angle: f64,
+    /// Smallest and mean ratio of a triangle's inner to its outer radius, twice: 1 if equilateral, 0 without area.
+    pub min_radius_ratio: f64,
+    pub mean_radius_ratio: f64,
+    /// Share of the triangles whose radius ratio is below 0.1.
+    pub slivers: f64,
+}
+
+impl Quality {
+    /// The larger of both largest distances.
+    pub fn hausdorff(&self) -> f64 {
+        self.to_surface.max.max(self.from_surface.max)
+    }
+}
+
+/// Points of a triangle are spread this many to a side: with sides of a cell, neighbours are a fifth of it apart.
+const SPREAD: usize = 5;
+
+/// Triangles, or points, treated together.
+const BATCH: usize = 256;
+
+/// Below this radius ratio a triangle faces nowhere.
+const NO_DIRECTION: f64 = 1e-6;
+
+/// Measures a mesh of `field` in `grid`. `distance` has the same surface, and near it ω is the distance from it or
+/// nearly so: Newton's method then finds the nearest face, where parts of unlike scale would mislead it.
+///
+/// # Errors
+/// Those of meshing the finer grid that gives points of the surface.
+pub fn measure(
+    mesh: &Mesh,
+    field: &dyn Field,
+    distance: &dyn Field,
+    grid: &Grid,
+) -> Result<Quality, MeshError> {
+    let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
+    let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
+    let mut quality = shapes(mesh);
+    if mesh.triangles.is_empty() {
+        return Ok(quality);
+    }
+    let (own, reference) = (extent(mesh), extent(&finer));
+    quality.volume_error = own.0 / reference.0 - 1.0;
+    quality.area_error = own.1 / reference.1 - 1.0;
+    mesh_to_surface(mesh, distance, &mut quality);
+    quality.from_surface = surface_to_mesh(mesh, &surface_points(&finer, distance, grid));
+    Ok(quality)
+}
+
+/// Volume and area.
+fn extent(mesh: &Mesh) -> (f64, f64) {
+    shells(mesh).iter().fold((0.0, 0.0), |sum, shell| (sum.0 + shell.volume, sum.1 + shell.area))
+}
+
+fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 3] {
+    triangle.map(|v| mesh.positions[v as usize])
+}
+
+fn shapes(mesh: &Mesh) -> Quality {
+    let shapes: Vec<(f64, f64)> = mesh
+        .triangles
+        .par_iter()
+        .map(|&t| (radius_ratio(corners(mesh, t)), min_angle(corners(mesh, t))))
+        .collect();
+    let count = shapes.len().max(1) as f64;
+    Quality {
+        min_angle: shapes.iter().fold(60.0, |min, shape| min.min(shape.1)),
+        min_radius_ratio: shapes.iter().fold(1.0, |min, shape| min.min(shape.0)),
+        mean_radius_ratio: shapes.iter().fold(0.0, |sum, shape| sum + shape.0) / count,
+        slivers: shapes.iter().filter(|shape| shape.0 < 0.1).count() as f64 / count,
+        ..Quality::default()
+    }
+}
+
+/// 2r/R of a triangle with the sides a, b, c and the area A: 16A²/((a + b + c)·abc).
+fn radius_ratio([p, q, r]: [DVec3; 3]) -> f64 {
+    let (a, b, c) = (q.distance(r), r.distance(p), p.distance(q));
+    let twice_area = (q - p).cross(r - p).length();
+    let below = (a + b + c) * a * b * c;
+    if below > 0.0 { 4.0 * twice_area * twice_area / below } else { 0.0 }
+}
+
+/// Degrees; 0 where two corners coincide.
+fn min_angle(corners: [DVec3; 3]) -> f64 {
+    let angle = |i: usize| {
+        let (u, v) = (corners[(i + 1) % 3] - corners[i], corners[(i + 2) % 3] - corners[i]);
+        u.cross(v).length().atan2(u.dot(v)).to_degrees()
+    };
+    angle(0).min(angle(1)).min(angle(2))
+}
+
+/// Sums over samples.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    max: f64,
+    squares: f64,
+    samples: usize,
+}
+
+impl Sums {
+    fn add(&mut self, value: f64) {
+        self.max = self.max.max(value);
+        self.squares += value * value;
+        self.samples += 1;
+    }
+
+    fn join(parts: impl Iterator<Item = Self>) -> Distances {
+        let all = parts.fold(Self::default(), |all, part| Self {
+            max: all.max.max(part.max),
+            squares: all.squares + part.squares,
+            samples: all.samples + part.samples,
+        });
+        Distances {
+            max: all.max,
+            rms: (all.squares / all.samples.max(1) as f64).sqrt(),
+            samples: all.samples,
+        }
+    }
+}
+
+/// Points of a triangle, on its border too: the middle first.
+fn spread([a, b, c]: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
+    let n = SPREAD;
+    let lattice = (0..=n).flat_map(move |i| {
+        (0..=n - i).map(move |j| (a * (n - i - j) as f64 + b * i as f64 + c * j as f64) / n as f64)
+    });
+    std::iter::once((a + b + c) / 3.0).chain(lattice)
+}
+
+fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality) {
+    let is_cap = |t: &[u32; 3]| t.iter().any(|v| mesh.caps.binary_search(v).is_ok());
+    let parts: Vec<(Sums, Sums, usize)> = mesh
+        .triangles
+        .par_chunks(BATCH)
+        .map(|triangles| {
+            let triangles: Vec<[DVec3; 3]> =
+                triangles.iter().filter(|t| !is_cap(t)).map(|&t| corners(mesh, t)).collect();
+            let points: Vec<DVec3> = triangles.iter().flat_map(|&t| spread(t)).collect();
+            let feet = feet(field, &points);
+            let (mut distances, mut angles, mut flipped) = (Sums::default(), Sums::default(), 0);
+            let each = points.len() / triangles.len().max(1);
+            for (t, triangle) in triangles.iter().enumerate() {
+                let [a, b, c] = *triangle;
+                let facing = unit((b - a).cross(c - a)).filter(|_| radius_ratio(*triangle) > NO_DIRECTION);
+                for i in t * each..(t + 1) * each {
+                    distances.add(feet[i].position.distance(points[i]));
+                    let (Some(facing), Some(normal)) = (facing, feet[i].normal) else { continue };
+                    if i == t * each {
+                        angles.add(facing.angle_between(normal).to_degrees());
+                        flipped += usize::from(facing.dot(normal) < 0.0);
+                    }
+                }
+            }
+            (distances, angles, flipped)
+        })
+        .collect();
+    quality.to_surface = Sums::join(parts.iter().map(|part| part.0));
+    quality.normal_error = Sums::join(parts.iter().map(|part| part.1));
+    quality.flipped = parts.iter().map(|part| part.2).sum();
+}
+
+/// A point of the surface, with its outward unit normal.
+#[derive(Debug, Clone, Copy)]
+struct Foot {
+    position: DVec3,
+    normal: Option<DVec3>,
+}
+
+/// Newton steps: a point beside a crease goes to and fro between its faces, nearer each time.
+const STEPS: usize = 24;
+
+/// The point of the surface that each point is led to by Newton's method.
+fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
+    let mut feet: Vec<Foot> = points.iter().map(|&position| Foot { position, normal: None }).collect();
+    let mut moving: Vec<usize> = (0..points.len()).collect();
+    for _ in 0..STEPS {
+        let at: Vec<DVec3> = moving.iter().map(|&i| feet[i].position).collect();
+        let mut found = gradients(field, &at).into_iter();
+        moving.retain(|&i| {
+            let Some((omega, gradient)) = found.next() else { return false };
+            let step = gradient * (omega / gradient.length_squared());
+            if !step.is_finite() {
+                return false;
+            }
+            let foot = &mut feet[i];
+            foot.position -= step;
+            foot.normal = unit(-gradient);
+            step.length()
+                > 1e-9 * foot.position.distance(points[i]) + f64::EPSILON * points[i].abs().max_element()
+        });
+        if moving.is_empty() {
+            break;
+        }
+    }
+    feet
+}
+
+/// Points all over the surface, about half a cell apart, on its creases and corners too, from a mesh of it.
+fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid) -> Vec<DVec3> {
+    let mut points = Vec::with_capacity(2 * mesh.positions.len());
+    let caps: std::collections::HashSet<u32> = mesh.caps.iter().copied().collect();
+    points.extend((0_u32..).zip(&mesh.positions).filter(|(v, _)| !caps.contains(v)).map(|(_, p)| *p));
+    let middles: Vec<DVec3> = mesh
+        .triangles
+        .iter()
+        .filter(|t| !t.iter().any(|v| caps.contains(v)))
+        .map(|&t| corners(mesh, t).iter().sum::<DVec3>() / 3.0)
+        .collect();
+    let parts: Vec<Vec<Foot>> = middles.par_chunks(BATCH).map(|part| feet(distance, part)).collect();
+    points.extend(parts.iter().flatten().map(|foot| foot.position));
+    // a point that Newton's method lost says nothing
+    points.retain(|p| p.is_finite() && grid.bounds().contains(*p));
+    points
+}
+
+/// A triangle in the index.
+struct Place([DVec3; 3]);
+
+impl RTreeObject for Place {
+    type Envelope = AABB<[f64; 3]>;
+
+    fn envelope(&self) -> Self::Envelope {
+        let [a, b, c] = self.0;
+        AABB::from_corners(a.min(b).min(c).to_array(), a.max(b).max(c).to_array())
+    }
+}
+
+impl PointDistance for Place {
+    fn distance_2(&self, point: &[f64; 3]) -> f64 {
+        let p = DVec3::from_array(*point);
+        p.distance_squared(nearest_point(self.0, p))
+    }
+}
+
+fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
+    let index = RTree::bulk_load(mesh.triangles.iter().map(|&t| Place(corners(mesh, t))).collect());
+    let parts: Vec<Sums> = points
+        .par_chunks(BATCH)
+        .map(|points| {
+            let mut sums = Sums::default();
+            for p in points {
+                let nearest = index.nearest_neighbor(p.to_array());
+                sums.add(nearest.map_or(f64::INFINITY, |t| t.distance_2(&p.to_array()).sqrt()));
+            }
+            sums
+        })
+        .collect();
+    Sums::join(parts.into_iter())
+}
+
+/// The point of a triangle nearest to `p`: inside, on a side or in a corner.
+fn nearest_point([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
+    let normal = (b - a).cross(c - a);
+    let above = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) >= 0.0;
+    if normal != DVec3::ZERO && above(a, b) && above(b, c) && above(c, a) {
+        return p - normal * (normal.dot(p - a) / normal.length_squared());
+    }
+    let on_side = |from: DVec3, to: DVec3| {
+        let way = to - from;
+        let share = way.dot(p - from) / way.length_squared();
+        from + way * if share > 0.0 { share.min(1.0) } else { 0.0 }
+    };
+    let sides = [on_side(a, b), on_side(b, c), on_side(c, a)];
+    sides.into_iter().min_by(|q, r| p.distance_squared(*q).total_cmp(&p.distance_squared(*r))).unwrap_or(a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Closures;
+    use crate::geom::Aabb;
+    use crate::mesh::marching_cubes;
+
+    #[test]
+    fn nearest_points_of_a_triangle() {
+        let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for (p, expected) in [
+            (DVec3::new(0.2, 0.3, 5.0), DVec3::new(0.2, 0.3, 0.0)),
+            (DVec3::new(0.4, -2.0, 1.0), DVec3::new(0.4, 0.0, 0.0)),
+            (DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.5, 0.5, 0.0)),
+            (DVec3::new(-1.0, -1.0, 2.0), DVec3::ZERO),
+            (DVec3::new(-1.0, 3.0, 2.0), DVec3::Y),
+        ] {
+            assert!(nearest_point(triangle, p).distance(expected) < 1e-15, "{p}");
+        }
+        // without area: a point or a segment
+        assert_eq!(nearest_point([DVec3::X; 3], DVec3::ZERO), DVec3::X);
+        assert_eq!(nearest_point([DVec3::ZERO, DVec3::X, 2.0 * DVec3::X], DVec3::ONE), DVec3::X);
+    }
+
+    #[test]
+    fn shapes_of_triangles() {
+        let equilateral = [DVec3::X, DVec3::Y, DVec3::Z];
+        assert!((radius_ratio(equilateral) - 1.0).abs() < 1e-15);
+        assert!((min_angle(equilateral) - 60.0).abs() < 1e-12);
+        // sides 3, 4, 5: r = 1, R = 2.5
+        let right = [DVec3::ZERO, 3.0 * DVec3::X, 4.0 * DVec3::Y];
+        assert!((radius_ratio(right) - 0.8).abs() < 1e-15);
+        assert!((min_angle(right) - (3.0_f64 / 4.0).atan().to_degrees()).abs() < 1e-12);
+        assert_eq!((radius_ratio([DVec3::X; 3]), min_angle([DVec3::X; 3])), (0.0, 0.0));
+    }
+
+    /// A mesh of a ball of radius r against the field of one of radius 1: 1 − r both ways, up to the chords' error.
+    #[test]
+    fn a_ball_that_is_too_small_is_told_both_ways() {
+        let ball = |radius: f64| Closures {
+            omega: move |p: DVec3| radius - p.length(),
+            gradient: |p: DVec3| -p.normalize_or(DVec3::X),
+        };
+        let bounds = Aabb::new(DVec3::NEG_ONE, DVec3::ONE);
+        let grid = Grid::around(&bounds, Resolution::Cells(40)).unwrap();
+        let mesh = marching_cubes(&ball(0.9), &grid, &|_| ()).unwrap();
+        let quality = measure(&mesh, &ball(1.0), &ball(1.0), &grid).unwrap();
+        let chord = 3.0 * grid.spacing().x.powi(2) / 8.0 / 0.9;
+        for found in [quality.to_surface, quality.from_surface] {
+            assert!(found.max >= 0.1 && found.max <= 0.1 + chord, "{found:?}");
+            assert!(found.rms >= 0.1 && found.rms < found.max && found.samples > 1000, "{found:?}");
+        }
+        assert!((quality.volume_error - (0.9_f64.powi(3) - 1.0)).abs() < 0.01, "{quality:?}");
+        assert!((quality.area_error - (0.9_f64.powi(2) - 1.0)).abs() < 0.01, "{quality:?}");
+        assert_eq!(quality.flipped, 0);
+        assert!(quality.normal_error.max < 90.0 && quality.slivers < 0.2, "{quality:?}");
+    }
+
+    /// A lost part shows only from the surface's side.
+    #[test]
+    fn a_missing_ball_shows_from_the_surface() {
+        let two = Closures {
+            omega: |p: DVec3| (0.3 - p.length()).max(0.3 - p.distance(DVec3::X)),
+            gradient: |p: DVec3| {
+                let nearer = if p.x < 0.5 { p } else { p - DVec3::X };
+                -nearer.normalize_or(DVec3::X)
+            },
+        };
+        let one =
+            Closures { omega: |p: DVec3| 0.3 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
+        let bounds = Aabb::new(DVec3::splat(-0.4), DVec3::new(1.4, 0.4, 0.4));
+        let grid = Grid::filling(&bounds, Resolution::Cells(45)).unwrap();
+        let mesh = marching_cubes(&one, &grid, &|_| ()).unwrap();
+        let quality = measure(&mesh, &two, &two, &grid).unwrap();
+        assert!(quality.to_surface.max < 0.01, "{quality:?}");
+        assert!((quality.from_surface.max - 1.0).abs() < 0.02, "{quality:?}");
+        assert!(quality.hausdorff() == quality.from_surface.max);
+    }
+
+    #[test]
+    fn triangles_that_face_inwards_are_counted() {
+        let ball =
+            Closures { omega: |p: DVec3| 0.8 - p.length(), gradient: |p: DVec3| -p.normalize_or(DVec3::X) };
+        let grid = Grid::around(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE), Resolution::Cells(16)).unwrap();
+        let mut mesh = marching_cubes(&ball, &grid, &|_| ()).unwrap();
+        mesh.triangles[7].swap(0, 1);
+        mesh.triangles[100].swap(1, 2);
+        assert_eq!(measure(&mesh, &ball, &ball, &grid).unwrap().flipped, 2);
+    }
+}
