@@ -192,7 +192,8 @@ impl Emitter<'_, '_> {
     fn scaled(&mut self, a: Value, b: Value, junction: Junction) -> Scaled {
         let less = self.compare(FloatCC::LessThan, a, b);
         let greater = self.compare(FloatCC::LessThan, b, a);
-        let (min, max) = (self.select(less, a, b), self.select(greater, a, b));
+        // one comparison for both, so that a NaN is one of them
+        let (min, max) = (self.select(less, a, b), self.select(less, b, a));
         let sum = self.builder.ins().fadd(a, b);
         let (zero, one) = (self.constant(0.0), self.constant(1.0));
         let (near, far, small) = match junction {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::graph::Node;
+use super::graph::{Graph, Node};
 use super::op::Binary;
 use super::r0;
 use super::real::Real;
@@ -50,6 +50,22 @@ impl Forms {
         self.exceptions.get(&pair(u, v)).copied().unwrap_or(self.default)
     }
 
+    /// The forms for a graph that keeps only these nodes of the present one, in their order.
+    #[must_use]
+    pub fn kept(&self, kept: &[bool], graph: &Graph) -> Self {
+        let numbers: Vec<usize> = kept
+            .iter()
+            .scan(0, |next, &kept| {
+                let number = *next;
+                *next += usize::from(kept);
+                Some(number)
+            })
+            .collect();
+        let of = |node: Node| kept[node.index()].then(|| graph.node(numbers[node.index()]));
+        let exceptions = self.exceptions.iter().filter_map(|(&(u, v), &form)| Some(((of(u)?, of(v)?), form)));
+        Self { default: self.default, exceptions: exceptions.collect() }
+    }
+
     /// How many pairs of operands do not have the default form.
     pub fn exceptions(&self) -> usize {
         self.exceptions.len()
@@ -90,7 +106,7 @@ impl Form {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::{Axis, Graph};
+    use crate::ir::Axis;
 
     #[test]
     fn a_pair_has_one_form_in_either_order() {

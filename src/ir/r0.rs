@@ -74,20 +74,22 @@ pub fn and_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
     let tau = (if p.small { p.min } else { p.max }) / p.denominator;
     let value = if p.small { p.min - p.min * tau } else { p.sum - p.h };
     let tau = if p.denominator == T::from_f64(0.0) { T::from_f64(-SINGULAR_TAU) } else { tau };
-    let (by_u, by_v) = weights_of_tau(tau, p.small, u < v);
+    let (by_u, by_v) = weights_of_tau(tau, p.small, [u < v, v < u]);
     (value, by_u, by_v)
 }
 
-/// The weights from τ, which has the opposite sign on the big branch; `less`: u < v.
+/// The weights from τ, which has the opposite sign on the big branch; `less`: u < v, v < u. At a tie both operands get
+/// the same one.
 #[inline(always)]
-fn weights_of_tau<T: Real>(tau: T, small: bool, less: bool) -> (T, T) {
+fn weights_of_tau<T: Real>(tau: T, small: bool, less: [bool; 2]) -> (T, T) {
     let one = T::from_f64(1.0);
     let square = tau * tau;
     let scale = one / (one + square);
     let lesser = (one - tau) * (one - tau) * scale; // weight of m
     let greater = (if small { square } else { one }) * (scale + scale); // weight of M
-    // u is M on the small branch unless it is the minimum, and the other way round on the big branch
-    if small == less { (lesser, greater) } else { (greater, lesser) }
+    // an operand is M on the small branch unless it is the minimum, and the other way round on the big branch
+    let of = |less: bool| if small == less { lesser } else { greater };
+    (of(less[0]), of(less[1]))
 }
 
 /// (∂/∂u, ∂/∂v) of u ∨ v.
@@ -117,8 +119,8 @@ struct Scaled<T> {
 #[inline(always)]
 fn scaled<T: Real>(u: T, v: T) -> Scaled<T> {
     let one = T::from_f64(1.0);
-    let min = if u < v { u } else { v };
-    let max = if u > v { u } else { v };
+    // one comparison for both, so that a NaN is one of them
+    let (min, max) = if u < v { (u, v) } else { (v, u) };
     let small = u + v > T::from_f64(0.0); // the sign of a rounded sum is exact, and it may overflow
     let (m, big) = if small { (min, max) } else { (max, min) };
     // exact at a tie, and a number at 0/0 and ∞/∞
@@ -153,7 +155,7 @@ pub fn and_weighted_scaled<T: Real>(u: T, v: T) -> (T, T, T) {
     let s = scaled(u, v);
     let tau = s.q / s.k1;
     let value = if s.small { s.m - s.m * tau } else { s.big * (s.k1 + s.q) };
-    let (by_u, by_v) = weights_of_tau(if s.small { tau } else { -tau }, s.small, u < v);
+    let (by_u, by_v) = weights_of_tau(if s.small { tau } else { -tau }, s.small, [u < v, v < u]);
     (value, by_u, by_v)
 }
 

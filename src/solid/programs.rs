@@ -67,7 +67,7 @@ pub struct Compiled<T> {
 /// What answers for many points.
 enum Many<T> {
     /// One loop with all operations in it.
-    Loop(BatchProgram<T>),
+    Loop(Box<BatchProgram<T>>),
     /// Step by step, for graphs with R₀ or with many leaves.
     Blocks(BlockProgram<T>),
 }
@@ -116,6 +116,10 @@ impl Programs {
             [root] => vec![guarded(&mut graph, root, guard, &mut forms)],
             _ => outputs.into_iter().map(|output| graph.binary(Binary::Add, output, guard)).collect(),
         };
+        // what the guard has replaced is not computed any more
+        let used = graph.reachable(&outputs);
+        let (graph, outputs) = graph.extract(&outputs);
+        let forms = forms.map(|forms| forms.kept(&used, &graph));
         let interpreter = Interpreter::with_forms(&graph, &outputs, forms.each_ref());
         Self { graph, outputs, forms, interpreter, double: Compiled::new(), single: Compiled::new() }
     }
@@ -139,9 +143,9 @@ impl Programs {
     fn batch_program<T: Lane>(&self) -> Result<&Many<T>, CodegenError> {
         let compile = || match BlockProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION))? {
             Some(program) => Ok(Many::Blocks(program)),
-            None => {
-                BatchProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION)).map(Many::Loop)
-            }
+            None => BatchProgram::compile(&self.graph, &self.outputs, self.forms(T::PRECISION))
+                .map(Box::new)
+                .map(Many::Loop),
         };
         T::compiled(self).batch.get_or_init(compile).as_ref().map_err(Clone::clone)
     }

@@ -117,6 +117,14 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The forms that are compared.
+const FORMS: [(&str, Form); 4] = [
+    ("stable", Form::Stable),
+    ("guarded", Form::Guarded),
+    ("textbook", Form::Textbook),
+    ("scaled", Form::Scaled),
+];
+
 /// The same solid in every form and on every engine.
 fn variants(program: &Program, solid: &Solid) -> Result<Vec<(&'static str, Solid)>, Failure> {
     let node = program.module().solids.iter().find(|s| s.name == solid.name()).map(|s| s.node);
@@ -125,7 +133,7 @@ fn variants(program: &Program, solid: &Solid) -> Result<Vec<(&'static str, Solid
     let make =
         |engine, form| Solid::with_form(solid.name(), graph, node, engine, form).map_err(Failure::usage);
     let mut all = Vec::new();
-    for (name, form) in [("stable", Form::Stable), ("textbook", Form::Textbook), ("scaled", Form::Scaled)] {
+    for (name, form) in FORMS {
         all.push((name, make(Engine::Jit, form)?));
     }
     all.push(("interp", make(Engine::Interpreter, Form::Stable)?));

@@ -129,6 +129,9 @@ fn is_choice(op: Binary) -> bool {
     matches!(op, Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax)
 }
 
+/// A node, and the constants of its cone.
+type Member = (Node, Vec<f64>);
+
 /// The graph taken apart.
 struct Parts<'g> {
     graph: &'g Graph,
@@ -177,7 +180,7 @@ impl<'g> Parts<'g> {
     /// Gives the cut nodes at the bottom that have one shape a common program.
     fn share(&mut self) {
         let mut groups: FxHashMap<Vec<Expr>, usize> = FxHashMap::default();
-        let mut members: Vec<(Graph, Vec<(Node, Vec<f64>)>)> = Vec::new();
+        let mut members: Vec<(Graph, Vec<Member>)> = Vec::new();
         for &node in &self.together[0] {
             let (shape, _, constants) = self.graph.parametrised(node);
             let number = *groups.entry(shape.exprs().to_vec()).or_insert_with(|| {
