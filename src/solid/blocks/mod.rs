@@ -23,7 +23,7 @@ use plan::{Operation, Plan, Step};
 const CACHED_BYTES: usize = 24 << 10;
 
 /// Points of a block, at least and at most; a multiple of every vector's lanes.
-const SHORTEST: usize = 32;
+const SHORTEST: usize = 128;
 const LONGEST: usize = 256;
 
 /// A rest of points is filled up to a multiple of this: the widest vector of `f32`.
