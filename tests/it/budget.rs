@@ -149,8 +149,8 @@ fn the_report_sets_certificates_beside_measured_errors() {
             certified += 1;
         }
     }
-    // three forms and the interpreter in two precisions, and single points in three forms
-    assert_eq!(certified, 11);
+    // four forms and the interpreter in two precisions, and single points in four forms
+    assert_eq!(certified, 14);
 }
 
 #[test]
