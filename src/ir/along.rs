@@ -36,7 +36,7 @@ pub fn along(graph: &mut Graph, root: Node, direction: u32) -> Option<[Node; 6]>
         known.insert(node, polynomial);
     }
     let terms = known.remove(&root)?;
-    // results below the range of normal numbers have lost digits that no multiple of ε covers
+    // bounds of errors below the range of normal numbers have lost digits themselves
     let least = builder.graph.constant(f64::MIN_POSITIVE);
     let zero = builder.graph.constant(0.0);
     let values = terms.map(|term| term.map_or(zero, |term| term.value));
@@ -120,7 +120,7 @@ impl Builder<'_> {
     /// (a ± α)(b ± β): |a|β + (|b| + β)α, and the rounding of ab.
     fn times(&mut self, a: Term, b: Term) -> Term {
         let value = self.graph.binary(Binary::Mul, a.value, b.value);
-        let own = self.rounding(value);
+        let own = self.rounding_or_underflow(value);
         let from_b = b.error.map(|error| self.scaled(error, a.value));
         let from_a = a.error.map(|error| {
             let plain = self.scaled(error, b.value);
@@ -133,7 +133,7 @@ impl Builder<'_> {
 
     fn quotient(&mut self, a: Term, divisor: Node) -> Term {
         let value = self.graph.binary(Binary::Div, a.value, divisor);
-        let own = self.rounding(value);
+        let own = self.rounding_or_underflow(value);
         let magnitude = self.graph.unary(Unary::Abs, divisor);
         let brought = a.error.map(|error| self.graph.binary(Binary::Div, error, magnitude));
         Term { value, error: self.added(brought, Some(own)) }
@@ -143,6 +143,14 @@ impl Builder<'_> {
     fn rounding(&mut self, value: Node) -> Node {
         let epsilon = self.graph.constant(ROUNDING);
         self.scaled(epsilon, value)
+    }
+
+    /// ε|v| of a product or quotient, and the digits that it loses below the range of normal numbers: what multiplies
+    /// it later makes them count.
+    fn rounding_or_underflow(&mut self, value: Node) -> Node {
+        let own = self.rounding(value);
+        let least = self.graph.constant(f64::MIN_POSITIVE);
+        self.graph.binary(Binary::Add, own, least)
     }
 
     /// bound·|v|

@@ -208,22 +208,6 @@ pub fn or_weighted_textbook<T: Real>(u: T, v: T) -> (T, T, T) {
     (or_textbook(u, v), or_weight_textbook(u, v), or_weight_textbook(v, u))
 }
 
-/// u ∧ v for bounds of intervals, which may be infinite: the scaled form with its limits.
-pub fn and_of_bounds(u: f64, v: f64) -> f64 {
-    if u == f64::NEG_INFINITY || v == f64::NEG_INFINITY {
-        return f64::NEG_INFINITY;
-    }
-    if u == f64::INFINITY || v == f64::INFINITY {
-        return u.min(v); // the limit of m·(1 − τ) as τ → 0
-    }
-    and_scaled(u, v)
-}
-
-/// u ∨ v for bounds of intervals.
-pub fn or_of_bounds(u: f64, v: f64) -> f64 {
-    -and_of_bounds(-u, -v)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -137,7 +137,9 @@ impl Candidate {
         let over = if plan.local { shifted(over, origin) } else { *over };
         // the solid's own program, unless it was compiled in another form for comparison
         let forms = if plan == Plan::STANDARD && solid.inner.omega.form == Form::Stable {
-            solid.inner.omega.value.forms(Precision::F64).clone()
+            // of this graph: that of the program has its guard, and other nodes
+            let [double, _] = super::programs::forms(&graph, Form::Stable);
+            double
         } else {
             Growth::over(&graph, &over).forms(&graph, plan.form, float)
         };

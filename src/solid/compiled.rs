@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 
 use crate::codegen::{self, Code, CodegenError, Form, Forms, Precision, Request, Rounding, Shape};
-use crate::ir::{Graph, Interpreter, Node, Real};
+use crate::ir::{Expr, Graph, Interpreter, Node, Real};
 
 use glam::DVec3;
 
@@ -259,7 +259,6 @@ impl<T: Lane> SegmentProgram<T> {
     }
 }
 
-/// A compiled range program.
 /// How range programs are called: rounding upwards where this file knows how to ask the processor for it.
 const ROUNDING: Rounding =
     if cfg!(all(target_arch = "x86_64", unix)) { Rounding::Upward } else { Rounding::Nearest };
@@ -308,6 +307,11 @@ impl RangeProgram {
         rounding: Rounding,
         parameters: Option<usize>,
     ) -> Result<Self, CodegenError> {
+        let given = parameters.unwrap_or(0);
+        let is_given = |expr| !matches!(expr, Expr::Parameter(i) if i as usize >= given);
+        if !graph.nodes().all(|(_, expr)| is_given(expr)) {
+            return Err(CodegenError::Bug("a parameter that the program is not given".into()));
+        }
         if rounding == Rounding::Upward && ROUNDING != Rounding::Upward {
             return Err(CodegenError::Unsupported("rounding upwards".into()));
         }

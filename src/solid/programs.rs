@@ -44,7 +44,7 @@ pub enum Guard {
 }
 
 /// The forms of `f64` and of `f32`: the stable one gives way to the scaled one where squares may leave the range.
-fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
+pub fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
     if form != Form::Stable {
         return [Forms::all(form), Forms::all(form)];
     }

@@ -104,6 +104,16 @@ impl<'a> Sweep<'a> {
         }
         self.enclosures.set(left - 1);
         let enclosure = self.leaves.enclose(leaf, negated, self.path, (t0, t1));
+        if t0 >= t1 {
+            // one instant: nothing is left to be divided
+            if enclosure.range.lo >= 0.0 {
+                out.certain.push((t0, t1));
+            }
+            if enclosure.range.hi.is_nan() || enclosure.range.hi >= 0.0 {
+                out.possible.push((t0, t1));
+            }
+            return;
+        }
         let met = Met::of(&enclosure, (t0, t1));
         let [a, b, c] = enclosure.coefficients.map(|c| c.width());
         let width = t1 - t0;

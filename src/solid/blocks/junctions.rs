@@ -75,7 +75,7 @@ const RUN: usize = 16;
 const CANCELLED: f64 = 1.0 / 8.0;
 
 /// Whether the textbook's result is near enough: nothing cancelled, and no square that counts has left the range.
-/// NaN is near enough to itself.
+/// NaN is not near enough: the stable form then gives NaN too.
 #[inline(always)]
 fn is_near<T: Reach>(result: T, h: T) -> bool {
     let part = result.abs() >= h * T::from_f64(CANCELLED);

@@ -5,7 +5,8 @@
 //! the throughput of roots and divisions on processors with wide vectors, no chain of dependent operations in deep
 //! folds, no spilled registers, and code whose size is that of the different shapes, not of the leaves.
 //!
-//! Invariant: the same bits as the interpreter and the programs for one point, whatever the number of points.
+//! Invariant: the same bits as the interpreter and the programs for one point, whatever the number of points; except in
+//! the guarded form, whose choice depends on the points that are looked at together.
 
 mod junctions;
 mod plan;
@@ -39,6 +40,7 @@ pub struct BlockProgram<T> {
     parameters: Vec<T>,
     columns: usize,
     block: usize,
+    outputs: usize,
 }
 
 /// A step with its code.
@@ -88,7 +90,8 @@ impl<T: Lane> BlockProgram<T> {
         let parameters = plan.constants.into_iter().map(T::from_f64).collect();
         let fitting = CACHED_BYTES / (size_of::<T>() * plan.columns.max(1));
         let block = (fitting / SHORTEST * SHORTEST).clamp(SHORTEST, LONGEST);
-        Ok(Some(Self { steps, pieces, parameters, columns: plan.columns, block }))
+        let (columns, outputs) = (plan.columns, outputs.len());
+        Ok(Some(Self { steps, pieces, parameters, columns, block, outputs }))
     }
 
     /// All outputs at many points, which may be any number.
@@ -97,13 +100,14 @@ impl<T: Lane> BlockProgram<T> {
     /// If the columns differ in length or there are not as many output columns as outputs.
     pub fn call<const N: usize>(&self, points: [&[T]; 3], mut out: [&mut [T]; N]) {
         let count = points[0].len();
+        assert_eq!(N, self.outputs, "outputs of the program");
         assert!(
             points.iter().all(|c| c.len() == count) && out.iter().all(|c| c.len() == count),
             "column lengths"
         );
         let whole = count / PADDING * PADDING;
         T::with_scratch(|scratch| {
-            scratch.columns.resize(self.columns * self.block, T::default());
+            self.make_room(scratch);
             for at in (0..whole).step_by(self.block) {
                 let range = at..(at + self.block).min(whole);
                 let mut outputs = out.each_mut().map(|column| &mut column[range.clone()]);
@@ -126,16 +130,25 @@ impl<T: Lane> BlockProgram<T> {
 
     /// All outputs at one point: for graphs so large that a program for single points would take too long to make.
     pub fn call_one(&self, point: [T; 3], out: &mut [T]) {
+        assert_eq!(out.len(), self.outputs, "outputs of the program");
         let inputs = point.map(|coordinate| [coordinate; PADDING]);
         let mut results = [[T::default(); PADDING]; MAX_OUTPUTS];
         let mut outputs = results.each_mut().map(<[T; PADDING]>::as_mut_slice);
         T::with_scratch(|scratch| {
-            scratch.columns.resize(self.columns * self.block, T::default());
+            self.make_room(scratch);
             let outputs = &mut outputs[..out.len()];
             self.block(inputs.each_ref().map(<[T; PADDING]>::as_slice), outputs, scratch);
         });
         for (out, column) in out.iter_mut().zip(results) {
             *out = column[0];
+        }
+    }
+
+    /// Never less than was there: programs of different sizes take turns.
+    fn make_room(&self, scratch: &mut Scratch<T>) {
+        let needed = self.columns * self.block;
+        if scratch.columns.len() < needed {
+            scratch.columns.resize(needed, T::default());
         }
     }
 
