@@ -54,8 +54,8 @@ pub fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
 
 type Slot<P> = OnceLock<Result<P, CodegenError>>;
 
-/// Graphs with more nodes than this are answered by their program over blocks for single points too: making one
-/// program of 500 balls (4 500 nodes) takes 30 ms, and a point through blocks only twice as long as through that.
+/// Graphs with more nodes than this are answered by their program over blocks for single points too: one program of
+/// 500 balls (4 500 nodes) takes some 30 ms to be made, which pays only for very many single points.
 const LARGE: usize = 1500;
 
 /// The compiled programs of one precision.

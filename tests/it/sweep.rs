@@ -28,15 +28,15 @@ const NAMES: [&str; 12] = [
     "rounded",
 ];
 
-struct Random(u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
-    fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn vector(&mut self) -> DVec3 {
+    pub(crate) fn vector(&mut self) -> DVec3 {
         2.0 * DVec3::new(self.unit(), self.unit(), self.unit()) - 1.0
     }
 }

@@ -6,6 +6,8 @@ use rfm::glam::DVec3;
 use rfm::sph::{Obstacle, Parameters, Particles, Simulation};
 use rfm::{Field, Program, Solid};
 
+use crate::sweep::Random;
+
 /// Hollow bodies with a wall of 1e-6, and the hollows within.
 const SHELLS: &str = "rfm 1
 let w = 1e-6
@@ -23,19 +25,6 @@ solid cave = (ball([0.2, 0, 0], 0.4 + w) or ball([-0.3, 0.1, 0], 0.35 + w) or cy
   \\ cave_in
 solid spikes = any i in 0..8: cone(0.15, 0.8).rotate_y(i*45 deg).move([0.02*i, 0, 0])
 ";
-
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn vector(&mut self) -> DVec3 {
-        2.0 * DVec3::new(self.unit(), self.unit(), self.unit()) - 1.0
-    }
-}
 
 fn solid(name: &str) -> Solid {
     Program::from_source("shells.rfm", SHELLS).unwrap_or_else(|e| panic!("{e}")).solid(name).unwrap()

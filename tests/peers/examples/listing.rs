@@ -1,4 +1,4 @@
-//! What the machine code consists of, as evidence for where time goes: `cargo run --release --example listing`.
+//! What the machine code of single points consists of, as evidence for where time goes: `cargo run --release --example listing`.
 //!
 //! For each program: nodes of its graph, instructions, divisions and roots, loads from and stores to the stack
 //! (constants that found no register, and values that lost theirs), selects. With the argument `asm`, the code of the
@@ -8,7 +8,7 @@
 #[path = "../src/scenes.rs"]
 mod scenes;
 
-use rfm::codegen::{Form, Listing, Precision, Request, Shape};
+use rfm::codegen::{Form, Forms, Listing, Precision, Request, Shape};
 use rfm::solid::ProgramKind;
 use rfm::{Program, Solid};
 use scenes::Order;
@@ -46,13 +46,13 @@ fn main() {
 fn assembly(solid: &Solid, kind: ProgramKind, form: Form, precision: Precision) -> String {
     let (graph, outputs) = solid.graph(kind);
     let (shape, inputs) = (Shape::Point, &[][..]);
-    let request = Request { graph, inputs, outputs, precision, shape, form, parameters: false };
+    let request = Request { graph, inputs, outputs, precision, shape, forms: &Forms::all(form), parameters: false };
     Listing::of(request).unwrap_or_else(|e| panic!("{e}")).assembly
 }
 
 fn print(what: &str, solid: &Solid, kind: ProgramKind, form: Form, precision: Precision) {
     let text = assembly(solid, kind, form, precision);
-    // the loop is the longest block
+    // the program is the longest block
     let longest = text.split("\nblock").max_by_key(|block| block.len()).unwrap_or_default();
     let lines: Vec<&str> = longest.lines().skip(1).map(str::trim).collect();
     let count = |test: &dyn Fn(&str) -> bool| lines.iter().filter(|line| test(line)).count();
