@@ -5,12 +5,14 @@
 //!
 //! Invariant: nothing here knows that a compiler exists, so a closure can stand in for a compiled solid.
 
+mod faces;
 mod sweep;
 
 use glam::DVec3;
 
 use crate::{geom::Aabb, interval::Interval};
 
+pub use faces::{Face, Faces, Part};
 pub use sweep::{Entry, Normals, Path, last_outside, search_path};
 
 /// Borrowed points as a structure of arrays; the three slices have one length.
@@ -106,6 +108,20 @@ pub trait Field: Sync {
     /// length; a field that knows nothing of its range is sampled, see [`Path::resolution`].
     fn first_entry(&self, path: &Path) -> Option<Entry> {
         search_path(self, path)
+    }
+
+    /// The faces of the obstacle's surface that may lie within `reach` of a point, and how they are joined; nothing is
+    /// added if the whole ball of that radius lies in the fluid.
+    ///
+    /// The default knows one face, by the distance −ω/|∇ω|, which holds near the surface only.
+    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
+        let (w, gradient) = self.omega_grad(p);
+        let slope = gradient.length();
+        let distance = -w / slope;
+        // a vanishing gradient gives no face
+        if distance < reach && slope > 0.0 {
+            faces.push(Part::Face(Face { distance, normal: -gradient / slope, mean_curvature: 0.0 }));
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::eval::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
-use crate::ir::Node;
+use crate::ir::{Node, Unary};
 use crate::syntax::ast::{self, Entry, Expr, ExprKind, Name};
 use crate::syntax::{Dimension, parse_unit};
 
@@ -21,19 +21,67 @@ pub struct Scene {
     /// The container.
     pub domain: Aabb,
     pub domain_span: Span,
-    /// Part of the normal speed that a wall of the box gives back, 0 … 1.
-    pub wall_restitution: f64,
+    /// What the walls of the box do to a particle that hits them.
+    pub walls: Bounce,
+    /// Whether a fluid sticks to walls and obstacles.
+    pub slip: Slip,
+    /// The vessel within the box, if there is one: the fluid stays where it is positive.
+    pub container: Option<Container>,
     pub fluid: Fluid,
     pub obstacles: Vec<Obstacle>,
     /// m/s²
     pub gravity: DVec3,
     pub method: Method,
+    pub solver: Solver,
     pub run: Run,
     /// The largest error of ω that is accepted of its obstacles in the box, if one is stated.
     pub tolerance: Option<Tolerance>,
 }
 
-/// The defaults are table 1 of the paper.
+/// What becomes of a particle at a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounce {
+    /// Part of the normal speed that is given back, 0 … 1.
+    pub restitution: f64,
+    /// Coefficient of friction μ.
+    pub friction: f64,
+}
+
+/// Whether a fluid sticks to walls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slip {
+    Free,
+    No,
+}
+
+/// A vessel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Container {
+    pub name: String,
+    /// Positive outside the vessel: what the fluid meets.
+    pub outside: Node,
+    pub span: Span,
+    pub bounce: Bounce,
+}
+
+/// How a method is run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solver {
+    /// Mean compression that `dfsph` accepts.
+    pub compression: f64,
+    /// Of its iterations, at most.
+    pub iterations: usize,
+    /// Of sums over neighbours; the method decides if it is not given.
+    pub precision: Option<Precision>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    Single,
+    Double,
+}
+
+/// The defaults are table 1 of the paper for its method, and those of water and of the particles' spacing for others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fluid {
     pub name: String,
@@ -59,8 +107,16 @@ pub struct Fluid {
     pub stiffness: f64,
     /// h, m
     pub support_radius: f64,
+    /// Speed of sound of `wcsph`, m/s; ten times the speed of a fall through the box if it is not given.
+    pub sound_speed: Option<f64>,
+    /// δ of the density diffusion of `wcsph`.
+    pub density_diffusion: f64,
+    /// α of the artificial viscosity of `wcsph`.
+    pub artificial_viscosity: f64,
+    /// Whether pressure may pull.
+    pub negative_pressure: bool,
     /// At the start, m/s.
-    pub velocity: DVec3,
+    pub velocity: [Node; 3],
     /// Random displacement of the start positions, as a part of the particle spacing.
     pub jitter: f64,
     pub seed: u64,
@@ -72,8 +128,7 @@ pub struct Obstacle {
     pub name: String,
     pub shape: Node,
     pub span: Span,
-    /// Coefficient of restitution c_R, 0 … 1.
-    pub restitution: f64,
+    pub bounce: Bounce,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,6 +143,10 @@ pub enum Fill {
 pub enum Method {
     /// Equations (8)–(14) of the paper, corrected.
     Paper,
+    /// Weakly compressible.
+    Wcsph,
+    /// Divergence-free (Bender & Koschier 2017).
+    Dfsph,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,26 +159,44 @@ pub struct Run {
     pub save_every: f64,
 }
 
-const SCENE_KEYS: [&str; 8] = ["units", "box", "fluid", "obstacle", "gravity", "method", "run", "tolerance"];
+const SCENE_KEYS: [&str; 11] = [
+    "units",
+    "box",
+    "container",
+    "fluid",
+    "obstacle",
+    "gravity",
+    "walls",
+    "method",
+    "solver",
+    "run",
+    "tolerance",
+];
 /// Keys that open a block; all others have a value.
-const BLOCKS: [&str; 4] = ["box", "fluid", "obstacle", "run"];
-const BOX_KEYS: [&str; 3] = ["min", "max", "restitution"];
-const FLUID_KEYS: [&str; 13] = [
+const BLOCKS: [&str; 6] = ["box", "container", "fluid", "obstacle", "solver", "run"];
+const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
+const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
+const FLUID_KEYS: [&str; 18] = [
     "shape",
     "fill",
     "particles",
     "density",
     "mass",
+    "spacing",
     "viscosity",
     "surface_tension",
     "threshold",
     "stiffness",
     "support_radius",
+    "sound_speed",
+    "density_diffusion",
+    "artificial_viscosity",
+    "negative_pressure",
     "velocity",
     "jitter",
     "seed",
 ];
-const OBSTACLE_KEYS: [&str; 2] = ["solid", "restitution"];
+const OBSTACLE_KEYS: [&str; 3] = ["solid", "restitution", "friction"];
 const RUN_KEYS: [&str; 3] = ["dt", "until", "save_every"];
 
 /// The entries of a block whose keys are known, each at most once unless it may be repeated.
@@ -144,28 +221,37 @@ impl<'a> Lowering<'a> {
             self.block(&scene.entries, "a scene", scene.name.span, &SCENE_KEYS, &["obstacle", "fluid"]);
         self.units(&block);
         let domain = self.domain(&block);
-        let fluid = self.fluid(&block);
-        let obstacles: Vec<Obstacle> =
-            block.blocks("obstacle").filter_map(|(_, entries, span)| self.obstacle(entries, span)).collect();
+        let words = [("paper", Method::Paper), ("wcsph", Method::Wcsph), ("dfsph", Method::Dfsph)];
+        let method = self.word_key(&block, "method", &words);
+        let fluid = self.fluid(&block, method.unwrap_or(Method::Paper));
+        let container = self.container(&block);
+        let slip = self.word_key(&block, "walls", &[("free_slip", Slip::Free), ("no_slip", Slip::No)]);
+        let solver = self.solver(&block);
+        let obstacles: Vec<Obstacle> = block
+            .blocks("obstacle")
+            .filter_map(|(_, entries, span)| self.obstacle(entries, span, "an obstacle"))
+            .collect();
         let gravity =
             self.vector_key(&block, "gravity", Dimension::ACCELERATION, DVec3::new(0.0, 0.0, -9.81));
-        let method = self.word_key(&block, "method", &[("paper", Method::Paper)]);
         let run = self.run(&block);
         let tolerance = block.setting("tolerance").and_then(|(_, value)| self.tolerance(value));
         if self.errors() > errors_before {
             return None;
         }
-        let (domain, wall_restitution, domain_span) = domain?;
+        let (domain, walls, domain_span) = domain?;
         Some(Scene {
             name: scene.name.text.clone(),
             span: scene.name.span,
             domain,
             domain_span,
-            wall_restitution,
+            walls,
+            slip: slip?,
+            container,
             fluid: fluid?,
             obstacles,
             gravity: gravity?,
             method: method?,
+            solver: solver?,
             run: run?,
             tolerance,
         })
@@ -245,7 +331,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    fn domain(&mut self, block: &Block<'_>) -> Option<(Aabb, f64, Span)> {
+    fn domain(&mut self, block: &Block<'_>) -> Option<(Aabb, Bounce, Span)> {
         let Some((_, entries, span)) = block.blocks("box").next() else {
             self.missing(block, "box", "write `box { min: [0, 0, 0], max: [3, 3, 3] }`");
             return None;
@@ -256,7 +342,7 @@ impl<'a> Lowering<'a> {
             self.missing(&block, "max", "write `max: [3, 3, 3]`");
         }
         let max = self.vector_key(&block, "max", Dimension::LENGTH, DVec3::ONE);
-        let restitution = self.number_key(&block, "restitution", Dimension::NONE, Some(0.5), Bound::Fraction);
+        let bounce = self.bounce(&block);
         let (min, max) = (min?, max?);
         if !max.cmpgt(min).all() {
             let message = format!("the box has no room: its size is {}", max - min);
@@ -266,10 +352,42 @@ impl<'a> Lowering<'a> {
             );
             return None;
         }
-        Some((Aabb::new(min, max), restitution?, span))
+        Some((Aabb::new(min, max), bounce?, span))
     }
 
-    fn fluid(&mut self, block: &Block<'_>) -> Option<Fluid> {
+    fn bounce(&mut self, block: &Block<'_>) -> Option<Bounce> {
+        let restitution = self.number_key(block, "restitution", Dimension::NONE, Some(0.5), Bound::Fraction);
+        let friction = self.number_key(block, "friction", Dimension::NONE, Some(0.0), Bound::NotNegative);
+        Some(Bounce { restitution: restitution?, friction: friction? })
+    }
+
+    fn container(&mut self, block: &Block<'a>) -> Option<Container> {
+        let (_, entries, span) = block.blocks("container").next()?;
+        let Obstacle { name, shape, span, bounce } = self.obstacle(entries, span, "a container")?;
+        let outside = self.module.graph.unary(Unary::Neg, shape);
+        Some(Container { name, outside, span, bounce })
+    }
+
+    fn solver(&mut self, block: &Block<'_>) -> Option<Solver> {
+        let (entries, span) =
+            block.blocks("solver").next().map_or((&[][..], block.span), |(_, entries, span)| (entries, span));
+        let block = self.block(entries, "a solver", span, &SOLVER_KEYS, &[]);
+        let compression =
+            self.number_key(&block, "compression", Dimension::NONE, Some(1e-3), Bound::Positive);
+        let iterations = self.count_key(&block, "iterations", 1);
+        let precision = self.word_key(
+            &block,
+            "precision",
+            &[("auto", None), ("f32", Some(Precision::Single)), ("f64", Some(Precision::Double))],
+        );
+        Some(Solver {
+            compression: compression?,
+            iterations: iterations?.unwrap_or(100),
+            precision: precision?,
+        })
+    }
+
+    fn fluid(&mut self, block: &Block<'_>, method: Method) -> Option<Fluid> {
         let mut fluids = block.blocks("fluid");
         let Some((label, entries, span)) = fluids.next() else {
             self.missing(
@@ -298,14 +416,47 @@ impl<'a> Lowering<'a> {
             |key, dimension, default, bound| self.number_key(&block, key, dimension, Some(default), bound);
         use Bound::{Fraction, NotNegative, Positive};
         let density = number("density", Dimension::DENSITY, 998.29, Positive);
+        let paper = method == Method::Paper;
         let mass = number("mass", Dimension::MASS, 0.02, Positive);
-        let viscosity = number("viscosity", Dimension::VISCOSITY, 3.5, NotNegative);
-        let surface_tension = number("surface_tension", Dimension::TENSION, 0.0728, NotNegative);
+        let spacing = number("spacing", Dimension::LENGTH, 0.02, Positive);
+        let viscosity =
+            number("viscosity", Dimension::VISCOSITY, if paper { 3.5 } else { 1e-3 }, NotNegative);
+        let surface_tension =
+            number("surface_tension", Dimension::TENSION, if paper { 0.0728 } else { 0.0 }, NotNegative);
         let threshold = number("threshold", Dimension::NONE, 7.065, Positive);
         let stiffness = number("stiffness", Dimension::ENERGY, 3.0, Positive);
-        let support_radius = number("support_radius", Dimension::LENGTH, 0.1, Positive);
+        let sound_speed = number("sound_speed", Dimension::SPEED, 1.0, Positive);
+        let density_diffusion = number("density_diffusion", Dimension::NONE, 0.1, NotNegative);
+        let artificial_viscosity = number("artificial_viscosity", Dimension::NONE, 0.02, NotNegative);
+        let (mass, density) = (mass?, density?);
+        // a spacing says as much as a mass
+        let mass = if block.setting("spacing").is_some() { density * spacing?.powi(3) } else { mass };
+        let own_support = if paper { 0.1 } else { 2.6 * (mass / density).cbrt() };
+        let support_radius =
+            self.number_key(&block, "support_radius", Dimension::LENGTH, Some(own_support), Positive);
+        let mut number =
+            |key, dimension, default, bound| self.number_key(&block, key, dimension, Some(default), bound);
         let jitter = number("jitter", Dimension::NONE, 0.0, Fraction);
-        let velocity = self.vector_key(&block, "velocity", Dimension::SPEED, DVec3::ZERO);
+        if let (Some((first, _)), Some((second, _))) = (block.setting("mass"), block.setting("spacing")) {
+            let message = "`mass` and `spacing` say the same: the mass of a particle is density·spacing³";
+            self.report(
+                Diagnostic::error(Code::SCENE_REPEATED, second.span, message)
+                    .label(first.span, "the mass is stated here"),
+            );
+        }
+        if let (Some((_, value)), false) = (block.setting("surface_tension"), paper)
+            && surface_tension.is_some_and(|tension| tension > 0.0)
+        {
+            let message = "surface tension is known to the method `paper` only";
+            self.report(
+                Diagnostic::error(Code::SCENE_KEY, value.span, message)
+                    .help("leave `surface_tension` out, or write `method: paper`"),
+            );
+        }
+        let negative_pressure =
+            self.word_key(&block, "negative_pressure", &[("clamp", false), ("keep", true)]);
+        let sound_speed = block.setting("sound_speed").is_some().then_some(sound_speed?);
+        let velocity = self.velocity(&block);
         let particles = self.count_key(&block, "particles", 1);
         let seed = self.count_key(&block, "seed", 0);
         let particles_span = block.setting("particles").map(|(_, value)| value.span);
@@ -317,22 +468,56 @@ impl<'a> Lowering<'a> {
             fill: fill?,
             particles: particles?,
             particles_span,
-            density: density?,
-            mass: mass?,
+            density,
+            mass,
             viscosity: viscosity?,
             surface_tension: surface_tension?,
             threshold: threshold?,
             stiffness: stiffness?,
             support_radius: support_radius?,
+            sound_speed,
+            density_diffusion: density_diffusion?,
+            artificial_viscosity: artificial_viscosity?,
+            negative_pressure: negative_pressure?,
             velocity: velocity?,
             jitter: jitter?,
             seed: seed?.unwrap_or(1) as u64,
         })
     }
 
-    fn obstacle(&mut self, entries: &'a [Entry], span: Span) -> Option<Obstacle> {
-        let block = self.block(entries, "an obstacle", span, &OBSTACLE_KEYS, &[]);
-        let restitution = self.number_key(&block, "restitution", Dimension::NONE, Some(0.5), Bound::Fraction);
+    /// Three speeds, which may depend on the place.
+    fn velocity(&mut self, block: &Block<'_>) -> Option<[Node; 3]> {
+        let Some((_, value)) = block.setting("velocity") else {
+            return Some([self.module.graph.constant(0.0); 3]);
+        };
+        let mut nodes = Vec::new();
+        if let ExprKind::Vector(parts) = &value.kind
+            && parts.len() == 3
+        {
+            for part in parts {
+                let node = match &part.kind {
+                    ExprKind::Quantity { .. } | ExprKind::Negate(_) => {
+                        let number = self.quantity_expr(part, Dimension::SPEED, "velocity")?;
+                        self.module.graph.constant(number)
+                    }
+                    _ => {
+                        let value = self.expr(part);
+                        self.as_number(&value, part.span)?
+                    }
+                };
+                nodes.push(node);
+            }
+        } else {
+            let found = self.expr(value);
+            let numbers = self.constant_vector(&found, value.span, "`velocity`")?;
+            nodes.extend(numbers.map(|number| self.module.graph.constant(number)));
+        }
+        nodes.try_into().ok()
+    }
+
+    fn obstacle(&mut self, entries: &'a [Entry], span: Span, what: &'static str) -> Option<Obstacle> {
+        let block = self.block(entries, what, span, &OBSTACLE_KEYS, &[]);
+        let bounce = self.bounce(&block);
         let Some((_, value)) = block.setting("solid") else {
             self.missing(&block, "solid", "write `solid: pawn` with the name of a solid");
             return None;
@@ -342,7 +527,7 @@ impl<'a> Lowering<'a> {
             ExprKind::Name(name) => name.clone(),
             _ => "obstacle".into(),
         };
-        Some(Obstacle { name, shape, span: value.span, restitution: restitution? })
+        Some(Obstacle { name, shape, span: value.span, bounce: bounce? })
     }
 
     /// One of a few words; the first is the default.

@@ -14,7 +14,7 @@ use super::cells::{Cell, Cells, Found, SIDE};
 use super::prefix::Word;
 use super::sweep::Sweep;
 use super::{Contact, Parts, Solid, Twin};
-use crate::field::{Entry, Field, Normals, Path, Points};
+use crate::field::{Entry, Faces, Field, Normals, Path, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
@@ -342,6 +342,17 @@ impl Field for CellMap {
 
     fn continuous(&self, p: DVec3) -> f64 {
         self.twin.omega(p)
+    }
+
+    /// For a `reach` up to that of the map; farther away it knows of no face.
+    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Near(program)) => {
+                self.parts.leaves.add_faces(&self.cells.programs, program as usize, p, reach, faces);
+            }
+            Some(Cell::Fluid) => {}
+            _ => self.parts.leaves.add_faces(&self.parts.words, 0, p, reach, faces),
+        }
     }
 
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {

@@ -12,6 +12,7 @@ mod cell_map;
 mod cells;
 mod compiled;
 mod dissect;
+mod faces;
 mod leaf;
 mod logic;
 mod prefix;
@@ -32,7 +33,7 @@ pub use dissect::{LeafInfo, Left};
 pub use programs::{Engine, ProgramKind};
 
 use crate::codegen::{CodegenError, Form, Forms, Precision};
-use crate::field::{self, Entry, Field, GradientsMut, Path, Points};
+use crate::field::{self, Entry, Faces, Field, GradientsMut, Path, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{self, Graph, Node, RangeEvaluator};
@@ -236,6 +237,14 @@ impl Solid {
         }
     }
 
+    /// The field that a fluid solver needs in a box: as [`Solid::surface`], and its faces within `reach`.
+    pub fn walls(&self, over: Aabb, reach: f64) -> Box<dyn Field> {
+        match CellMap::with_reach(self, over, reach) {
+            Some(map) => Box::new(map),
+            None => Box::new(self.clone()),
+        }
+    }
+
     /// Whether so many leaves decide the sign that it pays to find out which of them matter at a place.
     pub fn has_many_leaves(&self) -> bool {
         self.leaf_count().is_some_and(|leaves| leaves > TWIN_SUFFICES)
@@ -398,6 +407,18 @@ impl Field for Solid {
     fn first_entry(&self, path: &Path) -> Option<Entry> {
         self.twin().first_entry(path)
     }
+
+    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
+        match self.parts() {
+            Some(parts) => parts.leaves.add_faces(&parts.words, 0, p, reach, faces),
+            None => {
+                let Contact { distance, normal, mean_curvature } = self.contact(p);
+                if distance < reach {
+                    faces.push(field::Part::Face(field::Face { distance, normal, mean_curvature }));
+                }
+            }
+        }
+    }
 }
 
 /// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far away.
@@ -443,6 +464,10 @@ impl Field for Twin {
 
     fn range(&self, over: &Aabb) -> Interval {
         self.solid.twin_function().range(self.solid.inner.engine, over)
+    }
+
+    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
+        self.solid.faces(p, reach, faces);
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {

@@ -73,6 +73,11 @@ impl Kernels {
         self.spiky_gradient * q * q / if r > least { r } else { least }
     }
 
+    /// The constant of ∇W_spiky with h² taken out: ∇W = this·(1 − r/h)²·**r**/r.
+    pub fn spiky_steepness(&self) -> f64 {
+        self.spiky_gradient * self.h2
+    }
+
     /// W_viscosity = 15/(2πh³)·(−r³/2h³ + r²/h² + h/2r − 1), 1/m³; infinite at r = 0.
     pub fn viscosity(&self, r: f64) -> f64 {
         if r > self.h {

@@ -18,7 +18,7 @@
 //!     gradient: |p: DVec3| -2.0 * p,
 //! };
 //! let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
-//! let obstacles = vec![Obstacle { field: &ball, restitution: 0.5, resolution: 0.005 }];
+//! let obstacles = vec![Obstacle { field: &ball, restitution: 0.5, friction: 0.0, resolution: 0.005 }];
 //! let parameters = Parameters::default();
 //! let mut fluid = FluidBlock::drop(DVec3::Z * 0.8, 200).seed(&parameters, domain)?;
 //! carve(&mut fluid, &domain, &obstacles, 0.01)?;
@@ -37,33 +37,28 @@
 //! - After a step every particle is finite, in the box, and in the fluid (ω < 0), or the step was an error.
 //! - A step allocates nothing once the buffers have grown to the flow's size.
 
-mod boundary;
-mod contact;
-mod density;
-mod forces;
-mod grid;
+mod core;
 mod kernel;
-mod neighbours;
+mod methods;
+mod pairs;
 mod params;
 mod particles;
 mod seed;
 mod simulation;
 mod stats;
 mod vtp;
-mod wall;
+mod walls;
 
 #[cfg(test)]
 mod scenes;
 #[cfg(test)]
 mod tests;
 
-pub use boundary::Obstacle;
-pub use contact::{Contact, Undefined, first_contact, push_out};
 pub use kernel::Kernels;
-pub use params::{NegativePressure, ParameterError, Parameters};
+pub use params::{Dfsph, Method, NegativePressure, ParameterError, Parameters, Precision, Slip, Wcsph};
 pub use particles::{Particles, Vectors};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::{Pass, Stats};
 pub use vtp::{write_pvd, write_vtp};
-pub use wall::WallKernel;
+pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};

@@ -23,6 +23,83 @@ pub enum NegativePressure {
     Keep,
 }
 
+/// How pressure is found. Every method has density and motion; what else runs, the numbers below decide.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Method {
+    /// Equations 8–14 of the paper, corrected: p = k(ρ − ρ₀), kernels poly6, spiky and viscosity, fixed step.
+    #[default]
+    Paper,
+    /// Weakly compressible: density from the equation of continuity, pressure by Tait's equation.
+    Wcsph(Wcsph),
+    /// Divergence-free (Bender & Koschier 2017): pressure is solved for, so that the density stays.
+    Dfsph(Dfsph),
+}
+
+impl Method {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Wcsph(_) => "wcsph",
+            Self::Dfsph(_) => "dfsph",
+        }
+    }
+}
+
+/// Numbers of the weakly compressible method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wcsph {
+    /// Speed of sound c, m/s: ten times the greatest speed keeps the density within 1 %.
+    pub sound_speed: f64,
+    /// δ of the density diffusion (Molteni & Colagrossi 2009), 0.1; zero: the term is not computed.
+    pub density_diffusion: f64,
+    /// α of the artificial viscosity (Monaghan 1992), 0.02; zero: the term is not computed.
+    pub artificial_viscosity: f64,
+}
+
+/// Numbers of the divergence-free method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dfsph {
+    /// Mean compression that is accepted, as a part of the rest density. 1e-3.
+    pub tolerance: f64,
+    /// Iterations of either solver, at most. 100.
+    pub most_iterations: u32,
+}
+
+impl Default for Dfsph {
+    fn default() -> Self {
+        Self { tolerance: 1e-3, most_iterations: 100 }
+    }
+}
+
+/// What a wall does to a fluid that moves along it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Slip {
+    /// Nothing.
+    #[default]
+    Free,
+    /// The fluid at the wall has the wall's velocity: viscosity acts between the two.
+    No,
+}
+
+/// Of the sums over neighbours; state and motion are always in double precision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// 32 bits: distances have seven digits relative to a few support radii.
+    Single,
+    /// 64 bits.
+    #[default]
+    Double,
+}
+
+impl Precision {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "f32",
+            Self::Double => "f64",
+        }
+    }
+}
+
 /// Everything a step needs to know of the fluid. Defaults are table 1 of the paper where it has a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
@@ -53,6 +130,16 @@ pub struct Parameters {
     /// is three times the bound; in that scene, soft and viscous as it is, it still does not diverge, but loses
     /// 3 % more energy in the first second.
     pub time_step: f64,
+    /// Whether a step may be shorter than that where the state demands it (see
+    /// [`Simulation::stable_dt`](super::Simulation::stable_dt)).
+    pub adaptive: bool,
+    pub method: Method,
+    /// At walls and obstacles.
+    pub slip: Slip,
+    /// Coefficient of friction μ of the container's walls: of the speed along the wall, μ times what the wall takes of
+    /// the speed into it is lost. Zero: none.
+    pub wall_friction: f64,
+    pub precision: Precision,
 }
 
 impl Default for Parameters {
@@ -69,6 +156,11 @@ impl Default for Parameters {
             gravity: DVec3::new(0.0, 0.0, -9.81),
             wall_restitution: 0.5,
             time_step: 0.002,
+            adaptive: false,
+            method: Method::Paper,
+            slip: Slip::Free,
+            wall_friction: 0.0,
+            precision: Precision::Double,
         }
     }
 }
@@ -96,6 +188,9 @@ impl error::Error for ParameterError {}
 /// has, at 0.5 s and 1 s, 1037.8 and 300.6 J with steps of 0.5 ms; 1037.6 and 297.6 J with 2 ms; 1037.0 and
 /// 297.2 J with 4 ms; 1034.3 and 290.3 J with 10 ms. The bound at the fastest instant is 3.2 ms.
 const COURANT: f64 = 0.25;
+
+/// Part of the spacing that a particle may cross in one step where there is no sound: the customary 0.4.
+const ADVECTION: f64 = 0.4;
 
 /// Factor of √(h/a): a particle that is accelerated from rest moves 1/32 of h in such a step.
 const FORCE_FACTOR: f64 = 0.25;
@@ -125,6 +220,23 @@ impl Parameters {
         let e = self.wall_restitution;
         check("wall_restitution", e, (0.0..=1.0).contains(&e), "a number from 0 to 1")?;
         positive("time_step", self.time_step)?;
+        not_negative("wall_friction", self.wall_friction)?;
+        match self.method {
+            Method::Paper => {}
+            Method::Wcsph(method) => {
+                positive("sound_speed", method.sound_speed)?;
+                not_negative("density_diffusion", method.density_diffusion)?;
+                not_negative("artificial_viscosity", method.artificial_viscosity)?;
+            }
+            Method::Dfsph(method) => {
+                check(
+                    "tolerance",
+                    method.tolerance,
+                    (1e-9..1.0).contains(&method.tolerance),
+                    "from 1e-9 to 1",
+                )?;
+            }
+        }
         // Kernels divide by h⁹: far from metres that leaves the range of a double.
         let weight = self.particle_mass * Kernels::new(self.support_radius).poly6(0.0);
         check(
@@ -140,9 +252,13 @@ impl Parameters {
         (self.particle_mass / self.rest_density).cbrt()
     }
 
-    /// Speed of sound of p = k(ρ − ρ₀): c² = dp/dρ = k, m/s.
+    /// Speed of sound, m/s: that of p = k(ρ − ρ₀) is √(dp/dρ) = √k; none if the method knows no compression.
     pub fn sound_speed(&self) -> f64 {
-        self.stiffness.sqrt()
+        match self.method {
+            Method::Paper => self.stiffness.sqrt(),
+            Method::Wcsph(method) => method.sound_speed,
+            Method::Dfsph(_) => 0.0,
+        }
     }
 
     /// Pressure of a density, Pa (equation 9, read as p = k(ρ − ρ₀): the printed p = κρ pushes a fluid apart
@@ -166,8 +282,10 @@ impl Parameters {
     ///
     /// Pressure forces have no bound before the run; see [`Simulation::stable_dt`](super::Simulation::stable_dt).
     pub fn stable_dt(&self, max_speed: f64) -> f64 {
-        let h = self.support_radius;
-        let courant = COURANT * h / (self.sound_speed() + max_speed);
+        let courant = match self.method {
+            Method::Dfsph(_) => ADVECTION * self.spacing() / max_speed,
+            _ => COURANT * self.support_radius / (self.sound_speed() + max_speed),
+        };
         courant.min(self.viscous_dt()).min(self.force_dt(self.gravity.length()))
     }
 
@@ -178,6 +296,10 @@ impl Parameters {
 
     fn viscous_dt(&self) -> f64 {
         let h = self.support_radius;
+        if !matches!(self.method, Method::Paper) {
+            // ⅛·(h/2)²/ν (Morris et al. 1997)
+            return 0.125 * (0.5 * h).powi(2) * self.rest_density / self.viscosity;
+        }
         let lone_density = self.particle_mass * 315.0 / (64.0 * PI * h.powi(3));
         let laplacian = 45.0 / (PI * h.powi(5));
         lone_density.powi(2) / (2.0 * self.viscosity * self.particle_mass * laplacian)

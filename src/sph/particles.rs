@@ -54,6 +54,10 @@ impl Vectors {
         Points::new(&self.x, &self.y, &self.z)
     }
 
+    pub(super) fn bytes(&self) -> usize {
+        8 * (self.x.capacity() + self.y.capacity() + self.z.capacity())
+    }
+
     pub(super) fn components_mut(&mut self) -> [&mut Vec<f64>; 3] {
         [&mut self.x, &mut self.y, &mut self.z]
     }

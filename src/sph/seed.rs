@@ -13,7 +13,7 @@ use rand_pcg::{
 
 use crate::{field::Field, geom::Aabb};
 
-use super::{boundary::Obstacle, params::Parameters, particles::Particles};
+use super::{params::Parameters, particles::Particles, walls::Obstacle};
 
 /// More lattice sites than this are a mistake in the scene, not a fluid.
 const MAX_SITES: f64 = 5e7;
@@ -359,7 +359,7 @@ mod tests {
     #[test]
     fn carving_counts_what_it_removes() {
         let sphere = scenes::sphere(DVec3::ONE, 0.5);
-        let obstacle = Obstacle { field: &sphere, restitution: 0.5, resolution: 0.005 };
+        let obstacle = Obstacle { field: &sphere, restitution: 0.5, friction: 0.0, resolution: 0.005 };
         let mut particles = Particles::default();
         for x in [1.0, 1.5, 1.51, 1.7, 9.0] {
             particles.push(DVec3::new(x, 1.0, 1.0), DVec3::ZERO);

@@ -1,29 +1,21 @@
-//! The simulation: state, buffers and one step of the method.
-//!
-//! Velocity Verlet in kick–drift–kick form. Viscosity depends on the velocity, which is not yet known when
-//! the forces are found; it is predicted as v + a·dt/2 from the half-step velocity and the last acceleration,
-//! the paper's "approximation of a new velocity vector". One evaluation of the forces per step.
+//! The simulation: a state that is checked at the start, stepped, and asked for figures.
 //!
 //! Invariant: between steps positions, velocities, densities, pressures and accelerations belong to one
-//! instant, and particles lie in the grid's order.
+//! instant, and particles lie in the order of the columns.
 
 use std::{error, fmt};
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::geom::Aabb;
 
 use super::{
-    boundary::{Boundary, Obstacle},
-    density::{find_density, find_pressure},
-    forces::{Record, find_accelerations},
-    grid::CellGrid,
-    kernel::Kernels,
-    neighbours::{BLOCK, Neighbours},
+    core::{Core, first_non_finite},
+    methods::Scheme,
     params::{ParameterError, Parameters},
     particles::{Particles, Vectors},
     stats::{Pass, Stats},
+    walls::{Boundary, Obstacle},
 };
 
 /// Particles stop this part of the support radius before an obstacle.
@@ -35,7 +27,7 @@ pub enum SetupError {
     Parameter(ParameterError),
     /// The box is empty, flat or infinite.
     Domain(Aabb),
-    /// An obstacle's restitution is not in 0..=1, or its resolution is not positive.
+    /// An obstacle's restitution is not in 0..=1, its friction is negative, or its resolution is not positive.
     Obstacle {
         index: usize,
     },
@@ -57,7 +49,10 @@ impl fmt::Display for SetupError {
             Self::Parameter(error) => error.fmt(f),
             Self::Domain(b) => write!(f, "the box from {} to {} has no finite volume", b.min, b.max),
             Self::Obstacle { index } => {
-                write!(f, "obstacle {index} needs a restitution from 0 to 1 and a resolution above 0")
+                write!(
+                    f,
+                    "obstacle {index} needs a restitution from 0 to 1, a friction of at least 0 and a resolution above 0"
+                )
             }
             Self::NoParticles => write!(f, "there are no particles"),
             Self::NonFinite { id } => write!(f, "the position or velocity of particle {id} is not finite"),
@@ -120,25 +115,8 @@ impl error::Error for StepError {}
 
 /// A fluid in a box with obstacles.
 pub struct Simulation<'a> {
-    parameters: Parameters,
-    boundary: Boundary<'a>,
-    kernels: Kernels,
-    particles: Particles,
-    acceleration: Vectors,
-    steps: u64,
-    grid: CellGrid,
-    neighbours: Neighbours,
-    buffers: Buffers,
-}
-
-/// Storage that is kept between steps and whose content is not.
-#[derive(Default)]
-struct Buffers {
-    sorted: Vec<f64>,
-    sorted_id: Vec<u32>,
-    target: Vectors,
-    predicted: Vectors,
-    records: Vec<Record>,
+    core: Core<'a>,
+    scheme: Scheme,
 }
 
 impl<'a> Simulation<'a> {
@@ -154,25 +132,17 @@ impl<'a> Simulation<'a> {
     ) -> Result<Self, SetupError> {
         parameters.validate().map_err(SetupError::Parameter)?;
         let clearance = CLEARANCE * parameters.support_radius;
-        let boundary =
-            Boundary { domain, wall_restitution: parameters.wall_restitution, obstacles, clearance };
-        check_setup(&boundary, &particles)?;
-        let mut simulation = Self {
-            kernels: Kernels::new(parameters.support_radius),
-            acceleration: Vectors::default(),
-            parameters,
-            boundary,
-            particles,
-            steps: 0,
-            grid: CellGrid::default(),
-            neighbours: Neighbours::default(),
-            buffers: Buffers::default(),
+        let boundary = Boundary {
+            domain,
+            wall_restitution: parameters.wall_restitution,
+            wall_friction: parameters.wall_friction,
+            obstacles,
+            clearance,
         };
-        simulation.acceleration.resize(simulation.particles.len());
-        simulation.find_neighbours();
-        simulation.find_density_and_pressure();
-        simulation.find_forces(0.0);
-        Ok(simulation)
+        check_setup(&boundary, &particles)?;
+        let mut core = Core::new(parameters, boundary, particles);
+        let scheme = Scheme::start(&mut core);
+        Ok(Self { core, scheme })
     }
 
     /// Advances by one time step.
@@ -180,163 +150,72 @@ impl<'a> Simulation<'a> {
     /// # Errors
     /// [`StepError`] when a value is not finite any more; nothing is clamped to hide it.
     pub fn step(&mut self) -> Result<(), StepError> {
-        let half = 0.5 * self.parameters.time_step;
-        self.steps += 1;
-        self.kick(half);
-        self.drift();
-        self.collide()?;
-        self.find_neighbours();
-        self.find_density_and_pressure();
-        self.find_forces(half);
-        self.kick(half);
-        self.check_finite()
+        self.step_at_most(f64::INFINITY)
+    }
+
+    /// Advances by one time step of at most `longest` seconds: to arrive at an instant exactly.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn step_at_most(&mut self, longest: f64) -> Result<(), StepError> {
+        self.core.steps += 1;
+        self.core.time += self.scheme.step(&mut self.core, longest)?;
+        Ok(())
     }
 
     pub fn parameters(&self) -> &Parameters {
-        &self.parameters
+        &self.core.parameters
     }
 
     /// The particles, in the solver's order.
     pub fn particles(&self) -> &Particles {
-        &self.particles
+        &self.core.particles
     }
 
     /// m/s², in the order of the particles.
     pub fn acceleration(&self) -> &Vectors {
-        &self.acceleration
+        &self.core.acceleration
     }
 
     /// Steps taken; after an error, the one that failed included.
     pub fn steps(&self) -> u64 {
-        self.steps
+        self.core.steps
     }
 
     /// Simulated time, s.
     pub fn time(&self) -> f64 {
-        self.steps as f64 * self.parameters.time_step
+        self.core.time
     }
 
     /// Turns gravity, m/s², from the next step on (a container that rotates).
     pub fn set_gravity(&mut self, gravity: DVec3) {
-        self.parameters.gravity = gravity;
+        self.core.parameters.gravity = gravity;
     }
 
     /// The longest step, s, that this state allows: the parameters' limits for the present greatest speed,
     /// and the force limit for the present greatest acceleration.
     pub fn stable_dt(&self) -> f64 {
-        let longest =
-            |vectors: &Vectors| vectors.iter().map(DVec3::length_squared).fold(0.0, f64::max).sqrt();
-        let limit = self.parameters.stable_dt(longest(&self.particles.velocity));
-        limit.min(self.parameters.force_dt(longest(&self.acceleration)))
+        self.core.stable_dt()
     }
 
-    /// Ordered pairs of particles within the support radius: the work count of a step.
+    /// Ordered pairs of particles within the support radius, the work count of a step; counted when asked for.
     pub fn pairs(&self) -> usize {
-        self.neighbours.pairs()
+        self.core.pairs()
+    }
+
+    /// Memory of the state and all that a step needs, bytes.
+    pub fn bytes(&self) -> usize {
+        self.core.bytes() + self.scheme.bytes()
     }
 
     /// Figures of the present state.
     pub fn stats(&self) -> Stats {
-        Stats::of(&self.parameters, &self.boundary, &self.neighbours, &self.particles)
+        Stats::of(&self.core)
     }
 
     /// The passes that a step of this simulation runs, in order.
     pub fn passes(&self) -> Vec<Pass> {
-        Pass::of(&self.parameters, &self.boundary)
-    }
-
-    /// v += a·t
-    fn kick(&mut self, t: f64) {
-        add_scaled(&mut self.particles.velocity, &self.acceleration, t);
-    }
-
-    /// target = x + v·dt; the positions follow when collisions are resolved.
-    fn drift(&mut self) {
-        self.buffers.target.clone_from(&self.particles.position);
-        add_scaled(&mut self.buffers.target, &self.particles.velocity, self.parameters.time_step);
-    }
-
-    fn collide(&mut self) -> Result<(), StepError> {
-        // infinite positions would be clamped to the box and never seen
-        if let Some(i) = first_non_finite(&self.buffers.target) {
-            return Err(self.non_finite(i, Quantity::Position));
-        }
-        let Particles { position, velocity, .. } = &mut self.particles;
-        self.boundary.collide(position, &mut self.buffers.target, velocity).map_err(|fault| {
-            StepError::NonFinite {
-                step: self.steps,
-                id: self.particles.id[fault.index],
-                quantity: Quantity::Omega,
-                cause: Cause::FieldUndefined { at: fault.at },
-            }
-        })?;
-        std::mem::swap(&mut self.particles.position, &mut self.buffers.target);
-        Ok(())
-    }
-
-    fn find_neighbours(&mut self) {
-        let cells = self.neighbours.cells_per_radius(self.particles.len());
-        self.grid.sort(&self.particles.position, self.kernels.h, cells);
-        self.reorder();
-        self.neighbours.search(&self.grid, &self.particles.position, self.kernels.h);
-    }
-
-    /// Brings the particles into the grid's order.
-    fn reorder(&mut self) {
-        let order = self.grid.order();
-        let Particles { position, velocity, id, .. } = &mut self.particles;
-        let sorted = &mut self.buffers.sorted;
-        for vectors in [position, velocity, &mut self.acceleration] {
-            for component in vectors.components_mut() {
-                sorted.clear();
-                sorted.extend(order.iter().map(|&i| component[i as usize]));
-                std::mem::swap(sorted, component);
-            }
-        }
-        let sorted_id = &mut self.buffers.sorted_id;
-        sorted_id.clear();
-        sorted_id.extend(order.iter().map(|&i| id[i as usize]));
-        std::mem::swap(sorted_id, id);
-    }
-
-    fn find_density_and_pressure(&mut self) {
-        let Particles { position, density, pressure, .. } = &mut self.particles;
-        find_density(&self.neighbours, position, &self.kernels, self.parameters.particle_mass, density);
-        find_pressure(&self.parameters, density, pressure);
-    }
-
-    /// Accelerations for the velocities predicted `ahead` seconds from those stored.
-    fn find_forces(&mut self, ahead: f64) {
-        let predicted = &mut self.buffers.predicted;
-        predicted.clone_from(&self.particles.velocity);
-        add_scaled(predicted, &self.acceleration, ahead);
-        find_accelerations(
-            &self.parameters,
-            &self.kernels,
-            &self.neighbours,
-            &self.particles,
-            predicted,
-            &mut self.buffers.records,
-            &mut self.acceleration,
-        );
-    }
-
-    fn check_finite(&self) -> Result<(), StepError> {
-        if let Some(i) = self.particles.density.iter().position(|rho| !rho.is_finite()) {
-            return Err(self.non_finite(i, Quantity::Density));
-        }
-        match first_non_finite(&self.acceleration) {
-            Some(i) => Err(self.non_finite(i, Quantity::Acceleration)),
-            None => Ok(()),
-        }
-    }
-
-    fn non_finite(&self, index: usize, quantity: Quantity) -> StepError {
-        let dt = self.parameters.time_step;
-        // the state may hold NaN already; max and min pass it over
-        let stable = self.stable_dt();
-        let cause = if dt > stable { Cause::StepTooLong { dt, stable } } else { Cause::Overflow };
-        StepError::NonFinite { step: self.steps, id: self.particles.id[index], quantity, cause }
+        Pass::of(&self.core.parameters, &self.core.boundary)
     }
 }
 
@@ -345,7 +224,11 @@ fn check_setup(boundary: &Boundary<'_>, particles: &Particles) -> Result<(), Set
     if !(domain.is_finite() && domain.volume() > 0.0 && domain.volume() < f64::INFINITY) {
         return Err(SetupError::Domain(domain));
     }
-    let wrong = |o: &Obstacle<'_>| !((0.0..=1.0).contains(&o.restitution) && o.resolution > 0.0);
+    let wrong = |o: &Obstacle<'_>| {
+        !((0.0..=1.0).contains(&o.restitution)
+            && (0.0..f64::INFINITY).contains(&o.friction)
+            && o.resolution > 0.0)
+    };
     if let Some(index) = boundary.obstacles.iter().position(wrong) {
         return Err(SetupError::Obstacle { index });
     }
@@ -364,19 +247,4 @@ fn check_setup(boundary: &Boundary<'_>, particles: &Particles) -> Result<(), Set
         return Err(SetupError::NotInFluid { outside_box, inside_obstacles });
     }
     Ok(())
-}
-
-/// to += from·t
-fn add_scaled(to: &mut Vectors, from: &Vectors, t: f64) {
-    for (to, from) in [(&mut to.x, &from.x), (&mut to.y, &from.y), (&mut to.z, &from.z)] {
-        to.par_chunks_mut(16 * BLOCK).zip(from.par_chunks(16 * BLOCK)).for_each(|(to, from)| {
-            for (to, from) in to.iter_mut().zip(from) {
-                *to += from * t;
-            }
-        });
-    }
-}
-
-fn first_non_finite(vectors: &Vectors) -> Option<usize> {
-    vectors.iter().position(|v| !v.is_finite())
 }

@@ -6,9 +6,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{
-    boundary::Boundary, forces::Terms, neighbours::Neighbours, params::Parameters, particles::Particles,
-};
+use super::{core::Core, methods::Terms, params::Parameters, walls::Boundary};
 
 /// A stage of a step. Those a scene does not need do not run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,18 +114,14 @@ pub struct Stats {
 }
 
 impl Stats {
-    pub(super) fn of(
-        parameters: &Parameters,
-        boundary: &Boundary<'_>,
-        neighbours: &Neighbours,
-        particles: &Particles,
-    ) -> Self {
+    pub(super) fn of(core: &Core<'_>) -> Self {
+        let Core { parameters, boundary, particles, .. } = core;
         let mass = parameters.particle_mass;
         let g = parameters.gravity;
         let floor = boundary.domain.corners().map(|c| -g.dot(c)).into_iter().fold(f64::INFINITY, f64::min);
         let mut stats = Self {
             particles: particles.len(),
-            neighbours_per_particle: neighbours.pairs() as f64 / particles.len() as f64,
+            neighbours_per_particle: core.pairs() as f64 / particles.len() as f64,
             max_density_error: 0.0,
             kinetic_energy: 0.0,
             potential_energy: 0.0,

@@ -194,7 +194,12 @@ fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a
     let block = FluidBlock { jitter: scene.fluid.jitter, ..FluidBlock::drop(centre, count) };
     let mut particles = block.seed(&parameters, scene.domain).unwrap_or_else(|e| panic!("{e}"));
     let resolution = 0.05 * parameters.support_radius;
-    let obstacles = vec![Obstacle { field: pawn, restitution: scene.obstacles[0].restitution, resolution }];
+    let obstacles = vec![Obstacle {
+        field: pawn,
+        restitution: scene.obstacles[0].restitution,
+        friction: 0.0,
+        resolution,
+    }];
     carve(&mut particles, &scene.domain, &obstacles, 0.5 * parameters.spacing())
         .unwrap_or_else(|e| panic!("{e}"));
     Simulation::new(parameters, particles, scene.domain, obstacles).unwrap_or_else(|e| panic!("{e}"))

@@ -54,35 +54,29 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let scene = choose::scene(&program, options.scene.as_deref())?;
     let setup = Setup::of(shared, &program, scene)?;
     let (mut simulation, carved) = setup.simulation(&program, scene)?;
-    let last = match (options.steps, options.until) {
-        (Some(steps), _) => steps,
-        (None, Some(until)) if !(until.is_finite() && until >= 0.0) => {
-            return Err(Failure::usage(format!("--until {until}: expected a time in seconds")));
-        }
-        (None, until) => (until.unwrap_or(scene.run.until) / setup.parameters.time_step).round() as u64,
-    };
+    let goal = Goal::of(options, scene, &setup)?;
     if options.dry_run {
-        return dry_run(shared, &mut simulation, &setup, last);
+        return dry_run(shared, &mut simulation, &setup, goal);
     }
     let mut frames = Frames::new(options, scene, &setup)?;
     let interrupted = interruption()?;
-    let bar = progress::bar(last, "running");
+    let bar = progress::bar(goal.total(), "running");
     let mut watch = Watch::new(&simulation);
     frames.save(&simulation)?;
-    let per_frame = ((scene.run.save_every / setup.parameters.time_step).round() as u64).max(1);
+    let mut pace = Pace::new(scene, &setup);
     let mut failure = None;
-    for step in 1..=last {
+    while !goal.is_reached(&simulation) {
         let started = Instant::now();
-        let result = simulation.step();
+        let result = simulation.step_at_most(goal.left(&simulation).min(pace.left(&simulation)));
         watch.spent += started.elapsed();
         if let Err(error) = result {
             let kept = format!("the frames up to {:.4} s are kept", frames.last_time());
             failure = Some(Failure::Numerical(format!("{error}\n{kept}")));
             break;
         }
-        bar.set_position(step);
+        bar.set_position(goal.done(&simulation));
         let stop = interrupted.load(Ordering::Relaxed);
-        if step % per_frame == 0 || step == last || stop {
+        if pace.frame_is_due(&simulation) || goal.is_reached(&simulation) || stop {
             watch.look(&simulation);
             bar.set_message(format!("t = {:.3} s, {:.2} m/s", simulation.time(), watch.now.max_speed));
             frames.save(&simulation)?;
@@ -111,6 +105,108 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         print(&summary, &frames);
     }
     Ok(())
+}
+
+/// Where a run ends.
+#[derive(Clone, Copy)]
+enum Goal {
+    /// After so many steps.
+    Steps(u64),
+    /// At an instant, s, which steps of any length arrive at.
+    Time(f64),
+}
+
+impl Goal {
+    fn of(options: &Run, scene: &Scene, setup: &Setup) -> Result<Self, Failure> {
+        match (options.steps, options.until) {
+            (Some(steps), _) => Ok(Self::Steps(steps)),
+            (None, Some(until)) if !(until.is_finite() && until >= 0.0) => {
+                Err(Failure::usage(format!("--until {until}: expected a time in seconds")))
+            }
+            (None, until) => {
+                let until = until.unwrap_or(scene.run.until);
+                Ok(if setup.parameters.adaptive {
+                    Self::Time(until)
+                } else {
+                    Self::Steps((until / setup.parameters.time_step).round() as u64)
+                })
+            }
+        }
+    }
+
+    fn is_reached(self, simulation: &Simulation<'_>) -> bool {
+        match self {
+            Self::Steps(steps) => simulation.steps() >= steps,
+            Self::Time(end) => simulation.time() >= end * (1.0 - 1e-12),
+        }
+    }
+
+    /// Time to the end, s, if it is known.
+    fn left(self, simulation: &Simulation<'_>) -> f64 {
+        match self {
+            Self::Steps(_) => f64::INFINITY,
+            Self::Time(end) => end - simulation.time(),
+        }
+    }
+
+    /// For the bar: steps, or microseconds.
+    fn total(self) -> u64 {
+        match self {
+            Self::Steps(steps) => steps,
+            Self::Time(end) => (1e6 * end) as u64,
+        }
+    }
+
+    fn done(self, simulation: &Simulation<'_>) -> u64 {
+        match self {
+            Self::Steps(_) => simulation.steps(),
+            Self::Time(_) => (1e6 * simulation.time()) as u64,
+        }
+    }
+
+    /// Steps to come if each were as long as this, s.
+    fn steps(self, dt: f64) -> u64 {
+        match self {
+            Self::Steps(steps) => steps,
+            Self::Time(end) => (end / dt).ceil() as u64,
+        }
+    }
+}
+
+/// When frames are saved: after a number of equal steps, or at instants that steps are fitted to.
+enum Pace {
+    Steps(u64),
+    Times { every: f64, next: u64 },
+}
+
+impl Pace {
+    fn new(scene: &Scene, setup: &Setup) -> Self {
+        let every = scene.run.save_every;
+        if setup.parameters.adaptive {
+            Self::Times { every, next: 1 }
+        } else {
+            Self::Steps(((every / setup.parameters.time_step).round() as u64).max(1))
+        }
+    }
+
+    /// Time to the next frame, s, if steps are to be fitted to it.
+    fn left(&self, simulation: &Simulation<'_>) -> f64 {
+        match self {
+            Self::Steps(_) => f64::INFINITY,
+            Self::Times { every, next } => every * *next as f64 - simulation.time(),
+        }
+    }
+
+    fn frame_is_due(&mut self, simulation: &Simulation<'_>) -> bool {
+        match self {
+            Self::Steps(steps) => simulation.steps().is_multiple_of(*steps),
+            Self::Times { every, next } => {
+                let due = simulation.time() >= *every * *next as f64 * (1.0 - 1e-12);
+                *next += u64::from(due);
+                due
+            }
+        }
+    }
 }
 
 /// Set by Ctrl-C: the run ends after the step that is under way.
@@ -146,7 +242,7 @@ fn dry_run(
     shared: &Shared,
     simulation: &mut Simulation<'_>,
     setup: &Setup,
-    steps: u64,
+    goal: Goal,
 ) -> Result<(), Failure> {
     const TRIAL: u32 = 3;
     let started = Instant::now();
@@ -154,18 +250,19 @@ fn dry_run(
         simulation.step().map_err(|e| Failure::Numerical(e.to_string()))?;
     }
     let per_step = started.elapsed().as_secs_f64() / f64::from(TRIAL);
+    let time_step = simulation.time() / f64::from(TRIAL);
+    let steps = goal.steps(time_step);
     let stats = simulation.stats();
     let forecast = Forecast {
         schema: 1,
         particles: stats.particles,
         spacing: setup.parameters.spacing(),
         neighbours_per_particle: stats.neighbours_per_particle,
-        time_step: setup.parameters.time_step,
+        time_step,
         time_step_reason: setup.time_step_reason,
         steps,
         passes: pass_names(simulation),
-        // state and sorted copy of every particle, its forces, and four bytes for each neighbour
-        bytes: stats.particles as f64 * (300.0 + 4.0 * stats.neighbours_per_particle),
+        bytes: simulation.bytes() as f64,
         milliseconds_per_step: per_step * 1e3,
         seconds: per_step * steps as f64,
     };
@@ -244,7 +341,7 @@ impl Watch {
             scene: scene.name.clone(),
             steps,
             simulated_seconds: simulation.time(),
-            time_step: simulation.parameters().time_step,
+            time_step: simulation.time() / steps.max(1) as f64,
             particles: self.now.particles,
             particles_carved: carved,
             milliseconds_per_step: self.spent.as_secs_f64() * 1e3 / steps.max(1) as f64,
@@ -308,10 +405,15 @@ pub(super) fn explain(shared: &Shared, program: &Program, scene: &Scene) -> Resu
     let (simulation, _) = setup.simulation(program, scene)?;
     let running = simulation.passes();
     say!(
-        "scene {}: method paper, time step {:.3e} s ({})",
+        "scene {}: method {}, sums over neighbours in {}, time step {}",
         scene.name,
-        setup.parameters.time_step,
-        setup.time_step_reason
+        setup.parameters.method.name(),
+        setup.parameters.precision.name(),
+        if setup.parameters.adaptive {
+            setup.time_step_reason.to_string()
+        } else {
+            format!("{:.3e} s ({})", setup.parameters.time_step, setup.time_step_reason)
+        }
     );
     for pass in crate::sph::Pass::ALL {
         if running.contains(&pass) {

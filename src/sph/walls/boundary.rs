@@ -8,8 +8,7 @@
 //! The bounce is left to the velocity: a mirrored rest of path could lift a particle above the height it fell
 //! from.
 //!
-//! Walls and obstacles act on positions and velocities only. They add nothing to the density, so a fluid that
-//! has come to rest lies flatter on the floor than water would.
+//! This stage acts on positions and velocities only; what walls add to density and pressure, see [`Coverage`].
 //!
 //! Invariant: every particle leaves this stage finite, in the box, and with ω < 0 for every obstacle; where the
 //! wedge between a wall and an obstacle leaves no such place near the target, it stays where it last had one.
@@ -19,15 +18,20 @@ use rayon::prelude::*;
 use glam::DVec3;
 
 use crate::{
-    field::{Field, Path},
+    field::{Face, Faces, Field, Path},
     geom::Aabb,
 };
 
+use crate::sph::particles::Vectors;
+
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, reflect, turn_back},
-    neighbours::BLOCK,
-    particles::Vectors,
+    coverage::Coverage,
+    kernel::WallKernel,
 };
+
+/// Particles whose common way is asked about first.
+const BLOCK: usize = 128;
 
 /// Contacts of one particle in one step, before it is left where it is.
 const MAX_CONTACTS: usize = 4;
@@ -39,6 +43,8 @@ pub struct Obstacle<'a> {
     pub field: &'a dyn Field,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
+    /// Coefficient of friction μ: of the speed along the face, μ times what the face takes of the speed into it is lost.
+    pub friction: f64,
     /// Thickness in metres of the thinnest part that must hold whatever the speed, for fields that do not know their
     /// range (closures): their paths are sampled this closely. A twentieth of the support radius is a good value;
     /// thinner costs more samples per step. Compiled solids hold however thin they are.
@@ -47,9 +53,10 @@ pub struct Obstacle<'a> {
 
 /// The box and the bodies in it.
 #[derive(Clone)]
-pub(super) struct Boundary<'a> {
+pub(in crate::sph) struct Boundary<'a> {
     pub domain: Aabb,
     pub wall_restitution: f64,
+    pub wall_friction: f64,
     pub obstacles: Vec<Obstacle<'a>>,
     /// Distance from an obstacle's surface, m, at which particles stop.
     pub clearance: f64,
@@ -57,7 +64,7 @@ pub(super) struct Boundary<'a> {
 
 /// A particle (index) for which a field had no value.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fault {
+pub(in crate::sph) struct Fault {
     pub index: usize,
     pub at: DVec3,
 }
@@ -86,6 +93,32 @@ impl Boundary<'_> {
             })
             .min_by_key(|fault| fault.index);
         fault.map_or(Ok(()), Err)
+    }
+
+    /// What the box and the obstacles take of the kernel of a particle; nothing if they are farther away than h.
+    pub fn coverage(&self, kernel: WallKernel, h: f64, p: DVec3) -> Option<Coverage> {
+        let mut whole = Coverage::default();
+        for axis in 0..3 {
+            for (distance, side) in
+                [(p[axis] - self.domain.min[axis], 1.0), (self.domain.max[axis] - p[axis], -1.0)]
+            {
+                if distance < h {
+                    let mut normal = DVec3::ZERO;
+                    normal[axis] = side;
+                    let face = Face { distance, normal, mean_curvature: 0.0 };
+                    whole = whole.or(&Coverage::of_face(kernel, h, &face));
+                }
+            }
+        }
+        let mut faces = Faces::new();
+        for obstacle in &self.obstacles {
+            faces.clear();
+            obstacle.field.faces(p, h, &mut faces);
+            if !faces.is_empty() {
+                whole = whole.or(&Coverage::of_faces(kernel, h, &faces));
+            }
+        }
+        (whole.part > 0.0).then_some(whole)
     }
 
     fn collide_block(&self, block: &mut Block<'_>) -> Result<(), Fault> {
@@ -121,7 +154,11 @@ impl Boundary<'_> {
                 continue;
             };
             if outward > 0.0 {
+                let before = velocity;
                 velocity[axis] *= -self.wall_restitution;
+                let mut normal = DVec3::ZERO;
+                normal[axis] = before[axis].signum();
+                velocity = rubbed(before, velocity, normal, self.wall_friction);
             }
         }
         (at, velocity)
@@ -135,7 +172,8 @@ impl Boundary<'_> {
             let Some((obstacle, contact)) = self.nearest_contact(here, target)? else {
                 return Ok((target, velocity));
             };
-            velocity = turn_back(velocity, &contact, obstacle.restitution);
+            let turned = turn_back(velocity, &contact, obstacle.restitution);
+            velocity = rubbed(velocity, turned, contact.normal, obstacle.friction);
             let rest = target - contact.point;
             let slide = turn_back(rest, &contact, 0.0);
             here = contact.point;
@@ -163,6 +201,15 @@ impl Boundary<'_> {
         }
         Ok(nearest)
     }
+}
+
+/// A velocity after a contact that changed it from `before` to `after`, with friction: along the face it loses μ times
+/// the change along the normal, until nothing is left to lose.
+fn rubbed(before: DVec3, after: DVec3, normal: DVec3, friction: f64) -> DVec3 {
+    let change = (after - before).dot(normal).abs();
+    let along = after - after.dot(normal) * normal;
+    let speed = along.length();
+    if friction == 0.0 || speed == 0.0 { after } else { after - along * (friction * change / speed).min(1.0) }
 }
 
 /// A block's particles: where they were, where they go, how fast.

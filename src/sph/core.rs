@@ -1,0 +1,229 @@
+//! What all methods share: the particles, where they are, what bounds them, and the stages that do not depend on how
+//! pressure is found.
+
+use fearless_simd::{Level, Simd, SimdFloat};
+use rayon::prelude::*;
+
+use super::{
+    pairs::{Cloud, Columns, PairPass, Real},
+    params::{Parameters, Precision},
+    particles::{Particles, Vectors},
+    simulation::{Cause, Quantity, StepError},
+    walls::Boundary,
+};
+
+/// Particles that a loop over all of them leaves to one thread together.
+pub(super) const CHUNK: usize = 2048;
+
+pub(super) struct Core<'a> {
+    pub parameters: Parameters,
+    pub boundary: Boundary<'a>,
+    pub particles: Particles,
+    /// m/s²
+    pub acceleration: Vectors,
+    pub steps: u64,
+    /// s
+    pub time: f64,
+    level: Level,
+    columns: Columns,
+    /// Where the particles go before they collide.
+    target: Vectors,
+    sorted: Vec<f64>,
+    sorted_id: Vec<u32>,
+}
+
+impl<'a> Core<'a> {
+    pub fn new(parameters: Parameters, boundary: Boundary<'a>, particles: Particles) -> Self {
+        let mut acceleration = Vectors::default();
+        acceleration.resize(particles.len());
+        Self {
+            parameters,
+            boundary,
+            particles,
+            acceleration,
+            steps: 0,
+            time: 0.0,
+            level: Level::new(),
+            columns: Columns::default(),
+            target: Vectors::default(),
+            sorted: Vec::new(),
+            sorted_id: Vec::new(),
+        }
+    }
+
+    /// Moves the particles by v·dt, and back out of whatever they met on their way.
+    pub fn drift(&mut self, dt: f64) -> Result<(), StepError> {
+        self.target.clone_from(&self.particles.position);
+        add_scaled(&mut self.target, &self.particles.velocity, dt);
+        // infinite positions would be clamped to the box and never seen
+        if let Some(i) = first_non_finite(&self.target) {
+            return Err(self.non_finite(i, Quantity::Position, dt));
+        }
+        let Particles { position, velocity, id, .. } = &mut self.particles;
+        self.boundary.collide(position, &mut self.target, velocity).map_err(|fault| {
+            StepError::NonFinite {
+                step: self.steps,
+                id: id[fault.index],
+                quantity: Quantity::Omega,
+                cause: Cause::FieldUndefined { at: fault.at },
+            }
+        })?;
+        std::mem::swap(position, &mut self.target);
+        Ok(())
+    }
+
+    /// Brings all that belongs to a particle into the order of the columns: position, velocity, acceleration, number,
+    /// and what a method keeps besides.
+    pub fn sort(&mut self, kept: &mut [&mut Vec<f64>]) {
+        self.columns.sort(&self.particles.position, self.parameters.support_radius);
+        let order = self.columns.order();
+        let Particles { position, velocity, density, pressure, id } = &mut self.particles;
+        let vectors =
+            [position, velocity, &mut self.acceleration].into_iter().flat_map(Vectors::components_mut);
+        let scalars = [density, pressure].into_iter().chain(kept.iter_mut().map(|column| &mut **column));
+        for column in vectors.chain(scalars) {
+            permute(order, column, &mut self.sorted);
+        }
+        permute(order, id, &mut self.sorted_id);
+    }
+
+    /// Sums over the neighbours of every particle, in the precision of the parameters.
+    pub fn sum<P, const IN: usize, const SUMS: usize, const OUT: usize>(
+        &self,
+        pass: &P,
+        fields: [&[f64]; IN],
+        out: [&mut [f64]; OUT],
+    ) where
+        P: PairPass<IN, SUMS, OUT>,
+    {
+        let cloud = Cloud {
+            level: self.level,
+            columns: &self.columns,
+            position: &self.particles.position,
+            radius: self.parameters.support_radius,
+        };
+        match self.parameters.precision {
+            Precision::Single => cloud.sum::<f32, P, IN, SUMS, OUT>(pass, fields, out),
+            Precision::Double => cloud.sum::<f64, P, IN, SUMS, OUT>(pass, fields, out),
+        }
+    }
+
+    /// Ordered pairs of particles within the support radius, counted now.
+    pub fn pairs(&self) -> usize {
+        let mut counts = vec![0.0; self.particles.len()];
+        let count = Count { radius: self.parameters.support_radius };
+        self.sum(&count, [], [&mut counts]);
+        counts.iter().map(|&count| count as usize).sum()
+    }
+
+    /// # Errors
+    /// The first particle whose density or acceleration is no number.
+    pub fn check_finite(&self, dt: f64) -> Result<(), StepError> {
+        if let Some(i) = self.particles.density.par_iter().position_first(|rho| !rho.is_finite()) {
+            return Err(self.non_finite(i, Quantity::Density, dt));
+        }
+        match first_non_finite(&self.acceleration) {
+            Some(i) => Err(self.non_finite(i, Quantity::Acceleration, dt)),
+            None => Ok(()),
+        }
+    }
+
+    /// The longest step that this state allows, s: the parameters' limits for the present greatest speed, and the force
+    /// limit for the present greatest acceleration.
+    pub fn stable_dt(&self) -> f64 {
+        let limit = self.parameters.stable_dt(longest(&self.particles.velocity));
+        limit.min(self.parameters.force_dt(longest(&self.acceleration)))
+    }
+
+    /// The step to take now, s, at most `longest`.
+    pub fn next_dt(&self, longest: f64) -> f64 {
+        let stated = self.parameters.time_step;
+        if !self.parameters.adaptive {
+            return stated.min(longest);
+        }
+        let dt = stated.min(self.stable_dt());
+        // equal steps to the instant that is to be met, rather than full ones and a small rest
+        if longest.is_finite() { longest / (longest / dt - 1e-9).ceil().max(1.0) } else { dt }
+    }
+
+    /// Memory of the state and of what belongs to all methods.
+    pub fn bytes(&self) -> usize {
+        let Particles { position, velocity, density, pressure, id } = &self.particles;
+        let vectors = [position, velocity, &self.acceleration, &self.target].map(Vectors::bytes);
+        vectors.iter().sum::<usize>()
+            + 8 * (density.capacity() + pressure.capacity() + self.sorted.capacity())
+            + 4 * (id.capacity() + self.sorted_id.capacity())
+            + self.columns.bytes()
+    }
+
+    fn non_finite(&self, index: usize, quantity: Quantity, dt: f64) -> StepError {
+        // the state may hold NaN already; max and min pass it over
+        let stable = self.stable_dt();
+        let cause = if dt > stable { Cause::StepTooLong { dt, stable } } else { Cause::Overflow };
+        StepError::NonFinite { step: self.steps, id: self.particles.id[index], quantity, cause }
+    }
+}
+
+/// How many others are within the radius.
+struct Count {
+    radius: f64,
+}
+
+impl PairPass<0, 1, 1> for Count {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        _: [V; 3],
+        r2: V,
+        _: &[V; 0],
+        _: [V; 0],
+        sums: &mut [V; 1],
+    ) {
+        use fearless_simd::Select;
+        let near = r2.simd_lt(V::Element::of(self.radius * self.radius));
+        let one = V::splat(r2.token(), V::Element::of(1.0));
+        sums[0] += near.select(one, one - one);
+    }
+
+    fn finish(&self, _: usize, [count]: [f64; 1]) -> [f64; 1] {
+        [count - 1.0] // itself
+    }
+}
+
+fn permute<T: Copy + Send + Sync>(order: &[u32], values: &mut Vec<T>, buffer: &mut Vec<T>) {
+    buffer.clear();
+    buffer.extend_from_slice(values);
+    values.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each(|(values, order)| {
+        values.iter_mut().zip(order).for_each(|(to, &from)| *to = buffer[from as usize])
+    });
+}
+
+/// to += from·t
+pub(super) fn add_scaled(to: &mut Vectors, from: &Vectors, t: f64) {
+    for (to, from) in [(&mut to.x, &from.x), (&mut to.y, &from.y), (&mut to.z, &from.z)] {
+        add_scaled_column(to, from, t);
+    }
+}
+
+/// to += from·t
+pub(super) fn add_scaled_column(to: &mut [f64], from: &[f64], t: f64) {
+    to.par_chunks_mut(CHUNK).zip(from.par_chunks(CHUNK)).for_each(|(to, from)| {
+        for (to, from) in to.iter_mut().zip(from) {
+            *to += from * t;
+        }
+    });
+}
+
+/// Of the longest vector.
+pub(super) fn longest(vectors: &Vectors) -> f64 {
+    let longest =
+        |range: std::ops::Range<usize>| range.map(|i| vectors.get(i).length_squared()).fold(0.0, f64::max);
+    let n = vectors.len();
+    let chunks = (0..n.div_ceil(CHUNK)).into_par_iter();
+    // the greatest is the same in whatever order it is looked for
+    chunks.map(|c| longest(c * CHUNK..((c + 1) * CHUNK).min(n))).reduce(|| 0.0, f64::max).sqrt()
+}
+
+pub(super) fn first_non_finite(vectors: &Vectors) -> Option<usize> {
+    (0..vectors.len()).into_par_iter().with_min_len(CHUNK).position_first(|i| !vectors.get(i).is_finite())
+}

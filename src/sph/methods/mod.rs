@@ -1,0 +1,45 @@
+//! How pressure is found: one file for each method, each a readable `step` over the stages of [`Core`].
+
+mod dfsph;
+mod paper;
+mod wcsph;
+
+pub(super) use paper::Terms;
+
+use super::{core::Core, params::Method, simulation::StepError};
+
+/// A method with what it keeps between steps.
+pub(super) enum Scheme {
+    Paper(paper::Paper),
+    Wcsph(wcsph::Weakly),
+    Dfsph(dfsph::DivergenceFree),
+}
+
+impl Scheme {
+    /// Finds densities and forces of the first instant.
+    pub fn start(core: &mut Core<'_>) -> Self {
+        match core.parameters.method {
+            Method::Paper => Self::Paper(paper::Paper::start(core)),
+            Method::Wcsph(_) => Self::Wcsph(wcsph::Weakly::start(core)),
+            Method::Dfsph(_) => Self::Dfsph(dfsph::DivergenceFree::start(core)),
+        }
+    }
+
+    /// Advances by one step of at most `longest` seconds, and returns how long it was.
+    pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
+        match self {
+            Self::Paper(scheme) => scheme.step(core, longest),
+            Self::Wcsph(scheme) => scheme.step(core, longest),
+            Self::Dfsph(scheme) => scheme.step(core, longest),
+        }
+    }
+
+    /// Memory that is kept between steps.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Paper(scheme) => scheme.bytes(),
+            Self::Wcsph(scheme) => scheme.bytes(),
+            Self::Dfsph(scheme) => scheme.bytes(),
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! Walls without wall particles: what they add to sums over neighbours, and what stops a particle at them.
+//!
+//! ```text
+//! Field::faces ─▶ Coverage: λ, ∇λ, K in closed form ─▶ density, pressure, viscosity
+//! Field::first_entry ─▶ Contact ─▶ Boundary::collide: position and velocity
+//! ```
+
+mod boundary;
+mod contact;
+mod coverage;
+mod kernel;
+
+pub(super) use boundary::Boundary;
+pub use boundary::Obstacle;
+pub use contact::{Contact, Undefined, first_contact, push_out};
+pub(super) use coverage::Coverage;
+pub use kernel::WallKernel;
