@@ -17,6 +17,7 @@ pub mod cli;
 pub mod codegen;
 pub mod compile;
 pub mod diagnostic;
+pub mod experiment;
 pub mod field;
 pub mod geom;
 pub mod interval;
@@ -31,6 +32,7 @@ pub mod sph;
 pub mod syntax;
 
 pub use compile::{Error, Program};
+pub use experiment::Experiment;
 pub use field::Field;
 pub use glam;
 pub use solid::{Engine, Solid};

@@ -373,7 +373,7 @@ impl<'a> Lowering<'a> {
             block.blocks("solver").next().map_or((&[][..], block.span), |(_, entries, span)| (entries, span));
         let block = self.block(entries, "a solver", span, &SOLVER_KEYS, &[]);
         let compression =
-            self.number_key(&block, "compression", Dimension::NONE, Some(1e-3), Bound::Positive);
+            self.number_key(&block, "compression", Dimension::NONE, Some(1e-4), Bound::Positive);
         let iterations = self.count_key(&block, "iterations", 1);
         let precision = self.word_key(
             &block,
@@ -431,7 +431,12 @@ impl<'a> Lowering<'a> {
         let (mass, density) = (mass?, density?);
         // a spacing says as much as a mass
         let mass = if block.setting("spacing").is_some() { density * spacing?.powi(3) } else { mass };
-        let own_support = if paper { 0.1 } else { 2.6 * (mass / density).cbrt() };
+        // many neighbours make pressures smooth, and the incompressible solver slow
+        let own_support = match method {
+            Method::Paper => 0.1,
+            Method::Wcsph => 2.6 * (mass / density).cbrt(),
+            Method::Dfsph => 2.2 * (mass / density).cbrt(),
+        };
         let support_radius =
             self.number_key(&block, "support_radius", Dimension::LENGTH, Some(own_support), Positive);
         let mut number =

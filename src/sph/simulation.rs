@@ -203,6 +203,11 @@ impl<'a> Simulation<'a> {
         self.core.pairs()
     }
 
+    /// Iterations of the last step's solver; nothing for methods without one.
+    pub fn iterations(&self) -> Option<u32> {
+        self.scheme.iterations()
+    }
+
     /// Memory of the state and all that a step needs, bytes.
     pub fn bytes(&self) -> usize {
         self.core.bytes() + self.scheme.bytes()

@@ -26,6 +26,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("slice", &["field", "geom", "interval"]),
     ("mesh", &["field", "geom", "interval"]),
     ("sph", &["field", "geom", "interval"]),
+    ("experiment", &["compile", "diagnostic", "field", "geom", "ir", "lower", "solid", "sph"]),
     ("render", &["field", "geom"]),
     ("cli", &["*"]),
     ("lib", &["*"]),
@@ -33,7 +34,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
 ];
 
 /// Names that the crate's root re-exports, and the modules they come from.
-const REEXPORTED: [(&str, &str); 5] = [
+const REEXPORTED: [(&str, &str); 6] = [
+    ("Experiment", "experiment"),
     ("Program", "compile"),
     ("Error", "compile"),
     ("Solid", "solid"),

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::super::args::Run;
 use super::super::{Failure, note, output};
-use super::setup::Setup;
+use crate::Experiment;
 use crate::lower::Scene;
 use crate::mesh::{self, Grid, Mesh, Resolution, marching_cubes};
 use crate::render;
@@ -33,7 +33,7 @@ struct Pictures {
 }
 
 impl Frames {
-    pub fn new(options: &Run, scene: &Scene, setup: &Setup) -> Result<Self, Failure> {
+    pub fn new(options: &Run, scene: &Scene, setup: &Experiment) -> Result<Self, Failure> {
         let folder = options.output.clone().unwrap_or_else(|| default_folder(&options.file));
         let write_frames = !options.no_frames;
         // whatever can be refused comes before the first change to the folder
@@ -111,7 +111,7 @@ impl Pictures {
     /// long before.
     const FASTEST: f64 = 0.6;
 
-    fn new(scene: &Scene, setup: &Setup, obstacle: &Mesh) -> Result<Self, Failure> {
+    fn new(scene: &Scene, setup: &Experiment, obstacle: &Mesh) -> Result<Self, Failure> {
         let camera =
             render::Camera::three_quarter(&setup.domain, render::Camera::SIZE).map_err(Failure::usage)?;
         let mesh = render::Mesh {
@@ -186,7 +186,7 @@ fn not_cleared(folder: &Path, error: &std::io::Error) -> Failure {
 }
 
 /// All obstacles as one mesh, cut off at the box.
-fn obstacle_mesh(options: &Run, setup: &Setup) -> Result<Mesh, Failure> {
+fn obstacle_mesh(options: &Run, setup: &Experiment) -> Result<Mesh, Failure> {
     let mut all = Mesh::default();
     for (solid, ..) in &setup.obstacles {
         let bounds = solid.bounds().aabb().unwrap_or(setup.domain);

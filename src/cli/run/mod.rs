@@ -1,9 +1,8 @@
 //! `rfm run`: the fluid of a scene, step by step, with frames, pictures and a summary.
 //!
-//! setup (scene → simulation) → steps, with a frame every so often (`frames`) → summary.
+//! experiment (scene → simulation) → steps, with a frame every so often (`frames`) → summary.
 
 mod frames;
-mod setup;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,11 +12,11 @@ use serde::Serialize;
 
 use super::args::{Run, Shared};
 use super::{Failure, choose, input, note, output, progress};
-use crate::Program;
+use crate::diagnostic::Diagnostics;
 use crate::lower::Scene;
 use crate::sph::{Simulation, Stats};
+use crate::{Error, Experiment, Program};
 use frames::Frames;
-use setup::Setup;
 
 /// What `summary.json` and `--json` say; figures that judge the run are the worst of all saved instants.
 #[derive(Debug, Serialize)]
@@ -52,8 +51,8 @@ struct Summary {
 pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let program = input::program(shared, &options.file)?;
     let scene = choose::scene(&program, options.scene.as_deref())?;
-    let setup = Setup::of(shared, &program, scene)?;
-    let (mut simulation, carved) = setup.simulation(&program, scene)?;
+    let setup = experiment(shared, &program, scene)?;
+    let (mut simulation, carved) = start(&setup, &program, scene)?;
     let goal = Goal::of(options, scene, &setup)?;
     if options.dry_run {
         return dry_run(shared, &mut simulation, &setup, goal);
@@ -78,7 +77,11 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         let stop = interrupted.load(Ordering::Relaxed);
         if pace.frame_is_due(&simulation) || goal.is_reached(&simulation) || stop {
             watch.look(&simulation);
-            bar.set_message(format!("t = {:.3} s, {:.2} m/s", simulation.time(), watch.now.max_speed));
+            let mut message = format!("t = {:.3} s, {:.2} m/s", simulation.time(), watch.now.max_speed);
+            if let Some(iterations) = simulation.iterations() {
+                message += &format!(", {iterations} iterations");
+            }
+            bar.set_message(message);
             frames.save(&simulation)?;
         }
         if stop {
@@ -107,6 +110,37 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     Ok(())
 }
 
+fn experiment(shared: &Shared, program: &Program, scene: &Scene) -> Result<Experiment, Failure> {
+    let experiment = Experiment::of(program, scene, shared.engine.into()).map_err(refused)?;
+    tell(&experiment, program);
+    Ok(experiment)
+}
+
+fn start<'a>(
+    experiment: &'a Experiment,
+    program: &Program,
+    scene: &Scene,
+) -> Result<(Simulation<'a>, usize), Failure> {
+    let simulation = experiment.simulation(program, scene).map_err(refused)?;
+    tell(experiment, program);
+    Ok(simulation)
+}
+
+fn tell(experiment: &Experiment, program: &Program) {
+    input::show(&Diagnostics { list: experiment.take_warnings(), sources: program.sources().clone() });
+}
+
+/// Shows messages about the scene and makes them findings.
+fn refused(error: Error) -> Failure {
+    match error {
+        Error::Diagnostics(diagnostics) => {
+            input::show(&diagnostics);
+            Failure::Findings
+        }
+        other => choose::usage(other),
+    }
+}
+
 /// Where a run ends.
 #[derive(Clone, Copy)]
 enum Goal {
@@ -117,7 +151,7 @@ enum Goal {
 }
 
 impl Goal {
-    fn of(options: &Run, scene: &Scene, setup: &Setup) -> Result<Self, Failure> {
+    fn of(options: &Run, scene: &Scene, setup: &Experiment) -> Result<Self, Failure> {
         match (options.steps, options.until) {
             (Some(steps), _) => Ok(Self::Steps(steps)),
             (None, Some(until)) if !(until.is_finite() && until >= 0.0) => {
@@ -180,7 +214,7 @@ enum Pace {
 }
 
 impl Pace {
-    fn new(scene: &Scene, setup: &Setup) -> Self {
+    fn new(scene: &Scene, setup: &Experiment) -> Self {
         let every = scene.run.save_every;
         if setup.parameters.adaptive {
             Self::Times { every, next: 1 }
@@ -241,7 +275,7 @@ struct Forecast {
 fn dry_run(
     shared: &Shared,
     simulation: &mut Simulation<'_>,
-    setup: &Setup,
+    setup: &Experiment,
     goal: Goal,
 ) -> Result<(), Failure> {
     const TRIAL: u32 = 3;
@@ -401,8 +435,8 @@ fn print(summary: &Summary, frames: &Frames) {
 
 /// `rfm explain FILE:SCENE`: which passes run, which do not, and why.
 pub(super) fn explain(shared: &Shared, program: &Program, scene: &Scene) -> Result<(), Failure> {
-    let setup = Setup::of(shared, program, scene)?;
-    let (simulation, _) = setup.simulation(program, scene)?;
+    let setup = experiment(shared, program, scene)?;
+    let (simulation, _) = start(&setup, program, scene)?;
     let running = simulation.passes();
     say!(
         "scene {}: method {}, sums over neighbours in {}, time step {}",

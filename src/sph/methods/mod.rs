@@ -34,6 +34,10 @@ impl Scheme {
         }
     }
 
+    pub fn iterations(&self) -> Option<u32> {
+        if let Self::Dfsph(scheme) = self { Some(scheme.iterations) } else { None }
+    }
+
     /// Memory that is kept between steps.
     pub fn bytes(&self) -> usize {
         match self {

@@ -210,7 +210,9 @@ impl<'a> Rates<'a> {
         s * s * s
     }
 
-    /// Adds pressure, compression and diffusion, and artificial viscosity as a pressure between particles that approach.
+    /// Adds pressure, compression and diffusion, and artificial viscosity: a pressure between particles that approach, a
+    /// tension between those that part. With the pressure alone, noise at rest would hold up a part of the fluid's weight
+    /// (3 % of it with α = 0.1).
     #[inline(always)]
     fn accumulate<S: Simd, V: SimdFloat<S, Element: Real>, const ARTIFICIAL: bool>(
         &self,
@@ -229,8 +231,7 @@ impl<'a> Rates<'a> {
         if ARTIFICIAL {
             let least = of(0.01 * (0.5 * self.h).powi(2));
             // a viscosity made up needs no more than the twelve digits of an estimate in single precision
-            let strength = departing.min(of(0.0)) * of(self.artificial);
-            push = push - strength * (r2 + least).approximate_recip();
+            push = push - departing * of(self.artificial) * (r2 + least).approximate_recip();
         }
         let push = push * f;
         for k in 0..3 {
@@ -249,7 +250,7 @@ impl<'a> Rates<'a> {
             let (density, velocity) = (self.density[i], self.velocity.get(i));
             rate += density * wall.gradient.dot(velocity);
             pressure -= 2.0 * density * self.specific[i] * wall.gradient;
-            pressure = wall.completed(pressure, LEAST_FREE);
+            pressure = wall.completion(LEAST_FREE) * pressure;
             if self.parameters.slip == Slip::No {
                 viscous -= 2.0 * self.laminar * (wall.drag * velocity);
             }

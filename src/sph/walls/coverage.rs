@@ -99,14 +99,14 @@ impl Coverage {
         self.gradient.normalize_or_zero().dot(other.gradient.normalize_or_zero()).clamp(-1.0, 1.0)
     }
 
-    /// (1 − K)⁻¹·v: what a sum over the fluid alone would be if the fluid went on behind the walls as it is before them.
-    /// No direction is stretched by more than 1/`least_free`.
-    pub fn completed(&self, v: DVec3, least_free: f64) -> DVec3 {
+    /// (1 − K)⁻¹: makes of a sum over the fluid alone what it would be if the fluid went on behind the walls as it is
+    /// before them. No direction is stretched by more than 1/`least_free`.
+    pub fn completion(&self, least_free: f64) -> DMat3 {
         let free = DMat3::from_diagonal(DVec3::splat((1.0 - self.part).max(least_free)));
         let moment = free - self.spread;
         // along a face's normal K is at most ½ in the fluid; in corners the sum of several is held back
-        let determinant = moment.determinant();
-        if determinant < least_free.powi(3) { v / least_free } else { moment.inverse() * v }
+        let largest = DMat3::from_diagonal(DVec3::splat(1.0 / least_free));
+        if moment.determinant() < least_free.powi(3) { largest } else { moment.inverse() }
     }
 
     fn joined(&self, other: &Self, part: f64, da: f64, db: f64) -> Self {

@@ -1,7 +1,19 @@
 //! A scene of the language → a simulation: obstacles compiled, parameters checked, particles put and carved.
+//!
+//! ```no_run
+//! let program = rfm::Program::from_path("examples/pawn.rfm")?;
+//! let scene = &program.module().scenes[0];
+//! let experiment = rfm::Experiment::of(&program, scene, rfm::Engine::Auto)?;
+//! let (mut simulation, _carved) = experiment.simulation(&program, scene)?;
+//! simulation.step().unwrap();
+//! # Ok::<(), rfm::Error>(())
+//! ```
 
-use super::super::args::Shared;
-use super::super::{Failure, choose, input};
+use std::cell::RefCell;
+
+use glam::DVec3;
+
+use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
 use crate::field::Field;
 use crate::geom::Aabb;
@@ -12,8 +24,7 @@ use crate::sph::{
     self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
     carve,
 };
-use crate::{Program, Solid};
-use glam::DVec3;
+use crate::{Engine, Program, Solid};
 
 /// Particles start at least this part of the spacing away from an obstacle.
 const CLEARANCE: f64 = 0.5;
@@ -22,21 +33,30 @@ const CLEARANCE: f64 = 0.5;
 /// are swept.
 const PATH_RESOLUTION: f64 = 0.05;
 
-pub(super) struct Setup {
+/// What a scene needs besides its particles.
+pub struct Experiment {
+    /// The box.
     pub domain: Aabb,
+    /// Of the fluid and the method.
     pub parameters: Parameters,
     /// Solids, what answers for them in the box, and what they do to a particle.
     pub obstacles: Vec<(Solid, Box<dyn Field>, Bounce)>,
     fluid: Solid,
+    /// Why steps are as long as they are.
     pub time_step_reason: &'static str,
     /// A speed that the scene can reach by gravity, for the colours of pictures.
     pub typical_speed: f64,
+    warnings: RefCell<Vec<Diagnostic>>,
 }
 
-impl Setup {
-    pub fn of(shared: &Shared, program: &Program, scene: &Scene) -> Result<Self, Failure> {
-        let engine = shared.engine.into();
-        let compile = |name: &str, node| program.compile(name, node, engine).map_err(choose::usage);
+impl Experiment {
+    /// Compiles a scene's solids and derives the numbers of its method.
+    ///
+    /// # Errors
+    /// If the engine is not to be had, or the fluid's figures do not fit together.
+    pub fn of(program: &Program, scene: &Scene, engine: Engine) -> Result<Self, Error> {
+        let compile = |name: &str, node| program.compile(name, node, engine);
+        let warnings: RefCell<Vec<Diagnostic>> = RefCell::default();
         let fluid = compile(&scene.fluid.name, scene.fluid.shape)?;
         let mut obstacles = Vec::new();
         let reach = match scene.method {
@@ -99,7 +119,8 @@ impl Setup {
                         "the time step of {dt} s is longer than the {stable:.2e} s that are stable up to \
                          {typical_speed:.1} m/s, the speed of a fall through the box"
                     );
-                    warn(program, Diagnostic::warning(Code::LONG_STEP, scene.span, message));
+                    let long = Diagnostic::warning(Code::LONG_STEP, scene.span, message);
+                    warnings.borrow_mut().push(long);
                 }
                 "stated by the scene"
             }
@@ -118,11 +139,27 @@ impl Setup {
             let message = format!("the fluid's figures do not fit together: {error}");
             refuse(program, Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message))
         })?;
-        Ok(Self { domain: scene.domain, parameters, obstacles, fluid, time_step_reason, typical_speed })
+        Ok(Self {
+            domain: scene.domain,
+            parameters,
+            obstacles,
+            fluid,
+            time_step_reason,
+            typical_speed,
+            warnings,
+        })
+    }
+
+    /// What a person should know of the scene and does not keep it from being run; each is told once.
+    pub fn take_warnings(&self) -> Vec<Diagnostic> {
+        self.warnings.take()
     }
 
     /// The simulation at its start, and how many particles were carved off.
-    pub fn simulation(&self, program: &Program, scene: &Scene) -> Result<(Simulation<'_>, usize), Failure> {
+    ///
+    /// # Errors
+    /// If the fluid has no room.
+    pub fn simulation(&self, program: &Program, scene: &Scene) -> Result<(Simulation<'_>, usize), Error> {
         let fluid = &scene.fluid;
         let bounds = match self.fluid.bounds() {
             Bounds::Within(bounds) => *bounds,
@@ -172,7 +209,7 @@ impl Setup {
         scene: &Scene,
         particles: &mut Particles,
         obstacles: &[Obstacle<'_>],
-    ) -> Result<usize, Failure> {
+    ) -> Result<usize, Error> {
         let span = scene.fluid.shape_span;
         let clearance = CLEARANCE * self.parameters.spacing();
         let carved =
@@ -184,7 +221,7 @@ impl Setup {
                  outside the box; {} are left",
                 carved.inside, carved.too_close, carved.outside_box, carved.kept
             );
-            warn(program, Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message));
+            self.warnings.borrow_mut().push(Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message));
         }
         Ok(lost)
     }
@@ -231,7 +268,7 @@ fn fastest(program: &Program, scene: &Scene) -> f64 {
     most
 }
 
-fn no_fluid(program: &Program, error: &SeedError, span: Span) -> Failure {
+fn no_fluid(program: &Program, error: &SeedError, span: Span) -> Error {
     let code = match error {
         SeedError::NothingLeft(_) => Code::OBSTACLE_FILLS_BOX,
         _ => Code::SCENE_NO_ROOM,
@@ -239,12 +276,6 @@ fn no_fluid(program: &Program, error: &SeedError, span: Span) -> Failure {
     refuse(program, Diagnostic::error(code, span, error.to_string()))
 }
 
-/// Shows a message about the scene and makes it a finding.
-fn refuse(program: &Program, diagnostic: Diagnostic) -> Failure {
-    warn(program, diagnostic);
-    Failure::Findings
-}
-
-fn warn(program: &Program, diagnostic: Diagnostic) {
-    input::show(&Diagnostics { list: vec![diagnostic], sources: program.sources().clone() });
+fn refuse(program: &Program, diagnostic: Diagnostic) -> Error {
+    Error::Diagnostics(Diagnostics { list: vec![diagnostic], sources: program.sources().clone() })
 }
