@@ -30,6 +30,9 @@ pub struct MovingMap {
 /// A window also holds this part of the next one, so that a step which begins in it ends in it.
 const OVERLAP: f64 = 0.5;
 
+/// Windows of a run, at most: the rounding of their beginnings stays below a millionth of one.
+const MOST_WINDOWS: f64 = 1e9;
+
 impl MovingMap {
     /// Prepares a solid in a box, as [`CellMap::with_reach`], for a run from one time to another, in windows of time of
     /// the length `window`, all in seconds.
@@ -44,7 +47,7 @@ impl MovingMap {
         if domain.is_empty() || !domain.is_finite() || !ordered || !sensible {
             return None;
         }
-        let parts = solid.between(run.0, run.1 + (1.0 + OVERLAP) * window).parts()?;
+        let parts = solid.between(run.0 - window, run.1 + (1.0 + OVERLAP) * window).parts()?;
         let (lasting, restless) = Cells::lasting(&parts, domain, margin(&domain, reach));
         let current = Mutex::new(None);
         Some(Self { solid: solid.clone(), lasting, restless, reach, run, window, current })
@@ -53,15 +56,14 @@ impl MovingMap {
     /// The map during a step; nothing if the step is too long, or outside the run.
     pub fn between(&self, from: f64, to: f64) -> Option<CellMap> {
         let number = ((from - self.run.0) / self.window).floor();
-        let begin = self.run.0 + number * self.window;
+        // a little earlier, because it is rounded
+        let begin = self.run.0 + (number - 1e-6) * self.window;
         let end = begin + (1.0 + OVERLAP) * self.window;
-        let in_run = (0.0..1e15).contains(&number) && from <= self.run.1;
-        // the beginning of a window is rounded
-        let in_window = in_run && begin.min(from) <= from && from <= to && to <= end;
-        if !in_window {
+        let in_run = (0.0..MOST_WINDOWS).contains(&number) && from <= self.run.1;
+        if !(in_run && begin <= from && from <= to && to <= end) {
             return None;
         }
-        let cells = self.cells(number as u64, begin.min(from), end)?;
+        let cells = self.cells(number as u64, begin, end)?;
         CellMap::of(&self.solid.between(from, to), cells, self.reach)
     }
 
