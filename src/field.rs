@@ -136,6 +136,11 @@ pub trait Moving: Sync {
     ///
     /// Cheap enough to be asked for in every step.
     fn during(&self, from: f64, to: f64) -> Box<dyn Field + '_>;
+
+    /// Whether it does move: otherwise it is the same during every step.
+    fn moves(&self) -> bool {
+        true
+    }
 }
 
 /// An obstacle at rest, where one that may move is asked for.
@@ -145,6 +150,10 @@ pub struct Still<F>(pub F);
 impl<F: Field> Moving for Still<F> {
     fn during(&self, _from: f64, _to: f64) -> Box<dyn Field + '_> {
         Box::new(&self.0)
+    }
+
+    fn moves(&self) -> bool {
+        false
     }
 }
 

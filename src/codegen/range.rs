@@ -20,7 +20,6 @@ use super::emit::Emitter;
 use super::translate::pointers;
 use super::{Precision, Request};
 use crate::geom::Aabb;
-use crate::interval::Interval;
 use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeStep, Region, Unary};
 
 /// Boxes within this distance of the origin are answered by machine code.
@@ -58,7 +57,7 @@ const R0_UNDERFLOW: f64 = 1e-147;
 
 /// Whether machine code can answer for this graph.
 pub fn supports(graph: &Graph, root: Node) -> bool {
-    knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), &[], &[])
+    knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), Region::of(&Aabb::EMPTY))
 }
 
 /// Whether every operation of a graph is one that range programs have.
@@ -78,14 +77,9 @@ pub fn knows(graph: &Graph) -> bool {
 
 /// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by zero is
 /// not finite.
-pub fn stays_finite(
-    graph: &Graph,
-    evaluator: &RangeEvaluator,
-    parameters: &[f64],
-    uniforms: &[Interval],
-) -> bool {
-    let over = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
-    let ranges = evaluator.all_with(&Region { parameters, uniforms, ..Region::of(&over) });
+pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
+    let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
+    let ranges = evaluator.all_with(&Region { space: &space, ..numbers });
     let within = |node: Node, limit: f64| {
         let range = ranges[node.index()];
         range.lo > -limit && range.hi < limit

@@ -245,7 +245,8 @@ impl Graph {
 
     /// Whether a coordinate occurs in what a root depends on.
     pub fn uses(&self, root: Node, axis: Axis) -> bool {
-        self.cone(root).into_iter().any(|node| self.expr(node) == Expr::Coordinate(axis))
+        // most graphs have no time, and need not be walked to know it
+        self.find(Expr::Coordinate(axis)).is_some_and(|node| self.cone(root).binary_search(&node).is_ok())
     }
 
     /// Whether time does.

@@ -116,7 +116,7 @@ impl Store {
             let shape = &mut out.shapes[number as usize];
             shape.leaves += 1;
             let still = shape.motion.is_none();
-            let tame = still && codegen::range_stays_finite(&shape.graph, &shape.range, &constants, &[]);
+            let tame = still && shape.range_stays_finite(&constants, &[]);
             let (first, first_uniform) = (out.constants.len() as u32, out.uniforms as u32);
             out.leaves.push(Leaf { shape: number, first, first_uniform, tame });
             out.constants.extend(constants);
@@ -172,7 +172,7 @@ impl Leaves {
             let mut tame: Vec<bool> = self.store.leaves.iter().map(|leaf| leaf.tame).collect();
             for (i, shape, motion, constants) in self.store.moving() {
                 let own = motion.uniforms.over(time, constants);
-                tame[i] = codegen::range_stays_finite(&shape.graph, &shape.range, constants, &own);
+                tame[i] = shape.range_stays_finite(constants, &own);
                 uniforms.extend(own);
             }
             let pairs = uniforms.iter().map(|u| [u.lo, u.hi]).collect();
@@ -383,6 +383,12 @@ impl Shape {
     #[inline]
     fn uniforms(&self) -> usize {
         self.motion.as_ref().map_or(0, |motion| motion.uniforms.len())
+    }
+
+    /// Whether machine code may answer for the range of a leaf with these numbers.
+    fn range_stays_finite(&self, parameters: &[f64], uniforms: &[Interval]) -> bool {
+        let numbers = Region { parameters, uniforms, ..Region::of(&Aabb::EMPTY) };
+        codegen::range_stays_finite(&self.graph, &self.range, numbers)
     }
 
     /// The leaf as a formula of place and time.

@@ -18,6 +18,7 @@ mod moment;
 mod moving_map;
 mod prefix;
 mod programs;
+mod ranges;
 mod stretches;
 mod sweep;
 
@@ -38,12 +39,13 @@ use crate::codegen::{CodegenError, Form, Forms, Precision};
 use crate::field::{self, Entry, Field, GradientsMut, Moving, Path, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{self, Graph, Hoisted, Node, RangeEvaluator, Region, Uniforms};
+use crate::ir::{self, Graph, Node, Uniforms};
 use crate::simplify::{Applied, simplify};
 use leaf::{Leaves, Store};
 use logic::Logic;
-use moment::{Moment, UniformRanges};
+use moment::Moment;
 use programs::{Guard, Programs, UniformValues};
+use ranges::Ranges;
 use sweep::Sweep;
 
 /// Up to this many leaves the twin alone is cheaper than finding out which of them matter: a leaf and its share of
@@ -90,62 +92,6 @@ struct Function {
     gradient: OnceLock<Programs>,
 }
 
-/// The range programs of one function.
-struct Ranges {
-    /// Without what depends on time alone.
-    graph: Graph,
-    root: Node,
-    uniforms: Option<Uniforms>,
-    evaluator: RangeEvaluator,
-    code: OnceLock<Option<RangeProgram>>,
-}
-
-impl Ranges {
-    fn new(graph: &Graph, root: Node) -> Self {
-        let (graph, root, uniforms) = if graph.uses_time(root) {
-            let Hoisted { graph, outputs, uniforms, .. } = ir::hoisted(graph, &[root]);
-            (graph, outputs[0], Some(uniforms))
-        } else {
-            (graph.clone(), root, None)
-        };
-        let evaluator = RangeEvaluator::new(&graph, root);
-        Self { graph, root, uniforms, evaluator, code: OnceLock::new() }
-    }
-
-    /// What depends on time alone during a stretch of time.
-    fn uniforms_over(&self, time: Interval) -> UniformRanges {
-        let intervals = self.uniforms.as_ref().map_or(Vec::new(), |uniforms| uniforms.over(time, &[]));
-        let tame = crate::codegen::range_stays_finite(&self.graph, &self.evaluator, &[], &intervals);
-        let pairs = intervals.iter().map(|i| [i.lo, i.hi]).collect();
-        UniformRanges { intervals, pairs, tame }
-    }
-
-    /// The range over a box while time is in the stretch of a moment.
-    #[inline]
-    fn over(&self, engine: Engine, over: &Aabb, moment: &Moment, twin: bool) -> Interval {
-        if self.uniforms.is_some() {
-            return self.moving(engine, over, moment.ranges(twin, |time| self.uniforms_over(time)));
-        }
-        if engine != Engine::Interpreter {
-            let code = self.code.get_or_init(|| RangeProgram::compile(&self.graph, self.root).ok());
-            if let Some(range) = code.as_ref().and_then(|code| code.call(over, &[], &[])) {
-                return range;
-            }
-        }
-        self.evaluator.eval(over)
-    }
-
-    fn moving(&self, engine: Engine, over: &Aabb, uniforms: &UniformRanges) -> Interval {
-        if engine != Engine::Interpreter && uniforms.tame {
-            let code = self.code.get_or_init(|| RangeProgram::with_uniforms(&self.graph, self.root).ok());
-            if let Some(range) = code.as_ref().and_then(|code| code.call(over, &[], &uniforms.pairs)) {
-                return range;
-            }
-        }
-        self.evaluator.eval_with(&Region { uniforms: &uniforms.intervals, ..Region::of(over) })
-    }
-}
-
 impl Function {
     fn new(graph: Graph, root: Node, guard: Guard, form: Form) -> Self {
         Self {
@@ -157,6 +103,12 @@ impl Function {
             root,
             gradient: OnceLock::new(),
         }
+    }
+
+    /// The range over a box while time is in the stretch of a moment; of ω, or of its twin.
+    #[inline]
+    fn range(&self, engine: Engine, over: &Aabb, moment: &Moment, twin: bool) -> Interval {
+        self.range.over((&self.graph, self.root), engine, over, |find| moment.ranges(twin, find))
     }
 
     fn gradient(&self) -> &Programs {
@@ -229,7 +181,7 @@ impl Solid {
 
     /// Whether time occurs in the formula.
     pub fn moves(&self) -> bool {
-        self.inner.omega.range.uniforms.is_some()
+        self.inner.omega.range.moves()
     }
 
     /// How many numbers of a program depend on time alone: they are found once for each time, the rest at each point.
@@ -483,7 +435,7 @@ impl Solid {
     /// also where that overflows. [`Interval::ALL`] where ω may not be a number; points at which it is none because
     /// of their coordinates (not finite, or so large that their sum is not) are not spoken of.
     pub fn range(&self, over: &Aabb) -> Interval {
-        self.inner.omega.range.over(self.inner.engine, over, &self.moment, false)
+        self.inner.omega.range(self.inner.engine, over, &self.moment, false)
     }
 
     /// Where the straight path between two points first meets the solid; ω = 0 counts as met.
@@ -552,6 +504,10 @@ impl Moving for Solid {
     fn during(&self, from: f64, to: f64) -> Box<dyn Field + '_> {
         Box::new(self.between(from, to))
     }
+
+    fn moves(&self) -> bool {
+        self.moves()
+    }
 }
 
 /// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far away.
@@ -604,7 +560,7 @@ impl Field for Twin {
 
     fn range(&self, over: &Aabb) -> Interval {
         let Solid { inner, moment } = &self.solid;
-        self.solid.twin_function().range.over(inner.engine, over, moment, true)
+        self.solid.twin_function().range(inner.engine, over, moment, true)
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::bounds::Bounds;
 use super::programs::{ProgramKind, UniformValues};
+use super::ranges::UniformRanges;
 use super::{Inner, Parts};
 use crate::interval::Interval;
 
@@ -16,15 +17,6 @@ pub(super) struct Moment {
     twin_ranges: OnceLock<UniformRanges>,
     parts: OnceLock<Option<Arc<Parts>>>,
     bounds: OnceLock<Bounds>,
-}
-
-/// What depends on time alone, during the stretch.
-pub(super) struct UniformRanges {
-    pub intervals: Vec<Interval>,
-    /// The same numbers, for machine code.
-    pub pairs: Vec<[f64; 2]>,
-    /// Whether machine code may answer.
-    pub tame: bool,
 }
 
 impl Moment {

@@ -101,6 +101,10 @@ impl Moving for MovingMap {
             None => Box::new(self.solid.between(from, to)),
         }
     }
+
+    fn moves(&self) -> bool {
+        self.solid.moves()
+    }
 }
 
 impl std::fmt::Debug for MovingMap {

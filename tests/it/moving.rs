@@ -343,6 +343,7 @@ fn what_rests_rests_and_what_has_no_time_has_no_place() {
     }
     let still = Still(rest);
     assert_eq!(still.during(0.0, 1.0).omega(DVec3::ZERO), 0.5);
+    assert!(Moving::moves(&moving) && !still.moves());
 }
 
 /// A scene of many parts, some of which move.
