@@ -69,11 +69,14 @@ struct Inner {
     twin: OnceLock<Function>,
     contact: OnceLock<Programs>,
     velocity: OnceLock<Programs>,
-    parts: OnceLock<Option<(Arc<Store>, Arc<[u32]>)>>,
+    parts: OnceLock<Option<TakenApart>>,
     applied: Applied,
 }
 
-/// A solid taken apart.
+/// The leaves of a solid at all times, and how they are joined, in prefix form.
+type TakenApart = (Arc<Store>, Arc<[u32]>);
+
+/// A solid taken apart, during a stretch of time.
 struct Parts {
     leaves: Leaves,
     /// How they are joined, in prefix form.
@@ -123,7 +126,7 @@ impl Function {
 
 impl Inner {
     /// The solid taken apart into leaves, once; nothing if that would be too large.
-    fn parts(&self) -> Option<(Arc<Store>, Arc<[u32]>)> {
+    fn parts(&self) -> Option<TakenApart> {
         let take_apart = || {
             let (logic, nodes) = Logic::of(&self.omega.graph, self.omega.root)?;
             let leaves = Store::new(self.engine, &self.omega.graph, &nodes);
