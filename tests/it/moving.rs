@@ -84,6 +84,24 @@ fn both_engines_and_both_shapes_give_the_same_bits_at_every_time() {
     }
 }
 
+#[test]
+fn both_engines_find_the_same_entries() {
+    let mut random = Random(47);
+    let mut hits = 0;
+    for formula in FORMULAS {
+        let solids = [Engine::Jit, Engine::Interpreter].map(|engine| solid_with(formula, engine));
+        for _ in 0..200 {
+            let from = random.within(-2.0, 2.0);
+            let to = from + random.within(0.0, 0.3);
+            let path = Path::new(random.point(1.5), random.point(1.5), f64::INFINITY);
+            let [a, b] = solids.each_ref().map(|solid| solid.during(from, to).first_entry(&path));
+            assert_eq!(a, b, "{formula}: {path:?} from {from} to {to}");
+            hits += usize::from(a.is_some());
+        }
+    }
+    assert!(hits > 200, "{hits}");
+}
+
 /// ω and ∂ω/∂t against the same formula in 120-digit arithmetic: its value, and the difference quotient over 2⁻⁴⁰ s,
 /// whose own error is some 2⁻⁸⁰ of the third derivative.
 #[test]
