@@ -123,6 +123,100 @@ pub trait Field: Sync {
             faces.push(Part::Face(Face { distance, normal: -gradient / slope, mean_curvature: 0.0 }));
         }
     }
+
+    /// ω at a part of a path, at the time at which it is passed: the same as at any other time, unless the obstacle
+    /// moves.
+    fn on_path(&self, path: &Path, t: f64) -> f64 {
+        self.omega(path.at(t))
+    }
+
+    /// The velocity of the surface near a point, in the scene's units of length and time, along the surface's normal.
+    ///
+    /// On the surface ω(x(t), t) = 0, so it moves along n = −∇ω/|∇ω| with the speed ω_t/|∇ω|; at edges it is that of
+    /// one of the faces, or their mean. A motion within the surface itself, as of a turning cylinder, is not in ω.
+    fn wall_velocity(&self, _p: DVec3) -> DVec3 {
+        DVec3::ZERO
+    }
+
+    /// Whether a point is proven to be in the fluid, farther from every surface than the distance for which the field
+    /// was prepared, at all times that it speaks of. One look-up, or no for a field that was not prepared.
+    fn is_clear(&self, _p: DVec3) -> bool {
+        false
+    }
+}
+
+/// An obstacle that may move.
+pub trait Moving: Sync {
+    /// The obstacle during one time step, s: values, gradients and signs are those at `to`, ranges hold the whole step,
+    /// and [`Field::first_entry`] lets time run evenly from `from` to `to` while the path is passed.
+    ///
+    /// Cheap enough to be asked for in every step.
+    fn during(&self, from: f64, to: f64) -> Box<dyn Field + '_>;
+
+    /// Whether it does move: otherwise it is the same during every step.
+    fn moves(&self) -> bool {
+        true
+    }
+}
+
+/// An obstacle at rest, where one that may move is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Still<F>(pub F);
+
+impl<F: Field> Moving for Still<F> {
+    fn during(&self, _from: f64, _to: f64) -> Box<dyn Field + '_> {
+        Box::new(&self.0)
+    }
+
+    fn moves(&self) -> bool {
+        false
+    }
+}
+
+impl<F: Field + ?Sized> Field for &F {
+    fn omega(&self, p: DVec3) -> f64 {
+        (**self).omega(p)
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        (**self).omega_grad(p)
+    }
+
+    fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        (**self).omega_many(points, omega);
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        (**self).omega_grad_many(points, out);
+    }
+
+    fn continuous(&self, p: DVec3) -> f64 {
+        (**self).continuous(p)
+    }
+
+    fn range(&self, over: &Aabb) -> Interval {
+        (**self).range(over)
+    }
+
+    fn first_entry(&self, path: &Path) -> Option<Entry> {
+        (**self).first_entry(path)
+    }
+
+    fn on_path(&self, path: &Path, t: f64) -> f64 {
+        (**self).on_path(path, t)
+    }
+
+    fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        (**self).wall_velocity(p)
+    }
+
+    fn is_clear(&self, p: DVec3) -> bool {
+        (**self).is_clear(p)
+    }
+
+    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
+        (**self).faces(p, reach, faces);
+    }
 }
 
 /// A field made of two closures, for tests and for callers with formulas of their own.

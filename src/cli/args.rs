@@ -107,6 +107,9 @@ pub(super) struct Check {
     /// Check again whenever a file changes
     #[arg(long)]
     pub watch: bool,
+    /// The time at which solids that move are looked at, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
+    pub time: f64,
     /// Treat a kind of message as an error
     #[arg(long, value_enum, value_name = "KIND")]
     pub deny: Option<Deny>,
@@ -130,6 +133,9 @@ pub(super) struct Eval {
     /// A CSV file of points with the header x,y,z; `-` is standard input
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
+    /// The time at which solids that move are looked at, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
+    pub time: f64,
     /// Columns to print
     #[arg(long, value_enum, value_delimiter = ',', default_value = "value,gradient")]
     pub what: Vec<What>,
@@ -178,6 +184,9 @@ pub(super) struct Mesh {
     /// Mesh this box instead of the solid's own bounds; the mesh is closed at its border
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = aabb, allow_hyphen_values = true)]
     pub domain: Option<Aabb>,
+    /// The time at which solids that move are looked at, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
+    pub time: f64,
     /// How the surface is found
     #[arg(long, value_enum, default_value_t = MeshMethod::Mc)]
     pub method: MeshMethod,
@@ -291,6 +300,11 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .map(|part| part.trim().parse().map_err(|_| format!("`{part}` is not a number")))
         .collect();
     values?.try_into().map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
+    if value.is_finite() { Ok(value) } else { Err("the time must be finite".into()) }
 }
 
 fn point(text: &str) -> Result<DVec3, String> {

@@ -63,6 +63,8 @@ struct Facts {
     tolerance: Option<f64>,
     program: Option<String>,
     error_bound: Option<f64>,
+    /// The time, s, that all this is for; null for a solid at rest.
+    time: Option<f64>,
     /// Cells of the finer measuring grid in which parts of the surface hide, see `mesh::thin_cells`.
     thin_cells: Option<usize>,
 }
@@ -81,6 +83,7 @@ impl Facts {
             tolerance: None,
             program: None,
             error_bound: None,
+            time: solid.moves().then(|| solid.time()),
             thin_cells: None,
         }
     }
@@ -144,7 +147,7 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
             }
             Ok(program) => {
                 let mut diagnostics = program.warnings();
-                let facts = solids(shared, &program, &file, &mut diagnostics)?;
+                let facts = solids(shared, &program, &file, options.time, &mut diagnostics)?;
                 let denied = options.deny == Some(Deny::Warnings) && !diagnostics.list.is_empty();
                 if denied || diagnostics.has_errors() {
                     document.ok = false;
@@ -206,11 +209,12 @@ fn solids(
     shared: &Shared,
     program: &Program,
     file: &str,
+    time: f64,
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<Facts>, Failure> {
     let mut facts = Vec::new();
     for named in &program.module().solids {
-        let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
+        let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?.at(time);
         let operations = solid.graph(ProgramKind::Value).0.len();
         if operations > MOST_MEASURED {
             note(format!("solid `{}` has {operations} operations: it is not measured", named.name));
@@ -337,6 +341,9 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
     }
     for solid in facts {
         say!("  solid {}", solid.name);
+        if let Some(time) = solid.time {
+            say!("    moves       at t = {time} s:");
+        }
         if solid.empty {
             say!("    empty");
         }
@@ -379,7 +386,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
 }
 
 fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Result<(), Failure> {
-    let solid = choose::solid(shared, program, options.solid.as_deref())?;
+    let solid = choose::solid(shared, program, options.solid.as_deref())?.at(options.time);
     let window = match options.window {
         Some([u0, v0, u1, v1]) => Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)),
         None => plane.window(&around(&solid)?),

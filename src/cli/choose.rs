@@ -1,7 +1,7 @@
 //! Which solid or scene of a file is meant.
 
 use super::args::Shared;
-use super::{Failure, input};
+use super::{Failure, input, note};
 use crate::diagnostic::Diagnostics;
 use crate::lower::{NamedSolid, Scene};
 use crate::solid::Chosen;
@@ -14,6 +14,20 @@ pub(super) fn solid(shared: &Shared, program: &Program, name: Option<&str>) -> R
         None => default_solid(program)?.name.clone(),
     };
     program.solid_with(&name, shared.engine.into()).map_err(usage)
+}
+
+/// The solid by name, as [`solid`], at a time; says on standard error that it moves.
+pub(super) fn solid_at(
+    shared: &Shared,
+    program: &Program,
+    name: Option<&str>,
+    time: f64,
+) -> Result<Solid, Failure> {
+    let solid = solid(shared, program, name)?;
+    if solid.moves() {
+        note(format!("`{}` moves: this is how it is at t = {time} s", solid.name()));
+    }
+    Ok(solid.at(time))
 }
 
 fn default_solid(program: &Program) -> Result<&NamedSolid, Failure> {

@@ -23,7 +23,7 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
         return Err(Failure::usage("file and points cannot both be read from standard input"));
     }
     let program = input::program(shared, &options.file)?;
-    let solid = choose::solid(shared, &program, options.solid.as_deref())?;
+    let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let chosen = match options.precision {
         None => choose::within_tolerance(&program, &solid)?,
         Some(_) => None, // asked for by hand

@@ -67,6 +67,7 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
     let text = Explanation { program, solid: &solid };
     say!("solid {}", named.name);
+    text.motion();
     text.simplification(named);
     text.leaves();
     text.specialisation();
@@ -114,7 +115,8 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
 fn listing(solid: &Solid, kind: ProgramKind) -> Result<Listing, CodegenError> {
     let (graph, outputs) = solid.graph(kind);
     let (precision, shape, forms) = (Precision::F64, Shape::Point, solid.forms(kind, Precision::F64));
-    Listing::of(Request { graph, inputs: &[], outputs, precision, shape, forms, parameters: false })
+    let uniforms = solid.moves();
+    Listing::of(Request { graph, inputs: &[], outputs, precision, shape, forms, parameters: false, uniforms })
 }
 
 /// Leaves that are listed one by one.
@@ -143,6 +145,16 @@ impl Explanation<'_> {
         let cut: String = text.chars().take(60).collect();
         let more = if cut.len() < text.len() { "…" } else { "" };
         format!("{}:{}:{}  `{cut}{more}`", source.name, at.line, at.column)
+    }
+
+    /// What is found once for each time, if the solid moves.
+    fn motion(&self) {
+        if let Some(numbers) = self.solid.time_dependent(ProgramKind::Value) {
+            let s = if numbers == 1 { "" } else { "s" };
+            say!(
+                "  moves: time enters ω by {numbers} number{s}, found once for each time; below it is at t = 0 s"
+            );
+        }
     }
 
     /// Which rules changed what, and where it stood.

@@ -196,7 +196,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         ));
     }
     let program = input::program(shared, &options.file)?;
-    let solid = choose::solid(shared, &program, options.solid.as_deref())?;
+    let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let resolution = options.cell.map_or(Resolution::Cells(options.cells), Resolution::Spacing);
     let bounds = *solid.bounds();
     let grid = match (options.domain, bounds) {

@@ -67,7 +67,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.builder.ins().splat(vector, scalar)
     }
 
-    /// A parameter in every lane; NaN if the program was given none.
+    /// A parameter or uniform in every lane; NaN if the program was given none.
     pub fn parameter(&mut self, parameters: Option<Value>, i: u32) -> Value {
         let Some(base) = parameters else { return self.constant(f64::NAN) };
         let (lane, vector) = (self.lane_type(), self.vector_type());

@@ -61,6 +61,9 @@ pub struct Request<'a> {
     pub forms: &'a Forms,
     /// Whether the function takes one more argument, a pointer to the parameters of the graph.
     pub parameters: bool,
+    /// Whether it takes another one after that, a pointer to the graph's uniforms: numbers of the program's type, or for
+    /// [`Shape::Range`] pairs of bounds. Time itself no program knows, see [`hoisted`](crate::ir::hoisted).
+    pub uniforms: bool,
 }
 
 impl Precision {

@@ -17,9 +17,10 @@ use cranelift_frontend::FunctionBuilder;
 use glam::DVec3;
 
 use super::emit::Emitter;
+use super::translate::pointers;
 use super::{Precision, Request};
 use crate::geom::Aabb;
-use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeStep, Unary};
+use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeStep, Region, Unary};
 
 /// Boxes within this distance of the origin are answered by machine code.
 pub const REACH: f64 = 1e9;
@@ -56,14 +57,15 @@ const R0_UNDERFLOW: f64 = 1e-147;
 
 /// Whether machine code can answer for this graph.
 pub fn supports(graph: &Graph, root: Node) -> bool {
-    knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), &[])
+    knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), Region::of(&Aabb::EMPTY))
 }
 
 /// Whether every operation of a graph is one that range programs have.
 pub fn knows(graph: &Graph) -> bool {
     let is_number = |node| matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_));
     graph.nodes().all(|(_, expr)| match expr {
-        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) => true,
+        Expr::Coordinate(Axis::T) => false,
+        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => true,
         Expr::Unary(op, _) => matches!(op, Unary::Neg | Unary::Abs | Unary::Sqrt),
         Expr::Binary(Binary::Div, _, b) => is_number(b),
         Expr::Binary(op, ..) => {
@@ -73,10 +75,11 @@ pub fn knows(graph: &Graph) -> bool {
     })
 }
 
-/// Whether no bound can overflow for a box within [`REACH`], for these parameters. A quotient by zero is not finite.
-pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, parameters: &[f64]) -> bool {
-    let over = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
-    let ranges = evaluator.all_with(&over, parameters);
+/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by zero is
+/// not finite.
+pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
+    let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
+    let ranges = evaluator.all_with(&Region { space: &space, ..numbers });
     let within = |node: Node, limit: f64| {
         let range = ranges[node.index()];
         range.lo > -limit && range.hi < limit
@@ -93,7 +96,7 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, parameters: &[f64
 }
 
 /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the root out;
-/// with parameters, a pointer to them comes third.
+/// pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as there are any.
 pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, rounding: Rounding) {
     let block = builder.create_block();
     builder.append_block_params_for_function_params(block);
@@ -101,6 +104,7 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
     builder.seal_block(block);
     let arguments = builder.block_params(block).to_vec();
     let (input, output) = (arguments[0], arguments[1]);
+    let [parameters, uniforms] = pointers(request, &arguments[2..]);
     let emitter = Emitter::new(builder, Precision::F64, request.forms, request.graph);
     let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
     // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
@@ -124,8 +128,10 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
             RangeStep::Plain(Expr::Constant(bits)) => {
                 ranges.number(node, Number::Constant(f64::from_bits(bits)))
             }
+            RangeStep::Plain(Expr::Coordinate(Axis::T)) => ranges.pair(f64::NAN, f64::NAN), // `knows` refuses
+            RangeStep::Plain(Expr::Uniform(i)) => ranges.uniform(uniforms, i),
             RangeStep::Plain(Expr::Parameter(i)) => {
-                let splat = ranges.emitter.parameter(arguments.get(2).copied(), i);
+                let splat = ranges.emitter.parameter(parameters, i);
                 ranges.number(node, Number::Parameter(splat))
             }
             RangeStep::Plain(Expr::Unary(op, a)) => ranges.unary(op, ranges.values[&a]),
@@ -211,6 +217,14 @@ impl Ranges<'_, '_> {
             Number::Constant(c) => self.pair(-c, c),
             Number::Parameter(splat) => self.flip(splat, Lane::Low),
         }
+    }
+
+    /// A uniform: the bounds as they were given. A program that was given none has NaN.
+    fn uniform(&mut self, uniforms: Option<Value>, i: u32) -> Value {
+        let Some(base) = uniforms else { return self.pair(f64::NAN, f64::NAN) };
+        let flags = MemFlagsData::new();
+        let pair = self.emitter.builder.ins().load(types::F64X2, flags, base, 16 * i as i32);
+        self.flip(pair, Lane::Low)
     }
 
     /// A constant with two different lanes.

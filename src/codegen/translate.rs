@@ -46,6 +46,9 @@ impl Listing {
 
 fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), CodegenError> {
     let needed = needed(request);
+    if needed.iter().any(|&node| request.graph.expr(node) == Expr::Coordinate(Axis::T)) {
+        return Err(CodegenError::Bug("time is in the graph of a program".into()));
+    }
     let isa = target(needed.len())?;
     let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
     let mut linker = JITBuilder::with_isa(isa, default_libcall_names());
@@ -97,9 +100,7 @@ fn declare_parameters(function: &mut Function, module: &JITModule, request: Requ
         Shape::Point => vec![scalar, scalar, scalar, pointer],
         Shape::Batch | Shape::Range(_) => vec![pointer, pointer],
     };
-    if request.parameters {
-        parameters.push(pointer);
-    }
+    parameters.extend([request.parameters, request.uniforms].into_iter().filter(|&is| is).map(|_| pointer));
     function.signature.params = parameters;
 }
 
@@ -143,7 +144,9 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node
     let vector = emitter.vector_type();
     let coordinates: [Value; 3] =
         std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
-    let given = Given { coordinates, inputs: FxHashMap::default(), parameters: parameters.get(4).copied() };
+    let [given_parameters, uniforms] = pointers(request, &parameters[4..]);
+    let inputs = FxHashMap::default();
+    let given = Given { coordinates, inputs, parameters: given_parameters, uniforms };
     let values = nodes(&mut emitter, request, needed, hosts, given);
     let bytes = emitter.lane_type().bytes() as i32;
     for (i, output) in request.outputs.iter().enumerate() {
@@ -189,7 +192,8 @@ fn batch(
     };
     let coordinates = axes.map(&mut load);
     let inputs = request.inputs.iter().copied().zip(inputs.into_iter().map(load)).collect();
-    let given = Given { coordinates, inputs, parameters: arguments.get(2).copied() };
+    let [parameters, uniforms] = pointers(request, &arguments[2..]);
+    let given = Given { coordinates, inputs, parameters, uniforms };
     let values = nodes(&mut emitter, request, needed, hosts, given);
     for (output, base) in request.outputs.iter().zip(outputs) {
         let address = builder.ins().iadd(base, offset);
@@ -207,8 +211,16 @@ fn batch(
 struct Given {
     coordinates: [Value; 3],
     inputs: FxHashMap<Node, Value>,
-    /// A pointer.
+    /// A pointer, as the next.
     parameters: Option<Value>,
+    uniforms: Option<Value>,
+}
+
+/// The pointers to parameters and uniforms, as far as a program has them, from its last arguments.
+pub(super) fn pointers(request: Request<'_>, last: &[Value]) -> [Option<Value>; 2] {
+    let parameters = if request.parameters { last.first() } else { None };
+    let uniforms = if request.uniforms { last.last() } else { None };
+    [parameters.copied(), uniforms.copied()]
 }
 
 /// The values of all needed nodes, in the graph's order, beside those that were given.
@@ -219,7 +231,7 @@ fn nodes(
     hosts: &Hosts,
     given: Given,
 ) -> FxHashMap<Node, Value> {
-    let Given { coordinates, inputs: mut values, parameters } = given;
+    let Given { coordinates, inputs: mut values, parameters, uniforms } = given;
     for &node in needed {
         let expr = request.graph.expr(node);
         let host = host_of(expr, request.precision).and_then(|host| hosts.get(&host.name).copied());
@@ -228,7 +240,9 @@ fn nodes(
             Expr::Coordinate(Axis::X) => coordinates[0],
             Expr::Coordinate(Axis::Y) => coordinates[1],
             Expr::Coordinate(Axis::Z) => coordinates[2],
+            Expr::Coordinate(Axis::T) => emitter.constant(f64::NAN), // `build` refuses
             Expr::Parameter(i) => emitter.parameter(parameters, i),
+            Expr::Uniform(i) => emitter.parameter(uniforms, i),
             Expr::Unary(op, a) => emitter.unary(op, values[&a], host),
             Expr::Binary(op, a, b) => emitter.binary(op, (a, values[&a]), (b, values[&b]), host),
         };

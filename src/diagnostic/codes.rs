@@ -53,7 +53,7 @@ file; `x`, `y`, `z`, `pi` and the standard solids and functions are always there
 DUPLICATE_NAME = "E0202":
 "Two items have the same name. All items share one set of names; rename one of them.";
 RESERVED_NAME = "E0203":
-"`x`, `y`, `z` and `pi` always mean the coordinates and the number: an item cannot take their names.";
+"`x`, `y`, `z`, `t` and `pi` always mean the coordinates, the time and the number: an item cannot take their names.";
 NOT_A_FUNCTION = "E0204":
 "Brackets after a name call a function, but this name is a value (or the other way round).";
 ARGUMENTS = "E0205":
@@ -66,7 +66,8 @@ WRONG_TYPE = "E0207":
 "A number (or field) was expected and a vector or text was found, or the other way round. Vectors are written
 `[a, b, c]`; texts are written in double quotes.";
 NOT_CONSTANT = "E0208":
-"This value must be known when the file is compiled: it may use numbers, params and constants, but not x, y, z.";
+"This value must be known when the file is compiled: it may use numbers, params and constants, but not x, y, z,
+nor the time t. (Displacements and angles of `.move` and `.rotate` may depend on t.)";
 OUT_OF_RANGE = "E0209":
 "The value lies outside the range that is allowed for it: a size that must be positive, or a param outside its
 declared `in a .. b`.";

@@ -1,7 +1,7 @@
 //! The first meeting of a straight path with an obstacle, for fields that know their range and for those that do not.
 //!
 //! Invariant: where a field knows its range, nothing of the path before an [`Entry`] touches the obstacle, and a path
-//! without one does not touch it at all. A field that knows nothing is sampled, and what lies between two samples is
+//! without one does not touch it at all; of an obstacle that moves, each place at the time at which it is passed. A field that knows nothing is sampled, and what lies between two samples is
 //! not seen.
 
 use glam::DVec3;
@@ -101,7 +101,7 @@ impl Entry {
     pub fn first_sample_met<F: Field + ?Sized>(&self, field: &F, path: &Path) -> Option<(f64, f64)> {
         let middle = 0.5 * (self.t + self.until);
         let look = |t: f64| {
-            let w = field.omega(path.at(t));
+            let w = field.on_path(path, t);
             (w >= 0.0 || w.is_nan()).then_some((t, w))
         };
         look(self.t)
@@ -188,7 +188,7 @@ fn by_ranges<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), b
             stack.extend([(middle, t1), (t0, middle)]);
         } else {
             let begin = open.map_or(t0, |o| o.0);
-            if field.omega(path.at(t1)) >= 0.0 {
+            if field.on_path(path, t1) >= 0.0 {
                 return Some(((begin, t1), true));
             }
             open = Some((begin, t1));
@@ -199,13 +199,13 @@ fn by_ranges<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), b
 
 /// The first sample that is not in the fluid, and the last place before it that is.
 fn by_samples<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), bool)> {
-    let start = field.omega(path.at(path.start));
+    let start = field.on_path(path, path.start);
     if start >= 0.0 || start.is_nan() {
         return Some(((path.start, path.start), start >= 0.0));
     }
     let mut before = (path.start, start);
     for t in path.samples(path.start, 1.0) {
-        let after = (t, field.omega(path.at(t)));
+        let after = (t, field.on_path(path, t));
         if after.1.is_nan() {
             return Some(((before.0, t), false));
         }
@@ -237,7 +237,7 @@ pub fn last_outside<F: Field + ?Sized>(
         let secant = w_low / (w_low - w_high);
         let part = if k % 3 == 2 || !secant.is_finite() { 0.5 } else { secant.clamp(margin, 1.0 - margin) };
         let t = low + part * width;
-        let w = field.omega(path.at(t));
+        let w = field.on_path(path, t);
         if w < 0.0 {
             (low, w_low) = (t, w);
         } else {

@@ -12,11 +12,17 @@ use super::op::{Binary, Unary};
 
 /// (∂root/∂x, ∂root/∂y, ∂root/∂z). The work grows with what the root uses, not with the graph.
 pub fn gradient(graph: &mut Graph, root: Node) -> [Node; 3] {
+    let [x, y, z, _] = gradient_and_rate(graph, root);
+    [x, y, z]
+}
+
+/// The gradient, and ∂root/∂t at a fixed place.
+pub fn gradient_and_rate(graph: &mut Graph, root: Node) -> [Node; 4] {
     let cone = graph.cone(root);
     let depends = depends_on_coordinates(graph, &cone);
     let mut adjoints: FxHashMap<Node, Node> = FxHashMap::default();
     adjoints.insert(root, graph.constant(1.0));
-    let mut partials = [None; 3];
+    let mut partials = [None; 4];
     for &node in cone.iter().rev() {
         let Some(&adjoint) = adjoints.get(&node) else { continue };
         if let Expr::Coordinate(axis) = graph.expr(node) {
@@ -55,7 +61,7 @@ fn contributions(
 ) -> Vec<(Node, Node)> {
     let mut out = Vec::with_capacity(2);
     match graph.expr(node) {
-        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) => {}
+        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => {}
         Expr::Unary(op, a) => {
             if depends.contains(&a) {
                 let contribution = unary(graph, op, node, a, adjoint);
@@ -209,17 +215,19 @@ fn sum_of_squares(graph: &mut Graph, a: Node, b: Node) -> Node {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::{Axis, Interpreter};
+    use crate::ir::{Axis, Given, Interpreter};
 
     /// Derivatives against central differences at smooth points: h = 1e-5 leaves ~1e-9 of either error.
     #[test]
     fn every_operation_has_its_derivative() {
-        let points = [[0.3, 0.5, -0.2], [0.7, 0.2, 0.4], [0.15, 0.6, 0.9]];
+        let points = [[0.3, 0.5, -0.2, 0.1], [0.7, 0.2, 0.4, -0.2], [0.15, 0.6, 0.9, 0.3]];
         let mut roots = Vec::new();
         let mut graph = Graph::default();
         let (x, y, z) = (graph.coordinate(Axis::X), graph.coordinate(Axis::Y), graph.coordinate(Axis::Z));
         let z2 = graph.binary(Binary::Mul, z, z);
-        let inner = graph.binary(Binary::Add, y, z2);
+        let t = graph.coordinate(Axis::T);
+        let tz2 = graph.binary(Binary::Add, z2, t);
+        let inner = graph.binary(Binary::Add, y, tz2);
         for op in Unary::ALL {
             let inside = graph.unary(op, x);
             roots.push((op.name(), graph.binary(Binary::Mul, inside, inner)));
@@ -233,18 +241,18 @@ mod tests {
             }
         }
         for (name, root) in roots {
-            let partials = gradient(&mut graph, root);
+            let partials = gradient_and_rate(&mut graph, root);
             let mut outputs = vec![root];
             outputs.extend(partials);
             let (small, outputs) = graph.extract(&outputs);
             let interpreter = Interpreter::new(&small, &outputs);
-            let value = |p: [f64; 3]| {
-                let mut out = [0.0; 4];
-                interpreter.eval_f64(p, &mut out);
+            let value = |[x, y, z, time]: [f64; 4]| {
+                let mut out = [0.0; 5];
+                interpreter.eval_given(Given { time, ..Given::point([x, y, z]) }, &mut out);
                 out
             };
             for p in points {
-                for axis in 0..3 {
+                for axis in 0..4 {
                     let h = 1e-5;
                     let (mut low, mut high) = (p, p);
                     low[axis] -= h;

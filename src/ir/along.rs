@@ -26,7 +26,8 @@ const ROUNDING: f64 = 0.5 * f64::EPSILON * (1.0 + 1.0 / (1u64 << 30) as f64);
 type Polynomial = [Option<Term>; 3];
 
 /// [c₀, c₁, c₂, their error bounds] of a root along the path from the point (x, y, z) in the direction whose components
-/// are the parameters `direction`, `direction` + 1 and `direction` + 2; nothing unless the root is made of sums,
+/// are the parameters `direction`, `direction` + 1 and `direction` + 2, while time goes on by the parameter
+/// `direction` + 3 from the parameter `direction` + 4; nothing unless the root is made of sums,
 /// products and quotients by constants, and of degree two at most.
 pub fn along(graph: &mut Graph, root: Node, direction: u32) -> Option<[Node; 6]> {
     let mut builder = Builder { graph, direction };
@@ -58,12 +59,18 @@ impl Builder<'_> {
         let exact = |value| Some(Term { value, error: None });
         Some(match self.graph.expr(node) {
             Expr::Constant(_) | Expr::Parameter(_) => [exact(node), None, None],
+            Expr::Uniform(_) => return None,
             Expr::Coordinate(axis) => {
-                let number = self.direction + axis_number(axis);
+                let number = self.direction + axis as u32;
                 let step = self.graph.intern(Expr::Parameter(number), None);
                 // a difference of two points, rounded
                 let error = self.rounding(step);
-                [exact(node), Some(Term { value: step, error: Some(error) }), None]
+                // the program has no time of its own
+                let begin = match axis {
+                    Axis::T => self.graph.intern(Expr::Parameter(self.direction + 4), None),
+                    _ => node,
+                };
+                [exact(begin), Some(Term { value: step, error: Some(error) }), None]
             }
             Expr::Unary(Unary::Neg, a) => known[&a].map(|term| {
                 term.map(|term| Term { value: self.graph.unary(Unary::Neg, term.value), ..term })
@@ -164,14 +171,6 @@ impl Builder<'_> {
             (Some(a), Some(b)) => Some(self.graph.binary(Binary::Add, a, b)),
             (term, None) | (None, term) => term,
         }
-    }
-}
-
-fn axis_number(axis: Axis) -> u32 {
-    match axis {
-        Axis::X => 0,
-        Axis::Y => 1,
-        Axis::Z => 2,
     }
 }
 

@@ -10,10 +10,13 @@
 //! which is exact along the normal for every quadric. The leaves' distances are combined by the min/max twin, and
 //! normal and curvature are those of the leaf that decides; at a tie, the mean of the two. Products of two factors
 //! are split into their faces, sign(pq) = (p∧q)∨(¬p∧¬q): the product of a slab is half the distance far away.
+//!
+//! The surface of a leaf that depends on time moves along its outward normal n with the speed u_t/|∇u|: on
+//! u(x(t), t) = 0 the derivative ∇u·x′ + u_t vanishes, and n = −∇u/|∇u|.
 
 use rustc_hash::FxHashMap;
 
-use super::adjoint::gradient;
+use super::adjoint::{gradient, gradient_and_rate};
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
 use super::twin::sign_operands;
@@ -27,19 +30,31 @@ struct Surface {
     normal: [Node; 3],
     /// Mean curvature, positive where the solid is convex.
     curvature: Node,
+    /// Velocity along the normal, where it is asked for.
+    velocity: Option<[Node; 3]>,
 }
 
 /// [distance (positive in the fluid), outward unit normal x, y, z, mean curvature (1/length, convex positive)]
 pub fn contact(graph: &mut Graph, root: Node) -> [Node; 5] {
-    let mut builder = Builder { graph, known: FxHashMap::default() };
+    let mut builder = Builder { graph, known: FxHashMap::default(), moving: false };
     let surface = builder.surface(root);
     let [nx, ny, nz] = builder.unit(surface.normal);
     let distance = builder.graph.unary(Unary::Neg, surface.depth);
     [distance, nx, ny, nz, surface.curvature]
 }
 
+/// The velocity along its normal of the surface that [`contact`] finds: of the leaf that decides, or the mean of two.
+/// A motion within the surface itself, as of a turning cylinder, is not in ω.
+pub fn wall_velocity(graph: &mut Graph, root: Node) -> [Node; 3] {
+    let mut builder = Builder { graph, known: FxHashMap::default(), moving: true };
+    let surface = builder.surface(root);
+    let zero = graph.constant(0.0);
+    surface.velocity.unwrap_or([zero; 3])
+}
+
 struct Builder<'g> {
     graph: &'g mut Graph,
+    moving: bool,
     known: FxHashMap<Node, Surface>,
 }
 
@@ -76,7 +91,9 @@ impl Builder<'_> {
 
     /// The factors of a product, both of which vary.
     fn faces(&self, node: Node) -> Option<(Node, Node)> {
-        let varies = |factor| !matches!(self.graph.expr(factor), Expr::Constant(_) | Expr::Parameter(_));
+        let varies = |factor| {
+            !matches!(self.graph.expr(factor), Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_))
+        };
         match self.graph.expr(node) {
             Expr::Binary(Binary::Mul, p, q) if p != q && varies(p) && varies(q) => Some((p, q)),
             _ => None,
@@ -110,6 +127,7 @@ impl Builder<'_> {
             depth: self.graph.unary(Unary::Neg, s.depth),
             normal: s.normal.map(|n| self.graph.unary(Unary::Neg, n)),
             curvature: self.graph.unary(Unary::Neg, s.curvature),
+            velocity: s.velocity, // the other side of a surface moves with it
         }
     }
 
@@ -124,7 +142,11 @@ impl Builder<'_> {
             self.graph.binary(Binary::Add, a, b)
         };
         let normal = std::array::from_fn(|i| mixed(u.normal[i], v.normal[i]));
-        Surface { depth, normal, curvature: mixed(u.curvature, v.curvature) }
+        let velocity = match (u.velocity, v.velocity) {
+            (Some(a), Some(b)) => Some(std::array::from_fn(|i| mixed(a[i], b[i]))),
+            _ => None,
+        };
+        Surface { depth, normal, curvature: mixed(u.curvature, v.curvature), velocity }
     }
 
     fn leaf(&mut self, u: Node) -> Surface {
@@ -156,7 +178,15 @@ impl Builder<'_> {
         let across = self.graph.binary(Sub, b, trace);
         let twice = self.graph.binary(Add, g, g);
         let curvature = self.graph.binary(DivOrZero, across, twice);
-        Surface { depth, normal, curvature }
+        let velocity = self.moving.then(|| self.velocity(u, g, normal));
+        Surface { depth, normal, curvature, velocity }
+    }
+
+    /// n·u_t/|∇u|
+    fn velocity(&mut self, u: Node, g: Node, normal: [Node; 3]) -> [Node; 3] {
+        let [.., rate] = gradient_and_rate(self.graph, u);
+        let speed = self.graph.binary(Binary::DivOrZero, rate, g);
+        normal.map(|n| self.graph.binary(Binary::Mul, speed, n))
     }
 
     /// 2u/(g + √(g² − 2ub)), or u/g where the root is not real.

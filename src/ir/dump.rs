@@ -20,6 +20,8 @@ pub fn dump(graph: &Graph, roots: &[(&str, Node)], sources: &[Source]) -> String
             Expr::Coordinate(Axis::X) => format!("%{number} = x"),
             Expr::Coordinate(Axis::Y) => format!("%{number} = y"),
             Expr::Coordinate(Axis::Z) => format!("%{number} = z"),
+            Expr::Coordinate(Axis::T) => format!("%{number} = t"),
+            Expr::Uniform(i) => format!("%{number} = uniform {i}"),
             Expr::Parameter(i) => format!("%{number} = parameter {i}"),
             Expr::Unary(op, a) => format!("%{number} = {} %{}", op.name(), numbers[&a]),
             Expr::Binary(op, a, b) => format!("%{number} = {} %{} %{}", op.name(), numbers[&a], numbers[&b]),

@@ -14,6 +14,24 @@ pub struct Interpreter {
     outputs: Vec<Node>,
 }
 
+/// What a graph is evaluated for.
+#[derive(Debug, Clone, Copy)]
+pub struct Given<'a, T> {
+    pub point: [T; 3],
+    /// Seconds.
+    pub time: T,
+    pub parameters: &'a [T],
+    /// See [`Expr::Uniform`].
+    pub uniforms: &'a [T],
+}
+
+impl<T: Real> Given<'_, T> {
+    /// A point alone: time is not a number, and neither are parameters.
+    pub fn point(point: [T; 3]) -> Self {
+        Self { point, time: T::from_f64(f64::NAN), parameters: &[], uniforms: &[] }
+    }
+}
+
 thread_local! {
     // values of the nodes of one evaluation: kept, so that an evaluation does not allocate
     static SCRATCH_64: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
@@ -38,35 +56,41 @@ impl Interpreter {
 
     /// All outputs at a point; `out` is as long as the outputs.
     pub fn eval_f64(&self, point: [f64; 3], out: &mut [f64]) {
-        SCRATCH_64.with_borrow_mut(|scratch| self.eval(0, point, &[], scratch, out));
+        self.eval_given(Given::point(point), out);
     }
 
     /// All outputs at a point, for a graph with parameters.
     pub fn eval_with(&self, point: [f64; 3], parameters: &[f64], out: &mut [f64]) {
-        SCRATCH_64.with_borrow_mut(|scratch| self.eval(0, point, parameters, scratch, out));
+        self.eval_given(Given { parameters, ..Given::point(point) }, out);
+    }
+
+    /// All outputs for all that a graph may ask for.
+    pub fn eval_given(&self, given: Given<'_, f64>, out: &mut [f64]) {
+        SCRATCH_64.with_borrow_mut(|scratch| self.eval(0, given, scratch, out));
     }
 
     /// All outputs, every operation carried out in `f32`.
     pub fn eval_f32(&self, point: [f32; 3], out: &mut [f32]) {
-        SCRATCH_32.with_borrow_mut(|scratch| self.eval(1, point, &[], scratch, out));
+        self.eval_given_f32(Given::point(point), out);
     }
 
-    fn eval<T: Real>(
-        &self,
-        precision: usize,
-        point: [T; 3],
-        parameters: &[T],
-        values: &mut Vec<T>,
-        out: &mut [T],
-    ) {
+    /// [`Interpreter::eval_given`] in `f32`.
+    pub fn eval_given_f32(&self, given: Given<'_, f32>, out: &mut [f32]) {
+        SCRATCH_32.with_borrow_mut(|scratch| self.eval(1, given, scratch, out));
+    }
+
+    fn eval<T: Real>(&self, precision: usize, given: Given<'_, T>, values: &mut Vec<T>, out: &mut [T]) {
+        let number = |list: &[T], i: u32| list.get(i as usize).copied().unwrap_or(T::from_f64(f64::NAN));
         values.clear();
         for &(expr, forms) in &self.steps {
             let value = match expr {
                 Expr::Constant(bits) => T::from_f64(f64::from_bits(bits)),
-                Expr::Coordinate(Axis::X) => point[0],
-                Expr::Coordinate(Axis::Y) => point[1],
-                Expr::Coordinate(Axis::Z) => point[2],
-                Expr::Parameter(i) => parameters.get(i as usize).copied().unwrap_or(T::from_f64(f64::NAN)),
+                Expr::Coordinate(Axis::X) => given.point[0],
+                Expr::Coordinate(Axis::Y) => given.point[1],
+                Expr::Coordinate(Axis::Z) => given.point[2],
+                Expr::Coordinate(Axis::T) => given.time,
+                Expr::Parameter(i) => number(given.parameters, i),
+                Expr::Uniform(i) => number(given.uniforms, i),
                 Expr::Unary(op, a) => op.eval(values[a.index()]),
                 Expr::Binary(op, a, b) => forms[precision].eval(op, values[a.index()], values[b.index()]),
             };

@@ -44,8 +44,14 @@ impl Exact {
     }
 }
 
-/// The exact values of some nodes at a point; nothing if one of the operations they need is undefined there.
+/// The exact values of some nodes at a point; nothing if one of the operations they need is undefined there, and for
+/// formulas of time.
 pub fn evaluate(graph: &Graph, outputs: &[Node], point: [f64; 3]) -> Option<Vec<Exact>> {
+    evaluate_at(graph, outputs, point, f64::NAN)
+}
+
+/// The exact values of some nodes at a point and a time.
+pub fn evaluate_at(graph: &Graph, outputs: &[Node], point: [f64; 3], time: f64) -> Option<Vec<Exact>> {
     let used = graph.reachable(outputs);
     let mut values: Vec<Option<Big>> = Vec::with_capacity(graph.len());
     for (node, expr) in graph.nodes() {
@@ -59,7 +65,8 @@ pub fn evaluate(graph: &Graph, outputs: &[Node], point: [f64; 3]) -> Option<Vec<
             Expr::Coordinate(Axis::X) => big(point[0])?,
             Expr::Coordinate(Axis::Y) => big(point[1])?,
             Expr::Coordinate(Axis::Z) => big(point[2])?,
-            Expr::Parameter(_) => return None,
+            Expr::Coordinate(Axis::T) => big(time)?,
+            Expr::Parameter(_) | Expr::Uniform(_) => return None,
             Expr::Unary(op, a) => unary(op, of(a)?)?,
             Expr::Binary(op, a, b) => binary(op, of(a)?, of(b)?)?,
         };

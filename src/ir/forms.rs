@@ -62,8 +62,14 @@ impl Forms {
                 Some(number)
             })
             .collect();
-        let of = |node: Node| kept[node.index()].then(|| graph.node(numbers[node.index()]));
-        let exceptions = self.exceptions.iter().filter_map(|(&(u, v), &form)| Some(((of(u)?, of(v)?), form)));
+        self.mapped(|node| kept[node.index()].then(|| graph.node(numbers[node.index()])))
+    }
+
+    /// The forms for a graph that has these images of the present one's nodes.
+    #[must_use]
+    pub fn mapped(&self, of: impl Fn(Node) -> Option<Node>) -> Self {
+        let exceptions =
+            self.exceptions.iter().filter_map(|(&(u, v), &form)| Some((pair(of(u)?, of(v)?), form)));
         Self { default: self.default, exceptions: exceptions.collect() }
     }
 

@@ -20,6 +20,13 @@ pub enum Axis {
     X,
     Y,
     Z,
+    /// Time, s: a coordinate of the formula, but one that all points of a program share.
+    T,
+}
+
+impl Axis {
+    /// Those of a point.
+    pub const SPACE: [Self; 3] = [Self::X, Self::Y, Self::Z];
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -30,6 +37,9 @@ pub enum Expr {
     /// A constant that is known only when the program runs: programs of leaves that differ in their constants alone
     /// are one program.
     Parameter(u32),
+    /// A number that depends on time alone, known when the instant is, see [`hoisted`](super::hoisted); over a stretch
+    /// of time it has a range.
+    Uniform(u32),
     Unary(Unary, Node),
     Binary(Binary, Node, Node),
 }
@@ -37,7 +47,7 @@ pub enum Expr {
 impl Expr {
     pub fn operands(self) -> impl Iterator<Item = Node> {
         let (a, b) = match self {
-            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) => (None, None),
+            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) | Self::Uniform(_) => (None, None),
             Self::Unary(_, a) => (Some(a), None),
             Self::Binary(_, a, b) => (Some(a), Some(b)),
         };
@@ -47,7 +57,7 @@ impl Expr {
     /// The same operation on other operands.
     pub fn map(self, mut f: impl FnMut(Node) -> Node) -> Self {
         match self {
-            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) => self,
+            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) | Self::Uniform(_) => self,
             Self::Unary(op, a) => Self::Unary(op, f(a)),
             Self::Binary(op, a, b) => Self::Binary(op, f(a), f(b)),
         }
@@ -233,7 +243,18 @@ impl Graph {
         cone
     }
 
-    /// The node with x, y, z replaced: the same shape in other coordinates.
+    /// Whether a coordinate occurs in what a root depends on.
+    pub fn uses(&self, root: Node, axis: Axis) -> bool {
+        // most graphs have no time, and need not be walked to know it
+        self.find(Expr::Coordinate(axis)).is_some_and(|node| self.cone(root).binary_search(&node).is_ok())
+    }
+
+    /// Whether time does.
+    pub fn uses_time(&self, root: Node) -> bool {
+        self.uses(root, Axis::T)
+    }
+
+    /// The node with x, y, z replaced: the same shape in other coordinates, at the same time.
     pub fn substitute(&mut self, root: Node, coordinates: [Node; 3]) -> Node {
         let mut image: FxHashMap<Node, Node> = FxHashMap::default();
         for node in self.cone(root) {
@@ -258,7 +279,7 @@ impl Graph {
         for node in self.cone(root) {
             let value = match self.expr(node) {
                 Expr::Constant(bits) => f64::from_bits(bits),
-                Expr::Coordinate(_) | Expr::Parameter(_) => return None,
+                Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => return None,
                 Expr::Unary(op, a) => op.eval(values[&a]),
                 Expr::Binary(op, a, b) => op.eval(values[&a], values[&b]),
             };

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::forms::{Form, Forms};
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
-use super::range::RangeEvaluator;
+use super::range::{RangeEvaluator, Region};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
@@ -32,7 +32,8 @@ impl FloatType {
     };
 }
 
-/// Where forms are chosen for a solid of which nothing else is known: within this distance of the origin.
+/// Where forms are chosen for a solid of which nothing else is known: within this distance of the origin, and within
+/// as many seconds of the beginning.
 const REACH: f64 = 1e4;
 
 /// Ranges up to this size say themselves how large a node is; larger ones may have overflowed.
@@ -50,8 +51,9 @@ impl Growth {
     }
 
     pub fn over(graph: &Graph, over: &Aabb) -> Self {
+        let time = Interval::new(-REACH, REACH);
         let Some((last, _)) = graph.nodes().last() else { return Self { exponents: Vec::new() } };
-        let ranges = RangeEvaluator::new(graph, last).all(over);
+        let ranges = RangeEvaluator::new(graph, last).all_with(&Region { time, ..Region::of(over) });
         let mut exponents: Vec<f64> = Vec::with_capacity(ranges.len());
         for ((_, expr), range) in std::iter::zip(graph.nodes(), ranges) {
             exponents.push(exponent(graph, expr, range, &exponents));

@@ -34,7 +34,7 @@ pub fn localised(graph: &Graph, root: Node, origin: DVec3) -> (Graph, Node) {
     let mut images: HashMap<Node, Image> = HashMap::new();
     for node in graph.cone(root) {
         let shifted = match graph.expr(node) {
-            Expr::Coordinate(axis) => {
+            Expr::Coordinate(axis) if axis != Axis::T => {
                 let offset = origin[axis as usize];
                 Some(Shifted { axis, negative: false, offset, error: 0.0 })
             }

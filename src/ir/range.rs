@@ -59,6 +59,24 @@ impl Step {
     }
 }
 
+/// For what a range is to hold.
+#[derive(Debug, Clone, Copy)]
+pub struct Region<'a> {
+    pub space: &'a Aabb,
+    /// Seconds.
+    pub time: Interval,
+    pub parameters: &'a [f64],
+    /// Of the numbers that depend on time alone, see [`Expr::Uniform`]: one for each.
+    pub uniforms: &'a [Interval],
+}
+
+impl<'a> Region<'a> {
+    /// A box, at any time.
+    pub fn of(space: &'a Aabb) -> Self {
+        Self { space, time: Interval::ALL, parameters: &[], uniforms: &[] }
+    }
+}
+
 /// A graph prepared for the evaluation of ranges.
 #[derive(Debug, Clone)]
 pub struct RangeEvaluator {
@@ -76,37 +94,32 @@ impl RangeEvaluator {
         Self { steps, root }
     }
 
-    /// The range of ω over a box; bounds of the box may be infinite.
+    /// The range of ω over a box at any time; bounds of the box may be infinite.
     pub fn eval(&self, over: &Aabb) -> Interval {
-        self.eval_with(over, &[])
+        self.eval_with(&Region::of(over))
     }
 
-    /// The range over a box, for a graph with parameters.
-    pub fn eval_with(&self, over: &Aabb, parameters: &[f64]) -> Interval {
+    /// The range over a region.
+    pub fn eval_with(&self, region: &Region<'_>) -> Interval {
         SCRATCH.with_borrow_mut(|values| {
-            self.fill(over, parameters, values);
+            self.fill(region, values);
             values[self.root.index()]
         })
     }
 
     /// The ranges of all nodes, in the graph's order.
     pub fn all(&self, over: &Aabb) -> Vec<Interval> {
-        self.all_with(over, &[])
+        self.all_with(&Region::of(over))
     }
 
-    /// The ranges of all nodes of a graph with parameters.
-    pub fn all_with(&self, over: &Aabb, parameters: &[f64]) -> Vec<Interval> {
+    /// The ranges of all nodes over a region.
+    pub fn all_with(&self, region: &Region<'_>) -> Vec<Interval> {
         let mut values = Vec::new();
-        self.fill(over, parameters, &mut values);
+        self.fill(region, &mut values);
         values
     }
 
-    fn fill(&self, over: &Aabb, parameters: &[f64], values: &mut Vec<Interval>) {
-        let axes = [
-            Interval::new(over.min.x, over.max.x),
-            Interval::new(over.min.y, over.max.y),
-            Interval::new(over.min.z, over.max.z),
-        ];
+    fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>) {
         values.clear();
         for &step in &self.steps {
             // a coordinate is always a number, even if nothing else is known of it
@@ -122,7 +135,7 @@ impl RangeEvaluator {
                     slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
                 }
                 Step::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
-                Step::Plain(expr) => plain(expr, values, axes, parameters),
+                Step::Plain(expr) => plain(expr, values, region),
             };
             values.push(value);
         }
@@ -191,18 +204,21 @@ fn slab(e: Interval, first: (f64, f64), second: (f64, f64)) -> Interval {
     range
 }
 
-fn plain(expr: Expr, values: &[Interval], axes: [Interval; 3], parameters: &[f64]) -> Interval {
+fn plain(expr: Expr, values: &[Interval], region: &Region<'_>) -> Interval {
+    let Aabb { min, max } = *region.space;
     match expr {
         Expr::Constant(bits) => {
             let value = f64::from_bits(bits);
             Interval::new(value, value)
         }
-        Expr::Coordinate(Axis::X) => axes[0],
-        Expr::Coordinate(Axis::Y) => axes[1],
-        Expr::Coordinate(Axis::Z) => axes[2],
+        Expr::Coordinate(Axis::X) => Interval::new(min.x, max.x),
+        Expr::Coordinate(Axis::Y) => Interval::new(min.y, max.y),
+        Expr::Coordinate(Axis::Z) => Interval::new(min.z, max.z),
         Expr::Parameter(i) => {
-            parameters.get(i as usize).map_or(Interval::ALL, |&value| Interval::new(value, value))
+            region.parameters.get(i as usize).map_or(Interval::ALL, |&value| Interval::new(value, value))
         }
+        Expr::Coordinate(Axis::T) => region.time,
+        Expr::Uniform(i) => region.uniforms.get(i as usize).copied().unwrap_or(Interval::ALL),
         Expr::Unary(op, a) => unary(op, values[a.index()]),
         Expr::Binary(op, a, b) => binary(op, values[a.index()], values[b.index()]),
     }

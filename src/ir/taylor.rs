@@ -47,16 +47,17 @@ impl TaylorEvaluator {
         Self { steps: graph.nodes().map(|(_, expr)| (expr, Step::of(graph, expr))).collect(), root }
     }
 
-    /// The enclosure over the part [t₀, t₁] of the path between two points, for a graph with parameters.
+    /// The enclosure over the part [t₀, t₁] of the path between two points (x, y, z and time), for a graph with
+    /// parameters.
     pub fn enclose(
         &self,
-        from: [f64; 3],
-        to: [f64; 3],
+        from: [f64; 4],
+        to: [f64; 4],
         (t0, t1): (f64, f64),
         parameters: &[f64],
     ) -> Enclosure {
         let stretch = Interval::new(0.0, (t1 - t0).next_up());
-        let axes: [Jet; 3] = std::array::from_fn(|i| {
+        let axes: [Jet; 4] = std::array::from_fn(|i| {
             let slope = Interval::point(to[i]) - Interval::point(from[i]);
             let place = |t| Interval::point(from[i]) + slope * t;
             let over = [place(Interval::new(t0, t1)), slope, ZERO];
@@ -103,12 +104,15 @@ impl Jet {
     }
 }
 
-fn jet(expr: Expr, jets: &[Jet], axes: [Jet; 3], parameters: &[f64]) -> Jet {
+fn jet(expr: Expr, jets: &[Jet], axes: [Jet; 4], parameters: &[f64]) -> Jet {
     match expr {
         Expr::Constant(bits) => Jet::constant(f64::from_bits(bits)),
         Expr::Coordinate(Axis::X) => axes[0],
         Expr::Coordinate(Axis::Y) => axes[1],
         Expr::Coordinate(Axis::Z) => axes[2],
+        Expr::Coordinate(Axis::T) => axes[3],
+        // leaves keep time itself: their uniforms are not hoisted here
+        Expr::Uniform(_) => Jet::constant(f64::NAN),
         Expr::Parameter(i) => Jet::constant(parameters.get(i as usize).copied().unwrap_or(f64::NAN)),
         Expr::Unary(op, a) => unary(op, jets[a.index()]),
         Expr::Binary(op, a, b) => binary(op, jets[a.index()], jets[b.index()]),
@@ -232,7 +236,7 @@ fn either(at: Interval, over: Interval, a: Jet, b: Jet) -> Jet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::Interpreter;
+    use crate::ir::{Given, Interpreter};
 
     /// Values on random stretches against the enclosure, for every operation.
     #[test]
@@ -243,9 +247,13 @@ mod tests {
         let z2 = graph.binary(Binary::Mul, z, z);
         let inner = graph.binary(Binary::Add, y, z2);
         let positive = graph.binary(Binary::Add, inner, half);
+        let t = graph.coordinate(Axis::T);
         let mut roots = Vec::new();
         for op in Unary::ALL {
             let inside = graph.unary(op, positive);
+            roots.push((op.name(), graph.binary(Binary::Mul, inside, x)));
+            let moving = graph.binary(Binary::Add, positive, t);
+            let inside = graph.unary(op, moving);
             roots.push((op.name(), graph.binary(Binary::Mul, inside, x)));
         }
         for op in Binary::ALL {
@@ -262,16 +270,16 @@ mod tests {
             let (taylor, interpreter) =
                 (TaylorEvaluator::new(&small, root), Interpreter::new(&small, &[root]));
             for _ in 0..2_000 {
-                let from: [f64; 3] = std::array::from_fn(|_| random());
-                let to: [f64; 3] = std::array::from_fn(|_| random());
+                let from: [f64; 4] = std::array::from_fn(|_| random());
+                let to: [f64; 4] = std::array::from_fn(|_| random());
                 let t0 = random();
                 let t1 = t0 + (1.0 - t0) * random().powi(4);
                 let Enclosure { coefficients: [c0, c1, c2], range } = taylor.enclose(from, to, (t0, t1), &[]);
                 for k in 0..=4 {
                     let s = (t1 - t0) * f64::from(k) / 4.0;
-                    let p = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * (t0 + s));
+                    let [x, y, z, time] = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * (t0 + s));
                     let mut out = [0.0];
-                    interpreter.eval_f64(p, &mut out);
+                    interpreter.eval_given(Given { time, ..Given::point([x, y, z]) }, &mut out);
                     let step = Interval::point(s);
                     let polynomial = c0 + c1 * step + c2 * step.square();
                     // the point itself is rounded
@@ -297,7 +305,7 @@ mod tests {
         let root = g.unary(Unary::Sqrt, sum);
         let taylor = TaylorEvaluator::new(&g, root);
         let width = |w: f64| {
-            let found = taylor.enclose([-1.0, 0.5, 0.0], [1.0, 0.5, 0.0], (0.4, 0.4 + w), &[]);
+            let found = taylor.enclose([-1.0, 0.5, 0.0, 0.0], [1.0, 0.5, 0.0, 0.0], (0.4, 0.4 + w), &[]);
             found.coefficients[2].width() * w * w
         };
         let ratio = width(1e-2) / width(1e-3);

@@ -6,8 +6,9 @@
 
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
-use super::range::RangeEvaluator;
+use super::range::{RangeEvaluator, Region};
 use crate::geom::Aabb;
+use crate::interval::Interval;
 use glam::DVec3;
 
 /// Within these distances of the origin a leaf must be shown to be a number for the plain minimum to be used;
@@ -93,7 +94,8 @@ fn finite_nodes(graph: &Graph, root: Node) -> Vec<bool> {
     let ranges = RangeEvaluator::new(graph, root);
     for (reach, largest) in PROOFS {
         let over = Aabb::new(DVec3::splat(-reach), DVec3::splat(reach));
-        for (flag, range) in finite.iter_mut().zip(ranges.all(&over)) {
+        let region = Region { time: Interval::new(-reach, reach), ..Region::of(&over) };
+        for (flag, range) in finite.iter_mut().zip(ranges.all_with(&region)) {
             *flag &= range.lo >= -largest && range.hi <= largest;
         }
     }

@@ -192,10 +192,16 @@ impl<'a> Lowering<'a> {
         let value = self.module.graph.constant_value(node);
         if value.is_none() {
             let span = self.user_span(span);
-            let message = format!("{what} must be a constant, but it depends on x, y or z");
+            let on = if self.depends_on_place(node) { "x, y or z" } else { "t" };
+            let message = format!("{what} must be a constant, but it depends on {on}");
             self.report(Diagnostic::error(Code::NOT_CONSTANT, span, message));
         }
         value
+    }
+
+    /// Whether a value differs from point to point, and not only from one time to another.
+    pub fn depends_on_place(&self, node: Node) -> bool {
+        Axis::SPACE.into_iter().any(|axis| self.module.graph.uses(node, axis))
     }
 
     pub fn expr(&mut self, expr: &Expr) -> Value {
@@ -290,6 +296,7 @@ impl<'a> Lowering<'a> {
             "x" => Some(Axis::X),
             "y" => Some(Axis::Y),
             "z" => Some(Axis::Z),
+            "t" => Some(Axis::T),
             "pi" => return Value::Number(self.constant(std::f64::consts::PI)),
             _ => None,
         };
@@ -323,7 +330,8 @@ impl<'a> Lowering<'a> {
             None => {
                 let candidates = self.names.candidates(false);
                 let locals: Vec<String> = self.scope.locals.iter().map(|l| l.name.clone()).collect();
-                let all = candidates.iter().chain(&locals).map(String::as_str).chain(["x", "y", "z", "pi"]);
+                let all =
+                    candidates.iter().chain(&locals).map(String::as_str).chain(["x", "y", "z", "t", "pi"]);
                 let diagnostic =
                     Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"));
                 let diagnostic = match self.names.defined_later(name) {

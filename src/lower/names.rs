@@ -7,7 +7,7 @@ use crate::diagnostic::{SourceId, Span};
 use crate::syntax::ast::{Function, Name};
 
 /// Names with a meaning that no item can change.
-pub(super) const RESERVED: [&str; 4] = ["x", "y", "z", "pi"];
+pub(super) const RESERVED: [&str; 5] = ["x", "y", "z", "t", "pi"];
 
 #[derive(Debug, Clone)]
 pub(super) enum Kind<'a> {

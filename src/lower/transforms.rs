@@ -1,12 +1,12 @@
 //! Methods of shapes: the shape is evaluated in moved, turned or scaled coordinates.
 //!
 //! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point before
-//! the transformation.
+//! the transformation. Displacements and angles may depend on time: the shape then moves.
 
 use super::eval::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::ir::{Axis, Binary, Node};
+use crate::ir::{Axis, Binary, Node, Unary};
 use crate::syntax::ast::{Argument, Expr, Name};
 
 const METHODS: [&str; 7] = ["move", "rotate_x", "rotate_y", "rotate_z", "rotate", "scale", "mirror"];
@@ -20,6 +20,13 @@ fn parameters(method: &str) -> &'static [&'static str] {
         "mirror" => &["normal"],
         _ => &["angle"],
     }
+}
+
+/// A factor of a coordinate: a number, or a node that depends on time alone.
+#[derive(Clone, Copy)]
+enum Factor {
+    Number(f64),
+    Moving(Node),
 }
 
 impl Lowering<'_> {
@@ -57,7 +64,7 @@ impl Lowering<'_> {
     }
 
     fn transform(&mut self, shape: Node, method: &str, values: &[(Value, Span)], span: Span) -> Option<Node> {
-        let p = [Axis::X, Axis::Y, Axis::Z].map(|axis| self.module.graph.coordinate(axis));
+        let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
         let (first, at) = &values[0];
         match method {
             "move" => {
@@ -66,20 +73,18 @@ impl Lowering<'_> {
                 Some(self.module.graph.substitute(shape, q))
             }
             "rotate_x" | "rotate_y" | "rotate_z" => {
-                let angle = self.as_number(first, *at)?;
-                let angle = self.as_constant(angle, *at, "an angle")?;
+                let (sin, cos) = self.angle(first, *at)?;
                 let axis = usize::from(method.as_bytes()[7] - b'x');
                 let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
-                let (sin, cos) = sin_cos(angle);
                 let mut q = p;
+                let back = self.negative(sin, span);
                 q[j] = self.combination(&[(cos, p[j]), (sin, p[k])], span);
-                q[k] = self.combination(&[(-sin, p[j]), (cos, p[k])], span);
+                q[k] = self.combination(&[(back, p[j]), (cos, p[k])], span);
                 Some(self.module.graph.substitute(shape, q))
             }
             "rotate" => {
                 let axis = self.constant_vector(first, *at, "an axis")?;
-                let angle = self.as_number(&values[1].0, values[1].1)?;
-                let angle = self.as_constant(angle, values[1].1, "an angle")?;
+                let angle = self.angle(&values[1].0, values[1].1)?;
                 let axis = self.unit_vector(axis, *at)?;
                 let q = self.rotated_back(p, axis, angle, span);
                 Some(self.module.graph.substitute(shape, q))
@@ -90,8 +95,9 @@ impl Lowering<'_> {
                 let n = self.unit_vector(normal, *at)?;
                 // p − 2(p·n)n
                 let q = std::array::from_fn(|i| {
-                    let row: [(f64, Node); 3] =
-                        std::array::from_fn(|j| (f64::from(u8::from(i == j)) - 2.0 * n[i] * n[j], p[j]));
+                    let row: [(Factor, Node); 3] = std::array::from_fn(|j| {
+                        (Factor::Number(f64::from(u8::from(i == j)) - 2.0 * n[i] * n[j]), p[j])
+                    });
                     self.combination(&row, span)
                 });
                 Some(self.module.graph.substitute(shape, q))
@@ -131,34 +137,83 @@ impl Lowering<'_> {
         Some(self.binary(Binary::Mul, smallest, scaled, span))
     }
 
+    /// Sine and cosine of an angle that may depend on time, but not on the place.
+    fn angle(&mut self, value: &Value, at: Span) -> Option<(Factor, Factor)> {
+        let angle = self.as_number(value, at)?;
+        if self.module.graph.constant_value(angle).is_some() || self.depends_on_place(angle) {
+            let angle = self.as_constant(angle, at, "an angle")?;
+            let (sin, cos) = sin_cos(angle);
+            return Some((Factor::Number(sin), Factor::Number(cos)));
+        }
+        let [sin, cos] = [Unary::Sin, Unary::Cos].map(|op| self.unary(op, angle, at));
+        Some((Factor::Moving(sin), Factor::Moving(cos)))
+    }
+
+    fn negative(&mut self, factor: Factor, span: Span) -> Factor {
+        match factor {
+            Factor::Number(number) => Factor::Number(-number),
+            Factor::Moving(node) => Factor::Moving(self.unary(Unary::Neg, node, span)),
+        }
+    }
+
     /// The point turned by −angle about a unit axis (Rodrigues' formula, as a matrix).
-    fn rotated_back(&mut self, p: [Node; 3], n: [f64; 3], angle: f64, span: Span) -> [Node; 3] {
-        let (sin, cos) = sin_cos(-angle);
+    fn rotated_back(&mut self, p: [Node; 3], n: [f64; 3], angle: (Factor, Factor), span: Span) -> [Node; 3] {
+        let (sin, cos) = angle;
         std::array::from_fn(|i| {
-            let row: [(f64, Node); 3] = std::array::from_fn(|j| {
+            let row: [(Factor, Node); 3] = std::array::from_fn(|j| {
+                // of the vector product with the axis
                 let cross = match (3 + j - i) % 3 {
                     0 => 0.0,
                     1 => -n[(i + 2) % 3],
                     _ => n[(i + 1) % 3],
                 };
-                let identity = f64::from(u8::from(i == j));
-                (cos * identity + (1.0 - cos) * n[i] * n[j] + sin * cross, p[j])
+                let (identity, along) = (f64::from(u8::from(i == j)), n[i] * n[j]);
+                let factor = match (sin, cos) {
+                    (Factor::Number(sin), Factor::Number(cos)) => {
+                        Factor::Number(cos * identity + (1.0 - cos) * along - sin * cross)
+                    }
+                    _ => self.turning((sin, cos), (identity, along, cross), span),
+                };
+                (factor, p[j])
             });
             self.combination(&row, span)
         })
     }
 
+    /// cos·identity + (1 − cos)·along − sin·cross of a moving angle, written as along + (identity − along)·cos − cross·sin.
+    fn turning(
+        &mut self,
+        (sin, cos): (Factor, Factor),
+        (identity, along, cross): (f64, f64, f64),
+        span: Span,
+    ) -> Factor {
+        let (Factor::Moving(sin), Factor::Moving(cos)) = (sin, cos) else { return Factor::Number(f64::NAN) };
+        let number = Factor::Number;
+        let swinging = self.combination(&[(number(identity - along), cos), (number(-cross), sin)], span);
+        if along == 0.0 {
+            return Factor::Moving(swinging);
+        }
+        let along = self.constant(along);
+        Factor::Moving(self.binary(Binary::Add, along, swinging, span))
+    }
+
     /// Σ factor · node; terms with factor 0 left out, factors ±1 without a product.
-    fn combination(&mut self, terms: &[(f64, Node)], span: Span) -> Node {
+    fn combination(&mut self, terms: &[(Factor, Node)], span: Span) -> Node {
         let mut sum: Option<Node> = None;
-        for &(factor, node) in terms.iter().filter(|(factor, _)| *factor != 0.0) {
-            let magnitude = self.constant(factor.abs());
-            let term =
-                if factor.abs() == 1.0 { node } else { self.binary(Binary::Mul, magnitude, node, span) };
+        for &(factor, node) in terms {
+            let (term, negative) = match factor {
+                Factor::Number(0.0) => continue,
+                Factor::Number(factor) if factor.abs() == 1.0 => (node, factor < 0.0),
+                Factor::Number(factor) => {
+                    let magnitude = self.constant(factor.abs());
+                    (self.binary(Binary::Mul, magnitude, node, span), factor < 0.0)
+                }
+                Factor::Moving(factor) => (self.binary(Binary::Mul, factor, node, span), false),
+            };
             sum = Some(match sum {
-                None if factor < 0.0 => self.unary(crate::ir::Unary::Neg, term, span),
+                None if negative => self.unary(Unary::Neg, term, span),
                 None => term,
-                Some(sum) if factor < 0.0 => self.binary(Binary::Sub, sum, term, span),
+                Some(sum) if negative => self.binary(Binary::Sub, sum, term, span),
                 Some(sum) => self.binary(Binary::Add, sum, term, span),
             });
         }

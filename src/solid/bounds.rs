@@ -83,7 +83,7 @@ impl Probe for ByLeaves<'_> {
     type Known = Option<Arc<[u32]>>;
 
     fn everything(&self) -> Self::Known {
-        Some(self.parts.words.as_slice().into())
+        Some(self.parts.words.clone())
     }
 
     fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known> {

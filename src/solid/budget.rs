@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::Solid;
-use super::programs::{Guard, Programs};
+use super::programs::{Guard, Programs, UniformValues};
 use crate::codegen::{Form, Forms, Precision};
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
@@ -93,6 +93,10 @@ struct Candidate {
     /// In the coordinates of the program.
     over: Aabb,
     float: FloatType,
+    /// Of the solid.
+    time: Interval,
+    /// What the programs need to know of it.
+    uniforms: UniformValues,
 }
 
 /// Points that are converted at a time.
@@ -148,7 +152,8 @@ impl Candidate {
             (Precision::F32, false) => Inputs::Rounded,
             (Precision::F32, true) => Inputs::Shifted,
         };
-        Self { graph, root, origin, programs: None, forms, inputs, over, float }
+        let (time, uniforms) = (solid.moment.interval(), UniformValues::NONE);
+        Self { graph, root, origin, programs: None, forms, inputs, over, float, time, uniforms }
     }
 
     fn certify(&self, enough: f64) -> f64 {
@@ -159,13 +164,14 @@ impl Candidate {
             return f64::INFINITY;
         }
         let arithmetic = Arithmetic { float: self.float, forms: &self.forms, inputs: self.inputs };
-        ErrorAnalysis::new(&self.graph, self.root, arithmetic).certify(&self.over, enough)
+        ErrorAnalysis::new(&self.graph, self.root, arithmetic).during(self.time).certify(&self.over, enough)
     }
 
     fn with_programs(mut self, solid: &Solid, plan: Plan) -> Self {
         if plan != Plan::STANDARD || solid.inner.omega.form != Form::Stable {
             let forms = [self.forms.clone(), self.forms.clone()];
             let programs = Programs::with_forms(self.graph.clone(), vec![self.root], Guard::Infinite, forms);
+            self.uniforms = programs.uniforms_at(solid.time());
             self.programs = Some(programs);
         }
         self
@@ -207,12 +213,13 @@ impl Chosen {
         match self.plan.precision {
             Precision::F64 => {
                 let mut out = [0.0];
-                programs.point(engine, p.to_array(), &mut out);
+                programs.point(engine, &self.candidate.uniforms, p.to_array(), &mut out);
                 out[0]
             }
             Precision::F32 => {
                 let mut out = [0f32];
-                programs.point(engine, (p - self.candidate.origin).as_vec3().to_array(), &mut out);
+                let origin = self.candidate.origin;
+                programs.point(engine, &self.candidate.uniforms, (p - origin).as_vec3().to_array(), &mut out);
                 out[0].into()
             }
         }
@@ -234,6 +241,7 @@ impl Chosen {
             let values = &mut values[..out.len()];
             programs.batch(
                 self.solid.inner.engine,
+                &self.candidate.uniforms,
                 inputs.each_ref().map(|input| &input[..out.len()]),
                 [&mut *values],
             );
@@ -265,7 +273,8 @@ impl Field for Chosen {
         match self.plan.precision {
             Precision::F32 => self.values_f32(programs, points, omega),
             Precision::F64 => {
-                programs.batch(self.solid.inner.engine, [points.x, points.y, points.z], [&mut *omega]);
+                let (engine, uniforms) = (self.solid.inner.engine, &self.candidate.uniforms);
+                programs.batch(engine, uniforms, [points.x, points.y, points.z], [&mut *omega]);
             }
         }
         for (i, value) in omega.iter_mut().enumerate() {
@@ -282,6 +291,10 @@ impl Field for Chosen {
 
     fn range(&self, over: &Aabb) -> Interval {
         self.solid.range(over)
+    }
+
+    fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        self.solid.wall_velocity(p)
     }
 }
 

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::cells::{Cell, Cells, Found, SIDE};
+use super::leaf::Leaves;
 use super::prefix::Word;
 use super::sweep::Sweep;
 use super::{Contact, Parts, Solid, Twin};
@@ -44,7 +45,7 @@ pub struct CellMap {
     solid: Solid,
     twin: Twin,
     parts: Arc<Parts>,
-    cells: Cells,
+    cells: Arc<Cells>,
     reach: f64,
     /// By how much cells were grown, reach included: points that rounding puts into the next cell are still right.
     margin: f64,
@@ -73,6 +74,15 @@ struct Nearest {
     mean_curvature: f64,
     /// Whether the normal is the mean of several.
     tied: bool,
+    /// The first of those that decide.
+    leaf: u32,
+}
+
+/// By how much the cells of a box are grown.
+pub(super) fn margin(domain: &Aabb, reach: f64) -> f64 {
+    let largest = domain.min.abs().max(domain.max.abs()).max_element();
+    let cell = domain.size().max_element() / f64::from(SIDE);
+    reach * (1.0 + 1e-9) + 1e-9 * cell + 64.0 * f64::EPSILON * largest
 }
 
 impl CellMap {
@@ -90,10 +100,14 @@ impl CellMap {
             return None;
         }
         let parts = solid.parts()?;
-        let largest = domain.min.abs().max(domain.max.abs()).max_element();
-        let cell = domain.size().max_element() / f64::from(SIDE);
-        let margin = reach * (1.0 + 1e-9) + 1e-9 * cell + 64.0 * f64::EPSILON * largest;
-        let cells = Cells::new(&parts, domain, margin);
+        let margin = margin(&domain, reach);
+        let cells = Arc::new(Cells::new(&parts, domain, margin));
+        Self::of(solid, cells, reach)
+    }
+
+    /// A map of cells that are right for the solid's stretch of time, and were grown by [`margin`].
+    pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
+        let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
         Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin })
     }
 
@@ -207,7 +221,9 @@ impl CellMap {
         let word = Word::read(self.cells.programs[*at]);
         *at += 1;
         let (parts, all) = match word {
-            Word::Leaf { leaf, negated } => return Nearest::of(self.parts.leaves.contact(leaf, p), negated),
+            Word::Leaf { leaf, negated } => {
+                return Nearest::of(leaf, self.parts.leaves.contact(leaf, p), negated);
+            }
             Word::All(parts) => (parts, true),
             Word::Any(parts) => (parts, false),
         };
@@ -302,16 +318,21 @@ impl CellMap {
 
 impl Nearest {
     #[inline]
-    fn of([distance, x, y, z, mean_curvature]: [f64; 5], negated: bool) -> Self {
+    fn of(leaf: u32, [distance, x, y, z, mean_curvature]: [f64; 5], negated: bool) -> Self {
         let sign = if negated { -1.0 } else { 1.0 };
         let normal = sign * DVec3::new(x, y, z);
-        Self { distance: sign * distance, normal, mean_curvature: sign * mean_curvature, tied: false }
+        let mean_curvature = sign * mean_curvature;
+        Self { distance: sign * distance, normal, mean_curvature, tied: false, leaf }
     }
 
     fn mean(&self, other: &Self) -> Self {
         let normal = 0.5 * (self.normal + other.normal);
         let mean_curvature = 0.5 * (self.mean_curvature + other.mean_curvature);
-        Self { distance: self.distance, normal, mean_curvature, tied: true }
+        Self { distance: self.distance, normal, mean_curvature, tied: true, leaf: self.leaf }
+    }
+
+    fn velocity(&self, leaves: &Leaves, p: DVec3) -> DVec3 {
+        leaves.velocity(self.leaf, p)
     }
 
     #[inline]
@@ -372,6 +393,26 @@ impl Field for CellMap {
             Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Interval::point(free),
             _ => Interval::ALL,
         }
+    }
+
+    fn on_path(&self, path: &Path, t: f64) -> f64 {
+        if self.solid.moves() { self.twin.on_path(path, t) } else { self.omega(path.at(t)) }
+    }
+
+    fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        if !self.solid.moves() {
+            return DVec3::ZERO;
+        }
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Near(program)) => {
+                self.nearest(&mut (program as usize), p).velocity(&self.parts.leaves, p)
+            }
+            _ => self.solid.wall_velocity(p),
+        }
+    }
+
+    fn is_clear(&self, p: DVec3) -> bool {
+        self.place_of(p) == Place::Fluid
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {

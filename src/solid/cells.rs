@@ -14,7 +14,7 @@ use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
 use super::Parts;
-use super::prefix::{Verdict, leaf_count, prune};
+use super::prefix::{Verdict, Word, leaf_count, prune};
 use crate::geom::Aabb;
 
 /// Levels of the flat grid: 2⁶ cells along a side.
@@ -33,6 +33,10 @@ const LEVELS_IN_VAIN: u32 = 2;
 /// that would exceed it is not begun: the cells above it stay as they are. 10 000 balls need a third of it.
 const MOST_RANGES: usize = 1 << 24;
 
+/// Cells that a moving leaf may pass are left at this depth and divided anew for each window of time: eight or so of
+/// them lie side by side in what a paddle of a tenth of the box sweeps.
+const RESTLESS_DEPTH: u32 = 4;
+
 /// What is known of a cell; its last two bits say which, the others where to go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Cell {
@@ -45,7 +49,7 @@ pub(super) enum Cell {
 }
 
 /// The cells of a box.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Cells {
     pub domain: Aabb,
     /// Cells of the flat grid for each unit of length.
@@ -77,7 +81,8 @@ pub(super) struct Found {
 }
 
 /// A cell that may hold a surface, while the map is built.
-struct Pending {
+#[derive(Debug, Clone)]
+pub(super) struct Pending {
     depth: u32,
     /// Number of the cell along each axis at its depth.
     at: UVec3,
@@ -108,6 +113,13 @@ impl Cell {
     }
 }
 
+/// What is known of a box, and what is left of the solid in it.
+fn judged(parts: &Parts, over: &Aabb, words: &[u32]) -> (Verdict, Vec<u32>) {
+    let mut left = Vec::new();
+    let verdict = prune(words, &mut |leaf| parts.leaves.range(leaf, over), &mut left);
+    (verdict, left)
+}
+
 /// The box of a cell.
 fn bounds(domain: &Aabb, depth: u32, at: UVec3) -> Aabb {
     let size = domain.size() / f64::from(1u32 << depth);
@@ -115,9 +127,41 @@ fn bounds(domain: &Aabb, depth: u32, at: UVec3) -> Aabb {
     Aabb::new(corner, corner + size)
 }
 
+impl Pending {
+    /// Whether a leaf that moves is left in it.
+    fn is_restless(&self, parts: &Parts) -> bool {
+        let moves =
+            |&word: &u32| matches!(Word::read(word), Word::Leaf { leaf, .. } if parts.leaves.moves(leaf));
+        self.words.iter().any(moves)
+    }
+}
+
 impl Cells {
     /// Divides a box; `margin` is positive.
     pub fn new(parts: &Parts, domain: Aabb, margin: f64) -> Self {
+        let (mut cells, level) = Self::begin(parts, domain, margin);
+        cells.refine(level, parts, margin, |_| false);
+        cells
+    }
+
+    /// Divides a box as far as it is the same during all of the parts' stretch of time. The cells that are left may
+    /// change: those in which a leaf that moves matters at some time.
+    pub fn lasting(parts: &Parts, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
+        let (mut cells, level) = Self::begin(parts, domain, margin);
+        let left = cells
+            .refine(level, parts, margin, |cell| cell.depth == RESTLESS_DEPTH && cell.is_restless(parts));
+        (cells, left)
+    }
+
+    /// What [`Cells::lasting`] has found, with the cells that it has left divided for a shorter stretch of time.
+    pub fn completed(&self, left: &[Pending], parts: &Parts, margin: f64) -> Self {
+        let mut cells = self.clone();
+        cells.refine(left.to_vec(), parts, margin, |_| false);
+        cells
+    }
+
+    /// The box as one cell, unless it is settled at once.
+    fn begin(parts: &Parts, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
         let mut cells = Self {
             domain,
             per_length: f64::from(SIDE) / domain.size(),
@@ -126,34 +170,50 @@ impl Cells {
             programs: Vec::new(),
             counts: Counts::default(),
         };
+        let level = match judged(parts, &domain.grown(margin), &parts.words) {
+            (Verdict::Near, words) => {
+                vec![Pending { depth: 0, at: UVec3::ZERO, words, in_vain: 0, child: 0 }]
+            }
+            (verdict, _) => {
+                cells.settle(0, UVec3::ZERO, 0, settled(verdict));
+                Vec::new()
+            }
+        };
+        (cells, level)
+    }
+
+    /// Divides cells of one level until little is left in them; gives back those that `leave` says.
+    fn refine(
+        &mut self,
+        mut level: Vec<Pending>,
+        parts: &Parts,
+        margin: f64,
+        leave: impl Fn(&Pending) -> bool,
+    ) -> Vec<Pending> {
+        let domain = self.domain;
         let judge = |depth: u32, at: UVec3, words: &[u32]| {
-            let over = bounds(&domain, depth, at).grown(margin);
-            let mut left = Vec::new();
-            let verdict = prune(words, &mut |leaf| parts.leaves.range(leaf, &over), &mut left);
-            (verdict, left)
+            judged(parts, &bounds(&domain, depth, at).grown(margin), words)
         };
         let mut known = HashMap::new();
         let mut spent = 0;
-        let mut level = Vec::new();
-        match judge(0, UVec3::ZERO, &parts.words) {
-            (Verdict::Near, words) => {
-                level.push(Pending { depth: 0, at: UVec3::ZERO, words, in_vain: 0, child: 0 });
-            }
-            (verdict, _) => cells.settle(0, UVec3::ZERO, 0, settled(verdict)),
-        }
-        while let Some(depth) = level.first().map(|cell: &Pending| cell.depth) {
+        let mut all_left = Vec::new();
+        loop {
+            let (left, rest): (Vec<_>, Vec<_>) = level.into_iter().partition(&leave);
+            all_left.extend(left);
+            level = rest;
+            let Some(depth) = level.first().map(|cell: &Pending| cell.depth) else { return all_left };
             let leaves: Vec<usize> = level.iter().map(|cell| leaf_count(&cell.words)).collect();
             spent += 8 * leaves.iter().sum::<usize>();
             if spent > MOST_RANGES || depth >= MAX_DEPTH {
-                level.into_iter().for_each(|cell| cells.finish(cell, &mut known));
-                break;
+                level.into_iter().for_each(|cell| self.finish(cell, &mut known));
+                return all_left;
             }
             let (mut divided, mut done) = (Vec::new(), Vec::new());
             for (cell, count) in level.into_iter().zip(leaves) {
                 let enough = count <= FEW_LEAVES || cell.in_vain >= LEVELS_IN_VAIN;
                 if depth >= DEPTH && enough { done.push(cell) } else { divided.push((cell, count)) }
             }
-            done.into_iter().for_each(|cell| cells.finish(cell, &mut known));
+            done.into_iter().for_each(|cell| self.finish(cell, &mut known));
             // in parallel, but collected in order: the map is the same for any number of threads
             let octants: Vec<[(Verdict, Vec<u32>); 8]> = divided
                 .par_iter()
@@ -161,19 +221,18 @@ impl Cells {
                 .collect();
             level = Vec::new();
             for ((cell, count), octants) in divided.into_iter().zip(octants) {
-                let first = cells.divide(&cell);
+                let first = self.divide(&cell);
                 for (k, (verdict, words)) in octants.into_iter().enumerate() {
                     let (at, child) = (octant(cell.at, k), first + k);
                     if verdict == Verdict::Near {
                         let in_vain = if leaf_count(&words) < count { 0 } else { cell.in_vain + 1 };
                         level.push(Pending { depth: depth + 1, at, words, in_vain, child });
                     } else {
-                        cells.settle(depth + 1, at, child, settled(verdict));
+                        self.settle(depth + 1, at, child, settled(verdict));
                     }
                 }
             }
         }
-        cells
     }
 
     /// Makes room for the children of a cell, below the flat grid; where they begin.

@@ -5,12 +5,12 @@
 use std::cell::RefCell;
 
 use crate::codegen::{self, Code, CodegenError, Form, Forms, Precision, Request, Rounding, Shape};
-use crate::ir::{Expr, Graph, Interpreter, Node, Real};
+use crate::ir::{Expr, Given, Graph, Interpreter, Node, Real};
 
 use glam::DVec3;
 
 use super::blocks::{Frame, Place, Scratch, Wide};
-use super::programs::{Compiled, Programs};
+use super::programs::{Compiled, Programs, UniformValues};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
@@ -23,7 +23,11 @@ pub trait Lane: Real + Default + Wide {
     fn compiled(programs: &Programs) -> &Compiled<Self>;
 
     #[doc(hidden)]
-    fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]);
+    fn interpret(interpreter: &Interpreter, point: [Self; 3], uniforms: &[Self], out: &mut [Self]);
+
+    /// Numbers that depend on time alone, in this precision.
+    #[doc(hidden)]
+    fn uniforms(values: &UniformValues) -> &[Self];
 
     /// Working memory of this thread.
     #[doc(hidden)]
@@ -43,8 +47,13 @@ impl Lane for f32 {
         &programs.single
     }
 
-    fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]) {
-        interpreter.eval_f32(point, out);
+    fn interpret(interpreter: &Interpreter, point: [Self; 3], uniforms: &[Self], out: &mut [Self]) {
+        interpreter.eval_given_f32(Given { uniforms, ..Given::point(point) }, out);
+    }
+
+    #[inline]
+    fn uniforms(values: &UniformValues) -> &[Self] {
+        &values.single
     }
 
     fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R {
@@ -60,8 +69,13 @@ impl Lane for f64 {
         &programs.double
     }
 
-    fn interpret(interpreter: &Interpreter, point: [Self; 3], out: &mut [Self]) {
-        interpreter.eval_f64(point, out);
+    fn interpret(interpreter: &Interpreter, point: [Self; 3], uniforms: &[Self], out: &mut [Self]) {
+        interpreter.eval_given(Given { uniforms, ..Given::point(point) }, out);
+    }
+
+    #[inline]
+    fn uniforms(values: &UniformValues) -> &[Self] {
+        &values.double
     }
 
     fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R {
@@ -75,10 +89,17 @@ const MAX_OUTPUTS: usize = 5;
 /// Points in one vector, at most.
 const MAX_LANES: usize = 4;
 
+/// How many uniforms a graph has.
+pub(super) fn uniforms_of(graph: &Graph) -> usize {
+    let number = |expr| if let Expr::Uniform(i) = expr { i as usize + 1 } else { 0 };
+    graph.exprs().iter().map(|&expr| number(expr)).max().unwrap_or(0)
+}
+
 /// A compiled program for one point.
 #[derive(Debug)]
 pub struct PointProgram<T> {
     code: Code,
+    uniforms: usize,
     lane: std::marker::PhantomData<T>,
 }
 
@@ -86,6 +107,7 @@ impl<T: Lane> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
+        let uniforms = uniforms_of(graph);
         let request = Request {
             graph,
             inputs: &[],
@@ -94,23 +116,25 @@ impl<T: Lane> PointProgram<T> {
             shape: Shape::Point,
             forms,
             parameters: false,
+            uniforms: uniforms > 0,
         };
-        Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
+        Ok(Self { code: codegen::compile(request)?, uniforms, lane: std::marker::PhantomData })
     }
 
     /// All outputs at a point, in the order in which they were asked for.
     ///
     /// # Panics
-    /// If `out` is not as long as the program's outputs.
+    /// If `out` is not as long as the program's outputs, or `uniforms` not as long as its uniforms.
     #[inline]
-    pub fn call(&self, [x, y, z]: [T; 3], out: &mut [T]) {
+    pub fn call(&self, [x, y, z]: [T; 3], uniforms: &[T], out: &mut [T]) {
         assert_eq!(out.len(), self.code.outputs, "outputs of the program");
-        type Entry<T> = unsafe extern "C" fn(T, T, T, *mut T);
-        // SAFETY: `compile` asked for a point program of this precision, whose entry has this signature, and
-        // `self.code` keeps it mapped while it runs.
+        assert_eq!(uniforms.len(), self.uniforms, "uniforms of the program");
+        type Entry<T> = unsafe extern "C" fn(T, T, T, *mut T, *const T);
+        // SAFETY: `compile` asked for a point program of this precision, whose entry has this signature (the
+        // last argument is unused without uniforms), and `self.code` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
-        // SAFETY: the program writes `outputs` numbers to `out`, and its length was checked above.
-        unsafe { entry(x, y, z, out.as_mut_ptr()) }
+        // SAFETY: the program writes `outputs` numbers to `out` and reads its uniforms; both lengths were checked.
+        unsafe { entry(x, y, z, out.as_mut_ptr(), uniforms.as_ptr()) }
     }
 
     /// Bytes of machine code.
@@ -123,6 +147,7 @@ impl<T: Lane> PointProgram<T> {
 #[derive(Debug)]
 pub struct BatchProgram<T> {
     code: Code,
+    uniforms: usize,
     lane: std::marker::PhantomData<T>,
 }
 
@@ -130,6 +155,7 @@ impl<T: Lane> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
+        let uniforms = uniforms_of(graph);
         let request = Request {
             graph,
             inputs: &[],
@@ -138,17 +164,19 @@ impl<T: Lane> BatchProgram<T> {
             shape: Shape::Batch,
             forms,
             parameters: false,
+            uniforms: uniforms > 0,
         };
-        Ok(Self { code: codegen::compile(request)?, lane: std::marker::PhantomData })
+        Ok(Self { code: codegen::compile(request)?, uniforms, lane: std::marker::PhantomData })
     }
 
     /// All outputs at many points: whole blocks straight from and to the caller's columns, the rest through one
     /// padded block on the stack.
     ///
     /// # Panics
-    /// If the columns differ in length or there are not as many output columns as outputs.
-    pub fn call<const N: usize>(&self, points: [&[T]; 3], mut out: [&mut [T]; N]) {
+    /// If the columns differ in length or there are not as many output columns as outputs, or uniforms as it has.
+    pub fn call<const N: usize>(&self, points: [&[T]; 3], uniforms: &[T], mut out: [&mut [T]; N]) {
         let count = points[0].len();
+        assert_eq!(uniforms.len(), self.uniforms, "uniforms of the program");
         assert_eq!(N, self.code.outputs, "outputs of the program");
         assert!(
             points.iter().all(|c| c.len() == count) && out.iter().all(|c| c.len() == count),
@@ -157,7 +185,8 @@ impl<T: Lane> BatchProgram<T> {
         let lanes = T::PRECISION.lanes();
         let whole = count / lanes * lanes;
         if whole > 0 {
-            self.blocks(points.map(<[T]>::as_ptr), out.each_mut().map(|c| c.as_mut_ptr()), whole / lanes);
+            let columns = points.map(<[T]>::as_ptr);
+            self.blocks(columns, uniforms, out.each_mut().map(|c| c.as_mut_ptr()), whole / lanes);
         }
         if whole < count {
             let mut inputs = [[T::default(); MAX_LANES]; 3];
@@ -165,27 +194,28 @@ impl<T: Lane> BatchProgram<T> {
             for (padded, column) in inputs.iter_mut().zip(points) {
                 padded[..count - whole].copy_from_slice(&column[whole..]);
             }
-            self.blocks(inputs.each_ref().map(|c| c.as_ptr()), outputs.each_mut().map(|c| c.as_mut_ptr()), 1);
+            let inputs = inputs.each_ref().map(|c| c.as_ptr());
+            self.blocks(inputs, uniforms, outputs.each_mut().map(|c| c.as_mut_ptr()), 1);
             for (column, padded) in out.iter_mut().zip(outputs) {
                 column[whole..].copy_from_slice(&padded[..count - whole]);
             }
         }
     }
 
-    /// The columns hold at least `blocks` whole blocks: both callers above have seen to it.
-    fn blocks<const N: usize>(&self, points: [*const T; 3], out: [*mut T; N], blocks: usize) {
+    /// The columns hold at least `blocks` whole blocks and there are all uniforms: both callers above have seen to it.
+    fn blocks<const N: usize>(&self, points: [*const T; 3], uniforms: &[T], out: [*mut T; N], blocks: usize) {
         let mut columns = [std::ptr::null_mut::<T>(); 3 + MAX_OUTPUTS];
         for (column, point) in columns.iter_mut().zip(points) {
             *column = point.cast_mut(); // the program only reads the first three
         }
         columns[3..3 + N].copy_from_slice(&out);
-        type Entry<T> = unsafe extern "C" fn(*const *mut T, usize);
-        // SAFETY: `compile` asked for a batch program of this precision, whose entry has this signature, and
-        // `self.code` keeps it mapped while it runs.
+        type Entry<T> = unsafe extern "C" fn(*const *mut T, usize, *const T);
+        // SAFETY: `compile` asked for a batch program of this precision, whose entry has this signature (the last
+        // argument is unused without uniforms), and `self.code` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
         // SAFETY: the program reads `blocks` blocks of the first three columns and writes as many of the next N,
         // all of them long enough; it needs no alignment; outputs are exclusive borrows, so nothing overlaps.
-        unsafe { entry(columns.as_ptr(), blocks) }
+        unsafe { entry(columns.as_ptr(), blocks, uniforms.as_ptr()) }
     }
 
     /// Bytes of machine code.
@@ -200,6 +230,7 @@ pub struct SegmentProgram<T> {
     code: Code,
     inputs: usize,
     parameters: usize,
+    uniforms: usize,
     lane: std::marker::PhantomData<T>,
 }
 
@@ -213,9 +244,11 @@ impl<T: Lane> SegmentProgram<T> {
         parameters: usize,
     ) -> Result<Self, CodegenError> {
         let (precision, shape, forms) = (T::PRECISION, Shape::Batch, &Forms::all(Form::Stable));
-        let request = Request { graph, inputs, outputs, precision, shape, forms, parameters: true };
+        let request =
+            Request { graph, inputs, outputs, precision, shape, forms, parameters: true, uniforms: true };
         let code = codegen::compile(request)?;
-        Ok(Self { code, inputs: inputs.len(), parameters, lane: std::marker::PhantomData })
+        let uniforms = uniforms_of(graph);
+        Ok(Self { code, inputs: inputs.len(), parameters, uniforms, lane: std::marker::PhantomData })
     }
 
     /// Computes the columns `writes` of a block from its points and the columns `reads`.
@@ -228,6 +261,7 @@ impl<T: Lane> SegmentProgram<T> {
         let [inputs, outputs] = [reads, writes].map(<[Place]>::len);
         assert!(length.is_multiple_of(lanes) && frame.points.iter().all(|c| c.len() == length), "length");
         assert_eq!((inputs, outputs, parameters.len()), (self.inputs, self.code.outputs, self.parameters));
+        assert!(frame.uniforms.len() >= self.uniforms, "uniforms of the program");
         frame.pointers.clear();
         // the program only reads the points
         frame.pointers.extend(frame.points.iter().map(|column| column.as_ptr().cast_mut()));
@@ -248,14 +282,16 @@ impl<T: Lane> SegmentProgram<T> {
             };
             frame.pointers.push(pointer);
         }
-        type Entry<T> = unsafe extern "C" fn(*const *mut T, usize, *const T);
-        // SAFETY: `compile` asked for a batch program of this precision that takes parameters, whose entry has this
-        // signature, and `self.code` keeps it mapped while it runs.
+        type Entry<T> = unsafe extern "C" fn(*const *mut T, usize, *const T, *const T);
+        // SAFETY: `compile` asked for a batch program of this precision that takes parameters and
+        // uniforms, whose entry has this signature, and `self.code` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
         // SAFETY: the program reads and writes `length` numbers of each column, which were checked to be there, and
-        // its parameters, whose number was checked. Columns that were one would give wrong numbers, nothing worse:
+        // its parameters and uniforms, whose numbers were checked. Columns that were one would give wrong numbers, nothing worse:
         // all pointers into `columns` come from one exclusive borrow.
-        unsafe { entry(frame.pointers.as_ptr(), length / lanes, parameters.as_ptr()) }
+        unsafe {
+            entry(frame.pointers.as_ptr(), length / lanes, parameters.as_ptr(), frame.uniforms.as_ptr())
+        }
     }
 }
 
@@ -268,7 +304,9 @@ const ROUNDING: Rounding =
 pub struct RangeProgram {
     code: Code,
     rounding: Rounding,
-    parameters: usize,
+    /// Nothing if it takes no pointer to any.
+    parameters: Option<usize>,
+    uniforms: usize,
 }
 
 impl RangeProgram {
@@ -287,6 +325,17 @@ impl RangeProgram {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
         Self::new(graph, root, rounding, None)
+    }
+
+    /// A program of a graph with uniforms. It may be called with those for which [`codegen::range_stays_finite`].
+    ///
+    /// # Errors
+    /// As for [`RangeProgram::compile`].
+    pub fn with_uniforms(graph: &Graph, root: Node) -> Result<Self, CodegenError> {
+        if !codegen::range_is_known(graph) {
+            return Err(CodegenError::Unsupported("ranges of this formula".into()));
+        }
+        Self::new(graph, root, ROUNDING, None)
     }
 
     /// A program that takes its constants as parameters. It may be called with those for which
@@ -317,18 +366,34 @@ impl RangeProgram {
         }
         let (precision, shape, forms) = (Precision::F64, Shape::Range(rounding), &Forms::all(Form::Stable));
         let (outputs, with_parameters) = (&[root], parameters.is_some());
-        let request =
-            Request { graph, inputs: &[], outputs, precision, shape, forms, parameters: with_parameters };
-        Ok(Self { code: codegen::compile(request)?, rounding, parameters: parameters.unwrap_or(0) })
+        let uniforms = uniforms_of(graph);
+        let request = Request {
+            graph,
+            inputs: &[],
+            outputs,
+            precision,
+            shape,
+            forms,
+            parameters: with_parameters,
+            uniforms: uniforms > 0,
+        };
+        Ok(Self { code: codegen::compile(request)?, rounding, parameters, uniforms })
     }
 
-    /// The range over a box; nothing if the box reaches too far out.
+    /// The range over a box, for uniforms within these bounds; nothing if the box reaches too far out.
     ///
     /// # Panics
-    /// If there are not as many parameters as the program has.
+    /// If there are not as many parameters or uniforms as the program has.
     #[inline]
-    pub fn call(&self, over: &Aabb, parameters: &[f64]) -> Option<Interval> {
-        assert_eq!(parameters.len(), self.parameters, "parameters of the range program");
+    pub fn call(&self, over: &Aabb, parameters: &[f64], uniforms: &[[f64; 2]]) -> Option<Interval> {
+        assert_eq!(parameters.len(), self.parameters.unwrap_or(0), "parameters of the range program");
+        assert!(uniforms.len() >= self.uniforms, "uniforms of the range program");
+        // those that a program has come first
+        let uniforms = uniforms.as_ptr().cast::<f64>();
+        let (third, fourth) = match self.parameters {
+            Some(_) => (parameters.as_ptr(), uniforms),
+            None => (uniforms, std::ptr::null()),
+        };
         let reach = codegen::RANGE_REACH;
         let near = over.min.cmpge(DVec3::splat(-reach)).all() && over.max.cmple(DVec3::splat(reach)).all();
         let ordered = over.min.cmple(over.max).all();
@@ -340,14 +405,15 @@ impl RangeProgram {
         let mut out = [0.0; 2];
         match self.rounding {
             Rounding::Nearest => {
-                type Entry = unsafe extern "C" fn(*const f64, *mut f64, *const f64);
-                // SAFETY: `new` asked for a range program, whose entry has this signature (the last argument is
-                // unused without parameters), and `self.code` keeps it mapped while it runs.
+                type Entry = unsafe extern "C" fn(*const f64, *mut f64, *const f64, *const f64);
+                // SAFETY: `new` asked for a range program, whose entry has this signature (the last arguments are
+                // unused without parameters and uniforms), and `self.code` keeps it mapped while it runs.
                 let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.code.entry()) };
-                // SAFETY: the program reads six numbers and its parameters, checked above, and writes two.
-                unsafe { entry(input.as_ptr(), out.as_mut_ptr(), parameters.as_ptr()) };
+                // SAFETY: the program reads six numbers its parameters and uniforms, checked above, and
+                // writes two.
+                unsafe { entry(input.as_ptr(), out.as_mut_ptr(), third, fourth) };
             }
-            Rounding::Upward => self.call_rounding_upwards(&input, &mut out, parameters),
+            Rounding::Upward => self.call_rounding_upwards(&input, &mut out, [third, fourth]),
         }
         Some(Interval::new(out[0], out[1]))
     }
@@ -355,12 +421,12 @@ impl RangeProgram {
     /// The call as one block of assembly, so that no code of Rust runs in a rounding mode that it does not expect.
     #[cfg(all(target_arch = "x86_64", unix))]
     #[inline]
-    fn call_rounding_upwards(&self, input: &[f64; 6], out: &mut [f64; 2], parameters: &[f64]) {
+    fn call_rounding_upwards(&self, input: &[f64; 6], out: &mut [f64; 2], numbers: [*const f64; 2]) {
         /// The state at the start of every program (all exceptions masked), but rounding towards +∞ (bits 13, 14).
         static UPWARDS: u32 = 0x1f80 | 0x4000;
         // SAFETY: `new` asked for a range program, whose entry follows the C convention of this system with these
-        // three pointers (the last is unused without parameters); `self.code` keeps it mapped while it runs; it reads
-        // six numbers and its parameters, checked by the caller, writes two, and calls nothing. The stack is aligned
+        // four pointers (the last are unused without parameters and uniforms); `self.code` keeps it mapped while it runs; it reads
+        // six numbers, its parameters and its uniforms, checked by the caller, writes two, and calls nothing. The stack is aligned
         // at the start of the block, stays so, and is put back, as is the control register, before its end.
         unsafe {
             std::arch::asm!(
@@ -374,7 +440,8 @@ impl RangeProgram {
                 entry = in(reg) self.code.entry(),
                 in("rdi") input.as_ptr(),
                 in("rsi") out.as_mut_ptr(),
-                in("rdx") parameters.as_ptr(),
+                in("rdx") numbers[0],
+                in("rcx") numbers[1],
                 clobber_abi("C"),
             );
         }
@@ -382,7 +449,7 @@ impl RangeProgram {
 
     /// Never called here: `new` refuses such programs.
     #[cfg(not(all(target_arch = "x86_64", unix)))]
-    fn call_rounding_upwards(&self, _: &[f64; 6], out: &mut [f64; 2], _: &[f64]) {
+    fn call_rounding_upwards(&self, _: &[f64; 6], out: &mut [f64; 2], _: [*const f64; 2]) {
         *out = [f64::NEG_INFINITY, f64::INFINITY];
     }
 }
@@ -393,6 +460,7 @@ pub struct LeafProgram {
     point: Code,
     batch: Code,
     parameters: usize,
+    uniforms: usize,
 }
 
 impl LeafProgram {
@@ -409,38 +477,42 @@ impl LeafProgram {
                 shape,
                 forms,
                 parameters: true,
+                uniforms: true,
             })
         };
-        Ok(Self { point: compile(Shape::Point)?, batch: compile(Shape::Batch)?, parameters })
+        let uniforms = uniforms_of(graph);
+        Ok(Self { point: compile(Shape::Point)?, batch: compile(Shape::Batch)?, parameters, uniforms })
     }
 
     /// All outputs at a point.
     ///
     /// # Panics
-    /// If there are not as many outputs or parameters as the program has.
+    /// If there are not as many outputs, parameters or uniforms as the program has.
     #[inline]
-    pub fn call(&self, p: DVec3, parameters: &[f64], out: &mut [f64]) {
+    pub fn call(&self, p: DVec3, parameters: &[f64], uniforms: &[f64], out: &mut [f64]) {
         assert_eq!((out.len(), parameters.len()), (self.point.outputs, self.parameters), "leaf program");
-        type Entry = unsafe extern "C" fn(f64, f64, f64, *mut f64, *const f64);
-        // SAFETY: `compile` asked for a point program with parameters in `f64`, whose entry has this signature, and
-        // `self.point` keeps it mapped while it runs.
+        assert!(uniforms.len() >= self.uniforms, "leaf program");
+        type Entry = unsafe extern "C" fn(f64, f64, f64, *mut f64, *const f64, *const f64);
+        // SAFETY: `compile` asked for a point program with parameters and uniforms in `f64`, whose entry has this
+        // signature, and `self.point` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.point.entry()) };
-        // SAFETY: the program writes the outputs and reads the parameters; both lengths were checked above.
-        unsafe { entry(p.x, p.y, p.z, out.as_mut_ptr(), parameters.as_ptr()) }
+        // SAFETY: the program writes the outputs and reads parameters and uniforms; all lengths were checked above.
+        unsafe { entry(p.x, p.y, p.z, out.as_mut_ptr(), parameters.as_ptr(), uniforms.as_ptr()) }
     }
 
     /// The one output at many points: whole blocks, then the rest through one padded block.
     ///
     /// # Panics
-    /// If the columns differ in length, or the program has several outputs or other parameters.
-    pub fn call_many(&self, points: [&[f64]; 3], parameters: &[f64], out: &mut [f64]) {
+    /// If the columns differ in length, or the program has several outputs, other parameters or other uniforms.
+    pub fn call_many(&self, points: [&[f64]; 3], parameters: &[f64], uniforms: &[f64], out: &mut [f64]) {
         let count = out.len();
+        assert!(uniforms.len() >= self.uniforms, "leaf program");
         assert_eq!((1, parameters.len()), (self.batch.outputs, self.parameters), "leaf program");
         assert!(points.iter().all(|c| c.len() == count), "column lengths");
         const LANES: usize = Precision::F64.lanes();
         let whole = count / LANES * LANES;
         if whole > 0 {
-            self.blocks(points.map(<[f64]>::as_ptr), out.as_mut_ptr(), whole / LANES, parameters);
+            self.blocks(points.map(<[f64]>::as_ptr), out.as_mut_ptr(), whole / LANES, [parameters, uniforms]);
         }
         if whole < count {
             let mut inputs = [[0.0; LANES]; 3];
@@ -448,21 +520,29 @@ impl LeafProgram {
             for (padded, column) in inputs.iter_mut().zip(points) {
                 padded[..count - whole].copy_from_slice(&column[whole..]);
             }
-            self.blocks(inputs.each_ref().map(|c| c.as_ptr()), output.as_mut_ptr(), 1, parameters);
+            self.blocks(
+                inputs.each_ref().map(|c| c.as_ptr()),
+                output.as_mut_ptr(),
+                1,
+                [parameters, uniforms],
+            );
             out[whole..].copy_from_slice(&output[..count - whole]);
         }
     }
 
-    /// The columns hold at least `blocks` whole blocks: both callers above have seen to it.
-    fn blocks(&self, [x, y, z]: [*const f64; 3], out: *mut f64, blocks: usize, parameters: &[f64]) {
+    /// The columns hold at least `blocks` whole blocks, and there are all parameters and uniforms: both callers above
+    /// have seen to it.
+    fn blocks(&self, [x, y, z]: [*const f64; 3], out: *mut f64, blocks: usize, numbers: [&[f64]; 2]) {
+        let [parameters, uniforms] = numbers.map(<[f64]>::as_ptr);
         // the program only reads the first three
         let columns = [x.cast_mut(), y.cast_mut(), z.cast_mut(), out];
-        type Entry = unsafe extern "C" fn(*const *mut f64, usize, *const f64);
-        // SAFETY: `compile` asked for a batch program with parameters in `f64`, whose entry has this signature, and
-        // `self.batch` keeps it mapped while it runs.
+        type Entry = unsafe extern "C" fn(*const *mut f64, usize, *const f64, *const f64);
+        // SAFETY: `compile` asked for a batch program with parameters and uniforms in `f64`, whose entry has this
+        // signature, and `self.batch` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.batch.entry()) };
-        // SAFETY: the program reads `blocks` blocks of three columns and its parameters, whose number was checked,
+        // SAFETY: the program reads `blocks` blocks of three columns, its parameters and its uniforms, whose numbers were
+        // checked,
         // and writes as many blocks to `out`, which is borrowed exclusively.
-        unsafe { entry(columns.as_ptr(), blocks, parameters.as_ptr()) }
+        unsafe { entry(columns.as_ptr(), blocks, parameters, uniforms) }
     }
 }

@@ -2,7 +2,7 @@
 //! that ten thousand balls are compiled as one.
 
 use std::collections::HashMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
@@ -15,7 +15,10 @@ use crate::codegen;
 use crate::field::Path;
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{self, Enclosure, Expr, Graph, Interpreter, Node, RangeEvaluator, TaylorEvaluator};
+use crate::ir::{
+    self, Enclosure, Expr, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region, TaylorEvaluator,
+    Uniforms,
+};
 
 /// From so many leaves of one shape on, their ranges come from machine code: making it costs as much time as some
 /// thousand ranges by the interpreter. Their number decides, not that of the calls, so that the bounds of one leaf
@@ -24,10 +27,13 @@ const MANY_LEAVES: usize = 8;
 
 /// A shape of leaves.
 struct Shape {
+    /// What depends on time alone was taken out of it.
     graph: Graph,
     root: Node,
     parameters: usize,
     leaves: usize,
+    /// Nothing for a leaf at rest.
+    motion: Option<Motion>,
     range: RangeEvaluator,
     range_code: OnceLock<Option<RangeProgram>>,
     value: OnceLock<Evaluator>,
@@ -36,6 +42,17 @@ struct Shape {
     /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
     along: OnceLock<Option<Evaluator>>,
     taylor: OnceLock<TaylorEvaluator>,
+}
+
+/// What is peculiar to leaves that move.
+struct Motion {
+    /// The leaf as a formula of time.
+    graph: Graph,
+    root: Node,
+    uniforms: Uniforms,
+    /// With these uniforms, as the graph of the shape.
+    velocity: (Graph, Vec<Node>),
+    velocity_code: OnceLock<Evaluator>,
 }
 
 struct Evaluator {
@@ -47,21 +64,48 @@ struct Leaf {
     shape: u32,
     /// Where its constants begin.
     first: u32,
-    /// Whether machine code may answer for its range.
+    /// Where the numbers begin that depend on time alone.
+    first_uniform: u32,
+    /// Whether machine code may answer for its range; of leaves that move [`Ranges`] says it.
     tame: bool,
 }
 
-pub(super) struct Leaves {
+/// The leaves of a solid at all times.
+pub(super) struct Store {
     engine: Engine,
     shapes: Vec<Shape>,
     leaves: Vec<Leaf>,
     constants: Vec<f64>,
+    uniforms: usize,
 }
 
-impl Leaves {
+/// The leaves during a stretch of time: values are those at its end, ranges hold all of it.
+pub(super) struct Leaves {
+    store: Arc<Store>,
+    from: f64,
+    to: f64,
+    /// What depends on time alone, at the end.
+    uniforms: Vec<f64>,
+    ranges: OnceLock<Ranges>,
+}
+
+/// What depends on time alone, during the stretch.
+struct Ranges {
+    uniforms: Vec<Interval>,
+    /// The same numbers, for machine code.
+    pairs: Vec<[f64; 2]>,
+    /// Of leaves that move: whether machine code may answer for their range.
+    tame: Vec<bool>,
+}
+
+/// Numbers of one leaf that depend on time alone.
+type Uniform = SmallVec<[f64; 16]>;
+
+impl Store {
     pub fn new(engine: Engine, graph: &Graph, nodes: &[Node]) -> Self {
         let mut known: HashMap<Vec<Expr>, u32> = HashMap::new();
-        let mut out = Self { engine, shapes: Vec::new(), leaves: Vec::new(), constants: Vec::new() };
+        let (shapes, leaves, constants) = (Vec::new(), Vec::new(), Vec::new());
+        let mut out = Self { engine, shapes, leaves, constants, uniforms: 0 };
         for &node in nodes {
             let (shape, root, constants) = graph.parametrised(node);
             let next = out.shapes.len() as u32;
@@ -71,40 +115,14 @@ impl Leaves {
             }
             let shape = &mut out.shapes[number as usize];
             shape.leaves += 1;
-            let tame = codegen::range_stays_finite(&shape.graph, &shape.range, &constants);
-            out.leaves.push(Leaf { shape: number, first: out.constants.len() as u32, tame });
+            let still = shape.motion.is_none();
+            let tame = still && shape.range_stays_finite(&constants, &[]);
+            let (first, first_uniform) = (out.constants.len() as u32, out.uniforms as u32);
+            out.leaves.push(Leaf { shape: number, first, first_uniform, tame });
             out.constants.extend(constants);
+            out.uniforms += shape.uniforms();
         }
         out
-    }
-
-    pub fn len(&self) -> usize {
-        self.leaves.len()
-    }
-
-    pub fn shapes(&self) -> usize {
-        self.shapes.len()
-    }
-
-    /// Which shape a leaf has.
-    pub fn shape_of(&self, leaf: u32) -> usize {
-        self.leaves[leaf as usize].shape as usize
-    }
-
-    /// Operations of a leaf's formula, constants and coordinates not counted.
-    pub fn operations(&self, leaf: u32) -> usize {
-        let (shape, _) = self.of(leaf);
-        shape.graph.nodes().filter(|(_, expr)| expr.operands().next().is_some()).count()
-    }
-
-    /// An interval that contains the leaf's value at every point of a box.
-    pub fn range(&self, leaf: u32, over: &Aabb) -> Interval {
-        let (shape, constants) = self.of(leaf);
-        let by_code = self.engine != Engine::Interpreter && self.leaves[leaf as usize].tame;
-        if by_code && let Some(range) = shape.range_code().and_then(|code| code.call(over, constants)) {
-            return range;
-        }
-        shape.range.eval_with(over, constants)
     }
 
     fn of(&self, leaf: u32) -> (&Shape, &[f64]) {
@@ -114,19 +132,124 @@ impl Leaves {
         (shape, &self.constants[first..first + shape.parameters])
     }
 
+    /// The leaves that move, with their shapes and constants.
+    fn moving(&self) -> impl Iterator<Item = (usize, &Shape, &Motion, &[f64])> {
+        (0..self.leaves.len()).filter_map(|i| {
+            let (shape, constants) = self.of(i as u32);
+            Some((i, shape, shape.motion.as_ref()?, constants))
+        })
+    }
+
+    /// The leaves during a stretch of time.
+    pub fn during(self: &Arc<Self>, from: f64, to: f64) -> Leaves {
+        let mut uniforms = vec![0.0; self.uniforms];
+        if self.uniforms > 0 {
+            for (i, shape, motion, constants) in self.moving() {
+                let first = self.leaves[i].first_uniform as usize;
+                motion.uniforms.fill(to, constants, &mut uniforms[first..first + shape.uniforms()]);
+            }
+        }
+        Leaves { store: self.clone(), from, to, uniforms, ranges: OnceLock::new() }
+    }
+}
+
+impl Leaves {
+    /// Whether a leaf depends on time.
+    pub fn moves(&self, leaf: u32) -> bool {
+        self.store.of(leaf).0.motion.is_some()
+    }
+
+    fn of(&self, leaf: u32) -> (&Shape, &[f64], &[f64]) {
+        let (shape, constants) = self.store.of(leaf);
+        let first = self.store.leaves[leaf as usize].first_uniform as usize;
+        (shape, constants, &self.uniforms[first..first + shape.uniforms()])
+    }
+
+    fn ranges(&self) -> &Ranges {
+        self.ranges.get_or_init(|| {
+            let time = Interval::new(self.from.min(self.to), self.from.max(self.to));
+            let mut uniforms = Vec::with_capacity(self.store.uniforms);
+            let mut tame: Vec<bool> = self.store.leaves.iter().map(|leaf| leaf.tame).collect();
+            for (i, shape, motion, constants) in self.store.moving() {
+                let own = motion.uniforms.over(time, constants);
+                tame[i] = shape.range_stays_finite(constants, &own);
+                uniforms.extend(own);
+            }
+            let pairs = uniforms.iter().map(|u| [u.lo, u.hi]).collect();
+            Ranges { uniforms, pairs, tame }
+        })
+    }
+
+    pub fn len(&self) -> usize {
+        self.store.leaves.len()
+    }
+
+    pub fn shapes(&self) -> usize {
+        self.store.shapes.len()
+    }
+
+    /// Which shape a leaf has.
+    pub fn shape_of(&self, leaf: u32) -> usize {
+        self.store.leaves[leaf as usize].shape as usize
+    }
+
+    /// Operations of a leaf's formula, constants and coordinates not counted.
+    pub fn operations(&self, leaf: u32) -> usize {
+        let (shape, ..) = self.of(leaf);
+        let graph = shape.motion.as_ref().map_or(&shape.graph, |motion| &motion.graph);
+        graph.nodes().filter(|(_, expr)| expr.operands().next().is_some()).count()
+    }
+
+    /// An interval that contains the leaf's value at every point of a box, at all times of the stretch.
+    pub fn range(&self, leaf: u32, over: &Aabb) -> Interval {
+        let (shape, constants, uniforms) = self.of(leaf);
+        if uniforms.is_empty() {
+            let by_code = self.store.engine != Engine::Interpreter && self.store.leaves[leaf as usize].tame;
+            if by_code
+                && let Some(range) = shape.range_code().and_then(|code| code.call(over, constants, &[]))
+            {
+                return range;
+            }
+            return shape.range.eval_with(&Region { parameters: constants, ..Region::of(over) });
+        }
+        let ranges = self.ranges();
+        let first = self.store.leaves[leaf as usize].first_uniform as usize;
+        let own = first..first + uniforms.len();
+        let by_code = self.store.engine != Engine::Interpreter && ranges.tame[leaf as usize];
+        if by_code
+            && let Some(code) = shape.range_code()
+            && let Some(range) = code.call(over, constants, &ranges.pairs[own.clone()])
+        {
+            return range;
+        }
+        let uniforms = &ranges.uniforms[own];
+        shape.range.eval_with(&Region { parameters: constants, uniforms, ..Region::of(over) })
+    }
+
     #[inline]
     pub fn value(&self, leaf: u32, p: DVec3) -> f64 {
-        let (shape, constants) = self.of(leaf);
+        let (shape, constants, uniforms) = self.of(leaf);
         let mut out = [0.0];
-        shape.value(self.engine).point(p, constants, &mut out);
+        shape.value(self.store.engine).point(p, constants, uniforms, &mut out);
         out[0]
     }
 
     /// Value and gradient.
     pub fn gradient(&self, leaf: u32, p: DVec3) -> (f64, DVec3) {
-        let (shape, constants) = self.of(leaf);
+        self.gradient_along(leaf, p, 1.0)
+    }
+
+    /// Value and gradient after a part of the stretch of time.
+    pub fn gradient_along(&self, leaf: u32, p: DVec3, part: f64) -> (f64, DVec3) {
+        let (shape, constants, at_end) = self.of(leaf);
+        let mut uniforms = Uniform::from_slice(at_end);
+        if let Some(motion) = &shape.motion
+            && part < 1.0
+        {
+            motion.uniforms.fill(self.from + part * (self.to - self.from), constants, &mut uniforms);
+        }
         let mut out = [0.0; 4];
-        shape.gradient(self.engine).point(p, constants, &mut out);
+        shape.gradient(self.store.engine).point(p, constants, &uniforms, &mut out);
         (out[0], DVec3::new(out[1], out[2], out[3]))
     }
 
@@ -157,25 +280,35 @@ impl Leaves {
     /// Distance, outward normal and mean curvature, see `ir::contact`.
     #[inline]
     pub fn contact(&self, leaf: u32, p: DVec3) -> [f64; 5] {
-        let (shape, constants) = self.of(leaf);
+        let (shape, constants, uniforms) = self.of(leaf);
         let mut out = [0.0; 5];
-        shape.contact(self.engine).point(p, constants, &mut out);
+        shape.contact(self.store.engine).point(p, constants, uniforms, &mut out);
         out
     }
 
-    pub fn values(&self, leaf: u32, points: [&[f64]; 3], out: &mut [f64]) {
-        let (shape, constants) = self.of(leaf);
-        shape.value(self.engine).many(points, constants, out);
+    /// Velocity of the leaf's surface along its normal, see `ir::wall_velocity`.
+    pub fn velocity(&self, leaf: u32, p: DVec3) -> DVec3 {
+        let (shape, constants, uniforms) = self.of(leaf);
+        let Some(motion) = &shape.motion else { return DVec3::ZERO };
+        let mut out = [0.0; 3];
+        motion.velocity(shape, self.store.engine).point(p, constants, uniforms, &mut out);
+        DVec3::from_array(out)
     }
 
-    /// What a leaf is along the whole path, if it is a polynomial of degree two at most.
+    pub fn values(&self, leaf: u32, points: [&[f64]; 3], out: &mut [f64]) {
+        let (shape, constants, uniforms) = self.of(leaf);
+        shape.value(self.store.engine).many(points, constants, uniforms, out);
+    }
+
+    /// What a leaf is along the whole path, passed during the stretch of time, if it is a polynomial of degree two at most.
     pub fn along(&self, leaf: u32, negated: bool, from: DVec3, to: DVec3) -> Option<Enclosure> {
-        let (shape, constants) = self.of(leaf);
-        let program = shape.along(self.engine)?;
+        let (shape, constants, _) = self.of(leaf);
+        let program = shape.along(self.store.engine)?;
         let mut parameters: SmallVec<[f64; 16]> = SmallVec::from_slice(constants);
         parameters.extend_from_slice(&(to - from).to_array());
+        parameters.extend_from_slice(&[self.to - self.from, self.from]);
         let mut out = [0.0; 6];
-        program.point(from, &parameters, &mut out);
+        program.point(from, &parameters, &[], &mut out);
         let [a, b, c, d, e, f] = out;
         let coefficients = [(a, d), (b, e), (c, f)].map(|(value, error)| {
             let value = if negated { -value } else { value };
@@ -191,9 +324,11 @@ impl Leaves {
 
     /// An enclosure of a leaf over a part of a path.
     pub fn enclose(&self, leaf: u32, negated: bool, path: &Path, stretch: (f64, f64)) -> Enclosure {
-        let (shape, constants) = self.of(leaf);
-        let taylor = shape.taylor.get_or_init(|| TaylorEvaluator::new(&shape.graph, shape.root));
-        let found = taylor.enclose(path.from.to_array(), path.to.to_array(), stretch, constants);
+        let (shape, constants, _) = self.of(leaf);
+        let (graph, root) = shape.formula();
+        let taylor = shape.taylor.get_or_init(|| TaylorEvaluator::new(graph, root));
+        let (from, to) = (path.from.extend(self.from).to_array(), path.to.extend(self.to).to_array());
+        let found = taylor.enclose(from, to, stretch, constants);
         if negated {
             Enclosure { coefficients: found.coefficients.map(|c| -c), range: -found.range }
         } else {
@@ -202,8 +337,29 @@ impl Leaves {
     }
 }
 
+impl Motion {
+    #[inline]
+    fn velocity(&self, shape: &Shape, engine: Engine) -> &Evaluator {
+        let (graph, outputs) = &self.velocity;
+        let make = || Evaluator::new(engine, graph, outputs, shape.parameters);
+        self.velocity_code.get_or_init(make)
+    }
+}
+
 impl Shape {
     fn new(graph: Graph, root: Node, parameters: usize) -> Self {
+        let (graph, root, motion) = if graph.uses_time(root) {
+            let mut all = graph.clone();
+            let [x, y, z] = ir::wall_velocity(&mut all, root);
+            let (all, outputs, _) = crate::simplify::simplify(&all, &[root, x, y, z]);
+            let Hoisted { graph: rest, outputs, uniforms, .. } = ir::hoisted(&all, &outputs);
+            let velocity = rest.extract(&outputs[1..]);
+            let motion = Motion { graph, root, uniforms, velocity, velocity_code: OnceLock::new() };
+            let (rest, root) = rest.extract_cone(outputs[0]);
+            (rest, root, Some(motion))
+        } else {
+            (graph, root, None)
+        };
         let range = RangeEvaluator::new(&graph, root);
         let (range_code, value, gradient) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
         let (contact, along, taylor) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
@@ -212,6 +368,7 @@ impl Shape {
             root,
             parameters,
             leaves: 0,
+            motion,
             range,
             range_code,
             value,
@@ -222,9 +379,27 @@ impl Shape {
         }
     }
 
+    /// How many numbers of it depend on time alone.
+    #[inline]
+    fn uniforms(&self) -> usize {
+        self.motion.as_ref().map_or(0, |motion| motion.uniforms.len())
+    }
+
+    /// Whether machine code may answer for the range of a leaf with these numbers.
+    fn range_stays_finite(&self, parameters: &[f64], uniforms: &[Interval]) -> bool {
+        let numbers = Region { parameters, uniforms, ..Region::of(&Aabb::EMPTY) };
+        codegen::range_stays_finite(&self.graph, &self.range, numbers)
+    }
+
+    /// The leaf as a formula of place and time.
+    fn formula(&self) -> (&Graph, Node) {
+        self.motion.as_ref().map_or((&self.graph, self.root), |motion| (&motion.graph, motion.root))
+    }
+
     #[inline]
     fn range_code(&self) -> Option<&RangeProgram> {
-        if self.leaves < MANY_LEAVES {
+        // those of a leaf that moves are asked for again and again
+        if self.leaves < MANY_LEAVES && self.motion.is_none() {
             return None;
         }
         let compile = || RangeProgram::with_parameters(&self.graph, self.root, self.parameters).ok();
@@ -243,10 +418,11 @@ impl Shape {
 
     fn along(&self, engine: Engine) -> Option<&Evaluator> {
         let make = || {
-            let mut graph = self.graph.clone();
-            let outputs = ir::along(&mut graph, self.root, self.parameters as u32)?;
+            let (graph, root) = self.formula();
+            let mut graph = graph.clone();
+            let outputs = ir::along(&mut graph, root, self.parameters as u32)?;
             let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
-            Some(Evaluator::new(engine, &graph, &outputs, self.parameters + 3))
+            Some(Evaluator::new(engine, &graph, &outputs, self.parameters + 5))
         };
         self.along.get_or_init(make).as_ref()
     }
@@ -276,20 +452,24 @@ impl Evaluator {
     }
 
     #[inline]
-    fn point(&self, p: DVec3, constants: &[f64], out: &mut [f64]) {
+    fn point(&self, p: DVec3, constants: &[f64], uniforms: &[f64], out: &mut [f64]) {
         match &self.code {
-            Some(code) => code.call(p, constants, out),
-            None => self.interpreter.eval_with(p.to_array(), constants, out),
+            Some(code) => code.call(p, constants, uniforms, out),
+            None => self.interpret(p.to_array(), constants, uniforms, out),
         }
     }
 
-    fn many(&self, points: [&[f64]; 3], constants: &[f64], out: &mut [f64]) {
+    fn many(&self, points: [&[f64]; 3], constants: &[f64], uniforms: &[f64], out: &mut [f64]) {
         if let Some(code) = &self.code {
-            return code.call_many(points, constants, out);
+            return code.call_many(points, constants, uniforms, out);
         }
         for (i, out) in out.iter_mut().enumerate() {
             let p = points.map(|column| column[i]);
-            self.interpreter.eval_with(p, constants, std::slice::from_mut(out));
+            self.interpret(p, constants, uniforms, std::slice::from_mut(out));
         }
+    }
+
+    fn interpret(&self, p: [f64; 3], parameters: &[f64], uniforms: &[f64], out: &mut [f64]) {
+        self.interpreter.eval_given(Given { parameters, uniforms, ..Given::point(p) }, out);
     }
 }

@@ -15,8 +15,11 @@ mod dissect;
 mod faces;
 mod leaf;
 mod logic;
+mod moment;
+mod moving_map;
 mod prefix;
 mod programs;
+mod ranges;
 mod stretches;
 mod sweep;
 
@@ -30,17 +33,20 @@ pub use budget::{Chosen, OutOfBudget, Plan};
 pub use cell_map::{CellMap, CellStats, Place};
 pub use compiled::{BatchProgram, Lane, PointProgram, RangeProgram};
 pub use dissect::{LeafInfo, Left};
+pub use moving_map::MovingMap;
 pub use programs::{Engine, ProgramKind};
 
 use crate::codegen::{CodegenError, Form, Forms, Precision};
-use crate::field::{self, Entry, Faces, Field, GradientsMut, Path, Points};
+use crate::field::{self, Entry, Faces, Field, GradientsMut, Moving, Path, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{self, Graph, Node, RangeEvaluator};
+use crate::ir::{self, Graph, Node, Uniforms};
 use crate::simplify::{Applied, simplify};
-use leaf::Leaves;
+use leaf::{Leaves, Store};
 use logic::Logic;
-use programs::{Guard, Programs};
+use moment::Moment;
+use programs::{Guard, Programs, UniformValues};
+use ranges::Ranges;
 use sweep::Sweep;
 
 /// Up to this many leaves the twin alone is cheaper than finding out which of them matter: a leaf and its share of
@@ -48,9 +54,12 @@ use sweep::Sweep;
 const TWIN_SUFFICES: usize = 24;
 
 /// An obstacle, compiled.
+///
+/// A solid that moves is looked at one time, or during a stretch of time: see [`Solid::at`] and [`Solid::between`].
 #[derive(Clone)]
 pub struct Solid {
     inner: Arc<Inner>,
+    moment: Arc<Moment>,
 }
 
 struct Inner {
@@ -60,16 +69,19 @@ struct Inner {
     /// Same sign, no roots.
     twin: OnceLock<Function>,
     contact: OnceLock<Programs>,
-    parts: OnceLock<Option<Arc<Parts>>>,
-    bounds: OnceLock<Bounds>,
+    velocity: OnceLock<Programs>,
+    parts: OnceLock<Option<TakenApart>>,
     applied: Applied,
 }
 
-/// A solid taken apart.
+/// The leaves of a solid at all times, and how they are joined, in prefix form.
+type TakenApart = (Arc<Store>, Arc<[u32]>);
+
+/// A solid taken apart, during a stretch of time.
 struct Parts {
     leaves: Leaves,
     /// How they are joined, in prefix form.
-    words: Vec<u32>,
+    words: Arc<[u32]>,
 }
 
 /// One scalar function of space with all that answers questions about it.
@@ -80,8 +92,7 @@ struct Function {
     /// The graph without guards, from which further programs are derived.
     graph: Graph,
     root: Node,
-    range: RangeEvaluator,
-    range_code: OnceLock<Option<RangeProgram>>,
+    range: Ranges,
     gradient: OnceLock<Programs>,
 }
 
@@ -91,23 +102,17 @@ impl Function {
             value: Programs::new(graph.clone(), vec![root], guard, form),
             guard,
             form,
-            range: RangeEvaluator::new(&graph, root),
-            range_code: OnceLock::new(),
+            range: Ranges::new(&graph, root),
             graph,
             root,
             gradient: OnceLock::new(),
         }
     }
 
+    /// The range over a box while time is in the stretch of a moment; of ω, or of its twin.
     #[inline]
-    fn range(&self, engine: Engine, over: &Aabb) -> Interval {
-        if engine != Engine::Interpreter {
-            let code = self.range_code.get_or_init(|| RangeProgram::compile(&self.graph, self.root).ok());
-            if let Some(range) = code.as_ref().and_then(|code| code.call(over, &[])) {
-                return range;
-            }
-        }
-        self.range.eval(over)
+    fn range(&self, engine: Engine, over: &Aabb, moment: &Moment, twin: bool) -> Interval {
+        self.range.over((&self.graph, self.root), engine, over, |find| moment.ranges(twin, find))
     }
 
     fn gradient(&self) -> &Programs {
@@ -117,6 +122,20 @@ impl Function {
             let (graph, roots, _) = simplify(&graph, &[self.root, gx, gy, gz]);
             Programs::new(graph, roots, self.guard, self.form)
         })
+    }
+}
+
+impl Inner {
+    /// The solid taken apart into leaves, once; nothing if that would be too large.
+    fn parts(&self) -> Option<TakenApart> {
+        let take_apart = || {
+            let (logic, nodes) = Logic::of(&self.omega.graph, self.omega.root)?;
+            let leaves = Store::new(self.engine, &self.omega.graph, &nodes);
+            let mut words = Vec::new();
+            prefix::encode(&logic, &mut words);
+            Some((Arc::new(leaves), words.into()))
+        };
+        self.parts.get_or_init(take_apart).clone()
     }
 }
 
@@ -153,15 +172,48 @@ impl Solid {
             omega: Function::new(graph, roots[0], Guard::Infinite, form),
             twin: OnceLock::new(),
             contact: OnceLock::new(),
+            velocity: OnceLock::new(),
             parts: OnceLock::new(),
-            bounds: OnceLock::new(),
             applied,
         };
-        let solid = Self { inner: Arc::new(inner) };
+        let solid = Self { inner: Arc::new(inner), moment: Moment::new(0.0, 0.0) };
         if engine == Engine::Jit {
             solid.inner.omega.value.require_machine_code()?;
         }
         Ok(solid)
+    }
+
+    /// Whether time occurs in the formula.
+    pub fn moves(&self) -> bool {
+        self.inner.omega.range.moves()
+    }
+
+    /// How many numbers of a program depend on time alone: they are found once for each time, the rest at each point.
+    /// Nothing for a solid at rest.
+    pub fn time_dependent(&self, kind: ProgramKind) -> Option<usize> {
+        self.programs(kind).uniforms.as_ref().map(Uniforms::len)
+    }
+
+    /// The time, s, that values are for: 0 unless [`Solid::at`] or [`Solid::between`] has chosen another one.
+    pub fn time(&self) -> f64 {
+        self.moment.to
+    }
+
+    /// The solid at a time, s. Nothing is compiled again; a solid at rest is the same at all times. Where the time is
+    /// not a number, nothing is.
+    #[must_use]
+    pub fn at(&self, time: f64) -> Self {
+        self.between(time, time)
+    }
+
+    /// The solid during a stretch of time: values, gradients, signs and contacts are those at its end, ranges and bounds
+    /// hold all of it, and a path is passed from its beginning to its end.
+    #[must_use]
+    pub fn between(&self, from: f64, to: f64) -> Self {
+        if !self.moves() {
+            return self.clone();
+        }
+        Self { inner: self.inner.clone(), moment: Moment::new(from, to) }
     }
 
     /// As in `solid NAME = …`.
@@ -190,6 +242,33 @@ impl Solid {
         &self.inner.applied
     }
 
+    /// What the programs of one kind need to know of the time.
+    #[inline]
+    fn uniforms(&self, kind: ProgramKind, programs: &Programs) -> &UniformValues {
+        match &programs.uniforms {
+            None => const { &UniformValues::NONE },
+            Some(_) => self.moment.uniforms(kind, |time| programs.uniforms_at(time)),
+        }
+    }
+
+    /// All outputs of one kind of program at a point.
+    #[inline]
+    fn evaluate<T: Lane>(&self, kind: ProgramKind, p: [T; 3], out: &mut [T]) {
+        let programs = self.programs(kind);
+        programs.point(self.inner.engine, self.uniforms(kind, programs), p, out);
+    }
+
+    /// … and at many points.
+    fn evaluate_many<T: Lane, const N: usize>(
+        &self,
+        kind: ProgramKind,
+        points: [&[T]; 3],
+        out: [&mut [T]; N],
+    ) {
+        let programs = self.programs(kind);
+        programs.batch(self.inner.engine, self.uniforms(kind, programs), points, out);
+    }
+
     #[inline]
     fn programs(&self, kind: ProgramKind) -> &Programs {
         match kind {
@@ -200,6 +279,12 @@ impl Solid {
             ProgramKind::Contact => self.inner.contact.get_or_init(|| {
                 let mut graph = self.inner.omega.graph.clone();
                 let outputs = ir::contact(&mut graph, self.inner.omega.root);
+                let (graph, outputs, _) = simplify(&graph, &outputs);
+                Programs::new(graph, outputs, Guard::Infinite, Form::Stable)
+            }),
+            ProgramKind::Velocity => self.inner.velocity.get_or_init(|| {
+                let mut graph = self.inner.omega.graph.clone();
+                let outputs = ir::wall_velocity(&mut graph, self.inner.omega.root);
                 let (graph, outputs, _) = simplify(&graph, &outputs);
                 Programs::new(graph, outputs, Guard::Infinite, Form::Stable)
             }),
@@ -215,17 +300,15 @@ impl Solid {
         })
     }
 
+    /// The solid after a part of its stretch of time.
+    fn then(&self, part: f64) -> Self {
+        let Moment { from, to, .. } = *self.moment;
+        if part == 1.0 || from == to { self.clone() } else { self.at(from + part * (to - from)) }
+    }
+
     /// The solid taken apart into leaves, once; nothing if that would be too large.
     fn parts(&self) -> Option<Arc<Parts>> {
-        let take_apart = || {
-            let omega = &self.inner.omega;
-            let (logic, nodes) = Logic::of(&omega.graph, omega.root)?;
-            let leaves = Leaves::new(self.inner.engine, &omega.graph, &nodes);
-            let mut words = Vec::new();
-            prefix::encode(&logic, &mut words);
-            Some(Arc::new(Parts { leaves, words }))
-        };
-        self.inner.parts.get_or_init(take_apart).clone()
+        self.moment.parts(&self.inner)
     }
 
     /// The cheapest field with exactly the sign, zero set and surface gradient of ω in a box: the twin for a few
@@ -265,7 +348,7 @@ impl Solid {
     #[inline]
     pub fn omega(&self, p: DVec3) -> f64 {
         let mut out = [0.0];
-        self.inner.omega.value.point(self.inner.engine, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Value, p.to_array(), &mut out);
         out[0]
     }
 
@@ -273,7 +356,7 @@ impl Solid {
     #[inline]
     pub fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         let mut out = [0.0; 4];
-        self.programs(ProgramKind::Gradient).point(self.inner.engine, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Gradient, p.to_array(), &mut out);
         (out[0], DVec3::new(out[1], out[2], out[3]))
     }
 
@@ -281,7 +364,7 @@ impl Solid {
     #[inline]
     pub fn omega_f32(&self, p: Vec3) -> f32 {
         let mut out = [0.0];
-        self.inner.omega.value.point(self.inner.engine, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Value, p.to_array(), &mut out);
         out[0]
     }
 
@@ -289,7 +372,7 @@ impl Solid {
     #[inline]
     pub fn omega_grad_f32(&self, p: Vec3) -> (f32, Vec3) {
         let mut out = [0.0; 4];
-        self.programs(ProgramKind::Gradient).point(self.inner.engine, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Gradient, p.to_array(), &mut out);
         (out[0], Vec3::new(out[1], out[2], out[3]))
     }
 
@@ -298,7 +381,7 @@ impl Solid {
     /// # Panics
     /// If the columns differ in length.
     pub fn omega_many<T: Lane>(&self, points: [&[T]; 3], omega: &mut [T]) {
-        self.inner.omega.value.batch(self.inner.engine, points, [omega]);
+        self.evaluate_many(ProgramKind::Value, points, [omega]);
     }
 
     /// ω and ∇ω at many points given by columns: `out` is ω, ∂x, ∂y, ∂z.
@@ -306,7 +389,7 @@ impl Solid {
     /// # Panics
     /// If the columns differ in length.
     pub fn omega_grad_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 4]) {
-        self.programs(ProgramKind::Gradient).batch(self.inner.engine, points, out);
+        self.evaluate_many(ProgramKind::Gradient, points, out);
     }
 
     /// Inside (1), on the surface (0) or outside (−1), exactly the logic of the leaves' signs; NaN where a leaf is
@@ -314,22 +397,33 @@ impl Solid {
     #[inline]
     pub fn sign(&self, p: DVec3) -> f64 {
         let mut out = [0.0];
-        self.programs(ProgramKind::Sign).point(self.inner.engine, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Sign, p.to_array(), &mut out);
         ir::Unary::Sign.eval(out[0])
     }
 
     /// What a particle at this place needs to know of the surface.
     pub fn contact(&self, p: DVec3) -> Contact {
         let mut out = [0.0; 5];
-        self.programs(ProgramKind::Contact).point(self.inner.engine, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
         let [distance, nx, ny, nz, mean_curvature] = out;
         Contact { distance, normal: DVec3::new(nx, ny, nz), mean_curvature }
+    }
+
+    /// The velocity of the surface near a point, in the direction of its normal: of the face that [`Solid::contact`]
+    /// finds. Zero for a solid at rest. A motion within the surface itself, as of a turning cylinder, is not in ω.
+    pub fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        if !self.moves() {
+            return DVec3::ZERO;
+        }
+        let mut out = [0.0; 3];
+        self.evaluate(ProgramKind::Velocity, p.to_array(), &mut out);
+        DVec3::from_array(out)
     }
 
     /// The distance of [`Solid::contact`] in single precision throughout.
     pub fn distance_f32(&self, p: Vec3) -> f32 {
         let mut out = [0.0; 5];
-        self.programs(ProgramKind::Contact).point(self.inner.engine, p.to_array(), &mut out);
+        self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
         out[0]
     }
 
@@ -338,7 +432,7 @@ impl Solid {
     /// # Panics
     /// If the columns differ in length.
     pub fn contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
-        self.programs(ProgramKind::Contact).batch(self.inner.engine, points, out);
+        self.evaluate_many(ProgramKind::Contact, points, out);
     }
 
     /// The twin at many points: positive inside, 0 on the surface, negative outside.
@@ -346,18 +440,19 @@ impl Solid {
     /// # Panics
     /// If the columns differ in length.
     pub fn twin_many<T: Lane>(&self, points: [&[T]; 3], twin: &mut [T]) {
-        self.programs(ProgramKind::Sign).batch(self.inner.engine, points, [twin]);
+        self.evaluate_many(ProgramKind::Sign, points, [twin]);
     }
 
     /// An interval that contains ω of every point of a box: the exact value and the one that [`Solid::omega`] gives,
     /// also where that overflows. [`Interval::ALL`] where ω may not be a number; points at which it is none because
     /// of their coordinates (not finite, or so large that their sum is not) are not spoken of.
     pub fn range(&self, over: &Aabb) -> Interval {
-        self.inner.omega.range(self.inner.engine, over)
+        self.inner.omega.range(self.inner.engine, over, &self.moment, false)
     }
 
     /// Where the straight path between two points first meets the solid; ω = 0 counts as met.
     ///
+    /// During a stretch of time, see [`Solid::between`], time passes evenly along the path.
     /// Nothing of the path before the entry is in the solid, and a path without one does not touch it: proven, however
     /// thin the solid and long the path.
     pub fn first_entry(&self, from: DVec3, to: DVec3) -> Option<Entry> {
@@ -366,7 +461,7 @@ impl Solid {
 
     /// Where the solid is; found on first use by subdivision, then kept.
     pub fn bounds(&self) -> &Bounds {
-        self.inner.bounds.get_or_init(|| bounds::find(self))
+        self.moment.bounds(|| bounds::find(self))
     }
 
     /// Whether machine code answers, rather than the interpreter.
@@ -408,6 +503,14 @@ impl Field for Solid {
         self.twin().first_entry(path)
     }
 
+    fn on_path(&self, path: &Path, t: f64) -> f64 {
+        self.then(t).omega(path.at(t))
+    }
+
+    fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        self.wall_velocity(p)
+    }
+
     fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
         match self.parts() {
             Some(parts) => parts.leaves.add_faces(&parts.words, 0, p, reach, faces),
@@ -418,6 +521,16 @@ impl Field for Solid {
                 }
             }
         }
+    }
+}
+
+impl Moving for Solid {
+    fn during(&self, from: f64, to: f64) -> Box<dyn Field + '_> {
+        Box::new(self.between(from, to))
+    }
+
+    fn moves(&self) -> bool {
+        self.moves()
     }
 }
 
@@ -442,13 +555,13 @@ impl Field for Twin {
     #[inline]
     fn omega(&self, p: DVec3) -> f64 {
         let mut out = [0.0];
-        self.solid.programs(ProgramKind::Sign).point(self.solid.inner.engine, p.to_array(), &mut out);
+        self.solid.evaluate(ProgramKind::Sign, p.to_array(), &mut out);
         out[0]
     }
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         let mut out = [0.0; 4];
-        self.solid.programs(ProgramKind::SignGradient).point(self.solid.inner.engine, p.to_array(), &mut out);
+        self.solid.evaluate(ProgramKind::SignGradient, p.to_array(), &mut out);
         (out[0], DVec3::new(out[1], out[2], out[3]))
     }
 
@@ -458,12 +571,20 @@ impl Field for Twin {
 
     fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
         let columns = [out.omega, out.x, out.y, out.z];
-        let programs = self.solid.programs(ProgramKind::SignGradient);
-        programs.batch(self.solid.inner.engine, [points.x, points.y, points.z], columns);
+        self.solid.evaluate_many(ProgramKind::SignGradient, [points.x, points.y, points.z], columns);
+    }
+
+    fn on_path(&self, path: &Path, t: f64) -> f64 {
+        self.solid.then(t).twin().omega(path.at(t))
+    }
+
+    fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        self.solid.wall_velocity(p)
     }
 
     fn range(&self, over: &Aabb) -> Interval {
-        self.solid.twin_function().range(self.solid.inner.engine, over)
+        let Solid { inner, moment } = &self.solid;
+        self.solid.twin_function().range(inner.engine, over, moment, true)
     }
 
     fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {

@@ -5,7 +5,9 @@ use std::sync::OnceLock;
 use super::blocks::BlockProgram;
 use super::compiled::{BatchProgram, Lane, PointProgram};
 use crate::codegen::{CodegenError, Form, Forms, Precision};
-use crate::ir::{Axis, Binary, Expr, FloatType, Graph, Growth, Interpreter, Node, Unary};
+use crate::ir::{
+    self, Axis, Binary, Expr, FloatType, Graph, Growth, Hoisted, Interpreter, Node, Unary, Uniforms,
+};
 
 /// What evaluates a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -32,6 +34,24 @@ pub enum ProgramKind {
     SignGradient,
     /// Distance from the surface (positive in the fluid), outward unit normal, mean curvature
     Contact,
+    /// The surface's velocity along its normal: three numbers, zero for a solid at rest
+    Velocity,
+}
+
+impl ProgramKind {
+    pub(super) const COUNT: usize = 6;
+}
+
+/// Values of what depends on time alone, for programs of either precision: found in `f64` in any case.
+#[derive(Debug, Clone, Default)]
+pub struct UniformValues {
+    pub double: Vec<f64>,
+    pub single: Vec<f32>,
+}
+
+impl UniformValues {
+    /// Of a program that has none.
+    pub const NONE: Self = Self { double: Vec::new(), single: Vec::new() };
 }
 
 /// Where a program gives NaN although its formula might not.
@@ -85,6 +105,8 @@ pub struct Programs {
     /// Of R₀ in `f64` and in `f32`.
     forms: [Forms; 2],
     pub interpreter: Interpreter,
+    /// What depends on time alone; nothing if the solid is at rest.
+    pub uniforms: Option<Uniforms>,
     pub double: Compiled<f64>,
     pub single: Compiled<f32>,
 }
@@ -97,16 +119,19 @@ impl Programs {
 
     /// With the forms of R₀ in `f64` and in `f32`.
     pub fn with_forms(mut graph: Graph, outputs: Vec<Node>, guard: Guard, mut forms: [Forms; 2]) -> Self {
-        let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
-        let sum = |graph: &mut Graph, [x, y, z]: [Node; 3]| {
-            let sum = graph.binary(Binary::Add, x, y);
-            graph.binary(Binary::Add, sum, z)
+        let moves = outputs.iter().any(|&output| graph.uses_time(output));
+        let mut axes = Axis::SPACE.map(|axis| graph.coordinate(axis)).to_vec();
+        if moves {
+            axes.push(graph.coordinate(Axis::T));
+        }
+        let sum = |graph: &mut Graph, axes: &[Node]| {
+            axes[1..].iter().fold(axes[0], |sum, &axis| graph.binary(Binary::Add, sum, axis))
         };
         let size = match guard {
-            Guard::Infinite => sum(&mut graph, [x, y, z]),
+            Guard::Infinite => sum(&mut graph, &axes),
             Guard::FarAway => {
-                let magnitudes = [x, y, z].map(|c| graph.unary(Unary::Abs, c));
-                let size = sum(&mut graph, magnitudes);
+                let magnitudes: Vec<Node> = axes.iter().map(|&c| graph.unary(Unary::Abs, c)).collect();
+                let size = sum(&mut graph, &magnitudes);
                 let square = graph.binary(Binary::Mul, size, size);
                 graph.binary(Binary::Mul, square, square) // overflows where it should
             }
@@ -120,8 +145,24 @@ impl Programs {
         let used = graph.reachable(&outputs);
         let (graph, outputs) = graph.extract(&outputs);
         let forms = forms.map(|forms| forms.kept(&used, &graph));
+        let (graph, outputs, forms, uniforms) = if moves {
+            let Hoisted { graph, outputs, uniforms, image } = ir::hoisted(&graph, &outputs);
+            let forms = forms.map(|forms| forms.mapped(|node| image[node.index()]));
+            (graph, outputs, forms, Some(uniforms))
+        } else {
+            (graph, outputs, forms, None)
+        };
         let interpreter = Interpreter::with_forms(&graph, &outputs, forms.each_ref());
-        Self { graph, outputs, forms, interpreter, double: Compiled::new(), single: Compiled::new() }
+        let (double, single) = (Compiled::new(), Compiled::new());
+        Self { graph, outputs, forms, interpreter, uniforms, double, single }
+    }
+
+    /// What depends on time alone, at one time.
+    pub fn uniforms_at(&self, time: f64) -> UniformValues {
+        let Some(uniforms) = &self.uniforms else { return UniformValues::NONE };
+        let double = uniforms.at(time, &[]);
+        let single = double.iter().map(|&value| value as f32).collect();
+        UniformValues { double, single }
     }
 
     /// The forms of R₀ in one precision.
@@ -178,32 +219,40 @@ impl Programs {
     /// All outputs at a point. Inlined, so that a point made of three loose numbers is not written to memory and
     /// read back as a vector: that stalls for longer than the whole program takes.
     #[inline]
-    pub fn point<T: Lane>(&self, engine: Engine, p: [T; 3], out: &mut [T]) {
+    pub fn point<T: Lane>(&self, engine: Engine, uniforms: &UniformValues, p: [T; 3], out: &mut [T]) {
+        let uniforms = T::uniforms(uniforms);
         if engine == Engine::Interpreter {
-            T::interpret(&self.interpreter, p, out);
+            T::interpret(&self.interpreter, p, uniforms, out);
         } else if let Some(program) = self.large_program::<T>() {
-            program.call_one(p, out);
+            program.call_one(p, uniforms, out);
         } else if let Ok(program) = self.point_program::<T>() {
-            program.call(p, out);
+            program.call(p, uniforms, out);
         } else {
-            T::interpret(&self.interpreter, p, out);
+            T::interpret(&self.interpreter, p, uniforms, out);
         }
     }
 
     /// All outputs at many points.
-    pub fn batch<T: Lane, const N: usize>(&self, engine: Engine, points: [&[T]; 3], mut out: [&mut [T]; N]) {
+    pub fn batch<T: Lane, const N: usize>(
+        &self,
+        engine: Engine,
+        uniforms: &UniformValues,
+        points: [&[T]; 3],
+        mut out: [&mut [T]; N],
+    ) {
+        let uniforms = T::uniforms(uniforms);
         if engine != Engine::Interpreter
             && let Ok(program) = self.batch_program::<T>()
         {
             match program {
-                Many::Loop(program) => program.call(points, out),
-                Many::Blocks(program) => program.call(points, out),
+                Many::Loop(program) => program.call(points, uniforms, out),
+                Many::Blocks(program) => program.call(points, uniforms, out),
             }
             return;
         }
         let mut one = [T::default(); N];
         for i in 0..points[0].len() {
-            T::interpret(&self.interpreter, points.map(|column| column[i]), &mut one);
+            T::interpret(&self.interpreter, points.map(|column| column[i]), uniforms, &mut one);
             for (column, value) in out.iter_mut().zip(one) {
                 column[i] = value;
             }

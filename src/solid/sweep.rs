@@ -3,7 +3,8 @@
 //! Each leaf says on which stretches of the path it may be at least zero, and on which it surely is: leaves that are
 //! polynomials of degree two or less along the path in closed form, with bounds of all rounding errors; others by
 //! Taylor enclosures that are narrowed around their roots. "All of" then intersects stretches, "any of" unites them,
-//! and the earliest that is left is the entry.
+//! and the earliest that is left is the entry. While a particle passes its path, time passes too: leaves that move are
+//! functions of the path's parameter just as those at rest.
 //!
 //! Invariant: before an [`Entry`] no point of the path is in the solid, and a path without one does not touch it: in
 //! exact arithmetic, for the numbers that the graph holds.
@@ -145,25 +146,20 @@ impl<'a> Sweep<'a> {
     fn normals(&self, words: &[u32], t: f64) -> Normals {
         let size = self.path.from.abs().max(self.path.to.abs()).max_element();
         let together = TOGETHER * self.path.from.distance(self.path.to) + 16.0 * f64::EPSILON * size;
-        let (_, directions) = self.deciding(words, &mut 0, self.path.at(t), together);
+        let (_, directions) = self.deciding(words, &mut 0, t, together);
         let mut normals = Normals::default();
         directions.into_iter().for_each(|direction| normals.add(direction));
         normals
     }
 
     /// The smallest or largest u/|∇u| of a tree, as the tree says, and the outward directions of the leaves there.
-    fn deciding(
-        &self,
-        words: &[u32],
-        at: &mut usize,
-        p: DVec3,
-        together: f64,
-    ) -> (f64, SmallVec<[DVec3; 4]>) {
+    fn deciding(&self, words: &[u32], at: &mut usize, t: f64, together: f64) -> (f64, SmallVec<[DVec3; 4]>) {
         let word = Word::read(words[*at]);
         *at += 1;
+        let p = self.path.at(t);
         let (parts, sign) = match word {
             Word::Leaf { leaf, negated } => {
-                let (value, gradient) = self.leaves.gradient(leaf, p);
+                let (value, gradient) = self.leaves.gradient_along(leaf, p, t);
                 let sign = if negated { -1.0 } else { 1.0 };
                 let slope = gradient.length();
                 let known = slope > 0.0 && slope.is_finite();
@@ -174,9 +170,9 @@ impl<'a> Sweep<'a> {
             Word::All(parts) => (parts, 1.0),
             Word::Any(parts) => (parts, -1.0),
         };
-        let (mut best, mut directions) = self.deciding(words, at, p, together);
+        let (mut best, mut directions) = self.deciding(words, at, t, together);
         for _ in 1..parts {
-            let (next, more) = self.deciding(words, at, p, together);
+            let (next, more) = self.deciding(words, at, t, together);
             let ahead = sign * (next - best);
             if ahead < -together {
                 directions = more;

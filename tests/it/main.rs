@@ -12,6 +12,7 @@ mod diagnostics;
 mod examples;
 mod hard_cases;
 mod meshes;
+mod moving;
 mod numbers;
 mod pipeline;
 mod properties;

@@ -146,7 +146,7 @@ fn neither_exact_values_nor_rounded_ones_leave_the_range() {
         for i in 0..boxes() {
             let over = random.aabb();
             let slow = evaluator.eval(&over);
-            let fast: Vec<Interval> = programs.iter().map(|p| p.call(&over, &[]).unwrap()).collect();
+            let fast: Vec<Interval> = programs.iter().map(|p| p.call(&over, &[], &[]).unwrap()).collect();
             for _ in 0..3 {
                 let at = DVec3::new(random.unit(), random.unit(), random.unit());
                 let p = (over.min + over.size() * at).clamp(over.min, over.max);

@@ -20,7 +20,7 @@ use super::{Failure, choose, input, output, progress};
 use crate::codegen::{Form, target_description};
 use crate::geom::Aabb;
 use crate::ir::exact::{self, Exact};
-use crate::ir::{Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Node};
+use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Node};
 use crate::solid::{Lane, ProgramKind};
 use crate::{Engine, Program, Solid};
 use points::Points;
@@ -148,14 +148,24 @@ struct Truth {
 
 impl Truth {
     fn at(solid: &Solid, points: &Points) -> Self {
-        let (graph, outputs) = solid.graph(ProgramKind::Gradient);
-        let all = |single: bool| points.judged(single).map(|p| truth(graph, outputs, p)).collect();
+        let (graph, outputs) = if solid.moves() {
+            // programs do not know the time, the formula does
+            let (formula, root) = solid.formula();
+            let mut graph = formula.clone();
+            let [x, y, z] = ir::gradient(&mut graph, root);
+            (graph, vec![root, x, y, z])
+        } else {
+            let (graph, outputs) = solid.graph(ProgramKind::Gradient);
+            (graph.clone(), outputs.to_vec())
+        };
+        let all =
+            |single: bool| points.judged(single).map(|p| truth(&graph, &outputs, p, solid.time())).collect();
         Self { double: all(false), single: all(true) }
     }
 }
 
-fn truth(graph: &Graph, outputs: &[Node], p: DVec3) -> Option<[Exact; 4]> {
-    exact::evaluate(graph, outputs, p.to_array())?.try_into().ok()
+fn truth(graph: &Graph, outputs: &[Node], p: DVec3, time: f64) -> Option<[Exact; 4]> {
+    exact::evaluate_at(graph, outputs, p.to_array(), time)?.try_into().ok()
 }
 
 /// All rows of one solid in one precision.

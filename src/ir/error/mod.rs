@@ -28,8 +28,9 @@ use super::forms::Forms;
 use super::graph::{Expr, Graph, Node};
 use super::growth::FloatType;
 use super::op::Binary;
-use super::range::RangeEvaluator;
+use super::range::{RangeEvaluator, Region};
 use crate::geom::Aabb;
+use crate::interval::Interval;
 use step::{Operand, Step};
 
 /// How the coordinates of a point reach the program.
@@ -76,11 +77,18 @@ pub struct ErrorAnalysis<'a> {
     root: Node,
     arithmetic: Arithmetic<'a>,
     ranges: RangeEvaluator,
+    time: Interval,
 }
 
 impl<'a> ErrorAnalysis<'a> {
     pub fn new(graph: &'a Graph, root: Node, arithmetic: Arithmetic<'a>) -> Self {
-        Self { graph, root, arithmetic, ranges: RangeEvaluator::new(graph, root) }
+        Self { graph, root, arithmetic, ranges: RangeEvaluator::new(graph, root), time: Interval::ALL }
+    }
+
+    /// For these times, rather than for all.
+    #[must_use]
+    pub fn during(self, time: Interval) -> Self {
+        Self { time, ..self }
     }
 
     /// A bound of |computed − exact| of the root at every point of a box; ∞ where there is none. The box is divided
@@ -114,7 +122,7 @@ impl<'a> ErrorAnalysis<'a> {
 
     /// The errors of all nodes over a box, in the graph's order.
     pub fn errors(&self, over: &Aabb) -> Vec<Error> {
-        let ranges = self.ranges.all(over);
+        let ranges = self.ranges.all_with(&Region { time: self.time, ..Region::of(over) });
         let mut known: Vec<Operand> = Vec::with_capacity(ranges.len());
         for ((_, expr), range) in std::iter::zip(self.graph.nodes(), ranges) {
             // the ends of R₀'s ranges are R₀ of the operands' ends, rounded

@@ -63,6 +63,8 @@ pub struct Frame<'a, 'o, T> {
     /// x, y, z of the block's points.
     pub points: [&'a [T]; 3],
     pub outputs: &'a mut [&'o mut [T]],
+    /// Numbers that depend on time alone.
+    pub uniforms: &'a [T],
     /// Columns of [`Frame::stride`] numbers each.
     pub columns: &'a mut [T],
     pub stride: usize,
@@ -98,7 +100,7 @@ impl<T: Lane> BlockProgram<T> {
     ///
     /// # Panics
     /// If the columns differ in length or there are not as many output columns as outputs.
-    pub fn call<const N: usize>(&self, points: [&[T]; 3], mut out: [&mut [T]; N]) {
+    pub fn call<const N: usize>(&self, points: [&[T]; 3], uniforms: &[T], mut out: [&mut [T]; N]) {
         let count = points[0].len();
         assert_eq!(N, self.outputs, "outputs of the program");
         assert!(
@@ -111,7 +113,8 @@ impl<T: Lane> BlockProgram<T> {
             for at in (0..whole).step_by(self.block) {
                 let range = at..(at + self.block).min(whole);
                 let mut outputs = out.each_mut().map(|column| &mut column[range.clone()]);
-                self.block(points.map(|column| &column[range.clone()]), &mut outputs, scratch);
+                let points = points.map(|column| &column[range.clone()]);
+                self.block(points, uniforms, &mut outputs, scratch);
             }
             if whole < count {
                 let mut inputs = [[T::default(); PADDING]; 3];
@@ -120,7 +123,8 @@ impl<T: Lane> BlockProgram<T> {
                     padded[..count - whole].copy_from_slice(&column[whole..]);
                 }
                 let mut outputs = results.each_mut().map(<[T; PADDING]>::as_mut_slice);
-                self.block(inputs.each_ref().map(<[T; PADDING]>::as_slice), &mut outputs, scratch);
+                let inputs = inputs.each_ref().map(<[T; PADDING]>::as_slice);
+                self.block(inputs, uniforms, &mut outputs, scratch);
                 for (column, padded) in out.iter_mut().zip(results) {
                     column[whole..].copy_from_slice(&padded[..count - whole]);
                 }
@@ -129,7 +133,7 @@ impl<T: Lane> BlockProgram<T> {
     }
 
     /// All outputs at one point: for graphs so large that a program for single points would take too long to make.
-    pub fn call_one(&self, point: [T; 3], out: &mut [T]) {
+    pub fn call_one(&self, point: [T; 3], uniforms: &[T], out: &mut [T]) {
         assert_eq!(out.len(), self.outputs, "outputs of the program");
         let inputs = point.map(|coordinate| [coordinate; PADDING]);
         let mut results = [[T::default(); PADDING]; MAX_OUTPUTS];
@@ -137,7 +141,7 @@ impl<T: Lane> BlockProgram<T> {
         T::with_scratch(|scratch| {
             self.make_room(scratch);
             let outputs = &mut outputs[..out.len()];
-            self.block(inputs.each_ref().map(<[T; PADDING]>::as_slice), outputs, scratch);
+            self.block(inputs.each_ref().map(<[T; PADDING]>::as_slice), uniforms, outputs, scratch);
         });
         for (out, column) in out.iter_mut().zip(results) {
             *out = column[0];
@@ -152,9 +156,9 @@ impl<T: Lane> BlockProgram<T> {
         }
     }
 
-    fn block(&self, points: [&[T]; 3], outputs: &mut [&mut [T]], scratch: &mut Scratch<T>) {
+    fn block(&self, points: [&[T]; 3], uniforms: &[T], outputs: &mut [&mut [T]], scratch: &mut Scratch<T>) {
         let Scratch { columns, pointers } = scratch;
-        let mut frame = Frame { points, outputs, columns, stride: self.block, pointers };
+        let mut frame = Frame { points, outputs, uniforms, columns, stride: self.block, pointers };
         for step in &self.steps {
             match step {
                 Run::Arithmetic { piece, parameters, reads, writes } => {

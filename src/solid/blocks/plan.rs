@@ -111,7 +111,8 @@ fn is_step(graph: &Graph, expr: Expr, many: bool, is_junction: &[bool]) -> bool 
         _ if !many => false,
         // a leaf that is cut off at a constant remains one leaf
         Expr::Binary(op, a, b) if is_choice(op) || matches!(op, Binary::MinWeight | Binary::MaxWeight) => {
-            graph.as_constant(a).is_none() && graph.as_constant(b).is_none()
+            let is_number = |node| matches!(graph.expr(node), Expr::Constant(_) | Expr::Uniform(_));
+            !is_number(a) && !is_number(b)
         }
         Expr::Binary(Binary::Add | Binary::Sub | Binary::Mul, a, b) => {
             is_junction[a.index()] || is_junction[b.index()]
@@ -220,9 +221,9 @@ impl<'g> Parts<'g> {
         inputs
     }
 
-    /// Coordinates and constants need no column to be read from.
+    /// Coordinates, constants and what depends on time alone need no column to be read from.
     fn is_free(&self, node: Node) -> bool {
-        matches!(self.graph.expr(node), Expr::Coordinate(_) | Expr::Constant(_))
+        matches!(self.graph.expr(node), Expr::Coordinate(_) | Expr::Constant(_) | Expr::Uniform(_))
     }
 }
 

@@ -141,8 +141,8 @@ fn rows_26_to_28_normals_and_distances_of_the_cube() {
 
 #[test]
 fn row_17_the_hole_and_the_outside_of_a_thin_shell() {
-    for shell in solids("let r2 = x^2 + y^2 + z^2\nlet t = 1e-6\nsolid s = 1 - r2 and r2 - (1 - t)^2") {
-        // −3 ∧ (3 + 2t − t²)
+    for shell in solids("let r2 = x^2 + y^2 + z^2\nlet d = 1e-6\nsolid s = 1 - r2 and r2 - (1 - d)^2") {
+        // −3 ∧ (3 + 2d − d²)
         let v: f64 = 3.0 + 2e-6 - 1e-12;
         let expected = v - 3.0 - v.hypot(3.0);
         near(shell.omega(DVec3::new(2.0, 0.0, 0.0)), expected, 8.0);

@@ -1,0 +1,64 @@
+//! A solid at a time, or during a stretch of time: all that is found once for it and then kept.
+
+use std::sync::{Arc, OnceLock};
+
+use super::bounds::Bounds;
+use super::programs::{ProgramKind, UniformValues};
+use super::ranges::UniformRanges;
+use super::{Inner, Parts};
+use crate::interval::Interval;
+
+/// A stretch of time. Values are those at its end, ranges hold all of it; a solid at rest has one for ever.
+pub(super) struct Moment {
+    pub from: f64,
+    pub to: f64,
+    uniforms: [OnceLock<UniformValues>; ProgramKind::COUNT],
+    omega_ranges: OnceLock<UniformRanges>,
+    twin_ranges: OnceLock<UniformRanges>,
+    parts: OnceLock<Option<Arc<Parts>>>,
+    bounds: OnceLock<Bounds>,
+}
+
+impl Moment {
+    pub fn new(from: f64, to: f64) -> Arc<Self> {
+        Arc::new(Self {
+            from,
+            to,
+            uniforms: Default::default(),
+            omega_ranges: OnceLock::new(),
+            twin_ranges: OnceLock::new(),
+            parts: OnceLock::new(),
+            bounds: OnceLock::new(),
+        })
+    }
+
+    /// All times of the stretch.
+    pub fn interval(&self) -> Interval {
+        Interval::new(self.from.min(self.to), self.from.max(self.to))
+    }
+
+    /// What the programs of one kind need, found by `find`.
+    #[inline]
+    pub fn uniforms(&self, kind: ProgramKind, find: impl FnOnce(f64) -> UniformValues) -> &UniformValues {
+        self.uniforms[kind as usize].get_or_init(|| find(self.to))
+    }
+
+    /// What the ranges of ω, or of its twin, need.
+    pub fn ranges(&self, twin: bool, find: impl FnOnce(Interval) -> UniformRanges) -> &UniformRanges {
+        let slot = if twin { &self.twin_ranges } else { &self.omega_ranges };
+        slot.get_or_init(|| find(self.interval()))
+    }
+
+    /// The solid taken apart, see [`Inner::parts`].
+    pub fn parts(&self, inner: &Inner) -> Option<Arc<Parts>> {
+        let make = || {
+            let (store, words) = inner.parts()?;
+            Some(Arc::new(Parts { leaves: store.during(self.from, self.to), words }))
+        };
+        self.parts.get_or_init(make).clone()
+    }
+
+    pub fn bounds(&self, find: impl FnOnce() -> Bounds) -> &Bounds {
+        self.bounds.get_or_init(find)
+    }
+}
