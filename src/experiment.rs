@@ -15,11 +15,11 @@ use glam::DVec3;
 
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
-use crate::field::Field;
+use crate::field::{Field, Moving};
 use crate::geom::Aabb;
-use crate::ir::Interpreter;
+use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Bounce, Fill, Fluid, Method, Precision, Scene, Slip};
-use crate::solid::Bounds;
+use crate::solid::{Bounds, MovingMap};
 use crate::sph::{
     self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
     carve,
@@ -33,14 +33,27 @@ const CLEARANCE: f64 = 0.5;
 /// are swept.
 const PATH_RESOLUTION: f64 = 0.05;
 
+/// A solid in the fluid's way.
+pub struct Body {
+    /// As it is at the start.
+    pub solid: Solid,
+    /// What answers for it in the box.
+    field: Box<dyn Field>,
+    moving: Option<Box<dyn Moving>>,
+    bounce: Bounce,
+}
+
+/// A window of time in which the map of a moving solid stays, in steps.
+const WINDOW: f64 = 16.0;
+
 /// What a scene needs besides its particles.
 pub struct Experiment {
     /// The box.
     pub domain: Aabb,
     /// Of the fluid and the method.
     pub parameters: Parameters,
-    /// Solids, what answers for them in the box, and what they do to a particle.
-    pub obstacles: Vec<(Solid, Box<dyn Field>, Bounce)>,
+    /// The container's outside, if the scene has one, and the obstacles.
+    pub obstacles: Vec<Body>,
     fluid: Solid,
     /// Why steps are as long as they are.
     pub time_step_reason: &'static str,
@@ -58,7 +71,7 @@ impl Experiment {
         let compile = |name: &str, node| program.compile(name, node, engine);
         let warnings: RefCell<Vec<Diagnostic>> = RefCell::default();
         let fluid = compile(&scene.fluid.name, scene.fluid.shape)?;
-        let mut obstacles = Vec::new();
+        let (mut obstacles, mut moved) = (Vec::new(), Vec::new());
         let reach = match scene.method {
             Method::Paper => 0.0,
             _ => scene.fluid.support_radius,
@@ -67,7 +80,8 @@ impl Experiment {
         for (name, shape, bounce) in
             container.into_iter().chain(scene.obstacles.iter().map(|o| (&o.name, o.shape, o.bounce)))
         {
-            let solid = compile(name, shape)?;
+            let whole = compile(name, shape)?;
+            let solid = whole.at(0.0);
             let field: Box<dyn Field> = if reach > 0.0 {
                 solid.walls(scene.domain, reach)
             } else if solid.has_many_leaves() {
@@ -76,7 +90,8 @@ impl Experiment {
             } else {
                 Box::new(solid.clone())
             };
-            obstacles.push((solid, field, bounce));
+            moved.push(whole);
+            obstacles.push(Body { solid, field, moving: None, bounce });
         }
         let gravity = scene.gravity;
         let height = gravity.normalize_or_zero().abs().dot(scene.domain.size());
@@ -135,6 +150,17 @@ impl Experiment {
                 "derived: stable for a fall through the box"
             }
         };
+        for (body, solid) in obstacles.iter_mut().zip(&moved) {
+            if solid.moves() {
+                let run = (0.0, scene.run.until);
+                let reach = parameters.support_radius;
+                let window = WINDOW * parameters.stable_dt(typical_speed).min(parameters.time_step);
+                body.moving = Some(match MovingMap::new(solid, scene.domain, reach, run, window) {
+                    Some(map) => Box::new(map),
+                    None => Box::new(solid.clone()),
+                });
+            }
+        }
         parameters.validate().map_err(|error| {
             let message = format!("the fluid's figures do not fit together: {error}");
             refuse(program, Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message))
@@ -188,9 +214,11 @@ impl Experiment {
         let mut particles =
             block.seed(&self.parameters, self.domain).map_err(|e| no_fluid(program, &e, span))?;
         set_in_motion(program, fluid, &mut particles);
-        let obstacles: Vec<Obstacle<'_>> =
-            self.obstacles.iter().map(|(_, field, e)| self.obstacle(&**field, *e)).collect();
+        let obstacles: Vec<Obstacle<'_>> = self.obstacles.iter().map(|body| self.obstacle(body)).collect();
         let carved = self.carve(program, scene, &mut particles, &obstacles)?;
+        if fluid.hydrostatic {
+            self.put_under_pressure(&mut particles);
+        }
         let simulation = Simulation::new(self.parameters.clone(), particles, self.domain, obstacles);
         let simulation = simulation.map_err(|e| {
             refuse(program, Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string()))
@@ -198,9 +226,23 @@ impl Experiment {
         Ok((simulation, carved))
     }
 
-    fn obstacle<'a>(&self, field: &'a dyn Field, bounce: Bounce) -> Obstacle<'a> {
-        let resolution = PATH_RESOLUTION * self.parameters.support_radius;
-        Obstacle { field, restitution: bounce.restitution, friction: bounce.friction, resolution }
+    fn obstacle<'a>(&self, body: &'a Body) -> Obstacle<'a> {
+        Obstacle {
+            field: &*body.field,
+            moving: body.moving.as_deref(),
+            restitution: body.bounce.restitution,
+            friction: body.bounce.friction,
+            resolution: PATH_RESOLUTION * self.parameters.support_radius,
+        }
+    }
+
+    /// Gravity at a time, m/s²; nothing if the scene's does not change.
+    pub fn gravity_at(&self, program: &Program, scene: &Scene, time: f64) -> Option<DVec3> {
+        let nodes = scene.turning_gravity?;
+        let mut gravity = [0.0; 3];
+        let given = Given { time, ..Given::point([0.0; 3]) };
+        Interpreter::new(&program.module().graph, &nodes).eval_given(given, &mut gravity);
+        Some(DVec3::from_array(gravity))
     }
 
     fn carve(
@@ -227,6 +269,54 @@ impl Experiment {
     }
 }
 
+impl Experiment {
+    /// The densities of a fluid at rest under its own weight, its surface half a spacing above the highest particle.
+    fn put_under_pressure(&self, particles: &mut Particles) {
+        let p = &self.parameters;
+        let up = -p.gravity.normalize_or_zero();
+        let height = |at: DVec3| up.dot(at);
+        let top = particles.position.iter().map(height).fold(f64::NEG_INFINITY, f64::max) + 0.5 * p.spacing();
+        let pressure = |at: DVec3| p.rest_density * p.gravity.length() * (top - height(at));
+        particles.density = particles.position.iter().map(|at| p.density_under(pressure(at))).collect();
+    }
+}
+
+/// How far a flow is from what is known of it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Deviation {
+    /// √(Σ (p − p*)² / Σ p*²) over the particles, if the scene knows the pressure.
+    pub pressure: Option<f64>,
+    /// The same of the velocity.
+    pub velocity: Option<f64>,
+}
+
+impl Deviation {
+    /// Of the present state; nothing if the scene knows nothing, or nothing yet.
+    pub fn of(program: &Program, scene: &Scene, simulation: &Simulation<'_>) -> Option<Self> {
+        let truth = scene.truth.filter(|truth| simulation.time() >= truth.from * (1.0 - 1e-12))?;
+        let particles = simulation.particles();
+        let relative = |nodes: &[Node], found: &dyn Fn(usize, usize) -> f64| {
+            let formulas = Interpreter::new(&program.module().graph, nodes);
+            let (mut off, mut size) = (0.0, 0.0);
+            let mut known = [0.0; 3];
+            let known = &mut known[..nodes.len()];
+            for i in 0..particles.len() {
+                let point = particles.position.get(i).to_array();
+                formulas.eval_given(Given { time: simulation.time(), ..Given::point(point) }, known);
+                for (k, &known) in known.iter().enumerate() {
+                    off += (found(i, k) - known).powi(2);
+                    size += known * known;
+                }
+            }
+            (off / size).sqrt()
+        };
+        Some(Self {
+            pressure: truth.pressure.map(|node| relative(&[node], &|i, _| particles.pressure[i])),
+            velocity: truth.velocity.map(|nodes| relative(&nodes, &|i, k| particles.velocity.get(i)[k])),
+        })
+    }
+}
+
 /// The method of a scene with its numbers.
 fn method(scene: &Scene, typical_speed: f64) -> sph::Method {
     match scene.method {
@@ -248,7 +338,10 @@ fn set_in_motion(program: &Program, fluid: &Fluid, particles: &mut Particles) {
     let speeds = Interpreter::new(&program.module().graph, &fluid.velocity);
     for i in 0..particles.len() {
         let mut velocity = [0.0; 3];
-        speeds.eval_f64(particles.position.get(i).to_array(), &mut velocity);
+        speeds.eval_given(
+            Given { time: 0.0, ..Given::point(particles.position.get(i).to_array()) },
+            &mut velocity,
+        );
         particles.velocity.set(i, DVec3::from_array(velocity));
     }
 }
@@ -262,7 +355,7 @@ fn fastest(program: &Program, scene: &Scene) -> f64 {
         let part = DVec3::new((k % SIDE) as f64, (k / SIDE % SIDE) as f64, (k / SIDE / SIDE) as f64);
         let p = scene.domain.min + scene.domain.size() * part / (SIDE - 1) as f64;
         let mut velocity = [0.0; 3];
-        speeds.eval_f64(p.to_array(), &mut velocity);
+        speeds.eval_given(Given { time: 0.0, ..Given::point(p.to_array()) }, &mut velocity);
         most = most.max(DVec3::from_array(velocity).length());
     }
     most

@@ -151,7 +151,7 @@ pub trait Moving: Sync {
     /// and [`Field::first_entry`] lets time run evenly from `from` to `to` while the path is passed.
     ///
     /// Cheap enough to be asked for in every step.
-    fn during(&self, from: f64, to: f64) -> Box<dyn Field + '_>;
+    fn during(&self, from: f64, to: f64) -> Box<dyn Field + Send + '_>;
 
     /// Whether it does move: otherwise it is the same during every step.
     fn moves(&self) -> bool {
@@ -163,8 +163,8 @@ pub trait Moving: Sync {
 #[derive(Debug, Clone, Copy)]
 pub struct Still<F>(pub F);
 
-impl<F: Field> Moving for Still<F> {
-    fn during(&self, _from: f64, _to: f64) -> Box<dyn Field + '_> {
+impl<F: Field + Send> Moving for Still<F> {
+    fn during(&self, _from: f64, _to: f64) -> Box<dyn Field + Send + '_> {
         Box::new(&self.0)
     }
 

@@ -9,7 +9,7 @@ use super::eval::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
-use crate::ir::{Node, Unary};
+use crate::ir::{Given, Interpreter, Node, Unary};
 use crate::syntax::ast::{self, Entry, Expr, ExprKind, Name};
 use crate::syntax::{Dimension, parse_unit};
 
@@ -29,11 +29,15 @@ pub struct Scene {
     pub container: Option<Container>,
     pub fluid: Fluid,
     pub obstacles: Vec<Obstacle>,
-    /// m/s²
+    /// m/s², at the start.
     pub gravity: DVec3,
+    /// The same as formulas of t, if it changes.
+    pub turning_gravity: Option<[Node; 3]>,
     pub method: Method,
     pub solver: Solver,
     pub run: Run,
+    /// What is known of the flow, to be compared with.
+    pub truth: Option<Truth>,
     /// The largest error of ω that is accepted of its obstacles in the box, if one is stated.
     pub tolerance: Option<Tolerance>,
 }
@@ -62,6 +66,17 @@ pub struct Container {
     pub outside: Node,
     pub span: Span,
     pub bounce: Bounce,
+}
+
+/// A flow that is known, as formulas of x, y, z and t.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Pa
+    pub pressure: Option<Node>,
+    /// m/s
+    pub velocity: Option<[Node; 3]>,
+    /// From when on it holds, s.
+    pub from: f64,
 }
 
 /// How a method is run.
@@ -115,6 +130,8 @@ pub struct Fluid {
     pub artificial_viscosity: f64,
     /// Whether pressure may pull.
     pub negative_pressure: bool,
+    /// Whether the fluid starts under the pressure of its own weight, `wcsph` only: otherwise it starts without, and rings.
+    pub hydrostatic: bool,
     /// At the start, m/s.
     pub velocity: [Node; 3],
     /// Random displacement of the start positions, as a part of the particle spacing.
@@ -159,7 +176,7 @@ pub struct Run {
     pub save_every: f64,
 }
 
-const SCENE_KEYS: [&str; 11] = [
+const SCENE_KEYS: [&str; 12] = [
     "units",
     "box",
     "container",
@@ -170,13 +187,15 @@ const SCENE_KEYS: [&str; 11] = [
     "method",
     "solver",
     "run",
+    "truth",
     "tolerance",
 ];
 /// Keys that open a block; all others have a value.
-const BLOCKS: [&str; 6] = ["box", "container", "fluid", "obstacle", "solver", "run"];
+const BLOCKS: [&str; 7] = ["box", "container", "fluid", "obstacle", "solver", "run", "truth"];
+const TRUTH_KEYS: [&str; 3] = ["pressure", "velocity", "from"];
 const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
 const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
-const FLUID_KEYS: [&str; 18] = [
+const FLUID_KEYS: [&str; 19] = [
     "shape",
     "fill",
     "particles",
@@ -192,6 +211,7 @@ const FLUID_KEYS: [&str; 18] = [
     "density_diffusion",
     "artificial_viscosity",
     "negative_pressure",
+    "start",
     "velocity",
     "jitter",
     "seed",
@@ -231,8 +251,8 @@ impl<'a> Lowering<'a> {
             .blocks("obstacle")
             .filter_map(|(_, entries, span)| self.obstacle(entries, span, "an obstacle"))
             .collect();
-        let gravity =
-            self.vector_key(&block, "gravity", Dimension::ACCELERATION, DVec3::new(0.0, 0.0, -9.81));
+        let gravity = self.gravity(&block);
+        let truth = self.truth(&block);
         let run = self.run(&block);
         let tolerance = block.setting("tolerance").and_then(|(_, value)| self.tolerance(value));
         if self.errors() > errors_before {
@@ -249,10 +269,12 @@ impl<'a> Lowering<'a> {
             container,
             fluid: fluid?,
             obstacles,
-            gravity: gravity?,
+            gravity: gravity?.0,
+            turning_gravity: gravity?.1,
             method: method?,
             solver: solver?,
             run: run?,
+            truth: truth?,
             tolerance,
         })
     }
@@ -460,6 +482,7 @@ impl<'a> Lowering<'a> {
         }
         let negative_pressure =
             self.word_key(&block, "negative_pressure", &[("clamp", false), ("keep", true)]);
+        let hydrostatic = self.word_key(&block, "start", &[("free", false), ("hydrostatic", true)]);
         let sound_speed = block.setting("sound_speed").is_some().then_some(sound_speed?);
         let velocity = self.velocity(&block);
         let particles = self.count_key(&block, "particles", 1);
@@ -484,25 +507,80 @@ impl<'a> Lowering<'a> {
             density_diffusion: density_diffusion?,
             artificial_viscosity: artificial_viscosity?,
             negative_pressure: negative_pressure?,
+            hydrostatic: hydrostatic?,
             velocity: velocity?,
             jitter: jitter?,
             seed: seed?.unwrap_or(1) as u64,
         })
     }
 
+    /// Gravity at the start, and as formulas if it depends on t.
+    fn gravity(&mut self, block: &Block<'_>) -> Option<(DVec3, Option<[Node; 3]>)> {
+        let Some((_, value)) = block.setting("gravity") else {
+            return Some((DVec3::new(0.0, 0.0, -9.81), None));
+        };
+        let nodes = self.components(value, Dimension::ACCELERATION, "gravity")?;
+        let turns = nodes.iter().any(|&node| self.module.graph.constant_value(node).is_none());
+        if !turns {
+            return self
+                .vector_key(block, "gravity", Dimension::ACCELERATION, DVec3::ZERO)
+                .map(|gravity| (gravity, None));
+        }
+        if nodes.iter().any(|&node| self.depends_on_place(node)) {
+            let message = "`gravity` may depend on the time t, not on the place";
+            self.report(Diagnostic::error(Code::NOT_CONSTANT, value.span, message));
+            return None;
+        }
+        let mut start = [0.0; 3];
+        let given = Given { time: 0.0, ..Given::point([0.0; 3]) };
+        Interpreter::new(&self.module.graph, &nodes).eval_given(given, &mut start);
+        Some((DVec3::from_array(start), Some(nodes)))
+    }
+
+    fn truth(&mut self, block: &Block<'_>) -> Option<Option<Truth>> {
+        let Some((_, entries, span)) = block.blocks("truth").next() else { return Some(None) };
+        let block = self.block(entries, "a truth", span, &TRUTH_KEYS, &[]);
+        let pressure = match block.setting("pressure") {
+            Some((_, value)) => {
+                let found = self.expr(value);
+                Some(self.as_number(&found, value.span)?)
+            }
+            None => None,
+        };
+        let velocity = match block.setting("velocity") {
+            Some((_, value)) => Some(self.components(value, Dimension::SPEED, "velocity")?),
+            None => None,
+        };
+        if pressure.is_none() && velocity.is_none() {
+            self.missing(&block, "pressure", "write `pressure: 1000*9.81*(1 - z)`, or `velocity: [..]`");
+            return None;
+        }
+        let from = self.number_key(&block, "from", Dimension::TIME, Some(0.0), Bound::NotNegative)?;
+        Some(Some(Truth { pressure, velocity, from }))
+    }
+
     /// Three speeds, which may depend on the place.
     fn velocity(&mut self, block: &Block<'_>) -> Option<[Node; 3]> {
-        let Some((_, value)) = block.setting("velocity") else {
-            return Some([self.module.graph.constant(0.0); 3]);
-        };
+        match block.setting("velocity") {
+            Some((_, value)) => self.components(value, Dimension::SPEED, "velocity"),
+            None => Some([self.module.graph.constant(0.0); 3]),
+        }
+    }
+
+    /// The components of a vector, formulas or quantities.
+    fn components(&mut self, value: &Expr, dimension: Dimension, key: &str) -> Option<[Node; 3]> {
         let mut nodes = Vec::new();
         if let ExprKind::Vector(parts) = &value.kind
             && parts.len() == 3
         {
             for part in parts {
                 let node = match &part.kind {
-                    ExprKind::Quantity { .. } | ExprKind::Negate(_) => {
-                        let number = self.quantity_expr(part, Dimension::SPEED, "velocity")?;
+                    ExprKind::Quantity { .. } => {
+                        let number = self.quantity_expr(part, dimension, key)?;
+                        self.module.graph.constant(number)
+                    }
+                    ExprKind::Negate(inner) if matches!(inner.kind, ExprKind::Quantity { .. }) => {
+                        let number = self.quantity_expr(part, dimension, key)?;
                         self.module.graph.constant(number)
                     }
                     _ => {
@@ -514,7 +592,7 @@ impl<'a> Lowering<'a> {
             }
         } else {
             let found = self.expr(value);
-            let numbers = self.constant_vector(&found, value.span, "`velocity`")?;
+            let numbers = self.constant_vector(&found, value.span, &format!("`{key}`"))?;
             nodes.extend(numbers.map(|number| self.module.graph.constant(number)));
         }
         nodes.try_into().ok()

@@ -525,7 +525,7 @@ impl Field for Solid {
 }
 
 impl Moving for Solid {
-    fn during(&self, from: f64, to: f64) -> Box<dyn Field + '_> {
+    fn during(&self, from: f64, to: f64) -> Box<dyn Field + Send + '_> {
         Box::new(self.between(from, to))
     }
 

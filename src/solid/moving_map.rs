@@ -95,7 +95,7 @@ impl MovingMap {
 }
 
 impl Moving for MovingMap {
-    fn during(&self, from: f64, to: f64) -> Box<dyn Field + '_> {
+    fn during(&self, from: f64, to: f64) -> Box<dyn Field + Send + '_> {
         match self.between(from, to) {
             Some(map) => Box::new(map),
             None => Box::new(self.solid.between(from, to)),

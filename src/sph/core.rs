@@ -51,6 +51,13 @@ impl<'a> Core<'a> {
         }
     }
 
+    /// Sets obstacles that move to the coming step.
+    pub fn move_obstacles(&mut self, dt: f64) {
+        if self.boundary.obstacles.iter().any(|o| o.moving.is_some()) {
+            self.boundary.move_to(self.time, self.time + dt);
+        }
+    }
+
     /// Moves the particles by v·dt, and back out of whatever they met on their way.
     pub fn drift(&mut self, dt: f64) -> Result<(), StepError> {
         self.target.clone_from(&self.particles.position);

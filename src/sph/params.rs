@@ -275,6 +275,18 @@ impl Parameters {
         }
     }
 
+    /// The density that a pressure (Pa) belongs to, kg/m³: that at rest where the method knows no compression.
+    pub fn density_under(&self, pressure: f64) -> f64 {
+        match self.method {
+            Method::Paper => self.rest_density + pressure / self.stiffness,
+            Method::Wcsph(method) => {
+                let stiffness = method.sound_speed.powi(2) * self.rest_density / 7.0;
+                self.rest_density * (1.0 + pressure / stiffness).powf(1.0 / 7.0)
+            }
+            Method::Dfsph(_) => self.rest_density,
+        }
+    }
+
     /// The longest step, s, that is stable while no particle is faster than `max_speed` (m/s).
     ///
     /// The least of three limits:

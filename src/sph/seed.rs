@@ -359,7 +359,8 @@ mod tests {
     #[test]
     fn carving_counts_what_it_removes() {
         let sphere = scenes::sphere(DVec3::ONE, 0.5);
-        let obstacle = Obstacle { field: &sphere, restitution: 0.5, friction: 0.0, resolution: 0.005 };
+        let obstacle =
+            Obstacle { field: &sphere, moving: None, restitution: 0.5, friction: 0.0, resolution: 0.005 };
         let mut particles = Particles::default();
         for x in [1.0, 1.5, 1.51, 1.7, 9.0] {
             particles.push(DVec3::new(x, 1.0, 1.0), DVec3::ZERO);

@@ -132,13 +132,15 @@ impl<'a> Simulation<'a> {
     ) -> Result<Self, SetupError> {
         parameters.validate().map_err(SetupError::Parameter)?;
         let clearance = CLEARANCE * parameters.support_radius;
-        let boundary = Boundary {
+        let mut boundary = Boundary {
             domain,
             wall_restitution: parameters.wall_restitution,
             wall_friction: parameters.wall_friction,
             obstacles,
+            during: Vec::new(),
             clearance,
         };
+        boundary.move_to(0.0, 0.0);
         check_setup(&boundary, &particles)?;
         let mut core = Core::new(parameters, boundary, particles);
         let scheme = Scheme::start(&mut core);
@@ -245,7 +247,7 @@ fn check_setup(boundary: &Boundary<'_>, particles: &Particles) -> Result<(), Set
             return Err(SetupError::NonFinite { id: particles.id[i] });
         }
     }
-    let in_fluid = |p: DVec3| boundary.obstacles.iter().all(|o| o.field.omega(p) < 0.0);
+    let in_fluid = |p: DVec3| boundary.fields().all(|field| field.omega(p) < 0.0);
     let outside_box = particles.position.iter().filter(|&p| !domain.contains(p)).count();
     let inside_obstacles = particles.position.iter().filter(|&p| !in_fluid(p)).count();
     if outside_box + inside_obstacles > 0 {

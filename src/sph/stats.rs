@@ -161,6 +161,6 @@ impl Boundary<'_> {
                 0.0
             }
         };
-        self.obstacles.iter().map(|o| depth(o.field)).fold(0.0, f64::max)
+        self.fields().map(depth).fold(0.0, f64::max)
     }
 }

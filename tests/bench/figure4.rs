@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use rfm::lower::Scene;
-use rfm::sph::{FluidBlock, NegativePressure, Obstacle, Parameters, Simulation, Stats, carve};
+use rfm::sph::{FluidBlock, Obstacle, Parameters, Simulation, Stats, carve};
 use rfm::{Engine, Program, Solid, glam::DVec3};
 
 #[path = "figure4/plot.rs"]
@@ -178,13 +178,13 @@ fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a
         particle_mass: scene.fluid.mass,
         support_radius: scene.fluid.support_radius,
         stiffness: scene.fluid.stiffness,
-        negative_pressure: NegativePressure::default(),
         viscosity: scene.fluid.viscosity,
         surface_tension: scene.fluid.surface_tension,
         surface_threshold: scene.fluid.threshold,
         gravity: scene.gravity,
-        wall_restitution: scene.wall_restitution,
+        wall_restitution: scene.walls.restitution,
         time_step: 1.0,
+        ..Parameters::default()
     };
     let fall = (2.0 * scene.gravity.length() * scene.domain.size().z).sqrt();
     parameters.time_step = parameters.stable_dt(fall);
@@ -196,7 +196,8 @@ fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a
     let resolution = 0.05 * parameters.support_radius;
     let obstacles = vec![Obstacle {
         field: pawn,
-        restitution: scene.obstacles[0].restitution,
+        moving: None,
+        restitution: scene.obstacles[0].bounce.restitution,
         friction: 0.0,
         resolution,
     }];

@@ -188,7 +188,7 @@ fn not_cleared(folder: &Path, error: &std::io::Error) -> Failure {
 /// All obstacles as one mesh, cut off at the box.
 fn obstacle_mesh(options: &Run, setup: &Experiment) -> Result<Mesh, Failure> {
     let mut all = Mesh::default();
-    for (solid, ..) in &setup.obstacles {
+    for solid in setup.obstacles.iter().map(|body| &body.solid) {
         let bounds = solid.bounds().aabb().unwrap_or(setup.domain);
         let inside = setup.domain.grown(1e-3 * setup.domain.size().max_element());
         let over = bounds.intersection(&inside);

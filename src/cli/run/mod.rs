@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::args::{Run, Shared};
 use super::{Failure, choose, input, note, output, progress};
 use crate::diagnostic::Diagnostics;
+use crate::experiment::Deviation;
 use crate::lower::Scene;
 use crate::sph::{Simulation, Stats};
 use crate::{Error, Experiment, Program};
@@ -42,6 +43,12 @@ struct Summary {
     /// a fluid that had none at the start has some.
     energy_growth: Option<f64>,
     max_speed: f64,
+    /// Relative L2 deviation of the pressure from the scene's `truth`, root mean square over the saved instants.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pressure_error: Option<f64>,
+    /// The same of the velocity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_error: Option<f64>,
     passes: Vec<&'static str>,
     threads: usize,
     frames: usize,
@@ -65,6 +72,9 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let mut pace = Pace::new(scene, &setup);
     let mut failure = None;
     while !goal.is_reached(&simulation) {
+        if let Some(gravity) = setup.gravity_at(&program, scene, simulation.time()) {
+            simulation.set_gravity(gravity);
+        }
         let started = Instant::now();
         let result = simulation.step_at_most(goal.left(&simulation).min(pace.left(&simulation)));
         watch.spent += started.elapsed();
@@ -77,6 +87,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         let stop = interrupted.load(Ordering::Relaxed);
         if pace.frame_is_due(&simulation) || goal.is_reached(&simulation) || stop {
             watch.look(&simulation);
+            watch.compare(Deviation::of(&program, scene, &simulation));
             let mut message = format!("t = {:.3} s, {:.2} m/s", simulation.time(), watch.now.max_speed);
             if let Some(iterations) = simulation.iterations() {
                 message += &format!(", {iterations} iterations");
@@ -330,6 +341,9 @@ struct Watch {
     now: Stats,
     worst: Stats,
     neighbours: (f64, usize),
+    /// Σ of squared deviations from what is known, and of how many instants.
+    deviations: ([f64; 2], usize),
+    knows: [bool; 2],
 }
 
 impl Watch {
@@ -341,6 +355,8 @@ impl Watch {
             energy_at_start: energy,
             most_energy: energy,
             neighbours: (stats.neighbours_per_particle, 1),
+            deviations: ([0.0; 2], 0),
+            knows: [false; 2],
             now: stats.clone(),
             worst: stats,
         }
@@ -359,6 +375,21 @@ impl Watch {
         worst.max_density_error = worst.max_density_error.max(now.max_density_error);
         worst.max_speed = worst.max_speed.max(now.max_speed);
         self.now = now;
+    }
+
+    fn compare(&mut self, deviation: Option<Deviation>) {
+        let Some(Deviation { pressure, velocity }) = deviation else { return };
+        self.deviations.1 += 1;
+        for (k, found) in [pressure, velocity].into_iter().enumerate() {
+            self.knows[k] |= found.is_some();
+            self.deviations.0[k] += found.unwrap_or(0.0).powi(2);
+        }
+    }
+
+    /// Root mean square over the saved instants for which the truth holds.
+    fn deviation(&self, k: usize) -> Option<f64> {
+        let (squares, instants) = self.deviations;
+        self.knows[k].then(|| (squares[k] / instants as f64).sqrt())
     }
 
     fn summary(
@@ -390,6 +421,8 @@ impl Watch {
             energy_at_start: self.energy_at_start,
             energy_growth: growth(self.energy_at_start, self.most_energy),
             max_speed: self.worst.max_speed,
+            pressure_error: self.deviation(0),
+            velocity_error: self.deviation(1),
             passes: pass_names(simulation),
             threads: rayon::current_num_threads(),
             frames,
@@ -430,6 +463,14 @@ fn print(summary: &Summary, frames: &Frames) {
         summary.kinetic_energy + summary.potential_energy,
         100.0 * summary.max_density_error
     );
+    for (what, error) in [("pressure", summary.pressure_error), ("velocity", summary.velocity_error)] {
+        if let Some(error) = error {
+            say!(
+                "{what}: {:.2} % from what is known (relative L2, mean over the saved instants)",
+                100.0 * error
+            );
+        }
+    }
     say!("written to {}: {}", frames.folder().display(), frames.describe());
 }
 

@@ -186,6 +186,7 @@ impl DivergenceFree {
         self.find_other_accelerations(core);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);
+        core.move_obstacles(dt);
         core.drift(dt)?;
         self.settle(core, &mut []);
         core.check_finite(dt)?;
@@ -244,7 +245,7 @@ impl DivergenceFree {
         let rest = core.parameters.rest_density;
         let mut pressure = std::mem::take(&mut self.specific);
         // the compression to come without pressure; that which s takes away is found in each iteration
-        self.find_rate_of(core, &core.particles.velocity);
+        self.find_rate_of(core, &core.particles.velocity, true);
         let mut free = std::mem::take(&mut self.free);
         for ((free, rate), rho) in free.iter_mut().zip(&self.rate).zip(&core.particles.density) {
             *free = (rho - rest) / (RELAXATION_STEPS * dt) + rate;
@@ -275,7 +276,7 @@ impl DivergenceFree {
         loop {
             self.find_push(core, pressure);
             let push = std::mem::take(&mut self.push);
-            self.find_rate_of(core, &push);
+            self.find_rate_of(core, &push, false);
             self.push = push;
             let scale = 1.0 / (dt * self.stiffness);
             let beta = momentum / (momentum + 3.0);
@@ -347,13 +348,14 @@ impl DivergenceFree {
         core.sum(&pass, [pressure], [&mut x[..], y, z]);
     }
 
-    /// dρ/dt of a velocity, or of an acceleration per second.
-    fn find_rate_of(&mut self, core: &Core<'_>, velocity: &Vectors) {
+    /// dρ/dt of a velocity among walls that move, or of an acceleration per second.
+    fn find_rate_of(&mut self, core: &Core<'_>, velocity: &Vectors, with_walls: bool) {
         self.walls.complete(velocity, &mut self.completed);
         let pass = Squeeze {
             constants: Constants::of(&core.parameters),
             walls: &self.walls,
             completed: &self.completed,
+            with_walls,
         };
         let Vectors { x, y, z } = &self.completed;
         core.sum(&pass, [&x[..], y, z], [&mut self.rate]);
@@ -505,6 +507,7 @@ struct Squeeze<'a> {
     walls: &'a Walls,
     /// M·v
     completed: &'a Vectors,
+    with_walls: bool,
 }
 
 impl PairPass<3, 1, 1> for Squeeze<'_> {
@@ -527,7 +530,9 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
     fn finish(&self, i: usize, [sum]: [f64; 1]) -> [f64; 1] {
         let rate = -self.constants.mass_steepness * sum;
         let mirrored = |(wall, _): (&Coverage, &DMat3)| {
-            2.0 * self.constants.rest_density * wall.gradient.dot(self.completed.get(i))
+            // walls move with a velocity, and nothing moves with an acceleration by pressure
+            let sweep = if self.with_walls { wall.sweep } else { 0.0 };
+            2.0 * self.constants.rest_density * (wall.gradient.dot(self.completed.get(i)) - sweep)
         };
         [rate + self.walls.near(i).map_or(0.0, mirrored)]
     }
@@ -565,7 +570,7 @@ impl PairPass<3, 3, 3> for Drag<'_> {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
         let mut drag = 2.0 * self.kinematic * mass_steepness / rest_density * DVec3::from_array(sums);
         if let (Slip::No, Some((wall, _))) = (self.slip, self.walls.near(i)) {
-            drag -= 2.0 * self.kinematic * (wall.drag * self.velocity.get(i));
+            drag -= 2.0 * self.kinematic * (wall.drag * self.velocity.get(i) - wall.haul);
         }
         (drag + self.gravity).to_array()
     }

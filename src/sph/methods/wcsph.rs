@@ -75,6 +75,7 @@ impl Weakly {
     pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
         let dt = core.next_dt(longest);
         self.kick(core, 0.5 * dt);
+        core.move_obstacles(dt);
         core.drift(dt)?;
         core.sort(&mut [&mut self.density_rate]);
         self.find_rates(core, 0.5 * dt);
@@ -248,11 +249,11 @@ impl<'a> Rates<'a> {
         let mut viscous = viscous;
         if let Some(wall) = self.boundary.coverage(WallKernel::WendlandC2, self.h, self.position.get(i)) {
             let (density, velocity) = (self.density[i], self.velocity.get(i));
-            rate += density * wall.gradient.dot(velocity);
+            rate += density * (wall.gradient.dot(velocity) - wall.sweep);
             pressure -= 2.0 * density * self.specific[i] * wall.gradient;
             pressure = wall.completion(LEAST_FREE) * pressure;
             if self.parameters.slip == Slip::No {
-                viscous -= 2.0 * self.laminar * (wall.drag * velocity);
+                viscous -= 2.0 * self.laminar * (wall.drag * velocity - wall.haul);
             }
         }
         let [x, y, z] = (pressure + viscous + self.parameters.gravity).to_array();

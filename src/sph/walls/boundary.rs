@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use glam::DVec3;
 
 use crate::{
-    field::{Face, Faces, Field, Path},
+    field::{Face, Faces, Field, Moving, Path},
     geom::Aabb,
 };
 
@@ -36,11 +36,16 @@ const BLOCK: usize = 128;
 /// Contacts of one particle in one step, before it is left where it is.
 const MAX_CONTACTS: usize = 4;
 
+/// A particle that a moving wall overtakes is looked for so many clearances (a support radius) away.
+const REACH: f64 = 1e6;
+
 /// A body in the fluid's way.
 #[derive(Clone, Copy)]
 pub struct Obstacle<'a> {
-    /// ω > 0 inside the body.
+    /// ω > 0 inside the body; of one that moves, as it is at the start.
     pub field: &'a dyn Field,
+    /// The body as it moves, if it does.
+    pub moving: Option<&'a dyn Moving>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
     /// Coefficient of friction μ: of the speed along the face, μ times what the face takes of the speed into it is lost.
@@ -52,12 +57,13 @@ pub struct Obstacle<'a> {
 }
 
 /// The box and the bodies in it.
-#[derive(Clone)]
 pub(in crate::sph) struct Boundary<'a> {
     pub domain: Aabb,
     pub wall_restitution: f64,
     pub wall_friction: f64,
     pub obstacles: Vec<Obstacle<'a>>,
+    /// The obstacles that move, during the present step.
+    pub during: Vec<Option<Box<dyn Field + Send + 'a>>>,
     /// Distance from an obstacle's surface, m, at which particles stop.
     pub clearance: f64,
 }
@@ -69,7 +75,26 @@ pub(in crate::sph) struct Fault {
     pub at: DVec3,
 }
 
-impl Boundary<'_> {
+impl<'a> Boundary<'a> {
+    /// Sets the obstacles that move to a step from one time to another, s.
+    pub fn move_to(&mut self, from: f64, to: f64) {
+        self.during.clear();
+        self.during.extend(self.obstacles.iter().map(|o| o.moving.map(|moving| moving.during(from, to))));
+    }
+
+    /// An obstacle during the present step.
+    pub fn field(&self, k: usize) -> &dyn Field {
+        match self.during.get(k) {
+            Some(Some(moving)) => &**moving,
+            _ => self.obstacles[k].field,
+        }
+    }
+
+    /// All of them.
+    pub fn fields(&self) -> impl Iterator<Item = &dyn Field> {
+        (0..self.obstacles.len()).map(|k| self.field(k))
+    }
+
     /// Moves particles from `position` to `target` and corrects both target and velocity where they collide.
     ///
     /// # Errors
@@ -111,12 +136,18 @@ impl Boundary<'_> {
             }
         }
         let mut faces = Faces::new();
-        for obstacle in &self.obstacles {
+        for (k, obstacle) in self.obstacles.iter().enumerate() {
+            let field = self.field(k);
             faces.clear();
-            obstacle.field.faces(p, h, &mut faces);
-            if !faces.is_empty() {
-                whole = whole.or(&Coverage::of_faces(kernel, h, &faces));
+            field.faces(p, h, &mut faces);
+            if faces.is_empty() {
+                continue;
             }
+            let mut coverage = Coverage::of_faces(kernel, h, &faces);
+            if obstacle.moving.is_some() {
+                coverage.set_in_motion(field.wall_velocity(p));
+            }
+            whole = whole.or(&coverage);
         }
         (whole.part > 0.0).then_some(whole)
     }
@@ -128,7 +159,7 @@ impl Boundary<'_> {
             block.put(k, target, velocity);
             swept = swept.including(block.from(k)).including(target);
         }
-        if self.obstacles.iter().all(|obstacle| obstacle.field.range(&swept).hi < 0.0) {
+        if self.fields().all(|field| field.range(&swept).hi < 0.0) {
             return Ok(());
         }
         for k in 0..block.len() {
@@ -169,34 +200,46 @@ impl Boundary<'_> {
         let (mut here, mut target, mut velocity) = (from, to, velocity);
         for _ in 0..MAX_CONTACTS {
             (target, velocity) = self.hold_in_box(target, velocity);
-            let Some((obstacle, contact)) = self.nearest_contact(here, target)? else {
+            let Some((k, contact)) = self.nearest_contact(here, target)? else {
                 return Ok((target, velocity));
             };
-            let turned = turn_back(velocity, &contact, obstacle.restitution);
-            velocity = rubbed(velocity, turned, contact.normal, obstacle.friction);
+            let (obstacle, field) = (&self.obstacles[k], self.field(k));
+            // what counts is the velocity that the wall sees
+            let wall =
+                if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
+            let arriving = velocity - wall;
+            let turned = turn_back(arriving, &contact, obstacle.restitution);
+            velocity = wall + rubbed(arriving, turned, contact.normal, obstacle.friction);
             let rest = target - contact.point;
             let slide = turn_back(rest, &contact, 0.0);
             here = contact.point;
             target = here + slide;
             // A tangent enters a hollow surface, and by rounding a flat one: lift its end out again.
-            if obstacle.field.omega(target) >= 0.0
-                && let Some(lifted) = push_out(obstacle.field, target, slide.length(), self.clearance)?
+            // A wall that moves goes on after the contact, and may have come farther than the particle slides.
+            let way = slide.length() + (target - from).length();
+            let reach =
+                if obstacle.moving.is_some() { 2.0 * way + REACH * self.clearance } else { slide.length() };
+            if field.omega(target) >= 0.0
+                && let Some(lifted) = push_out(field, target, reach, self.clearance)?
             {
                 target = lifted.point;
-                velocity = reflect(velocity, lifted.normal, obstacle.restitution);
+                velocity = wall + reflect(velocity - wall, lifted.normal, obstacle.restitution);
+                if obstacle.moving.is_some() {
+                    here = target;
+                }
             }
         }
         Ok((here, velocity))
     }
 
-    fn nearest_contact(&self, from: DVec3, to: DVec3) -> Result<Option<(&Obstacle<'_>, Contact)>, Undefined> {
-        let mut nearest: Option<(&Obstacle<'_>, Contact)> = None;
-        for obstacle in &self.obstacles {
+    fn nearest_contact(&self, from: DVec3, to: DVec3) -> Result<Option<(usize, Contact)>, Undefined> {
+        let mut nearest: Option<(usize, Contact)> = None;
+        for (k, obstacle) in self.obstacles.iter().enumerate() {
             let path = Path::new(from, to, obstacle.resolution);
-            if let Some(contact) = first_contact(obstacle.field, &path, self.clearance)?
+            if let Some(contact) = first_contact(self.field(k), &path, self.clearance)?
                 && nearest.is_none_or(|(_, other)| contact.fraction < other.fraction)
             {
-                nearest = Some((obstacle, contact));
+                nearest = Some((k, contact));
             }
         }
         Ok(nearest)

@@ -35,6 +35,10 @@ pub(in crate::sph) struct Coverage {
     pub spread: DMat3,
     /// Σ (A/h)/d·(1 − n⊗n), 1/m²: what a fluid that sticks to the faces feels of a velocity.
     pub drag: DMat3,
+    /// ∇λ·v of walls that move, 1/s.
+    pub sweep: f64,
+    /// The drag of the walls' own velocity, 1/(m·s).
+    pub haul: DVec3,
 }
 
 impl Coverage {
@@ -54,7 +58,14 @@ impl Coverage {
             gradient: -area * n,
             spread: face.distance * area * along,
             drag: area / face.distance.max(NEAREST * h) * (DMat3::IDENTITY - along),
+            ..Self::default()
         }
+    }
+
+    /// All of these walls move with one velocity.
+    pub fn set_in_motion(&mut self, velocity: DVec3) {
+        self.sweep = self.gradient.dot(velocity);
+        self.haul = self.drag * velocity;
     }
 
     /// A tree of faces, from its front.
@@ -115,6 +126,8 @@ impl Coverage {
             gradient: da * self.gradient + db * other.gradient,
             spread: da * self.spread + db * other.spread,
             drag: da * self.drag + db * other.drag,
+            sweep: da * self.sweep + db * other.sweep,
+            haul: da * self.haul + db * other.haul,
         }
     }
 }
