@@ -592,11 +592,11 @@ impl Field for Twin {
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {
-        let Some(parts) = self.solid.parts() else { return field::search_path(self, path) };
         let finite = path.from.is_finite() && path.to.is_finite();
         if finite && self.range(&path.hull(path.start, 1.0)).hi < 0.0 {
-            return None;
+            return None; // nearly all paths end here
         }
+        let Some(parts) = self.solid.parts() else { return field::search_path(self, path) };
         Sweep::new(&parts.leaves, path).first_entry(&parts.words, (path.start, 1.0))
     }
 }
