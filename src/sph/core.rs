@@ -26,8 +26,8 @@ pub(super) struct Core<'a> {
     pub time: f64,
     level: Level,
     columns: Columns,
-    /// Where the particles go before they collide.
-    target: Vectors,
+    /// Working memory: where the particles go before they collide, or what a method needs a vector for.
+    pub spare: Vectors,
     sorted: Vec<f64>,
     sorted_id: Vec<u32>,
 }
@@ -45,7 +45,7 @@ impl<'a> Core<'a> {
             time: 0.0,
             level: Level::new(),
             columns: Columns::default(),
-            target: Vectors::default(),
+            spare: Vectors::default(),
             sorted: Vec::new(),
             sorted_id: Vec::new(),
         }
@@ -60,22 +60,19 @@ impl<'a> Core<'a> {
 
     /// Moves the particles by v·dt, and back out of whatever they met on their way.
     pub fn drift(&mut self, dt: f64) -> Result<(), StepError> {
-        self.target.clone_from(&self.particles.position);
-        add_scaled(&mut self.target, &self.particles.velocity, dt);
+        set_sum(&mut self.spare, &self.particles.position, &self.particles.velocity, dt);
         // infinite positions would be clamped to the box and never seen
-        if let Some(i) = first_non_finite(&self.target) {
+        if let Some(i) = first_non_finite(&self.spare) {
             return Err(self.non_finite(i, Quantity::Position, dt));
         }
         let Particles { position, velocity, id, .. } = &mut self.particles;
-        self.boundary.collide(position, &mut self.target, velocity).map_err(|fault| {
-            StepError::NonFinite {
-                step: self.steps,
-                id: id[fault.index],
-                quantity: Quantity::Omega,
-                cause: Cause::FieldUndefined { at: fault.at },
-            }
+        self.boundary.collide(position, &mut self.spare, velocity).map_err(|fault| StepError::NonFinite {
+            step: self.steps,
+            id: id[fault.index],
+            quantity: Quantity::Omega,
+            cause: Cause::FieldUndefined { at: fault.at },
         })?;
-        std::mem::swap(position, &mut self.target);
+        std::mem::swap(position, &mut self.spare);
         Ok(())
     }
 
@@ -156,7 +153,7 @@ impl<'a> Core<'a> {
     /// Memory of the state and of what belongs to all methods.
     pub fn bytes(&self) -> usize {
         let Particles { position, velocity, density, pressure, id } = &self.particles;
-        let vectors = [position, velocity, &self.acceleration, &self.target].map(Vectors::bytes);
+        let vectors = [position, velocity, &self.acceleration, &self.spare].map(Vectors::bytes);
         vectors.iter().sum::<usize>()
             + 8 * (density.capacity() + pressure.capacity() + self.sorted.capacity())
             + 4 * (id.capacity() + self.sorted_id.capacity())
@@ -197,11 +194,30 @@ impl PairPass<0, 1, 1> for Count {
     }
 }
 
-fn permute<T: Copy + Send + Sync>(order: &[u32], values: &mut Vec<T>, buffer: &mut Vec<T>) {
-    buffer.clear();
-    buffer.extend_from_slice(values);
-    values.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each(|(values, order)| {
-        values.iter_mut().zip(order).for_each(|(to, &from)| *to = buffer[from as usize])
+fn permute<T: Copy + Default + Send + Sync>(order: &[u32], values: &mut Vec<T>, buffer: &mut Vec<T>) {
+    buffer.resize(values.len(), T::default());
+    buffer.par_chunks_mut(CHUNK).zip(order.par_chunks(CHUNK)).for_each(|(buffer, order)| {
+        for (to, &from) in buffer.iter_mut().zip(order) {
+            *to = values[from as usize];
+        }
+    });
+    std::mem::swap(values, buffer);
+}
+
+/// to = a + b·t
+pub(super) fn set_sum(to: &mut Vectors, a: &Vectors, b: &Vectors, t: f64) {
+    for (to, a, b) in [(&mut to.x, &a.x, &b.x), (&mut to.y, &a.y, &b.y), (&mut to.z, &a.z, &b.z)] {
+        set_sum_column(to, a, b, t);
+    }
+}
+
+/// to = a + b·t
+pub(super) fn set_sum_column(to: &mut Vec<f64>, a: &[f64], b: &[f64], t: f64) {
+    to.resize(a.len(), 0.0);
+    to.par_chunks_mut(CHUNK).zip(a.par_chunks(CHUNK)).zip(b.par_chunks(CHUNK)).for_each(|((to, a), b)| {
+        for ((to, a), b) in to.iter_mut().zip(a).zip(b) {
+            *to = a + b * t;
+        }
     });
 }
 

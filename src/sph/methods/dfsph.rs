@@ -81,7 +81,7 @@ struct Walls {
     coverage: Vec<Coverage>,
     /// M = (1 − K)⁻¹
     completion: Vec<DMat3>,
-    found: Vec<Option<Coverage>>,
+    found: Vec<(u32, Coverage)>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -90,18 +90,18 @@ impl Walls {
     fn find(&mut self, core: &Core<'_>) {
         let h = core.parameters.support_radius;
         let position = &core.particles.position;
-        (0..position.len())
-            .into_par_iter()
-            .with_min_len(CHUNK / 4)
-            .map(|i| core.boundary.coverage(WallKernel::WendlandC2, h, position.get(i)))
-            .collect_into_vec(&mut self.found);
+        self.found.clear();
+        self.found.par_extend((0..position.len()).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
+            Some((i as u32, core.boundary.coverage(WallKernel::WendlandC2, h, position.get(i))?))
+        }));
         self.place.clear();
+        self.place.resize(position.len(), NONE);
         self.coverage.clear();
         self.completion.clear();
-        for found in &self.found {
-            self.place.push(if found.is_some() { self.coverage.len() as u32 } else { NONE });
-            self.coverage.extend(found);
-            self.completion.extend(found.as_ref().map(|wall| wall.completion(LEAST_FREE)));
+        for (place, (i, wall)) in self.found.iter().enumerate() {
+            self.place[*i as usize] = place as u32;
+            self.coverage.push(*wall);
+            self.completion.push(wall.completion(LEAST_FREE));
         }
     }
 
@@ -201,7 +201,7 @@ impl DivergenceFree {
             + size_of::<DMat3>() * self.walls.completion.capacity()
             + 4 * self.walls.place.capacity()
             + size_of::<Coverage>() * self.walls.coverage.capacity()
-            + size_of::<Option<Coverage>>() * self.walls.found.capacity()
+            + size_of::<(u32, Coverage)>() * self.walls.found.capacity()
     }
 
     /// Order, walls, densities and factors of the present positions.

@@ -16,7 +16,7 @@ use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
 use crate::sph::{
-    core::{Core, add_scaled},
+    core::{Core, add_scaled, set_sum},
     kernel::Kernels,
     pairs::{PairPass, Real},
     params::Parameters,
@@ -27,14 +27,13 @@ use crate::sph::{
 /// What is kept between steps: working memory only.
 pub struct Paper {
     kernels: Kernels,
-    predicted: Vectors,
     volume: Vec<f64>,
 }
 
 impl Paper {
     pub fn start(core: &mut Core<'_>) -> Self {
         let kernels = Kernels::new(core.parameters.support_radius);
-        let mut scheme = Self { kernels, predicted: Vectors::default(), volume: Vec::new() };
+        let mut scheme = Self { kernels, volume: Vec::new() };
         core.sort(&mut []);
         scheme.find_density_and_pressure(core);
         scheme.find_accelerations(core, 0.0);
@@ -55,7 +54,7 @@ impl Paper {
     }
 
     pub fn bytes(&self) -> usize {
-        self.predicted.bytes() + 8 * self.volume.capacity()
+        8 * self.volume.capacity()
     }
 
     fn find_density_and_pressure(&self, core: &mut Core<'_>) {
@@ -82,13 +81,13 @@ impl Paper {
             core.acceleration = acceleration;
             return;
         }
-        self.predicted.clone_from(&core.particles.velocity);
-        add_scaled(&mut self.predicted, &acceleration, ahead);
+        let mut predicted = std::mem::take(&mut core.spare);
+        set_sum(&mut predicted, &core.particles.velocity, &acceleration, ahead);
         let mass = core.parameters.particle_mass;
         self.volume.clear();
         self.volume.extend(core.particles.density.iter().map(|rho| mass / rho));
 
-        let Vectors { x: vx, y: vy, z: vz } = &self.predicted;
+        let Vectors { x: vx, y: vy, z: vz } = &predicted;
         let fields = [&vx[..], vy, vz, &core.particles.pressure, &self.volume];
         let Vectors { x, y, z } = &mut acceleration;
         let out = [&mut x[..], y, z];
@@ -100,6 +99,7 @@ impl Paper {
             (false, false) => core.sum(&Forces::<false, false> { kernels, parameters, volume }, fields, out),
         }
         core.acceleration = acceleration;
+        core.spare = predicted;
     }
 }
 

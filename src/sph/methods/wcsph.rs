@@ -21,7 +21,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::sph::{
-    core::{CHUNK, Core, add_scaled, add_scaled_column},
+    core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
     pairs::{PairPass, Real},
     params::{Method, NegativePressure, Parameters, Slip, Wcsph},
     particles::Vectors,
@@ -40,7 +40,6 @@ pub struct Weakly {
     numbers: Wcsph,
     /// dρ/dt, kg/m³/s
     density_rate: Vec<f64>,
-    predicted: Vectors,
     /// p/ρ²
     specific: Vec<f64>,
     /// ρ − ρ₀/c²·g·x: constant in a fluid at rest.
@@ -59,13 +58,8 @@ impl Weakly {
             *rho = core.parameters.rest_density;
         }
         core.particles.pressure.resize(n, 0.0);
-        let mut scheme = Self {
-            numbers,
-            density_rate: vec![0.0; n],
-            predicted: Vectors::default(),
-            specific: Vec::new(),
-            reduced: Vec::new(),
-        };
+        let mut scheme =
+            Self { numbers, density_rate: vec![0.0; n], specific: Vec::new(), reduced: Vec::new() };
         core.sort(&mut [&mut scheme.density_rate]);
         scheme.find_rates(core, 0.0);
         scheme.find_pressure(core);
@@ -87,7 +81,7 @@ impl Weakly {
 
     pub fn bytes(&self) -> usize {
         let columns = [&self.density_rate, &self.specific, &self.reduced];
-        self.predicted.bytes() + columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
+        columns.map(|column| 8 * column.capacity()).iter().sum()
     }
 
     /// v += a·t, ρ += dρ/dt·t
@@ -109,10 +103,9 @@ impl Weakly {
 
     /// Accelerations and rates of density for velocities and densities predicted `ahead` seconds from those stored.
     fn find_rates(&mut self, core: &mut Core<'_>, ahead: f64) {
-        self.predicted.clone_from(&core.particles.velocity);
-        add_scaled(&mut self.predicted, &core.acceleration, ahead);
-        self.specific.clone_from(&core.particles.density);
-        add_scaled_column(&mut self.specific, &self.density_rate, ahead);
+        let mut predicted = std::mem::take(&mut core.spare);
+        set_sum(&mut predicted, &core.particles.velocity, &core.acceleration, ahead);
+        set_sum_column(&mut self.specific, &core.particles.density, &self.density_rate, ahead);
         self.reduced.resize(core.particles.len(), 0.0);
         let (numbers, parameters) = (&self.numbers, &core.parameters);
         let hydrostatic = parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity;
@@ -128,11 +121,11 @@ impl Weakly {
         );
 
         let mut acceleration = std::mem::take(&mut core.acceleration);
-        let Vectors { x: vx, y: vy, z: vz } = &self.predicted;
+        let Vectors { x: vx, y: vy, z: vz } = &predicted;
         let fields = [&vx[..], vy, vz, &self.specific, &self.reduced];
         let Vectors { x, y, z } = &mut acceleration;
         let out = [&mut x[..], y, z, &mut self.density_rate];
-        let rates = Rates::new(core, numbers, &self.predicted, &self.specific);
+        let rates = Rates::new(core, numbers, &predicted, &self.specific);
         match (rates.laminar > 0.0, rates.artificial > 0.0) {
             (true, true) => core.sum(&Viscous::<true>(rates), fields, out),
             (true, false) => core.sum(&Viscous::<false>(rates), fields, out),
@@ -140,6 +133,7 @@ impl Weakly {
             (false, false) => core.sum(&Inviscid::<false>(rates), fields, out),
         }
         core.acceleration = acceleration;
+        core.spare = predicted;
     }
 }
 

@@ -86,7 +86,7 @@ fn stop(field: &dyn Field, path: &Path, entry: &Entry, clearance: f64) -> Result
     let back = clearance / if approach > 0.0 { approach } else { step.length() };
     let mut fraction = if back.is_finite() { (entry.t - back).max(0.0) } else { 0.0 };
     let mut less = POINT * (1.0 + path.from.abs().max(path.to.abs()).max_element() / step.length());
-    while fraction > 0.0 && omega(field, path.at(fraction))? >= 0.0 {
+    while fraction > 0.0 && on_path(field, path, fraction)? >= 0.0 {
         fraction = (fraction - less).max(0.0);
         less *= 4.0;
     }
@@ -172,6 +172,12 @@ pub(super) fn turn_back(mut velocity: DVec3, contact: &Contact, restitution: f64
 pub(super) fn reflect(velocity: DVec3, normal: DVec3, restitution: f64) -> DVec3 {
     let speed = velocity.dot(normal);
     if speed < 0.0 { velocity - (1.0 + restitution) * speed * normal } else { velocity }
+}
+
+/// ω at a part of a path, when it is passed.
+fn on_path(field: &dyn Field, path: &Path, t: f64) -> Result<f64, Undefined> {
+    let w = field.on_path(path, t);
+    if w.is_nan() { Err(Undefined { at: path.at(t) }) } else { Ok(w) }
 }
 
 fn omega(field: &dyn Field, at: DVec3) -> Result<f64, Undefined> {
