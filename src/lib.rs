@@ -18,6 +18,7 @@ pub mod codegen;
 pub mod compile;
 pub mod diagnostic;
 pub mod field;
+pub mod fluid_surface;
 pub mod geom;
 pub mod interval;
 pub mod ir;

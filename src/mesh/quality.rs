@@ -68,29 +68,53 @@ const BATCH: usize = 256;
 /// Below this radius ratio a triangle faces nowhere.
 const NO_DIRECTION: f64 = 1e-6;
 
-/// Measures a mesh of `field` in `grid`. `distance` has the same surface, and near it ω is the distance from it or
-/// nearly so: Newton's method then finds the nearest face, where parts of unlike scale would mislead it.
+/// What meshes of one surface are measured against.
+pub struct Reference<'a> {
+    distance: &'a dyn Field,
+    /// Points all over the surface.
+    points: Vec<DVec3>,
+    /// Volume and area of a mesh in half the cells.
+    extent: (f64, f64),
+}
+
+impl<'a> Reference<'a> {
+    /// Prepares to measure meshes of `field` in `grid`. `distance` has the same surface, and near it ω is the distance
+    /// from it or nearly so: Newton's method then finds the nearest face, where parts of unlike scale would mislead it.
+    ///
+    /// # Errors
+    /// Those of meshing the finer grid that gives points of the surface.
+    pub fn new(field: &dyn Field, distance: &'a dyn Field, grid: &Grid) -> Result<Self, MeshError> {
+        let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
+        let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
+        Ok(Self { distance, points: surface_points(&finer, distance, grid), extent: extent(&finer) })
+    }
+
+    /// Measures a mesh.
+    pub fn measure(&self, mesh: &Mesh) -> Quality {
+        let mut quality = shapes(mesh);
+        if mesh.triangles.is_empty() {
+            return quality;
+        }
+        let own = extent(mesh);
+        quality.volume_error = own.0 / self.extent.0 - 1.0;
+        quality.area_error = own.1 / self.extent.1 - 1.0;
+        mesh_to_surface(mesh, self.distance, &mut quality);
+        quality.from_surface = surface_to_mesh(mesh, &self.points);
+        quality
+    }
+}
+
+/// Measures one mesh of `field` in `grid`, see [`Reference`].
 ///
 /// # Errors
-/// Those of meshing the finer grid that gives points of the surface.
+/// Those of [`Reference::new`].
 pub fn measure(
     mesh: &Mesh,
     field: &dyn Field,
     distance: &dyn Field,
     grid: &Grid,
 ) -> Result<Quality, MeshError> {
-    let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
-    let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
-    let mut quality = shapes(mesh);
-    if mesh.triangles.is_empty() {
-        return Ok(quality);
-    }
-    let (own, reference) = (extent(mesh), extent(&finer));
-    quality.volume_error = own.0 / reference.0 - 1.0;
-    quality.area_error = own.1 / reference.1 - 1.0;
-    mesh_to_surface(mesh, distance, &mut quality);
-    quality.from_surface = surface_to_mesh(mesh, &surface_points(&finer, distance, grid));
-    Ok(quality)
+    Ok(Reference::new(field, distance, grid)?.measure(mesh))
 }
 
 /// Volume and area.
@@ -295,7 +319,7 @@ fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
 }
 
 /// The point of a triangle nearest to `p`: inside, on a side or in a corner.
-fn nearest_point([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
+pub(super) fn nearest_point([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
     let normal = (b - a).cross(c - a);
     let above = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) >= 0.0;
     if normal != DVec3::ZERO && above(a, b) && above(b, c) && above(c, a) {

@@ -10,6 +10,7 @@ mod cli;
 mod contact;
 mod diagnostics;
 mod examples;
+mod fluid_surface;
 mod hard_cases;
 mod meshes;
 mod numbers;
