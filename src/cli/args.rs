@@ -374,7 +374,9 @@ fn tolerance(text: &str) -> Result<Tolerance, String> {
 /// `A..B`, `A..`, `..B`, or one number.
 fn frames(text: &str) -> Result<Frames, String> {
     let whole = |text: &str| {
-        text.trim().parse::<usize>().map_err(|_| format!("`{text}` is not the number of a frame; expected A..B"))
+        text.trim()
+            .parse::<usize>()
+            .map_err(|_| format!("`{text}` is not the number of a frame; expected A..B"))
     };
     let Some((first, end)) = text.split_once("..") else {
         let first = whole(text)?;
@@ -426,7 +428,9 @@ mod tests {
 
     #[test]
     fn lengths_have_units_or_are_metres() {
-        for (text, expected) in [("0.5", 0.5), ("2 mm", 2e-3), ("2e-1cm", 2e-3), ("-1m", -1.0), ("1E3um", 1e-3)] {
+        for (text, expected) in
+            [("0.5", 0.5), ("2 mm", 2e-3), ("2e-1cm", 2e-3), ("-1m", -1.0), ("1E3um", 1e-3)]
+        {
             let found = length(text).unwrap();
             assert!((found - expected).abs() < 1e-15, "{text}: {found}");
         }
@@ -448,7 +452,10 @@ mod tests {
     fn ranges_of_frames() {
         let range = |first, end| Ok(Frames { first, end });
         assert_eq!(frames("3..5"), range(3, Some(5)));
-        assert_eq!((frames("3.."), frames("..5"), frames("..")), (range(3, None), range(0, Some(5)), range(0, None)));
+        assert_eq!(
+            (frames("3.."), frames("..5"), frames("..")),
+            (range(3, None), range(0, Some(5)), range(0, None))
+        );
         assert_eq!(frames("7"), range(7, Some(8)));
         assert!(frames("a..b").is_err() && frames("-1..2").is_err() && frames("").is_err());
     }

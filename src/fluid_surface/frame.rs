@@ -222,8 +222,7 @@ fn base64_bytes(text: &[u8], most: usize) -> Result<Vec<u8>, FrameError> {
         }
         group.push(character);
         if group.len() == 4 {
-            let decoded =
-                BASE64_STANDARD.decode(&group).map_err(|_| FrameError::Malformed("base64 data"))?;
+            let decoded = BASE64_STANDARD.decode(&group).map_err(|_| FrameError::Malformed("base64 data"))?;
             bytes.extend(decoded);
             group.clear();
         }

@@ -178,7 +178,8 @@ fn strange_particles_end_in_a_mesh_or_a_message() {
         ("nan 0 0 1 1 1", 0),
         ("0 0 0 1e30 0 0", 2),
         ("1e30 1e30 1e30", 0),
-        ("0 0 0 100 0 0", 0),
+        ("0 0 0 50 0 0", 0),
+        ("0 0 0 100 0 0", 2),
         ("inf 0 0", 0),
     ] {
         let count = points.split_whitespace().count() / 3;

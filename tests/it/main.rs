@@ -17,6 +17,7 @@ mod numbers;
 mod pipeline;
 mod properties;
 mod ranges;
+mod simplify;
 mod sweep;
 mod tidy;
 mod tool;

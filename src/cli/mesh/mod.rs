@@ -257,8 +257,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     if shared.json {
         let figures = quality.filter(|_| options.quality).map(Figures::from);
-        let mut summary =
-            summary(solid.name(), options.method, &report, thin.count, figures, milliseconds);
+        let mut summary = summary(solid.name(), options.method, &report, thin.count, figures, milliseconds);
         summary.simplified = simplified.as_ref().map(SimplifiedFigures::from);
         return output::json(&summary);
     }

@@ -1,10 +1,13 @@
-//! VTK polygonal data (`.vtp`) with appended raw data, for ParaView.
+//! VTK polygonal data (`.vtp`) with its numbers as base64, for ParaView.
 //!
 //! Positions are `double`, since exact vertices are the point of this mesher; normals are `float`.
 //!
 //! Invariant: everything is little-endian; the same mesh gives the same bytes.
 
 use std::io::{self, Write};
+
+use base64::prelude::BASE64_STANDARD;
+use base64::write::EncoderWriter;
 
 use super::super::Mesh;
 
@@ -14,15 +17,6 @@ use super::super::Mesh;
 /// What the writer reports.
 pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     let (points, polys) = (mesh.positions.len(), mesh.triangles.len());
-    // each array is its length in bytes, as u64, and its bytes
-    let sizes = [12 * points, 24 * points, 12 * polys, 4 * polys];
-    let offsets = [0, 1, 2, 3].map(|i| sizes[..i].iter().map(|size| size + 8).sum::<usize>());
-    let array = |kind: &str, name: &str, components: usize, i: usize| {
-        format!(
-            r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="appended" offset="{}"/>"#,
-            offsets[i]
-        )
-    };
     write!(
         out,
         r#"<?xml version="1.0"?>
@@ -30,42 +24,40 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
 <PolyData>
 <Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{polys}">
 <PointData Normals="normals">
-{}
-</PointData>
-<Points>
-{}
-</Points>
-<Polys>
-{}
-{}
-</Polys>
-</Piece>
-</PolyData>
-<AppendedData encoding="raw">
-_"#,
-        array("Float32", "normals", 3, 0),
-        array("Float64", "points", 3, 1),
-        array("Int32", "connectivity", 1, 2),
-        array("Int32", "offsets", 1, 3),
+"#
     )?;
-    let length = |i: usize| (sizes[i] as u64).to_le_bytes();
-    out.write_all(&length(0))?;
-    for normal in &mesh.normals {
-        normal.to_array().iter().try_for_each(|&x| out.write_all(&(x as f32).to_le_bytes()))?;
-    }
-    out.write_all(&length(1))?;
-    for position in &mesh.positions {
-        position.to_array().iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
-    }
-    out.write_all(&length(2))?;
-    for triangle in &mesh.triangles {
-        triangle.iter().try_for_each(|&v| out.write_all(&(v as i32).to_le_bytes()))?;
-    }
-    out.write_all(&length(3))?;
-    for index in 1..=polys {
-        out.write_all(&((3 * index) as i32).to_le_bytes())?;
-    }
-    out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+    let normals = mesh.normals.iter().flat_map(|n| n.to_array()).map(|x| (x as f32).to_le_bytes());
+    array(out, "Float32", "normals", 3, normals)?;
+    writeln!(out, "</PointData>\n<Points>")?;
+    let positions = mesh.positions.iter().flat_map(|p| p.to_array()).map(f64::to_le_bytes);
+    array(out, "Float64", "points", 3, positions)?;
+    writeln!(out, "</Points>\n<Polys>")?;
+    let corners = mesh.triangles.iter().flatten().map(|&v| (v as i32).to_le_bytes());
+    array(out, "Int32", "connectivity", 1, corners)?;
+    let ends = (1..=polys).map(|triangle| (3 * triangle as i64).to_le_bytes());
+    array(out, "Int64", "offsets", 1, ends)?;
+    writeln!(out, "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>")
+}
+
+/// An array as base64: the number of its bytes, and its bytes.
+fn array<const N: usize>(
+    out: &mut impl Write,
+    kind: &str,
+    name: &str,
+    components: usize,
+    numbers: impl Iterator<Item = [u8; N]>,
+) -> io::Result<()> {
+    writeln!(
+        out,
+        r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="binary">"#
+    )?;
+    let bytes: Vec<u8> = numbers.flatten().collect();
+    let mut encoder = EncoderWriter::new(&mut *out, &BASE64_STANDARD);
+    encoder.write_all(&(bytes.len() as u64).to_le_bytes())?;
+    encoder.write_all(&bytes)?;
+    encoder.finish()?;
+    drop(encoder);
+    writeln!(out, "\n</DataArray>")
 }
 
 #[cfg(test)]
@@ -85,7 +77,9 @@ mod tests {
             let piece = pieces.into_iter().next().unwrap().into_loaded_piece_data(None).unwrap();
             let flat: Vec<f64> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
             assert_eq!(piece.points.into_vec::<f64>().unwrap(), flat);
-            let Some(VertexNumbers::XML { connectivity, offsets }) = piece.polys else { panic!("no polygons") };
+            let Some(VertexNumbers::XML { connectivity, offsets }) = piece.polys else {
+                panic!("no polygons")
+            };
             let indices: Vec<u64> = mesh.triangles.iter().flatten().map(|&v| u64::from(v)).collect();
             assert_eq!(connectivity, indices);
             let ends: Vec<u64> = (1..=mesh.triangles.len() as u64).map(|i| 3 * i).collect();

@@ -281,8 +281,7 @@ impl Contraction<'_> {
         for t in self.fans.fan(a).chain(of_b) {
             let triangle = self.fans.mesh.triangles[t as usize];
             ring.samples.extend(&self.samples.0[t as usize]);
-            ring.worst_shape =
-                ring.worst_shape.min(slivers::quality(triangle.map(|v| self.position(v))));
+            ring.worst_shape = ring.worst_shape.min(slivers::quality(triangle.map(|v| self.position(v))));
             if triangle.contains(&a) && triangle.contains(&b) {
                 ring.vanishing.push(t);
             } else {
@@ -371,37 +370,33 @@ impl Contraction<'_> {
     /// Whether new triangles lie within the tolerance of the surface and face as it does; those of caps are let be.
     fn is_near_surface(&mut self, ring: &Ring, corners: &[[DVec3; 3]]) -> bool {
         let is_cap = |v: &Option<u32>| v.is_some_and(|v| self.fans.mesh.caps.binary_search(&v).is_ok());
-        let of_surface: Vec<&[DVec3; 3]> = ring
-            .staying
-            .iter()
-            .zip(corners)
-            .filter_map(|((_, t), corners)| (!t.iter().any(is_cap)).then_some(corners))
-            .collect();
-        let points: Vec<DVec3> = of_surface.iter().flat_map(|&&t| spread(t)).collect();
-        let each = points.len() / of_surface.len().max(1);
-        let found = self.gradients.at(self.distance, &points);
-        for (i, (omega, gradient)) in found.enumerate() {
-            // false for what is not a number
-            if !(omega.abs() <= self.tolerance * gradient.length()) {
-                return false;
-            }
-            let [a, b, c] = *of_surface[i / each];
-            // the middle comes first
-            if i % each == 0 && (b - a).cross(c - a).dot(gradient) >= 0.0 {
-                return false;
-            }
+        let of_surface = || {
+            let pairs = ring.staying.iter().zip(corners);
+            pairs.filter_map(|((_, t), corners)| (!t.iter().any(is_cap)).then_some(*corners))
+        };
+        // false for what is not a number
+        let is_near = |omega: f64, gradient: DVec3| omega.abs() <= self.tolerance * gradient.length();
+        // most that fail do so here
+        let middles: Vec<DVec3> = of_surface().map(|[a, b, c]| (a + b + c) / 3.0).collect();
+        let areas: Vec<DVec3> = of_surface().map(|[a, b, c]| (b - a).cross(c - a)).collect();
+        let found = self.gradients.at(self.distance, &middles);
+        let faces_out = |(area, (omega, gradient)): (&DVec3, (f64, DVec3))| {
+            is_near(omega, gradient) && area.dot(gradient) < 0.0
+        };
+        if !areas.iter().zip(found).all(faces_out) {
+            return false;
         }
-        true
+        let points: Vec<DVec3> = of_surface().flat_map(spread).collect();
+        self.gradients.at(self.distance, &points).all(|(omega, gradient)| is_near(omega, gradient))
     }
 }
 
-/// Points of a triangle between its corners, which lie on the surface: the middle first.
+/// Points of a triangle besides its corners, which lie on the surface.
 fn spread([a, b, c]: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
     let n = SPREAD;
     let lattice = (0..=n).flat_map(move |i| (0..=n - i).map(move |j| [n - i - j, i, j]));
     let between = lattice.filter(move |weights| weights.iter().all(|&w| w < n));
-    let point = move |[u, v, w]: [usize; 3]| (a * u as f64 + b * v as f64 + c * w as f64) / n as f64;
-    std::iter::once((a + b + c) / 3.0).chain(between.map(point))
+    between.map(move |[u, v, w]| (a * u as f64 + b * v as f64 + c * w as f64) / n as f64)
 }
 
 #[cfg(test)]

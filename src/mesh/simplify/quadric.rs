@@ -30,12 +30,7 @@ impl Quadric {
     }
 
     pub fn plus(self, other: Self) -> Self {
-        Self {
-            a: self.a + other.a,
-            b: self.b + other.b,
-            c: self.c + other.c,
-            area: self.area + other.area,
-        }
+        Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, area: self.area + other.area }
     }
 
     /// Weighted sum of the squared distances from the planes; rounding does not make it negative.

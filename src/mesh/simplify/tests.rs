@@ -7,7 +7,12 @@ use crate::mesh::{Grid, Quality, Report, Resolution, check, dual_contouring, mar
 type Mesher = fn(&dyn Field, &Grid, &(dyn Fn(f64) + Sync)) -> Result<Mesh, crate::mesh::MeshError>;
 
 /// Simplifies a mesh in [−1, 1]³; what it was, what it is, and the measured quality of that.
-fn simplified(mesher: Mesher, field: &dyn Field, cells: usize, tolerance: f64) -> (Report, Report, Quality, Mesh) {
+fn simplified(
+    mesher: Mesher,
+    field: &dyn Field,
+    cells: usize,
+    tolerance: f64,
+) -> (Report, Report, Quality, Mesh) {
     let grid = Grid::filling(&Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0)), Resolution::Cells(cells));
     let grid = grid.unwrap();
     let mut mesh = mesher(field, &grid, &|_| ()).unwrap();
@@ -96,7 +101,8 @@ fn caps_stay_where_they_are() {
 
 #[test]
 fn no_tolerance_changes_nothing_and_the_same_mesh_gives_the_same_bits() {
-    let grid = Grid::filling(&Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0)), Resolution::Cells(24)).unwrap();
+    let grid =
+        Grid::filling(&Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0)), Resolution::Cells(24)).unwrap();
     let mesh = marching_cubes(&ball(), &grid, &|_| ()).unwrap();
     for tolerance in [0.0, -1.0, f64::NAN] {
         let mut same = mesh.clone();
