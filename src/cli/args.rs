@@ -187,8 +187,8 @@ pub(super) struct Mesh {
     /// Contract thin triangles; all vertices stay on the surface
     #[arg(long)]
     pub no_slivers: bool,
-    /// Take as many triangles as leave the mesh this near to the surface: a length, or a part of the mesh's diagonal
-    /// as in 0.1%. The distance is measured and reported; vertices stay on the surface
+    /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of the mesh's
+    /// diagonal as in 0.1%. The distance is measured; vertices stay on the surface
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub simplify: Option<Tolerance>,
     /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing

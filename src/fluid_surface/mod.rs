@@ -84,7 +84,7 @@ impl Reconstruction {
         }
         let bounds = particles.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p));
         let extent = bounds.size().max_element();
-        if !(extent <= Self::MOST_CELLS * self.cell) {
+        if extent > Self::MOST_CELLS * self.cell {
             return Err(SurfaceError::TooWide { extent, cell: self.cell });
         }
         // near the origin f32 has its digits where they are needed

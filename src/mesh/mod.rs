@@ -62,7 +62,7 @@ pub use grid::{Grid, GridError, Resolution};
 pub use quality::{Distances, Quality, Reference, measure};
 pub use shells::{Shell, shells};
 pub use simplify::simplify;
-pub use slivers::{SLIVER, quality, remove_slivers};
+pub use slivers::remove_slivers;
 pub use thin::{ThinCells, thin_cells};
 
 /// Triangles over shared vertices.

@@ -10,6 +10,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::{
     Grid, Mesh, MeshError, Resolution, dual_contouring,
@@ -56,6 +57,29 @@ impl Quality {
     /// The larger of both largest distances.
     pub fn hausdorff(&self) -> f64 {
         self.to_surface.max.max(self.from_surface.max)
+    }
+}
+
+/// One flat object, the Hausdorff distance first.
+impl Serialize for Quality {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Quality", 15)?;
+        object.serialize_field("hausdorff", &self.hausdorff())?;
+        object.serialize_field("mesh_to_surface_max", &self.to_surface.max)?;
+        object.serialize_field("mesh_to_surface_rms", &self.to_surface.rms)?;
+        object.serialize_field("surface_to_mesh_max", &self.from_surface.max)?;
+        object.serialize_field("surface_to_mesh_rms", &self.from_surface.rms)?;
+        object.serialize_field("samples", &(self.to_surface.samples + self.from_surface.samples))?;
+        object.serialize_field("normal_error_max", &self.normal_error.max)?;
+        object.serialize_field("normal_error_rms", &self.normal_error.rms)?;
+        object.serialize_field("volume_error", &self.volume_error)?;
+        object.serialize_field("area_error", &self.area_error)?;
+        object.serialize_field("flipped", &self.flipped)?;
+        object.serialize_field("min_angle", &self.min_angle)?;
+        object.serialize_field("min_radius_ratio", &self.min_radius_ratio)?;
+        object.serialize_field("mean_radius_ratio", &self.mean_radius_ratio)?;
+        object.serialize_field("slivers", &self.slivers)?;
+        object.end()
     }
 }
 

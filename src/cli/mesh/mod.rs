@@ -41,9 +41,9 @@ struct Summary {
     evaluations: u64,
     milliseconds: f64,
     method: &'static str,
-    /// With `--quality` only.
+    /// With `--quality` only: lengths in metres, angles in degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
-    quality: Option<Figures>,
+    quality: Option<Quality>,
     /// With `--simplify` only.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     simplified: Option<SimplifiedFigures>,
@@ -68,48 +68,6 @@ impl From<&Simplified> for SimplifiedFigures {
             simplify_tolerance: simplified.tolerance,
             simplify_error: simplified.quality.hausdorff(),
             simplify_milliseconds: simplified.milliseconds,
-        }
-    }
-}
-
-/// How far a mesh is from the surface, lengths in metres, angles in degrees.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Figures {
-    pub hausdorff: f64,
-    pub mesh_to_surface_max: f64,
-    pub mesh_to_surface_rms: f64,
-    pub surface_to_mesh_max: f64,
-    pub surface_to_mesh_rms: f64,
-    pub samples: usize,
-    pub normal_error_max: f64,
-    pub normal_error_rms: f64,
-    pub volume_error: f64,
-    pub area_error: f64,
-    pub flipped: usize,
-    pub min_angle: f64,
-    pub min_radius_ratio: f64,
-    pub mean_radius_ratio: f64,
-    pub slivers: f64,
-}
-
-impl From<Quality> for Figures {
-    fn from(quality: Quality) -> Self {
-        Self {
-            hausdorff: quality.hausdorff(),
-            mesh_to_surface_max: quality.to_surface.max,
-            mesh_to_surface_rms: quality.to_surface.rms,
-            surface_to_mesh_max: quality.from_surface.max,
-            surface_to_mesh_rms: quality.from_surface.rms,
-            samples: quality.to_surface.samples + quality.from_surface.samples,
-            normal_error_max: quality.normal_error.max,
-            normal_error_rms: quality.normal_error.rms,
-            volume_error: quality.volume_error,
-            area_error: quality.area_error,
-            flipped: quality.flipped,
-            min_angle: quality.min_angle,
-            min_radius_ratio: quality.min_radius_ratio,
-            mean_radius_ratio: quality.mean_radius_ratio,
-            slivers: quality.slivers,
         }
     }
 }
@@ -256,8 +214,8 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         output::write(path, |out| format.write(&mesh, out))?;
     }
     if shared.json {
-        let figures = quality.filter(|_| options.quality).map(Figures::from);
-        let mut summary = summary(solid.name(), options.method, &report, thin.count, figures, milliseconds);
+        let quality = quality.filter(|_| options.quality);
+        let mut summary = summary(solid.name(), options.method, &report, thin.count, quality, milliseconds);
         summary.simplified = simplified.as_ref().map(SimplifiedFigures::from);
         return output::json(&summary);
     }
@@ -292,7 +250,7 @@ fn summary(
     method: MeshMethod,
     report: &Report,
     thin_cells: usize,
-    quality: Option<Figures>,
+    quality: Option<Quality>,
     milliseconds: f64,
 ) -> Summary {
     Summary {

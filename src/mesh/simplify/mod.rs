@@ -41,7 +41,7 @@ const LEAST_GAIN: f64 = 0.01;
 /// The cosine of the angle by which a triangle may turn.
 const LARGEST_TURN: f64 = 0.5;
 
-/// New triangles are at least this well shaped, or better than the worst they replace (see [`slivers::quality`]).
+/// New triangles are at least this well shaped, or better than the worst they replace (see [`slivers::roundness`]).
 const WORST_SHAPE: f64 = 0.2;
 
 /// Quadrics may say this many tolerances and an edge is still tried: they measure from planes, which is often too much.
@@ -55,7 +55,7 @@ const SPREAD: usize = 4;
 /// nothing.
 pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize {
     let before = mesh.positions.len();
-    if !(tolerance > 0.0) || mesh.triangles.is_empty() {
+    if tolerance.is_nan() || tolerance <= 0.0 || mesh.triangles.is_empty() {
         return 0;
     }
     let original = mesh.positions.clone();
@@ -222,7 +222,9 @@ impl Contraction<'_> {
         }
         let (p, q) = (self.position(a), self.position(b));
         let quadric = self.quadrics[a as usize].plus(self.quadrics[b as usize]);
-        let least = quadric.at(quadric.least(0.5 * (p + q) - self.origin));
+        // the ends too: the pull towards the middle leaves a little of its way
+        let places = [quadric.least(0.5 * (p + q) - self.origin), p - self.origin, q - self.origin];
+        let least = places.into_iter().fold(f64::INFINITY, |least, place| least.min(quadric.at(place)));
         if least > (HOPEFUL * self.tolerance).powi(2) * quadric.area {
             return;
         }
@@ -281,7 +283,7 @@ impl Contraction<'_> {
         for t in self.fans.fan(a).chain(of_b) {
             let triangle = self.fans.mesh.triangles[t as usize];
             ring.samples.extend(&self.samples.0[t as usize]);
-            ring.worst_shape = ring.worst_shape.min(slivers::quality(triangle.map(|v| self.position(v))));
+            ring.worst_shape = ring.worst_shape.min(slivers::roundness(triangle.map(|v| self.position(v))));
             if triangle.contains(&a) && triangle.contains(&b) {
                 ring.vanishing.push(t);
             } else {
@@ -342,8 +344,8 @@ impl Contraction<'_> {
             let area = |[p, q, r]: [DVec3; 3]| (q - p).cross(r - p);
             let (was, is) = (area(old), area(new));
             // slivers have hardly a direction: against the surface alone
-            let turn = if slivers::quality(old) < slivers::SLIVER { -1.0 } else { LARGEST_TURN };
-            if was.dot(is) < turn * was.length() * is.length() || slivers::quality(new) < least_shape {
+            let turn = if slivers::roundness(old) < slivers::SLIVER { -1.0 } else { LARGEST_TURN };
+            if was.dot(is) < turn * was.length() * is.length() || slivers::roundness(new) < least_shape {
                 return None;
             }
         }
@@ -359,7 +361,7 @@ impl Contraction<'_> {
             let p = self.original[sample as usize];
             let distances = corners.iter().map(|&t| p.distance_squared(nearest_point(t, p)));
             let (nearest, distance) = distances.enumerate().min_by(|x, y| x.1.total_cmp(&y.1))?;
-            if !(distance <= limit) {
+            if distance.is_nan() || distance > limit {
                 return None;
             }
             shared[nearest].push(sample);

@@ -84,13 +84,14 @@ pub fn union(spheres: &[Sphere], order: Order, j: Joins) -> Tree {
     fold(&leaves, order, &|u, v| j.or(u, v))
 }
 
-/// Balls as distances, which its mesher likes best.
-pub fn balls(balls: &[Ball], j: Joins) -> Tree {
+/// Balls, each as r² − d² or, with a root more but of slope 1, as r − d.
+pub fn balls(balls: &[Ball], j: Joins, as_distance: bool) -> Tree {
     let (x, y, z) = Tree::axes();
     let square = |axis: &Tree, at: f64| (axis.clone() - at as f32).square();
     let leaf = |b: &Ball| {
         let [p, q, r] = b.centre;
-        b.radius as f32 - (square(&x, p) + square(&y, q) + square(&z, r)).sqrt()
+        let squares = square(&x, p) + square(&y, q) + square(&z, r);
+        if as_distance { b.radius as f32 - squares.sqrt() } else { (b.radius * b.radius) as f32 - squares }
     };
     let leaves: Vec<Tree> = balls.iter().map(leaf).collect();
     fold(&leaves, Order::Balanced, &|u, v| j.or(u, v))

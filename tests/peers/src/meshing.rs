@@ -18,7 +18,9 @@ use nalgebra::{Matrix4, Vector3};
 use rfm::field::{Field, GradientsMut, Points};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Mesh, Quality, Reference, Resolution, dual_contouring, is_closed_manifold, marching_cubes, shells};
+use rfm::mesh::{
+    Grid, Mesh, Quality, Reference, Resolution, dual_contouring, is_closed_manifold, marching_cubes, shells,
+};
 use rfm::{Engine, Program, Solid};
 
 use crate::fidget::{self as peer, Joins};
@@ -36,7 +38,8 @@ const TURNS: usize = 15;
 struct Scene {
     name: &'static str,
     text: String,
-    tree: Box<dyn Fn(Joins) -> fidget::context::Tree>,
+    /// As Fidget takes it, under the names of its forms.
+    trees: Vec<(&'static str, fidget::context::Tree)>,
     /// ω in `f32` as a person would write it.
     hand: Option<fn([f32; 3]) -> f32>,
     volume: Option<f64>,
@@ -68,12 +71,14 @@ pub fn run(only: &str) {
 
 fn scenes() -> Vec<Scene> {
     let balls = scenes::balls(500);
-    let of_balls = balls.clone();
+    let forms = |tree: fn(Joins) -> fidget::context::Tree| {
+        vec![("Fidget, R0", tree(Joins::R0)), ("Fidget, min/max", tree(Joins::MinMax))]
+    };
     vec![
         Scene {
             name: "pawn",
             text: scenes::PAWN.into(),
-            tree: Box::new(peer::pawn),
+            trees: forms(peer::pawn),
             hand: Some(pawn),
             volume: Some(0.442701),
             cells: &[128, 256],
@@ -82,7 +87,7 @@ fn scenes() -> Vec<Scene> {
         Scene {
             name: "bishop",
             text: scenes::BISHOP.into(),
-            tree: Box::new(peer::bishop),
+            trees: forms(peer::bishop),
             hand: Some(bishop),
             volume: Some(0.601689),
             cells: &[128, 256],
@@ -91,7 +96,11 @@ fn scenes() -> Vec<Scene> {
         Scene {
             name: "500 balls",
             text: scenes::balls_text(&balls),
-            tree: Box::new(move |joins| peer::balls(&of_balls, joins)),
+            // joined by R0 they take Fidget minutes: only its best forms
+            trees: vec![
+                ("Fidget, min/max of r² − d²", peer::balls(&balls, Joins::MinMax, false)),
+                ("Fidget, min/max of r − d", peer::balls(&balls, Joins::MinMax, true)),
+            ],
             hand: None,
             volume: None,
             cells: &[512],
@@ -106,7 +115,6 @@ fn measure(scene: &Scene, cells: usize) {
     let solid = program.solid_with(name, Engine::Jit).unwrap_or_else(|e| panic!("{e}"));
     let bounds = Aabb::new(DVec3::splat(CORNER), DVec3::splat(CORNER + SIDE));
     let grid = |cells| Grid::filling(&bounds, Resolution::Cells(cells)).unwrap_or_else(|e| panic!("{e}"));
-    let shapes = [Joins::R0, Joins::MinMax].map(|joins| JitShape::from(-(scene.tree)(joins)));
     let here = grid(cells);
     let ours = |dual: bool| {
         let (solid, here) = (&solid, &here);
@@ -121,13 +129,10 @@ fn measure(scene: &Scene, cells: usize) {
         row("rfm marching cubes, exact roots", Box::new(ours(false))),
         row("rfm dual contouring", Box::new(ours(true))),
     ];
-    // many balls joined by R0 take Fidget minutes: only its best form there
-    if scene.hand.is_some() {
-        let shape = shapes[0].clone();
-        rows.push(row("Fidget, R0", Box::new(move || fidget_mesh(&shape, cells))));
+    for &(name, ref tree) in &scene.trees {
+        let shape = JitShape::from(-tree.clone());
+        rows.push(row(name, Box::new(move || fidget_mesh(&shape, cells))));
     }
-    let shape = shapes[1].clone();
-    rows.push(row("Fidget, min/max", Box::new(move || fidget_mesh(&shape, cells))));
     if let Some(hand) = scene.hand {
         rows.push(row("isosurface, marching cubes", Box::new(move || by_isosurface(hand, cells))));
         rows.push(row("fast-surface-nets", Box::new(move || by_surface_nets(hand, cells))));
@@ -145,7 +150,8 @@ fn measure(scene: &Scene, cells: usize) {
     }
     let surface = solid.surface(bounds);
     let depth = Depth(&solid);
-    let reference = Reference::new(&*surface, &depth, &grid(scene.measured_in)).unwrap_or_else(|e| panic!("{e}"));
+    let reference =
+        Reference::new(&*surface, &depth, &grid(scene.measured_in)).unwrap_or_else(|e| panic!("{e}"));
     print(scene, cells, &rows, &reference);
 }
 
@@ -162,7 +168,8 @@ fn print(scene: &Scene, cells: usize, rows: &[Row<'_>], reference: &Reference<'_
         let volume: f64 = shells(&row.found).iter().map(|shell| shell.volume).sum();
         let error = scene.volume.map_or(quality.volume_error, |truth| volume / truth - 1.0);
         // turn by turn: what else the machine does disturbs both
-        let ratio = crate::measure::median(row.times.iter().zip(&rows[0].times).map(|(t, o)| t / o).collect());
+        let ratio =
+            crate::measure::median(row.times.iter().zip(&rows[0].times).map(|(t, o)| t / o).collect());
         println!(
             "| {} | {:.1} | {ratio:.1} | {} | {:.1e} | {:.1e} | {:+.3} % | {} |",
             row.name,
@@ -192,7 +199,10 @@ impl Field for Depth<'_> {
     fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
         let mut curvature = vec![0.0; points.len()];
         let GradientsMut { omega, x, y, z } = out;
-        self.0.contact_many([points.x, points.y, points.z], [&mut *omega, &mut *x, &mut *y, &mut *z, &mut curvature]);
+        self.0.contact_many(
+            [points.x, points.y, points.z],
+            [&mut *omega, &mut *x, &mut *y, &mut *z, &mut curvature],
+        );
         for column in [omega, x, y, z] {
             column.iter_mut().for_each(|value| *value = -*value);
         }
@@ -203,8 +213,12 @@ impl Field for Depth<'_> {
 fn fidget_mesh(shape: &JitShape, cells: usize) -> Mesh {
     let (half, middle) = (0.5 * SIDE as f32, (CORNER + 0.5 * SIDE) as f32);
     let to_world = Matrix4::new_translation(&Vector3::repeat(middle)) * Matrix4::new_scaling(half);
-    let settings =
-        Settings { depth: cells.ilog2() as u8, world_to_model: to_world, threads: None, ..Settings::default() };
+    let settings = Settings {
+        depth: cells.ilog2() as u8,
+        world_to_model: to_world,
+        threads: None,
+        ..Settings::default()
+    };
     let bound = BoundShape::try_from(shape.clone()).expect("no further variables");
     let found = Octree::build(&bound, &settings).expect("nobody cancels").walk_dual();
     let positions = found.vertices.iter().map(|v| [v.x, v.y, v.z].map(f64::from).into()).collect();
