@@ -19,6 +19,7 @@ pub mod compile;
 pub mod diagnostic;
 pub mod experiment;
 pub mod field;
+pub mod fluid_surface;
 pub mod geom;
 pub mod interval;
 pub mod ir;

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::mesh::Format;
 use crate::geom::Aabb;
 use crate::slice::{Axis, Plane};
+use crate::syntax::{Dimension, parse_unit};
 use glam::DVec3;
 
 /// Obstacles written as R-functions, compiled to machine code: check, mesh, simulate.
@@ -74,7 +76,7 @@ pub(super) enum Command {
     Check(Check),
     /// Evaluate ω, ∇ω, sign, distance and normal at points
     Eval(Eval),
-    /// Make a closed triangle mesh of a solid
+    /// Make a closed triangle mesh of a solid, or of the fluid of a run
     Mesh(Mesh),
     /// Simulate the fluid of a scene around its obstacles
     Run(Run),
@@ -167,19 +169,20 @@ pub(super) enum Precision {
 
 #[derive(Debug, Args)]
 pub(super) struct Mesh {
-    /// The file; `-` is standard input
+    /// The file; `-` is standard input. With --fluid the folder of a run
     pub file: PathBuf,
     /// The solid [default: the only one, or the first obstacle of the scene]
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
-    /// Where the mesh goes; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf
+    /// Where the mesh goes; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf. With --fluid a folder
+    /// [default: surface/ in that of the run]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Cells along the longest side
     #[arg(long, value_name = "N", default_value_t = 128, conflicts_with = "cell")]
     pub cells: usize,
-    /// Size of a cell instead of their number
-    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
+    /// Size of a cell instead of their number, in metres or with a unit; with --fluid half the radius by default
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = length)]
     pub cell: Option<f64>,
     /// Mesh this box instead of the solid's own bounds; the mesh is closed at its border
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = aabb, allow_hyphen_values = true)]
@@ -193,12 +196,56 @@ pub(super) struct Mesh {
     /// Contract thin triangles; all vertices stay on the surface
     #[arg(long)]
     pub no_slivers: bool,
+    /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of the mesh's
+    /// diagonal as in 0.1%. The distance is measured; vertices stay on the surface
+    #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
+    pub simplify: Option<Tolerance>,
     /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
     #[arg(long)]
     pub quality: bool,
     /// Write .stl as text
     #[arg(long)]
     pub ascii: bool,
+    /// Mesh the fluid: a closed surface around the particles of each frame that `rfm run` wrote
+    #[arg(
+        long,
+        help_heading = "Fluid",
+        conflicts_with_all = ["solid", "cells", "domain", "method", "no_slivers", "simplify", "quality"]
+    )]
+    pub fluid: bool,
+    /// Half the spacing of the particles [default: from the run's summary.json]
+    #[arg(
+        long,
+        help_heading = "Fluid",
+        value_name = "LENGTH",
+        value_parser = length,
+        requires = "fluid",
+        allow_negative_numbers = true
+    )]
+    pub radius: Option<f64>,
+    /// Only these frames, counted from 0; B is the first that is left out [default: all]
+    #[arg(long, help_heading = "Fluid", value_name = "A..B", value_parser = frames, requires = "fluid")]
+    pub frames: Option<Frames>,
+    /// The format of the files [default: vtp, with a collection for ParaView]
+    #[arg(long, help_heading = "Fluid", value_enum, requires = "fluid")]
+    pub format: Option<Format>,
+}
+
+/// How far a simplified mesh may be from the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Tolerance {
+    /// Metres.
+    Length(f64),
+    /// Part of the diagonal of the mesh's bounds.
+    OfDiagonal(f64),
+}
+
+/// A range of frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Frames {
+    pub first: usize,
+    /// The first that is left out.
+    pub end: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -307,6 +354,54 @@ fn seconds(text: &str) -> Result<f64, String> {
     if value.is_finite() { Ok(value) } else { Err("the time must be finite".into()) }
 }
 
+/// A number of metres, or a number with a unit of length.
+fn length(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let unit = text.find(|c: char| c.is_alphabetic() && !matches!(c, 'e' | 'E')).unwrap_or(text.len());
+    let (number, unit) = text.split_at(unit);
+    let number: f64 = number.trim().parse().map_err(|_| format!("`{text}` is not a length"))?;
+    match unit {
+        "" => Ok(number),
+        unit => parse_unit(unit)
+            .filter(|unit| unit.dimension == Dimension::LENGTH)
+            .map(|unit| number * unit.factor)
+            .ok_or_else(|| format!("`{unit}` is not a unit of length; expected m, cm, mm, um or km")),
+    }
+}
+
+/// A length, or a percentage.
+fn tolerance(text: &str) -> Result<Tolerance, String> {
+    let found = match text.trim().strip_suffix('%') {
+        None => length(text).map(|length| (length, Tolerance::Length(length))),
+        Some(number) => number
+            .trim()
+            .parse::<f64>()
+            .map(|percent| (percent, Tolerance::OfDiagonal(percent / 100.0)))
+            .map_err(|_| format!("`{text}` is neither a length nor a percentage")),
+    };
+    match found? {
+        (size, tolerance) if size.is_finite() && size > 0.0 => Ok(tolerance),
+        _ => Err("expected a length or a percentage above 0".into()),
+    }
+}
+
+/// `A..B`, `A..`, `..B`, or one number.
+fn frames(text: &str) -> Result<Frames, String> {
+    let whole = |text: &str| {
+        text.trim()
+            .parse::<usize>()
+            .map_err(|_| format!("`{text}` is not the number of a frame; expected A..B"))
+    };
+    let Some((first, end)) = text.split_once("..") else {
+        let first = whole(text)?;
+        return Ok(Frames { first, end: first.checked_add(1) });
+    };
+    Ok(Frames {
+        first: if first.trim().is_empty() { 0 } else { whole(first)? },
+        end: if end.trim().is_empty() { None } else { Some(whole(end)?) },
+    })
+}
+
 fn point(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text).map(DVec3::from_array)
 }
@@ -343,5 +438,39 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn lengths_have_units_or_are_metres() {
+        for (text, expected) in
+            [("0.5", 0.5), ("2 mm", 2e-3), ("2e-1cm", 2e-3), ("-1m", -1.0), ("1E3um", 1e-3)]
+        {
+            let found = length(text).unwrap();
+            assert!((found - expected).abs() < 1e-15, "{text}: {found}");
+        }
+        for text in ["", "mm", "2 kg", "2 furlong", "1,5"] {
+            assert!(length(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn tolerances_are_lengths_or_percentages() {
+        assert_eq!(tolerance("2mm"), Ok(Tolerance::Length(2e-3)));
+        assert_eq!(tolerance("0.5 %"), Ok(Tolerance::OfDiagonal(5e-3)));
+        for text in ["0", "-1mm", "%", "0%", "nan", "inf%", "1e400", "few"] {
+            assert!(tolerance(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn ranges_of_frames() {
+        let range = |first, end| Ok(Frames { first, end });
+        assert_eq!(frames("3..5"), range(3, Some(5)));
+        assert_eq!(
+            (frames("3.."), frames("..5"), frames("..")),
+            (range(3, None), range(0, Some(5)), range(0, None))
+        );
+        assert_eq!(frames("7"), range(7, Some(8)));
+        assert!(frames("a..b").is_err() && frames("-1..2").is_err() && frames("").is_err());
     }
 }

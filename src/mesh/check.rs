@@ -73,6 +73,13 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
     }
 }
 
+/// Whether a mesh is closed and manifold, see [`Report`].
+pub fn is_closed_manifold(mesh: &Mesh) -> bool {
+    let edges = Edges::of(mesh);
+    let used: usize = shells(mesh).iter().map(|shell| shell.vertices).sum();
+    edges.closed && edges.two_sided && edges.fans == used
+}
+
 /// Findings about a mesh's edges.
 struct Edges {
     count: usize,

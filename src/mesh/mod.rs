@@ -3,7 +3,7 @@
 //! [`Grid`] lays nodes → [`marching_cubes`] samples ω in the bricks of cells that ranges do not exclude, connects
 //! crossed edges by the case table, or by the corners' values where the table leaves a choice, puts each vertex on the
 //! surface by a root search on ω itself, merges vertices that coincide in a node and adds normals −∇ω/|∇ω| →
-//! [`remove_slivers`] if asked → [`check`] reports topology, volume and distance, [`thin_cells`] what the grid cannot
+//! [`remove_slivers`] or [`simplify()`] if asked → [`check`] reports topology, volume and distance, [`thin_cells`] what the grid cannot
 //! see, [`measure`] the distance both ways → the [`formats`] write. [`dual_contouring`] does what [`marching_cubes`]
 //! does, with sharp creases.
 //!
@@ -43,6 +43,7 @@ mod quality;
 mod roots;
 mod shells;
 mod signs;
+mod simplify;
 mod slivers;
 mod thin;
 
@@ -53,14 +54,15 @@ use std::fmt;
 
 use glam::DVec3;
 
-pub use check::{Report, check};
+pub use check::{Report, check, is_closed_manifold};
 pub use dual::dual_contouring;
 pub use extract::marching_cubes;
 pub use formats::{glb, obj, ply, stl, threemf, vtp};
 pub use grid::{Grid, GridError, Resolution};
-pub use quality::{Distances, Quality, measure};
+pub use quality::{Distances, Quality, Reference, measure};
 pub use shells::{Shell, shells};
-pub use slivers::{SLIVER, quality, remove_slivers};
+pub use simplify::simplify;
+pub use slivers::remove_slivers;
 pub use thin::{ThinCells, thin_cells};
 
 /// Triangles over shared vertices.
@@ -82,6 +84,14 @@ pub struct Mesh {
 impl Mesh {
     /// Most vertices of a mesh: the corners of twice as many triangles then still have 32-bit numbers.
     pub const MAX_VERTICES: usize = 1 << 29;
+
+    /// A mesh of no field: each normal is the area-weighted mean of the triangles around.
+    pub fn from_triangles(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let normals = vec![DVec3::ZERO; positions.len()];
+        let mut mesh = Self { positions, normals, triangles, ..Self::default() };
+        normals::fill_missing(&mut mesh);
+        mesh
+    }
 }
 
 /// Counts of work, the same on any machine.

@@ -10,6 +10,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::{
     Grid, Mesh, MeshError, Resolution, dual_contouring,
@@ -59,6 +60,29 @@ impl Quality {
     }
 }
 
+/// One flat object, the Hausdorff distance first.
+impl Serialize for Quality {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Quality", 15)?;
+        object.serialize_field("hausdorff", &self.hausdorff())?;
+        object.serialize_field("mesh_to_surface_max", &self.to_surface.max)?;
+        object.serialize_field("mesh_to_surface_rms", &self.to_surface.rms)?;
+        object.serialize_field("surface_to_mesh_max", &self.from_surface.max)?;
+        object.serialize_field("surface_to_mesh_rms", &self.from_surface.rms)?;
+        object.serialize_field("samples", &(self.to_surface.samples + self.from_surface.samples))?;
+        object.serialize_field("normal_error_max", &self.normal_error.max)?;
+        object.serialize_field("normal_error_rms", &self.normal_error.rms)?;
+        object.serialize_field("volume_error", &self.volume_error)?;
+        object.serialize_field("area_error", &self.area_error)?;
+        object.serialize_field("flipped", &self.flipped)?;
+        object.serialize_field("min_angle", &self.min_angle)?;
+        object.serialize_field("min_radius_ratio", &self.min_radius_ratio)?;
+        object.serialize_field("mean_radius_ratio", &self.mean_radius_ratio)?;
+        object.serialize_field("slivers", &self.slivers)?;
+        object.end()
+    }
+}
+
 /// Points of a triangle are spread this many to a side: with sides of a cell, neighbours are a fifth of it apart.
 const SPREAD: usize = 5;
 
@@ -68,29 +92,53 @@ const BATCH: usize = 256;
 /// Below this radius ratio a triangle faces nowhere.
 const NO_DIRECTION: f64 = 1e-6;
 
-/// Measures a mesh of `field` in `grid`. `distance` has the same surface, and near it ω is the distance from it or
-/// nearly so: Newton's method then finds the nearest face, where parts of unlike scale would mislead it.
+/// What meshes of one surface are measured against.
+pub struct Reference<'a> {
+    distance: &'a dyn Field,
+    /// Points all over the surface.
+    points: Vec<DVec3>,
+    /// Volume and area of a mesh in half the cells.
+    extent: (f64, f64),
+}
+
+impl<'a> Reference<'a> {
+    /// Prepares to measure meshes of `field` in `grid`. `distance` has the same surface, and near it ω is the distance
+    /// from it or nearly so: Newton's method then finds the nearest face, where parts of unlike scale would mislead it.
+    ///
+    /// # Errors
+    /// Those of meshing the finer grid that gives points of the surface.
+    pub fn new(field: &dyn Field, distance: &'a dyn Field, grid: &Grid) -> Result<Self, MeshError> {
+        let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
+        let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
+        Ok(Self { distance, points: surface_points(&finer, distance, grid), extent: extent(&finer) })
+    }
+
+    /// Measures a mesh.
+    pub fn measure(&self, mesh: &Mesh) -> Quality {
+        let mut quality = shapes(mesh);
+        if mesh.triangles.is_empty() {
+            return quality;
+        }
+        let own = extent(mesh);
+        quality.volume_error = own.0 / self.extent.0 - 1.0;
+        quality.area_error = own.1 / self.extent.1 - 1.0;
+        mesh_to_surface(mesh, self.distance, &mut quality);
+        quality.from_surface = surface_to_mesh(mesh, &self.points);
+        quality
+    }
+}
+
+/// Measures one mesh of `field` in `grid`, see [`Reference`].
 ///
 /// # Errors
-/// Those of meshing the finer grid that gives points of the surface.
+/// Those of [`Reference::new`].
 pub fn measure(
     mesh: &Mesh,
     field: &dyn Field,
     distance: &dyn Field,
     grid: &Grid,
 ) -> Result<Quality, MeshError> {
-    let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
-    let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
-    let mut quality = shapes(mesh);
-    if mesh.triangles.is_empty() {
-        return Ok(quality);
-    }
-    let (own, reference) = (extent(mesh), extent(&finer));
-    quality.volume_error = own.0 / reference.0 - 1.0;
-    quality.area_error = own.1 / reference.1 - 1.0;
-    mesh_to_surface(mesh, distance, &mut quality);
-    quality.from_surface = surface_to_mesh(mesh, &surface_points(&finer, distance, grid));
-    Ok(quality)
+    Ok(Reference::new(field, distance, grid)?.measure(mesh))
 }
 
 /// Volume and area.
@@ -295,7 +343,7 @@ fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
 }
 
 /// The point of a triangle nearest to `p`: inside, on a side or in a corner.
-fn nearest_point([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
+pub(super) fn nearest_point([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
     let normal = (b - a).cross(c - a);
     let above = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) >= 0.0;
     if normal != DVec3::ZERO && above(a, b) && above(b, c) && above(c, a) {

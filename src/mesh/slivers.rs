@@ -14,8 +14,8 @@ use super::{
     collapse::{Fans, compact},
 };
 
-/// Triangles below this quality are slivers: 1 is equilateral, 0 has no area.
-pub const SLIVER: f64 = 0.1;
+/// Triangles less round than this are slivers: 1 is equilateral, 0 has no area.
+pub(super) const SLIVER: f64 = 0.1;
 
 /// The cosine of the largest angle by which a triangle may turn. Slivers themselves may turn freely: they have hardly a
 /// direction.
@@ -25,7 +25,7 @@ const LARGEST_TURN: f64 = 0.7;
 const PASSES: usize = 4;
 
 /// 4√3 · area / sum of the squared sides: 1 for an equilateral triangle, 0 for one without area.
-pub fn quality([a, b, c]: [DVec3; 3]) -> f64 {
+pub(super) fn roundness([a, b, c]: [DVec3; 3]) -> f64 {
     let sides = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
     let twice_area = (b - a).cross(c - a).length();
     if sides > 0.0 { 2.0 * 3.0_f64.sqrt() * twice_area / sides } else { 0.0 }
@@ -35,7 +35,7 @@ pub fn quality([a, b, c]: [DVec3; 3]) -> f64 {
 pub fn remove_slivers(mesh: &mut Mesh) -> usize {
     let before = mesh.positions.len();
     for _ in 0..PASSES {
-        let is_sliver = |t: &[u32; 3]| quality(t.map(|v| mesh.positions[v as usize])) < SLIVER;
+        let is_sliver = |t: &[u32; 3]| roundness(t.map(|v| mesh.positions[v as usize])) < SLIVER;
         let slivers: Vec<u32> =
             (0..mesh.triangles.len() as u32).filter(|&t| is_sliver(&mesh.triangles[t as usize])).collect();
         let vertices: Vec<u32> = slivers.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
@@ -57,7 +57,7 @@ pub fn remove_slivers(mesh: &mut Mesh) -> usize {
 fn contract_one(fans: &mut Fans<'_>, sliver: u32) -> bool {
     let corners = fans.mesh.triangles[sliver as usize];
     let position = |v: u32| fans.mesh.positions[v as usize];
-    if quality(corners.map(position)) >= SLIVER {
+    if roundness(corners.map(position)) >= SLIVER {
         return false; // an earlier step has mended it
     }
     let mut edges = [0, 1, 2].map(|i| (corners[i], corners[(i + 1) % 3]));
@@ -86,18 +86,18 @@ fn gain(fans: &Fans<'_>, kept: u32, lost: u32) -> Option<f64> {
     for t in fans.fan(lost) {
         let triangle = fans.mesh.triangles[t as usize];
         let old = triangle.map(|v| fans.mesh.positions[v as usize]);
-        before = before.min(quality(old));
+        before = before.min(roundness(old));
         if triangle.contains(&kept) {
             continue; // vanishes
         }
         let new = triangle.map(|v| fans.mesh.positions[if v == lost { kept } else { v } as usize]);
         let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
         let (old_area, new_area) = (area(old), area(new));
-        let least = if quality(old) < SLIVER { 0.0 } else { LARGEST_TURN };
+        let least = if roundness(old) < SLIVER { 0.0 } else { LARGEST_TURN };
         if old_area.dot(new_area) < least * old_area.length() * new_area.length() {
             return None;
         }
-        after = after.min(quality(new));
+        after = after.min(roundness(new));
     }
     (after > before).then_some(after)
 }
@@ -110,15 +110,16 @@ mod tests {
     use crate::mesh::{Grid, Resolution, check, marching_cubes};
 
     fn share_of_slivers(mesh: &Mesh) -> f64 {
-        let thin = mesh.triangles.iter().filter(|t| quality(t.map(|v| mesh.positions[v as usize])) < SLIVER);
+        let thin =
+            mesh.triangles.iter().filter(|t| roundness(t.map(|v| mesh.positions[v as usize])) < SLIVER);
         thin.count() as f64 / mesh.triangles.len() as f64
     }
 
     #[test]
     fn equilateral_triangles_have_quality_one() {
         let corners = [DVec3::X, DVec3::Y, DVec3::Z];
-        assert!((quality(corners) - 1.0).abs() < 1e-15);
-        assert_eq!(quality([DVec3::X, DVec3::Y, 0.5 * (DVec3::X + DVec3::Y)]), 0.0);
+        assert!((roundness(corners) - 1.0).abs() < 1e-15);
+        assert_eq!(roundness([DVec3::X, DVec3::Y, 0.5 * (DVec3::X + DVec3::Y)]), 0.0);
     }
 
     #[test]

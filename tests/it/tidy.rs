@@ -25,6 +25,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("compile", &["diagnostic", "geom", "syntax", "ir", "lower", "simplify", "codegen", "solid"]),
     ("slice", &["field", "geom", "interval"]),
     ("mesh", &["field", "geom", "interval"]),
+    ("fluid_surface", &["geom", "mesh"]),
     ("sph", &["field", "geom", "interval"]),
     ("experiment", &["compile", "diagnostic", "field", "geom", "ir", "lower", "solid", "sph"]),
     ("render", &["field", "geom"]),

@@ -8,11 +8,11 @@ use anstream::println;
 use serde::Serialize;
 
 use super::super::args::MeshMethod;
-use super::super::mesh::{Depth, Figures};
+use super::super::mesh::Depth;
 use super::super::{Failure, progress};
 use super::plot::{self, Axis};
 use crate::Solid;
-use crate::mesh::{self, Grid, Resolution};
+use crate::mesh::{self, Grid, Quality, Resolution};
 
 /// Resolutions of each method, each twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;
@@ -31,7 +31,7 @@ pub(super) struct Row {
     closed: bool,
     manifold: bool,
     #[serde(flatten)]
-    figures: Figures,
+    quality: Quality,
     evaluations: u64,
     gradients: u64,
     milliseconds: f64,
@@ -52,8 +52,8 @@ pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<Row>, Failure>
             let grid = Grid::around(&bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
             let mut row = row(solid, method, cells, &grid)?;
             if let Some(coarser) = rows.last().filter(|r| r.method == row.method && 2 * r.cells == cells) {
-                row.order = order(coarser.figures.hausdorff, row.figures.hausdorff);
-                row.order_rms = order(coarser.figures.mesh_to_surface_rms, row.figures.mesh_to_surface_rms);
+                row.order = order(coarser.quality.hausdorff(), row.quality.hausdorff());
+                row.order_rms = order(coarser.quality.to_surface.rms, row.quality.to_surface.rms);
             }
             rows.push(row);
             bar.inc(1);
@@ -85,7 +85,7 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<R
         triangles: report.triangles,
         closed: report.closed,
         manifold: report.manifold,
-        figures: quality.into(),
+        quality,
         evaluations: mesh.work.evaluations,
         gradients: mesh.work.gradients,
         milliseconds: fastest,
@@ -118,21 +118,21 @@ pub(super) fn print(rows: &[Row]) {
     );
     for row in rows {
         let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));
-        let figures = &row.figures;
+        let quality = &row.quality;
         println!(
             "{:<7} {:>5} {:>9} {:>9.2} {:>10.2e} {:>6} {:>9.1e} {:>6} {:>+9.1e} {:>7.2}° {:>6.2} % {:>7}",
             row.method,
             row.cells,
             row.triangles,
             row.milliseconds,
-            figures.hausdorff,
+            quality.hausdorff(),
             order(row.order),
-            figures.mesh_to_surface_rms,
+            quality.to_surface.rms,
             order(row.order_rms),
-            figures.volume_error,
-            figures.normal_error_rms,
-            100.0 * figures.slivers,
-            figures.flipped,
+            quality.volume_error,
+            quality.normal_error.rms,
+            100.0 * quality.slivers,
+            quality.flipped,
         );
     }
 }
@@ -141,7 +141,7 @@ pub(super) fn print(rows: &[Row]) {
 pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
     let marks: Vec<(&Row, f64)> = rows
         .iter()
-        .map(|row| (row, row.figures.hausdorff))
+        .map(|row| (row, row.quality.hausdorff()))
         .filter(|(_, error)| *error > 0.0 && error.is_finite())
         .collect();
     let x = Axis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);

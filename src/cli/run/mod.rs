@@ -29,6 +29,10 @@ struct Summary {
     time_step: f64,
     particles: usize,
     particles_carved: usize,
+    /// Of one particle, kg.
+    particle_mass: f64,
+    /// kg/m³
+    rest_density: f64,
     milliseconds_per_step: f64,
     neighbours_per_particle: f64,
     max_penetration: f64,
@@ -409,6 +413,8 @@ impl Watch {
             time_step: simulation.time() / steps.max(1) as f64,
             particles: self.now.particles,
             particles_carved: carved,
+            particle_mass: simulation.parameters().particle_mass,
+            rest_density: simulation.parameters().rest_density,
             milliseconds_per_step: self.spent.as_secs_f64() * 1e3 / steps.max(1) as f64,
             neighbours_per_particle: self.neighbours.0 / self.neighbours.1 as f64,
             max_penetration: self.worst.max_penetration,

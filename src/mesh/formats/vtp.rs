@@ -1,69 +1,92 @@
-//! VTK polygonal data (`.vtp`) as text, for ParaView.
+//! VTK polygonal data (`.vtp`) with its numbers as base64, for ParaView.
 //!
-//! Invariant: every number is written with the fewest digits that read back to the same `f64`.
+//! Positions are `double`, since exact vertices are the point of this mesher; normals are `float`.
+//!
+//! Invariant: everything is little-endian; the same mesh gives the same bytes.
 
 use std::io::{self, Write};
 
+use base64::prelude::BASE64_STANDARD;
+use base64::write::EncoderWriter;
+
 use super::super::Mesh;
 
-/// Writes a mesh as ASCII VTP with one normal for each vertex.
+/// Writes a mesh as VTP with one normal for each vertex.
 ///
 /// # Errors
 /// What the writer reports.
 pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     let (points, polys) = (mesh.positions.len(), mesh.triangles.len());
-    writeln!(out, r#"<?xml version="1.0"?>"#)?;
-    writeln!(out, r#"<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian">"#)?;
-    writeln!(out, r#"<PolyData><Piece NumberOfPoints="{points}" NumberOfPolys="{polys}">"#)?;
-    writeln!(out, r#"<PointData Normals="normals">"#)?;
-    writeln!(out, r#"<DataArray type="Float64" Name="normals" NumberOfComponents="3" format="ascii">"#)?;
-    for n in &mesh.normals {
-        writeln!(out, "{} {} {}", n.x, n.y, n.z)?;
-    }
-    writeln!(out, "</DataArray></PointData>\n<Points>")?;
-    writeln!(out, r#"<DataArray type="Float64" Name="points" NumberOfComponents="3" format="ascii">"#)?;
-    for p in &mesh.positions {
-        writeln!(out, "{} {} {}", p.x, p.y, p.z)?;
-    }
-    writeln!(out, "</DataArray></Points>\n<Polys>")?;
-    writeln!(out, r#"<DataArray type="Int32" Name="connectivity" format="ascii">"#)?;
-    for [a, b, c] in &mesh.triangles {
-        writeln!(out, "{a} {b} {c}")?;
-    }
-    writeln!(out, r#"</DataArray><DataArray type="Int32" Name="offsets" format="ascii">"#)?;
-    for index in 1..=polys {
-        writeln!(out, "{}", 3 * index)?;
-    }
-    writeln!(out, "</DataArray></Polys></Piece></PolyData></VTKFile>")
+    write!(
+        out,
+        r#"<?xml version="1.0"?>
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<PolyData>
+<Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{polys}">
+<PointData Normals="normals">
+"#
+    )?;
+    let normals = mesh.normals.iter().flat_map(|n| n.to_array()).map(|x| (x as f32).to_le_bytes());
+    array(out, "Float32", "normals", 3, normals)?;
+    writeln!(out, "</PointData>\n<Points>")?;
+    let positions = mesh.positions.iter().flat_map(|p| p.to_array()).map(f64::to_le_bytes);
+    array(out, "Float64", "points", 3, positions)?;
+    writeln!(out, "</Points>\n<Polys>")?;
+    let corners = mesh.triangles.iter().flatten().map(|&v| (v as i32).to_le_bytes());
+    array(out, "Int32", "connectivity", 1, corners)?;
+    let ends = (1..=polys).map(|triangle| (3 * triangle as i64).to_le_bytes());
+    array(out, "Int64", "offsets", 1, ends)?;
+    writeln!(out, "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>")
+}
+
+/// An array as base64: the number of its bytes, and its bytes.
+fn array<const N: usize>(
+    out: &mut impl Write,
+    kind: &str,
+    name: &str,
+    components: usize,
+    numbers: impl Iterator<Item = [u8; N]>,
+) -> io::Result<()> {
+    writeln!(
+        out,
+        r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="binary">"#
+    )?;
+    let bytes: Vec<u8> = numbers.flatten().collect();
+    let mut encoder = EncoderWriter::new(&mut *out, &BASE64_STANDARD);
+    encoder.write_all(&(bytes.len() as u64).to_le_bytes())?;
+    encoder.write_all(&bytes)?;
+    encoder.finish()?;
+    drop(encoder);
+    writeln!(out, "\n</DataArray>")
 }
 
 #[cfg(test)]
 mod tests {
+    use vtkio::model::{Attribute, DataSet, VertexNumbers};
+
     use super::*;
     use crate::mesh::tests::pawn_mesh;
 
     #[test]
-    fn vtp_text_counts_agree() {
-        let mesh = pawn_mesh();
-        let mut bytes = Vec::new();
-        write(&mesh, &mut bytes).unwrap();
-        let text = String::from_utf8(bytes).unwrap();
-        let document = roxmltree::Document::parse(&text).unwrap();
-        let piece = document.descendants().find(|n| n.has_tag_name("Piece")).unwrap();
-        let count = |name: &str| piece.attribute(name).unwrap().parse::<usize>().unwrap();
-        assert_eq!(
-            (count("NumberOfPoints"), count("NumberOfPolys")),
-            (mesh.positions.len(), mesh.triangles.len())
-        );
-        let array = |name: &str| -> Vec<f64> {
-            let found = piece.descendants().find(|n| n.attribute("Name") == Some(name)).unwrap();
-            found.text().unwrap().split_whitespace().map(|n| n.parse().unwrap()).collect()
-        };
-        let flat: Vec<f64> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
-        assert_eq!(array("points"), flat);
-        assert_eq!(array("normals").len(), flat.len());
-        let indices: Vec<f64> = mesh.triangles.iter().flatten().map(|&v| f64::from(v)).collect();
-        assert_eq!(array("connectivity"), indices);
-        assert_eq!(array("offsets").last(), Some(&(3.0 * mesh.triangles.len() as f64)));
+    fn vtp_reads_back() {
+        for mesh in [pawn_mesh(), Mesh::default()] {
+            let mut bytes = Vec::new();
+            write(&mesh, &mut bytes).unwrap();
+            let vtk = vtkio::Vtk::parse_xml(&bytes[..]).unwrap();
+            let DataSet::PolyData { pieces, .. } = vtk.data else { panic!("another kind of data") };
+            let piece = pieces.into_iter().next().unwrap().into_loaded_piece_data(None).unwrap();
+            let flat: Vec<f64> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
+            assert_eq!(piece.points.into_vec::<f64>().unwrap(), flat);
+            let Some(VertexNumbers::XML { connectivity, offsets }) = piece.polys else {
+                panic!("no polygons")
+            };
+            let indices: Vec<u64> = mesh.triangles.iter().flatten().map(|&v| u64::from(v)).collect();
+            assert_eq!(connectivity, indices);
+            let ends: Vec<u64> = (1..=mesh.triangles.len() as u64).map(|i| 3 * i).collect();
+            assert_eq!(offsets, ends);
+            let [Attribute::DataArray(normals)] = &piece.data.point[..] else { panic!("no normals") };
+            let flat: Vec<f32> = mesh.normals.iter().flat_map(|n| n.to_array()).map(|x| x as f32).collect();
+            assert_eq!((normals.name.as_str(), normals.data.cast_into::<f32>().unwrap()), ("normals", flat));
+        }
     }
 }

@@ -10,7 +10,7 @@ use fidget::types::{Grad, Interval};
 use fidget::var::{Var, VarMap};
 
 use crate::measure::{Points, Work};
-use crate::scenes::{Order, Sphere, fold};
+use crate::scenes::{Ball, Order, Sphere, fold};
 
 /// How *and* and *or* are computed.
 #[derive(Clone, Copy, PartialEq)]
@@ -82,6 +82,19 @@ pub fn union(spheres: &[Sphere], order: Order, j: Joins) -> Tree {
     };
     let leaves: Vec<Tree> = spheres.iter().map(leaf).collect();
     fold(&leaves, order, &|u, v| j.or(u, v))
+}
+
+/// Balls, each as r² − d² or, with a root more but of slope 1, as r − d.
+pub fn balls(balls: &[Ball], j: Joins, as_distance: bool) -> Tree {
+    let (x, y, z) = Tree::axes();
+    let square = |axis: &Tree, at: f64| (axis.clone() - at as f32).square();
+    let leaf = |b: &Ball| {
+        let [p, q, r] = b.centre;
+        let squares = square(&x, p) + square(&y, q) + square(&z, r);
+        if as_distance { b.radius as f32 - squares.sqrt() } else { (b.radius * b.radius) as f32 - squares }
+    };
+    let leaves: Vec<Tree> = balls.iter().map(leaf).collect();
+    fold(&leaves, Order::Balanced, &|u, v| j.or(u, v))
 }
 
 /// Columns in the order in which a tape takes its variables.

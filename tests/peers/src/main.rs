@@ -1,7 +1,7 @@
 //! Compares rfm with Fidget and with hand-written loops, in one run, on one thread.
 //!
-//! `cargo run --release --manifest-path tests/peers/Cargo.toml [-- --json FILE] [--only TEXT]`; what it prints is
-//! explained in `README.md` beside it.
+//! `cargo run --release --manifest-path tests/peers/Cargo.toml [-- --json FILE] [--only TEXT]`, with `--meshes` the
+//! meshers instead of the evaluators; what it prints is explained in `README.md` beside it.
 
 mod bars;
 mod compile;
@@ -9,6 +9,7 @@ mod fidget;
 mod groups;
 mod hand;
 mod measure;
+mod meshing;
 mod ours;
 mod scenes;
 mod table;
@@ -23,16 +24,26 @@ const GRADIENTS_UP_TO: usize = 500;
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
-    let (mut json, mut only) = (None, String::new());
+    let (mut json, mut only, mut meshes) = (None, String::new(), false);
     while let Some(argument) = arguments.next() {
+        if argument == "--meshes" {
+            meshes = true;
+            continue;
+        }
         match (argument.as_str(), arguments.next()) {
             ("--json", Some(file)) => json = Some(file),
             ("--only", Some(text)) => only = text,
             _ => {
-                eprintln!("usage: peers [--json FILE] [--only TEXT], TEXT being part of an obstacle's title");
+                eprintln!(
+                    "usage: peers [--meshes] [--json FILE] [--only TEXT], TEXT being part of an obstacle's title"
+                );
                 return ExitCode::from(2);
             }
         }
+    }
+    if meshes {
+        meshing::run(&only);
+        return ExitCode::SUCCESS;
     }
     let found = measure(&only);
     let bars = found.bars();

@@ -90,3 +90,28 @@ pub fn union_text(spheres: &[Sphere], order: Order) -> String {
     text.push('\n');
     text
 }
+
+/// A ball of which the radius itself is given.
+#[derive(Clone)]
+pub struct Ball {
+    pub centre: [f64; 3],
+    pub radius: f64,
+}
+
+/// Balls at random places in the box, all inside it, many of them overlapping.
+pub fn balls(n: usize) -> Vec<Ball> {
+    let mut random = Random(11);
+    (0..n)
+        .map(|_| Ball {
+            centre: [(); 3].map(|()| 0.2 + 2.6 * random.next()),
+            radius: 0.05 + 0.05 * random.next(),
+        })
+        .collect()
+}
+
+/// A file with the union of balls as its solid `balls`.
+pub fn balls_text(balls: &[Ball]) -> String {
+    let leaf = |Ball { centre: [x, y, z], radius }: &Ball| format!("ball([{x}, {y}, {z}], {radius})");
+    let list: Vec<String> = balls.iter().map(leaf).collect();
+    format!("rfm 1\nsolid balls = {}\n", list.join("\n or "))
+}

@@ -1,7 +1,10 @@
-//! `rfm mesh`: a closed triangle mesh of a solid, in the format that the file's ending names.
+//! `rfm mesh`: a closed triangle mesh of a solid, in the format that the file's ending names; with `--fluid` surfaces
+//! of the particles of a run.
 
-use std::io::{self, Write};
-use std::path::Path;
+mod fluid;
+mod format;
+mod simplified;
+
 use std::time::Instant;
 
 use glam::DVec3;
@@ -13,62 +16,12 @@ use crate::Solid;
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
 use crate::mesh::{
-    self, Grid, Mesh, MeshError, Quality, Report, Resolution, ThinCells, dual_contouring, marching_cubes,
+    self, Grid, Mesh, MeshError, Quality, Reference, Report, Resolution, ThinCells, dual_contouring,
+    marching_cubes,
 };
 use crate::solid::Bounds;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Format {
-    Stl,
-    Ply,
-    Obj,
-    Vtp,
-    Glb,
-    ThreeMf,
-    StlText,
-}
-
-impl Format {
-    fn of(path: &Path) -> Result<Self, Failure> {
-        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-        match ending.as_str() {
-            "stl" => Ok(Self::Stl),
-            "ply" => Ok(Self::Ply),
-            "obj" => Ok(Self::Obj),
-            "vtp" => Ok(Self::Vtp),
-            "glb" => Ok(Self::Glb),
-            "3mf" => Ok(Self::ThreeMf),
-            _ => Err(Failure::usage(format!(
-                "cannot tell the mesh format of `{}`: the ending must be .stl, .ply, .obj, .vtp, .glb or .3mf",
-                path.display()
-            ))),
-        }
-    }
-
-    /// The format that the options ask for.
-    fn chosen(options: &Options) -> Result<Option<Self>, Failure> {
-        let format = options.output.as_deref().map(Self::of).transpose()?;
-        match (format, options.ascii) {
-            (Some(Self::Stl), true) => Ok(Some(Self::StlText)),
-            (format, false) => Ok(format),
-            _ => Err(Failure::usage(
-                "--ascii is for .stl files: the other formats are text or binary by themselves",
-            )),
-        }
-    }
-
-    pub fn write(self, mesh: &Mesh, mut out: &mut dyn Write) -> io::Result<()> {
-        match self {
-            Self::Stl => mesh::stl::write(mesh, &mut out),
-            Self::Ply => mesh::ply::write(mesh, &mut out),
-            Self::Obj => mesh::obj::write(mesh, &mut out),
-            Self::Vtp => mesh::vtp::write(mesh, &mut out),
-            Self::Glb => mesh::glb::write(mesh, &mut out),
-            Self::ThreeMf => mesh::threemf::write(mesh, &mut out),
-            Self::StlText => mesh::stl::write_ascii(mesh, &mut out),
-        }
-    }
-}
+pub(super) use format::Format;
+use simplified::{Simplified, simplified};
 
 #[derive(Serialize)]
 struct Summary {
@@ -88,49 +41,33 @@ struct Summary {
     evaluations: u64,
     milliseconds: f64,
     method: &'static str,
-    /// With `--quality` only.
+    /// With `--quality` only: lengths in metres, angles in degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
-    quality: Option<Figures>,
+    quality: Option<Quality>,
+    /// With `--simplify` only.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    simplified: Option<SimplifiedFigures>,
 }
 
-/// How far a mesh is from the surface, lengths in metres, angles in degrees.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Figures {
-    pub hausdorff: f64,
-    pub mesh_to_surface_max: f64,
-    pub mesh_to_surface_rms: f64,
-    pub surface_to_mesh_max: f64,
-    pub surface_to_mesh_rms: f64,
-    pub samples: usize,
-    pub normal_error_max: f64,
-    pub normal_error_rms: f64,
-    pub volume_error: f64,
-    pub area_error: f64,
-    pub flipped: usize,
-    pub min_angle: f64,
-    pub min_radius_ratio: f64,
-    pub mean_radius_ratio: f64,
-    pub slivers: f64,
+struct SimplifiedFigures {
+    /// Triangles before.
+    simplified_from: usize,
+    /// Metres, as asked for.
+    simplify_tolerance: f64,
+    /// Measured Hausdorff distance from the surface, metres.
+    simplify_error: f64,
+    /// With measuring.
+    simplify_milliseconds: f64,
 }
 
-impl From<Quality> for Figures {
-    fn from(quality: Quality) -> Self {
+impl From<&Simplified> for SimplifiedFigures {
+    fn from(simplified: &Simplified) -> Self {
         Self {
-            hausdorff: quality.hausdorff(),
-            mesh_to_surface_max: quality.to_surface.max,
-            mesh_to_surface_rms: quality.to_surface.rms,
-            surface_to_mesh_max: quality.from_surface.max,
-            surface_to_mesh_rms: quality.from_surface.rms,
-            samples: quality.to_surface.samples + quality.from_surface.samples,
-            normal_error_max: quality.normal_error.max,
-            normal_error_rms: quality.normal_error.rms,
-            volume_error: quality.volume_error,
-            area_error: quality.area_error,
-            flipped: quality.flipped,
-            min_angle: quality.min_angle,
-            min_radius_ratio: quality.min_radius_ratio,
-            mean_radius_ratio: quality.mean_radius_ratio,
-            slivers: quality.slivers,
+            simplified_from: simplified.from,
+            simplify_tolerance: simplified.tolerance,
+            simplify_error: simplified.quality.hausdorff(),
+            simplify_milliseconds: simplified.milliseconds,
         }
     }
 }
@@ -189,7 +126,20 @@ impl Field for Depth<'_> {
 }
 
 pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
-    let format = Format::chosen(options)?;
+    if options.fluid {
+        return fluid::run(shared, options);
+    }
+    if options.file.is_dir() {
+        let folder = options.file.display();
+        return Err(Failure::usage(format!(
+            "`{folder}` is a folder: give a file, or mesh the fluid of a run with `rfm mesh {folder} --fluid`"
+        )));
+    }
+    let format = match options.output.as_deref().map(Format::of).transpose()? {
+        Some(format) => Some(format.as_text(options.ascii)?),
+        None if options.ascii => return Err(Format::no_text()),
+        None => None,
+    };
     if format.is_none() && !shared.json {
         return Err(Failure::usage(
             "no output: give -o FILE.stl (or .ply, .obj, .vtp, .glb, .3mf), or --json for the figures alone",
@@ -214,7 +164,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     // same surface as ω, cheaper, and normals of one face at creases
     let grid = grid.transpose().map_err(Failure::usage)?;
     let surface = solid.surface(grid.as_ref().map_or(Aabb::EMPTY, |grid| *grid.bounds()));
-    let mesh = match &grid {
+    let mut mesh = match &grid {
         None => Mesh::default(),
         Some(grid) => {
             let bar = progress::bar(1000, "meshing");
@@ -229,6 +179,22 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         }
     };
     let milliseconds = started.elapsed().as_secs_f64() * 1e3;
+    let depth = Depth(&solid);
+    let measured = options.quality || options.simplify.is_some();
+    let spinner = measured.then(|| progress::spinner("measuring"));
+    let reference = grid.as_ref().filter(|_| measured).map(|grid| Reference::new(&*surface, &depth, grid));
+    let reference = reference.transpose().map_err(Failure::usage)?;
+    let simplified = options.simplify.zip(reference.as_ref()).map(|(tolerance, reference)| {
+        let found = simplified(&mesh, tolerance, &depth, reference);
+        mesh.clone_from(&found.mesh);
+        found
+    });
+    let quality = match (&simplified, &reference) {
+        (Some(simplified), _) => Some(simplified.quality),
+        (None, Some(reference)) => Some(reference.measure(&mesh)),
+        (None, None) => None,
+    };
+    spinner.inspect(|spinner| spinner.finish_and_clear());
     let report = mesh::check(&mesh, &*surface);
     let thin = grid
         .as_ref()
@@ -241,15 +207,6 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
             thin.count, thin.bounds.min, thin.bounds.max
         ));
     }
-    let quality = match grid.as_ref().filter(|_| options.quality) {
-        None => None,
-        Some(grid) => {
-            let bar = progress::spinner("measuring");
-            let quality = mesh::measure(&mesh, &*surface, &Depth(&solid), grid).map_err(Failure::usage)?;
-            bar.finish_and_clear();
-            Some(quality)
-        }
-    };
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(&solid, bounds, options)));
     }
@@ -257,19 +214,22 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         output::write(path, |out| format.write(&mesh, out))?;
     }
     if shared.json {
-        let figures = quality.map(Figures::from);
-        return output::json(&summary(
-            solid.name(),
-            options.method,
-            &report,
-            thin.count,
-            figures,
-            milliseconds,
-        ));
+        let quality = quality.filter(|_| options.quality);
+        let mut summary = summary(solid.name(), options.method, &report, thin.count, quality, milliseconds);
+        summary.simplified = simplified.as_ref().map(SimplifiedFigures::from);
+        return output::json(&summary);
     }
     print(&report, milliseconds);
-    if let Some(quality) = &quality {
-        print_quality(quality);
+    if let Some(simplified) = &simplified {
+        say!(
+            "simplified from {} triangles: at most {:.2e} from the surface, {:.2e} allowed",
+            simplified.from,
+            simplified.quality.hausdorff(),
+            simplified.tolerance
+        );
+    }
+    if let Some(quality) = quality.filter(|_| options.quality) {
+        print_quality(&quality);
     }
     if let Some(path) = &options.output {
         say!("written to {}", path.display());
@@ -290,7 +250,7 @@ fn summary(
     method: MeshMethod,
     report: &Report,
     thin_cells: usize,
-    quality: Option<Figures>,
+    quality: Option<Quality>,
     milliseconds: f64,
 ) -> Summary {
     Summary {
@@ -311,6 +271,7 @@ fn summary(
         milliseconds,
         method: method.name(),
         quality,
+        simplified: None,
     }
 }
 

@@ -1,0 +1,274 @@
+//! `rfm mesh DIR --fluid`: the frames that `rfm run` wrote → surfaces of the fluid, one file for each frame.
+//!
+//! Everything is read and checked before the first file is written; each file is whole or not there.
+
+use std::path::Path;
+use std::time::Instant;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::super::args::{Frames, Mesh as Options, Shared};
+use super::super::{Failure, note, output, progress};
+use super::format::Format;
+use crate::fluid_surface::{Entry, Reconstruction, read_collection, read_points};
+use crate::mesh::{is_closed_manifold, shells};
+use crate::sph;
+
+/// What `--json` says; lengths in metres, volumes in cubic metres.
+#[derive(Debug, Serialize)]
+struct Summary {
+    schema: u32,
+    /// How many were meshed.
+    frames: usize,
+    triangles: usize,
+    milliseconds: f64,
+    particle_radius: f64,
+    support_radius: f64,
+    cell: f64,
+    format: &'static str,
+    surfaces: Vec<Surface>,
+}
+
+/// One frame.
+#[derive(Debug, Serialize)]
+struct Surface {
+    frame: usize,
+    time: f64,
+    file: String,
+    particles: usize,
+    /// Particles whose position is not a number: they are left out.
+    left_out: usize,
+    vertices: usize,
+    triangles: usize,
+    closed: bool,
+    components: usize,
+    volume: f64,
+    /// Particles times mass over rest density.
+    particle_volume: f64,
+    /// The one over the other, null without particles: the error of the surface, and the fluid's own compression.
+    volume_ratio: Option<f64>,
+    milliseconds: f64,
+}
+
+/// What is needed of a run's `summary.json`.
+#[derive(Debug, Deserialize)]
+struct RunFigures {
+    particle_mass: f64,
+    rest_density: f64,
+}
+
+/// How large the particles are.
+struct Scale {
+    surface: Reconstruction,
+    /// Mass over rest density, m³.
+    particle_volume: f64,
+}
+
+pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
+    let format = options.format.unwrap_or(Format::Vtp).as_text(options.ascii)?;
+    let folder = &options.file;
+    let entries = chosen(collection(folder)?, options.frames)?;
+    let scale = Scale::of(folder, options)?;
+    for (_, entry) in &entries {
+        let file = folder.join(&entry.file);
+        if !file.is_file() {
+            let lost =
+                format!("the frame `{}` is missing; `rfm run` writes it again, or choose", file.display());
+            return Err(Failure::usage(format!("{lost} others with --frames A..B")));
+        }
+    }
+    let target = options.output.clone().unwrap_or_else(|| folder.join("surface"));
+    let started = Instant::now();
+    let bar = progress::bar(entries.len() as u64, "surfaces");
+    let mut surfaces: Vec<Surface> = Vec::new();
+    for (frame, entry) in &entries {
+        let made = surface(*frame, entry, folder, &target, &scale, format);
+        let made = made.map_err(|failure| with_kept(failure, surfaces.len(), &target))?;
+        bar.set_message(format!("t = {:.3} s, {} triangles", made.time, made.triangles));
+        surfaces.push(made);
+        if format == Format::Vtp {
+            output::write(&target.join("surface.pvd"), |mut out| {
+                sph::write_pvd(&mut out, surfaces.iter().map(|s| (s.time, s.file.as_str())))
+            })?;
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let left_out: usize = surfaces.iter().map(|surface| surface.left_out).sum();
+    if left_out > 0 {
+        note(format!("{left_out} positions are not numbers and were left out"));
+    }
+    let summary = Summary {
+        schema: 1,
+        frames: surfaces.len(),
+        triangles: surfaces.iter().map(|surface| surface.triangles).sum(),
+        milliseconds: started.elapsed().as_secs_f64() * 1e3,
+        particle_radius: scale.surface.particle_radius,
+        support_radius: scale.surface.support_radius,
+        cell: scale.surface.cell,
+        format: format.ending(),
+        surfaces,
+    };
+    if shared.json {
+        return output::json(&summary);
+    }
+    print(&summary);
+    say!("written to {}", target.display());
+    Ok(())
+}
+
+/// The frames of a run, from its `particles.pvd`.
+fn collection(folder: &Path) -> Result<Vec<Entry>, Failure> {
+    let shown = folder.display();
+    if !folder.exists() {
+        return Err(Failure::usage(format!(
+            "there is no folder `{shown}`: --fluid meshes what `rfm run FILE -o {shown}` leaves there"
+        )));
+    }
+    if !folder.is_dir() {
+        let run = folder.with_extension("out");
+        return Err(Failure::usage(format!(
+            "`{shown}` is a file: --fluid meshes the folder of a run; try `rfm run {shown}`, then `rfm mesh {} --fluid`",
+            run.display()
+        )));
+    }
+    let path = folder.join("particles.pvd");
+    if !path.is_file() {
+        return Err(Failure::usage(format!(
+            "there are no frames in `{shown}`: `rfm run` lists them in particles.pvd, unless it is told --no-frames"
+        )));
+    }
+    let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.display()));
+    let text = std::fs::read_to_string(&path).map_err(|error| failed(error.to_string()))?;
+    let entries = read_collection(&text).map_err(|error| failed(error.to_string()))?;
+    if entries.is_empty() {
+        return Err(failed("it lists no frames".into()));
+    }
+    Ok(entries)
+}
+
+/// The entries that are asked for, with their numbers.
+fn chosen(entries: Vec<Entry>, frames: Option<Frames>) -> Result<Vec<(usize, Entry)>, Failure> {
+    let count = entries.len();
+    let Frames { first, end } = frames.unwrap_or_default();
+    let end = end.unwrap_or(count);
+    if first >= end || end > count {
+        return Err(Failure::usage(format!(
+            "--frames {first}..{end}: there are {count} frames, from 0 to {}; B is the first that is left out",
+            count - 1
+        )));
+    }
+    Ok(entries.into_iter().enumerate().take(end).skip(first).collect())
+}
+
+impl Scale {
+    /// From the flags, else from what the run says of its particles.
+    fn of(folder: &Path, options: &Options) -> Result<Self, Failure> {
+        let path = folder.join("summary.json");
+        let figures = std::fs::read_to_string(&path)
+            .map_err(|error| error.to_string())
+            .and_then(|text| serde_json::from_str::<RunFigures>(&text).map_err(|error| error.to_string()))
+            .map(|figures| figures.particle_mass / figures.rest_density);
+        let usable = |length: f64| length.is_finite() && length > 0.0;
+        let particle_volume = match (options.radius, figures) {
+            (_, Ok(volume)) if usable(volume) => volume,
+            (Some(radius), _) => (2.0 * radius).powi(3),
+            (None, found) => {
+                let why = found.err().unwrap_or_else(|| "its mass or density is not positive".into());
+                return Err(Failure::usage(format!(
+                    "`{}` does not tell how large the particles are: {why}\ngive half their spacing with --radius, \
+                     for example --radius 13.6mm",
+                    path.display()
+                )));
+            }
+        };
+        let radius = options.radius.unwrap_or(0.5 * particle_volume.cbrt());
+        let advised = Reconstruction::of_radius(radius);
+        let cell = options.cell.unwrap_or(advised.cell);
+        for (flag, length) in [("--radius", radius), ("--cell", cell)] {
+            if !usable(length) {
+                return Err(Failure::usage(format!("{flag} {length}: expected a length above 0")));
+            }
+        }
+        Ok(Self { surface: Reconstruction { cell, ..advised }, particle_volume })
+    }
+}
+
+/// Reads one frame, meshes it and writes the mesh.
+fn surface(
+    frame: usize,
+    entry: &Entry,
+    folder: &Path,
+    target: &Path,
+    scale: &Scale,
+    format: Format,
+) -> Result<Surface, Failure> {
+    let started = Instant::now();
+    let path = folder.join(&entry.file);
+    let failed = |error: String| {
+        let rest = "`rfm run` writes it again, or leave it out with --frames A..B";
+        Failure::usage(format!("cannot mesh the frame `{}`: {error}\n{rest}", path.display()))
+    };
+    let bytes = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
+    let points = read_points(&bytes).map_err(|error| failed(error.to_string()))?;
+    let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
+    let mesh = scale.surface.mesh(&finite).map_err(|error| failed(error.to_string()))?;
+    create(target)?;
+    let file = format!("surface_{frame:06}.{}", format.ending());
+    output::write(&target.join(&file), |out| format.write(&mesh, out))?;
+    let parts = shells(&mesh);
+    let volume = parts.iter().fold(0.0, |sum, shell| sum + shell.volume);
+    let particle_volume = finite.len() as f64 * scale.particle_volume;
+    Ok(Surface {
+        frame,
+        time: entry.time,
+        file,
+        particles: finite.len(),
+        left_out: points.len() - finite.len(),
+        vertices: mesh.positions.len(),
+        triangles: mesh.triangles.len(),
+        closed: is_closed_manifold(&mesh),
+        components: parts.len(),
+        volume,
+        particle_volume,
+        volume_ratio: (particle_volume > 0.0).then_some(volume / particle_volume),
+        milliseconds: started.elapsed().as_secs_f64() * 1e3,
+    })
+}
+
+fn create(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::usage(format!("cannot make the folder `{}`: {error}", folder.display())))
+}
+
+/// A failure that says what is there already.
+fn with_kept(failure: Failure, kept: usize, target: &Path) -> Failure {
+    match failure {
+        Failure::Usage(message) if kept > 0 => {
+            Failure::Usage(format!("{message}\nthe {kept} surfaces before it are in `{}`", target.display()))
+        }
+        other => other,
+    }
+}
+
+fn print(summary: &Summary) {
+    let ratios = summary.surfaces.iter().filter_map(|surface| surface.volume_ratio);
+    let (least, most) =
+        ratios.fold((f64::INFINITY, 0.0), |(least, most), ratio| (ratio.min(least), ratio.max(most)));
+    say!(
+        "{} frames, {} triangles in {:.1} ms; particles of radius {:.3e} m, cells of {:.3e} m",
+        summary.frames,
+        summary.triangles,
+        summary.milliseconds,
+        summary.particle_radius,
+        summary.cell
+    );
+    if least <= most {
+        say!("volume within the surface: {least:.3} to {most:.3} times that of the particles");
+    }
+    let open = summary.surfaces.iter().filter(|surface| !surface.closed).count();
+    if open > 0 {
+        note(format!("{open} of the surfaces are not closed manifolds"));
+    }
+}

@@ -1,0 +1,204 @@
+//! From the particles of a fluid to a closed triangle mesh around them, frame by frame.
+//!
+//! [`read_collection`] lists the frames of a run → [`read_points`] reads the positions of one → [`Reconstruction::mesh`]
+//! lays a surface around them (crate `splashsurf_lib`): the density that a kernel sum gives, over the rest density, is
+//! meshed by marching cubes at a threshold, as Löschner, Böttcher, Jeske and Bender describe ("Weighted Laplacian
+//! Smoothing for Surface Reconstruction of Particle-based Fluids", 2023).
+//!
+//! Invariant: the mesh is closed, its triangles are counter-clockwise seen from outside the fluid, and the same
+//! particles give the same bits on any number of threads: what the crate returns in the order in which threads finish
+//! is put in order here.
+
+mod collection;
+mod frame;
+
+use std::fmt;
+
+use glam::DVec3;
+use splashsurf_lib::nalgebra::Vector3;
+use splashsurf_lib::{GridDecompositionParameters, Parameters, SpatialDecomposition, reconstruct_surface};
+
+use crate::geom::Aabb;
+use crate::mesh::Mesh;
+
+pub use collection::{CollectionError, Entry, read_collection};
+pub use frame::{FrameError, read_points};
+
+/// What a surface is made with; lengths in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reconstruction {
+    /// Half of the particles' spacing: a particle stands for a cube of twice this side.
+    pub particle_radius: f64,
+    /// Beyond this distance a particle has no weight. Twice the smoothing length, which splashsurf advises to be twice
+    /// the radius: larger ones smooth the surface, and blunt it.
+    pub support_radius: f64,
+    /// Side of a marching-cubes cell. splashsurf advises half the radius; from a whole one on, single particles show
+    /// as facets.
+    pub cell: f64,
+    /// The part of the rest density at which the surface lies: 0.6, as splashsurf advises, which is where a half-space
+    /// full of particles keeps about its volume.
+    pub threshold: f64,
+}
+
+impl Reconstruction {
+    /// Support radius over particle radius.
+    const SUPPORT: f64 = 4.0;
+    /// Cell over particle radius.
+    const CELL: f64 = 0.5;
+    const THRESHOLD: f64 = 0.6;
+    /// Most cells within the support radius: at 32 one particle already touches 137 000 nodes.
+    const MOST_IN_SUPPORT: f64 = 32.0;
+    /// Most cells along the longest side of the fluid: `f32`, in which the crate computes fast, then still resolves a
+    /// thousandth of a cell.
+    const MOST_CELLS: f64 = 16384.0;
+
+    /// The advised values for particles of a radius.
+    pub fn of_radius(particle_radius: f64) -> Self {
+        Self {
+            particle_radius,
+            support_radius: Self::SUPPORT * particle_radius,
+            cell: Self::CELL * particle_radius,
+            threshold: Self::THRESHOLD,
+        }
+    }
+
+    /// The surface around particles. No particles give no triangles.
+    ///
+    /// # Errors
+    /// Lengths that are not positive, cells too small for the radius or for the extent of the fluid, positions that are
+    /// not numbers.
+    pub fn mesh(&self, particles: &[DVec3]) -> Result<Mesh, SurfaceError> {
+        let positive = |length: f64| length.is_finite() && length > 0.0;
+        if ![self.particle_radius, self.support_radius, self.cell].into_iter().all(positive) {
+            return Err(SurfaceError::Length);
+        }
+        if self.support_radius > Self::MOST_IN_SUPPORT * self.cell {
+            let least = self.support_radius / Self::MOST_IN_SUPPORT;
+            return Err(SurfaceError::CellTooSmall { cell: self.cell, least });
+        }
+        if let Some(index) = particles.iter().position(|p| !p.is_finite()) {
+            return Err(SurfaceError::NotANumber { index });
+        }
+        if particles.is_empty() {
+            return Ok(Mesh::default());
+        }
+        let bounds = particles.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p));
+        let extent = bounds.size().max_element();
+        if extent > Self::MOST_CELLS * self.cell {
+            return Err(SurfaceError::TooWide { extent, cell: self.cell });
+        }
+        // near the origin f32 has its digits where they are needed
+        let middle = bounds.centre();
+        let positions: Vec<Vector3<f32>> = particles
+            .iter()
+            .map(|p| {
+                let p = (*p - middle).as_vec3();
+                Vector3::new(p.x, p.y, p.z)
+            })
+            .collect();
+        let found = reconstruct_surface::<i64, f32>(&positions, &self.parameters());
+        let surface = found.map_err(|error| SurfaceError::Crate(error.to_string()))?.mesh;
+        let positions = surface.vertices.iter().map(|v| [v.x, v.y, v.z]).collect();
+        in_order(positions, surface.triangles, middle)
+    }
+
+    fn parameters(&self) -> Parameters<f32> {
+        let [radius, support, cell] =
+            [self.particle_radius, self.support_radius, self.cell].map(|length| length as f32);
+        let mut parameters = Parameters::new(radius, support, cell);
+        parameters.iso_surface_threshold = self.threshold as f32;
+        // without subdomains densities are summed in the order in which threads come
+        parameters.spatial_decomposition = SpatialDecomposition::UniformGrid(GridDecompositionParameters {
+            auto_disable: false,
+            ..GridDecompositionParameters::default()
+        });
+        parameters
+    }
+}
+
+/// A mesh whose vertices are sorted by place and whose triangles by vertices: the crate stitches subdomains together in
+/// the order in which threads finish.
+fn in_order(
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[usize; 3]>,
+    middle: DVec3,
+) -> Result<Mesh, SurfaceError> {
+    if positions.len() > Mesh::MAX_VERTICES {
+        return Err(SurfaceError::TooManyVertices { found: positions.len() });
+    }
+    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
+    order.sort_by(|&a, &b| {
+        let (a, b) = (positions[a as usize], positions[b as usize]);
+        a[2].total_cmp(&b[2]).then(a[1].total_cmp(&b[1])).then(a[0].total_cmp(&b[0]))
+    });
+    let mut number = vec![0; positions.len()];
+    (0..).zip(&order).for_each(|(new, &old): (u32, _)| number[old as usize] = new);
+    let mut sorted: Vec<[u32; 3]> = triangles
+        .into_iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|v| number[v]);
+            // begin with the least corner, keep the way round
+            if a < b && a < c {
+                [a, b, c]
+            } else if b < c {
+                [b, c, a]
+            } else {
+                [c, a, b]
+            }
+        })
+        .collect();
+    sorted.sort_unstable();
+    let place = |&old: &u32| DVec3::from(positions[old as usize].map(f64::from)) + middle;
+    Ok(Mesh::from_triangles(order.iter().map(place).collect(), sorted))
+}
+
+/// Why particles got no surface.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SurfaceError {
+    /// A length is not positive and finite.
+    Length,
+    CellTooSmall {
+        cell: f64,
+        least: f64,
+    },
+    /// The fluid is too many cells wide.
+    TooWide {
+        extent: f64,
+        cell: f64,
+    },
+    /// A position is infinite or not a number.
+    NotANumber {
+        index: usize,
+    },
+    TooManyVertices {
+        found: usize,
+    },
+    /// What `splashsurf_lib` says.
+    Crate(String),
+}
+
+impl fmt::Display for SurfaceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length => write!(f, "the particle radius and the cell must be lengths above 0"),
+            Self::CellTooSmall { cell, least } => {
+                write!(f, "a cell of {cell} m is too small for these particles; use {least:.3e} m or more")
+            }
+            Self::TooWide { extent, cell } => write!(
+                f,
+                "the particles are {extent:.3e} m apart, too many cells of {cell:.3e} m: has one flown off? \
+                 Larger cells may help"
+            ),
+            Self::NotANumber { index } => write!(f, "the position of particle {index} is not a number"),
+            Self::TooManyVertices { found } => {
+                write!(f, "the surface would have {found} vertices; use larger cells")
+            }
+            Self::Crate(message) => write!(f, "the surface could not be made: {message}"),
+        }
+    }
+}
+
+impl std::error::Error for SurfaceError {}
+
+#[cfg(test)]
+mod tests;
