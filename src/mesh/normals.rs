@@ -90,11 +90,14 @@ pub(super) fn unit(v: DVec3) -> Option<DVec3> {
 /// Replaces each zero normal by the area-weighted mean of the triangles around, or by +z if these cancel. Cap vertices
 /// lie inside the solid, where ∇ω says nothing about the cap: they too are left to this.
 pub(super) fn fill_missing(mesh: &mut Mesh) {
-    if !mesh.normals.contains(&DVec3::ZERO) {
+    let is_missing: Vec<bool> = mesh.normals.par_iter().map(|n| *n == DVec3::ZERO).collect();
+    if is_missing.par_iter().all(|missing| !missing) {
         return;
     }
-    let is_missing: Vec<bool> = mesh.normals.iter().map(|n| *n == DVec3::ZERO).collect();
-    for triangle in &mesh.triangles {
+    let touches = |t: &&[u32; 3]| t.iter().any(|&v| is_missing[v as usize]);
+    // found in parallel, summed in their order
+    let around: Vec<&[u32; 3]> = mesh.triangles.par_iter().filter(touches).collect();
+    for triangle in around {
         let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
         let twice_area = (b - a).cross(c - a);
         for &v in triangle.iter().filter(|&&v| is_missing[v as usize]) {

@@ -195,8 +195,8 @@ fn row(name: &str, solid: &Solid, cells: usize, volume: Option<f64>) -> (f64, Me
                 let made = cubes(&*field, &grid);
                 (made, processor_time().zip(before).map(|(after, before)| after - before))
             });
-            found = made;
             let elapsed = start.elapsed().as_secs_f64();
+            found = made;
             *fastest = fastest.min(elapsed);
             if pool.current_num_threads() == 1 {
                 on_processor += spent.unwrap_or(elapsed);

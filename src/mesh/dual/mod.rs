@@ -1,7 +1,7 @@
 //! Manifold dual contouring: one vertex for each sheet of the surface in a cell, placed on creases and corners.
 //!
 //! `crossings` finds the cells that the surface passes and its hits on their edges, as for marching cubes → `loops` tells
-//! which hits belong together → `place` gives each loop a vertex (`qef`, `crease`) → `quads` joins the four vertices
+//! which hits belong together → `place` gives each loop a vertex (`sharp`, `qef`, `crease`) → `quads` joins the four vertices
 //! around each hit and cuts the quad in two → `refine` cuts edges that are still too far from the surface → `unfold` turns
 //! edges of triangles that lie upside down.
 //!
@@ -20,16 +20,19 @@ mod project;
 mod qef;
 mod quads;
 mod refine;
+mod sharp;
 #[cfg(test)]
 mod tests;
 mod unfold;
+mod vertices;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use self::loops::Sheets;
-use self::place::{Hits, Kind, Placed, Rings, Scene, Slots, Vertices};
+use self::place::{Placed, Scene, Slots};
 use self::quads::Quads;
+use self::vertices::{Hits, Kind, Rings, Vertices};
 use super::{
     Grid, Mesh, MeshError, Work,
     collapse::{self, AtNode},

@@ -1,22 +1,17 @@
 //! Where the vertex of a loop goes: onto the surface, and onto its crease or corner where the loop encloses one.
 //!
 //! Loops whose hits face nearly the same way take the mean of the hits, moved onto the surface by Newton's method,
-//! all of a brick together. For the others the candidates are tried in turn: the minimiser of the quadratic error if
-//! it lies on the surface already (plane faces, tips of cones), the crease of the two or three faces that the hits
-//! show, the minimiser moved onto the surface, the mean of the hits.
+//! all of a task together; the others are left to `sharp`.
 //!
 //! Invariant: a vertex lies within [`SLIDE`] of its cell or of the mean of its hits, on the border if its cell is in the
 //! ring.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::super::{
     cases::{EDGES, tube},
     crossings::{Crossed, Task},
-    normals::{Gradients, unit},
+    normals::Gradients,
     patches::cell_low,
     prune::{BRICK, Lattice},
     signs::{
@@ -24,27 +19,17 @@ use super::super::{
         vertex_table,
     },
 };
-use super::crease::{self, Face};
 use super::loops::{CellLoops, LOOPS, Loop, Sheets};
-use super::project;
-use super::qef;
+use super::vertices::{Hit, Hits, Kind, Rings, Vertex};
+use super::{project, sharp};
 use crate::field::Field;
 use crate::geom::Aabb;
 
 /// Hits whose normals all lie within this of their mean (cosine of 10°) see a smooth surface.
 const NEARLY_FLAT: f64 = 0.985;
 
-/// Normals that differ less than this from each face found so far belong to one of them (cosine of 25°).
-const NEW_FACE: f64 = 0.906;
-
-/// How far from its cell a vertex may lie, in cells: creases that curve pass a little beside the hits that show them.
-const REACH: f64 = 0.05;
-
 /// How far from its cell a point may slide onto the surface, in cells.
-const SLIDE: f64 = 0.5;
-
-/// Corners must lie in their cells up to rounding, in cells: else two cells would place a vertex in the same one.
-const CORNER_REACH: f64 = 1e-9;
+pub(super) const SLIDE: f64 = 0.5;
 
 /// Newton steps onto a smooth surface.
 const STEPS: usize = 4;
@@ -55,106 +40,6 @@ const LAST_STEP: f64 = 3e-6;
 
 /// How far from a face into its cell the ends of a tunnel lie, as a share of the way to the middle.
 const INTO_CELL: f64 = 0.25;
-
-/// A distance from the surface that is none, in cells: plane faces give 1e-15.
-const ON_SURFACE: f64 = 1e-11;
-
-/// A vertex of the mesh.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Vertex {
-    pub position: DVec3,
-    /// Outward unit normal; zero on creases and where there is none.
-    pub normal: DVec3,
-    pub kind: Kind,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    /// The surface is smooth in the cell.
-    Smooth,
-    /// The surface may have a crease there.
-    Sharp,
-    /// On the border, where the solid leaves the grid.
-    Cap,
-}
-
-/// Vertices by their numbers.
-#[derive(Default)]
-pub(super) struct Vertices {
-    pub positions: Vec<DVec3>,
-    pub normals: Vec<DVec3>,
-    pub kinds: Vec<Kind>,
-}
-
-impl Vertices {
-    pub fn new(count: usize) -> Self {
-        // rayon writes the zeros, so each thread touches memory of its own for the first time
-        let zeros = || rayon::iter::repeat_n(DVec3::ZERO, count).collect();
-        Self { positions: zeros(), normals: zeros(), kinds: vec![Kind::Smooth; count] }
-    }
-
-    pub fn len(&self) -> usize {
-        self.positions.len()
-    }
-
-    pub fn get(&self, v: u32) -> Vertex {
-        let v = v as usize;
-        Vertex { position: self.positions[v], normal: self.normals[v], kind: self.kinds[v] }
-    }
-
-    pub fn push(&mut self, vertex: Vertex) {
-        self.positions.push(vertex.position);
-        self.normals.push(vertex.normal);
-        self.kinds.push(vertex.kind);
-    }
-}
-
-/// Where the surface crosses an edge.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Hit {
-    pub position: DVec3,
-    /// Outward unit normal; zero where the field has none.
-    pub normal: DVec3,
-    /// Whether the edge leaves the grid: the hit lies on the border inside the solid.
-    pub is_cap: bool,
-}
-
-/// Hits by the numbers of their edges.
-#[derive(Default)]
-pub(super) struct Hits {
-    pub positions: Vec<DVec3>,
-    pub normals: Vec<DVec3>,
-    pub is_cap: Vec<bool>,
-}
-
-impl Hits {
-    pub fn get(&self, number: u32) -> Hit {
-        let i = number as usize;
-        Hit { position: self.positions[i], normal: self.normals[i], is_cap: self.is_cap[i] }
-    }
-}
-
-/// The vertices of the four cells around each crossed edge, by the edge's place in the cell.
-pub(super) struct Rings(Vec<[AtomicU32; 4]>);
-
-/// A place without a vertex; only a field whose ranges contradict its values leaves one.
-pub(super) const NONE: u32 = u32::MAX;
-
-impl Rings {
-    pub fn new(count: usize) -> Self {
-        let empty = |_| [const { AtomicU32::new(NONE) }; 4];
-        Self((0..count).into_par_iter().map(empty).collect())
-    }
-
-    pub fn get(&self, hit: u32) -> [u32; 4] {
-        self.0[hit as usize].each_ref().map(|vertex| vertex.load(Ordering::Relaxed))
-    }
-
-    /// Each place is written by one cell.
-    fn set(&self, hit: u32, edge: u8, vertex: u32) {
-        self.0[hit as usize][usize::from(edge & 3)].store(vertex, Ordering::Relaxed);
-    }
-}
 
 /// Where the vertices of a task go.
 pub(super) struct Slots<'a> {
@@ -286,9 +171,13 @@ impl Scene<'_> {
             scratch.hits.extend(around.edges.iter().map(|&e| self.hits.get(hit(e))));
             let high = self.lattice.position(low.map(|n| n + 1));
             let cell = Aabb::new(self.lattice.position(low), high);
-            let found = placed.vertex(self.field, &cell, self.spacing, &scratch.hits, mean);
-            slots.set(place, found.0);
-            placed.fallbacks.push((vertex, found.1));
+            let (hits, count) = (&scratch.hits, &mut placed.gradients);
+            let (found, fallback) = match cell.size().min_element() > 0.0 {
+                true => (sharp::at_crease(self.field, &cell, self.spacing, hits, mean, count), mean),
+                false => sharp::on_border(self.field, &cell, hits, mean, count),
+            };
+            slots.set(place, found);
+            placed.fallbacks.push((vertex, fallback));
         }
     }
 
@@ -389,124 +278,4 @@ impl Slots<'_> {
         self.normals[place] = vertex.normal;
         self.kinds[place] = vertex.kind;
     }
-}
-
-impl Placed {
-    /// The vertex of a loop that is not smooth or lies on the border, and where it goes otherwise.
-    fn vertex(
-        &mut self,
-        field: &dyn Field,
-        cell: &Aabb,
-        spacing: DVec3,
-        hits: &[Hit],
-        mean: DVec3,
-    ) -> (Vertex, DVec3) {
-        if cell.size().min_element() == 0.0 {
-            return self.on_border(field, cell, hits, mean);
-        }
-        (self.at_crease(field, cell, spacing, hits, mean), mean)
-    }
-
-    fn at_crease(
-        &mut self,
-        field: &dyn Field,
-        cell: &Aabb,
-        spacing: DVec3,
-        hits: &[Hit],
-        mean: DVec3,
-    ) -> Vertex {
-        let size = spacing.min_element();
-        let lies_within = |p: DVec3, reach: f64| {
-            p.cmpge(cell.min - reach * spacing).all() && p.cmple(cell.max + reach * spacing).all()
-        };
-        let sharp = |position| Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp };
-
-        let planes = hits.iter().filter(|hit| hit.normal != DVec3::ZERO);
-        let (least, rank) = qef::minimiser(planes.map(|hit| (hit.position, hit.normal)), mean);
-        let reach_of = |rank: usize| if rank == 3 { CORNER_REACH } else { REACH };
-        if lies_within(least, reach_of(rank)) {
-            self.gradients += 1;
-            let (omega, gradient) = field.omega_grad(least);
-            if omega.abs() <= ON_SURFACE * size * gradient.length() {
-                return sharp(least);
-            }
-        }
-        let faces = faces(hits);
-        let pairs: &[&[usize]] = match faces.len() {
-            3 => &[&[0, 1, 2], &[0, 1], &[0, 2], &[1, 2]],
-            2 => &[&[0, 1]],
-            _ => &[],
-        };
-        for chosen in pairs {
-            let few: Vec<Face> = chosen.iter().map(|&i| faces[i]).collect();
-            let found = crease::find(field, mean, &few, size, &mut self.gradients);
-            if let Some(found) = found.filter(|p| lies_within(*p, reach_of(chosen.len()))) {
-                return sharp(found);
-            }
-        }
-        let inside = least.clamp(cell.min, cell.max);
-        for start in [inside, mean] {
-            let settled = self.settle(field, start, DVec3::ONE, size);
-            if let Some((position, normal)) = settled.filter(|(p, _)| lies_within(*p, SLIDE)) {
-                return Vertex { position, normal, kind: Kind::Sharp };
-            }
-        }
-        sharp(mean)
-    }
-
-    /// The vertex of a cell of the ring: on the border, and on the surface where that meets the border in the cell.
-    fn on_border(&mut self, field: &dyn Field, cell: &Aabb, hits: &[Hit], mean: DVec3) -> (Vertex, DVec3) {
-        let on_surface: Vec<DVec3> = hits.iter().filter(|hit| !hit.is_cap).map(|hit| hit.position).collect();
-        let clamped = |p: DVec3| p.clamp(cell.min, cell.max);
-        if on_surface.is_empty() {
-            let normal = unit(hits.iter().map(|hit| hit.normal).sum()).unwrap_or(DVec3::ZERO);
-            let position = clamped(mean);
-            return (Vertex { position, normal, kind: Kind::Cap }, position);
-        }
-        let mean = clamped(on_surface.iter().sum::<DVec3>() / on_surface.len() as f64);
-        let free = DVec3::select(cell.size().cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO);
-        let size = cell.size().max_element();
-        let settled = self.settle(field, mean, free, size).filter(|(p, _)| clamped(*p) == *p);
-        let position = settled.map_or(mean, |(p, _)| p);
-        (Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp }, mean)
-    }
-
-    /// The surface near a point by Newton's method along the free axes, with its normal.
-    fn settle(&mut self, field: &dyn Field, start: DVec3, free: DVec3, size: f64) -> Option<(DVec3, DVec3)> {
-        let mut at = start;
-        for _ in 0..2 * STEPS {
-            self.gradients += 1;
-            let (omega, gradient) = field.omega_grad(at);
-            let slope = gradient * free;
-            let step = slope * (omega / slope.length_squared());
-            if !step.is_finite() {
-                return None;
-            }
-            at -= step;
-            if at.distance(start) > size {
-                return None;
-            }
-            if step.length() <= ON_SURFACE * size {
-                return Some((at, unit(-gradient)?));
-            }
-        }
-        None
-    }
-}
-
-/// Up to three faces that the hits lie on: the two that differ most, and one that differs from both.
-fn faces(hits: &[Hit]) -> Vec<Face> {
-    let faces: Vec<Face> = hits
-        .iter()
-        .filter(|hit| hit.normal != DVec3::ZERO)
-        .map(|hit| Face { point: hit.position, normal: hit.normal })
-        .collect();
-    let pairs = (0..faces.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
-    let cosine = |(i, j): &(usize, usize)| faces[*i].normal.dot(faces[*j].normal);
-    let Some((a, b)) = pairs.min_by(|p, q| cosine(p).total_cmp(&cosine(q))) else { return Vec::new() };
-    let likeness = |face: &&Face| face.normal.dot(faces[a].normal).max(face.normal.dot(faces[b].normal));
-    let third = faces.iter().min_by(|p, q| likeness(p).total_cmp(&likeness(q)));
-    let mut found = vec![faces[a], faces[b]];
-    found.extend(third.filter(|face| likeness(face) < NEW_FACE));
-    found
 }

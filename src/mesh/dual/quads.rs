@@ -20,7 +20,8 @@ use super::super::{
     signs::Signs,
 };
 use super::loops::Sheets;
-use super::place::{Hit, Hits, Kind, NONE, Placed, Rings, Vertex, Vertices};
+use super::place::Placed;
+use super::vertices::{Hit, Hits, Kind, NONE, Rings, Vertex, Vertices};
 use crate::field::Field;
 
 /// What the quads are made of.

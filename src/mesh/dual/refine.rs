@@ -11,8 +11,9 @@ use rayon::prelude::*;
 
 use super::super::normals::{gradients, unit};
 use super::crease;
-use super::place::{Kind, Vertex, Vertices};
+
 use super::project;
+use super::vertices::{Kind, Vertex, Vertices};
 use crate::field::Field;
 
 /// The distance of an edge's middle from the surface above which it is cut, in cells. It bounds what is left: the pawn
@@ -90,13 +91,28 @@ fn cuts(
                 })
                 .collect();
             let mut count = middles.len() as u64;
-            let found = gradients(field, &middles).into_iter();
+            let found = gradients(field, &middles);
             let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
-            let cut = edges.iter().zip(found).filter(|(_, found)| off(*found)).filter_map(|(edge, _)| {
+            let (mut bends, mut others) = (Vec::new(), Vec::new());
+            for (edge, found) in edges.into_iter().zip(found).filter(|(_, found)| off(*found)) {
+                match Bend::new(vertices, edge, found) {
+                    Some(bend) => bends.push(bend),
+                    None => others.push(edge),
+                }
+            }
+            let mut cut = Vec::with_capacity(bends.len() + others.len());
+            for (bend, settled) in settle(field, bends, tolerance, &mut count) {
+                if settled {
+                    cut.extend(bend.cut(tolerance));
+                } else {
+                    others.push(bend.edge);
+                }
+            }
+            cut.extend(others.into_iter().filter_map(|edge| {
                 let ends = edge.map(|v| vertices.get(v));
-                Some((*edge, middle(field, ends, tolerance, &mut count)?))
-            });
-            (cut.collect(), count)
+                Some((edge, middle(field, ends, tolerance, &mut count)?))
+            }));
+            (cut, count)
         })
         .collect();
     let count = parts.iter().map(|part| part.1).sum();
@@ -119,6 +135,84 @@ fn may_bulge(vertices: &Vertices, edge: [u32; 2], tolerance: f64) -> bool {
         _ => chord != DVec3::ZERO,
     }
 }
+
+/// An edge over a smooth bend: the normal at its middle is about the mean of those at its ends, where across a crease it
+/// would be one of them.
+struct Bend {
+    edge: [u32; 2],
+    start: DVec3,
+    /// The edge's length.
+    length: f64,
+    /// Mean of the normals at the ends.
+    mean: DVec3,
+    position: DVec3,
+    normal: DVec3,
+}
+
+impl Bend {
+    /// The bend of an edge, if it is one, one step of Newton's method on; `found` are ω and ∇ω at its middle.
+    fn new(vertices: &Vertices, edge: [u32; 2], found: (f64, DVec3)) -> Option<Self> {
+        let [a, b] = edge.map(|v| vertices.get(v));
+        if a.kind != Kind::Smooth || b.kind != Kind::Smooth {
+            return None;
+        }
+        let (mean, normal) = (unit(a.normal + b.normal)?, unit(-found.1)?);
+        // nearer to the mean than to either: half of the way from the mean to an end
+        let half_way = unit(mean + a.normal)?.dot(mean).min(unit(mean + b.normal)?.dot(mean));
+        let start = 0.5 * (a.position + b.position);
+        let mut bend =
+            Self { edge, start, length: a.position.distance(b.position), mean, position: start, normal };
+        let is_bend = normal.dot(mean) > half_way && a.normal.dot(b.normal) > 0.0;
+        is_bend.then(|| {
+            bend.step(found);
+            bend
+        })
+    }
+
+    /// One step of Newton's method; its length.
+    fn step(&mut self, (omega, gradient): (f64, DVec3)) -> f64 {
+        let step = gradient * (omega / gradient.length_squared());
+        self.position -= step;
+        step.length()
+    }
+
+    /// The cut at the point that was found; none if the surface is near after all.
+    fn cut(&self, tolerance: f64) -> Option<EdgeCut> {
+        let Self { edge, start, position, normal, .. } = *self;
+        (position.distance(start) > tolerance)
+            .then_some((edge, Vertex { position, normal, kind: Kind::Smooth }))
+    }
+}
+
+/// Steps of Newton's method on bends.
+const STEPS: usize = 6;
+
+/// Moves bends onto the surface, together; tells of each whether that went well.
+fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) -> Vec<(Bend, bool)> {
+    let mut bends: Vec<(Bend, bool)> = bends.into_iter().map(|bend| (bend, false)).collect();
+    for _ in 0..STEPS {
+        let positions: Vec<DVec3> =
+            bends.iter().filter(|(_, settled)| !settled).map(|(bend, _)| bend.position).collect();
+        if positions.is_empty() {
+            break;
+        }
+        *count += positions.len() as u64;
+        let mut found = gradients(field, &positions).into_iter();
+        for (bend, settled) in bends.iter_mut().filter(|(_, settled)| !settled) {
+            let Some(found) = found.next() else { break };
+            bend.normal = unit(-found.1).unwrap_or(DVec3::ZERO);
+            *settled = bend.step(found) <= LAST_STEP * tolerance;
+        }
+    }
+    for (bend, settled) in &mut bends {
+        let is_near = bend.position.distance(bend.start) <= LONGEST_MOVE * bend.length;
+        *settled &= is_near && bend.normal.dot(bend.mean) > 0.0;
+    }
+    bends
+}
+
+/// A step, in tolerances, that needs no other after it: what it leaves is its square times the curvature, 1e-11 of it.
+const LAST_STEP: f64 = 1e-5;
 
 /// The vertex that cuts an edge: on the crease between the faces at its ends, or on the surface; none where the surface
 /// is near after all (the field told another face's distance), or too far off.

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::super::normals::{gradients, unit};
-use super::place::{Kind, Vertices};
+use super::vertices::{Kind, Vertices};
 use crate::field::Field;
 
 /// Turning one edge may unfold its neighbours too; what is left after so many rounds stays.
@@ -117,7 +117,7 @@ fn turn(
 mod tests {
     use glam::DVec3;
 
-    use super::super::place::Vertex;
+    use super::super::vertices::Vertex;
     use super::*;
     use crate::field::Closures;
 
