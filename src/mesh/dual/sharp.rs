@@ -23,7 +23,8 @@ const REACH: f64 = 0.05;
 const CORNER_REACH: f64 = 1e-9;
 
 /// How often a crease is sought. The point of it nearest to the middle may lie outside the cell although the crease cuts
-/// off one of its corners: going to and fro between the crease and the cell leads to a point of both.
+/// off one of its corners: then it is followed into the cell, or left for the cell's nearest point where it bends too much
+/// for that, and found once more.
 const TRIES: usize = 4;
 
 /// Newton steps: twice as many as a smooth surface takes.
@@ -71,7 +72,10 @@ pub(super) fn at_crease(
             if lies_within(found, reach_of(chosen.len())) {
                 return sharp(found);
             }
-            start = found.clamp(cell.min, cell.max);
+            let &[a, b] = &few[..] else { break };
+            let along = a.normal.cross(b.normal);
+            start = middle_within(found, along, cell, 0.5 * REACH * spacing)
+                .unwrap_or_else(|| found.clamp(cell.min, cell.max));
         }
     }
     let inside = least.clamp(cell.min, cell.max);
@@ -137,6 +141,14 @@ fn settle(
     None
 }
 
+/// The middle of the part of a line through `p` that lies in a box with a margin.
+fn middle_within(p: DVec3, along: DVec3, cell: &Aabb, margin: DVec3) -> Option<DVec3> {
+    let (a, b) = ((cell.min - margin - p) / along, (cell.max + margin - p) / along);
+    let (from, to) = (a.min(b).max_element(), a.max(b).min_element());
+    let middle = p + 0.5 * (from + to) * along;
+    (from <= to && middle.is_finite()).then_some(middle)
+}
+
 /// Up to three faces that the hits lie on: the two that differ most, and one that differs from both.
 fn faces(hits: &[Hit]) -> Vec<Face> {
     let faces: Vec<Face> = hits
@@ -152,4 +164,22 @@ fn faces(hits: &[Hit]) -> Vec<Face> {
     let mut found = vec![faces[a], faces[b]];
     found.extend(third.filter(|face| likeness(face) < NEW_FACE));
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_followed_into_a_cell() {
+        let cell = Aabb::new(DVec3::ZERO, DVec3::ONE);
+        let found = |p: DVec3, along: DVec3| middle_within(p, along, &cell, DVec3::ZERO);
+        // cuts off the corner (1, 0): enters at x = 0.8 and leaves at y = 0.2
+        let cut = found(DVec3::new(0.5, -0.3, 0.5), DVec3::new(1.0, 1.0, 0.0)).unwrap();
+        assert!(cut.distance(DVec3::new(0.9, 0.1, 0.5)) < 1e-15, "{cut}");
+        // along an axis, beside and through
+        assert_eq!(found(DVec3::new(0.5, 1.5, 0.5), DVec3::X), None);
+        assert_eq!(found(DVec3::new(7.0, 0.25, 0.5), -DVec3::X), Some(DVec3::new(0.5, 0.25, 0.5)));
+        assert_eq!(found(DVec3::ZERO, DVec3::ZERO), None);
+    }
 }
