@@ -198,11 +198,11 @@ impl Scene<'_> {
         let at = |i: usize| self.hits.positions[hits[i % n] as usize];
         let mean = (0..n).map(at).sum::<DVec3>() / n as f64;
         let size = self.spacing.min_element();
-        for i in 0..n {
+        for (i, (&hit, &edge)) in hits.iter().zip(&around.edges).enumerate() {
             let vertex = slots.first + (place + i) as u32;
-            self.rings.set(hits[i], around.edges[i], vertex);
+            self.rings.set(hit, edge, vertex);
             let before = slots.first + (place + (i + n - 1) % n) as u32;
-            placed.seconds.push(((hits[i], vertex), before));
+            placed.seconds.push(((hit, vertex), before));
             let start = at(i).midpoint(at(i + 1)).lerp(mean, INTO_CELL);
             let found = project::newton(self.field, start, INTO_CELL * size, &mut placed.gradients);
             let position = found.map_or(start, |face| face.point);
