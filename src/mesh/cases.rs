@@ -29,9 +29,6 @@ pub(super) enum Ambiguous {
     JoinSolid,
 }
 
-/// The rule in force. A wall about as thin as a cell then stays connected and does not leak.
-pub(super) const RULE: Ambiguous = Ambiguous::JoinSolid;
-
 /// Triangles of all cells that the signs alone decide, as edges of the cell, counter-clockwise seen from the fluid.
 pub(super) struct Cases {
     triangles: Vec<[u8; 3]>,
@@ -274,7 +271,11 @@ fn triangulate(polygon: &[usize]) -> Option<Vec<[u8; 3]>> {
 ///
 /// A tube is a walk around both loops at once: from the cross edge at (i, j), corner i of `a` and corner j of the
 /// reversed `b`, a triangle leads to (i + 1, j) or to (i, j + 1).
-fn tube(a: &[usize], b: &[usize], place: &impl Fn(usize) -> [f64; 3]) -> Option<(u32, Vec<[u8; 3]>)> {
+pub(super) fn tube(
+    a: &[usize],
+    b: &[usize],
+    place: &impl Fn(usize) -> [f64; 3],
+) -> Option<(u32, Vec<[u8; 3]>)> {
     let cost = |p: usize, q: usize| {
         let (from, to) = (place(p), place(q));
         let squared: f64 = (0..3).map(|i| (from[i] - to[i]).powi(2)).sum();

@@ -9,6 +9,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::Mesh;
 
 /// A vertex that lies exactly on a node of the grid.
@@ -22,7 +24,7 @@ pub(super) struct AtNode {
 /// Contracts the edges of zero length among the listed vertices and drops what vanishes. Tells which of the vertices
 /// were lost, if any.
 pub(super) fn merge_coincident(mesh: &mut Mesh, mut at_nodes: Vec<AtNode>) -> Option<Vec<bool>> {
-    at_nodes.sort_unstable();
+    at_nodes.par_sort_unstable();
     let groups: Vec<&[AtNode]> =
         at_nodes.chunk_by(|a, b| a.node == b.node).filter(|group| group.len() > 1).collect();
     if groups.is_empty() {

@@ -32,6 +32,7 @@ mod ambiguity;
 mod cases;
 mod check;
 mod collapse;
+mod crossings;
 mod dual;
 mod extract;
 pub mod formats;

@@ -57,14 +57,21 @@ pub(super) fn gradients(field: &dyn Field, positions: &[DVec3]) -> Vec<(f64, DVe
 /// Vertices evaluated together.
 const BATCH: usize = 1024;
 
-/// Computes `mesh.normals`.
-pub(super) fn add(field: &dyn Field, mesh: &mut Mesh) {
-    mesh.normals = vec![DVec3::ZERO; mesh.positions.len()];
-    let batches = mesh.normals.par_chunks_mut(BATCH).zip(mesh.positions.par_chunks(BATCH));
-    batches.for_each_init(Gradients::default, |gradients, (normals, positions)| {
-        gradients.normals(field, positions, normals);
-    });
-    mesh.work.gradients += mesh.positions.len() as u64;
+/// Computes the normals of the vertices given by number.
+pub(super) fn add(field: &dyn Field, mesh: &mut Mesh, vertices: &[u32]) {
+    let parts: Vec<Vec<DVec3>> = vertices
+        .par_chunks(BATCH)
+        .map_init(Gradients::default, |gradients, part| {
+            let positions: Vec<DVec3> = part.iter().map(|&v| mesh.positions[v as usize]).collect();
+            let mut normals = vec![DVec3::ZERO; part.len()];
+            gradients.normals(field, &positions, &mut normals);
+            normals
+        })
+        .collect();
+    for (&v, normal) in vertices.iter().zip(parts.into_iter().flatten()) {
+        mesh.normals[v as usize] = normal;
+    }
+    mesh.work.gradients += vertices.len() as u64;
     for &v in &mesh.caps {
         mesh.normals[v as usize] = DVec3::ZERO;
     }
@@ -83,11 +90,14 @@ pub(super) fn unit(v: DVec3) -> Option<DVec3> {
 /// Replaces each zero normal by the area-weighted mean of the triangles around, or by +z if these cancel. Cap vertices
 /// lie inside the solid, where ∇ω says nothing about the cap: they too are left to this.
 pub(super) fn fill_missing(mesh: &mut Mesh) {
-    if !mesh.normals.contains(&DVec3::ZERO) {
+    let is_missing: Vec<bool> = mesh.normals.par_iter().map(|n| *n == DVec3::ZERO).collect();
+    if is_missing.par_iter().all(|missing| !missing) {
         return;
     }
-    let is_missing: Vec<bool> = mesh.normals.iter().map(|n| *n == DVec3::ZERO).collect();
-    for triangle in &mesh.triangles {
+    let touches = |t: &&[u32; 3]| t.iter().any(|&v| is_missing[v as usize]);
+    // found in parallel, summed in their order
+    let around: Vec<&[u32; 3]> = mesh.triangles.par_iter().filter(touches).collect();
+    for triangle in around {
         let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
         let twice_area = (b - a).cross(c - a);
         for &v in triangle.iter().filter(|&&v| is_missing[v as usize]) {

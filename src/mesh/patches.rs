@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::{
     ambiguity,
-    cases::{Inner, Patch, edge, face_corners, loops},
+    cases::{Inner, Patch, Tunnel, edge, face_corners, loops},
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, set_positions},
 };
@@ -32,22 +32,27 @@ pub(super) fn find(
     evaluations: &mut u64,
 ) -> Vec<CellPatch> {
     let mut found = Vec::new();
-    for z in 0..BRICK {
-        let corners = around.corners(z);
-        if crossed_cells(&corners) == 0 {
-            continue;
-        }
-        for bit in set_positions(undecided_cells(&corners)) {
-            let cell = [low[0] + bit % BRICK, low[1] + bit / BRICK, low[2] + z];
-            let cell = Cell::new(field, lattice, cell);
-            *evaluations += 8;
-            let Patch { triangles, inner } = cell.patch();
-            let inner =
-                inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
-            found.push(CellPatch { cell: (z, bit), triangles, inner });
-        }
+    for (z, bit) in undecided(around) {
+        let cell = Cell::new(field, lattice, cell_low(low, (z, bit)));
+        *evaluations += 8;
+        let Patch { triangles, inner } = cell.patch();
+        let inner =
+            inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
+        found.push(CellPatch { cell: (z, bit), triangles, inner });
     }
     found
+}
+
+/// Planes and bits of a brick's cells that signs alone do not decide, ascending.
+pub(super) fn undecided(around: &Around) -> impl Iterator<Item = (usize, usize)> {
+    let planes = (0..BRICK).map(|z| (z, around.corners(z)));
+    let crossed = planes.filter(|(_, corners)| crossed_cells(corners) != 0);
+    crossed.flat_map(|(z, corners)| set_positions(undecided_cells(&corners)).map(move |bit| (z, bit)))
+}
+
+/// The extended indices of the low corner of a cell, given by its plane and bit, of the brick at `low`.
+pub(super) fn cell_low(low: [usize; 3], (z, bit): (usize, usize)) -> [usize; 3] {
+    [low[0] + bit % BRICK, low[1] + bit / BRICK, low[2] + z]
 }
 
 /// Cells with an ambiguous face, or with two opposite corners that differ from all others: `cases::needs_values` for
@@ -68,14 +73,14 @@ pub(super) fn undecided_cells(corners: &[u64; 8]) -> u64 {
 }
 
 /// A cell with the values at its corners.
-struct Cell {
+pub(super) struct Cell {
     low: DVec3,
     high: DVec3,
     values: ambiguity::Corners,
 }
 
 impl Cell {
-    fn new(field: &dyn Field, lattice: &Lattice, low: [usize; 3]) -> Self {
+    pub(super) fn new(field: &dyn Field, lattice: &Lattice, low: [usize; 3]) -> Self {
         let ends = [low, low.map(|n| n + 1)];
         let at = |corner: usize| [0, 1, 2].map(|axis: usize| ends[corner >> axis & 1][axis]);
         let positions: [DVec3; 8] = std::array::from_fn(|corner| lattice.position(at(corner)));
@@ -88,9 +93,16 @@ impl Cell {
         Self { low: positions[0], high: positions[7], values }
     }
 
-    fn patch(&self) -> Patch {
+    /// Its loops of crossed edges, and which two of them bound a tunnel.
+    pub(super) fn loops(&self) -> (Vec<Vec<usize>>, Option<Tunnel>) {
         let polygons = loops(ambiguity::inside(&self.values), ambiguity::faces(&self.values));
-        Patch::new(&polygons, ambiguity::tunnel(&self.values, &polygons))
+        let tunnel = ambiguity::tunnel(&self.values, &polygons);
+        (polygons, tunnel)
+    }
+
+    fn patch(&self) -> Patch {
+        let (polygons, tunnel) = self.loops();
+        Patch::new(&polygons, tunnel)
     }
 
     fn corner(&self, corner: usize) -> DVec3 {

@@ -8,7 +8,7 @@
 
 use super::{
     MeshError,
-    patches::CellPatch,
+    cases::{EDGES, edge},
     prune::{BRICK, Bricks, Lattice, NearBrick, Place},
 };
 use crate::field::{Field, Points};
@@ -94,37 +94,10 @@ pub(super) struct Brick {
     before: [[u16; BRICK]; 3],
     /// The bricks above: at i − 1 the one that is higher on the axes whose bits are set in i.
     upper: [Place; 7],
-    /// The number of its first vertex: those on edges come first, then the inner ones of `patches`.
+    /// The number of its first vertex: those on edges come first, then the inner ones.
     pub first: u32,
-    /// Cells that signs alone do not decide.
-    pub patches: Vec<CellPatch>,
-}
-
-/// The near bricks that have a crossed cell: those without hold no crossed edge either, whose other cells would be
-/// crossed too.
-#[derive(Debug)]
-pub(super) struct CrossedBricks {
-    pub list: Vec<Brick>,
-    /// For each near brick its place in the list, or [`Self::NONE`].
-    places: Vec<u32>,
-}
-
-impl CrossedBricks {
-    const NONE: u32 = u32::MAX;
-
-    /// Takes crossed bricks out of `near` near ones.
-    pub(super) fn new(list: Vec<Brick>, near: usize) -> Self {
-        let mut places = vec![Self::NONE; near];
-        for (place, brick) in list.iter().enumerate() {
-            places[brick.number] = place as u32;
-        }
-        Self { list, places }
-    }
-
-    /// A near brick by its number.
-    fn get(&self, number: u32) -> Option<&Brick> {
-        self.list.get(self.places[number as usize] as usize)
-    }
+    /// How many vertices lie within its cells.
+    pub inner: u32,
 }
 
 /// Vertices on edges of a brick and on those of the bricks above that its cells use, by [`edge_slot`].
@@ -137,6 +110,24 @@ const SLOTS: usize = SLOTS_ALONG.pow(3);
 pub(super) const fn edge_slot(axis: usize, [x, y, z]: [usize; 3]) -> usize {
     axis * SLOTS + (z * SLOTS_ALONG + y) * SLOTS_ALONG + x
 }
+
+/// An empty table.
+pub(super) fn vertex_table() -> Box<VertexTable> {
+    Box::new([0; 3 * SLOTS])
+}
+
+/// Where the vertex of each edge of the first cell stands in a vertex table; that of another cell stands as much
+/// further on as the cell's x edge.
+pub(super) const SLOT_OF_EDGE: [usize; EDGES] = {
+    let mut slots = [0; EDGES];
+    let mut e = 0;
+    while e < EDGES {
+        let (axis, low) = edge(e);
+        slots[e] = edge_slot(axis, [low & 1, low >> 1 & 1, low >> 2 & 1]);
+        e += 1;
+    }
+    slots
+};
 
 impl Brick {
     /// Finds a brick's neighbours and crossed edges.
@@ -151,7 +142,7 @@ impl Brick {
             before: [[0; BRICK]; 3],
             upper,
             first: 0,
-            patches: Vec::new(),
+            inner: 0,
         };
         let around = brick.around(signs);
         for z in 0..BRICK {
@@ -171,19 +162,13 @@ impl Brick {
     }
 
     /// Number of crossed edges.
-    fn crossings(&self) -> u32 {
+    pub(super) fn crossings(&self) -> u32 {
         u32::from(self.before[2][BRICK - 1]) + self.edges[2][BRICK - 1].count_ones()
-    }
-
-    /// Whether the surface passes through any of its cells.
-    pub(super) fn is_crossed(&self, signs: &[Signs]) -> bool {
-        let around = self.around(signs);
-        (0..BRICK).any(|z| crossed_cells(&around.corners(z)) != 0)
     }
 
     /// Number of vertices, on edges and within cells.
     pub(super) fn vertices(&self) -> usize {
-        self.crossings() as usize + self.patches.iter().map(|patch| patch.inner.len()).sum::<usize>()
+        (self.crossings() + self.inner) as usize
     }
 
     /// Calls `visit(axis, node)` for each crossed edge in the order of vertices; nodes count from the brick's first.
@@ -213,8 +198,13 @@ impl Brick {
         around
     }
 
-    /// Writes the numbers of all vertices that the brick's cells may use.
-    pub(super) fn number_vertices(&self, bricks: &CrossedBricks, table: &mut VertexTable) {
+    /// Writes the numbers of all vertices that the brick's cells may use. `crossed` gives a near brick by its number,
+    /// if it is crossed: one without a crossed cell holds no crossed edge either, whose other cells would be crossed too.
+    pub(super) fn number_vertices<'a>(
+        &self,
+        crossed: impl Fn(u32) -> Option<&'a Self>,
+        table: &mut VertexTable,
+    ) {
         let mut next = self.first;
         self.for_each_edge(|axis, node| {
             table[edge_slot(axis, node)] = next;
@@ -222,7 +212,7 @@ impl Brick {
         });
         for (i, place) in (1..8_usize).zip(self.upper) {
             let Place::Near(neighbour) = place else { continue };
-            let Some(neighbour) = bricks.get(neighbour) else { continue };
+            let Some(neighbour) = crossed(neighbour) else { continue };
             let offset = [0, 1, 2].map(|axis: usize| (i >> axis & 1) * BRICK);
             let mut touching = u64::MAX;
             touching &= if i & 1 == 0 { u64::MAX } else { FIRST_COLUMN };
@@ -253,6 +243,11 @@ pub(super) struct Around {
 }
 
 impl Around {
+    /// Whether the surface passes through any of the brick's cells.
+    pub(super) fn is_crossed(&self) -> bool {
+        (0..BRICK).any(|z| crossed_cells(&self.corners(z)) != 0)
+    }
+
     /// For each cell of plane `z`, bit x + 8·y, whether its corner c is inside; c as in `cases`.
     pub(super) fn corners(&self, z: usize) -> [u64; 8] {
         let [a, b, c, d] = self.corners_below(z);

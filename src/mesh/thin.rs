@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{
     Grid, MeshError,
-    extract::sample,
+    crossings::sample,
     prune::{BRICK, Bricks, Lattice, Place},
     signs::{Brick, Signs, crossed_cells},
 };

@@ -1,5 +1,6 @@
-//! How long marching cubes take, and how that grows with the grid. `cargo bench --bench mesh` prints a table; with
-//! `-- --large` also 2048 cells. Asserts nothing about time.
+//! How long marching cubes and dual contouring take, how that grows with the grid, and how far the meshes are from the
+//! surface. `cargo bench --bench mesh` prints all tables; `-- methods` or `-- growth` one of them, `-- --large` 2048
+//! cells too. Asserts nothing about time.
 //!
 //! Pawn and bishop stand in the box [0, 3]³, as in the paper; the balls are 500 at random places. The fastest of several
 //! runs counts, runs with one thread and with all taking turns. Where the system tells (Linux), the processor's time of
@@ -9,10 +10,10 @@
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-use rfm::field::Field;
+use rfm::field::{Field, GradientsMut, Points};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Mesh, Resolution, check, marching_cubes};
+use rfm::mesh::{Grid, Mesh, Resolution, check, dual_contouring, marching_cubes, measure};
 use rfm::{Engine, Program, Solid};
 
 /// True volumes by quadrature of the profiles, independent of this program.
@@ -23,8 +24,129 @@ const PATIENCE: Duration = Duration::from_millis(3000);
 const RUNS: usize = 100;
 
 fn main() {
-    let large = std::env::args().any(|argument| argument == "--large");
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let is_wanted = |part: &str| {
+        arguments.iter().all(|argument| argument.starts_with("--")) || arguments.iter().any(|a| a == part)
+    };
+    if is_wanted("methods") {
+        methods();
+    }
+    if is_wanted("growth") {
+        growth(arguments.iter().any(|argument| argument == "--large"));
+    }
+}
+
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+fn example(name: &str) -> Solid {
+    let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
+    let program = Program::from_path(path.as_str()).unwrap_or_else(|e| panic!("{e}"));
+    program.solid_with(name, Engine::Jit).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn filling(cells: usize) -> Grid {
+    Grid::filling(&domain(), Resolution::Cells(cells)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A way to make a mesh.
+type Method = (&'static str, fn(&dyn Field, &Grid) -> Mesh);
+
+const METHODS: [Method; 2] = [("mc", cubes), ("dc", dual)];
+
+fn cubes(field: &dyn Field, grid: &Grid) -> Mesh {
+    marching_cubes(field, grid, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn dual(field: &dyn Field, grid: &Grid) -> Mesh {
+    dual_contouring(field, grid, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Both methods side by side: time, and what the mesh is like. The last but one column is what counts in the choice
+/// between them: the error times the time, in µm·s; halving the cells of either leaves it about as it is.
+fn methods() {
+    println!(
+        "| solid | cells | method | 1 thread, ms | {} threads, ms | triangles | Hausdorff distance, m | surface to mesh, rms m | volume error | upside down | slivers | error × time, µm·s | closed |",
+        processors()
+    );
+    println!("|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|");
+    let pools = pools();
+    for (name, volume) in VOLUMES {
+        let solid = example(name);
+        let field = solid.surface(domain());
+        for cells in [16, 32, 64, 128, 256, 512] {
+            let grid = filling(cells);
+            let mut fastest = [[f64::INFINITY; 2]; METHODS.len()];
+            let started = Instant::now();
+            for _ in 0..RUNS {
+                for ((_, method), fastest) in METHODS.iter().zip(&mut fastest) {
+                    for (pool, fastest) in pools.iter().zip(fastest) {
+                        let start = Instant::now();
+                        let made = pool.install(|| method(&*field, &grid));
+                        *fastest = fastest.min(start.elapsed().as_secs_f64());
+                        drop(made);
+                    }
+                }
+                if started.elapsed() > PATIENCE {
+                    break;
+                }
+            }
+            for ((method, mesh), [one, all]) in METHODS.iter().zip(fastest) {
+                let found = mesh(&*field, &grid);
+                let quality =
+                    measure(&found, &*field, &Depth(&solid), &grid).unwrap_or_else(|e| panic!("{e}"));
+                let report = check(&found, &*field);
+                println!(
+                    "| {name} | {cells} | {method} | {:.2} | {:.2} | {} | {:.2e} | {:.2e} | {:+.4} % | {} | {:.2} % | {:.3} | {} |",
+                    1e3 * one,
+                    1e3 * all,
+                    found.triangles.len(),
+                    quality.hausdorff(),
+                    quality.from_surface.rms,
+                    100.0 * (found_volume(&found) / volume - 1.0),
+                    quality.flipped,
+                    100.0 * quality.slivers,
+                    1e6 * quality.hausdorff() * one,
+                    if report.closed && report.manifold { "yes" } else { "NO" },
+                );
+            }
+        }
+    }
+}
+
+/// A solid as its distance, positive inside: what a mesh is measured against.
+struct Depth<'a>(&'a Solid);
+
+impl Field for Depth<'_> {
+    fn omega(&self, p: DVec3) -> f64 {
+        -self.0.contact(p).distance
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        let contact = self.0.contact(p);
+        (-contact.distance, -contact.normal)
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        let GradientsMut { omega, x, y, z } = out;
+        let mut curvature = vec![0.0; points.len()];
+        self.0.contact_many([points.x, points.y, points.z], [omega, x, y, z, &mut curvature]);
+        for column in [omega, x, y, z] {
+            column.iter_mut().for_each(|value| *value = -*value);
+        }
+    }
+}
+
+/// One thread, and all.
+fn pools() -> [rayon::ThreadPool; 2] {
+    [1, processors()].map(|threads| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap_or_else(|e| panic!("{e}"))
+    })
+}
+
+fn growth(large: bool) {
+    let processors = processors();
     let mut sizes = vec![64, 128, 256, 512, 1024];
     if large {
         sizes.push(2048);
@@ -34,12 +156,10 @@ fn main() {
     );
     println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
     for (name, volume) in VOLUMES {
-        let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
-        let program = Program::from_path(path.as_str()).unwrap_or_else(|e| panic!("{e}"));
-        let solid = program.solid_with(name, Engine::Jit).unwrap_or_else(|e| panic!("{e}"));
+        let solid = example(name);
         let mut points = Vec::new();
         for &cells in &sizes {
-            let (seconds, _) = row(name, &solid, cells, processors, Some(volume));
+            let (seconds, _) = row(name, &solid, cells, Some(volume));
             points.push((cells as f64, seconds));
         }
         println!("{name}: time grows as cells^{:.2}", exponent(&points));
@@ -49,7 +169,7 @@ fn main() {
     drop(solid.surface(domain()));
     println!("500 balls: programs and cell map {:.1} ms", 1e3 * started.elapsed().as_secs_f64());
     for cells in [128, 256, 512] {
-        let (_, mesh) = row("500 balls", &solid, cells, processors, None);
+        let (_, mesh) = row("500 balls", &solid, cells, None);
         let report = check(&mesh, &*solid.surface(domain()));
         println!(
             "closed {}, manifold {}, {} solids, Euler characteristic {}",
@@ -59,12 +179,10 @@ fn main() {
 }
 
 /// Measures and prints one line; returns the processor's seconds of one thread, and the mesh.
-fn row(name: &str, solid: &Solid, cells: usize, processors: usize, volume: Option<f64>) -> (f64, Mesh) {
-    let grid = Grid::filling(&domain(), Resolution::Cells(cells)).unwrap_or_else(|e| panic!("{e}"));
+fn row(name: &str, solid: &Solid, cells: usize, volume: Option<f64>) -> (f64, Mesh) {
+    let grid = filling(cells);
     let field = solid.surface(domain());
-    let pools = [1, processors].map(|threads| {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap_or_else(|e| panic!("{e}"))
-    });
+    let pools = pools();
     let mut fastest = [f64::INFINITY; 2];
     let (mut on_processor, mut runs) = (0.0, 0_u32);
     let mut found = Mesh::default();
@@ -74,11 +192,11 @@ fn row(name: &str, solid: &Solid, cells: usize, processors: usize, volume: Optio
             let start = Instant::now();
             let (made, spent) = pool.install(|| {
                 let before = processor_time();
-                let made = mesh(&*field, &grid);
+                let made = cubes(&*field, &grid);
                 (made, processor_time().zip(before).map(|(after, before)| after - before))
             });
-            found = made;
             let elapsed = start.elapsed().as_secs_f64();
+            found = made;
             *fastest = fastest.min(elapsed);
             if pool.current_num_threads() == 1 {
                 on_processor += spent.unwrap_or(elapsed);
@@ -104,10 +222,6 @@ fn row(name: &str, solid: &Solid, cells: usize, processors: usize, volume: Optio
         peak_memory(),
     );
     (fastest[0], found)
-}
-
-fn mesh(field: &dyn Field, grid: &Grid) -> Mesh {
-    marching_cubes(field, grid, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn domain() -> Aabb {

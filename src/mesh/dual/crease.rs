@@ -55,14 +55,27 @@ pub(super) fn find(
         for (plane, face) in planes.iter_mut().zip(faces) {
             let towards = face.point - at;
             let along = unit(towards - plane.normal * plane.normal.dot(towards))?;
-            // off by more than δ it may be on another face
-            *plane = project::onto_face(field, at + delta * along, plane.normal, delta, count)?;
+            *plane = tangent(field, at + delta * along, plane.normal, delta, count)?;
         }
         at = meeting_point(at, planes)?;
     }
     *count += 1;
     let (omega, gradient) = field.omega_grad(at);
     (omega.abs() <= RESIDUAL * size * gradient.length()).then_some(at)
+}
+
+/// The tangent plane of the face near a probe, which misses the face by the square of their distance, as a plane that
+/// touches it would at δ from the crease. Where the field there is another face's, the face is sought at most δ away:
+/// farther, the point may be on another.
+fn tangent(field: &dyn Field, probe: DVec3, normal: DVec3, delta: f64, count: &mut u64) -> Option<Face> {
+    *count += 1;
+    let (omega, gradient) = field.omega_grad(probe);
+    let found = unit(-gradient)
+        .map(|normal| Face { point: probe - gradient * (omega / gradient.length_squared()), normal });
+    let is_same = |face: &Face| {
+        face.normal.dot(normal) > project::SAME_FACE && face.point.distance(probe) <= 0.5 * delta
+    };
+    found.filter(is_same).or_else(|| project::onto_face(field, probe, normal, delta, count))
 }
 
 /// The point nearest to `from` in two or three planes; none where they are nearly parallel.

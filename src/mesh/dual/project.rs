@@ -17,7 +17,7 @@ const STEPS: usize = 8;
 const LAST_STEP: f64 = 1e-9;
 
 /// Faces turn by less than this between a point and its foot (cosine).
-const SAME_FACE: f64 = 0.8;
+pub(super) const SAME_FACE: f64 = 0.8;
 
 /// The first step along a line, in sizes; each next is twice as long.
 const FIRST_STEP: f64 = 1.0 / 64.0;

@@ -2,7 +2,8 @@
 //!
 //! A quad is cut along the diagonal that follows the surface better: at a crease the one along it. Where two vertices
 //! would be joined by two edges of the mesh (see `loops`), each of these gets a vertex of its own in the middle, and
-//! the quads there become fans around their hits.
+//! where a cell has a ring of vertices at the end of a tunnel a quad has two of them: such quads become fans around
+//! their hits.
 //!
 //! Invariant: the triangles of a quad, fans included, have its sides as their border, so the mesh is as closed and
 //! manifold as the quads are.
@@ -12,144 +13,258 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::normals::{gradients, unit};
-use super::bricks::{Brick, Hit};
-use super::place::{Crossing, Kind, Placed, Vertex};
+use super::super::{
+    crossings::{self, Crossed, Task},
+    normals::{Gradients, unit},
+    prune::BRICK,
+    signs::Signs,
+};
+use super::loops::Sheets;
+use super::place::Placed;
+use super::vertices::{Hit, Hits, Kind, NONE, Rings, Vertex, Vertices};
 use crate::field::Field;
 
-/// Vertices of the four cells around each crossed edge, by the edge's place in the cell.
-pub(super) struct Quads {
-    around: Vec<[u32; 4]>,
-    /// Number of the first crossed edge of each brick.
-    first: Vec<usize>,
-    /// Vertices in the middle of sides that two quads would share with two others: by edge and ends.
+/// What the quads are made of.
+pub(super) struct Quads<'a> {
+    field: &'a dyn Field,
+    signs: &'a [Signs],
+    crossed: &'a Crossed<Sheets>,
+    hits: &'a Hits,
+    rings: &'a Rings,
+    /// Vertices in the middle of sides that two quads would share with two others: by hit and ends.
     middles: BTreeMap<(u32, [u32; 2]), u32>,
+    /// The second vertex of a cell at a hit: by hit and first vertex.
+    seconds: BTreeMap<(u32, u32), u32>,
 }
 
-/// A place without a vertex; only a field whose ranges contradict its values leaves one.
-const NONE: u32 = u32::MAX;
+/// A quad: its hit, and its corners counter-clockwise seen from the fluid.
+type Quad = (u32, [u32; 4]);
 
-/// Triangles, and vertices that they turn upside down.
+/// The triangles of all quads that are no fans, two for each hit; [`NOTHING`] in the places of the others.
 #[derive(Default)]
 pub(super) struct Cut {
     pub triangles: Vec<[u32; 3]>,
+    /// Vertices whose triangles lie upside down whichever way they are cut.
     pub spoilt: Vec<u32>,
+    /// Corners of fans, around their hits.
+    fans: Vec<(u32, Vec<u32>)>,
     pub gradients: u64,
 }
 
-impl Quads {
-    /// Collects all vertices in the order of bricks and joins them around their edges.
-    pub fn join(bricks: &[Brick], placed: Vec<Placed>, vertices: &mut Vec<Vertex>) -> Self {
-        let mut first = Vec::with_capacity(bricks.len());
-        let mut count = 0;
-        for brick in bricks {
-            first.push(count);
-            count += brick.hits.len();
-        }
-        let number = |at: Crossing| (first[at.slot as usize] + at.number as usize) as u32;
-        let mut around = vec![[NONE; 4]; count];
-        let mut twice = Vec::new();
-        for part in placed {
-            let base = vertices.len() as u32;
-            for link in &part.links {
-                around[number(link.crossing) as usize][usize::from(link.place)] = base + link.vertex;
-            }
-            twice.extend(part.twice.iter().map(|t| (t.segment.map(number), base + t.vertex)));
-            vertices.extend(part.vertices);
-        }
+/// No triangle.
+const NOTHING: [u32; 3] = [NONE; 3];
+
+impl<'a> Quads<'a> {
+    /// Joins vertices around their edges; adds those that lie between two cells.
+    pub fn join(
+        field: &'a dyn Field,
+        signs: &'a [Signs],
+        crossed: &'a Crossed<Sheets>,
+        (hits, rings): (&'a Hits, &'a Rings),
+        placed: &[Placed],
+        vertices: &mut Vertices,
+    ) -> Self {
+        let mut twice: Vec<_> = placed.iter().flat_map(|part| part.twice.iter().copied()).collect();
         twice.sort_unstable();
         let mut middles = BTreeMap::new();
-        for pair in twice.chunk_by(|a, b| a.0 == b.0).filter(|pair| pair.len() == 2) {
-            let segment = pair[0].0;
-            let ends = [pair[0].1, pair[1].1];
+        for pair in twice.chunk_by(|a, b| a.segment == b.segment).filter(|pair| pair.len() == 2) {
             let middle = vertices.len() as u32;
-            let hits = segment.map(|crossing| hit(bricks, &first, crossing));
-            vertices.push(between(hits));
-            for crossing in segment {
-                middles.insert((crossing, ends), middle);
+            let ends = pair[0].segment.map(|hit| hits.get(hit).position);
+            let position = ends[0].midpoint(ends[1]);
+            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            for hit in pair[0].segment {
+                middles.insert((hit, [pair[0].vertex, pair[1].vertex]), middle);
             }
         }
-        Self { around, first, middles }
+        let seconds = placed.iter().flat_map(|part| part.seconds.iter().copied()).collect();
+        Self { field, signs, crossed, hits, rings, middles, seconds }
     }
 
     /// Cuts all quads.
-    pub fn cut(&self, field: &dyn Field, bricks: &[Brick], vertices: &mut Vec<Vertex>) -> Cut {
-        let known: &[Vertex] = vertices;
-        let parts: Vec<Part> = (0..bricks.len())
-            .into_par_iter()
-            .map(|slot| self.cut_brick(field, bricks, known, slot))
+    pub fn cut(&self, vertices: &Vertices) -> Cut {
+        let mut triangles: Vec<[u32; 3]> =
+            rayon::iter::repeat_n(NOTHING, 2 * self.hits.positions.len()).collect();
+        let counts = self.crossed.tasks.iter().map(|task| 2 * task.vertices);
+        let jobs = self.crossed.tasks.par_iter().zip(crossings::parts(&mut triangles, counts));
+        let parts: Vec<Cut> = jobs
+            .map_init(Gradients::default, |gradients, (task, triangles)| {
+                let mut cut = Cut::default();
+                let mut doubtful = Vec::new();
+                let first = task.first as u32;
+                self.for_each_quad(task, |quad, rim| {
+                    let pair = &mut triangles[2 * (quad.0 - first) as usize..][..2];
+                    match rim {
+                        Some(rim) => cut.fans.push((quad.0, rim)),
+                        None => match self.cut_smooth(vertices, quad) {
+                            Some(along_first) => pair.copy_from_slice(&halves(quad.1, along_first)),
+                            None => doubtful.push(quad),
+                        },
+                    }
+                });
+                self.cut_doubtful(vertices, &doubtful, gradients, &mut cut, |hit, pair| {
+                    triangles[2 * (hit - first) as usize..][..2].copy_from_slice(&pair);
+                });
+                cut
+            })
             .collect();
-        let mut cut = Cut::default();
+        let mut cut = Cut { triangles, ..Cut::default() };
         for part in parts {
-            cut.triangles.extend(part.cut.triangles);
-            cut.spoilt.extend(part.cut.spoilt);
-            cut.gradients += part.cut.gradients;
-            for (rim, hit) in part.fans {
-                let centre = vertices.len() as u32;
-                let vertex = Vertex {
-                    position: hit.position,
-                    normal: hit.normal,
-                    kind: Kind::Sharp,
-                    fallback: hit.position,
-                };
-                vertices.push(vertex);
-                let next = rim.iter().cycle().skip(1);
-                cut.triangles.extend(rim.iter().zip(next).map(|(&a, &b)| [centre, a, b]));
-            }
+            cut.spoilt.extend(part.spoilt);
+            cut.fans.extend(part.fans);
+            cut.gradients += part.gradients;
         }
         cut
     }
 
-    fn cut_brick(&self, field: &dyn Field, bricks: &[Brick], vertices: &[Vertex], slot: usize) -> Part {
-        let brick = &bricks[slot];
-        let mut part = Part::default();
+    /// Cuts the quads around vertices that have moved once more. `moved` are ascending.
+    pub fn cut_again(&self, vertices: &Vertices, moved: &[u32], cut: &mut Cut) {
+        let mut is_moved = vec![false; vertices.len()];
+        moved.iter().for_each(|&v| is_moved[v as usize] = true);
+        let touched: Vec<Vec<Quad>> = self
+            .crossed
+            .tasks
+            .par_iter()
+            .map(|task| {
+                let mut touched = Vec::new();
+                self.for_each_quad(task, |quad, rim| {
+                    if rim.is_none() && quad.1.iter().any(|&v| is_moved[v as usize]) {
+                        touched.push(quad);
+                    }
+                });
+                touched
+            })
+            .collect();
         let mut doubtful = Vec::new();
-        let mut number = self.first[slot];
-        let mut hits = brick.hits.iter();
-        brick.for_each_crossed(|_, low| {
-            let (around, Some(hit)) = (self.around[number], hits.next()) else { return };
-            number += 1;
-            if around.contains(&NONE) {
-                return;
+        for quad in touched.into_iter().flatten() {
+            match self.cut_smooth(vertices, quad) {
+                Some(along_first) => {
+                    cut.triangles[2 * quad.0 as usize..][..2].copy_from_slice(&halves(quad.1, along_first));
+                }
+                None => doubtful.push(quad),
             }
-            // counter-clockwise seen from the high end, where the fluid is if the low end is inside
-            let [a, b, c, d] = around;
-            let corners = if brick.is_inside(low) { [d, c, a, b] } else { [b, a, c, d] };
-            if let Some(rim) = self.rim((number - 1) as u32, corners) {
-                return part.fans.push((rim, *hit));
-            }
-            match cut_smooth(corners.map(|v| &vertices[v as usize]), hit) {
-                Some(along_first) => part.cut.triangles.extend(halves(corners, along_first)),
-                None => doubtful.push((corners, *hit)),
-            }
+        }
+        let mut triangles = std::mem::take(&mut cut.triangles);
+        cut.spoilt.clear();
+        self.cut_doubtful(vertices, &doubtful, &mut Gradients::default(), cut, |hit, pair| {
+            triangles[2 * hit as usize..][..2].copy_from_slice(&pair);
         });
-        part.cut_doubtful(field, vertices, &doubtful);
-        part
+        cut.triangles = triangles;
     }
 
-    /// The corners and middles around a quad that has middles.
-    fn rim(&self, crossing: u32, corners: [u32; 4]) -> Option<Vec<u32>> {
-        if self.middles.is_empty() {
+    /// All triangles, those of fans last; adds the middles of the fans to the vertices.
+    pub fn triangles(&self, cut: Cut, vertices: &mut Vertices) -> Vec<[u32; 3]> {
+        let Cut { mut triangles, fans, .. } = cut;
+        if !fans.is_empty() || triangles.contains(&NOTHING) {
+            triangles.retain(|t| *t != NOTHING);
+        }
+        for (hit, rim) in fans {
+            let centre = vertices.len() as u32;
+            let Hit { position, normal, .. } = self.hits.get(hit);
+            vertices.push(Vertex { position, normal, kind: Kind::Sharp });
+            let next = rim.iter().cycle().skip(1);
+            triangles.extend(rim.iter().zip(next).map(|(&a, &b)| [centre, a, b]));
+        }
+        triangles
+    }
+
+    /// Calls `visit(quad, rim)` for each crossed edge that has a vertex in each of the four cells around it; with a rim
+    /// if there are more.
+    fn for_each_quad(&self, task: &Task<Sheets>, mut visit: impl FnMut(Quad, Option<Vec<u32>>)) {
+        for brick in &task.bricks {
+            let inside = &self.signs[brick.number];
+            let mut hit = brick.first;
+            brick.for_each_edge(|_, [x, y, z]| {
+                let around = self.rings.get(hit);
+                if !around.contains(&NONE) {
+                    // counter-clockwise seen from the high end, where the fluid is if the low end is inside
+                    let [a, b, c, d] = around;
+                    let is_inside = inside[z] >> (BRICK * y + x) & 1 == 1;
+                    let corners = if is_inside { [d, c, a, b] } else { [b, a, c, d] };
+                    visit((hit, corners), self.rim((hit, corners)));
+                }
+                hit += 1;
+            });
+        }
+    }
+
+    /// The corners and middles around a quad that has more than four of both.
+    fn rim(&self, (hit, corners): Quad) -> Option<Vec<u32>> {
+        if self.middles.is_empty() && self.seconds.is_empty() {
             return None;
         }
         let mut rim = Vec::new();
         for i in 0..4 {
             let (a, b) = (corners[i], corners[(i + 1) % 4]);
             rim.push(a);
-            rim.extend(self.middles.get(&(crossing, [a.min(b), a.max(b)])));
+            rim.extend(self.seconds.get(&(hit, a)));
+            rim.extend(self.middles.get(&(hit, [a.min(b), a.max(b)])));
         }
         (rim.len() > 4).then_some(rim)
     }
-}
 
-fn hit(bricks: &[Brick], first: &[usize], crossing: u32) -> Hit {
-    let slot = first.partition_point(|&f| f <= crossing as usize) - 1;
-    bricks[slot].hits[crossing as usize - first[slot]]
-}
+    /// Which diagonal cuts a quad on a smooth surface: whether it is the first; none if that needs a closer look.
+    fn cut_smooth(&self, vertices: &Vertices, (hit, corners): Quad) -> Option<bool> {
+        let corners = corners.map(|v| v as usize);
+        if self.hits.is_cap[hit as usize] {
+            return Some(true).filter(|_| corners.iter().all(|&v| vertices.kinds[v] == Kind::Cap));
+        }
+        if corners.iter().any(|&v| vertices.kinds[v] != Kind::Smooth) {
+            return None;
+        }
+        let positions = corners.map(|v| vertices.positions[v]);
+        let normals = corners.map(|v| vertices.normals[v]);
+        let chords = [positions[2] - positions[0], positions[3] - positions[1]];
+        // how far the surface bulges over a chord, from the normals at its ends
+        let bulges =
+            [(normals[2] - normals[0]).dot(chords[0]).abs(), (normals[3] - normals[1]).dot(chords[1]).abs()];
+        let squared = chords.map(|chord| chord.length_squared());
+        let flat = FLAT * FLAT * squared[0].max(squared[1]);
+        let is_plane = bulges[0].max(bulges[1]).powi(2) < flat;
+        let along_first = if is_plane { squared[0] <= squared[1] } else { bulges[0] <= bulges[1] };
+        // twice the areas: of the triangle after corner i on the way around
+        let normal = self.hits.normals[hit as usize];
+        let sides: [DVec3; 4] = std::array::from_fn(|i| positions[(i + 1) % 4] - positions[i]);
+        let faces_out = |i: usize| sides[i].cross(sides[(i + 1) % 4]).dot(normal) > 0.0;
+        let is_good = |along_first: bool| {
+            let i = usize::from(!along_first);
+            faces_out(i) && faces_out(i + 2)
+        };
+        [along_first, !along_first].into_iter().find(|&first| is_good(first))
+    }
 
-fn between(hits: [Hit; 2]) -> Vertex {
-    let position = 0.5 * (hits[0].position + hits[1].position);
-    Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp, fallback: position }
+    /// Cuts quads at creases so that the triangles face as the surface does below their middles.
+    fn cut_doubtful(
+        &self,
+        vertices: &Vertices,
+        quads: &[Quad],
+        gradients: &mut Gradients,
+        cut: &mut Cut,
+        mut write: impl FnMut(u32, [[u32; 3]; 2]),
+    ) {
+        let corners = |t: [u32; 3]| t.map(|v| vertices.positions[v as usize]);
+        let choices = |quad: [u32; 4]| [true, false].map(|first| halves(quad, first)).into_iter().flatten();
+        let middles: Vec<DVec3> = quads
+            .iter()
+            .flat_map(|(_, quad)| choices(*quad).map(|t| corners(t).iter().sum::<DVec3>() / 3.0))
+            .collect();
+        cut.gradients += middles.len() as u64;
+        let mut below = gradients.at(self.field, &middles);
+        for &(hit, quad) in quads {
+            let Hit { normal, is_cap, .. } = self.hits.get(hit);
+            let mut agreement = [0.0; 4];
+            for (agreement, t) in agreement.iter_mut().zip(choices(quad)) {
+                let [a, b, c] = corners(t);
+                let facing = unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO);
+                let outward = below.next().and_then(|(_, gradient)| unit(-gradient)).unwrap_or(normal);
+                *agreement = facing.dot(if is_cap { normal } else { outward });
+            }
+            let (first, second) = (agreement[0].min(agreement[1]), agreement[2].min(agreement[3]));
+            write(hit, halves(quad, first >= second));
+            if first.max(second) < 0.0 {
+                cut.spoilt.extend(quad.iter().filter(|&&v| vertices.kinds[v as usize] == Kind::Sharp));
+            }
+        }
+    }
 }
 
 /// The triangles of a quad cut along its first diagonal (from corner 0) or its second.
@@ -157,66 +272,5 @@ fn halves([a, b, c, d]: [u32; 4], along_first: bool) -> [[u32; 3]; 2] {
     if along_first { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] }
 }
 
-/// Which diagonal cuts a quad on a smooth surface: whether it is the first; none if that needs a closer look.
-fn cut_smooth(corners: [&Vertex; 4], hit: &Hit) -> Option<bool> {
-    if hit.is_cap {
-        return Some(true).filter(|_| corners.iter().all(|v| v.kind == Kind::Cap));
-    }
-    if corners.iter().any(|v| v.kind != Kind::Smooth) {
-        return None;
-    }
-    // how far the surface bulges over a chord, from the normals at its ends
-    let bulge = |i: usize, j: usize| {
-        let (a, b) = (corners[i], corners[j]);
-        let chord = b.position - a.position;
-        ((b.normal - a.normal).dot(chord).abs(), chord.length())
-    };
-    let (first, second) = (bulge(0, 2), bulge(1, 3));
-    let is_plane = first.0.max(second.0) < FLAT * first.1.max(second.1);
-    let along_first = if is_plane { first.1 <= second.1 } else { first.0 <= second.0 };
-    let faces_out = |along_first: bool| {
-        halves([0, 1, 2, 3], along_first).into_iter().all(|t| {
-            let [a, b, c] = t.map(|i| corners[i as usize].position);
-            (b - a).cross(c - a).dot(hit.normal) > 0.0
-        })
-    };
-    [along_first, !along_first].into_iter().find(|&first| faces_out(first))
-}
-
 /// A bulge below this share of a chord is none: the shorter diagonal makes the better triangles.
 const FLAT: f64 = 1e-3;
-
-/// What one brick adds.
-#[derive(Default)]
-struct Part {
-    cut: Cut,
-    fans: Vec<(Vec<u32>, Hit)>,
-}
-
-impl Part {
-    /// Cuts quads at creases so that the triangles face as the surface does below their middles.
-    fn cut_doubtful(&mut self, field: &dyn Field, vertices: &[Vertex], quads: &[([u32; 4], Hit)]) {
-        let corners = |t: [u32; 3]| t.map(|v| vertices[v as usize].position);
-        let choices = |quad: [u32; 4]| [true, false].map(|first| halves(quad, first)).into_iter().flatten();
-        let middles: Vec<DVec3> = quads
-            .iter()
-            .flat_map(|(quad, _)| choices(*quad).map(|t| corners(t).iter().sum::<DVec3>() / 3.0))
-            .collect();
-        self.cut.gradients += middles.len() as u64;
-        let mut below = gradients(field, &middles).into_iter();
-        for (quad, hit) in quads {
-            let agreement = choices(*quad).map(|t| {
-                let [a, b, c] = corners(t);
-                let facing = unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO);
-                let outward = below.next().and_then(|(_, gradient)| unit(-gradient)).unwrap_or(hit.normal);
-                facing.dot(if hit.is_cap { hit.normal } else { outward })
-            });
-            let agreement: Vec<f64> = agreement.collect();
-            let (first, second) = (agreement[0].min(agreement[1]), agreement[2].min(agreement[3]));
-            self.cut.triangles.extend(halves(*quad, first >= second));
-            if first.max(second) < 0.0 {
-                self.cut.spoilt.extend(quad.iter().filter(|&&v| vertices[v as usize].kind == Kind::Sharp));
-            }
-        }
-    }
-}

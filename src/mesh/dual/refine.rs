@@ -11,8 +11,9 @@ use rayon::prelude::*;
 
 use super::super::normals::{gradients, unit};
 use super::crease;
-use super::place::{Kind, Vertex};
+
 use super::project;
+use super::vertices::{Kind, Vertex, Vertices};
 use crate::field::Field;
 
 /// The distance of an edge's middle from the surface above which it is cut, in cells. It bounds what is left: the pawn
@@ -22,8 +23,8 @@ const TOLERANCE: f64 = 0.025;
 /// Each round quarters what is left.
 const ROUNDS: usize = 3;
 
-/// Edges looked at together.
-const BATCH: usize = 1024;
+/// Triangles looked at together.
+const BATCH: usize = 2048;
 
 /// How far a middle may move on a smooth surface, in lengths of its edge: farther, and triangles would turn over.
 const LONGEST_MOVE: f64 = 0.4;
@@ -38,21 +39,28 @@ const BESIDE: f64 = 0.1;
 /// Cuts edges until the mesh is near the surface; returns the number of evaluations of ∇ω.
 pub(super) fn refine(
     field: &dyn Field,
-    vertices: &mut Vec<Vertex>,
+    vertices: &mut Vertices,
     triangles: &mut Vec<[u32; 3]>,
     size: f64,
 ) -> u64 {
     let mut evaluations = 0;
+    // triangles whose edges have not been looked at
+    let mut fresh = 0..triangles.len();
+    let mut changed: Vec<u32> = Vec::new();
     for _ in 0..ROUNDS {
-        let (cuts, count) = cuts(field, vertices, triangles, TOLERANCE * size);
+        let is_fresh = triangles[fresh.clone()].par_iter().copied();
+        let others: Vec<[u32; 3]> = changed.iter().map(|&t| triangles[t as usize]).collect();
+        let (cuts, count) = cuts(field, vertices, is_fresh.chain(others), TOLERANCE * size);
         evaluations += count;
         if cuts.is_empty() {
             break;
         }
         let first = vertices.len() as u32;
         let numbers: Vec<([u32; 2], u32)> = cuts.iter().zip(first..).map(|(cut, v)| (cut.0, v)).collect();
-        vertices.extend(cuts.into_iter().map(|cut| cut.1));
-        *triangles = divided(vertices, triangles, &numbers);
+        cuts.into_iter().for_each(|cut| vertices.push(cut.1));
+        let whole = triangles.len();
+        changed = divide(vertices, triangles, &numbers);
+        fresh = whole..triangles.len();
     }
     evaluations
 }
@@ -60,56 +68,155 @@ pub(super) fn refine(
 /// An edge's ends, ascending, and the vertex that cuts it.
 type EdgeCut = ([u32; 2], Vertex);
 
-/// The edges to cut, ascending by their ends.
+/// The edges of some triangles to cut, ascending by their ends.
 fn cuts(
     field: &dyn Field,
-    vertices: &[Vertex],
-    triangles: &[[u32; 3]],
+    vertices: &Vertices,
+    triangles: impl IndexedParallelIterator<Item = [u32; 3]>,
     tolerance: f64,
 ) -> (Vec<EdgeCut>, u64) {
-    // each edge of a closed mesh is run along once in ascending order
-    let sides = triangles.par_iter().flat_map_iter(|t| (0..3).map(|i| [t[i], t[(i + 1) % 3]]));
-    let mut edges: Vec<[u32; 2]> =
-        sides.filter(|&[a, b]| a < b && may_bulge(vertices, [a, b], tolerance)).collect();
-    edges.par_sort_unstable();
-    let parts: Vec<(Vec<EdgeCut>, u64)> = edges
-        .par_chunks(BATCH)
+    let parts: Vec<(Vec<EdgeCut>, u64)> = triangles
+        .fold_chunks(BATCH, Vec::new, |mut edges: Vec<[u32; 2]>, t| {
+            // each edge of a closed mesh is run along once in ascending order
+            let sides = (0..3).map(|i| [t[i], t[(i + 1) % 3]]);
+            edges.extend(sides.filter(|&[a, b]| a < b && may_bulge(vertices, [a, b], tolerance)));
+            edges
+        })
         .map(|edges| {
-            let ends = |edge: &[u32; 2]| edge.map(|v| &vertices[v as usize]);
-            let between = |[a, b]: [&Vertex; 2]| 0.5 * (a.position + b.position);
-            let middles: Vec<DVec3> = edges.iter().map(|edge| between(ends(edge))).collect();
-            let mut count = middles.len() as u64;
-            let found = gradients(field, &middles).into_iter();
-            let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
-            let cut = edges
+            let middles: Vec<DVec3> = edges
                 .iter()
-                .zip(found)
-                .filter(|(_, found)| off(*found))
-                .filter_map(|(edge, _)| Some((*edge, middle(field, ends(edge), tolerance, &mut count)?)));
-            (cut.collect(), count)
+                .map(|edge| {
+                    let [a, b] = edge.map(|v| vertices.positions[v as usize]);
+                    0.5 * (a + b)
+                })
+                .collect();
+            let mut count = middles.len() as u64;
+            let found = gradients(field, &middles);
+            let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
+            let (mut bends, mut others) = (Vec::new(), Vec::new());
+            for (edge, found) in edges.into_iter().zip(found).filter(|(_, found)| off(*found)) {
+                match Bend::new(vertices, edge, found) {
+                    Some(bend) => bends.push(bend),
+                    None => others.push(edge),
+                }
+            }
+            let mut cut = Vec::with_capacity(bends.len() + others.len());
+            for (bend, settled) in settle(field, bends, tolerance, &mut count) {
+                if settled {
+                    cut.extend(bend.cut(tolerance));
+                } else {
+                    others.push(bend.edge);
+                }
+            }
+            cut.extend(others.into_iter().filter_map(|edge| {
+                let ends = edge.map(|v| vertices.get(v));
+                Some((edge, middle(field, ends, tolerance, &mut count)?))
+            }));
+            (cut, count)
         })
         .collect();
     let count = parts.iter().map(|part| part.1).sum();
-    (parts.into_iter().flat_map(|part| part.0).collect(), count)
+    let mut cuts: Vec<EdgeCut> = parts.into_iter().flat_map(|part| part.0).collect();
+    cuts.sort_unstable_by_key(|cut| cut.0);
+    (cuts, count)
 }
 
 /// Whether the surface may be farther than `tolerance` from the middle of an edge, as far as its ends tell.
-fn may_bulge(vertices: &[Vertex], edge: [u32; 2], tolerance: f64) -> bool {
-    let [a, b] = edge.map(|v| &vertices[v as usize]);
-    let chord = b.position - a.position;
-    match (a.kind, b.kind) {
-        // sheets that touch
-        _ if chord == DVec3::ZERO => false,
+fn may_bulge(vertices: &Vertices, edge: [u32; 2], tolerance: f64) -> bool {
+    let [a, b] = edge.map(|v| v as usize);
+    let chord = vertices.positions[b] - vertices.positions[a];
+    match (vertices.kinds[a], vertices.kinds[b]) {
+        (Kind::Smooth, Kind::Smooth) => {
+            (vertices.normals[b] - vertices.normals[a]).dot(chord).abs() > 4.0 * tolerance
+        }
         // a cap is no part of ω = 0
         (Kind::Cap, _) | (_, Kind::Cap) => false,
-        (Kind::Smooth, Kind::Smooth) => (b.normal - a.normal).dot(chord).abs() > 4.0 * tolerance,
-        _ => true,
+        // sheets that touch
+        _ => chord != DVec3::ZERO,
     }
 }
 
+/// An edge over a smooth bend: the normal at its middle is about the mean of those at its ends, where across a crease it
+/// would be one of them.
+struct Bend {
+    edge: [u32; 2],
+    start: DVec3,
+    /// The edge's length.
+    length: f64,
+    /// Mean of the normals at the ends.
+    mean: DVec3,
+    position: DVec3,
+    normal: DVec3,
+}
+
+impl Bend {
+    /// The bend of an edge, if it is one, one step of Newton's method on; `found` are ω and ∇ω at its middle.
+    fn new(vertices: &Vertices, edge: [u32; 2], found: (f64, DVec3)) -> Option<Self> {
+        let [a, b] = edge.map(|v| vertices.get(v));
+        if a.kind != Kind::Smooth || b.kind != Kind::Smooth {
+            return None;
+        }
+        let (mean, normal) = (unit(a.normal + b.normal)?, unit(-found.1)?);
+        // nearer to the mean than to either: half of the way from the mean to an end
+        let half_way = unit(mean + a.normal)?.dot(mean).min(unit(mean + b.normal)?.dot(mean));
+        let start = 0.5 * (a.position + b.position);
+        let mut bend =
+            Self { edge, start, length: a.position.distance(b.position), mean, position: start, normal };
+        let is_bend = normal.dot(mean) > half_way && a.normal.dot(b.normal) > 0.0;
+        is_bend.then(|| {
+            bend.step(found);
+            bend
+        })
+    }
+
+    /// One step of Newton's method; its length.
+    fn step(&mut self, (omega, gradient): (f64, DVec3)) -> f64 {
+        let step = gradient * (omega / gradient.length_squared());
+        self.position -= step;
+        step.length()
+    }
+
+    /// The cut at the point that was found; none if the surface is near after all.
+    fn cut(&self, tolerance: f64) -> Option<EdgeCut> {
+        let Self { edge, start, position, normal, .. } = *self;
+        (position.distance(start) > tolerance)
+            .then_some((edge, Vertex { position, normal, kind: Kind::Smooth }))
+    }
+}
+
+/// Steps of Newton's method on bends.
+const STEPS: usize = 6;
+
+/// Moves bends onto the surface, together; tells of each whether that went well.
+fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) -> Vec<(Bend, bool)> {
+    let mut bends: Vec<(Bend, bool)> = bends.into_iter().map(|bend| (bend, false)).collect();
+    for _ in 0..STEPS {
+        let positions: Vec<DVec3> =
+            bends.iter().filter(|(_, settled)| !settled).map(|(bend, _)| bend.position).collect();
+        if positions.is_empty() {
+            break;
+        }
+        *count += positions.len() as u64;
+        let mut found = gradients(field, &positions).into_iter();
+        for (bend, settled) in bends.iter_mut().filter(|(_, settled)| !settled) {
+            let Some(found) = found.next() else { break };
+            bend.normal = unit(-found.1).unwrap_or(DVec3::ZERO);
+            *settled = bend.step(found) <= LAST_STEP * tolerance;
+        }
+    }
+    for (bend, settled) in &mut bends {
+        let is_near = bend.position.distance(bend.start) <= LONGEST_MOVE * bend.length;
+        *settled &= is_near && bend.normal.dot(bend.mean) > 0.0;
+    }
+    bends
+}
+
+/// A step, in tolerances, that needs no other after it: what it leaves is its square times the curvature, 1e-11 of it.
+const LAST_STEP: f64 = 1e-5;
+
 /// The vertex that cuts an edge: on the crease between the faces at its ends, or on the surface; none where the surface
 /// is near after all (the field told another face's distance), or too far off.
-fn middle(field: &dyn Field, [a, b]: [&Vertex; 2], tolerance: f64, count: &mut u64) -> Option<Vertex> {
+fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u64) -> Option<Vertex> {
     let (start, length) = (0.5 * (a.position + b.position), a.position.distance(b.position));
     let is_near = |p: &DVec3, reach: f64| p.distance(start) <= reach * length;
     let mut face = |p: DVec3, normal: DVec3| match unit(normal) {
@@ -130,7 +237,7 @@ fn middle(field: &dyn Field, [a, b]: [&Vertex; 2], tolerance: f64, count: &mut u
         // the bottom of a groove between walls at ±angle/2 lies half a length · tan(angle/2) below the middle
         let drop = (0.5 * first.normal.angle_between(second.normal)).tan();
         if let Some(position) = found.filter(|p| is_near(p, (0.25 + 0.75 * drop).min(LONGEST_DROP))) {
-            return Some(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp, fallback: position });
+            return Some(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
         }
     }
     let normal = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
@@ -139,11 +246,12 @@ fn middle(field: &dyn Field, [a, b]: [&Vertex; 2], tolerance: f64, count: &mut u
         None => project::newton(field, start, length, count),
     };
     let found = found.filter(|face| is_near(&face.point, LONGEST_MOVE))?;
-    Some(Vertex { position: found.point, normal: found.normal, kind: Kind::Smooth, fallback: found.point })
+    Some(Vertex { position: found.point, normal: found.normal, kind: Kind::Smooth })
 }
 
-/// The triangles, those at cut edges divided. `middles` are sorted by their edges.
-fn divided(vertices: &[Vertex], triangles: &[[u32; 3]], middles: &[([u32; 2], u32)]) -> Vec<[u32; 3]> {
+/// Divides triangles at cut edges: the first part takes the place of the whole, the others go to the end. Returns the
+/// places of those that were divided. `middles` are sorted by their edges.
+fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 2], u32)]) -> Vec<u32> {
     let mut is_end = vec![false; vertices.len()];
     middles.iter().flat_map(|m| m.0).for_each(|v| is_end[v as usize] = true);
     let middle = |a: u32, b: u32| {
@@ -153,31 +261,45 @@ fn divided(vertices: &[Vertex], triangles: &[[u32; 3]], middles: &[([u32; 2], u3
         let at = middles.binary_search_by_key(&[a.min(b), a.max(b)], |m| m.0).ok()?;
         Some(middles[at].1)
     };
-    let distance = |a: u32, b: u32| vertices[a as usize].position.distance(vertices[b as usize].position);
-    let mut out = Vec::with_capacity(triangles.len() + 4 * middles.len());
-    for &[a, b, c] in triangles {
+    let position = |v: u32| vertices.positions[v as usize];
+    let distance = |a: u32, b: u32| position(a).distance(position(b));
+    let mut changed = Vec::new();
+    let mut others = Vec::new();
+    for (t, triangle) in triangles.iter_mut().enumerate() {
+        let [a, b, c] = *triangle;
         // turned so that the first side is cut if one is, and the third is whole if one is
         let turns = [[a, b, c], [b, c, a], [c, a, b]];
         let cuts = turns.map(|[p, q, _]| middle(p, q));
         let turn = match cuts.map(|m| m.is_some()) {
+            [false, false, false] => continue,
             [false, true, _] => 1,
             [_, false, true] => 2,
             _ => 0,
         };
+        changed.push(t as u32);
         let [a, b, c] = turns[turn];
         match [cuts[turn], cuts[(turn + 1) % 3], cuts[(turn + 2) % 3]] {
             [Some(ab), Some(bc), Some(ca)] => {
-                out.extend([[a, ab, ca], [ab, b, bc], [bc, c, ca], [ab, bc, ca]])
+                *triangle = [a, ab, ca];
+                others.extend([[ab, b, bc], [bc, c, ca], [ab, bc, ca]]);
             }
             [Some(ab), Some(bc), None] if distance(ab, c) <= distance(a, bc) => {
-                out.extend([[ab, b, bc], [ab, bc, c], [a, ab, c]]);
+                *triangle = [ab, b, bc];
+                others.extend([[ab, bc, c], [a, ab, c]]);
             }
-            [Some(ab), Some(bc), None] => out.extend([[ab, b, bc], [a, ab, bc], [a, bc, c]]),
-            [Some(ab), None, None] => out.extend([[a, ab, c], [ab, b, c]]),
-            _ => out.push([a, b, c]),
+            [Some(ab), Some(bc), None] => {
+                *triangle = [ab, b, bc];
+                others.extend([[a, ab, bc], [a, bc, c]]);
+            }
+            [Some(ab), _, _] => {
+                *triangle = [a, ab, c];
+                others.push([ab, b, c]);
+            }
+            _ => {}
         }
     }
-    out
+    triangles.extend(others);
+    changed
 }
 
 #[cfg(test)]
@@ -188,17 +310,17 @@ mod tests {
     fn every_choice_of_cut_sides_tiles_the_triangle() {
         let places =
             [DVec3::ZERO, DVec3::X, DVec3::Y, 0.5 * DVec3::X, DVec3::new(0.5, 0.5, 0.0), 0.5 * DVec3::Y];
-        let vertices = places.map(|position| Vertex {
-            position,
-            normal: DVec3::Z,
-            kind: Kind::Smooth,
-            fallback: position,
-        });
+        let mut vertices = Vertices::default();
+        for position in places {
+            vertices.push(Vertex { position, normal: DVec3::Z, kind: Kind::Smooth });
+        }
         let sides = [([0, 1], 3), ([0, 2], 5), ([1, 2], 4)];
         for chosen in 0..8 {
             let middles: Vec<_> = (0..3).filter(|i| chosen >> i & 1 == 1).map(|i| sides[i]).collect();
             for triangle in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
-                let parts = divided(&vertices, &[triangle], &middles);
+                let mut parts = vec![triangle];
+                let changed = divide(&vertices, &mut parts, &middles);
+                assert_eq!(changed.len(), usize::from(chosen != 0));
                 assert_eq!(parts.len(), 1 + middles.len());
                 let areas = parts.iter().map(|t| {
                     let [a, b, c] = t.map(|v| places[v as usize]);

@@ -7,15 +7,17 @@
 
 use std::collections::BTreeMap;
 
-use super::super::normals::unit;
-use super::place::{Kind, Vertex};
+use glam::DVec3;
+
+use super::super::normals::{gradients, unit};
+use super::vertices::{Kind, Vertices};
 use crate::field::Field;
 
 /// Turning one edge may unfold its neighbours too; what is left after so many rounds stays.
 const ROUNDS: usize = 4;
 
 /// Turns edges of triangles that lie upside down.
-pub(super) fn unfold(field: &dyn Field, vertices: &[Vertex], triangles: &mut [[u32; 3]], count: &mut u64) {
+pub(super) fn unfold(field: &dyn Field, vertices: &Vertices, triangles: &mut [[u32; 3]], count: &mut u64) {
     for _ in 0..ROUNDS {
         let folded = folded(field, vertices, triangles, count);
         if folded.is_empty() || !turn(field, vertices, triangles, &folded, count) {
@@ -24,32 +26,44 @@ pub(super) fn unfold(field: &dyn Field, vertices: &[Vertex], triangles: &mut [[u
     }
 }
 
-/// How well a triangle faces as the surface below its middle does: the cosine between them.
-fn agreement(field: &dyn Field, vertices: &[Vertex], triangle: [u32; 3], count: &mut u64) -> f64 {
-    let [a, b, c] = triangle.map(|v| vertices[v as usize].position);
-    *count += 1;
-    let outward = unit(-field.omega_grad((a + b + c) / 3.0).1);
-    match (unit((b - a).cross(c - a)), outward) {
+fn corners(vertices: &Vertices, triangle: [u32; 3]) -> [DVec3; 3] {
+    triangle.map(|v| vertices.positions[v as usize])
+}
+
+/// How well a triangle faces as the surface below its middle does, where ∇ω is given: the cosine between them.
+fn facing([a, b, c]: [DVec3; 3], gradient: DVec3) -> f64 {
+    match (unit((b - a).cross(c - a)), unit(-gradient)) {
         (Some(facing), Some(outward)) => facing.dot(outward),
         _ => 0.0,
     }
 }
 
+fn agreement(field: &dyn Field, vertices: &Vertices, triangle: [u32; 3], count: &mut u64) -> f64 {
+    let corners = corners(vertices, triangle);
+    *count += 1;
+    facing(corners, field.omega_grad(corners.iter().sum::<DVec3>() / 3.0).1)
+}
+
 /// Triangles upside down; only vertices on creases make such.
-fn folded(field: &dyn Field, vertices: &[Vertex], triangles: &[[u32; 3]], count: &mut u64) -> Vec<usize> {
-    let is_sharp = |v: &u32| vertices[*v as usize].kind == Kind::Sharp;
-    let is_cap = |v: &u32| vertices[*v as usize].kind == Kind::Cap;
-    let suspects = triangles
-        .iter()
-        .enumerate()
-        .filter(|(_, t)| t.iter().filter(|v| is_sharp(v)).count() >= 2 && !t.iter().any(is_cap));
-    suspects.filter(|(_, t)| agreement(field, vertices, **t, count) < 0.0).map(|(i, _)| i).collect()
+fn folded(field: &dyn Field, vertices: &Vertices, triangles: &[[u32; 3]], count: &mut u64) -> Vec<usize> {
+    let kinds = |t: &[u32; 3]| t.map(|v| vertices.kinds[v as usize]);
+    let is_suspect = |kinds: [Kind; 3]| {
+        kinds.iter().filter(|&&kind| kind == Kind::Sharp).count() >= 2 && !kinds.contains(&Kind::Cap)
+    };
+    let suspects: Vec<usize> =
+        triangles.iter().enumerate().filter(|(_, t)| is_suspect(kinds(t))).map(|(i, _)| i).collect();
+    let middle = |&t: &usize| corners(vertices, triangles[t]).iter().sum::<DVec3>() / 3.0;
+    let middles: Vec<DVec3> = suspects.iter().map(middle).collect();
+    *count += middles.len() as u64;
+    let below = gradients(field, &middles);
+    let found = suspects.into_iter().zip(below);
+    found.filter(|&(t, (_, g))| facing(corners(vertices, triangles[t]), g) < 0.0).map(|(t, _)| t).collect()
 }
 
 /// Turns the edge of each folded triangle that helps most; whether any did.
 fn turn(
     field: &dyn Field,
-    vertices: &[Vertex],
+    vertices: &Vertices,
     triangles: &mut [[u32; 3]],
     folded: &[usize],
     count: &mut u64,
@@ -103,6 +117,7 @@ fn turn(
 mod tests {
     use glam::DVec3;
 
+    use super::super::vertices::Vertex;
     use super::*;
     use crate::field::Closures;
 
@@ -111,12 +126,11 @@ mod tests {
     fn a_fold_is_turned_out() {
         let floor = Closures { omega: |p: DVec3| -p.z, gradient: |_| -DVec3::Z };
         let places = [[0.0, 0.0], [2.0, 0.0], [0.4, 0.4], [0.0, 2.0]];
-        let vertices = places.map(|[x, y]| Vertex {
-            position: DVec3::new(x, y, 0.0),
-            normal: DVec3::Z,
-            kind: Kind::Sharp,
-            fallback: DVec3::ZERO,
-        });
+        let mut vertices = Vertices::default();
+        for [x, y] in places {
+            let position = DVec3::new(x, y, 0.0);
+            vertices.push(Vertex { position, normal: DVec3::Z, kind: Kind::Sharp });
+        }
         // 1–3 is the diagonal outside the dart 0, 1, 2, 3
         let mut triangles = [[0, 1, 3], [1, 2, 3]];
         assert!(agreement(&floor, &vertices, triangles[1], &mut 0) < 0.0);

@@ -1,0 +1,105 @@
+//! What dual contouring makes its mesh of: vertices, and the hits on crossed edges around which they stand.
+//!
+//! Columns rather than rows: most steps read positions alone, or kinds alone.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A vertex of the mesh.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Vertex {
+    pub position: DVec3,
+    /// Outward unit normal; zero on creases and where there is none.
+    pub normal: DVec3,
+    pub kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The surface is smooth in the cell.
+    Smooth,
+    /// The surface may have a crease there.
+    Sharp,
+    /// On the border, where the solid leaves the grid.
+    Cap,
+}
+
+/// Vertices by their numbers.
+#[derive(Default)]
+pub(super) struct Vertices {
+    pub positions: Vec<DVec3>,
+    pub normals: Vec<DVec3>,
+    pub kinds: Vec<Kind>,
+}
+
+impl Vertices {
+    pub fn new(count: usize) -> Self {
+        // rayon writes the zeros, so each thread touches memory of its own for the first time
+        let zeros = || rayon::iter::repeat_n(DVec3::ZERO, count).collect();
+        Self { positions: zeros(), normals: zeros(), kinds: vec![Kind::Smooth; count] }
+    }
+
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    pub fn get(&self, v: u32) -> Vertex {
+        let v = v as usize;
+        Vertex { position: self.positions[v], normal: self.normals[v], kind: self.kinds[v] }
+    }
+
+    pub fn push(&mut self, vertex: Vertex) {
+        self.positions.push(vertex.position);
+        self.normals.push(vertex.normal);
+        self.kinds.push(vertex.kind);
+    }
+}
+
+/// Where the surface crosses an edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hit {
+    pub position: DVec3,
+    /// Outward unit normal; zero where the field has none.
+    pub normal: DVec3,
+    /// Whether the edge leaves the grid: the hit lies on the border inside the solid.
+    pub is_cap: bool,
+}
+
+/// Hits by the numbers of their edges.
+#[derive(Default)]
+pub(super) struct Hits {
+    pub positions: Vec<DVec3>,
+    pub normals: Vec<DVec3>,
+    pub is_cap: Vec<bool>,
+}
+
+impl Hits {
+    pub fn get(&self, number: u32) -> Hit {
+        let i = number as usize;
+        Hit { position: self.positions[i], normal: self.normals[i], is_cap: self.is_cap[i] }
+    }
+}
+
+/// The vertices of the four cells around each crossed edge, by the edge's place in the cell.
+pub(super) struct Rings(Vec<[AtomicU32; 4]>);
+
+/// A place without a vertex; only a field whose ranges contradict its values leaves one.
+pub(super) const NONE: u32 = u32::MAX;
+
+impl Rings {
+    pub fn new(count: usize) -> Self {
+        let empty = |_| [const { AtomicU32::new(NONE) }; 4];
+        Self((0..count).into_par_iter().map(empty).collect())
+    }
+
+    pub fn get(&self, hit: u32) -> [u32; 4] {
+        self.0[hit as usize].each_ref().map(|vertex| vertex.load(Ordering::Relaxed))
+    }
+
+    /// Each place is written by one cell.
+    pub fn set(&self, hit: u32, edge: u8, vertex: u32) {
+        self.0[hit as usize][usize::from(edge & 3)].store(vertex, Ordering::Relaxed);
+    }
+}
