@@ -160,8 +160,13 @@ impl<'a> Simulation<'a> {
     /// # Errors
     /// As [`Simulation::step`].
     pub fn step_at_most(&mut self, longest: f64) -> Result<(), StepError> {
+        let before = self.core.steps;
         self.core.steps += 1;
-        self.core.time += self.scheme.step(&mut self.core, longest)?;
+        let dt = self.scheme.step(&mut self.core, longest)?;
+        // equal steps are counted, so that their rounding errors do not add up
+        let counted = |steps: u64| steps as f64 * dt;
+        self.core.time =
+            if self.core.time == counted(before) { counted(before + 1) } else { self.core.time + dt };
         Ok(())
     }
 
