@@ -37,6 +37,7 @@
 //! - After a step every particle is finite, in the box, and in the fluid (ω < 0), or the step was an error.
 //! - A step allocates nothing once the buffers have grown to the flow's size.
 
+mod checkpoint;
 mod core;
 mod kernel;
 mod methods;
@@ -54,6 +55,7 @@ mod scenes;
 #[cfg(test)]
 mod tests;
 
+pub use checkpoint::{Checkpoint, CheckpointError};
 pub use kernel::Kernels;
 pub use params::{Dfsph, Method, NegativePressure, ParameterError, Parameters, Precision, Slip, Wcsph};
 pub use particles::{Particles, Vectors};

@@ -10,6 +10,7 @@ use glam::DVec3;
 use crate::geom::Aabb;
 
 use super::{
+    checkpoint::{Checkpoint, CheckpointError},
     core::{Core, first_non_finite},
     methods::Scheme,
     params::{ParameterError, Parameters},
@@ -32,6 +33,8 @@ pub enum SetupError {
         index: usize,
     },
     NoParticles,
+    /// The checkpoint is not one of this method.
+    Checkpoint(CheckpointError),
     /// A particle's position or velocity is not finite.
     NonFinite {
         id: u32,
@@ -54,6 +57,7 @@ impl fmt::Display for SetupError {
                     "obstacle {index} needs a restitution from 0 to 1, a friction of at least 0 and a resolution above 0"
                 )
             }
+            Self::Checkpoint(error) => write!(f, "the checkpoint cannot be used: {error}"),
             Self::NoParticles => write!(f, "there are no particles"),
             Self::NonFinite { id } => write!(f, "the position or velocity of particle {id} is not finite"),
             Self::NotInFluid { outside_box, inside_obstacles } => {
@@ -143,6 +147,32 @@ impl<'a> Simulation<'a> {
         let mut core = Core::new(parameters, boundary, particles);
         let scheme = Scheme::start(&mut core);
         Ok(Self { core, scheme })
+    }
+
+    /// A simulation that goes on from a checkpoint: with the same parameters, box and obstacles every later step has
+    /// the bits that it would have had without the interruption.
+    ///
+    /// # Errors
+    /// [`SetupError`] as for [`Simulation::new`], or because the checkpoint is one of another method.
+    pub fn resume(
+        parameters: Parameters,
+        checkpoint: &Checkpoint,
+        domain: Aabb,
+        obstacles: Vec<Obstacle<'a>>,
+    ) -> Result<Self, SetupError> {
+        let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
+        // sorting leaves in their places what was sorted before
+        let mut simulation = Self::new(parameters, particles, domain, obstacles)?;
+        let restored = checkpoint.restore(&mut simulation.core);
+        restored.and_then(|()| simulation.scheme.restore(checkpoint)).map_err(SetupError::Checkpoint)?;
+        Ok(simulation)
+    }
+
+    /// What [`Simulation::resume`] needs; the fingerprint is the caller's.
+    pub fn checkpoint(&self) -> Checkpoint {
+        let mut checkpoint = Checkpoint::of(&self.core);
+        self.scheme.save(&mut checkpoint);
+        checkpoint
     }
 
     /// Advances by one time step.

@@ -19,6 +19,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::sph::{
+    checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled},
     pairs::{PairPass, Real},
     params::{Dfsph, Method, Parameters, Slip},
@@ -128,6 +129,18 @@ impl DivergenceFree {
         self.remove_divergence(core, dt);
         core.check_finite(dt)?;
         Ok(dt)
+    }
+
+    /// The answers of the last step; all else follows from the positions.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.set("density pressure", self.density_pressure.clone());
+        checkpoint.set("divergence pressure", self.divergence_pressure.clone());
+    }
+
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.density_pressure = checkpoint.of_particles("density pressure")?;
+        self.divergence_pressure = checkpoint.of_particles("divergence pressure")?;
+        Ok(())
     }
 
     pub fn bytes(&self) -> usize {

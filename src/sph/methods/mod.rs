@@ -6,7 +6,12 @@ mod wcsph;
 
 pub(super) use paper::Terms;
 
-use super::{core::Core, params::Method, simulation::StepError};
+use super::{
+    checkpoint::{Checkpoint, CheckpointError},
+    core::Core,
+    params::Method,
+    simulation::StepError,
+};
 
 /// A method with what it keeps between steps.
 pub(super) enum Scheme {
@@ -31,6 +36,25 @@ impl Scheme {
             Self::Paper(scheme) => scheme.step(core, longest),
             Self::Wcsph(scheme) => scheme.step(core, longest),
             Self::Dfsph(scheme) => scheme.step(core, longest),
+        }
+    }
+
+    /// Puts into a checkpoint what the next step needs besides the particles and their accelerations.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        match self {
+            Self::Paper(_) => {}
+            Self::Wcsph(scheme) => scheme.save(checkpoint),
+            Self::Dfsph(scheme) => scheme.save(checkpoint),
+        }
+    }
+
+    /// # Errors
+    /// The column that the checkpoint lacks.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        match self {
+            Self::Paper(_) => Ok(()),
+            Self::Wcsph(scheme) => scheme.restore(checkpoint),
+            Self::Dfsph(scheme) => scheme.restore(checkpoint),
         }
     }
 
