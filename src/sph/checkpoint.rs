@@ -112,6 +112,9 @@ impl Checkpoint {
         }
         checkpoint.set("density", particles.density.clone());
         checkpoint.set("pressure", particles.pressure.clone());
+        if let Some(contacts) = &core.contacts {
+            checkpoint.set("contacts", contacts.totals().as_flattened().to_vec());
+        }
         checkpoint
     }
 

@@ -15,6 +15,7 @@ use super::{
     methods::Scheme,
     params::{ParameterError, Parameters},
     particles::{Particles, Vectors},
+    probes::{Contacts, Gauge, Probe},
     stats::{Pass, Stats},
     walls::{Boundary, Obstacle},
 };
@@ -222,6 +223,51 @@ impl<'a> Simulation<'a> {
         self.core.parameters.gravity = gravity;
     }
 
+    /// A probe that may be asked for samples from now on, at most once at each instant.
+    ///
+    /// # Errors
+    /// The number of an obstacle that does not exist.
+    pub fn gauge(&mut self, probe: Probe) -> Result<Gauge, SetupError> {
+        self.prepare(probe)?;
+        Ok(Gauge::new(probe))
+    }
+
+    /// A probe of a run that goes on from a checkpoint, with the memory that it had then.
+    ///
+    /// # Errors
+    /// As [`Simulation::gauge`].
+    pub fn gauge_at(
+        &mut self,
+        probe: Probe,
+        checkpoint: &Checkpoint,
+        memory: &[f64],
+    ) -> Result<Gauge, SetupError> {
+        let is_first = self.core.contacts.is_none();
+        self.prepare(probe)?;
+        if let (true, Some(contacts), Ok(totals)) =
+            (is_first, &mut self.core.contacts, checkpoint.get("contacts"))
+        {
+            contacts.restore(totals);
+        }
+        Ok(Gauge::remembering(probe, memory))
+    }
+
+    fn prepare(&mut self, probe: Probe) -> Result<(), SetupError> {
+        if let Probe::Force { obstacle, .. } = probe {
+            let obstacles = self.core.boundary.obstacles.len();
+            if obstacle >= obstacles {
+                return Err(SetupError::Obstacle { index: obstacle });
+            }
+            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles));
+        }
+        Ok(())
+    }
+
+    /// What a probe reads now: a figure for each of its [columns](Probe::columns).
+    pub fn sample(&self, gauge: &mut Gauge) -> Vec<f64> {
+        gauge.sample(&self.core, &self.scheme)
+    }
+
     /// The longest step, s, that this state allows: the parameters' limits for the present greatest speed,
     /// and the force limit for the present greatest acceleration.
     pub fn stable_dt(&self) -> f64 {
@@ -245,7 +291,12 @@ impl<'a> Simulation<'a> {
 
     /// The passes that a step of this simulation runs, in order.
     pub fn passes(&self) -> Vec<Pass> {
-        Pass::of(&self.core.parameters, &self.core.boundary)
+        self.plan().into_iter().filter_map(|(pass, absence)| absence.is_none().then_some(pass)).collect()
+    }
+
+    /// All passes in the order in which a step would run them, each with the reason if it does not run.
+    pub fn plan(&self) -> Vec<(Pass, Option<&'static str>)> {
+        Pass::plan(&self.core.parameters, &self.core.boundary)
     }
 }
 

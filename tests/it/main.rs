@@ -16,6 +16,7 @@ mod numbers;
 mod pipeline;
 mod properties;
 mod ranges;
+mod run;
 mod sweep;
 mod tidy;
 mod tool;

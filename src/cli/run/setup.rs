@@ -9,8 +9,8 @@ use crate::ir::Interpreter;
 use crate::lower::{Bounce, Fill, Fluid, Method, Precision, Scene, Slip};
 use crate::solid::Bounds;
 use crate::sph::{
-    self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
-    carve,
+    self, Checkpoint, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError,
+    SetupError, Simulation, carve,
 };
 use crate::{Program, Solid};
 use glam::DVec3;
@@ -159,6 +159,12 @@ impl Setup {
             refuse(program, Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string()))
         })?;
         Ok((simulation, carved))
+    }
+
+    /// The simulation at a checkpoint.
+    pub fn resume(&self, checkpoint: &Checkpoint) -> Result<Simulation<'_>, SetupError> {
+        let obstacles = self.obstacles.iter().map(|(_, field, e)| self.obstacle(&**field, *e)).collect();
+        Simulation::resume(self.parameters.clone(), checkpoint, self.domain, obstacles)
     }
 
     fn obstacle<'a>(&self, field: &'a dyn Field, bounce: Bounce) -> Obstacle<'a> {

@@ -22,7 +22,7 @@ use crate::{
     geom::Aabb,
 };
 
-use crate::sph::particles::Vectors;
+use crate::sph::{particles::Vectors, probes::Contacts};
 
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, reflect, turn_back},
@@ -70,7 +70,8 @@ pub(in crate::sph) struct Fault {
 }
 
 impl Boundary<'_> {
-    /// Moves particles from `position` to `target` and corrects both target and velocity where they collide.
+    /// Moves particles from `position` to `target` and corrects both target and velocity where they collide; what
+    /// obstacles do to velocities is added to `contacts`, if somebody asks.
     ///
     /// # Errors
     /// The first particle, in the order of the arrays, at which a field is undefined.
@@ -79,6 +80,7 @@ impl Boundary<'_> {
         position: &Vectors,
         target: &mut Vectors,
         velocity: &mut Vectors,
+        contacts: Option<&Contacts>,
     ) -> Result<(), Fault> {
         let [tx, ty, tz] = target.components_mut().map(|c| c.par_chunks_mut(BLOCK));
         let [vx, vy, vz] = velocity.components_mut().map(|c| c.par_chunks_mut(BLOCK));
@@ -89,7 +91,7 @@ impl Boundary<'_> {
             .enumerate()
             .filter_map(|(b, (((x, y), z), ((u, v), w)))| {
                 let mut block = Block { first: b * BLOCK, position, target: [x, y, z], velocity: [u, v, w] };
-                self.collide_block(&mut block).err()
+                self.collide_block(&mut block, contacts).err()
             })
             .min_by_key(|fault| fault.index);
         fault.map_or(Ok(()), Err)
@@ -121,7 +123,7 @@ impl Boundary<'_> {
         (whole.part > 0.0).then_some(whole)
     }
 
-    fn collide_block(&self, block: &mut Block<'_>) -> Result<(), Fault> {
+    fn collide_block(&self, block: &mut Block<'_>, contacts: Option<&Contacts>) -> Result<(), Fault> {
         let mut swept = Aabb::EMPTY;
         for k in 0..block.len() {
             let (target, velocity) = self.hold_in_box(block.target(k), block.velocity(k));
@@ -133,7 +135,11 @@ impl Boundary<'_> {
         }
         for k in 0..block.len() {
             let (at, velocity) = self
-                .resolve(block.from(k), block.target(k), block.velocity(k))
+                .resolve(block.from(k), block.target(k), block.velocity(k), |obstacle, change, at| {
+                    if let Some(contacts) = contacts {
+                        contacts.add(block.first + k, obstacle, change, at);
+                    }
+                })
                 .map_err(|undefined| block.fault(k, undefined))?;
             block.put(k, at, velocity);
         }
@@ -164,14 +170,22 @@ impl Boundary<'_> {
         (at, velocity)
     }
 
-    /// Where a particle comes to rest on its way, and with what velocity.
-    fn resolve(&self, from: DVec3, to: DVec3, velocity: DVec3) -> Result<(DVec3, DVec3), Undefined> {
+    /// Where a particle comes to rest on its way, and with what velocity; `hit` hears of each obstacle's change of the
+    /// velocity, and where it was.
+    fn resolve(
+        &self,
+        from: DVec3,
+        to: DVec3,
+        velocity: DVec3,
+        hit: impl Fn(usize, DVec3, DVec3),
+    ) -> Result<(DVec3, DVec3), Undefined> {
         let (mut here, mut target, mut velocity) = (from, to, velocity);
         for _ in 0..MAX_CONTACTS {
             (target, velocity) = self.hold_in_box(target, velocity);
-            let Some((obstacle, contact)) = self.nearest_contact(here, target)? else {
+            let Some((index, contact)) = self.nearest_contact(here, target)? else {
                 return Ok((target, velocity));
             };
+            let (obstacle, before) = (&self.obstacles[index], velocity);
             let turned = turn_back(velocity, &contact, obstacle.restitution);
             velocity = rubbed(velocity, turned, contact.normal, obstacle.friction);
             let rest = target - contact.point;
@@ -185,18 +199,19 @@ impl Boundary<'_> {
                 target = lifted.point;
                 velocity = reflect(velocity, lifted.normal, obstacle.restitution);
             }
+            hit(index, velocity - before, contact.point);
         }
         Ok((here, velocity))
     }
 
-    fn nearest_contact(&self, from: DVec3, to: DVec3) -> Result<Option<(&Obstacle<'_>, Contact)>, Undefined> {
-        let mut nearest: Option<(&Obstacle<'_>, Contact)> = None;
-        for obstacle in &self.obstacles {
+    fn nearest_contact(&self, from: DVec3, to: DVec3) -> Result<Option<(usize, Contact)>, Undefined> {
+        let mut nearest: Option<(usize, Contact)> = None;
+        for (index, obstacle) in self.obstacles.iter().enumerate() {
             let path = Path::new(from, to, obstacle.resolution);
             if let Some(contact) = first_contact(obstacle.field, &path, self.clearance)?
                 && nearest.is_none_or(|(_, other)| contact.fraction < other.fraction)
             {
-                nearest = Some((obstacle, contact));
+                nearest = Some((index, contact));
             }
         }
         Ok(nearest)
