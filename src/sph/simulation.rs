@@ -265,7 +265,7 @@ impl<'a> Simulation<'a> {
 
     /// What a probe reads now: a figure for each of its [columns](Probe::columns).
     pub fn sample(&self, gauge: &mut Gauge) -> Vec<f64> {
-        gauge.sample(&self.core, &self.scheme)
+        gauge.sample(&self.core)
     }
 
     /// The longest step, s, that this state allows: the parameters' limits for the present greatest speed,

@@ -428,7 +428,15 @@ fn runs_are_the_same_for_any_number_of_threads() {
             assert!(bytes("out1") == bytes("out2"), "{part}/{name}");
         }
     }
-    let expected = ["checkpoints", "frames", "obstacle.stl", "obstacle.vtp", "particles.pvd", "pictures", "summary.json"];
+    let expected = [
+        "checkpoints",
+        "frames",
+        "obstacle.stl",
+        "obstacle.vtp",
+        "particles.pvd",
+        "pictures",
+        "summary.json",
+    ];
     assert_eq!(files(&folder.path().join("out1")), expected);
 }
 

@@ -79,7 +79,7 @@ fn a_run_that_was_stopped_goes_on_as_if_it_had_not_been() {
         std::fs::write(here.join("drop.rfm"), scene(method, "until: 0.1 s, save_every: 10 ms")).unwrap();
         run(here, &["straight"]).expect(0);
         // stopped between two frames, and then at its end
-        run(here, &["broken", "--steps", "37"]).expect(0);
+        run(here, &["broken", "--steps", "11"]).expect(0);
         let summary = run(here, &["broken", "--resume", "--json"]).expect(0).json();
         assert_same_results(&here.join("straight"), &here.join("broken"));
         let straight = std::fs::read_to_string(here.join("straight/summary.json")).unwrap();

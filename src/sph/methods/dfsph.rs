@@ -131,11 +131,6 @@ impl DivergenceFree {
         Ok(dt)
     }
 
-    /// p/ρ² of both solvers: both push the fluid, and are pushed back by walls.
-    pub fn specific_pressure(&self) -> Vec<f64> {
-        self.density_pressure.iter().zip(&self.divergence_pressure).map(|(s, t)| s + t).collect()
-    }
-
     /// The answers of the last step; all else follows from the positions.
     pub fn save(&self, checkpoint: &mut Checkpoint) {
         checkpoint.set("density pressure", self.density_pressure.clone());

@@ -5,7 +5,6 @@ mod paper;
 mod wcsph;
 
 pub(super) use paper::Terms;
-pub(super) use wcsph::LEAST_FREE;
 
 use super::{
     checkpoint::{Checkpoint, CheckpointError},
@@ -37,15 +36,6 @@ impl Scheme {
             Self::Paper(scheme) => scheme.step(core, longest),
             Self::Wcsph(scheme) => scheme.step(core, longest),
             Self::Dfsph(scheme) => scheme.step(core, longest),
-        }
-    }
-
-    /// p/ρ² of each particle, where walls answer to pressure.
-    pub fn specific_pressure(&self, core: &Core<'_>) -> Option<Vec<f64>> {
-        match self {
-            Self::Paper(_) => None,
-            Self::Wcsph(scheme) => Some(scheme.specific_pressure(core)),
-            Self::Dfsph(scheme) => Some(scheme.specific_pressure()),
         }
     }
 

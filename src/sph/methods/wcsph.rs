@@ -25,7 +25,7 @@ use crate::sph::{
     core::{CHUNK, Core, add_scaled, add_scaled_column},
     pairs::{PairPass, Real},
     params::{Method, NegativePressure, Parameters, Slip, Wcsph},
-    particles::{Particles, Vectors},
+    particles::Vectors,
     simulation::StepError,
     walls::{Boundary, WallKernel},
 };
@@ -34,7 +34,7 @@ use crate::sph::{
 const EXPONENT: i32 = 7;
 
 /// Corrections for walls divide by what is left of the kernel, but never by less than this.
-pub const LEAST_FREE: f64 = 0.25;
+const LEAST_FREE: f64 = 0.25;
 
 /// What is kept between steps: the rate of change of the density; the rest is working memory.
 pub struct Weakly {
@@ -83,12 +83,6 @@ impl Weakly {
         self.find_pressure(core);
         core.check_finite(dt)?;
         Ok(dt)
-    }
-
-    /// p/ρ²
-    pub fn specific_pressure(&self, core: &Core<'_>) -> Vec<f64> {
-        let Particles { pressure, density, .. } = &core.particles;
-        pressure.iter().zip(density).map(|(p, rho)| p / (rho * rho)).collect()
     }
 
     pub fn save(&self, checkpoint: &mut Checkpoint) {

@@ -16,7 +16,6 @@ use crate::geom::Aabb;
 use super::{
     core::Core,
     kernel::Kernels,
-    methods::Scheme,
     params::{Method, NegativePressure, Parameters},
     stats::energies,
     walls::WallKernel,
@@ -28,8 +27,8 @@ pub(super) use force::Contacts;
 /// asked for. In a full neighbourhood the variance is 0.05 (Wendland) to 0.1 (poly6), at a wall half of it.
 const LEAST_SPREAD: f64 = 1e-5;
 
-/// Walls take no more of a kernel than this.
-const MOST_COVERED: f64 = 0.75;
+/// Walls take no more of a kernel than this; in the corner of a box they take seven eighths.
+const MOST_COVERED: f64 = 0.9;
 
 /// What is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,10 +42,8 @@ pub enum Probe {
     Velocity { at: DVec3 },
     /// What the fluid does to an obstacle, N, and its torque about a point, N·m.
     ///
-    /// Counted are the pressure that the obstacle's faces give back to the fluid, the friction at a wall that the fluid
-    /// sticks to, and particles' contacts, averaged over the time since the last sample. The paper's method knows
-    /// contacts only. Where several walls are near a particle, its acceleration by them is shared out along their
-    /// normals.
+    /// Counted are the fluid's pressure on the obstacle's faces, the friction where the fluid sticks to walls, and the
+    /// contacts of particles, averaged over the time since the last sample. The paper's method knows contacts only.
     Force { obstacle: usize, about: DVec3 },
     /// Mass per second through a plane, along its normal, kg/s: ∫ ρ v·n over the plane with the density and velocity
     /// that the kernel makes of the particles.
@@ -100,7 +97,7 @@ impl Gauge {
         Self { probe, last: memory.try_into().unwrap_or([0.0; 7]) }
     }
 
-    pub(super) fn sample(&mut self, core: &Core<'_>, scheme: &Scheme) -> Vec<f64> {
+    pub(super) fn sample(&mut self, core: &Core<'_>) -> Vec<f64> {
         match self.probe {
             Probe::Height { x, y } => vec![height(core, x, y)],
             Probe::Pressure { at } => vec![Neighbourhood::around(core, at).pressure()],
@@ -112,7 +109,7 @@ impl Gauge {
                 vec![kinetic, potential, elastic, kinetic + potential + elastic]
             }
             Probe::Force { obstacle, about } => {
-                let mut force = force::pressure_on(core, scheme, obstacle, about);
+                let mut force = force::pressure_on(core, obstacle, about);
                 let (time, total) =
                     (core.time, core.contacts.as_ref().map_or([0.0; 6], |c| c.total(obstacle)));
                 let passed = time - self.last[0];

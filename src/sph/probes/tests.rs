@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::field::Field;
+use crate::sph::methods::Scheme;
 use crate::sph::{Dfsph, Obstacle, Particles, Simulation, Wcsph, scenes, walls::Boundary};
 
 const G: f64 = 9.81;
@@ -28,7 +29,7 @@ fn water(method: Method) -> Parameters {
 }
 
 fn weakly() -> Method {
-    Method::Wcsph(Wcsph { sound_speed: 30.0, density_diffusion: 0.1, artificial_viscosity: 0.1 })
+    Method::Wcsph(Wcsph { sound_speed: 30.0, density_diffusion: 0.1, artificial_viscosity: 0.0 })
 }
 
 /// Particles at the middles of the cells of a lattice that fills a box.
@@ -126,7 +127,7 @@ fn a_falling_block_carries_its_mass_through_a_plane() {
         for z in [0.5, 0.512, 0.55, 0.63] {
             let found = flux(&core, DVec3::new(0.0, 0.0, z), -DVec3::Z);
             // the lattice's layers are summed where an integral is meant
-            assert!((found / (RHO * area * 2.0) - 1.0).abs() < 2e-3, "{z}: {found}");
+            assert!((found / (RHO * area * 2.0) - 1.0).abs() < 3e-3, "{z}: {found}");
             assert_eq!(flux(&core, DVec3::new(0.0, 0.0, z), DVec3::Z), -found);
         }
         assert_eq!(flux(&core, DVec3::new(0.0, 0.0, 0.1), DVec3::Z), 0.0);
@@ -139,7 +140,10 @@ fn energies_of_a_fall() {
     let domain = Aabb::new(DVec3::splat(-10.0), DVec3::splat(10.0));
     let block = lattice(DVec3::ZERO, DVec3::splat(0.2));
     let mass = RHO * 0.008;
-    let parameters = Parameters { precision: crate::sph::Precision::Double, ..water(weakly()) };
+    // diffusion would take a density that is even for one that is not at rest
+    let method =
+        Method::Wcsph(Wcsph { sound_speed: 30.0, density_diffusion: 0.0, artificial_viscosity: 0.0 });
+    let parameters = Parameters { precision: crate::sph::Precision::Double, ..water(method) };
     let mut simulation = Simulation::new(parameters, block, domain, Vec::new()).unwrap();
     let mut gauge = simulation.gauge(Probe::Energy).unwrap();
     let [_, potential, elastic, total] = simulation.sample(&mut gauge)[..] else { panic!() };
@@ -186,7 +190,9 @@ fn load_of_still_water(method: Method, about: DVec3) -> ([f64; 6], f64) {
     let body = Obstacle { restitution: 0.0, ..scenes::obstacle(&block) };
     let particles = lattice(DVec3::Z * 0.2, DVec3::new(WIDTH, WIDTH, 0.2 + DEPTH));
     let weight = particles.len() as f64 * RHO * SPACING.powi(3) * G;
-    let mut simulation = Simulation::new(water(method), particles, bowl(), vec![body]).unwrap();
+    // calms it; what walls give is pressure alone
+    let parameters = Parameters { viscosity: 5.0, ..water(method) };
+    let mut simulation = Simulation::new(parameters, particles, bowl(), vec![body]).unwrap();
     let mut gauge = simulation.gauge(Probe::Force { obstacle: 0, about }).unwrap();
     let (mut sum, mut passed) = ([0.0; 6], 0.0);
     while simulation.time() < 1.5 {
@@ -210,7 +216,7 @@ fn the_floor_carries_the_water() {
         let (force, weight) = load_of_still_water(method, corner);
         println!("{}: {force:?} of {weight} N", method.name());
         let name = method.name();
-        // the walls of the box share in what particles in corners feel
+        // particles lie unevenly at walls, and the water still sways a little
         assert!((force[2] / weight + 1.0).abs() < 0.04, "{name}: {} {weight}", force[2]);
         assert!(force[0].abs() + force[1].abs() < 0.03 * weight, "{name}: {force:?}");
         // the weight attacks in the middle, WIDTH/2 away from the corner along x and y
