@@ -83,6 +83,9 @@ impl<'a> Lowering<'a> {
         let mut stated =
             block.entries.iter().map(Entry::key).filter(|key| MEASURED.contains(&key.text.as_str()));
         let Some(key) = stated.next() else {
+            if block.entries.iter().any(|entry| !PROBE_KEYS.contains(&entry.key().text.as_str())) {
+                return None; // it may be the misspelt one, which was reported
+            }
             let message = format!("a probe needs one of {}", MEASURED.join(", "));
             self.report(
                 Diagnostic::error(Code::SCENE_MISSING, block.span, message)
@@ -136,8 +139,9 @@ impl<'a> Lowering<'a> {
         let point = self.place(&block, "point", domain);
         let normal = self.vector_key(&block, "normal", Dimension::NONE, DVec3::X)?;
         let Some(unit) = normal.try_normalize() else {
+            let at = block.setting("normal").map_or(span, |(_, value)| value.span);
             let message = format!("`normal` must have a length, found {normal}");
-            self.report(Diagnostic::error(Code::OUT_OF_RANGE, span, message));
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message));
             return None;
         };
         Some(Measured::Flux { point: point?, normal: unit })
