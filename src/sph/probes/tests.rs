@@ -53,13 +53,16 @@ fn bowl() -> Aabb {
 
 /// A state that is given, not computed.
 fn state(method: Method, particles: Particles, domain: Aabb) -> Core<'static> {
-    let boundary = Boundary {
-        domain,
-        wall_restitution: 0.5,
-        wall_friction: 0.0,
-        obstacles: Vec::new(),
-        clearance: 1e-6,
-    };
+    state_around(method, particles, domain, Vec::new())
+}
+
+fn state_around(
+    method: Method,
+    particles: Particles,
+    domain: Aabb,
+    obstacles: Vec<Obstacle<'_>>,
+) -> Core<'_> {
+    let boundary = Boundary { domain, wall_restitution: 0.5, wall_friction: 0.0, obstacles, clearance: 1e-6 };
     let mut core = Core::new(water(method), boundary, particles);
     Scheme::start(&mut core);
     core.particles.density.fill(RHO);
@@ -184,48 +187,45 @@ fn floor(z: f64) -> impl Field {
     scenes::half_space(DVec3::Z * z, DVec3::Z)
 }
 
-/// Mean force and torque about a point on a block under still water, and the water's weight.
-fn load_of_still_water(method: Method, about: DVec3) -> ([f64; 6], f64) {
+#[test]
+fn a_block_carries_the_water_on_it() {
     let block = floor(0.2);
-    let body = Obstacle { restitution: 0.0, ..scenes::obstacle(&block) };
     let particles = lattice(DVec3::Z * 0.2, DVec3::new(WIDTH, WIDTH, 0.2 + DEPTH));
     let weight = particles.len() as f64 * RHO * SPACING.powi(3) * G;
-    // calms it; what walls give is pressure alone
-    let parameters = Parameters { viscosity: 5.0, ..water(method) };
-    let mut simulation = Simulation::new(parameters, particles, bowl(), vec![body]).unwrap();
-    let mut gauge = simulation.gauge(Probe::Force { obstacle: 0, about }).unwrap();
-    let (mut sum, mut passed) = ([0.0; 6], 0.0);
-    while simulation.time() < 1.5 {
-        let before = simulation.time();
-        simulation.step().unwrap();
-        let dt = simulation.time() - before;
-        // sampled in every step: contacts are averaged over the time since the last sample
-        let force = simulation.sample(&mut gauge);
-        if simulation.time() > 0.75 {
-            passed += dt;
-            sum.iter_mut().zip(force).for_each(|(sum, x)| *sum += x * dt);
-        }
+    for method in [weakly(), Method::Dfsph(Dfsph::default())] {
+        let mut core = state_around(method, particles.clone(), bowl(), vec![scenes::obstacle(&block)]);
+        let heights = core.particles.position.z.clone();
+        core.particles.pressure = heights.iter().map(|z| RHO * G * (0.2 + DEPTH - z)).collect();
+        core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
+        let [x, y, z, torque_x, torque_y, torque_z] =
+            force::pressure_on(&core, 0, DVec3::new(WIDTH, 0.0, 0.0));
+        // the lattice's layers are summed where an integral is meant
+        assert!((z / weight + 1.0).abs() < 0.01, "{z} {weight}");
+        assert!(x == 0.0 && y == 0.0 && torque_z.abs() < 1e-9 * weight, "{x} {y} {torque_z}");
+        // the weight attacks in the middle, half the width away from the corner along x and y
+        let arm = 0.5 * WIDTH * weight;
+        assert!((torque_x / arm + 1.0).abs() < 0.01 && (torque_y / arm + 1.0).abs() < 0.01, "{torque_x}");
     }
-    (sum.map(|x| x / passed), weight)
 }
 
 #[test]
-fn the_floor_carries_the_water() {
-    for method in [weakly(), Method::Dfsph(Dfsph::default())] {
-        let corner = DVec3::new(WIDTH, 0.0, 0.0);
-        let (force, weight) = load_of_still_water(method, corner);
-        println!("{}: {force:?} of {weight} N", method.name());
-        let name = method.name();
-        // particles lie unevenly at walls, and the water still sways a little
-        assert!((force[2] / weight + 1.0).abs() < 0.04, "{name}: {} {weight}", force[2]);
-        assert!(force[0].abs() + force[1].abs() < 0.03 * weight, "{name}: {force:?}");
-        // the weight attacks in the middle, WIDTH/2 away from the corner along x and y
-        let arm = 0.5 * WIDTH * weight;
-        assert!(
-            (force[3] + arm).abs() < 0.06 * arm && (force[4] + arm).abs() < 0.06 * arm,
-            "{name}: {force:?}"
-        );
+fn a_shear_drags_a_block_that_it_sticks_to() {
+    let block = floor(0.2);
+    let particles = lattice(DVec3::Z * 0.2, DVec3::new(WIDTH, WIDTH, 0.2 + DEPTH));
+    let mut core = state_around(weakly(), particles, bowl(), vec![scenes::obstacle(&block)]);
+    let (rate, viscosity) = (3.0, 2.0);
+    core.parameters.viscosity = viscosity;
+    core.particles.pressure.fill(0.0);
+    core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
+    core.acceleration.z.fill(-G); // in free fall no pressure is missing
+    for i in 0..core.particles.len() {
+        core.particles.velocity.x[i] = rate * (core.particles.position.z[i] - 0.2);
     }
+    assert_eq!(force::pressure_on(&core, 0, DVec3::ZERO)[0], 0.0, "it slips");
+    core.parameters.slip = crate::sph::Slip::No;
+    let [x, y, z, ..] = force::pressure_on(&core, 0, DVec3::ZERO);
+    let exact = viscosity * rate * WIDTH * WIDTH;
+    assert!((x / exact - 1.0).abs() < 0.01 && y == 0.0 && z.abs() < 1e-9, "{x} {exact} {y} {z}");
 }
 
 /// A particle without neighbours above a block.
