@@ -21,8 +21,8 @@ use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Bounce, Fill, Fluid, Method, Precision, Scene, Slip};
 use crate::solid::{Bounds, MovingMap};
 use crate::sph::{
-    self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
-    carve,
+    self, Checkpoint, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError,
+    SetupError, Simulation, carve,
 };
 use crate::{Engine, Program, Solid};
 
@@ -40,7 +40,8 @@ pub struct Body {
     /// What answers for it in the box.
     field: Box<dyn Field>,
     moving: Option<Box<dyn Moving>>,
-    bounce: Bounce,
+    /// What it does to a particle.
+    pub bounce: Bounce,
 }
 
 /// A window of time in which the map of a moving solid stays, in steps.
@@ -224,6 +225,15 @@ impl Experiment {
             refuse(program, Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string()))
         })?;
         Ok((simulation, carved))
+    }
+
+    /// The simulation at a checkpoint.
+    ///
+    /// # Errors
+    /// If the checkpoint does not fit the scene.
+    pub fn resume(&self, checkpoint: &Checkpoint) -> Result<Simulation<'_>, SetupError> {
+        let obstacles = self.obstacles.iter().map(|body| self.obstacle(body)).collect();
+        Simulation::resume(self.parameters.clone(), checkpoint, self.domain, obstacles)
     }
 
     fn obstacle<'a>(&self, body: &'a Body) -> Obstacle<'a> {

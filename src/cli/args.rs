@@ -266,19 +266,22 @@ pub(super) struct Run {
     /// Folder for frames, pictures and summary [default: the file's name + .out]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// Stop after this many steps
+    /// Stop after this many steps, counted from the run's beginning
     #[arg(long, value_name = "N", conflicts_with = "until")]
     pub steps: Option<u64>,
     /// Stop at this simulated time, seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub until: Option<f64>,
-    /// Print what would be run, and run nothing
+    /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed
     #[arg(long)]
+    pub resume: bool,
+    /// Print what would be run, and run nothing
+    #[arg(long, conflicts_with = "resume")]
     pub dry_run: bool,
     /// Write no pictures
     #[arg(long)]
     pub no_pictures: bool,
-    /// Write no frames and no pictures, only the summary
+    /// Write no frames and no pictures
     #[arg(long)]
     pub no_frames: bool,
     /// Cells of the obstacle's mesh along its longest side

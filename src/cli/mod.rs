@@ -16,6 +16,7 @@ mod explain;
 mod input;
 mod mesh;
 mod output;
+mod plot;
 mod progress;
 mod report;
 mod run;

@@ -101,7 +101,8 @@ SCENE_KEY = "E0301":
       obstacle { solid: post, restitution: 0.5 }
       gravity: [0, 0, -9.81 m/s^2]
       method: paper
-      run      { dt: 2 ms, until: 5 s, save_every: 0.05 s }
+      run      { dt: 2 ms, until: 5 s, save_every: 0.05 s, checkpoint_every: 0.5 s }
+      probe gauge { height: [1, 0.5], every: 10 ms }
       tolerance: 1e-6
     }
 

@@ -9,6 +9,7 @@ mod arguments;
 mod builtins;
 mod eval;
 mod names;
+mod probes;
 mod scene;
 mod transforms;
 mod value;
@@ -16,6 +17,7 @@ mod value;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
+pub use probes::{Measured, Probe};
 pub use scene::{Bounce, Container, Fill, Fluid, Method, Obstacle, Precision, Run, Scene, Slip, Solver};
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::Tolerance;
 use super::eval::Lowering;
+use super::probes::{Probe, Surroundings};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
@@ -38,6 +39,7 @@ pub struct Scene {
     pub run: Run,
     /// What is known of the flow, to be compared with.
     pub truth: Option<Truth>,
+    pub probes: Vec<Probe>,
     /// The largest error of ω that is accepted of its obstacles in the box, if one is stated.
     pub tolerance: Option<Tolerance>,
 }
@@ -174,9 +176,11 @@ pub struct Run {
     pub until: f64,
     /// Time between saved frames, s.
     pub save_every: f64,
+    /// Time between checkpoints, s; one goes with every frame if it is not given.
+    pub checkpoint_every: Option<f64>,
 }
 
-const SCENE_KEYS: [&str; 12] = [
+const SCENE_KEYS: [&str; 13] = [
     "units",
     "box",
     "container",
@@ -188,10 +192,12 @@ const SCENE_KEYS: [&str; 12] = [
     "solver",
     "run",
     "truth",
+    "probe",
     "tolerance",
 ];
 /// Keys that open a block; all others have a value.
-const BLOCKS: [&str; 7] = ["box", "container", "fluid", "obstacle", "solver", "run", "truth"];
+const BLOCKS: [&str; 9] =
+    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux"];
 const TRUTH_KEYS: [&str; 3] = ["pressure", "velocity", "from"];
 const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
 const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
@@ -217,18 +223,18 @@ const FLUID_KEYS: [&str; 19] = [
     "seed",
 ];
 const OBSTACLE_KEYS: [&str; 3] = ["solid", "restitution", "friction"];
-const RUN_KEYS: [&str; 3] = ["dt", "until", "save_every"];
+const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
 
 /// The entries of a block whose keys are known, each at most once unless it may be repeated.
-struct Block<'a> {
-    entries: &'a [Entry],
+pub(super) struct Block<'a> {
+    pub entries: &'a [Entry],
     what: &'static str,
-    span: Span,
+    pub span: Span,
 }
 
 /// What a number may be.
 #[derive(Clone, Copy)]
-enum Bound {
+pub(super) enum Bound {
     Positive,
     NotNegative,
     Fraction,
@@ -237,8 +243,13 @@ enum Bound {
 impl<'a> Lowering<'a> {
     pub fn scene(&mut self, scene: &'a ast::Scene) -> Option<Scene> {
         let errors_before = self.errors();
-        let block =
-            self.block(&scene.entries, "a scene", scene.name.span, &SCENE_KEYS, &["obstacle", "fluid"]);
+        let block = self.block(
+            &scene.entries,
+            "a scene",
+            scene.name.span,
+            &SCENE_KEYS,
+            &["obstacle", "fluid", "probe"],
+        );
         self.units(&block);
         let domain = self.domain(&block);
         let words = [("paper", Method::Paper), ("wcsph", Method::Wcsph), ("dfsph", Method::Dfsph)];
@@ -254,6 +265,14 @@ impl<'a> Lowering<'a> {
         let gravity = self.gravity(&block);
         let truth = self.truth(&block);
         let run = self.run(&block);
+        let probes = match (&domain, &fluid) {
+            (Some((domain, ..)), Some(fluid)) => {
+                let container = container.iter().map(|c| &c.name[..]);
+                let bodies = container.chain(obstacles.iter().map(|o| &o.name[..])).collect();
+                self.probes(&block, &Surroundings { domain: *domain, bodies, fluid: &fluid.name })
+            }
+            _ => Vec::new(),
+        };
         let tolerance = block.setting("tolerance").and_then(|(_, value)| self.tolerance(value));
         if self.errors() > errors_before {
             return None;
@@ -275,6 +294,7 @@ impl<'a> Lowering<'a> {
             solver: solver?,
             run: run?,
             truth: truth?,
+            probes,
             tolerance,
         })
     }
@@ -294,7 +314,7 @@ impl<'a> Lowering<'a> {
         self.diagnostics.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error).count()
     }
 
-    fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
+    pub(super) fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
         if block.entries.iter().any(|entry| entry.key().text == key) {
             return; // there, but of the wrong form, which was reported
         }
@@ -303,7 +323,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reports unknown keys, and known ones that stand twice.
-    fn block<'b>(
+    pub(super) fn block<'b>(
         &mut self,
         entries: &'b [Entry],
         what: &'static str,
@@ -633,13 +653,14 @@ impl<'a> Lowering<'a> {
     }
 
     fn run(&mut self, block: &Block<'_>) -> Option<Run> {
-        let defaults = Run { dt: None, until: 5.0, save_every: 0.05 };
+        let defaults = Run { dt: None, until: 5.0, save_every: 0.05, checkpoint_every: None };
         let Some((_, entries, span)) = block.blocks("run").next() else { return Some(defaults) };
         let block = self.block(entries, "a run", span, &RUN_KEYS, &[]);
-        let dt = match block.setting("dt") {
-            Some(_) => Some(self.number_key(&block, "dt", Dimension::TIME, None, Bound::Positive)?),
-            None => None,
+        let mut optional = |key| match block.setting(key) {
+            Some(_) => self.number_key(&block, key, Dimension::TIME, None, Bound::Positive).map(Some),
+            None => Some(None),
         };
+        let (dt, checkpoint_every) = (optional("dt"), optional("checkpoint_every"));
         let until = self.number_key(&block, "until", Dimension::TIME, Some(defaults.until), Bound::Positive);
         let save = self.number_key(
             &block,
@@ -648,11 +669,11 @@ impl<'a> Lowering<'a> {
             Some(defaults.save_every),
             Bound::Positive,
         );
-        Some(Run { dt, until: until?, save_every: save? })
+        Some(Run { dt: dt?, until: until?, save_every: save?, checkpoint_every: checkpoint_every? })
     }
 
     /// The value of a key, checked; `None` was reported. A key without a default must be present.
-    fn number_key(
+    pub(super) fn number_key(
         &mut self,
         block: &Block<'_>,
         key: &str,
@@ -675,7 +696,7 @@ impl<'a> Lowering<'a> {
         None
     }
 
-    fn vector_key(
+    pub(super) fn vector_key(
         &mut self,
         block: &Block<'_>,
         key: &str,
@@ -714,7 +735,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// A constant in SI units; a unit, where one is written, must fit.
-    fn quantity_expr(&mut self, expr: &Expr, expected: Dimension, key: &str) -> Option<f64> {
+    pub(super) fn quantity_expr(&mut self, expr: &Expr, expected: Dimension, key: &str) -> Option<f64> {
         match &expr.kind {
             ExprKind::Quantity { value, unit } => {
                 let parsed = parse_unit(&unit.text)?; // the grammar admits known units only
@@ -760,14 +781,14 @@ fn example_unit(dimension: Dimension) -> &'static str {
 }
 
 impl<'a> Block<'a> {
-    fn setting(&self, key: &str) -> Option<(&'a Name, &'a Expr)> {
+    pub(super) fn setting(&self, key: &str) -> Option<(&'a Name, &'a Expr)> {
         self.entries.iter().find_map(|entry| match entry {
             Entry::Setting { key: name, value } if name.text == key => Some((name, value)),
             _ => None,
         })
     }
 
-    fn blocks(
+    pub(super) fn blocks(
         &self,
         key: &'static str,
     ) -> impl Iterator<Item = (Option<&'a Name>, &'a [Entry], Span)> + use<'a> {

@@ -8,6 +8,7 @@ use super::{
     pairs::{Cloud, Columns, PairPass, Real},
     params::{Parameters, Precision},
     particles::{Particles, Vectors},
+    probes::Contacts,
     simulation::{Cause, Quantity, StepError},
     walls::Boundary,
 };
@@ -24,6 +25,8 @@ pub(super) struct Core<'a> {
     pub steps: u64,
     /// s
     pub time: f64,
+    /// Of obstacles, if somebody asks.
+    pub contacts: Option<Contacts>,
     level: Level,
     columns: Columns,
     /// Working memory: where the particles go before they collide, or what a method needs a vector for.
@@ -43,6 +46,7 @@ impl<'a> Core<'a> {
             acceleration,
             steps: 0,
             time: 0.0,
+            contacts: None,
             level: Level::new(),
             columns: Columns::default(),
             spare: Vectors::default(),
@@ -66,13 +70,18 @@ impl<'a> Core<'a> {
             return Err(self.non_finite(i, Quantity::Position, dt));
         }
         let Particles { position, velocity, id, .. } = &mut self.particles;
-        self.boundary.collide(position, &mut self.spare, velocity).map_err(|fault| StepError::NonFinite {
-            step: self.steps,
-            id: id[fault.index],
-            quantity: Quantity::Omega,
-            cause: Cause::FieldUndefined { at: fault.at },
-        })?;
+        self.boundary.collide(position, &mut self.spare, velocity, self.contacts.as_ref()).map_err(
+            |fault| StepError::NonFinite {
+                step: self.steps,
+                id: id[fault.index],
+                quantity: Quantity::Omega,
+                cause: Cause::FieldUndefined { at: fault.at },
+            },
+        )?;
         std::mem::swap(position, &mut self.spare);
+        if let Some(contacts) = &mut self.contacts {
+            contacts.settle(self.parameters.particle_mass);
+        }
         Ok(())
     }
 

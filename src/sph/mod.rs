@@ -37,12 +37,14 @@
 //! - After a step every particle is finite, in the box, and in the fluid (ω < 0), or the step was an error.
 //! - A step allocates nothing once the buffers have grown to the flow's size.
 
+mod checkpoint;
 mod core;
 mod kernel;
 mod methods;
 mod pairs;
 mod params;
 mod particles;
+mod probes;
 mod seed;
 mod simulation;
 mod stats;
@@ -54,11 +56,13 @@ mod scenes;
 #[cfg(test)]
 mod tests;
 
+pub use checkpoint::{Checkpoint, CheckpointError};
 pub use kernel::Kernels;
 pub use params::{Dfsph, Method, NegativePressure, ParameterError, Parameters, Precision, Slip, Wcsph};
 pub use particles::{Particles, Vectors};
+pub use probes::{Gauge, Probe};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::{Pass, Stats};
-pub use vtp::{write_pvd, write_vtp};
+pub use vtp::{short_time, write_pvd, write_vtp};
 pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};

@@ -58,6 +58,10 @@ impl Vectors {
         8 * (self.x.capacity() + self.y.capacity() + self.z.capacity())
     }
 
+    pub(super) fn components(&self) -> [&Vec<f64>; 3] {
+        [&self.x, &self.y, &self.z]
+    }
+
     pub(super) fn components_mut(&mut self) -> [&mut Vec<f64>; 3] {
         [&mut self.x, &mut self.y, &mut self.z]
     }

@@ -10,10 +10,12 @@ use glam::DVec3;
 use crate::geom::Aabb;
 
 use super::{
+    checkpoint::{Checkpoint, CheckpointError},
     core::{Core, first_non_finite},
     methods::Scheme,
     params::{ParameterError, Parameters},
     particles::{Particles, Vectors},
+    probes::{Contacts, Gauge, Probe},
     stats::{Pass, Stats},
     walls::{Boundary, Obstacle},
 };
@@ -32,6 +34,8 @@ pub enum SetupError {
         index: usize,
     },
     NoParticles,
+    /// The checkpoint is not one of this method.
+    Checkpoint(CheckpointError),
     /// A particle's position or velocity is not finite.
     NonFinite {
         id: u32,
@@ -54,6 +58,7 @@ impl fmt::Display for SetupError {
                     "obstacle {index} needs a restitution from 0 to 1, a friction of at least 0 and a resolution above 0"
                 )
             }
+            Self::Checkpoint(error) => write!(f, "the checkpoint cannot be used: {error}"),
             Self::NoParticles => write!(f, "there are no particles"),
             Self::NonFinite { id } => write!(f, "the position or velocity of particle {id} is not finite"),
             Self::NotInFluid { outside_box, inside_obstacles } => {
@@ -130,6 +135,17 @@ impl<'a> Simulation<'a> {
         domain: Aabb,
         obstacles: Vec<Obstacle<'a>>,
     ) -> Result<Self, SetupError> {
+        Self::at(parameters, particles, domain, obstacles, (0, 0.0))
+    }
+
+    /// After so many steps, at a time.
+    fn at(
+        parameters: Parameters,
+        particles: Particles,
+        domain: Aabb,
+        obstacles: Vec<Obstacle<'a>>,
+        (steps, time): (u64, f64),
+    ) -> Result<Self, SetupError> {
         parameters.validate().map_err(SetupError::Parameter)?;
         let clearance = CLEARANCE * parameters.support_radius;
         let mut boundary = Boundary {
@@ -140,11 +156,39 @@ impl<'a> Simulation<'a> {
             during: Vec::new(),
             clearance,
         };
-        boundary.move_to(0.0, 0.0);
+        boundary.move_to(time, time);
         check_setup(&boundary, &particles)?;
         let mut core = Core::new(parameters, boundary, particles);
+        (core.steps, core.time) = (steps, time);
         let scheme = Scheme::start(&mut core);
         Ok(Self { core, scheme })
+    }
+
+    /// A simulation that goes on from a checkpoint: with the same parameters, box and obstacles every later step has
+    /// the bits that it would have had without the interruption.
+    ///
+    /// # Errors
+    /// [`SetupError`] as for [`Simulation::new`], or because the checkpoint is one of another method.
+    pub fn resume(
+        parameters: Parameters,
+        checkpoint: &Checkpoint,
+        domain: Aabb,
+        obstacles: Vec<Obstacle<'a>>,
+    ) -> Result<Self, SetupError> {
+        let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
+        // sorting leaves in their places what was sorted before
+        let instant = (checkpoint.steps, checkpoint.time);
+        let mut simulation = Self::at(parameters, particles, domain, obstacles, instant)?;
+        let restored = checkpoint.restore(&mut simulation.core);
+        restored.and_then(|()| simulation.scheme.restore(checkpoint)).map_err(SetupError::Checkpoint)?;
+        Ok(simulation)
+    }
+
+    /// What [`Simulation::resume`] needs; the fingerprint is the caller's.
+    pub fn checkpoint(&self) -> Checkpoint {
+        let mut checkpoint = Checkpoint::of(&self.core);
+        self.scheme.save(&mut checkpoint);
+        checkpoint
     }
 
     /// Advances by one time step.
@@ -199,6 +243,51 @@ impl<'a> Simulation<'a> {
         self.core.parameters.gravity = gravity;
     }
 
+    /// A probe that may be asked for samples from now on, at most once at each instant.
+    ///
+    /// # Errors
+    /// The number of an obstacle that does not exist.
+    pub fn gauge(&mut self, probe: Probe) -> Result<Gauge, SetupError> {
+        self.prepare(probe)?;
+        Ok(Gauge::new(probe))
+    }
+
+    /// A probe of a run that goes on from a checkpoint, with the memory that it had then.
+    ///
+    /// # Errors
+    /// As [`Simulation::gauge`].
+    pub fn gauge_at(
+        &mut self,
+        probe: Probe,
+        checkpoint: &Checkpoint,
+        memory: &[f64],
+    ) -> Result<Gauge, SetupError> {
+        let is_first = self.core.contacts.is_none();
+        self.prepare(probe)?;
+        if let (true, Some(contacts), Ok(totals)) =
+            (is_first, &mut self.core.contacts, checkpoint.get("contacts"))
+        {
+            contacts.restore(totals);
+        }
+        Ok(Gauge::remembering(probe, memory))
+    }
+
+    fn prepare(&mut self, probe: Probe) -> Result<(), SetupError> {
+        if let Probe::Force { obstacle, .. } = probe {
+            let obstacles = self.core.boundary.obstacles.len();
+            if obstacle >= obstacles {
+                return Err(SetupError::Obstacle { index: obstacle });
+            }
+            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles));
+        }
+        Ok(())
+    }
+
+    /// What a probe reads now: a figure for each of its [columns](Probe::columns).
+    pub fn sample(&self, gauge: &mut Gauge) -> Vec<f64> {
+        gauge.sample(&self.core)
+    }
+
     /// The longest step, s, that this state allows: the parameters' limits for the present greatest speed,
     /// and the force limit for the present greatest acceleration.
     pub fn stable_dt(&self) -> f64 {
@@ -227,7 +316,12 @@ impl<'a> Simulation<'a> {
 
     /// The passes that a step of this simulation runs, in order.
     pub fn passes(&self) -> Vec<Pass> {
-        Pass::of(&self.core.parameters, &self.core.boundary)
+        self.plan().into_iter().filter_map(|(pass, absence)| absence.is_none().then_some(pass)).collect()
+    }
+
+    /// All passes in the order in which a step would run them, each with the reason if it does not run.
+    pub fn plan(&self) -> Vec<(Pass, Option<&'static str>)> {
+        Pass::plan(&self.core.parameters, &self.core.boundary)
     }
 }
 

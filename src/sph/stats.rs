@@ -6,7 +6,12 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::{core::Core, methods::Terms, params::Parameters, walls::Boundary};
+use super::{
+    core::Core,
+    methods::Terms,
+    params::{Method, Parameters, Slip, Wcsph},
+    walls::Boundary,
+};
 
 /// A stage of a step. Those a scene does not need do not run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,55 +20,71 @@ pub enum Pass {
     Walls,
     Obstacles,
     Neighbours,
+    Coverage,
     Density,
+    DensityDiffusion,
     Pressure,
+    PressureSolver,
     Viscosity,
+    ArtificialViscosity,
+    NoSlip,
     SurfaceTension,
     Gravity,
 }
 
 impl Pass {
-    /// In the order in which a step runs them.
-    pub const ALL: [Self; 9] = [
-        Self::Integrate,
-        Self::Walls,
-        Self::Obstacles,
-        Self::Neighbours,
-        Self::Density,
-        Self::Pressure,
-        Self::Viscosity,
-        Self::SurfaceTension,
-        Self::Gravity,
-    ];
-
-    /// Why a scene runs without the pass.
-    pub fn absence(self) -> &'static str {
-        match self {
-            Self::Integrate | Self::Walls | Self::Neighbours | Self::Density => "always runs",
-            Self::Obstacles => "the scene has no obstacle",
-            Self::Pressure => "the stiffness is zero",
-            Self::Viscosity => "the viscosity is zero",
-            Self::SurfaceTension => "the surface tension is zero",
-            Self::Gravity => "gravity is zero",
-        }
-    }
-
-    pub(super) fn of(parameters: &Parameters, boundary: &Boundary<'_>) -> Vec<Self> {
+    /// All passes, about in the order of a step, each with the reason if it does not run.
+    pub(super) fn plan(
+        parameters: &Parameters,
+        boundary: &Boundary<'_>,
+    ) -> Vec<(Self, Option<&'static str>)> {
+        const STATE: &str = "the method has an equation of state";
+        let unless = |needed: bool, reason: &'static str| (!needed).then_some(reason);
         let terms = Terms::of(parameters);
-        [
-            (Self::Integrate, true),
-            (Self::Walls, true),
-            (Self::Obstacles, !boundary.obstacles.is_empty()),
-            (Self::Neighbours, true),
-            (Self::Density, true),
-            (Self::Pressure, terms.pressure),
-            (Self::Viscosity, terms.viscosity),
-            (Self::SurfaceTension, terms.tension),
-            (Self::Gravity, parameters.gravity != DVec3::ZERO),
+        let (paper, wcsph, dfsph) = match parameters.method {
+            Method::Paper => (true, None, false),
+            Method::Wcsph(wcsph) => (false, Some(wcsph), false),
+            Method::Dfsph(_) => (false, None, true),
+        };
+        let of_wcsph = |needed: &dyn Fn(Wcsph) -> bool, zero| match wcsph {
+            None => Some("it belongs to the method wcsph"),
+            Some(numbers) => unless(needed(numbers), zero),
+        };
+        let no_slip = match () {
+            () if paper => Some("in this method walls act on positions and velocities only"),
+            () if parameters.slip == Slip::Free => Some("the fluid slips along walls"),
+            () => unless(terms.viscosity, "the viscosity is zero"),
+        };
+        let pressure = match () {
+            () if dfsph => Some("the method solves for the pressure"),
+            () => unless(!paper || terms.pressure, "the stiffness is zero"),
+        };
+        let tension = match () {
+            () if !paper => Some("it belongs to the method paper"),
+            () => unless(terms.tension, "the surface tension is zero"),
+        };
+        vec![
+            (Self::Integrate, None),
+            (Self::Walls, None),
+            (Self::Obstacles, unless(!boundary.obstacles.is_empty(), "the scene has no obstacle")),
+            (Self::Neighbours, None),
+            (Self::Coverage, unless(!paper, "in this method walls act on positions and velocities only")),
+            (Self::Density, None),
+            (
+                Self::DensityDiffusion,
+                of_wcsph(&|numbers| numbers.density_diffusion > 0.0, "the density diffusion is zero"),
+            ),
+            (Self::Pressure, pressure),
+            (Self::PressureSolver, unless(dfsph, STATE)),
+            (Self::Viscosity, unless(terms.viscosity, "the viscosity is zero")),
+            (
+                Self::ArtificialViscosity,
+                of_wcsph(&|numbers| numbers.artificial_viscosity > 0.0, "the artificial viscosity is zero"),
+            ),
+            (Self::NoSlip, no_slip),
+            (Self::SurfaceTension, tension),
+            (Self::Gravity, unless(parameters.gravity != DVec3::ZERO, "gravity is zero")),
         ]
-        .into_iter()
-        .filter_map(|(pass, runs)| runs.then_some(pass))
-        .collect()
     }
 
     pub fn name(self) -> &'static str {
@@ -72,9 +93,14 @@ impl Pass {
             Self::Walls => "walls",
             Self::Obstacles => "obstacles",
             Self::Neighbours => "neighbours",
+            Self::Coverage => "wall coverage",
             Self::Density => "density",
+            Self::DensityDiffusion => "density diffusion",
             Self::Pressure => "pressure",
+            Self::PressureSolver => "pressure solver",
             Self::Viscosity => "viscosity",
+            Self::ArtificialViscosity => "artificial viscosity",
+            Self::NoSlip => "no slip",
             Self::SurfaceTension => "surface tension",
             Self::Gravity => "gravity",
         }
@@ -117,14 +143,13 @@ impl Stats {
     pub(super) fn of(core: &Core<'_>) -> Self {
         let Core { parameters, boundary, particles, .. } = core;
         let mass = parameters.particle_mass;
-        let g = parameters.gravity;
-        let floor = boundary.domain.corners().map(|c| -g.dot(c)).into_iter().fold(f64::INFINITY, f64::min);
+        let [kinetic_energy, potential_energy] = energies(core);
         let mut stats = Self {
             particles: particles.len(),
             neighbours_per_particle: core.pairs() as f64 / particles.len() as f64,
             max_density_error: 0.0,
-            kinetic_energy: 0.0,
-            potential_energy: 0.0,
+            kinetic_energy,
+            potential_energy,
             momentum: DVec3::ZERO,
             max_speed: 0.0,
             max_penetration: 0.0,
@@ -135,8 +160,6 @@ impl Stats {
         for i in 0..particles.len() {
             let (x, v, rho) = (particles.position.get(i), particles.velocity.get(i), particles.density[i]);
             stats.max_density_error = stats.max_density_error.max(rho / parameters.rest_density - 1.0);
-            stats.kinetic_energy += 0.5 * mass * v.length_squared();
-            stats.potential_energy += mass * (-g.dot(x) - floor);
             stats.momentum += mass * v;
             stats.max_speed = stats.max_speed.max(v.length());
             stats.lost += usize::from(!boundary.domain.contains(x));
@@ -147,6 +170,16 @@ impl Stats {
         }
         stats
     }
+}
+
+/// Kinetic and potential energy, J, the latter from the box's lowest corner along gravity.
+pub(super) fn energies(core: &Core<'_>) -> [f64; 2] {
+    let Core { parameters, boundary, particles, .. } = core;
+    let (mass, g) = (parameters.particle_mass, parameters.gravity);
+    let floor = boundary.domain.corners().map(|c| -g.dot(c)).into_iter().fold(f64::INFINITY, f64::min);
+    let kinetic = particles.velocity.iter().map(|v| 0.5 * mass * v.length_squared()).sum();
+    let potential = particles.position.iter().map(|x| mass * (-g.dot(x) - floor)).sum();
+    [kinetic, potential]
 }
 
 impl Boundary<'_> {

@@ -71,9 +71,14 @@ pub fn write_pvd<'a>(
     writeln!(out, "<Collection>")?;
     for (time, file) in frames {
         let file = file.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
-        writeln!(out, r#"<DataSet timestep="{time}" part="0" file="{file}"/>"#)?;
+        writeln!(out, r#"<DataSet timestep="{}" part="0" file="{file}"/>"#, short_time(time))?;
     }
     writeln!(out, "</Collection>\n</VTKFile>")
+}
+
+/// A time in seconds to twelve digits: the sum of many steps is 0.04999999999999996 where 0.05 is meant.
+pub fn short_time(time: f64) -> f64 {
+    format!("{time:.11e}").parse().unwrap_or(time)
 }
 
 /// The raw block behind the document: each array is its length in bytes (u64) and its bytes.
@@ -144,7 +149,7 @@ mod tests {
     #[test]
     fn a_collection_lists_times_and_escaped_names() {
         let mut text = Vec::new();
-        write_pvd(&mut text, [(0.0, "a.vtp"), (0.04, "b&c.vtp")]).unwrap();
+        write_pvd(&mut text, [(0.0, "a.vtp"), (0.04 - 4e-17, "b&c.vtp")]).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert!(text.contains(r#"<DataSet timestep="0" part="0" file="a.vtp"/>"#));
         assert!(text.contains(r#"<DataSet timestep="0.04" part="0" file="b&amp;c.vtp"/>"#));

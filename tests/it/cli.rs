@@ -428,7 +428,15 @@ fn runs_are_the_same_for_any_number_of_threads() {
             assert!(bytes("out1") == bytes("out2"), "{part}/{name}");
         }
     }
-    let expected = ["frames", "obstacle.stl", "obstacle.vtp", "particles.pvd", "pictures", "summary.json"];
+    let expected = [
+        "checkpoints",
+        "frames",
+        "obstacle.stl",
+        "obstacle.vtp",
+        "particles.pvd",
+        "pictures",
+        "summary.json",
+    ];
     assert_eq!(files(&folder.path().join("out1")), expected);
 }
 
@@ -479,7 +487,7 @@ fn a_run_leaves_nothing_of_the_one_before() {
     run(&["--mesh-cells", "0"]).expect(2);
     assert_eq!([files(&here.join("out")), files(&here.join("out/frames"))], before);
     run(&["--no-frames", "--steps", "1"]).expect(0);
-    assert_eq!(files(&here.join("out")), ["frames", "pictures", "summary.json"]);
+    assert_eq!(files(&here.join("out")), ["checkpoints", "frames", "pictures", "summary.json"]);
     assert_eq!(files(&here.join("out/frames")), ["notes.txt"]);
     assert!(files(&here.join("out/pictures")).is_empty());
 }

@@ -18,6 +18,7 @@ mod numbers;
 mod pipeline;
 mod properties;
 mod ranges;
+mod run;
 mod simplify;
 mod sweep;
 mod tidy;

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::super::args::MeshMethod;
 use super::super::mesh::Depth;
+use super::super::plot::{self, Axis};
 use super::super::{Failure, progress};
-use super::plot::{self, Axis};
 use crate::Solid;
 use crate::mesh::{self, Grid, Quality, Resolution};
 

@@ -1,18 +1,11 @@
-//! Speed against error as a picture: one mark for each program; and what other pictures of the report share.
+//! Speed against error as a picture: one mark for each program.
 
 use std::fmt::Write;
 use std::path::Path;
 
-use super::super::{Failure, output};
+use super::super::Failure;
+use super::super::plot::{Axis, BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, begin, end, grid};
 use super::Row;
-use crate::slice;
-
-pub(super) const WIDTH: f64 = 760.0;
-pub(super) const HEIGHT: f64 = 520.0;
-pub(super) const LEFT: f64 = 80.0;
-pub(super) const RIGHT: f64 = 190.0;
-pub(super) const TOP: f64 = 50.0;
-pub(super) const BOTTOM: f64 = 60.0;
 
 /// Errors below this are drawn at it: an exact answer has no place on a logarithmic axis.
 const LEAST_ERROR: f64 = 1e-17;
@@ -20,54 +13,6 @@ const LEAST_ERROR: f64 = 1e-17;
 /// The plot as SVG or PNG, as the ending of the path says.
 pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
     end(svg(solid, rows), path)
-}
-
-/// The beginning of a plot: the white ground and the title.
-pub(super) fn begin(title: &str) -> String {
-    format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="Ubuntu" font-size="13"><rect width="100%" height="100%" fill="#ffffff"/><text x="{LEFT}" y="28" font-size="17">{}</text>"##,
-        slice::escaped(title)
-    )
-}
-
-/// The finished plot as SVG or PNG, as the ending of the path says.
-pub(super) fn end(mut svg: String, path: &Path) -> Result<Vec<u8>, Failure> {
-    svg.push_str("</svg>\n");
-    match output::Picture::of(path)? {
-        output::Picture::Svg => Ok(svg.into_bytes()),
-        output::Picture::Png => {
-            let mut bytes = Vec::new();
-            slice::rasterise(&svg, 2.0, &mut bytes).map_err(Failure::usage)?;
-            Ok(bytes)
-        }
-    }
-}
-
-/// A logarithmic axis over whole powers of ten.
-pub(super) struct Axis {
-    low: i32,
-    high: i32,
-    from: f64,
-    to: f64,
-}
-
-impl Axis {
-    pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        let (mut low, mut high) = (i32::MAX, i32::MIN);
-        for value in values {
-            low = low.min(value.log10().floor() as i32);
-            high = high.max(value.log10().ceil() as i32);
-        }
-        if low >= high {
-            (low, high) = if low == i32::MAX { (0, 1) } else { (low, low + 1) };
-        }
-        Self { low, high, from, to }
-    }
-
-    pub fn at(&self, value: f64) -> f64 {
-        let share = (value.log10() - f64::from(self.low)) / f64::from(self.high - self.low);
-        self.from + share * (self.to - self.from)
-    }
 }
 
 fn svg(solid: &str, rows: &[Row]) -> String {
@@ -85,38 +30,6 @@ fn svg(solid: &str, rows: &[Row]) -> String {
     }
     legend(&mut out, &marks);
     out
-}
-
-/// Lines at the whole powers of ten, and what the axes are.
-pub(super) fn grid(out: &mut String, x: &Axis, y: &Axis, [along, up]: [&str; 2]) {
-    // writing to a String cannot fail
-    for power in x.low..=x.high {
-        let at = x.at(10f64.powi(power));
-        let _ = write!(
-            out,
-            r##"<line x1="{at:.1}" y1="{TOP}" x2="{at:.1}" y2="{:.1}" stroke="#dddddd"/><text x="{at:.1}" y="{:.1}" text-anchor="middle">{}</text>"##,
-            HEIGHT - BOTTOM,
-            HEIGHT - BOTTOM + 20.0,
-            10f64.powi(power)
-        );
-    }
-    for power in (y.low..=y.high).filter(|p| (p - y.low) % 2 == 0) {
-        let at = y.at(10f64.powi(power));
-        let _ = write!(
-            out,
-            r##"<line x1="{LEFT}" y1="{at:.1}" x2="{:.1}" y2="{at:.1}" stroke="#dddddd"/><text x="{:.1}" y="{:.1}" text-anchor="end">1e{power}</text>"##,
-            WIDTH - RIGHT,
-            LEFT - 8.0,
-            at + 4.5
-        );
-    }
-    let middle = 0.5 * (TOP + HEIGHT - BOTTOM);
-    let _ = write!(
-        out,
-        r##"<text x="{:.1}" y="{:.1}" text-anchor="middle">{along}</text><text x="20" y="{middle:.1}" text-anchor="middle" transform="rotate(-90 20 {middle:.1})">{up}</text>"##,
-        0.5 * (LEFT + WIDTH - RIGHT),
-        HEIGHT - 14.0
-    );
 }
 
 /// Colour tells the program, shape the form; interpreters are hollow.

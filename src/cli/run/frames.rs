@@ -8,11 +8,15 @@ use glam::DVec3;
 
 use super::super::args::Run;
 use super::super::{Failure, note, output};
+use super::{checkpoints, probes};
 use crate::Experiment;
 use crate::lower::Scene;
 use crate::mesh::{self, Grid, Mesh, Resolution, marching_cubes};
 use crate::render;
-use crate::sph::{self, Simulation};
+use crate::sph::{self, Checkpoint, Simulation};
+
+/// Name in a checkpoint of the frames' times.
+const TIMES: &str = "frames";
 
 pub(super) struct Frames {
     folder: PathBuf,
@@ -33,8 +37,14 @@ struct Pictures {
 }
 
 impl Frames {
-    pub fn new(options: &Run, scene: &Scene, setup: &Experiment) -> Result<Self, Failure> {
-        let folder = options.output.clone().unwrap_or_else(|| default_folder(&options.file));
+    /// The files of a run that begins, or goes on from a checkpoint.
+    pub fn new(
+        options: &Run,
+        scene: &Scene,
+        setup: &Experiment,
+        resumed: Option<&Checkpoint>,
+    ) -> Result<Self, Failure> {
+        let folder = folder(options);
         let write_frames = !options.no_frames;
         // whatever can be refused comes before the first change to the folder
         let obstacle = if write_frames { obstacle_mesh(options, setup)? } else { Mesh::default() };
@@ -44,7 +54,9 @@ impl Frames {
             None
         };
         create(&folder)?;
-        remove_old(&folder)?;
+        if resumed.is_none() {
+            remove_old(&folder)?;
+        }
         let has_obstacle = write_frames && !setup.obstacles.is_empty();
         if write_frames {
             create(&folder.join("frames"))?;
@@ -56,7 +68,41 @@ impl Frames {
             output::write(&folder.join("obstacle.stl"), |mut out| mesh::stl::write(&obstacle, &mut out))?;
             output::write(&folder.join("obstacle.vtp"), |mut out| mesh::vtp::write(&obstacle, &mut out))?;
         }
-        Ok(Self { folder, saved: Vec::new(), write_frames, has_obstacle, pictures, count: 0, last_time: 0.0 })
+        let (count, last_time) = (0, 0.0);
+        let mut frames =
+            Self { folder, saved: Vec::new(), write_frames, has_obstacle, pictures, count, last_time };
+        if let Some(checkpoint) = resumed {
+            frames.take_up(checkpoint)?;
+        }
+        Ok(frames)
+    }
+
+    /// Lists the frames up to a checkpoint again, and removes those after it.
+    fn take_up(&mut self, checkpoint: &Checkpoint) -> Result<(), Failure> {
+        let times = checkpoint.get(TIMES).unwrap_or_default();
+        self.last_time = times.last().copied().unwrap_or_default();
+        if !self.write_frames {
+            return Ok(());
+        }
+        self.count = times.len();
+        let named = times.iter().enumerate().map(|(number, time)| (*time, frame_name(number)));
+        self.saved = named.filter(|(_, name)| self.folder.join(name).is_file()).collect();
+        if let Some(pictures) = &mut self.pictures {
+            pictures.count = self.count;
+        }
+        self.write_collection()?;
+        remove_numbered(&self.folder.join("frames"), "particles_", ".vtp", self.count)?;
+        remove_numbered(&self.folder.join("pictures"), "frame_", ".png", self.count)
+    }
+
+    /// Puts into a checkpoint which frames there are; one that was saved out of turn, because the run ended, is not
+    /// among them: a run that goes on has the frames of one that never stopped.
+    pub fn remember(&self, checkpoint: &mut Checkpoint, in_turn: bool) {
+        let mut times: Vec<f64> = self.saved.iter().map(|(time, _)| *time).collect();
+        if !in_turn && self.last_time == checkpoint.time {
+            times.pop();
+        }
+        checkpoint.set(TIMES, times);
     }
 
     pub fn folder(&self) -> &Path {
@@ -92,17 +138,21 @@ impl Frames {
         if !self.write_frames {
             return Ok(());
         }
-        let name = format!("frames/particles_{:06}.vtp", self.count);
+        let name = frame_name(self.count);
         output::write(&self.folder.join(&name), |mut out| sph::write_vtp(&mut out, simulation.particles()))?;
         self.saved.push((simulation.time(), name));
-        output::write(&self.folder.join("particles.pvd"), |mut out| {
-            sph::write_pvd(&mut out, self.saved.iter().map(|(time, file)| (*time, file.as_str())))
-        })?;
+        self.write_collection()?;
         if let Some(pictures) = &mut self.pictures {
             pictures.save(&self.folder.join(format!("pictures/frame_{:06}.png", self.count)), simulation)?;
         }
         self.count += 1;
         Ok(())
+    }
+
+    fn write_collection(&self) -> Result<(), Failure> {
+        output::write(&self.folder.join("particles.pvd"), |mut out| {
+            sph::write_pvd(&mut out, self.saved.iter().map(|(time, file)| (*time, file.as_str())))
+        })
     }
 }
 
@@ -142,9 +192,17 @@ impl Pictures {
     }
 }
 
-/// `pawn.rfm` → `pawn.out`, beside the file; standard input → `rfm.out`.
-fn default_folder(file: &Path) -> PathBuf {
-    if file == Path::new("-") { PathBuf::from("rfm.out") } else { file.with_extension("out") }
+/// Where a run's files go: by default `pawn.rfm` → `pawn.out`, beside the file; standard input → `rfm.out`.
+pub(super) fn folder(options: &Run) -> PathBuf {
+    match &options.output {
+        Some(folder) => folder.clone(),
+        None if options.file == Path::new("-") => PathBuf::from("rfm.out"),
+        None => options.file.with_extension("out"),
+    }
+}
+
+fn frame_name(number: usize) -> String {
+    format!("frames/particles_{number:06}.vtp")
 }
 
 fn create(folder: &Path) -> Result<(), Failure> {
@@ -160,11 +218,14 @@ fn remove_old(folder: &Path) -> Result<(), Failure> {
             std::fs::remove_file(&path).map_err(|e| not_cleared(folder, &e))?;
         }
     }
-    remove_numbered(&folder.join("frames"), "particles_", ".vtp")?;
-    remove_numbered(&folder.join("pictures"), "frame_", ".png")
+    checkpoints::remove_all(folder).map_err(|e| not_cleared(folder, &e))?;
+    probes::remove_old(folder).map_err(|e| not_cleared(folder, &e))?;
+    remove_numbered(&folder.join("frames"), "particles_", ".vtp", 0)?;
+    remove_numbered(&folder.join("pictures"), "frame_", ".png", 0)
 }
 
-fn remove_numbered(folder: &Path, prefix: &str, suffix: &str) -> Result<(), Failure> {
+/// Removes files by their number, from one on.
+fn remove_numbered(folder: &Path, prefix: &str, suffix: &str, first: usize) -> Result<(), Failure> {
     if !folder.is_dir() {
         return Ok(());
     }
@@ -174,7 +235,7 @@ fn remove_numbered(folder: &Path, prefix: &str, suffix: &str) -> Result<(), Fail
         let name = entry.file_name();
         let name = name.to_string_lossy();
         let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(suffix));
-        if number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit())) {
+        if number.and_then(|n| n.parse::<usize>().ok()).is_some_and(|n| n >= first) {
             std::fs::remove_file(entry.path()).map_err(failed)?;
         }
     }

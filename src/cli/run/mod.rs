@@ -1,8 +1,11 @@
 //! `rfm run`: the fluid of a scene, step by step, with frames, pictures and a summary.
 //!
-//! experiment (scene → simulation) → steps, with a frame every so often (`frames`) → summary.
+//! experiment (scene → simulation) → steps, with a frame, a checkpoint and samples of probes every so often → summary.
 
+mod checkpoints;
 mod frames;
+mod pace;
+mod probes;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,9 +18,11 @@ use super::{Failure, choose, input, note, output, progress};
 use crate::diagnostic::Diagnostics;
 use crate::experiment::Deviation;
 use crate::lower::Scene;
-use crate::sph::{Simulation, Stats};
+use crate::sph::{Checkpoint, Simulation, Stats, StepError, short_time};
 use crate::{Error, Experiment, Program};
+use checkpoints::Checkpoints;
 use frames::Frames;
+use probes::Probes;
 
 /// What `summary.json` and `--json` say; figures that judge the run are the worst of all saved instants.
 #[derive(Debug, Serialize)]
@@ -63,64 +68,56 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let program = input::program(shared, &options.file)?;
     let scene = choose::scene(&program, options.scene.as_deref())?;
     let setup = experiment(shared, &program, scene)?;
-    let (mut simulation, carved) = start(&setup, &program, scene)?;
+    let fingerprint = checkpoints::fingerprint(&program, scene, &setup);
+    let folder = frames::folder(options);
+    let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint)).transpose()?;
+    let (mut simulation, carved) = match &resumed {
+        Some(checkpoint) => (setup.resume(checkpoint).map_err(Failure::usage)?, 0),
+        None => start(&setup, &program, scene)?,
+    };
     let goal = Goal::of(options, scene, &setup)?;
     if options.dry_run {
         return dry_run(shared, &mut simulation, &setup, goal);
     }
-    let mut frames = Frames::new(options, scene, &setup)?;
+    let mut recording = Recording {
+        program: &program,
+        scene,
+        setup: &setup,
+        frames: Frames::new(options, scene, &setup, resumed.as_ref())?,
+        probes: Probes::start(&folder, scene, &mut simulation, resumed.as_ref())?,
+        checkpoints: Checkpoints::new(&folder, fingerprint, scene, resumed.as_ref()),
+        watch: Watch::new(&simulation, carved, resumed.as_ref()),
+    };
+    let pace = Pace::new(scene, &setup, simulation.time());
     let interrupted = interruption()?;
-    let bar = progress::bar(goal.total(), "running");
-    let mut watch = Watch::new(&simulation);
-    frames.save(&simulation)?;
-    let mut pace = Pace::new(scene, &setup);
-    let mut failure = None;
-    while !goal.is_reached(&simulation) {
-        if let Some(gravity) = setup.gravity_at(&program, scene, simulation.time()) {
-            simulation.set_gravity(gravity);
+    let end = recording.go_on(&mut simulation, goal, pace, &interrupted);
+    let finished = match end {
+        Ok(finished) => finished,
+        Err(Failure::Usage(message)) => {
+            return Err(Failure::Usage(format!("{message}\n{}", recording.kept())));
         }
-        let started = Instant::now();
-        let result = simulation.step_at_most(goal.left(&simulation).min(pace.left(&simulation)));
-        watch.spent += started.elapsed();
-        if let Err(error) = result {
-            let kept = format!("the frames up to {:.4} s are kept", frames.last_time());
-            failure = Some(Failure::Numerical(format!("{error}\n{kept}")));
-            break;
-        }
-        bar.set_position(goal.done(&simulation));
-        let stop = interrupted.load(Ordering::Relaxed);
-        if pace.frame_is_due(&simulation) || goal.is_reached(&simulation) || stop {
-            watch.look(&simulation);
-            watch.compare(Deviation::of(&program, scene, &simulation));
-            let mut message = format!("t = {:.3} s, {:.2} m/s", simulation.time(), watch.now.max_speed);
-            if let Some(iterations) = simulation.iterations() {
-                message += &format!(", {iterations} iterations");
-            }
-            bar.set_message(message);
-            frames.save(&simulation)?;
-        }
-        if stop {
-            failure = Some(Failure::Interrupted);
-            break;
-        }
-    }
-    bar.finish_and_clear();
-    let summary = watch.summary(scene, &simulation, carved, frames.count(), failure.is_none());
-    output::write(&frames.folder().join("summary.json"), |out| {
+        Err(other) => return Err(other),
+    };
+    let Recording { frames, probes, watch, .. } = &recording;
+    let summary = watch.summary(scene, &simulation, frames.count(), finished.is_ok());
+    output::write(&folder.join("summary.json"), |out| {
         serde_json::to_writer_pretty(&mut *out, &summary)?;
         writeln!(out)
     })?;
+    probes.plot()?;
     if shared.json {
         output::json(&summary)?;
     }
-    if let Some(failure) = failure {
-        if matches!(failure, Failure::Interrupted) {
-            note(format!("interrupted after {} steps; the frames so far are kept", simulation.steps()));
+    match finished {
+        Ok(()) if !shared.json => print(&summary, frames, probes),
+        Ok(()) => {}
+        Err(Stop::Interrupted) => {
+            note(format!("interrupted after {} steps; {}", simulation.steps(), recording.kept()));
+            return Err(Failure::Interrupted);
         }
-        return Err(failure);
-    }
-    if !shared.json {
-        print(&summary, &frames);
+        Err(Stop::Numerical(error)) => {
+            return Err(Failure::Numerical(format!("{error}\n{}", recording.kept())));
+        }
     }
     Ok(())
 }
@@ -155,6 +152,112 @@ fn refused(error: Error) -> Failure {
         other => choose::usage(other),
     }
 }
+
+/// All that is written while a run goes on.
+struct Recording<'a> {
+    program: &'a Program,
+    scene: &'a Scene,
+    setup: &'a Experiment,
+    frames: Frames,
+    probes: Probes,
+    checkpoints: Checkpoints,
+    watch: Watch,
+}
+
+/// Why a run ended before its end.
+enum Stop {
+    Interrupted,
+    Numerical(StepError),
+}
+
+impl Recording<'_> {
+    /// Steps to the goal, or as far as it goes.
+    fn go_on(
+        &mut self,
+        simulation: &mut Simulation<'_>,
+        goal: Goal,
+        mut pace: Pace,
+        interrupted: &AtomicBool,
+    ) -> Result<Result<(), Stop>, Failure> {
+        let bar = progress::bar(goal.total(), "running");
+        if simulation.steps() == 0 {
+            self.frames.save(simulation)?;
+        }
+        self.probes.sample(simulation)?;
+        while !goal.is_reached(simulation) {
+            if let Some(gravity) = self.setup.gravity_at(self.program, self.scene, simulation.time()) {
+                simulation.set_gravity(gravity);
+            }
+            let started = Instant::now();
+            let result = simulation.step_at_most(goal.left(simulation).min(pace.left(simulation)));
+            self.watch.spent += started.elapsed();
+            if let Err(error) = result {
+                bar.finish_and_clear();
+                return Ok(Err(Stop::Numerical(error)));
+            }
+            bar.set_position(goal.done(simulation));
+            let stop = interrupted.load(Ordering::Relaxed);
+            let in_turn = pace.frame_is_due(simulation);
+            self.record(simulation, in_turn, stop || goal.is_reached(simulation))?;
+            let speed = self.watch.now.max_speed;
+            let mut message = format!("t = {:.3} s, {speed:.2} m/s", simulation.time());
+            if let Some(iterations) = simulation.iterations() {
+                message += &format!(", {iterations} iterations");
+            }
+            bar.set_message(message);
+            if stop {
+                bar.finish_and_clear();
+                return Ok(Err(Stop::Interrupted));
+            }
+        }
+        // a run that goes on and is at its end already has lost the frame that was saved there out of turn
+        if self.frames.last_time() != simulation.time() {
+            self.frames.save(simulation)?;
+        }
+        bar.finish_and_clear();
+        Ok(Ok(()))
+    }
+
+    /// Writes what is due after a step: frames first, so that a checkpoint never knows of one that is not there.
+    fn record(&mut self, simulation: &Simulation<'_>, in_turn: bool, last: bool) -> Result<(), Failure> {
+        self.probes.sample(simulation)?;
+        if in_turn {
+            self.look(simulation);
+        }
+        if in_turn || last {
+            self.frames.save(simulation)?;
+        }
+        if self.checkpoints.is_due(simulation.time(), in_turn) || last {
+            let Self { frames, probes, watch, .. } = self;
+            self.checkpoints.save(simulation, |checkpoint| {
+                frames.remember(checkpoint, in_turn);
+                probes.save(checkpoint);
+                checkpoint.set(WATCH, watch.memory());
+            })?;
+        }
+        if last && !in_turn {
+            self.look(simulation);
+        }
+        Ok(())
+    }
+
+    fn look(&mut self, simulation: &Simulation<'_>) {
+        self.watch.look(simulation);
+        self.watch.compare(Deviation::of(self.program, self.scene, simulation));
+    }
+
+    /// What is left of a run that ended early.
+    fn kept(&self) -> String {
+        let frames = format!("the frames up to {} s are kept", short_time(self.frames.last_time()));
+        match self.checkpoints.last() {
+            Some(path) => format!("{frames}; --resume goes on from `{}`", path.display()),
+            None => format!("{frames}; there is no checkpoint yet"),
+        }
+    }
+}
+
+/// Name in a checkpoint of what [`Watch`] remembers.
+const WATCH: &str = "watch";
 
 /// Where a run ends.
 #[derive(Clone, Copy)]
@@ -229,10 +332,11 @@ enum Pace {
 }
 
 impl Pace {
-    fn new(scene: &Scene, setup: &Experiment) -> Self {
+    /// From a time on, s.
+    fn new(scene: &Scene, setup: &Experiment, time: f64) -> Self {
         let every = scene.run.save_every;
         if setup.parameters.adaptive {
-            Self::Times { every, next: 1 }
+            Self::Times { every, next: 1 + (time / every * (1.0 + 1e-12)) as u64 }
         } else {
             Self::Steps(((every / setup.parameters.time_step).round() as u64).max(1))
         }
@@ -293,13 +397,27 @@ fn dry_run(
     setup: &Experiment,
     goal: Goal,
 ) -> Result<(), Failure> {
-    const TRIAL: u32 = 3;
-    let started = Instant::now();
-    for _ in 0..TRIAL {
-        simulation.step().map_err(|e| Failure::Numerical(e.to_string()))?;
+    /// Steps that are taken before the clock starts: buffers grow, and solvers begin without an answer to start from.
+    const FIRST: u32 = 2;
+    /// Steps at most, and seconds after which no further one is begun.
+    const TRIAL: (u32, f64) = (20, 1.0);
+    let mut step = || simulation.step().map_err(|e| Failure::Numerical(e.to_string()));
+    for _ in 0..FIRST {
+        step()?;
     }
-    let per_step = started.elapsed().as_secs_f64() / f64::from(TRIAL);
-    let time_step = simulation.time() / f64::from(TRIAL);
+    let started = Instant::now();
+    let mut trial = 0;
+    while trial < TRIAL.0 && started.elapsed().as_secs_f64() < TRIAL.1 {
+        step()?;
+        trial += 1;
+    }
+    let per_step = started.elapsed().as_secs_f64() / f64::from(trial);
+    // at the start a fluid is slower than it will be
+    let time_step = if setup.parameters.adaptive {
+        setup.parameters.stable_dt(setup.typical_speed).min(simulation.stable_dt())
+    } else {
+        setup.parameters.time_step
+    };
     let steps = goal.steps(time_step);
     let stats = simulation.stats();
     let forecast = Forecast {
@@ -340,6 +458,7 @@ fn pass_names(simulation: &Simulation<'_>) -> Vec<&'static str> {
 /// The figures of a run while it goes on.
 struct Watch {
     spent: Duration,
+    carved: usize,
     energy_at_start: f64,
     most_energy: f64,
     now: Stats,
@@ -351,11 +470,12 @@ struct Watch {
 }
 
 impl Watch {
-    fn new(simulation: &Simulation<'_>) -> Self {
+    fn new(simulation: &Simulation<'_>, carved: usize, resumed: Option<&Checkpoint>) -> Self {
         let stats = simulation.stats();
         let energy = stats.kinetic_energy + stats.potential_energy;
-        Self {
+        let mut watch = Self {
             spent: Duration::ZERO,
+            carved,
             energy_at_start: energy,
             most_energy: energy,
             neighbours: (stats.neighbours_per_particle, 1),
@@ -363,7 +483,73 @@ impl Watch {
             knows: [false; 2],
             now: stats.clone(),
             worst: stats,
+        };
+        if let Some(memory) = resumed.and_then(|checkpoint| checkpoint.get(WATCH).ok()) {
+            watch.take_up(memory);
         }
+        watch
+    }
+
+    /// What a run that goes on must know of its beginning.
+    fn memory(&self) -> Vec<f64> {
+        let Self { spent, carved, energy_at_start, most_energy, neighbours, worst, .. } = self;
+        vec![
+            spent.as_secs_f64(),
+            *carved as f64,
+            *energy_at_start,
+            *most_energy,
+            neighbours.0,
+            neighbours.1 as f64,
+            worst.max_penetration,
+            worst.inside as f64,
+            worst.lost as f64,
+            worst.non_finite as f64,
+            worst.max_density_error,
+            worst.max_speed,
+            self.deviations.0[0],
+            self.deviations.0[1],
+            self.deviations.1 as f64,
+        ]
+    }
+
+    /// The other way; a memory of another length is none.
+    fn take_up(&mut self, memory: &[f64]) {
+        let Ok(
+            [
+                spent,
+                carved,
+                start,
+                most,
+                sum,
+                looks,
+                depth,
+                inside,
+                lost,
+                non_finite,
+                density,
+                speed,
+                pressures,
+                velocities,
+                compared,
+            ],
+        ) = <[f64; 15]>::try_from(memory)
+        else {
+            return;
+        };
+        self.spent = Duration::try_from_secs_f64(spent).unwrap_or_default();
+        self.carved = carved as usize;
+        (self.energy_at_start, self.most_energy) = (start, most);
+        self.neighbours = (sum, looks as usize);
+        self.deviations = ([pressures, velocities], compared as usize);
+        self.worst = Stats {
+            max_penetration: depth,
+            inside: inside as usize,
+            lost: lost as usize,
+            non_finite: non_finite as usize,
+            max_density_error: density,
+            max_speed: speed,
+            ..self.worst.clone()
+        };
     }
 
     fn look(&mut self, simulation: &Simulation<'_>) {
@@ -396,14 +582,7 @@ impl Watch {
         self.knows[k].then(|| (squares[k] / instants as f64).sqrt())
     }
 
-    fn summary(
-        &self,
-        scene: &Scene,
-        simulation: &Simulation<'_>,
-        carved: usize,
-        frames: usize,
-        finished: bool,
-    ) -> Summary {
+    fn summary(&self, scene: &Scene, simulation: &Simulation<'_>, frames: usize, finished: bool) -> Summary {
         let steps = simulation.steps();
         Summary {
             schema: 1,
@@ -412,7 +591,7 @@ impl Watch {
             simulated_seconds: simulation.time(),
             time_step: simulation.time() / steps.max(1) as f64,
             particles: self.now.particles,
-            particles_carved: carved,
+            particles_carved: self.carved,
             particle_mass: simulation.parameters().particle_mass,
             rest_density: simulation.parameters().rest_density,
             milliseconds_per_step: self.spent.as_secs_f64() * 1e3 / steps.max(1) as f64,
@@ -442,7 +621,7 @@ fn growth(start: f64, most: f64) -> Option<f64> {
     if most <= start { Some(0.0) } else { Some(most / start - 1.0).filter(|part| part.is_finite()) }
 }
 
-fn print(summary: &Summary, frames: &Frames) {
+fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
     say!(
         "{} particles, {} steps of {:.3e} s = {:.3} s simulated",
         summary.particles,
@@ -477,14 +656,14 @@ fn print(summary: &Summary, frames: &Frames) {
             );
         }
     }
-    say!("written to {}: {}", frames.folder().display(), frames.describe());
+    let probes = if probes.count() > 0 { format!(", {} probes", probes.count()) } else { String::new() };
+    say!("written to {}: {}{probes}", frames.folder().display(), frames.describe());
 }
 
 /// `rfm explain FILE:SCENE`: which passes run, which do not, and why.
 pub(super) fn explain(shared: &Shared, program: &Program, scene: &Scene) -> Result<(), Failure> {
     let setup = experiment(shared, program, scene)?;
     let (simulation, _) = start(&setup, program, scene)?;
-    let running = simulation.passes();
     say!(
         "scene {}: method {}, sums over neighbours in {}, time step {}",
         scene.name,
@@ -496,11 +675,10 @@ pub(super) fn explain(shared: &Shared, program: &Program, scene: &Scene) -> Resu
             format!("{:.3e} s ({})", setup.parameters.time_step, setup.time_step_reason)
         }
     );
-    for pass in crate::sph::Pass::ALL {
-        if running.contains(&pass) {
-            say!("  runs      {pass}");
-        } else {
-            say!("  left out  {pass}: {}", pass.absence());
+    for (pass, absence) in simulation.plan() {
+        match absence {
+            None => say!("  runs      {pass}"),
+            Some(reason) => say!("  left out  {pass}: {reason}"),
         }
     }
     Ok(())

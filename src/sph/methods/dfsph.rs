@@ -27,6 +27,7 @@ use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
 use crate::sph::{
+    checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled},
     pairs::{PairPass, Real},
     params::{Dfsph, Method, Parameters, Slip},
@@ -146,7 +147,9 @@ impl DivergenceFree {
         };
         scheme.push.resize(n);
         scheme.settle(core, &mut []);
-        scheme.relax(core);
+        if core.steps == 0 {
+            scheme.relax(core);
+        }
         scheme
     }
 
@@ -191,6 +194,20 @@ impl DivergenceFree {
         self.settle(core, &mut []);
         core.check_finite(dt)?;
         Ok(dt)
+    }
+
+    /// The answers of the last step; all else follows from the positions.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.set("specific pressure", self.specific.clone());
+        checkpoint.set("stiffness", vec![self.stiffness]);
+    }
+
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.specific = checkpoint.of_particles("specific pressure")?;
+        if let [stiffness] = checkpoint.get("stiffness")? {
+            self.stiffness = *stiffness;
+        }
+        Ok(())
     }
 
     pub fn bytes(&self) -> usize {

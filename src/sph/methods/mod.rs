@@ -6,7 +6,12 @@ mod wcsph;
 
 pub(super) use paper::Terms;
 
-use super::{core::Core, params::Method, simulation::StepError};
+use super::{
+    checkpoint::{Checkpoint, CheckpointError},
+    core::Core,
+    params::Method,
+    simulation::StepError,
+};
 
 /// A method with what it keeps between steps.
 pub(super) enum Scheme {
@@ -36,6 +41,25 @@ impl Scheme {
 
     pub fn iterations(&self) -> Option<u32> {
         if let Self::Dfsph(scheme) = self { Some(scheme.iterations) } else { None }
+    }
+
+    /// Puts into a checkpoint what the next step needs besides the particles and their accelerations.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        match self {
+            Self::Paper(_) => {}
+            Self::Wcsph(scheme) => scheme.save(checkpoint),
+            Self::Dfsph(scheme) => scheme.save(checkpoint),
+        }
+    }
+
+    /// # Errors
+    /// The column that the checkpoint lacks.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        match self {
+            Self::Paper(_) => Ok(()),
+            Self::Wcsph(scheme) => scheme.restore(checkpoint),
+            Self::Dfsph(scheme) => scheme.restore(checkpoint),
+        }
     }
 
     /// Memory that is kept between steps.

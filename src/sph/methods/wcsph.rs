@@ -21,6 +21,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::sph::{
+    checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
     pairs::{PairPass, Real},
     params::{Method, NegativePressure, Parameters, Slip, Wcsph},
@@ -77,6 +78,15 @@ impl Weakly {
         self.find_pressure(core);
         core.check_finite(dt)?;
         Ok(dt)
+    }
+
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.set("density rate", self.density_rate.clone());
+    }
+
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.density_rate = checkpoint.of_particles("density rate")?;
+        Ok(())
     }
 
     pub fn bytes(&self) -> usize {

@@ -22,7 +22,7 @@ use crate::{
     geom::Aabb,
 };
 
-use crate::sph::particles::Vectors;
+use crate::sph::{particles::Vectors, probes::Contacts};
 
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, reflect, turn_back},
@@ -95,7 +95,8 @@ impl<'a> Boundary<'a> {
         (0..self.obstacles.len()).map(|k| self.field(k))
     }
 
-    /// Moves particles from `position` to `target` and corrects both target and velocity where they collide.
+    /// Moves particles from `position` to `target` and corrects both target and velocity where they collide; what
+    /// obstacles do to velocities is added to `contacts`, if somebody asks.
     ///
     /// # Errors
     /// The first particle, in the order of the arrays, at which a field is undefined.
@@ -104,6 +105,7 @@ impl<'a> Boundary<'a> {
         position: &Vectors,
         target: &mut Vectors,
         velocity: &mut Vectors,
+        contacts: Option<&Contacts>,
     ) -> Result<(), Fault> {
         let [tx, ty, tz] = target.components_mut().map(|c| c.par_chunks_mut(BLOCK));
         let [vx, vy, vz] = velocity.components_mut().map(|c| c.par_chunks_mut(BLOCK));
@@ -114,7 +116,7 @@ impl<'a> Boundary<'a> {
             .enumerate()
             .filter_map(|(b, (((x, y), z), ((u, v), w)))| {
                 let mut block = Block { first: b * BLOCK, position, target: [x, y, z], velocity: [u, v, w] };
-                self.collide_block(&mut block).err()
+                self.collide_block(&mut block, contacts).err()
             })
             .min_by_key(|fault| fault.index);
         fault.map_or(Ok(()), Err)
@@ -152,7 +154,7 @@ impl<'a> Boundary<'a> {
         (whole.part > 0.0).then_some(whole)
     }
 
-    fn collide_block(&self, block: &mut Block<'_>) -> Result<(), Fault> {
+    fn collide_block(&self, block: &mut Block<'_>, contacts: Option<&Contacts>) -> Result<(), Fault> {
         let mut swept = Aabb::EMPTY;
         for k in 0..block.len() {
             let (target, velocity) = self.hold_in_box(block.target(k), block.velocity(k));
@@ -164,7 +166,11 @@ impl<'a> Boundary<'a> {
         }
         for k in 0..block.len() {
             let (at, velocity) = self
-                .resolve(block.from(k), block.target(k), block.velocity(k))
+                .resolve(block.from(k), block.target(k), block.velocity(k), |obstacle, change, at| {
+                    if let Some(contacts) = contacts {
+                        contacts.add(block.first + k, obstacle, change, at);
+                    }
+                })
                 .map_err(|undefined| block.fault(k, undefined))?;
             block.put(k, at, velocity);
         }
@@ -195,15 +201,23 @@ impl<'a> Boundary<'a> {
         (at, velocity)
     }
 
-    /// Where a particle comes to rest on its way, and with what velocity.
-    fn resolve(&self, from: DVec3, to: DVec3, velocity: DVec3) -> Result<(DVec3, DVec3), Undefined> {
+    /// Where a particle comes to rest on its way, and with what velocity; `hit` hears of each obstacle's change of the
+    /// velocity, and where it was.
+    fn resolve(
+        &self,
+        from: DVec3,
+        to: DVec3,
+        velocity: DVec3,
+        hit: impl Fn(usize, DVec3, DVec3),
+    ) -> Result<(DVec3, DVec3), Undefined> {
         let (mut here, mut target, mut velocity) = (from, to, velocity);
         for _ in 0..MAX_CONTACTS {
             (target, velocity) = self.hold_in_box(target, velocity);
-            let Some((k, contact)) = self.nearest_contact(here, target)? else {
+            let Some((index, contact)) = self.nearest_contact(here, target)? else {
                 return Ok((target, velocity));
             };
-            let (obstacle, field) = (&self.obstacles[k], self.field(k));
+            let (obstacle, field) = (&self.obstacles[index], self.field(index));
+            let before = velocity;
             // what counts is the velocity that the wall sees
             let wall =
                 if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
@@ -228,6 +242,7 @@ impl<'a> Boundary<'a> {
                     here = target;
                 }
             }
+            hit(index, velocity - before, contact.point);
         }
         Ok((here, velocity))
     }

@@ -25,7 +25,7 @@ const MOST_CURVED: f64 = 0.4;
 const NEAREST: f64 = 0.1;
 
 /// Integrals of a kernel over the walls near a particle.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::sph) struct Coverage {
     /// λ = ∫ W, 0 to 1.
     pub part: f64,
@@ -39,6 +39,20 @@ pub(in crate::sph) struct Coverage {
     pub sweep: f64,
     /// The drag of the walls' own velocity, 1/(m·s).
     pub haul: DVec3,
+}
+
+/// Nothing is covered. (A matrix is the identity by default.)
+impl Default for Coverage {
+    fn default() -> Self {
+        Self {
+            part: 0.0,
+            gradient: DVec3::ZERO,
+            spread: DMat3::ZERO,
+            drag: DMat3::ZERO,
+            sweep: 0.0,
+            haul: DVec3::ZERO,
+        }
+    }
 }
 
 impl Coverage {
@@ -177,6 +191,17 @@ mod tests {
             moment += DMat3::from_cols(y * slope.x, y * slope.y, y * slope.z);
         }
         (part, gradient, moment)
+    }
+
+    #[test]
+    fn walls_that_are_far_away_take_nothing() {
+        let far = face(1.1 * H, DVec3::X);
+        let near = face(0.1 * H, DVec3::Y);
+        for faces in [&[][..], &[far], &[Part::All(2), far, near]] {
+            let coverage = Coverage::of_faces(WallKernel::WendlandC2, H, &Faces::from_slice(faces));
+            assert_eq!((coverage.part, coverage.gradient.length()), (0.0, 0.0));
+            assert_eq!((coverage.spread, coverage.drag), (DMat3::ZERO, DMat3::ZERO));
+        }
     }
 
     #[test]

@@ -1,0 +1,179 @@
+//! Checkpoints of a run: written beside the frames, the last two kept, found again by `--resume`.
+//!
+//! Invariant: an older checkpoint goes only after a newer one is whole.
+
+use std::path::{Path, PathBuf};
+
+use super::super::{Failure, note, output};
+use super::pace::Every;
+use crate::Experiment;
+use crate::Program;
+use crate::ir;
+use crate::lower::Scene;
+use crate::sph::{Checkpoint, CheckpointError, Parameters, Simulation};
+
+/// The one before the last is for the case that the last is found damaged.
+const KEPT: usize = 2;
+
+const FOLDER: &str = "checkpoints";
+
+pub(super) struct Checkpoints {
+    folder: PathBuf,
+    fingerprint: [u8; 32],
+    /// Of those between frames; without, one goes with every frame.
+    every: Option<Every>,
+    /// Steps of those that lie in the folder, oldest first.
+    steps: Vec<u64>,
+}
+
+impl Checkpoints {
+    pub fn new(
+        run_folder: &Path,
+        fingerprint: [u8; 32],
+        scene: &Scene,
+        resumed: Option<&Checkpoint>,
+    ) -> Self {
+        let folder = run_folder.join(FOLDER);
+        let time = resumed.map_or(0.0, |checkpoint| checkpoint.time);
+        let every = scene.run.checkpoint_every.map(|period| Every::after(period, time));
+        let upto = resumed.map_or(0, |checkpoint| checkpoint.steps);
+        let steps = list(&folder).into_iter().filter(|steps| *steps <= upto && resumed.is_some()).collect();
+        Self { folder, fingerprint, every, steps }
+    }
+
+    /// Whether one is to be written at this instant, at which a frame was saved or was not.
+    pub fn is_due(&mut self, time: f64, with_frame: bool) -> bool {
+        self.every.as_mut().map_or(with_frame, |every| every.is_due(time))
+    }
+
+    /// Writes the present instant with whatever `more` adds to it.
+    pub fn save(
+        &mut self,
+        simulation: &Simulation<'_>,
+        more: impl FnOnce(&mut Checkpoint),
+    ) -> Result<(), Failure> {
+        std::fs::create_dir_all(&self.folder).map_err(|e| {
+            Failure::usage(format!("cannot make the folder `{}`: {e}", self.folder.display()))
+        })?;
+        let mut checkpoint = simulation.checkpoint();
+        checkpoint.fingerprint = self.fingerprint;
+        more(&mut checkpoint);
+        let steps = checkpoint.steps;
+        output::write(&path(&self.folder, steps), |mut out| checkpoint.write(&mut out))?;
+        self.steps.retain(|other| *other != steps);
+        self.steps.push(steps);
+        while self.steps.len() > KEPT {
+            // a file that cannot be removed is no reason to end a run
+            let _ = std::fs::remove_file(path(&self.folder, self.steps.remove(0)));
+        }
+        Ok(())
+    }
+
+    /// The newest, if there is one.
+    pub fn last(&self) -> Option<PathBuf> {
+        self.steps.last().map(|steps| path(&self.folder, *steps))
+    }
+}
+
+/// The newest sound checkpoint of a run.
+pub(super) fn latest(run_folder: &Path, fingerprint: &[u8; 32]) -> Result<Checkpoint, Failure> {
+    let folder = run_folder.join(FOLDER);
+    let mut faults = Vec::new();
+    for steps in list(&folder).into_iter().rev() {
+        let path = path(&folder, steps);
+        match read(&path) {
+            Ok(checkpoint) if checkpoint.fingerprint != *fingerprint => {
+                return Err(Failure::usage(format!(
+                    "cannot go on from `{}`: it belongs to another scene, or this one was changed since; only the \
+                     `run` block and probes may change (without --resume the run begins anew)",
+                    path.display()
+                )));
+            }
+            Ok(checkpoint) => {
+                for fault in &faults {
+                    note(format!("{fault}; going on from the one before, step {steps}"));
+                }
+                return Ok(checkpoint);
+            }
+            Err(error) => faults.push(format!("cannot use `{}`: {error}", path.display())),
+        }
+    }
+    if faults.is_empty() {
+        let folder = folder.display();
+        return Err(Failure::usage(format!("there is no checkpoint in `{folder}` to go on from")));
+    }
+    Err(Failure::usage(faults.join("\n")))
+}
+
+/// Removes all checkpoints of a folder, and nothing else.
+pub(super) fn remove_all(run_folder: &Path) -> std::io::Result<()> {
+    let folder = run_folder.join(FOLDER);
+    for steps in list(&folder) {
+        std::fs::remove_file(path(&folder, steps))?;
+    }
+    Ok(())
+}
+
+/// Of whatever decides the bits of a state: the fluid, the box, obstacles and the method's numbers. Not the step, how
+/// long the run is and what is saved of it: a run may go on with others.
+pub(super) fn fingerprint(program: &Program, scene: &Scene, setup: &Experiment) -> [u8; 32] {
+    let fluid = &scene.fluid;
+    let container = scene.container.iter().map(|c| ("container", c.outside));
+    let obstacles = scene.obstacles.iter().map(|o| ("obstacle", o.shape));
+    let velocity = fluid.velocity.iter().map(|node| ("velocity", *node));
+    let gravity = scene.turning_gravity.iter().flatten().map(|node| ("gravity", *node));
+    let fluid_shape = [("fluid", fluid.shape)].into_iter();
+    let roots: Vec<_> =
+        fluid_shape.chain(container).chain(obstacles).chain(velocity).chain(gravity).collect();
+    let bounces: Vec<_> = setup.obstacles.iter().map(|body| &body.bounce).collect();
+    // gravity that turns is in the formulas, and in the parameters as it was last
+    let parameters = Parameters { time_step: 0.0, adaptive: false, ..setup.parameters.clone() };
+    // numbers print with all their digits
+    let text = format!(
+        "{}\n{:?}\n{bounces:?}\n{parameters:?}\n{:?} {:?} {:?} {}",
+        ir::dump(&program.module().graph, &roots, &[]),
+        scene.domain,
+        fluid.fill,
+        fluid.particles,
+        fluid.jitter,
+        fluid.seed,
+    );
+    blake3::hash(text.as_bytes()).into()
+}
+
+fn path(folder: &Path, steps: u64) -> PathBuf {
+    folder.join(format!("step_{steps:010}.checkpoint"))
+}
+
+/// Steps of the checkpoints in a folder, ascending.
+fn list(folder: &Path) -> Vec<u64> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut steps: Vec<u64> = entries
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            name.to_str()?.strip_prefix("step_")?.strip_suffix(".checkpoint")?.parse().ok()
+        })
+        .collect();
+    steps.sort_unstable();
+    steps
+}
+
+/// Why a file is not used.
+enum Unusable {
+    File(std::io::Error),
+    Content(CheckpointError),
+}
+
+impl std::fmt::Display for Unusable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::File(error) => error.fmt(f),
+            Self::Content(error) => error.fmt(f),
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<Checkpoint, Unusable> {
+    let bytes = std::fs::read(path).map_err(Unusable::File)?;
+    Checkpoint::read(&bytes).map_err(Unusable::Content)
+}

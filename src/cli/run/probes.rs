@@ -1,0 +1,258 @@
+//! What probes read, as CSV that grows by one line at a time, and as a plot at the end.
+//!
+//! Invariant: whatever ends a run, a file holds its header and the lines of all samples before that, and at most one
+//! that is cut off, which `--resume` removes.
+
+use std::fmt::Write as _;
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, RIGHT, TOP, WIDTH};
+use super::super::{Failure, output};
+use super::pace::Every;
+use crate::lower::{Measured, Scene};
+use crate::slice;
+use crate::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
+
+const FOLDER: &str = "probes";
+
+/// A resumed run takes over samples up to this part after the checkpoint's time, which are those before it: times are
+/// written with twelve digits.
+const ROUNDING: f64 = 1e-10;
+
+/// Points of a line of a plot, at most.
+const MOST_POINTS: usize = 2000;
+
+pub(super) struct Probes(Vec<Recorder>);
+
+/// One probe with its file.
+struct Recorder {
+    name: String,
+    gauge: Gauge,
+    clock: Every,
+    path: PathBuf,
+    file: File,
+}
+
+impl Probes {
+    /// Begins the files, or takes up those of a run that goes on.
+    pub fn start(
+        run_folder: &Path,
+        scene: &Scene,
+        simulation: &mut Simulation<'_>,
+        resumed: Option<&Checkpoint>,
+    ) -> Result<Self, Failure> {
+        let folder = run_folder.join(FOLDER);
+        if !scene.probes.is_empty() {
+            std::fs::create_dir_all(&folder)
+                .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.display())))?;
+        }
+        let mut recorders = Vec::new();
+        for stated in &scene.probes {
+            let probe = probe(&stated.measured);
+            let memory = resumed.and_then(|checkpoint| checkpoint.get(&column(&stated.name)).ok());
+            let gauge = match resumed {
+                Some(checkpoint) => simulation.gauge_at(probe, checkpoint, memory.unwrap_or_default()),
+                None => simulation.gauge(probe),
+            };
+            let gauge = gauge.map_err(|e| Failure::usage(format!("probe `{}`: {e}", stated.name)))?;
+            let path = folder.join(format!("{}.csv", stated.name));
+            let header = header(&probe);
+            let kept = match resumed {
+                Some(checkpoint) => lines_until(&path, &header, checkpoint.time * (1.0 + ROUNDING)),
+                None => String::new(),
+            };
+            output::write(&path, |out| write!(out, "{header}\n{kept}"))?;
+            let file = OpenOptions::new().append(true).open(&path).map_err(|e| not_written(&path, &e))?;
+            let every = stated.every.unwrap_or(scene.run.save_every);
+            // a probe that was not there before begins with the present instant
+            let clock = Every::after(every, if kept.is_empty() { -every } else { simulation.time() });
+            recorders.push(Recorder { name: stated.name.clone(), gauge, clock, path, file });
+        }
+        Ok(Self(recorders))
+    }
+
+    /// Reads those that are due.
+    pub fn sample(&mut self, simulation: &Simulation<'_>) -> Result<(), Failure> {
+        for recorder in &mut self.0 {
+            if !recorder.clock.is_due(simulation.time()) {
+                continue;
+            }
+            let mut line = short_time(simulation.time()).to_string();
+            for value in simulation.sample(&mut recorder.gauge) {
+                // writing to a String cannot fail
+                let _ = if value.is_nan() { write!(line, ",nan") } else { write!(line, ",{value}") };
+            }
+            line.push('\n');
+            // in one piece, and not held back
+            recorder.file.write_all(line.as_bytes()).map_err(|e| not_written(&recorder.path, &e))?;
+        }
+        Ok(())
+    }
+
+    /// Puts into a checkpoint what a probe needs to go on.
+    pub fn save(&self, checkpoint: &mut Checkpoint) {
+        for recorder in &self.0 {
+            checkpoint.set(&column(&recorder.name), recorder.gauge.memory().to_vec());
+        }
+    }
+
+    /// Draws what was read, as SVG and PNG beside each file.
+    pub fn plot(&self) -> Result<(), Failure> {
+        for recorder in &self.0 {
+            let text = std::fs::read_to_string(&recorder.path)
+                .map_err(|e| Failure::usage(format!("cannot read `{}`: {e}", recorder.path.display())))?;
+            for ending in ["svg", "png"] {
+                let path = recorder.path.with_extension(ending);
+                let picture = plot::end(drawn(&recorder.name, &recorder.gauge.probe, &text), &path)?;
+                output::write(&path, |out| out.write_all(&picture))?;
+            }
+        }
+        Ok(())
+    }
+
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// Removes what probes of an earlier run have left: its tables and plots, and nothing else.
+pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
+    let folder = run_folder.join(FOLDER);
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(&folder)? {
+        let path = entry?.path();
+        let is_table = path.extension().is_some_and(|ending| ending == "csv")
+            && std::fs::read(&path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()));
+        if is_table {
+            for ending in ["svg", "png", "csv"] {
+                let path = path.with_extension(ending);
+                if path.is_file() {
+                    std::fs::remove_file(path)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+const TIME: &str = "time [s]";
+
+fn header(probe: &Probe) -> String {
+    let columns = probe.columns().iter().map(|(name, unit)| format!(",{name} [{unit}]"));
+    std::iter::once(TIME.to_string()).chain(columns).collect()
+}
+
+/// Name in a checkpoint.
+fn column(name: &str) -> String {
+    format!("probe {name}")
+}
+
+fn probe(measured: &Measured) -> Probe {
+    match *measured {
+        Measured::Height([x, y]) => Probe::Height { x, y },
+        Measured::Pressure(at) => Probe::Pressure { at },
+        Measured::Velocity(at) => Probe::Velocity { at },
+        Measured::Force { body, about } => Probe::Force { obstacle: body, about },
+        Measured::Flux { point, normal } => Probe::Flux { point, normal },
+        Measured::Energy => Probe::Energy,
+    }
+}
+
+/// The whole lines of a table with times up to `end`; nothing of a table of other columns.
+fn lines_until(path: &Path, header: &str, end: f64) -> String {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let mut lines = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
+    if lines.next().is_none_or(|first| first.trim_end() != header) {
+        return String::new();
+    }
+    let before =
+        |line: &&str| line.split(',').next().and_then(|t| t.parse().ok()).is_some_and(|t: f64| t <= end);
+    lines.take_while(before).collect()
+}
+
+fn not_written(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::usage(format!("cannot write `{}`: {error}", path.display()))
+}
+
+/// One line for each column over time; where a value is missing, the line is interrupted.
+fn drawn(name: &str, probe: &Probe, table: &str) -> String {
+    const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
+    let rows: Vec<Vec<f64>> = table
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
+        .collect();
+    let columns = probe.columns();
+    let value = |row: &[f64], column: usize| row.get(column).copied().unwrap_or(f64::NAN);
+    let stride = rows.len().div_ceil(MOST_POINTS).max(1);
+    let shown = || rows.iter().step_by(stride);
+    let times = rows.iter().map(|row| value(row, 0));
+    let values = rows.iter().flat_map(|row| row.iter().skip(1).copied());
+    let x = EvenAxis::over(times, LEFT, WIDTH - RIGHT);
+    let y = EvenAxis::over(values, HEIGHT - plot::BOTTOM, TOP);
+    let units: std::collections::BTreeSet<&str> = columns.iter().map(|(_, unit)| *unit).collect();
+    let units = units.into_iter().collect::<Vec<_>>().join(", ");
+    let mut out = plot::begin(name);
+    plot::even_grid(&mut out, &x, &y, ["time, s", &units]);
+    for (k, ((name, unit), colour)) in columns.iter().zip(COLOURS).enumerate() {
+        let mut path = String::new();
+        let mut pen_down = false;
+        for row in shown() {
+            let (t, v) = (value(row, 0), value(row, 1 + k));
+            if t.is_finite() && v.is_finite() {
+                let _ = write!(path, "{}{:.1} {:.1}", if pen_down { 'L' } else { 'M' }, x.at(t), y.at(v));
+            }
+            pen_down = v.is_finite();
+        }
+        let at = TOP + 12.0 + 21.0 * k as f64;
+        let legend = WIDTH - RIGHT + 22.0;
+        let _ = write!(
+            out,
+            r##"<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.6"/><rect x="{legend:.1}" y="{:.1}" width="11" height="11" fill="{colour}"/><text x="{:.1}" y="{at:.1}">{}, {unit}</text>"##,
+            at - 10.0,
+            legend + 18.0,
+            slice::escaped(name),
+        );
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_cut_at_a_time_and_where_it_was_torn() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let header = header(&Probe::Height { x: 0.0, y: 0.0 });
+        assert_eq!(header, "time [s],height [m]");
+        let check = |text: &str, expected: &str| {
+            std::fs::write(&path, text).unwrap();
+            assert_eq!(lines_until(&path, &header, 0.05 * (1.0 + ROUNDING)), expected);
+        };
+        check("time [s],height [m]\n0,1\n0.05,2\n0.1,3\n", "0,1\n0.05,2\n");
+        check("time [s],height [m]\n0,1\n0.05,", "0,1\n");
+        check("time [s],pressure [Pa]\n0,1\n", "");
+        check("", "");
+        check("time [s],height [m]\n0,nan\nx,2\n0.05,1\n", "0,nan\n");
+        assert_eq!(lines_until(&folder.path().join("none"), &header, 1.0), "");
+    }
+
+    #[test]
+    fn a_plot_is_interrupted_where_values_are_missing() {
+        let probe = Probe::Velocity { at: glam::DVec3::ZERO };
+        let table = "time [s],…\n0,nan,1,2\n1,2,nan,3\n2,3,1,4\n3,4,1,5\n";
+        let svg = drawn("a<b", &probe, table);
+        let paths: Vec<&str> =
+            svg.split("<path d=\"").skip(1).map(|p| p.split('"').next().unwrap()).collect();
+        let moves: Vec<(usize, usize)> =
+            paths.iter().map(|p| (p.matches('M').count(), p.matches('L').count())).collect();
+        assert_eq!(moves, [(1, 2), (2, 1), (1, 3)]);
+        assert!(svg.contains("a&lt;b"));
+    }
+}

@@ -1,0 +1,209 @@
+//! Probes of a scene: what is measured while it runs, and how often.
+//!
+//! Invariant: every place lies in the scene's box, and every normal has length one.
+
+use glam::DVec3;
+
+use super::eval::Lowering;
+use super::scene::{Block, Bound};
+use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::geom::Aabb;
+use crate::syntax::Dimension;
+use crate::syntax::ast::{Entry, Expr, ExprKind};
+
+/// A measurement that goes on while a scene runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    pub name: String,
+    pub span: Span,
+    pub measured: Measured,
+    /// Simulated time between samples, s; that between frames if it is not given.
+    pub every: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Measured {
+    /// z of the fluid's surface above a place (x, y), m.
+    Height([f64; 2]),
+    /// Pa
+    Pressure(DVec3),
+    /// m/s
+    Velocity(DVec3),
+    /// Force on a body, N, and its torque about a point, N·m. The container comes first, then the obstacles.
+    Force { body: usize, about: DVec3 },
+    /// Mass per second through a plane, along its normal of length one, kg/s.
+    Flux { point: DVec3, normal: DVec3 },
+    /// Kinetic, potential and elastic energy of the fluid, J.
+    Energy,
+}
+
+const MEASURED: [&str; 6] = ["height", "pressure", "velocity", "force", "flux", "energy"];
+const PROBE_KEYS: [&str; 8] = ["height", "pressure", "velocity", "force", "flux", "energy", "about", "every"];
+const FLUX_KEYS: [&str; 2] = ["point", "normal"];
+
+/// What a probe may name.
+pub(super) struct Surroundings<'a> {
+    pub domain: Aabb,
+    /// In the order of their numbers.
+    pub bodies: Vec<&'a str>,
+    pub fluid: &'a str,
+}
+
+impl<'a> Lowering<'a> {
+    pub(super) fn probes(&mut self, scene: &Block<'a>, around: &Surroundings<'_>) -> Vec<Probe> {
+        let mut probes: Vec<Probe> = Vec::new();
+        for (label, entries, span) in scene.blocks("probe") {
+            let Some(label) = label else {
+                self.report(
+                    Diagnostic::error(Code::SCENE_MISSING, span, "a probe needs a name: that of its file")
+                        .help("write `probe gauge { height: [1, 0.5] }`"),
+                );
+                continue;
+            };
+            if let Some(first) = probes.iter().find(|probe| probe.name == label.text) {
+                let message = format!("two probes are named `{}`", label.text);
+                self.report(
+                    Diagnostic::error(Code::SCENE_REPEATED, label.span, message)
+                        .label(first.span, "the first"),
+                );
+            }
+            let block = self.block(entries, "a probe", span, &PROBE_KEYS, &[]);
+            let every = match block.setting("every") {
+                None => Some(None),
+                Some(_) => self.number_key(&block, "every", Dimension::TIME, None, Bound::Positive).map(Some),
+            };
+            if let (Some(measured), Some(every)) = (self.measured(&block, around), every) {
+                probes.push(Probe { name: label.text.clone(), span: label.span, measured, every });
+            }
+        }
+        probes
+    }
+
+    fn measured(&mut self, block: &Block<'_>, around: &Surroundings<'_>) -> Option<Measured> {
+        let mut stated =
+            block.entries.iter().map(Entry::key).filter(|key| MEASURED.contains(&key.text.as_str()));
+        let Some(key) = stated.next() else {
+            if block.entries.iter().any(|entry| !PROBE_KEYS.contains(&entry.key().text.as_str())) {
+                return None; // it may be the misspelt one, which was reported
+            }
+            let message = format!("a probe needs one of {}", MEASURED.join(", "));
+            self.report(
+                Diagnostic::error(Code::SCENE_MISSING, block.span, message)
+                    .help("write `height: [1, 0.5]` or `pressure: [0, 0.5, 0.1]`"),
+            );
+            return None;
+        };
+        if let Some(second) = stated.find(|second| second.text != key.text) {
+            self.report(
+                Diagnostic::error(Code::SCENE_REPEATED, second.span, "a probe measures one thing")
+                    .label(key.span, "this one already")
+                    .help("write a second probe"),
+            );
+        }
+        if let Some((about, _)) = block.setting("about").filter(|_| key.text != "force") {
+            let message = format!("`about` has no meaning for `{}`", key.text);
+            self.report(
+                Diagnostic::error(Code::SCENE_KEY, about.span, message)
+                    .help("it is the point about which the torque of a `force` is taken"),
+            );
+        }
+        let domain = &around.domain;
+        if key.text == "flux" {
+            return self.flux(block, domain);
+        }
+        let (_, value) = block.setting(&key.text)?; // a block in its place was reported
+        match key.text.as_str() {
+            "height" => self.place_on_ground(value, domain).map(Measured::Height),
+            "pressure" => self.place(block, "pressure", domain).map(Measured::Pressure),
+            "velocity" => self.place(block, "velocity", domain).map(Measured::Velocity),
+            "force" => {
+                let body = self.one_of(value, "force", &around.bodies, "obstacle of this scene");
+                let about = self.vector_key(block, "about", Dimension::LENGTH, DVec3::ZERO);
+                Some(Measured::Force { body: body?, about: about? })
+            }
+            _ => {
+                self.one_of(value, "energy", &[around.fluid], "fluid of this scene").map(|_| Measured::Energy)
+            }
+        }
+    }
+
+    fn flux(&mut self, block: &Block<'_>, domain: &Aabb) -> Option<Measured> {
+        let (_, entries, span) = block.blocks("flux").next()?;
+        let block = self.block(entries, "a flux", span, &FLUX_KEYS, &[]);
+        for (key, help) in [("point", "write `point: [1, 0, 0]`"), ("normal", "write `normal: [1, 0, 0]`")] {
+            if block.setting(key).is_none() {
+                self.missing(&block, key, help);
+                return None;
+            }
+        }
+        let point = self.place(&block, "point", domain);
+        let normal = self.vector_key(&block, "normal", Dimension::NONE, DVec3::X)?;
+        let Some(unit) = normal.try_normalize() else {
+            let at = block.setting("normal").map_or(span, |(_, value)| value.span);
+            let message = format!("`normal` must have a length, found {normal}");
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message));
+            return None;
+        };
+        Some(Measured::Flux { point: point?, normal: unit })
+    }
+
+    /// A place in the box.
+    fn place(&mut self, block: &Block<'_>, key: &'static str, domain: &Aabb) -> Option<DVec3> {
+        let at = self.vector_key(block, key, Dimension::LENGTH, DVec3::ZERO)?;
+        let (_, value) = block.setting(key)?;
+        self.within(domain.contains(at), value, format!("{at}"), domain).then_some(at)
+    }
+
+    /// A place seen from above.
+    fn place_on_ground(&mut self, value: &Expr, domain: &Aabb) -> Option<[f64; 2]> {
+        let ExprKind::Vector(parts) = &value.kind else {
+            return self.no_pair(value);
+        };
+        let [x, y] = &parts[..] else { return self.no_pair(value) };
+        let [x, y] = [x, y].map(|part| self.quantity_expr(part, Dimension::LENGTH, "height"));
+        let (x, y) = (x?, y?);
+        let inside = domain.contains(DVec3::new(x, y, domain.min.z));
+        self.within(inside, value, format!("[{x}, {y}]"), domain).then_some([x, y])
+    }
+
+    fn no_pair(&mut self, value: &Expr) -> Option<[f64; 2]> {
+        self.report(
+            Diagnostic::error(Code::WRONG_TYPE, value.span, "`height` is measured at a place `[x, y]`")
+                .help("write `height: [1, 0.5]`"),
+        );
+        None
+    }
+
+    fn within(&mut self, inside: bool, value: &Expr, found: String, domain: &Aabb) -> bool {
+        if !inside {
+            let message = format!("the probe lies outside the box: {found}");
+            self.report(
+                Diagnostic::error(Code::OUT_OF_RANGE, value.span, message)
+                    .help(format!("the box goes from {} to {}", domain.min, domain.max)),
+            );
+        }
+        inside
+    }
+
+    /// The number of a name among those that are known.
+    fn one_of(&mut self, value: &Expr, key: &str, known: &[&str], what: &str) -> Option<usize> {
+        let ExprKind::Name(name) = &value.kind else {
+            let message = format!("`{key}` needs a name: that of the {what}");
+            self.report(Diagnostic::error(Code::WRONG_TYPE, value.span, message));
+            return None;
+        };
+        let found = known.iter().position(|other| other == name);
+        if found.is_none() {
+            let help = match known {
+                [] => "it has none".to_string(),
+                known => format!("there is {}", known.join(", ")),
+            };
+            self.report(
+                Diagnostic::error(Code::UNKNOWN_NAME, value.span, format!("`{name}` is no {what}"))
+                    .help(help)
+                    .suggest(name, known.iter().copied()),
+            );
+        }
+        found
+    }
+}

@@ -1,0 +1,320 @@
+//! Runs that are interrupted, damaged, starved of space, or diverge: nothing that was saved is lost, and what goes on is
+//! what would have been. Probes in their files.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::tool::{Outcome, rfm, snapshot};
+
+/// A drop beside a post, with probes of all kinds.
+fn scene(method: &str, run: &str) -> String {
+    format!(
+        "rfm 1
+param r = 0.1 in 0.05 .. 0.2 \"radius of the post\"
+solid post = cylinder(r, 0.3).move([0.5, 0.5, 0])
+scene drop {{
+  box {{ max: [1, 1, 1] }}
+  fluid water {{ shape: ball([0.5, 0.52, 0.45], 0.14), fill: middle, spacing: 0.03, viscosity: 0.5 }}
+  obstacle {{ solid: post }}
+  method: {method}
+  run {{ {run} }}
+  probe level {{ height: [0.5, 0.52], every: 3 ms }}
+  probe load {{ force: post, about: [0.5, 0.5, 0] }}
+  probe wind {{ velocity: [0.5, 0.52, 0.45] }}
+  probe head {{ pressure: [0.5, 0.52, 0.45] }}
+  probe fall {{ flux {{ point: [0.5, 0.5, 0.4], normal: [0, 0, -1] }}, every: 20 ms }}
+  probe balance {{ energy: water }}
+}}
+"
+    )
+}
+
+const METHODS: [&str; 3] = ["paper", "wcsph", "dfsph"];
+const PROBES: [&str; 6] = ["balance", "fall", "head", "level", "load", "wind"];
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// What must not differ between a run in one go and one with a stop in between.
+fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = vec![];
+    let mut add = |name: String| {
+        let bytes = std::fs::read(out.join(&name)).unwrap();
+        found.push((name, bytes));
+    };
+    names(&out.join("frames")).into_iter().for_each(|name| add(format!("frames/{name}")));
+    PROBES.iter().for_each(|name| add(format!("probes/{name}.csv")));
+    add("particles.pvd".into());
+    found
+}
+
+#[track_caller]
+fn assert_same_results(one: &Path, other: &Path) {
+    let (one, other) = (results(one), results(other));
+    let names =
+        |results: &[(String, Vec<u8>)]| results.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&one), names(&other));
+    for ((name, one), (_, other)) in one.iter().zip(&other) {
+        assert!(one == other, "{name} differs");
+    }
+}
+
+fn run(folder: &Path, flags: &[&str]) -> Outcome {
+    let always = ["run", "drop.rfm", "--threads", "1", "--no-pictures", "--mesh-cells", "8", "-o"];
+    rfm(folder, &[&always[..], flags].concat())
+}
+
+#[test]
+fn a_run_that_was_stopped_goes_on_as_if_it_had_not_been() {
+    for method in METHODS {
+        let folder = tempfile::tempdir().unwrap();
+        let here = folder.path();
+        std::fs::write(here.join("drop.rfm"), scene(method, "until: 0.1 s, save_every: 10 ms")).unwrap();
+        run(here, &["straight"]).expect(0);
+        // stopped between two frames, and then at its end
+        run(here, &["broken", "--steps", "11"]).expect(0);
+        let summary = run(here, &["broken", "--resume", "--json"]).expect(0).json();
+        assert_same_results(&here.join("straight"), &here.join("broken"));
+        let straight = std::fs::read_to_string(here.join("straight/summary.json")).unwrap();
+        let straight: serde_json::Value = serde_json::from_str(&straight).unwrap();
+        for key in
+            ["steps", "simulated_seconds", "kinetic_energy", "potential_energy", "energy_at_start", "frames"]
+        {
+            assert_eq!(summary[key], straight[key], "{method}: {key}");
+        }
+        assert_eq!(names(&here.join("broken/checkpoints")).len(), 2);
+        // a run that is at its end stays there
+        run(here, &["broken", "--resume"]).expect(0);
+        assert_same_results(&here.join("straight"), &here.join("broken"));
+        for name in PROBES {
+            for ending in ["csv", "svg", "png"] {
+                assert!(here.join(format!("straight/probes/{name}.{ending}")).is_file(), "{name}.{ending}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_longer_run_goes_on_from_the_end_of_a_shorter() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), scene("dfsph", "until: 40 ms, save_every: 10 ms")).unwrap();
+    run(here, &["short"]).expect(0);
+    std::fs::write(here.join("drop.rfm"), scene("dfsph", "until: 80 ms, save_every: 10 ms")).unwrap();
+    run(here, &["short", "--resume"]).expect(0);
+    run(here, &["long"]).expect(0);
+    assert_same_results(&here.join("short"), &here.join("long"));
+    let pvd = std::fs::read_to_string(here.join("long/particles.pvd")).unwrap();
+    assert!(pvd.contains(r#"timestep="0.05""#), "{pvd}");
+}
+
+#[test]
+fn damaged_and_foreign_checkpoints() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), scene("wcsph", "until: 60 ms, save_every: 10 ms")).unwrap();
+    let none = run(here, &["out", "--resume"]).expect(2);
+    assert!(!here.join("out").exists());
+    run(here, &["straight"]).expect(0);
+    run(here, &["out", "--until", "0.03"]).expect(0);
+    let [older, newer] = &names(&here.join("out/checkpoints"))[..] else { panic!("not two checkpoints") };
+    let (older, newer) = (here.join("out/checkpoints").join(older), here.join("out/checkpoints").join(newer));
+    let sound = std::fs::read(&newer).unwrap();
+
+    // another post, another name
+    let changed = run(here, &["out", "--resume", "-D", "r=0.11"]).expect(2);
+    let cut = &sound[..sound.len() / 2];
+    std::fs::write(&newer, cut).unwrap();
+    let fallen_back = run(here, &["out", "--resume", "--until", "0.04"]).expect(0);
+    assert!(fallen_back.stderr.contains("is damaged"), "{}", fallen_back.stderr);
+    assert!(fallen_back.stderr.contains("going on from the one before"), "{}", fallen_back.stderr);
+    run(here, &["out", "--resume"]).expect(0);
+    assert_same_results(&here.join("straight"), &here.join("out"));
+
+    for name in names(&here.join("out/checkpoints")) {
+        std::fs::remove_file(here.join("out/checkpoints").join(name)).unwrap();
+    }
+    let mut flipped = sound.clone();
+    flipped[sound.len() / 3] ^= 4;
+    std::fs::write(&older, flipped).unwrap();
+    std::fs::write(&newer, "time,height\n").unwrap();
+    let before = names(&here.join("out"));
+    let neither = run(here, &["out", "--resume"]).expect(2);
+    assert_eq!(names(&here.join("out")), before);
+
+    let mut text = String::new();
+    for (what, outcome) in [("no checkpoint", none), ("another scene", changed), ("none is sound", neither)] {
+        text += &format!("{what}\n{}", outcome.stderr);
+    }
+    let steps = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+    let text = text.replace(&steps(&older), "OLDER").replace(&steps(&newer), "NEWER");
+    snapshot("cli", "resume refused", &text);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_has_a_checkpoint_and_goes_on() {
+    for signal in ["-INT", "-TERM"] {
+        let folder = tempfile::tempdir().unwrap();
+        let here = folder.path();
+        std::fs::write(here.join("drop.rfm"), scene("dfsph", "until: 60 s, save_every: 10 ms")).unwrap();
+        let child = Command::new(env!("CARGO_BIN_EXE_rfm"))
+            .args(["run", "drop.rfm", "--threads", "1", "--no-pictures", "--mesh-cells", "8", "-o", "out"])
+            .current_dir(here)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let started = Instant::now();
+        while !here.join("out/frames/particles_000002.vtp").is_file() {
+            assert!(started.elapsed() < Duration::from_secs(60), "no frame");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let output = child.wait_with_output().unwrap();
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{message}");
+        assert!(
+            message.contains("interrupted after") && message.contains("--resume goes on from"),
+            "{message}"
+        );
+        let summary = std::fs::read_to_string(here.join("out/summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+        assert_eq!(summary["finished"], false);
+        let end = summary["simulated_seconds"].as_f64().unwrap() + 0.02;
+        let until = format!("{}", (100.0 * end).ceil() / 100.0);
+        run(here, &["out", "--resume", "--until", &until]).expect(0);
+        run(here, &["straight", "--until", &until]).expect(0);
+        assert_same_results(&here.join("straight"), &here.join("out"));
+    }
+}
+
+/// The frames that a collection lists; each must be there, and whole.
+fn listed(out: &Path) -> usize {
+    let text = std::fs::read_to_string(out.join("particles.pvd")).unwrap();
+    let document = roxmltree::Document::parse(&text).unwrap();
+    let frames: Vec<_> = document.descendants().filter_map(|node| node.attribute("file")).collect();
+    for frame in &frames {
+        let bytes = std::fs::read(out.join(frame)).unwrap();
+        assert!(bytes.ends_with(b"</AppendedData>\n</VTKFile>\n"), "{frame}");
+    }
+    frames.len()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_ends_a_run_in_order_and_it_goes_on_when_there_is_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let few = scene("paper", "dt: 1 ms, until: 0.3 s, save_every: 1 ms").replace("0.14", "0.05");
+    std::fs::write(here.join("drop.rfm"), few).unwrap();
+    // no file may exceed 16 KiB; the collection does after some two hundred frames
+    let shell = "trap '' XFSZ; ulimit -f 16; [ $(ulimit -f) = 16 ] && exec \"$0\" \"$@\"";
+    let output = Command::new("bash")
+        .args(["-c", shell, env!("CARGO_BIN_EXE_rfm"), "run", "drop.rfm", "--threads", "1", "--no-pictures"])
+        .args(["--mesh-cells", "4", "-o", "out"])
+        .current_dir(here)
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("cannot write `out/particles.pvd`"), "{message}");
+    assert!(message.contains("--resume goes on from"), "{message}");
+    let frames = listed(&here.join("out"));
+    assert!((100..300).contains(&frames), "{frames}");
+    assert!(names(&here.join("out")).iter().all(|name| !name.starts_with(".rfm-")));
+    run(here, &["out", "--resume"]).expect(0);
+    run(here, &["straight"]).expect(0);
+    assert_eq!(listed(&here.join("out")), 301);
+    assert_same_results(&here.join("straight"), &here.join("out"));
+}
+
+#[test]
+fn a_diverging_run_says_where_and_keeps_what_was_sound() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let wild = scene("paper", "dt: 1 ms, until: 1 s, save_every: 1 ms")
+        .replace("viscosity: 0.5", "stiffness: 1e300, support_radius: 0.1, jitter: 0.2");
+    std::fs::write(here.join("drop.rfm"), wild).unwrap();
+    let outcome = run(here, &["out"]).expect(3);
+    for part in ["step ", "of particle ", "the time step of 0.001 s is too long", "the frames up to"] {
+        assert!(outcome.stderr.contains(part), "no `{part}` in {}", outcome.stderr);
+    }
+    assert!(listed(&here.join("out")) > 0);
+    let summary = std::fs::read_to_string(here.join("out/summary.json")).unwrap();
+    assert!(summary.contains("\"finished\": false"), "{summary}");
+}
+
+#[test]
+fn checkpoints_as_often_as_a_scene_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let often = scene("paper", "dt: 1 ms, until: 50 ms, save_every: 10 ms, checkpoint_every: 20 ms");
+    std::fs::write(here.join("drop.rfm"), often).unwrap();
+    run(here, &["out"]).expect(0);
+    // after 20, 40 and 50 ms: the last two
+    assert_eq!(
+        names(&here.join("out/checkpoints")),
+        ["step_0000000040.checkpoint", "step_0000000050.checkpoint"]
+    );
+}
+
+#[test]
+fn probes_write_tables_with_units() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let text = scene("paper", "dt: 1 ms, until: 40 ms, save_every: 10 ms");
+    std::fs::write(here.join("drop.rfm"), text).unwrap();
+    run(here, &["out"]).expect(0);
+    let table = |name: &str| std::fs::read_to_string(here.join(format!("out/probes/{name}.csv"))).unwrap();
+    let header = |name: &str| table(name).lines().next().unwrap().to_string();
+    assert_eq!(header("level"), "time [s],height [m]");
+    assert_eq!(header("wind"), "time [s],velocity x [m/s],velocity y [m/s],velocity z [m/s]");
+    assert_eq!(header("fall"), "time [s],flux [kg/s]");
+    assert_eq!(header("balance"), "time [s],kinetic [J],potential [J],elastic [J],total [J]");
+    let times = |name: &str| {
+        table(name).lines().skip(1).map(|l| l.split(',').next().unwrap().to_string()).collect::<Vec<_>>()
+    };
+    assert_eq!(times("balance"), ["0", "0.01", "0.02", "0.03", "0.04"]);
+    assert_eq!(times("fall"), ["0", "0.02", "0.04"]);
+    assert_eq!(times("level").len(), 14);
+    // before the drop meets the post it falls freely: kinetic energy is what potential energy was
+    let rows: Vec<Vec<f64>> = table("balance")
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').map(|x| x.parse().unwrap()).collect())
+        .collect();
+    let mass = 998.29 * 0.03f64.powi(3);
+    let count = rows[0][2] / (mass * 9.81) / 0.45;
+    let expected = 0.5 * mass * count * (9.81f64 * 0.01).powi(2);
+    assert!((rows[1][1] / expected - 1.0).abs() < 0.05, "{} {expected}", rows[1][1]);
+    // a second run of another scene leaves no table of the first
+    let less = text_without_probes();
+    std::fs::write(here.join("drop.rfm"), less).unwrap();
+    run(here, &["out"]).expect(0);
+    assert!(names(&here.join("out/probes")).is_empty());
+}
+
+fn text_without_probes() -> String {
+    let text = scene("paper", "dt: 1 ms, until: 5 ms, save_every: 5 ms");
+    let lines: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("probe")).collect();
+    lines.join("\n") + "\n"
+}
+
+#[test]
+fn explain_lists_the_passes_of_each_method() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::new();
+    for method in METHODS {
+        std::fs::write(folder.path().join("drop.rfm"), scene(method, "until: 1 s")).unwrap();
+        text += &rfm(folder.path(), &["explain", "drop.rfm:drop"]).expect(0).stdout;
+    }
+    snapshot("cli", "explain passes", &text);
+}
