@@ -261,7 +261,9 @@ pub fn carve(
                 carved.inside += 1;
                 continue 'particles;
             }
-            if clearance > 0.0 && -w < clearance * obstacle.field.omega_grad(p).1.length() {
+            // away from surfaces a map of cells knows no more of ω than its sign
+            let distant = || -obstacle.field.continuous(p);
+            if clearance > 0.0 && distant() < clearance * obstacle.field.omega_grad(p).1.length() {
                 carved.too_close += 1;
                 continue 'particles;
             }
@@ -360,7 +362,7 @@ mod tests {
     fn carving_counts_what_it_removes() {
         let sphere = scenes::sphere(DVec3::ONE, 0.5);
         let obstacle =
-            Obstacle { field: &sphere, moving: None, restitution: 0.5, friction: 0.0, resolution: 0.005 };
+            Obstacle::at_rest(&sphere, 0.005);
         let mut particles = Particles::default();
         for x in [1.0, 1.5, 1.51, 1.7, 9.0] {
             particles.push(DVec3::new(x, 1.0, 1.0), DVec3::ZERO);

@@ -20,4 +20,5 @@ mod ranges;
 mod sweep;
 mod tidy;
 mod tool;
+mod validation;
 mod walls;
