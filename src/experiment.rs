@@ -22,7 +22,7 @@ use crate::lower::{Fill, Fluid, Method, Precision, Scene, Skin, Slip};
 use crate::solid::{Bounds, MovingMap};
 use crate::sph::{
     self, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError, Simulation,
-    SurfaceVelocity, carve,
+    SurfaceVelocity, carve, make_room,
 };
 use crate::{Engine, Program, Solid};
 
@@ -254,7 +254,13 @@ impl Experiment {
         obstacles: &[Obstacle<'_>],
     ) -> Result<usize, Error> {
         let span = scene.fluid.shape_span;
-        let clearance = CLEARANCE * self.parameters.spacing();
+        let mut clearance = CLEARANCE * self.parameters.spacing();
+        if let sph::Method::Wcsph(_) = self.parameters.method {
+            // its density does not follow from where particles are: those too near may move, and only what finds no
+            // place goes
+            make_room(particles, &self.domain, obstacles, clearance);
+            clearance *= 0.5;
+        }
         let carved =
             carve(particles, &self.domain, obstacles, clearance).map_err(|e| no_fluid(program, &e, span))?;
         let lost = carved.inside + carved.too_close + carved.outside_box;

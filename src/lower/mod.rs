@@ -16,7 +16,9 @@ mod value;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-pub use scene::{Bounce, Container, Fill, Fluid, Method, Obstacle, Precision, Run, Scene, Skin, Slip, Solver};
+pub use scene::{
+    Bounce, Container, Fill, Fluid, Method, Obstacle, Precision, Run, Scene, Skin, Slip, Solver,
+};
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 use crate::ir::{Graph, Node};

@@ -57,7 +57,7 @@ mod tests;
 pub use kernel::Kernels;
 pub use params::{Dfsph, Method, NegativePressure, ParameterError, Parameters, Precision, Slip, Wcsph};
 pub use particles::{Particles, Vectors};
-pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve};
+pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::{Pass, Stats};
 pub use vtp::{write_pvd, write_vtp};
