@@ -18,11 +18,11 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
 use crate::field::{Field, Moving};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
-use crate::lower::{Bounce, Fill, Fluid, Method, Precision, Scene, Slip};
+use crate::lower::{Fill, Fluid, Method, Precision, Scene, Skin, Slip};
 use crate::solid::{Bounds, MovingMap};
 use crate::sph::{
     self, Checkpoint, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError,
-    SetupError, Simulation, carve,
+    SetupError, Simulation, SurfaceVelocity, carve, make_room,
 };
 use crate::{Engine, Program, Solid};
 
@@ -40,8 +40,9 @@ pub struct Body {
     /// What answers for it in the box.
     field: Box<dyn Field>,
     moving: Option<Box<dyn Moving>>,
-    /// What it does to a particle.
-    pub bounce: Bounce,
+    /// What it does to a particle, and to the fluid that moves along it.
+    pub skin: Skin,
+    surface_velocity: Option<Box<SurfaceVelocity>>,
 }
 
 /// A window of time in which the map of a moving solid stays, in steps.
@@ -77,9 +78,9 @@ impl Experiment {
             Method::Paper => 0.0,
             _ => scene.fluid.support_radius,
         };
-        let container = scene.container.as_ref().map(|c| (&c.name, c.outside, c.bounce));
-        for (name, shape, bounce) in
-            container.into_iter().chain(scene.obstacles.iter().map(|o| (&o.name, o.shape, o.bounce)))
+        let container = scene.container.as_ref().map(|c| (&c.name, c.outside, c.skin));
+        for (name, shape, skin) in
+            container.into_iter().chain(scene.obstacles.iter().map(|o| (&o.name, o.shape, o.skin)))
         {
             let whole = compile(name, shape)?;
             let solid = whole.at(0.0);
@@ -92,7 +93,8 @@ impl Experiment {
                 Box::new(solid.clone())
             };
             moved.push(whole);
-            obstacles.push(Body { solid, field, moving: None, bounce });
+            let surface_velocity = skin.velocity.map(|nodes| surface_velocity(program, &nodes));
+            obstacles.push(Body { solid, field, moving: None, skin, surface_velocity });
         }
         let gravity = scene.gravity;
         let height = gravity.normalize_or_zero().abs().dot(scene.domain.size());
@@ -117,10 +119,7 @@ impl Experiment {
             time_step: 1.0,
             adaptive: scene.method != Method::Paper && scene.run.dt.is_none(),
             method: method(scene, typical_speed),
-            slip: match scene.slip {
-                Slip::Free => sph::Slip::Free,
-                Slip::No => sph::Slip::No,
-            },
+            slip: slip(scene.slip),
             precision: match (scene.solver.precision, scene.method) {
                 (Some(Precision::Double), _) | (None, Method::Paper) => sph::Precision::Double,
                 _ => sph::Precision::Single,
@@ -240,8 +239,10 @@ impl Experiment {
         Obstacle {
             field: &*body.field,
             moving: body.moving.as_deref(),
-            restitution: body.bounce.restitution,
-            friction: body.bounce.friction,
+            restitution: body.skin.bounce.restitution,
+            friction: body.skin.bounce.friction,
+            slip: slip(body.skin.slip),
+            surface_velocity: body.surface_velocity.as_deref(),
             resolution: PATH_RESOLUTION * self.parameters.support_radius,
         }
     }
@@ -263,7 +264,13 @@ impl Experiment {
         obstacles: &[Obstacle<'_>],
     ) -> Result<usize, Error> {
         let span = scene.fluid.shape_span;
-        let clearance = CLEARANCE * self.parameters.spacing();
+        let mut clearance = CLEARANCE * self.parameters.spacing();
+        if let sph::Method::Wcsph(_) = self.parameters.method {
+            // its density does not follow from where particles are: those too near may move, and only what finds no
+            // place goes
+            make_room(particles, &self.domain, obstacles, clearance);
+            clearance *= 0.5;
+        }
         let carved =
             carve(particles, &self.domain, obstacles, clearance).map_err(|e| no_fluid(program, &e, span))?;
         let lost = carved.inside + carved.too_close + carved.outside_box;
@@ -325,6 +332,23 @@ impl Deviation {
             velocity: truth.velocity.map(|nodes| relative(&nodes, &|i, k| particles.velocity.get(i)[k])),
         })
     }
+}
+
+fn slip(slip: Slip) -> sph::Slip {
+    match slip {
+        Slip::Free => sph::Slip::Free,
+        Slip::No => sph::Slip::No,
+    }
+}
+
+/// How a surface moves within itself.
+fn surface_velocity(program: &Program, nodes: &[Node; 3]) -> Box<SurfaceVelocity> {
+    let formulas = Interpreter::new(&program.module().graph, nodes);
+    Box::new(move |p, time| {
+        let mut velocity = [0.0; 3];
+        formulas.eval_given(Given { time, ..Given::point(p.to_array()) }, &mut velocity);
+        DVec3::from_array(velocity)
+    })
 }
 
 /// The method of a scene with its numbers.

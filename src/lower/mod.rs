@@ -18,7 +18,9 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 pub use probes::{Measured, Probe};
-pub use scene::{Bounce, Container, Fill, Fluid, Method, Obstacle, Precision, Run, Scene, Slip, Solver};
+pub use scene::{
+    Bounce, Container, Fill, Fluid, Method, Obstacle, Precision, Run, Scene, Skin, Slip, Solver, Truth,
+};
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 use crate::ir::{Graph, Node};

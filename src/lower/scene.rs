@@ -24,7 +24,7 @@ pub struct Scene {
     pub domain_span: Span,
     /// What the walls of the box do to a particle that hits them.
     pub walls: Bounce,
-    /// Whether a fluid sticks to walls and obstacles.
+    /// Whether a fluid sticks to the walls of the box, and to obstacles that do not say otherwise.
     pub slip: Slip,
     /// The vessel within the box, if there is one: the fluid stays where it is positive.
     pub container: Option<Container>,
@@ -60,6 +60,15 @@ pub enum Slip {
     No,
 }
 
+/// What a solid does to the fluid at its surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Skin {
+    pub bounce: Bounce,
+    pub slip: Slip,
+    /// Motion within the surface as formulas of x, y, z and t, m/s: of a belt, or of a cylinder that turns.
+    pub velocity: Option<[Node; 3]>,
+}
+
 /// A vessel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Container {
@@ -67,7 +76,7 @@ pub struct Container {
     /// Positive outside the vessel: what the fluid meets.
     pub outside: Node,
     pub span: Span,
-    pub bounce: Bounce,
+    pub skin: Skin,
 }
 
 /// A flow that is known, as formulas of x, y, z and t.
@@ -147,7 +156,7 @@ pub struct Obstacle {
     pub name: String,
     pub shape: Node,
     pub span: Span,
-    pub bounce: Bounce,
+    pub skin: Skin,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -222,7 +231,9 @@ const FLUID_KEYS: [&str; 19] = [
     "jitter",
     "seed",
 ];
-const OBSTACLE_KEYS: [&str; 3] = ["solid", "restitution", "friction"];
+const OBSTACLE_KEYS: [&str; 5] = ["solid", "restitution", "friction", "walls", "surface_velocity"];
+const FREE_SLIP: (&str, Slip) = ("free_slip", Slip::Free);
+const NO_SLIP: (&str, Slip) = ("no_slip", Slip::No);
 const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
 
 /// The entries of a block whose keys are known, each at most once unless it may be repeated.
@@ -255,12 +266,13 @@ impl<'a> Lowering<'a> {
         let words = [("paper", Method::Paper), ("wcsph", Method::Wcsph), ("dfsph", Method::Dfsph)];
         let method = self.word_key(&block, "method", &words);
         let fluid = self.fluid(&block, method.unwrap_or(Method::Paper));
-        let container = self.container(&block);
-        let slip = self.word_key(&block, "walls", &[("free_slip", Slip::Free), ("no_slip", Slip::No)]);
+        let slip = self.word_key(&block, "walls", &[FREE_SLIP, NO_SLIP]);
+        let walls = slip.unwrap_or(Slip::Free);
+        let container = self.container(&block, walls);
         let solver = self.solver(&block);
         let obstacles: Vec<Obstacle> = block
             .blocks("obstacle")
-            .filter_map(|(_, entries, span)| self.obstacle(entries, span, "an obstacle"))
+            .filter_map(|(_, entries, span)| self.obstacle(entries, span, "an obstacle", walls))
             .collect();
         let gravity = self.gravity(&block);
         let truth = self.truth(&block);
@@ -403,11 +415,32 @@ impl<'a> Lowering<'a> {
         Some(Bounce { restitution: restitution?, friction: friction? })
     }
 
-    fn container(&mut self, block: &Block<'a>) -> Option<Container> {
+    fn container(&mut self, block: &Block<'a>, walls: Slip) -> Option<Container> {
         let (_, entries, span) = block.blocks("container").next()?;
-        let Obstacle { name, shape, span, bounce } = self.obstacle(entries, span, "a container")?;
+        let Obstacle { name, shape, span, skin } = self.obstacle(entries, span, "a container", walls)?;
         let outside = self.module.graph.unary(Unary::Neg, shape);
-        Some(Container { name, outside, span, bounce })
+        Some(Container { name, outside, span, skin })
+    }
+
+    /// What a solid does at its surface; the fluid sticks to it as to all `walls`, unless it says otherwise.
+    fn skin(&mut self, block: &Block<'_>, walls: Slip) -> Option<Skin> {
+        let bounce = self.bounce(block);
+        let words = if walls == Slip::No { [NO_SLIP, FREE_SLIP] } else { [FREE_SLIP, NO_SLIP] };
+        let slip = self.word_key(block, "walls", &words)?;
+        let velocity = match block.setting("surface_velocity") {
+            Some((key, value)) => {
+                if slip == Slip::Free {
+                    let message = "a surface along which the fluid slips does not take it along";
+                    self.report(
+                        Diagnostic::error(Code::SCENE_KEY, key.span, message)
+                            .help("write `walls: no_slip` beside it, or leave `surface_velocity` out"),
+                    );
+                }
+                Some(self.components(value, Dimension::SPEED, "surface_velocity")?)
+            }
+            None => None,
+        };
+        Some(Skin { bounce: bounce?, slip, velocity })
     }
 
     fn solver(&mut self, block: &Block<'_>) -> Option<Solver> {
@@ -618,9 +651,15 @@ impl<'a> Lowering<'a> {
         nodes.try_into().ok()
     }
 
-    fn obstacle(&mut self, entries: &'a [Entry], span: Span, what: &'static str) -> Option<Obstacle> {
+    fn obstacle(
+        &mut self,
+        entries: &'a [Entry],
+        span: Span,
+        what: &'static str,
+        walls: Slip,
+    ) -> Option<Obstacle> {
         let block = self.block(entries, what, span, &OBSTACLE_KEYS, &[]);
-        let bounce = self.bounce(&block);
+        let skin = self.skin(&block, walls);
         let Some((_, value)) = block.setting("solid") else {
             self.missing(&block, "solid", "write `solid: pawn` with the name of a solid");
             return None;
@@ -630,7 +669,7 @@ impl<'a> Lowering<'a> {
             ExprKind::Name(name) => name.clone(),
             _ => "obstacle".into(),
         };
-        Some(Obstacle { name, shape, span: value.span, bounce: bounce? })
+        Some(Obstacle { name, shape, span: value.span, skin: skin? })
     }
 
     /// One of a few words; the first is the default.

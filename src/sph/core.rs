@@ -55,11 +55,9 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Sets obstacles that move to the coming step.
+    /// Sets the obstacles to the coming step.
     pub fn move_obstacles(&mut self, dt: f64) {
-        if self.boundary.obstacles.iter().any(|o| o.moving.is_some()) {
-            self.boundary.move_to(self.time, self.time + dt);
-        }
+        self.boundary.move_to(self.time, self.time + dt);
     }
 
     /// Moves the particles by v·dt, and back out of whatever they met on their way.

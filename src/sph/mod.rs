@@ -18,7 +18,7 @@
 //!     gradient: |p: DVec3| -2.0 * p,
 //! };
 //! let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
-//! let obstacles = vec![Obstacle { field: &ball, moving: None, restitution: 0.5, friction: 0.0, resolution: 0.005 }];
+//! let obstacles = vec![Obstacle::at_rest(&ball, 0.005)];
 //! let parameters = Parameters::default();
 //! let mut fluid = FluidBlock::drop(DVec3::Z * 0.8, 200).seed(&parameters, domain)?;
 //! carve(&mut fluid, &domain, &obstacles, 0.01)?;
@@ -61,8 +61,8 @@ pub use kernel::Kernels;
 pub use params::{Dfsph, Method, NegativePressure, ParameterError, Parameters, Precision, Slip, Wcsph};
 pub use particles::{Particles, Vectors};
 pub use probes::{Gauge, Probe};
-pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve};
+pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::{Pass, Stats};
 pub use vtp::{short_time, write_pvd, write_vtp};
-pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};
+pub use walls::{Contact, Obstacle, SurfaceVelocity, Undefined, WallKernel, first_contact, push_out};

@@ -135,7 +135,7 @@ pub struct Parameters {
     /// [`Simulation::stable_dt`](super::Simulation::stable_dt)).
     pub adaptive: bool,
     pub method: Method,
-    /// At walls and obstacles.
+    /// At the walls of the box; obstacles have their own.
     pub slip: Slip,
     /// Coefficient of friction μ of the container's walls: of the speed along the wall, μ times what the wall takes of
     /// the speed into it is lost. Zero: none.

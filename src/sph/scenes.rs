@@ -86,7 +86,7 @@ pub fn pawn() -> impl Field {
 }
 
 pub fn obstacle(field: &dyn Field) -> Obstacle<'_> {
-    Obstacle { field, moving: None, restitution: 0.5, friction: 0.0, resolution: 0.005 }
+    Obstacle::at_rest(field, 0.005)
 }
 
 /// A drop of the paper's fluid above the pawn, the drop's lowest point near the pawn's head.

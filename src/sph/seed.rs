@@ -261,7 +261,9 @@ pub fn carve(
                 carved.inside += 1;
                 continue 'particles;
             }
-            if clearance > 0.0 && -w < clearance * obstacle.field.omega_grad(p).1.length() {
+            // away from surfaces a map of cells knows no more of ω than its sign
+            let near = clearance > 0.0 && !obstacle.field.is_clear(p);
+            if near && -w < clearance * obstacle.field.omega_grad(p).1.length() {
                 carved.too_close += 1;
                 continue 'particles;
             }
@@ -271,6 +273,28 @@ pub fn carve(
     carved.kept = kept.len();
     *particles = kept;
     if carved.kept == 0 { Err(SeedError::NothingLeft(carved)) } else { Ok(carved) }
+}
+
+/// Moves particles of the fluid that are nearer to an obstacle than `clearance`, m, to that distance: a lattice that a
+/// surface cuts keeps its volume, where without those particles a gap would remain along the wall.
+pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle<'_>], clearance: f64) {
+    for i in 0..particles.len() {
+        let mut p = particles.position.get(i);
+        for obstacle in obstacles {
+            if obstacle.field.is_clear(p) {
+                continue;
+            }
+            let (w, gradient) = obstacle.field.omega_grad(p);
+            let slope = gradient.length();
+            let lacking = clearance + w / slope;
+            if w < 0.0 && slope > 0.0 && lacking > 0.0 {
+                p -= lacking / slope * gradient;
+            }
+        }
+        if domain.contains(p) {
+            particles.position.set(i, p);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -359,8 +383,7 @@ mod tests {
     #[test]
     fn carving_counts_what_it_removes() {
         let sphere = scenes::sphere(DVec3::ONE, 0.5);
-        let obstacle =
-            Obstacle { field: &sphere, moving: None, restitution: 0.5, friction: 0.0, resolution: 0.005 };
+        let obstacle = Obstacle::at_rest(&sphere, 0.005);
         let mut particles = Particles::default();
         for x in [1.0, 1.5, 1.51, 1.7, 9.0] {
             particles.push(DVec3::new(x, 1.0, 1.0), DVec3::ZERO);

@@ -152,8 +152,10 @@ impl<'a> Simulation<'a> {
             domain,
             wall_restitution: parameters.wall_restitution,
             wall_friction: parameters.wall_friction,
+            slip: parameters.slip,
             obstacles,
             during: Vec::new(),
+            time: 0.0,
             clearance,
         };
         boundary.move_to(time, time);

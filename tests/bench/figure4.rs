@@ -195,11 +195,8 @@ fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a
     let mut particles = block.seed(&parameters, scene.domain).unwrap_or_else(|e| panic!("{e}"));
     let resolution = 0.05 * parameters.support_radius;
     let obstacles = vec![Obstacle {
-        field: pawn,
-        moving: None,
-        restitution: scene.obstacles[0].bounce.restitution,
-        friction: 0.0,
-        resolution,
+        restitution: scene.obstacles[0].skin.bounce.restitution,
+        ..Obstacle::at_rest(pawn, resolution)
     }];
     carve(&mut particles, &scene.domain, &obstacles, 0.5 * parameters.spacing())
         .unwrap_or_else(|e| panic!("{e}"));

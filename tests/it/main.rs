@@ -23,4 +23,5 @@ mod simplify;
 mod sweep;
 mod tidy;
 mod tool;
+mod validation;
 mod walls;

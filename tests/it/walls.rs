@@ -48,8 +48,7 @@ fn fly(field: &dyn Field, starts: &[DVec3], steps: usize, check: &dyn Fn(DVec3, 
     };
     let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
     // an infinite resolution: nothing may depend on it
-    let obstacle =
-        Obstacle { field, moving: None, restitution: 1.0, friction: 0.0, resolution: f64::INFINITY };
+    let obstacle = Obstacle { restitution: 1.0, ..Obstacle::at_rest(field, f64::INFINITY) };
     let mut simulation = Simulation::new(parameters, fluid, domain, vec![obstacle]).unwrap();
     for step in 0..steps {
         simulation.step().unwrap();

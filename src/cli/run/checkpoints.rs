@@ -125,12 +125,12 @@ pub(super) fn fingerprint(program: &Program, scene: &Scene, setup: &Experiment) 
     let fluid_shape = [("fluid", fluid.shape)].into_iter();
     let roots: Vec<_> =
         fluid_shape.chain(container).chain(obstacles).chain(velocity).chain(gravity).collect();
-    let bounces: Vec<_> = setup.obstacles.iter().map(|body| &body.bounce).collect();
+    let skins: Vec<_> = setup.obstacles.iter().map(|body| &body.skin).collect();
     // gravity that turns is in the formulas, and in the parameters as it was last
     let parameters = Parameters { time_step: 0.0, adaptive: false, ..setup.parameters.clone() };
     // numbers print with all their digits
     let text = format!(
-        "{}\n{:?}\n{bounces:?}\n{parameters:?}\n{:?} {:?} {:?} {}",
+        "{}\n{:?}\n{skins:?}\n{parameters:?}\n{:?} {:?} {:?} {}",
         ir::dump(&program.module().graph, &roots, &[]),
         scene.domain,
         fluid.fill,

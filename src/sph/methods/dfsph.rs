@@ -30,7 +30,7 @@ use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled},
     pairs::{PairPass, Real},
-    params::{Dfsph, Method, Parameters, Slip},
+    params::{Dfsph, Method, Parameters},
     particles::{Particles, Vectors},
     simulation::StepError,
     walls::{Coverage, WallKernel},
@@ -245,7 +245,6 @@ impl DivergenceFree {
                 walls: &self.walls,
                 velocity: &core.particles.velocity,
                 kinematic: core.parameters.viscosity / core.parameters.rest_density,
-                slip: core.parameters.slip,
                 gravity: g,
             };
             core.sum(&pass, [&vx[..], vy, vz], [&mut x[..], y, z]);
@@ -562,7 +561,6 @@ struct Drag<'a> {
     velocity: &'a Vectors,
     /// ν, m²/s
     kinematic: f64,
-    slip: Slip,
     gravity: DVec3,
 }
 
@@ -586,7 +584,7 @@ impl PairPass<3, 3, 3> for Drag<'_> {
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
         let mut drag = 2.0 * self.kinematic * mass_steepness / rest_density * DVec3::from_array(sums);
-        if let (Slip::No, Some((wall, _))) = (self.slip, self.walls.near(i)) {
+        if let Some((wall, _)) = self.walls.near(i) {
             drag -= 2.0 * self.kinematic * (wall.drag * self.velocity.get(i) - wall.haul);
         }
         (drag + self.gravity).to_array()

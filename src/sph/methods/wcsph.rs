@@ -24,7 +24,7 @@ use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
     pairs::{PairPass, Real},
-    params::{Method, NegativePressure, Parameters, Slip, Wcsph},
+    params::{Method, NegativePressure, Parameters, Wcsph},
     particles::Vectors,
     simulation::StepError,
     walls::{Boundary, WallKernel},
@@ -256,9 +256,7 @@ impl<'a> Rates<'a> {
             rate += density * (wall.gradient.dot(velocity) - wall.sweep);
             pressure -= 2.0 * density * self.specific[i] * wall.gradient;
             pressure = wall.completion(LEAST_FREE) * pressure;
-            if self.parameters.slip == Slip::No {
-                viscous -= 2.0 * self.laminar * (wall.drag * velocity - wall.haul);
-            }
+            viscous -= 2.0 * self.laminar * (wall.drag * velocity - wall.haul);
         }
         let [x, y, z] = (pressure + viscous + self.parameters.gravity).to_array();
         [x, y, z, rate]

@@ -68,6 +68,8 @@ fn state_around(
         wall_friction: 0.0,
         obstacles,
         during: Vec::new(),
+        slip: crate::sph::Slip::Free,
+        time: 0.0,
         clearance: 1e-6,
     };
     let mut core = Core::new(water(method), boundary, particles);

@@ -18,11 +18,11 @@ use rayon::prelude::*;
 use glam::DVec3;
 
 use crate::{
-    field::{Face, Faces, Field, Moving, Path},
+    field::{Face, Faces, Field, Moving, Part, Path},
     geom::Aabb,
 };
 
-use crate::sph::{particles::Vectors, probes::Contacts};
+use crate::sph::{params::Slip, particles::Vectors, probes::Contacts};
 
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, reflect, turn_back},
@@ -39,6 +39,9 @@ const MAX_CONTACTS: usize = 4;
 /// A particle that a moving wall overtakes is looked for so many clearances (a support radius) away.
 const REACH: f64 = 1e6;
 
+/// The velocity of a surface within itself, m/s, at a place on it and a time, s.
+pub type SurfaceVelocity = dyn Fn(DVec3, f64) -> DVec3 + Send + Sync;
+
 /// A body in the fluid's way.
 #[derive(Clone, Copy)]
 pub struct Obstacle<'a> {
@@ -54,6 +57,26 @@ pub struct Obstacle<'a> {
     /// range (closures): their paths are sampled this closely. A twentieth of the support radius is a good value;
     /// thinner costs more samples per step. Compiled solids hold however thin they are.
     pub resolution: f64,
+    /// Whether the fluid sticks to it.
+    pub slip: Slip,
+    /// How its surface moves within itself, as that of a belt or of a cylinder that turns; a fluid that sticks is taken
+    /// along.
+    pub surface_velocity: Option<&'a SurfaceVelocity>,
+}
+
+impl<'a> Obstacle<'a> {
+    /// A body at rest: the fluid slips along it, and half of a speed into it is given back.
+    pub fn at_rest(field: &'a dyn Field, resolution: f64) -> Self {
+        Self {
+            field,
+            moving: None,
+            restitution: 0.5,
+            friction: 0.0,
+            resolution,
+            slip: Slip::Free,
+            surface_velocity: None,
+        }
+    }
 }
 
 /// The box and the bodies in it.
@@ -61,9 +84,13 @@ pub(in crate::sph) struct Boundary<'a> {
     pub domain: Aabb,
     pub wall_restitution: f64,
     pub wall_friction: f64,
+    /// Whether the fluid sticks to the box.
+    pub slip: Slip,
     pub obstacles: Vec<Obstacle<'a>>,
     /// The obstacles that move, during the present step.
     pub during: Vec<Option<Box<dyn Field + Send + 'a>>>,
+    /// The end of the present step, s.
+    pub time: f64,
     /// Distance from an obstacle's surface, m, at which particles stop.
     pub clearance: f64,
 }
@@ -78,6 +105,7 @@ pub(in crate::sph) struct Fault {
 impl<'a> Boundary<'a> {
     /// Sets the obstacles that move to a step from one time to another, s.
     pub fn move_to(&mut self, from: f64, to: f64) {
+        self.time = to;
         self.during.clear();
         self.during.extend(self.obstacles.iter().map(|o| o.moving.map(|moving| moving.during(from, to))));
     }
@@ -137,6 +165,9 @@ impl<'a> Boundary<'a> {
                 }
             }
         }
+        if self.slip == Slip::Free {
+            whole.let_slip();
+        }
         let mut faces = Faces::new();
         for (k, obstacle) in self.obstacles.iter().enumerate() {
             let field = self.field(k);
@@ -146,8 +177,14 @@ impl<'a> Boundary<'a> {
                 continue;
             }
             let mut coverage = Coverage::of_faces(kernel, h, &faces);
+            if obstacle.slip == Slip::Free {
+                coverage.let_slip();
+            }
             if obstacle.moving.is_some() {
                 coverage.set_in_motion(field.wall_velocity(p));
+            }
+            if let Some(velocity) = obstacle.surface_velocity {
+                coverage.take_along(velocity(nearest_place(p, &faces), self.time));
             }
             whole = whole.or(&coverage);
         }
@@ -259,6 +296,13 @@ impl<'a> Boundary<'a> {
         }
         Ok(nearest)
     }
+}
+
+/// The place of the nearest face.
+fn nearest_place(p: DVec3, faces: &[Part]) -> DVec3 {
+    let faces = faces.iter().filter_map(|part| if let Part::Face(face) = part { Some(face) } else { None });
+    let nearest = faces.min_by(|a, b| a.distance.abs().total_cmp(&b.distance.abs()));
+    nearest.map_or(p, |face| p - face.distance * face.normal)
 }
 
 /// A velocity after a contact that changed it from `before` to `after`, with friction: along the face it loses μ times

@@ -33,7 +33,7 @@ pub(in crate::sph) struct Coverage {
     pub gradient: DVec3,
     /// K − λ·1 = Σ d·(A/h)·n⊗n over the faces.
     pub spread: DMat3,
-    /// Σ (A/h)/d·(1 − n⊗n), 1/m²: what a fluid that sticks to the faces feels of a velocity.
+    /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks: what it feels of a velocity.
     pub drag: DMat3,
     /// ∇λ·v of walls that move, 1/s.
     pub sweep: f64,
@@ -80,6 +80,17 @@ impl Coverage {
     pub fn set_in_motion(&mut self, velocity: DVec3) {
         self.sweep = self.gradient.dot(velocity);
         self.haul = self.drag * velocity;
+    }
+
+    /// The fluid slips along all of these walls.
+    pub fn let_slip(&mut self) {
+        self.drag = DMat3::ZERO;
+        self.haul = DVec3::ZERO;
+    }
+
+    /// All of these walls move within themselves, besides any other motion.
+    pub fn take_along(&mut self, velocity: DVec3) {
+        self.haul += self.drag * velocity;
     }
 
     /// A tree of faces, from its front.
