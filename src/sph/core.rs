@@ -192,8 +192,8 @@ impl PairPass<0, 1, 1> for Count {
     ) {
         use fearless_simd::Select;
         let near = r2.simd_lt(V::Element::of(self.radius * self.radius));
-        let one = V::splat(r2.token(), V::Element::of(1.0));
-        sums[0] += near.select(one, one - one);
+        let [one, none] = [1.0, 0.0].map(|x| V::splat(r2.token(), V::Element::of(x)));
+        sums[0] += near.select(one, none);
     }
 
     fn finish(&self, _: usize, [count]: [f64; 1]) -> [f64; 1] {

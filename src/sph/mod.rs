@@ -40,7 +40,10 @@
 mod checkpoint;
 mod core;
 mod kernel;
+// loops over the few components of registers are counted: what an iterator's closure holds is not compiled for wide ones
+#[allow(clippy::needless_range_loop)]
 mod methods;
+#[allow(clippy::needless_range_loop)]
 mod pairs;
 mod params;
 mod particles;
