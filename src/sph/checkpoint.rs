@@ -300,7 +300,7 @@ mod tests {
         let pawn = scenes::pawn();
         let [paper, wcsph, dfsph] = methods();
         let of_paper = scenes::drop_on(&pawn, paper, 50).checkpoint();
-        for (parameters, column) in [(wcsph, "density rate"), (dfsph, "density pressure")] {
+        for (parameters, column) in [(wcsph, "density rate"), (dfsph, "specific pressure")] {
             let resumed = Simulation::resume(parameters, &of_paper, scenes::BOX, Vec::new());
             let error = SetupError::Checkpoint(CheckpointError::Column(column.into()));
             assert_eq!(resumed.err(), Some(error));

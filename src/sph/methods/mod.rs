@@ -17,7 +17,7 @@ use super::{
 pub(super) enum Scheme {
     Paper(paper::Paper),
     Wcsph(wcsph::Weakly),
-    Dfsph(dfsph::DivergenceFree),
+    Dfsph(Box<dfsph::DivergenceFree>),
 }
 
 impl Scheme {
@@ -26,7 +26,7 @@ impl Scheme {
         match core.parameters.method {
             Method::Paper => Self::Paper(paper::Paper::start(core)),
             Method::Wcsph(_) => Self::Wcsph(wcsph::Weakly::start(core)),
-            Method::Dfsph(_) => Self::Dfsph(dfsph::DivergenceFree::start(core)),
+            Method::Dfsph(_) => Self::Dfsph(Box::new(dfsph::DivergenceFree::start(core))),
         }
     }
 

@@ -236,7 +236,7 @@ impl<'a> Rates<'a> {
         if ARTIFICIAL {
             let least = of(0.01 * (0.5 * self.h).powi(2));
             // a viscosity made up needs no more than the twelve digits of an estimate in single precision
-            push = push - departing * of(self.artificial) * (r2 + least).approximate_recip();
+            push -= departing * of(self.artificial) * (r2 + least).approximate_recip();
         }
         let push = push * f;
         for k in 0..3 {
