@@ -208,10 +208,27 @@ impl<'a> Boundary<'a> {
                         contacts.add(block.first + k, obstacle, change, at);
                     }
                 })
+                .and_then(|(at, velocity)| self.leave_moving(at, velocity))
                 .map_err(|undefined| block.fault(k, undefined))?;
             block.put(k, at, velocity);
         }
         Ok(())
+    }
+
+    /// A wall that moves may come to where a particle has stopped earlier in the step: it takes the particle along.
+    fn leave_moving(&self, mut at: DVec3, mut velocity: DVec3) -> Result<(DVec3, DVec3), Undefined> {
+        for (k, obstacle) in self.obstacles.iter().enumerate().filter(|(_, o)| o.moving.is_some()) {
+            let field = self.field(k);
+            if field.omega(at) < 0.0 {
+                continue;
+            }
+            if let Some(lifted) = push_out(field, at, REACH * self.clearance, self.clearance)? {
+                let wall = field.wall_velocity(lifted.point);
+                at = lifted.point;
+                velocity = wall + reflect(velocity - wall, lifted.normal, obstacle.restitution);
+            }
+        }
+        Ok((at, velocity))
     }
 
     /// Clamps to the box; the part of the velocity that points out of a wall that was crossed is returned.
