@@ -210,17 +210,17 @@ fn by_samples<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), 
             return Some(((before.0, t), false));
         }
         if after.1 >= 0.0 {
-            return Some(((last_outside(field, path, before, after), t), true));
+            return Some(((last_outside(|t| field.on_path(path, t), path, before, after), t), true));
         }
         before = after;
     }
     None
 }
 
-/// Largest known t with ω < 0 on a path, between one (t, ω) in the fluid and a later one that is not: secant steps,
-/// every third a bisection.
-pub fn last_outside<F: Field + ?Sized>(
-    field: &F,
+/// Largest known t with `omega`(t) < 0 on a path, between one (t, ω) in the fluid and a later one that is not: secant
+/// steps, every third a bisection. Who asks decides at which time a field that moves is meant.
+pub fn last_outside(
+    omega: impl Fn(f64) -> f64,
     path: &Path,
     (mut low, mut w_low): (f64, f64),
     (mut high, mut w_high): (f64, f64),
@@ -237,7 +237,7 @@ pub fn last_outside<F: Field + ?Sized>(
         let secant = w_low / (w_low - w_high);
         let part = if k % 3 == 2 || !secant.is_finite() { 0.5 } else { secant.clamp(margin, 1.0 - margin) };
         let t = low + part * width;
-        let w = field.on_path(path, t);
+        let w = omega(t);
         if w < 0.0 {
             (low, w_low) = (t, w);
         } else {

@@ -4,7 +4,7 @@
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::sph::{Obstacle, Parameters, Particles, Simulation};
-use rfm::{Field, Program, Solid};
+use rfm::{Engine, Experiment, Field, Program, Solid};
 
 use crate::sweep::Random;
 
@@ -88,4 +88,30 @@ fn nothing_enters_or_passes() {
     });
     let spikes = solid("spikes");
     fly(&spikes, &starts(1_000, |p| spikes.omega(p) < -0.01), 200, &|_, _| true);
+}
+
+/// A blade turns through a tray of water, closed by lids of the box.
+const STIRRED: &str = "rfm 1
+solid blade = box([-0.02, -0.15, -0.35], [0.02, 0.15, -0.1]).rotate_z(pi*t)
+scene stirred {
+  box { min: [-0.4, -0.4, -0.5], max: [0.4, 0.4, 0.5] }
+  obstacle { solid: blade }
+  fluid water { shape: z <= -0.1, density: 1000, spacing: 5 cm, viscosity: 1 Pa·s, start: hydrostatic }
+  method: wcsph
+  run { until: 0.4 s, save_every: 0.05 s }
+}";
+
+#[test]
+fn a_turning_blade_stays_free_of_water() {
+    let program = Program::from_source("stirred.rfm", STIRRED).unwrap_or_else(|e| panic!("{e}"));
+    let scene = &program.module().scenes[0];
+    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
+    let blade = program.solid("blade").unwrap();
+    while simulation.time() < scene.run.until {
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+        let now = blade.at(simulation.time());
+        let inside = simulation.particles().position.iter().filter(|&p| now.sign(p) > 0.0).count();
+        assert_eq!(inside, 0, "after {} s", simulation.time());
+    }
 }

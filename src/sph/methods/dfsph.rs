@@ -42,9 +42,6 @@ const RELAXATION_STEPS: f64 = 10.0;
 /// Walls and disorder make the system stiffer than the even fluid that [`stiffness`] speaks of.
 const STIFFNESS: f64 = 1.5;
 
-/// Corrections for walls divide by what is left of the kernel, but never by less than this.
-const LEAST_FREE: f64 = 0.25;
-
 /// A particle without neighbours has no pressure to find: a factor below this part of that in a full neighbourhood.
 const LONELY: f64 = 1e-3;
 
@@ -77,12 +74,10 @@ pub struct DivergenceFree {
 /// Walls near particles, found once for all passes of a step.
 #[derive(Default)]
 struct Walls {
-    /// Place in `coverage` of each particle; `NONE`: no wall is near.
+    /// Place in `found` of each particle; `NONE`: no wall is near.
     place: Vec<u32>,
-    coverage: Vec<Coverage>,
-    /// M = (1 − K)⁻¹
-    completion: Vec<DMat3>,
-    found: Vec<(u32, Coverage)>,
+    /// Particle, what walls take of its kernel, and M = (1 − K)⁻¹.
+    found: Vec<(u32, Coverage, DMat3)>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -93,32 +88,30 @@ impl Walls {
         let position = &core.particles.position;
         self.found.clear();
         self.found.par_extend((0..position.len()).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
-            Some((i as u32, core.boundary.coverage(WallKernel::WendlandC2, h, position.get(i))?))
+            let wall = core.boundary.coverage(WallKernel::WendlandC2, h, position.get(i))?;
+            Some((i as u32, wall, wall.completion()))
         }));
         self.place.clear();
         self.place.resize(position.len(), NONE);
-        self.coverage.clear();
-        self.completion.clear();
-        for (place, (i, wall)) in self.found.iter().enumerate() {
+        for (place, (i, ..)) in self.found.iter().enumerate() {
             self.place[*i as usize] = place as u32;
-            self.coverage.push(*wall);
-            self.completion.push(wall.completion(LEAST_FREE));
         }
     }
 
     #[inline]
     fn near(&self, i: usize) -> Option<(&Coverage, &DMat3)> {
         let place = self.place[i];
-        (place != NONE).then(|| (&self.coverage[place as usize], &self.completion[place as usize]))
+        (place != NONE).then(|| {
+            let (_, wall, completion) = &self.found[place as usize];
+            (wall, completion)
+        })
     }
 
     /// M·v, into `completed`.
     fn complete(&self, v: &Vectors, completed: &mut Vectors) {
         completed.clone_from(v);
-        for (i, &place) in self.place.iter().enumerate() {
-            if place != NONE {
-                completed.set(i, self.completion[place as usize] * v.get(i));
-            }
+        for &(i, _, completion) in &self.found {
+            completed.set(i as usize, completion * v.get(i as usize));
         }
     }
 }
@@ -215,10 +208,8 @@ impl DivergenceFree {
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + self.push.bytes()
             + self.completed.bytes()
-            + size_of::<DMat3>() * self.walls.completion.capacity()
             + 4 * self.walls.place.capacity()
-            + size_of::<Coverage>() * self.walls.coverage.capacity()
-            + size_of::<(u32, Coverage)>() * self.walls.found.capacity()
+            + size_of::<(u32, Coverage, DMat3)>() * self.walls.found.capacity()
     }
 
     /// Order, walls, densities and factors of the present positions.
@@ -294,9 +285,9 @@ impl DivergenceFree {
             let push = std::mem::take(&mut self.push);
             self.find_rate_of(core, &push, false);
             self.push = push;
+            let guess = |scale: f64, s: f64, error: f64, factor: f64| (s + scale * error / factor).max(0.0);
             let scale = 1.0 / (dt * self.stiffness);
-            let beta = momentum / (momentum + 3.0);
-            // one sweep: the errors at this guess, the guess that they ask for, and where momentum carries it
+            // the errors at this guess, and whether momentum leads from it uphill
             self.rate
                 .par_chunks(CHUNK)
                 .zip(free.par_chunks(CHUNK))
@@ -308,7 +299,7 @@ impl DivergenceFree {
                     for k in 0..rate.len() {
                         if factor[k] > least {
                             let error = free[k] + dt * rate[k];
-                            let next = (s[k] + scale * error / factor[k]).max(0.0);
+                            let next = guess(scale, s[k], error, factor[k]);
                             // an expansion that no pressure can end is no error
                             sums[0] += if s[k] > 0.0 { error.abs() } else { error.max(0.0) };
                             sums[1] += factor[k] * (s[k] - next) * (next - last[k]);
@@ -323,15 +314,15 @@ impl DivergenceFree {
             if done || !mean.is_finite() {
                 break;
             }
-            if mean > 2.0 * best {
+            let too_long = mean > 2.0 * best;
+            if too_long {
                 // steps are too long for this neighbourhood
                 self.stiffness *= 1.3;
-                momentum = 0.0;
-                best = mean;
             }
-            best = best.min(mean);
-            let beta = if uphill > 0.0 { 0.0 } else { beta };
-            momentum = if uphill > 0.0 { 0.0 } else { momentum + 1.0 };
+            best = if too_long { mean } else { best.min(mean) };
+            let begin_anew = too_long || uphill > 0.0;
+            let beta = if begin_anew { 0.0 } else { momentum / (momentum + 3.0) };
+            momentum = if begin_anew { 0.0 } else { momentum + 1.0 };
             let scale = 1.0 / (dt * self.stiffness);
             pressure
                 .par_chunks_mut(CHUNK)
@@ -343,7 +334,7 @@ impl DivergenceFree {
                     for k in 0..s.len() {
                         if factor[k] > least {
                             let error = free[k] + dt * rate[k];
-                            let next = (s[k] + scale * error / factor[k]).max(0.0);
+                            let next = guess(scale, s[k], error, factor[k]);
                             s[k] = (next + beta * (next - last[k])).max(0.0);
                             last[k] = next;
                         } else {

@@ -33,9 +33,6 @@ use crate::sph::{
 /// The exponent of Tait's equation for water.
 const EXPONENT: i32 = 7;
 
-/// Corrections for walls divide by what is left of the kernel, but never by less than this.
-const LEAST_FREE: f64 = 0.25;
-
 /// What is kept between steps: the rate of change of the density; the rest is working memory.
 pub struct Weakly {
     numbers: Wcsph,
@@ -255,7 +252,7 @@ impl<'a> Rates<'a> {
             let (density, velocity) = (self.density[i], self.velocity.get(i));
             rate += density * (wall.gradient.dot(velocity) - wall.sweep);
             pressure -= 2.0 * density * self.specific[i] * wall.gradient;
-            pressure = wall.completion(LEAST_FREE) * pressure;
+            pressure = wall.completion() * pressure;
             viscous -= 2.0 * self.laminar * (wall.drag * velocity - wall.haul);
         }
         let [x, y, z] = (pressure + viscous + self.parameters.gravity).to_array();

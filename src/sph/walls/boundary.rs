@@ -283,18 +283,11 @@ impl<'a> Boundary<'a> {
             here = contact.point;
             target = here + slide;
             // A tangent enters a hollow surface, and by rounding a flat one: lift its end out again.
-            // A wall that moves goes on after the contact, and may have come farther than the particle slides.
-            let way = slide.length() + (target - from).length();
-            let reach =
-                if obstacle.moving.is_some() { 2.0 * way + REACH * self.clearance } else { slide.length() };
             if field.omega(target) >= 0.0
-                && let Some(lifted) = push_out(field, target, reach, self.clearance)?
+                && let Some(lifted) = push_out(field, target, slide.length(), self.clearance)?
             {
                 target = lifted.point;
                 velocity = wall + reflect(velocity - wall, lifted.normal, obstacle.restitution);
-                if obstacle.moving.is_some() {
-                    here = target;
-                }
             }
             hit(index, velocity - before, contact.point);
         }

@@ -110,7 +110,8 @@ pub fn push_out(
     let contact = |from: DVec3, to: DVec3| -> Result<Contact, Undefined> {
         let (outer, inner) = (omega(field, to)?, omega(field, from)?);
         let path = Path::new(to, from, f64::INFINITY);
-        let fraction = last_outside(field, &path, (0.0, outer), (1.0, inner));
+        // the way out is found where the obstacle is at the end of the step, not on its way there
+        let fraction = last_outside(|t| field.omega(path.at(t)), &path, (0.0, outer), (1.0, inner));
         let point = path.at(fraction);
         let mut faces = Normals::default();
         let normal = normal(field, point, to - from)?;

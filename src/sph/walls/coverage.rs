@@ -21,6 +21,9 @@ use super::kernel::WallKernel;
 /// Curvatures are believed up to this part of 1/h: beyond it the series behind the correction does not hold.
 const MOST_CURVED: f64 = 0.4;
 
+/// Corrections for walls divide by what is left of the kernel, but never by less than this.
+const LEAST_FREE: f64 = 0.25;
+
 /// A face nearer than this part of the support radius counts as so near where a velocity's slope is asked for.
 const NEAREST: f64 = 0.1;
 
@@ -136,13 +139,13 @@ impl Coverage {
     }
 
     /// (1 − K)⁻¹: makes of a sum over the fluid alone what it would be if the fluid went on behind the walls as it is
-    /// before them. No direction is stretched by more than 1/`least_free`.
-    pub fn completion(&self, least_free: f64) -> DMat3 {
-        let free = DMat3::from_diagonal(DVec3::splat((1.0 - self.part).max(least_free)));
+    /// before them. No direction is stretched by more than 1/[`LEAST_FREE`].
+    pub fn completion(&self) -> DMat3 {
+        let free = DMat3::from_diagonal(DVec3::splat((1.0 - self.part).max(LEAST_FREE)));
         let moment = free - self.spread;
         // along a face's normal K is at most ½ in the fluid; in corners the sum of several is held back
-        let largest = DMat3::from_diagonal(DVec3::splat(1.0 / least_free));
-        if moment.determinant() < least_free.powi(3) { largest } else { moment.inverse() }
+        let largest = DMat3::from_diagonal(DVec3::splat(1.0 / LEAST_FREE));
+        if moment.determinant() < LEAST_FREE.powi(3) { largest } else { moment.inverse() }
     }
 
     fn joined(&self, other: &Self, part: f64, da: f64, db: f64) -> Self {
