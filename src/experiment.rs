@@ -359,10 +359,12 @@ fn method(scene: &Scene, typical_speed: f64) -> sph::Method {
             sound_speed: scene.fluid.sound_speed.unwrap_or(10.0 * typical_speed),
             density_diffusion: scene.fluid.density_diffusion,
             artificial_viscosity: scene.fluid.artificial_viscosity,
+            shifting: scene.fluid.shifting,
         }),
         Method::Dfsph => sph::Method::Dfsph(sph::Dfsph {
             tolerance: scene.solver.compression,
             most_iterations: scene.solver.iterations as u32,
+            shifting: scene.fluid.shifting,
         }),
     }
 }

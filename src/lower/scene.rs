@@ -139,6 +139,8 @@ pub struct Fluid {
     pub density_diffusion: f64,
     /// α of the artificial viscosity of `wcsph`.
     pub artificial_viscosity: f64,
+    /// Strength of the particle shifting.
+    pub shifting: f64,
     /// Whether pressure may pull.
     pub negative_pressure: bool,
     /// Whether the fluid starts under the pressure of its own weight, `wcsph` only: otherwise it starts without, and rings.
@@ -210,7 +212,7 @@ const BLOCKS: [&str; 9] =
 const TRUTH_KEYS: [&str; 3] = ["pressure", "velocity", "from"];
 const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
 const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
-const FLUID_KEYS: [&str; 19] = [
+const FLUID_KEYS: [&str; 20] = [
     "shape",
     "fill",
     "particles",
@@ -225,6 +227,7 @@ const FLUID_KEYS: [&str; 19] = [
     "sound_speed",
     "density_diffusion",
     "artificial_viscosity",
+    "shifting",
     "negative_pressure",
     "start",
     "velocity",
@@ -503,6 +506,7 @@ impl<'a> Lowering<'a> {
         let sound_speed = number("sound_speed", Dimension::SPEED, 1.0, Positive);
         let density_diffusion = number("density_diffusion", Dimension::NONE, 0.1, NotNegative);
         let artificial_viscosity = number("artificial_viscosity", Dimension::NONE, 0.02, NotNegative);
+        let shifting = number("shifting", Dimension::NONE, 1.0, NotNegative);
         let (mass, density) = (mass?, density?);
         // a spacing says as much as a mass
         let mass = if block.setting("spacing").is_some() { density * spacing?.powi(3) } else { mass };
@@ -559,6 +563,7 @@ impl<'a> Lowering<'a> {
             sound_speed,
             density_diffusion: density_diffusion?,
             artificial_viscosity: artificial_viscosity?,
+            shifting: shifting?,
             negative_pressure: negative_pressure?,
             hydrostatic: hydrostatic?,
             velocity: velocity?,

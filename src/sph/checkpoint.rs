@@ -259,7 +259,8 @@ mod tests {
             precision: Precision::Single,
             ..Parameters::default()
         };
-        let wcsph = Wcsph { sound_speed: 30.0, density_diffusion: 0.1, artificial_viscosity: 0.02 };
+        let wcsph =
+            Wcsph { sound_speed: 30.0, density_diffusion: 0.1, artificial_viscosity: 0.02, shifting: 1.0 };
         [
             Parameters::default(),
             Parameters { method: Method::Wcsph(wcsph), ..water.clone() },

@@ -31,7 +31,6 @@ pub(super) struct Core<'a> {
     columns: Columns,
     /// Working memory: where the particles go before they collide, or what a method needs a vector for.
     pub spare: Vectors,
-    sorted: Vec<f64>,
     sorted_id: Vec<u32>,
 }
 
@@ -50,7 +49,6 @@ impl<'a> Core<'a> {
             level: Level::new(),
             columns: Columns::default(),
             spare: Vectors::default(),
-            sorted: Vec::new(),
             sorted_id: Vec::new(),
         }
     }
@@ -60,9 +58,13 @@ impl<'a> Core<'a> {
         self.boundary.move_to(self.time, self.time + dt);
     }
 
-    /// Moves the particles by v·dt, and back out of whatever they met on their way.
-    pub fn drift(&mut self, dt: f64) -> Result<(), StepError> {
+    /// Moves the particles by v·dt, and back out of whatever they met on their way. A second velocity, a field with its
+    /// factor, moves them too, but is none that they have.
+    pub fn drift(&mut self, dt: f64, shift: Option<(&Vectors, f64)>) -> Result<(), StepError> {
         set_sum(&mut self.spare, &self.particles.position, &self.particles.velocity, dt);
+        if let Some((shift, factor)) = shift {
+            add_scaled(&mut self.spare, shift, factor * dt);
+        }
         // infinite positions would be clamped to the box and never seen
         if let Some(i) = first_non_finite(&self.spare) {
             return Err(self.non_finite(i, Quantity::Position, dt));
@@ -93,7 +95,7 @@ impl<'a> Core<'a> {
             [position, velocity, &mut self.acceleration].into_iter().flat_map(Vectors::components_mut);
         let scalars = [density, pressure].into_iter().chain(kept.iter_mut().map(|column| &mut **column));
         for column in vectors.chain(scalars) {
-            permute(order, column, &mut self.sorted);
+            permute(order, column, &mut self.spare.x);
         }
         permute(order, id, &mut self.sorted_id);
     }
@@ -162,7 +164,7 @@ impl<'a> Core<'a> {
         let Particles { position, velocity, density, pressure, id } = &self.particles;
         let vectors = [position, velocity, &self.acceleration, &self.spare].map(Vectors::bytes);
         vectors.iter().sum::<usize>()
-            + 8 * (density.capacity() + pressure.capacity() + self.sorted.capacity())
+            + 8 * (density.capacity() + pressure.capacity())
             + 4 * (id.capacity() + self.sorted_id.capacity())
             + self.columns.bytes()
     }

@@ -1,12 +1,18 @@
-//! The three smoothing kernels of the paper, all with support radius h.
+//! Smoothing kernels, all with support radius h. Those of the paper:
 //!
 //! - poly6, for density and the colour field (equations 8, 13, 14);
 //! - spiky, for pressure (equation 10): its gradient does not vanish where particles meet;
 //! - viscosity (equation 11): its Laplacian is positive everywhere.
 //!
+//! And Wendland's C2 (1995), whose Fourier transform is positive: particles under it do not pair.
+//!
 //! Invariant: each kernel integrates to one over the ball of radius h and is exactly zero beyond it.
 
 use std::f64::consts::PI;
+
+use fearless_simd::{Simd, SimdFloat};
+
+use super::pairs::Real;
 
 /// Kernels of one support radius with their constants.
 ///
@@ -94,6 +100,36 @@ impl Kernels {
     }
 }
 
+/// Wendland C2: W = w·(1 − q)⁴(1 + 4q), ∇W = −c·(1 − q)³·**r**, with q = r/h.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wendland {
+    /// Support radius h, m.
+    pub h: f64,
+    /// w = 21/(2πh³), 1/m³
+    pub weight: f64,
+    /// c = 210/(πh⁵), 1/m⁵
+    pub steepness: f64,
+}
+
+impl Wendland {
+    pub fn new(h: f64) -> Self {
+        Self { h, weight: 21.0 / (2.0 * PI * h.powi(3)), steepness: 210.0 / (PI * h.powi(5)) }
+    }
+
+    /// W, 1/m³.
+    pub fn at(&self, r2: f64) -> f64 {
+        let s = positive(1.0 - r2.sqrt() / self.h);
+        self.weight * s.powi(4) * (5.0 - 4.0 * s)
+    }
+
+    /// 1 − q of many at once, zero beyond the support.
+    #[inline(always)]
+    pub fn nearness<S: Simd, V: SimdFloat<S, Element: Real>>(&self, r2: V) -> V {
+        let of = V::Element::of;
+        r2.sqrt().mul_add(of(-1.0 / self.h), of(1.0)).max(of(0.0))
+    }
+}
+
 /// max(x, 0) in one instruction; `f64::max` takes three to return the number when the other is NaN.
 #[inline(always)]
 fn positive(x: f64) -> f64 {
@@ -118,7 +154,13 @@ mod tests {
     fn kernels_integrate_to_one() {
         let k = Kernels::new(H);
         // midpoint error of 2000 shells: about 1e-7
-        for total in [integral(|r| k.poly6(r * r)), integral(|r| k.spiky(r)), integral(|r| k.viscosity(r))] {
+        let wendland = Wendland::new(H);
+        for total in [
+            integral(|r| k.poly6(r * r)),
+            integral(|r| k.spiky(r)),
+            integral(|r| k.viscosity(r)),
+            integral(|r| wendland.at(r * r)),
+        ] {
             assert!((total - 1.0).abs() < 1e-6, "{total}");
         }
     }
@@ -166,6 +208,9 @@ mod tests {
             close(k.poly6_gradient(r * r) * r, slope(&poly6), k.poly6(0.0) / H);
             close(k.spiky_gradient(r) * r, slope(&|r| k.spiky(r)), k.spiky(0.0) / H);
             close(k.poly6_laplacian(r * r), laplacian(&poly6), k.poly6(0.0) / (H * H));
+            let wendland = Wendland::new(H);
+            let gradient = -wendland.steepness * (1.0 - r / H).powi(3) * r;
+            close(gradient, slope(&|r| wendland.at(r * r)), wendland.weight / H);
             close(k.viscosity_laplacian(r), laplacian(&|r| k.viscosity(r)), k.viscosity_laplacian(0.0));
         }
     }

@@ -54,6 +54,9 @@ pub struct Wcsph {
     pub density_diffusion: f64,
     /// α of the artificial viscosity (Monaghan 1992), 0.02; zero: the term is not computed.
     pub artificial_viscosity: f64,
+    /// How strongly particles drift to where there are fewer of them, which keeps them even, 1; zero: they do not, and
+    /// pressure acts in pairs that conserve momentum but not the order of the particles.
+    pub shifting: f64,
 }
 
 /// Numbers of the divergence-free method.
@@ -64,11 +67,13 @@ pub struct Dfsph {
     pub tolerance: f64,
     /// Iterations of the solver, at most. 100.
     pub most_iterations: u32,
+    /// How strongly particles drift to where there are fewer of them, 1; zero: they do not.
+    pub shifting: f64,
 }
 
 impl Default for Dfsph {
     fn default() -> Self {
-        Self { tolerance: 1e-4, most_iterations: 100 }
+        Self { tolerance: 1e-4, most_iterations: 100, shifting: 1.0 }
     }
 }
 
@@ -231,6 +236,7 @@ impl Parameters {
                 positive("sound_speed", method.sound_speed)?;
                 not_negative("density_diffusion", method.density_diffusion)?;
                 not_negative("artificial_viscosity", method.artificial_viscosity)?;
+                not_negative("shifting", method.shifting)?;
             }
             Method::Dfsph(method) => {
                 check(
@@ -239,6 +245,7 @@ impl Parameters {
                     (1e-9..1.0).contains(&method.tolerance),
                     "from 1e-9 to 1",
                 )?;
+                not_negative("shifting", method.shifting)?;
             }
         }
         // Kernels divide by h⁹: far from metres that leaves the range of a double.

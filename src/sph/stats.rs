@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::{
     core::Core,
     methods::Terms,
-    params::{Method, Parameters, Slip, Wcsph},
+    params::{Dfsph, Method, Parameters, Slip, Wcsph},
     walls::Boundary,
 };
 
@@ -27,6 +27,7 @@ pub enum Pass {
     PressureSolver,
     Viscosity,
     ArtificialViscosity,
+    Shifting,
     NoSlip,
     SurfaceTension,
     Gravity,
@@ -63,6 +64,12 @@ impl Pass {
             () if !paper => Some("it belongs to the method paper"),
             () => unless(terms.tension, "the surface tension is zero"),
         };
+        let shifting = match parameters.method {
+            Method::Paper => Some("it belongs to the methods wcsph and dfsph"),
+            Method::Wcsph(Wcsph { shifting, .. }) | Method::Dfsph(Dfsph { shifting, .. }) => {
+                unless(shifting > 0.0, "the shifting is zero")
+            }
+        };
         vec![
             (Self::Integrate, None),
             (Self::Walls, None),
@@ -81,6 +88,7 @@ impl Pass {
                 Self::ArtificialViscosity,
                 of_wcsph(&|numbers| numbers.artificial_viscosity > 0.0, "the artificial viscosity is zero"),
             ),
+            (Self::Shifting, shifting),
             (Self::NoSlip, no_slip),
             (Self::SurfaceTension, tension),
             (Self::Gravity, unless(parameters.gravity != DVec3::ZERO, "gravity is zero")),
@@ -100,6 +108,7 @@ impl Pass {
             Self::PressureSolver => "pressure solver",
             Self::Viscosity => "viscosity",
             Self::ArtificialViscosity => "artificial viscosity",
+            Self::Shifting => "particle shifting",
             Self::NoSlip => "no slip",
             Self::SurfaceTension => "surface tension",
             Self::Gravity => "gravity",

@@ -50,6 +50,7 @@ fn main() {
         sound_speed: 10.0 * (9.81f64 * 2.0 * 1.5).sqrt(),
         density_diffusion: 0.1,
         artificial_viscosity: 0.02,
+        shifting: 1.0,
     });
     println!("| method | precision | particles | neighbours | ms per step | ns per particle·neighbour |");
     println!("|---|---|--:|--:|--:|--:|");

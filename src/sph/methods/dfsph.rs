@@ -26,14 +26,16 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
+use super::shifting::{depth, restore_crowding, save_crowding, shift};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled},
+    kernel::Wendland,
     pairs::{PairPass, Real},
     params::{Dfsph, Method, Parameters},
     particles::{Particles, Vectors},
     simulation::StepError,
-    walls::{Coverage, WallKernel},
+    walls::{Coverage, LEAST_FREE, WallKernel},
 };
 
 /// A density that is off comes back within so many steps.
@@ -58,6 +60,8 @@ pub struct DivergenceFree {
     free: Vec<f64>,
     /// a(s)
     push: Vectors,
+    /// Σ V ∇W + ∇λ, 1/m: where the particles crowd; zero at the surface.
+    crowding: Vectors,
     /// M·v
     completed: Vectors,
     walls: Walls,
@@ -131,6 +135,7 @@ impl DivergenceFree {
             rate: vec![0.0; n],
             free: vec![0.0; n],
             push: Vectors::default(),
+            crowding: Vectors::default(),
             completed: Vectors::default(),
             walls: Walls::default(),
             last: Vec::new(),
@@ -164,7 +169,7 @@ impl DivergenceFree {
             core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
             self.keep_density(core, dt);
             // a place that cannot be left is found by the first step
-            if core.drift(dt).is_err() {
+            if core.drift(dt, None).is_err() {
                 break;
             }
             let [x, y, z] = velocity.components_mut();
@@ -183,7 +188,7 @@ impl DivergenceFree {
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);
         core.move_obstacles(dt);
-        core.drift(dt)?;
+        core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
         self.settle(core, &mut []);
         core.check_finite(dt)?;
         Ok(dt)
@@ -193,6 +198,7 @@ impl DivergenceFree {
     pub fn save(&self, checkpoint: &mut Checkpoint) {
         checkpoint.set("specific pressure", self.specific.clone());
         checkpoint.set("stiffness", vec![self.stiffness]);
+        save_crowding(&self.crowding, checkpoint);
     }
 
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
@@ -200,6 +206,7 @@ impl DivergenceFree {
         if let [stiffness] = checkpoint.get("stiffness")? {
             self.stiffness = *stiffness;
         }
+        self.crowding = restore_crowding(checkpoint)?;
         Ok(())
     }
 
@@ -207,6 +214,7 @@ impl DivergenceFree {
         let columns = [&self.specific, &self.factor, &self.rate, &self.free, &self.last];
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + self.push.bytes()
+            + self.crowding.bytes()
             + self.completed.bytes()
             + 4 * self.walls.place.capacity()
             + size_of::<(u32, Coverage, DMat3)>() * self.walls.found.capacity()
@@ -220,7 +228,9 @@ impl DivergenceFree {
         self.walls.find(core);
         let mut density = std::mem::take(&mut core.particles.density);
         let pass = Densities { constants: Constants::of(&core.parameters), walls: &self.walls };
-        core.sum(&pass, [], [&mut density, &mut self.factor]);
+        self.crowding.resize(density.len());
+        let Vectors { x, y, z } = &mut self.crowding;
+        core.sum(&pass, [], [&mut density, &mut self.factor, x, y, z]);
         core.particles.density = density;
     }
 
@@ -385,13 +395,12 @@ fn lattice_sum(ratio: f64) -> f64 {
     };
     let cube = || -reach..=reach;
     let sum: f64 = cube().flat_map(|x| cube().flat_map(move |y| cube().map(move |z| weight(x, y, z)))).sum();
-    sum * 21.0 / (2.0 * std::f64::consts::PI * ratio.powi(3))
+    sum * Wendland::new(ratio).weight
 }
 
-/// Of the kernel W = w(1 − q)⁴(1 + 4q), ∇W = −c(1 − q)³·r.
 #[derive(Clone, Copy)]
 struct Constants {
-    per_h: f64,
+    kernel: Wendland,
     rest_density: f64,
     /// m·w, over the sum on a lattice: an even fluid has its rest density.
     mass_weight: f64,
@@ -404,36 +413,30 @@ struct Constants {
 impl Constants {
     fn of(parameters: &Parameters) -> Self {
         let (h, m) = (parameters.support_radius, parameters.particle_mass);
+        let kernel = Wendland::new(h);
         Self {
-            per_h: 1.0 / h,
+            kernel,
             rest_density: parameters.rest_density,
-            mass_weight: m * 21.0
-                / (2.0 * std::f64::consts::PI * h.powi(3) * lattice_sum(h / parameters.spacing())),
+            mass_weight: m * kernel.weight / lattice_sum(h / parameters.spacing()),
+            mass_steepness: m * kernel.steepness,
             full_factor: parameters.rest_density
                 * m
-                * (210.0f64 / std::f64::consts::PI).powi(2)
+                * kernel.steepness.powi(2)
                 * 4.0
                 * std::f64::consts::PI
-                / (2310.0 * h.powi(5)),
-            mass_steepness: m * 210.0 / (std::f64::consts::PI * h.powi(5)),
+                * h.powi(5)
+                / 2310.0,
         }
-    }
-
-    /// 1 − q, zero beyond the support.
-    #[inline(always)]
-    fn nearness<S: Simd, V: SimdFloat<S, Element: Real>>(&self, r2: V) -> V {
-        let of = V::Element::of;
-        r2.sqrt().mul_add(of(-self.per_h), of(1.0)).max(of(0.0))
     }
 }
 
-/// ρ and the factor.
+/// ρ, the factor, and where the particles crowd.
 struct Densities<'a> {
     constants: Constants,
     walls: &'a Walls,
 }
 
-impl PairPass<0, 5, 2> for Densities<'_> {
+impl PairPass<0, 6, 5> for Densities<'_> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
@@ -441,10 +444,10 @@ impl PairPass<0, 5, 2> for Densities<'_> {
         r2: V,
         _: &[V; 0],
         _: [V; 0],
-        sums: &mut [V; 5],
+        sums: &mut [V; 6],
     ) {
         let of = V::Element::of;
-        let s = self.constants.nearness(r2);
+        let s = self.constants.kernel.nearness(r2);
         let f = s * s * s;
         // 1 + 4q = 5 − 4s
         sums[0] = (f * s).mul_add(s.mul_add(of(-4.0), of(5.0)), sums[0]);
@@ -452,22 +455,27 @@ impl PairPass<0, 5, 2> for Densities<'_> {
             sums[1 + k] = f.mul_add(d[k], sums[1 + k]);
         }
         sums[4] = (f * f).mul_add(r2, sums[4]);
+        sums[5] = f.mul_add(r2, sums[5]);
     }
 
-    fn finish(&self, i: usize, [weight, x, y, z, mut squares]: [f64; 5]) -> [f64; 2] {
+    fn finish(&self, i: usize, [weight, x, y, z, mut squares, spread]: [f64; 6]) -> [f64; 5] {
         let Constants { mass_weight, mass_steepness, rest_density, .. } = self.constants;
         let mut density = mass_weight * weight;
         let slope = -mass_steepness * DVec3::new(x, y, z);
-        let own = match self.walls.near(i) {
-            None => slope.length_squared(),
-            Some((wall, completion)) => {
-                density += rest_density * wall.part;
-                // the neighbours are completed about as much as the particle itself
-                squares *= completion.determinant().max(1.0).cbrt().powi(2);
-                (*completion * (slope + 2.0 * rest_density * wall.gradient)).length_squared()
-            }
-        };
-        [density, own + mass_steepness.powi(2) * squares]
+        let mut crowding = slope / rest_density;
+        let mut spread = mass_steepness / rest_density * spread / 3.0;
+        let mut own = slope;
+        if let Some((wall, completion)) = self.walls.near(i) {
+            density += rest_density * wall.part;
+            crowding += wall.gradient;
+            spread += wall.share();
+            // the neighbours are completed about as much as the particle itself
+            squares *= completion.determinant().max(1.0).cbrt().powi(2);
+            own = *completion * (slope + 2.0 * rest_density * wall.gradient);
+        }
+        let factor = own.length_squared() + mass_steepness.powi(2) * squares;
+        let crowding = depth(spread) * crowding;
+        [density, factor, crowding.x, crowding.y, crowding.z]
     }
 }
 
@@ -488,7 +496,7 @@ impl PairPass<1, 3, 3> for Push<'_> {
         other: [V; 1],
         sums: &mut [V; 3],
     ) {
-        let s = self.constants.nearness(r2);
+        let s = self.constants.kernel.nearness(r2);
         let push = (own[0] + other[0]) * s * s * s;
         for k in 0..3 {
             sums[k] = push.mul_add(d[k], sums[k]);
@@ -527,7 +535,7 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
         other: [V; 3],
         sums: &mut [V; 1],
     ) {
-        let s = self.constants.nearness(r2);
+        let s = self.constants.kernel.nearness(r2);
         let departing = (own[0] - other[0]) * d[0];
         let departing = (own[1] - other[1]).mul_add(d[1], departing);
         let departing = (own[2] - other[2]).mul_add(d[2], departing);
@@ -565,7 +573,7 @@ impl PairPass<3, 3, 3> for Drag<'_> {
         other: [V; 3],
         sums: &mut [V; 3],
     ) {
-        let s = self.constants.nearness(r2);
+        let s = self.constants.kernel.nearness(r2);
         let f = s * s * s;
         for k in 0..3 {
             sums[k] = f.mul_add(other[k] - own[k], sums[k]);
@@ -576,6 +584,7 @@ impl PairPass<3, 3, 3> for Drag<'_> {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
         let mut drag = 2.0 * self.kinematic * mass_steepness / rest_density * DVec3::from_array(sums);
         if let Some((wall, _)) = self.walls.near(i) {
+            drag /= (1.0 - wall.slippery).max(LEAST_FREE);
             drag -= 2.0 * self.kinematic * (wall.drag * self.velocity.get(i) - wall.haul);
         }
         (drag + self.gravity).to_array()

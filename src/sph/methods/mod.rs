@@ -2,6 +2,7 @@
 
 mod dfsph;
 mod paper;
+mod shifting;
 mod wcsph;
 
 pub(super) use paper::Terms;

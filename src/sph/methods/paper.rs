@@ -44,7 +44,7 @@ impl Paper {
         let dt = core.next_dt(longest);
         add_scaled(&mut core.particles.velocity, &core.acceleration, 0.5 * dt);
         core.move_obstacles(dt);
-        core.drift(dt)?;
+        core.drift(dt, None)?;
         core.sort(&mut []);
         self.find_density_and_pressure(core);
         self.find_accelerations(core, 0.5 * dt);

@@ -1,8 +1,8 @@
 //! Weakly compressible fluid: the density follows the motion (equation of continuity), the pressure the density (Tait).
 //!
 //! ```text
-//! dρ_i/dt = Σ m v_ij·∇W  + δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V_j r_ji·∇W/r²  + ρ_i (v_i − v_wall)·∇λ
-//! a_i = g − (1 − K)⁻¹ [Σ m (p_i/ρ_i² + p_j/ρ_j²) ∇W + 2p_i/ρ_i ∇λ] + viscosity
+//! dρ_i/dt = ρ_i/G_i [Σ V v_ij·∇W + (v_i − v_wall)·∇λ]  + δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V r_ji·∇W/r²
+//! a_i = g − (1 − K)⁻¹/(ρ_i G_i) Σ V (p_j − p_i) ∇W + viscosity
 //! p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1)
 //! ```
 //!
@@ -10,9 +10,16 @@
 //! hydrostatic part ρᴴ taken off (Fourtakas et al. 2019), so that it does not lift a fluid at rest. Viscosity: laminar
 //! (Morris et al. 1997) or artificial (Monaghan 1992).
 //!
+//! Gradients are of differences and divided by what the sum makes of the gradient of a position, G = −⅓ Σ V r·∇W + ⅓ tr K
+//! (0.98 on a lattice at h = 2.6 spacings): a pressure that is linear in space has its exact gradient, however far above
+//! zero it lies. Such forces do not push particles apart; shifting keeps them even instead ([`super::shifting`]). At a free
+//! surface and in spray, where G is small, and everywhere without shifting, pressures act in equal pairs p_i + p_j, which
+//! conserve momentum to rounding.
+//!
 //! Walls enter by λ, ∇λ and K in closed form ([`Coverage`]). The pressure beyond a wall is that of the particle,
 //! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a); since a is what is asked for, that is a linear
-//! system of three unknowns for each particle at a wall, solved at once: the factor (1 − K)⁻¹.
+//! system of three unknowns for each particle at a wall, solved at once: the factor (1 − K)⁻¹. Along walls that let it slip
+//! a flow is mirrored: their part of the kernel adds to the viscosity what the rest does.
 //!
 //! Time: kick–drift–kick with one evaluation per step; velocity and density at the new place are predicted.
 
@@ -20,28 +27,30 @@ use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::shifting::{depth, restore_crowding, save_crowding, shift};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
+    kernel::Wendland,
     pairs::{PairPass, Real},
     params::{Method, NegativePressure, Parameters, Wcsph},
     particles::Vectors,
     simulation::StepError,
-    walls::{Boundary, WallKernel},
+    walls::{Boundary, LEAST_FREE, WallKernel},
 };
 
 /// The exponent of Tait's equation for water.
 const EXPONENT: i32 = 7;
 
-/// What is kept between steps: the rate of change of the density; the rest is working memory.
+/// What is kept between steps: the rates of change; the rest is working memory.
 pub struct Weakly {
     numbers: Wcsph,
     /// dρ/dt, kg/m³/s
     density_rate: Vec<f64>,
-    /// p/ρ²
-    specific: Vec<f64>,
-    /// ρ − ρ₀/c²·g·x: constant in a fluid at rest.
-    reduced: Vec<f64>,
+    /// Σ V ∇W + ∇λ, 1/m: where the particles crowd; zero at the surface.
+    crowding: Vectors,
+    /// ρ − ρ₀ as predicted
+    excess: Vec<f64>,
 }
 
 impl Weakly {
@@ -57,7 +66,7 @@ impl Weakly {
         }
         core.particles.pressure.resize(n, 0.0);
         let mut scheme =
-            Self { numbers, density_rate: vec![0.0; n], specific: Vec::new(), reduced: Vec::new() };
+            Self { numbers, density_rate: vec![0.0; n], crowding: Vectors::default(), excess: Vec::new() };
         core.sort(&mut [&mut scheme.density_rate]);
         scheme.find_rates(core, 0.0);
         scheme.find_pressure(core);
@@ -68,7 +77,7 @@ impl Weakly {
         let dt = core.next_dt(longest);
         self.kick(core, 0.5 * dt);
         core.move_obstacles(dt);
-        core.drift(dt)?;
+        core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
         core.sort(&mut [&mut self.density_rate]);
         self.find_rates(core, 0.5 * dt);
         self.kick(core, 0.5 * dt);
@@ -79,16 +88,18 @@ impl Weakly {
 
     pub fn save(&self, checkpoint: &mut Checkpoint) {
         checkpoint.set("density rate", self.density_rate.clone());
+        save_crowding(&self.crowding, checkpoint);
     }
 
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         self.density_rate = checkpoint.of_particles("density rate")?;
+        self.crowding = restore_crowding(checkpoint)?;
         Ok(())
     }
 
     pub fn bytes(&self) -> usize {
-        let columns = [&self.density_rate, &self.specific, &self.reduced];
-        columns.map(|column| 8 * column.capacity()).iter().sum()
+        let columns = [&self.density_rate, &self.excess];
+        columns.map(|column| 8 * column.capacity()).iter().sum::<usize>() + self.crowding.bytes()
     }
 
     /// v += a·t, ρ += dρ/dt·t
@@ -108,38 +119,40 @@ impl Weakly {
         );
     }
 
-    /// Accelerations and rates of density for velocities and densities predicted `ahead` seconds from those stored.
+    /// Accelerations and rates of density for velocities and densities predicted `ahead` seconds from those stored. The
+    /// pressures that belong to them take the place of the particles'.
     fn find_rates(&mut self, core: &mut Core<'_>, ahead: f64) {
+        let n = core.particles.len();
         let mut predicted = std::mem::take(&mut core.spare);
         set_sum(&mut predicted, &core.particles.velocity, &core.acceleration, ahead);
-        set_sum_column(&mut self.specific, &core.particles.density, &self.density_rate, ahead);
-        self.reduced.resize(core.particles.len(), 0.0);
+        set_sum_column(&mut self.excess, &core.particles.density, &self.density_rate, ahead);
+        self.crowding.resize(n);
+        let mut pressure = std::mem::take(&mut core.particles.pressure);
         let (numbers, parameters) = (&self.numbers, &core.parameters);
-        let hydrostatic = parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity;
-        let position = &core.particles.position;
-        self.specific.par_chunks_mut(CHUNK).zip(self.reduced.par_chunks_mut(CHUNK)).enumerate().for_each(
-            |(chunk, (specific, reduced))| {
-                for (k, (specific, reduced)) in specific.iter_mut().zip(reduced).enumerate() {
-                    let rho = *specific;
-                    *specific = tait(numbers, parameters, rho) / (rho * rho);
-                    *reduced = rho - hydrostatic.dot(position.get(chunk * CHUNK + k));
+        self.excess.par_chunks_mut(CHUNK).zip(pressure.par_chunks_mut(CHUNK)).for_each(
+            |(excess, pressure)| {
+                for (excess, pressure) in excess.iter_mut().zip(pressure) {
+                    *pressure = tait(numbers, parameters, *excess);
+                    *excess -= parameters.rest_density;
                 }
             },
         );
 
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let Vectors { x: vx, y: vy, z: vz } = &predicted;
-        let fields = [&vx[..], vy, vz, &self.specific, &self.reduced];
+        let fields = [&vx[..], vy, vz, &pressure, &self.excess];
         let Vectors { x, y, z } = &mut acceleration;
-        let out = [&mut x[..], y, z, &mut self.density_rate];
-        let rates = Rates::new(core, numbers, &predicted, &self.specific);
+        let Vectors { x: cx, y: cy, z: cz } = &mut self.crowding;
+        let out = [&mut x[..], y, z, &mut self.density_rate, cx, cy, cz];
+        let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess);
         match (rates.laminar > 0.0, rates.artificial > 0.0) {
-            (true, true) => core.sum(&Viscous::<true>(rates), fields, out),
-            (true, false) => core.sum(&Viscous::<false>(rates), fields, out),
-            (false, true) => core.sum(&Inviscid::<true>(rates), fields, out),
-            (false, false) => core.sum(&Inviscid::<false>(rates), fields, out),
+            (true, true) => core.sum(&Pairs::<true, true>(rates), fields, out),
+            (true, false) => core.sum(&Pairs::<true, false>(rates), fields, out),
+            (false, true) => core.sum(&Pairs::<false, true>(rates), fields, out),
+            (false, false) => core.sum(&Pairs::<false, false>(rates), fields, out),
         }
         core.acceleration = acceleration;
+        core.particles.pressure = pressure;
         core.spare = predicted;
     }
 }
@@ -161,146 +174,137 @@ struct Rates<'a> {
     boundary: &'a Boundary<'a>,
     position: &'a Vectors,
     velocity: &'a Vectors,
-    density: &'a [f64],
-    specific: &'a [f64],
-    h: f64,
-    /// m·c of ∇W = −c(1 − q)³·r
-    mass_steepness: f64,
-    /// 2δhcV of the diffusion
+    pressure: &'a [f64],
+    /// ρ − ρ₀
+    excess: &'a [f64],
+    kernel: Wendland,
+    /// V·c of V∇W = −V·c·(1 − q)³·r
+    steepness: f64,
+    /// 2δ·h/2·c·ρ₀ of the diffusion, over ρ₀
     diffusion: f64,
+    /// ρ₀/c²·g: how the density of a fluid at rest grows with the depth
+    hydrostatic: DVec3,
     /// ν = μ/ρ₀, m²/s
     laminar: f64,
-    /// αhc/ρ₀
+    /// α·h/2·c·ρ₀
     artificial: f64,
+    /// Whether shifting keeps the particles even.
+    shifting: bool,
 }
 
-/// Without viscosity, or with the artificial one alone.
-struct Inviscid<'a, const ARTIFICIAL: bool>(Rates<'a>);
-
-/// With laminar viscosity.
-struct Viscous<'a, const ARTIFICIAL: bool>(Rates<'a>);
-
 impl<'a> Rates<'a> {
-    fn new(core: &'a Core<'a>, numbers: &Wcsph, velocity: &'a Vectors, specific: &'a [f64]) -> Self {
+    fn new(
+        core: &'a Core<'a>,
+        numbers: &Wcsph,
+        velocity: &'a Vectors,
+        pressure: &'a [f64],
+        excess: &'a [f64],
+    ) -> Self {
         let parameters = &core.parameters;
-        let h = parameters.support_radius;
-        let smoothing = 0.5 * h;
-        let steepness = 210.0 / (std::f64::consts::PI * h.powi(5));
-        let mass_steepness = parameters.particle_mass * steepness;
+        let kernel = Wendland::new(parameters.support_radius);
+        let smoothing = 0.5 * parameters.support_radius;
         Self {
             parameters,
             boundary: &core.boundary,
             position: &core.particles.position,
             velocity,
-            density: &core.particles.density,
-            specific,
-            h,
-            mass_steepness,
-            diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed * mass_steepness
-                / parameters.rest_density,
+            pressure,
+            excess,
+            kernel,
+            steepness: parameters.particle_mass / parameters.rest_density * kernel.steepness,
+            diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
+            hydrostatic: parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity,
             laminar: parameters.viscosity / parameters.rest_density,
-            artificial: numbers.artificial_viscosity * smoothing * numbers.sound_speed
-                / parameters.rest_density,
+            artificial: numbers.artificial_viscosity
+                * smoothing
+                * numbers.sound_speed
+                * parameters.rest_density,
+            shifting: numbers.shifting > 0.0,
         }
     }
+}
 
-    /// (1 − q)³, zero beyond the support.
-    #[inline(always)]
-    fn slope<S: Simd, V: SimdFloat<S, Element: Real>>(&self, r2: V) -> V {
-        let of = V::Element::of;
-        let s = r2.sqrt().mul_add(of(-1.0 / self.h), of(1.0)).max(of(0.0));
-        s * s * s
-    }
+/// One pass, with laminar viscosity or without it, with the artificial one or without it. With f = (1 − q)³ and d from the
+/// neighbour it sums f·(p_j − p_i + Π)·d, f·d, f·d², f·(v_i − v_j)·d, f·(ρ_j − ρ_i) and f·(v_j − v_i).
+struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(Rates<'a>);
 
-    /// Adds pressure, compression and diffusion, and artificial viscosity: a pressure between particles that approach, a
-    /// tension between those that part. With the pressure alone, noise at rest would hold up a part of the fluid's weight
-    /// (3 % of it with α = 0.1).
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<5, 12, 7> for Pairs<'_, LAMINAR, ARTIFICIAL> {
+    /// The artificial viscosity is a pressure between particles that approach and a tension between those that part: with the
+    /// pressure alone, noise at rest would hold up a part of the fluid's weight (3 % of it with α = 0.1).
     #[inline(always)]
-    fn accumulate<S: Simd, V: SimdFloat<S, Element: Real>, const ARTIFICIAL: bool>(
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
         d: [V; 3],
         r2: V,
-        f: V,
         own: &[V; 5],
         other: [V; 5],
-        sums: &mut [V; 5],
+        sums: &mut [V; 12],
     ) {
         let of = V::Element::of;
+        let rates = &self.0;
+        let s = rates.kernel.nearness(r2);
+        let f = s * s * s;
         let departing = (own[0] - other[0]) * d[0];
         let departing = (own[1] - other[1]).mul_add(d[1], departing);
         let departing = (own[2] - other[2]).mul_add(d[2], departing);
-        let mut push = own[3] + other[3];
+        let mut push = other[3] - own[3];
         if ARTIFICIAL {
-            let least = of(0.01 * (0.5 * self.h).powi(2));
+            let least = of(0.01 * (0.5 * rates.kernel.h).powi(2));
             // a viscosity made up needs no more than the twelve digits of an estimate in single precision
-            push -= departing * of(self.artificial) * (r2 + least).approximate_recip();
+            push -= departing * of(rates.artificial) * (r2 + least).approximate_recip();
         }
         let push = push * f;
         for k in 0..3 {
             sums[k] = push.mul_add(d[k], sums[k]);
+            sums[3 + k] = f.mul_add(d[k], sums[3 + k]);
         }
-        sums[3] = f.mul_add(departing, sums[3]);
-        sums[4] = f.mul_add(other[4] - own[4], sums[4]);
-    }
-
-    /// Acceleration and rate of density of particle `i` from Σ push·f·d, Σ f·v·d, Σ f·Δρ and the viscous acceleration.
-    fn finish(&self, i: usize, push: DVec3, compression: f64, diffusion: f64, viscous: DVec3) -> [f64; 4] {
-        let mut pressure = self.mass_steepness * push;
-        let mut rate = -self.mass_steepness * compression + self.diffusion * diffusion;
-        let mut viscous = viscous;
-        if let Some(wall) = self.boundary.coverage(WallKernel::WendlandC2, self.h, self.position.get(i)) {
-            let (density, velocity) = (self.density[i], self.velocity.get(i));
-            rate += density * (wall.gradient.dot(velocity) - wall.sweep);
-            pressure -= 2.0 * density * self.specific[i] * wall.gradient;
-            pressure = wall.completion() * pressure;
-            viscous -= 2.0 * self.laminar * (wall.drag * velocity - wall.haul);
-        }
-        let [x, y, z] = (pressure + viscous + self.parameters.gravity).to_array();
-        [x, y, z, rate]
-    }
-}
-
-impl<const ARTIFICIAL: bool> PairPass<5, 5, 4> for Inviscid<'_, ARTIFICIAL> {
-    #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
-        &self,
-        d: [V; 3],
-        r2: V,
-        own: &[V; 5],
-        other: [V; 5],
-        sums: &mut [V; 5],
-    ) {
-        self.0.accumulate::<S, V, ARTIFICIAL>(d, r2, self.0.slope(r2), own, other, sums);
-    }
-
-    fn finish(&self, i: usize, [x, y, z, compression, diffusion]: [f64; 5]) -> [f64; 4] {
-        self.0.finish(i, DVec3::new(x, y, z), compression, diffusion, DVec3::ZERO)
-    }
-}
-
-impl<const ARTIFICIAL: bool> PairPass<5, 8, 4> for Viscous<'_, ARTIFICIAL> {
-    #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
-        &self,
-        d: [V; 3],
-        r2: V,
-        own: &[V; 5],
-        other: [V; 5],
-        sums: &mut [V; 8],
-    ) {
-        let f = self.0.slope(r2);
-        let [x, y, z, compression, diffusion, drag @ ..] = sums;
-        let mut inviscid = [*x, *y, *z, *compression, *diffusion];
-        self.0.accumulate::<S, V, ARTIFICIAL>(d, r2, f, own, other, &mut inviscid);
-        [*x, *y, *z, *compression, *diffusion] = inviscid;
-        for k in 0..3 {
-            drag[k] = f.mul_add(other[k] - own[k], drag[k]);
+        sums[6] = f.mul_add(r2, sums[6]);
+        sums[7] = f.mul_add(departing, sums[7]);
+        sums[8] = f.mul_add(other[4] - own[4], sums[8]);
+        if LAMINAR {
+            for k in 0..3 {
+                sums[9 + k] = f.mul_add(other[k] - own[k], sums[9 + k]);
+            }
         }
     }
 
-    fn finish(&self, i: usize, [x, y, z, compression, diffusion, u, v, w]: [f64; 8]) -> [f64; 4] {
+    fn finish(&self, i: usize, sums: [f64; 12]) -> [f64; 7] {
+        let [px, py, pz, cx, cy, cz, squares, departing, denser, ux, uy, uz] = sums;
         let rates = &self.0;
-        let viscous = 2.0 * rates.laminar * rates.mass_steepness / rates.parameters.rest_density;
-        rates.finish(i, DVec3::new(x, y, z), compression, diffusion, viscous * DVec3::new(u, v, w))
+        let Rates { parameters, steepness, laminar, .. } = *rates;
+        let mut crowding = -steepness * DVec3::new(cx, cy, cz);
+        let denser = rates.diffusion * steepness * (denser - rates.hydrostatic.dot(crowding) / steepness);
+        let mut push = steepness * DVec3::new(px, py, pz);
+        let mut spread = steepness * squares / 3.0;
+        let mut compression = -steepness * departing;
+        let mut drag = 2.0 * laminar * steepness * DVec3::new(ux, uy, uz);
+        let wall = rates.boundary.coverage(WallKernel::WendlandC2, rates.kernel.h, rates.position.get(i));
+        if let Some(wall) = &wall {
+            let velocity = rates.velocity.get(i);
+            crowding += wall.gradient;
+            spread += wall.share();
+            compression += wall.gradient.dot(velocity) - wall.sweep;
+            drag /= (1.0 - wall.slippery).max(LEAST_FREE);
+            drag -= 2.0 * laminar * (wall.drag * velocity - wall.haul);
+        }
+        let depth = if rates.shifting { depth(spread) } else { 0.0 };
+        let mean = if depth > 0.0 { 1.0 + depth * (1.0 / spread - 1.0) } else { 1.0 };
+        let density = parameters.rest_density + depth * rates.excess[i];
+        // where particles are not kept even, their own pressure pushes them apart
+        push -= (1.0 - depth) * 2.0 * rates.pressure[i] * crowding;
+        if let Some(wall) = &wall {
+            push = wall.completion() * push;
+        }
+        let acceleration = mean * (push / density + drag) + parameters.gravity;
+        let crowding = depth * crowding;
+        [
+            acceleration.x,
+            acceleration.y,
+            acceleration.z,
+            mean * density * compression + denser,
+            crowding.x,
+            crowding.y,
+            crowding.z,
+        ]
     }
 }

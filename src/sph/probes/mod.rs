@@ -15,7 +15,7 @@ use crate::geom::Aabb;
 
 use super::{
     core::Core,
-    kernel::Kernels,
+    kernel::{Kernels, Wendland},
     params::{Method, NegativePressure, Parameters},
     stats::energies,
     walls::WallKernel,
@@ -146,9 +146,7 @@ impl Weight {
         if self.kernel == WallKernel::Poly6 {
             return self.kernels.poly6(r2);
         }
-        let h = self.kernels.h;
-        let q = (r2.sqrt() / h).min(1.0);
-        21.0 / (2.0 * std::f64::consts::PI * h.powi(3)) * (1.0 - q).powi(4) * (1.0 + 4.0 * q)
+        Wendland::new(self.kernels.h).at(r2)
     }
 }
 

@@ -29,7 +29,12 @@ fn water(method: Method) -> Parameters {
 }
 
 fn weakly() -> Method {
-    Method::Wcsph(Wcsph { sound_speed: 30.0, density_diffusion: 0.1, artificial_viscosity: 0.0 })
+    Method::Wcsph(Wcsph {
+        sound_speed: 30.0,
+        density_diffusion: 0.1,
+        artificial_viscosity: 0.0,
+        shifting: 1.0,
+    })
 }
 
 /// Particles at the middles of the cells of a lattice that fills a box.
@@ -155,8 +160,12 @@ fn energies_of_a_fall() {
     let block = lattice(DVec3::ZERO, DVec3::splat(0.2));
     let mass = RHO * 0.008;
     // diffusion would take a density that is even for one that is not at rest
-    let method =
-        Method::Wcsph(Wcsph { sound_speed: 30.0, density_diffusion: 0.0, artificial_viscosity: 0.0 });
+    let method = Method::Wcsph(Wcsph {
+        sound_speed: 30.0,
+        density_diffusion: 0.0,
+        artificial_viscosity: 0.0,
+        shifting: 1.0,
+    });
     let parameters = Parameters { precision: crate::sph::Precision::Double, ..water(method) };
     let mut simulation = Simulation::new(parameters, block, domain, Vec::new()).unwrap();
     let mut gauge = simulation.gauge(Probe::Energy).unwrap();

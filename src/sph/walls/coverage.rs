@@ -22,7 +22,7 @@ use super::kernel::WallKernel;
 const MOST_CURVED: f64 = 0.4;
 
 /// Corrections for walls divide by what is left of the kernel, but never by less than this.
-const LEAST_FREE: f64 = 0.25;
+pub(in crate::sph) const LEAST_FREE: f64 = 0.25;
 
 /// A face nearer than this part of the support radius counts as so near where a velocity's slope is asked for.
 const NEAREST: f64 = 0.1;
@@ -38,6 +38,8 @@ pub(in crate::sph) struct Coverage {
     pub spread: DMat3,
     /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks: what it feels of a velocity.
     pub drag: DMat3,
+    /// λ of the walls along which the fluid slips.
+    pub slippery: f64,
     /// ∇λ·v of walls that move, 1/s.
     pub sweep: f64,
     /// The drag of the walls' own velocity, 1/(m·s).
@@ -52,6 +54,7 @@ impl Default for Coverage {
             gradient: DVec3::ZERO,
             spread: DMat3::ZERO,
             drag: DMat3::ZERO,
+            slippery: 0.0,
             sweep: 0.0,
             haul: DVec3::ZERO,
         }
@@ -89,6 +92,7 @@ impl Coverage {
     pub fn let_slip(&mut self) {
         self.drag = DMat3::ZERO;
         self.haul = DVec3::ZERO;
+        self.slippery = self.part;
     }
 
     /// All of these walls move within themselves, besides any other motion.
@@ -138,6 +142,11 @@ impl Coverage {
         self.gradient.normalize_or_zero().dot(other.gradient.normalize_or_zero()).clamp(-1.0, 1.0)
     }
 
+    /// ⅓ tr K: the walls' part of the gradient of a position.
+    pub fn share(&self) -> f64 {
+        self.part + self.spread.diagonal().element_sum() / 3.0
+    }
+
     /// (1 − K)⁻¹: makes of a sum over the fluid alone what it would be if the fluid went on behind the walls as it is
     /// before them. No direction is stretched by more than 1/[`LEAST_FREE`].
     pub fn completion(&self) -> DMat3 {
@@ -154,6 +163,7 @@ impl Coverage {
             gradient: da * self.gradient + db * other.gradient,
             spread: da * self.spread + db * other.spread,
             drag: da * self.drag + db * other.drag,
+            slippery: da * self.slippery + db * other.slippery,
             sweep: da * self.sweep + db * other.sweep,
             haul: da * self.haul + db * other.haul,
         }

@@ -13,8 +13,7 @@
 //! so that nothing cancels as the particle leaves the wall; the inner piece of the spline, which stays away from zero,
 //! is written out.
 //!
-//! The solver does not use them yet: its walls act on positions and velocities alone (see [`super::boundary`]), and
-//! the density of a particle at a wall is too low by the part λ. These forms are what a density with walls needs.
+//! The integrals over the faces near a particle are joined in [`super::coverage`].
 //!
 //! Invariant: λ(δ) + λ(−δ) = 1; all three vanish from δ = 1 on.
 

@@ -13,5 +13,5 @@ mod kernel;
 pub(super) use boundary::Boundary;
 pub use boundary::{Obstacle, SurfaceVelocity};
 pub use contact::{Contact, Undefined, first_contact, push_out};
-pub(super) use coverage::Coverage;
+pub(super) use coverage::{Coverage, LEAST_FREE};
 pub use kernel::WallKernel;
