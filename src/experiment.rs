@@ -18,11 +18,11 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
 use crate::field::{Field, Moving};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
-use crate::lower::{Fill, Fluid, Method, Precision, Scene, Skin, Slip};
+use crate::lower::{Fill, Fluid, Gravity, Method, Precision, Scene, Skin, Slip};
 use crate::solid::{Bounds, MovingMap};
 use crate::sph::{
     self, Checkpoint, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError,
-    SetupError, Simulation, SurfaceVelocity, carve, make_room,
+    SetupError, Simulation, VectorField, carve, make_room,
 };
 use crate::{Engine, Program, Solid};
 
@@ -42,7 +42,7 @@ pub struct Body {
     moving: Option<Box<dyn Moving>>,
     /// What it does to a particle, and to the fluid that moves along it.
     pub skin: Skin,
-    surface_velocity: Option<Box<SurfaceVelocity>>,
+    surface_velocity: Option<Box<VectorField>>,
 }
 
 /// A window of time in which the map of a moving solid stays, in steps.
@@ -54,6 +54,8 @@ pub struct Experiment {
     pub domain: Aabb,
     /// Of the fluid and the method.
     pub parameters: Parameters,
+    /// Gravity that depends on the place.
+    gravity_field: Option<Box<VectorField>>,
     /// The container's outside, if the scene has one, and the obstacles.
     pub obstacles: Vec<Body>,
     fluid: Solid,
@@ -93,10 +95,14 @@ impl Experiment {
                 Box::new(solid.clone())
             };
             moved.push(whole);
-            let surface_velocity = skin.velocity.map(|nodes| surface_velocity(program, &nodes));
+            let surface_velocity = skin.velocity.map(|nodes| vector_field(program, &nodes));
             obstacles.push(Body { solid, field, moving: None, skin, surface_velocity });
         }
-        let gravity = scene.gravity;
+        let (gravity, gravity_field) = match scene.gravity {
+            Gravity::Still(gravity) => (gravity, None),
+            Gravity::Turning(nodes) => (at_time(program, &nodes, 0.0), None),
+            Gravity::Field(nodes) => (DVec3::ZERO, Some(vector_field(program, &nodes))),
+        };
         let height = gravity.normalize_or_zero().abs().dot(scene.domain.size());
         let start = fastest(program, scene);
         let typical_speed = (start * start + 2.0 * gravity.length() * height).sqrt();
@@ -168,6 +174,7 @@ impl Experiment {
         Ok(Self {
             domain: scene.domain,
             parameters,
+            gravity_field,
             obstacles,
             fluid,
             time_step_reason,
@@ -220,9 +227,12 @@ impl Experiment {
             self.put_under_pressure(&mut particles);
         }
         let simulation = Simulation::new(self.parameters.clone(), particles, self.domain, obstacles);
-        let simulation = simulation.map_err(|e| {
+        let mut simulation = simulation.map_err(|e| {
             refuse(program, Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string()))
         })?;
+        if let Some(field) = &self.gravity_field {
+            simulation.set_gravity_field(field);
+        }
         Ok((simulation, carved))
     }
 
@@ -232,7 +242,11 @@ impl Experiment {
     /// If the checkpoint does not fit the scene.
     pub fn resume(&self, checkpoint: &Checkpoint) -> Result<Simulation<'_>, SetupError> {
         let obstacles = self.obstacles.iter().map(|body| self.obstacle(body)).collect();
-        Simulation::resume(self.parameters.clone(), checkpoint, self.domain, obstacles)
+        let mut simulation = Simulation::resume(self.parameters.clone(), checkpoint, self.domain, obstacles)?;
+        if let Some(field) = &self.gravity_field {
+            simulation.set_gravity_field(field);
+        }
+        Ok(simulation)
     }
 
     fn obstacle<'a>(&self, body: &'a Body) -> Obstacle<'a> {
@@ -247,13 +261,9 @@ impl Experiment {
         }
     }
 
-    /// Gravity at a time, m/s²; nothing if the scene's does not change.
+    /// Gravity at a time, m/s²; nothing if the scene's does not turn.
     pub fn gravity_at(&self, program: &Program, scene: &Scene, time: f64) -> Option<DVec3> {
-        let nodes = scene.turning_gravity?;
-        let mut gravity = [0.0; 3];
-        let given = Given { time, ..Given::point([0.0; 3]) };
-        Interpreter::new(&program.module().graph, &nodes).eval_given(given, &mut gravity);
-        Some(DVec3::from_array(gravity))
+        if let Gravity::Turning(nodes) = &scene.gravity { Some(at_time(program, nodes, time)) } else { None }
     }
 
     fn carve(
@@ -341,13 +351,18 @@ fn slip(slip: Slip) -> sph::Slip {
     }
 }
 
-/// How a surface moves within itself.
-fn surface_velocity(program: &Program, nodes: &[Node; 3]) -> Box<SurfaceVelocity> {
+/// Formulas of t alone.
+fn at_time(program: &Program, nodes: &[Node; 3], time: f64) -> DVec3 {
+    vector_field(program, nodes)(DVec3::ZERO, time)
+}
+
+/// Formulas of the place and of t.
+fn vector_field(program: &Program, nodes: &[Node; 3]) -> Box<VectorField> {
     let formulas = Interpreter::new(&program.module().graph, nodes);
     Box::new(move |p, time| {
-        let mut velocity = [0.0; 3];
-        formulas.eval_given(Given { time, ..Given::point(p.to_array()) }, &mut velocity);
-        DVec3::from_array(velocity)
+        let mut vector = [0.0; 3];
+        formulas.eval_given(Given { time, ..Given::point(p.to_array()) }, &mut vector);
+        DVec3::from_array(vector)
     })
 }
 

@@ -10,9 +10,29 @@ use super::probes::{Probe, Surroundings};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
-use crate::ir::{Given, Interpreter, Node, Unary};
+use crate::ir::{Node, Unary};
 use crate::syntax::ast::{self, Entry, Expr, ExprKind, Name};
 use crate::syntax::{Dimension, parse_unit};
+
+/// Acceleration of all of the fluid, m/s².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Gravity {
+    Still(DVec3),
+    /// Formulas of t alone: a container that turns.
+    Turning([Node; 3]),
+    /// Formulas of the place, and perhaps of t: any body force.
+    Field([Node; 3]),
+}
+
+impl Gravity {
+    /// Its formulas, if it is not always the same.
+    pub fn formulas(&self) -> Option<&[Node; 3]> {
+        match self {
+            Self::Still(_) => None,
+            Self::Turning(nodes) | Self::Field(nodes) => Some(nodes),
+        }
+    }
+}
 
 /// What a simulation needs, as a file states it.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,10 +50,7 @@ pub struct Scene {
     pub container: Option<Container>,
     pub fluid: Fluid,
     pub obstacles: Vec<Obstacle>,
-    /// m/s², at the start.
-    pub gravity: DVec3,
-    /// The same as formulas of t, if it changes.
-    pub turning_gravity: Option<[Node; 3]>,
+    pub gravity: Gravity,
     pub method: Method,
     pub solver: Solver,
     pub run: Run,
@@ -303,8 +320,7 @@ impl<'a> Lowering<'a> {
             container,
             fluid: fluid?,
             obstacles,
-            gravity: gravity?.0,
-            turning_gravity: gravity?.1,
+            gravity: gravity?,
             method: method?,
             solver: solver?,
             run: run?,
@@ -528,15 +544,6 @@ impl<'a> Lowering<'a> {
                     .label(first.span, "the mass is stated here"),
             );
         }
-        if let (Some((_, value)), false) = (block.setting("surface_tension"), paper)
-            && surface_tension.is_some_and(|tension| tension > 0.0)
-        {
-            let message = "surface tension is known to the method `paper` only";
-            self.report(
-                Diagnostic::error(Code::SCENE_KEY, value.span, message)
-                    .help("leave `surface_tension` out, or write `method: paper`"),
-            );
-        }
         let negative_pressure =
             self.word_key(&block, "negative_pressure", &[("clamp", false), ("keep", true)]);
         let hydrostatic = self.word_key(&block, "start", &[("free", false), ("hydrostatic", true)]);
@@ -572,27 +579,19 @@ impl<'a> Lowering<'a> {
         })
     }
 
-    /// Gravity at the start, and as formulas if it depends on t.
-    fn gravity(&mut self, block: &Block<'_>) -> Option<(DVec3, Option<[Node; 3]>)> {
+    fn gravity(&mut self, block: &Block<'_>) -> Option<Gravity> {
         let Some((_, value)) = block.setting("gravity") else {
-            return Some((DVec3::new(0.0, 0.0, -9.81), None));
+            return Some(Gravity::Still(DVec3::new(0.0, 0.0, -9.81)));
         };
         let nodes = self.components(value, Dimension::ACCELERATION, "gravity")?;
         let turns = nodes.iter().any(|&node| self.module.graph.constant_value(node).is_none());
         if !turns {
             return self
                 .vector_key(block, "gravity", Dimension::ACCELERATION, DVec3::ZERO)
-                .map(|gravity| (gravity, None));
+                .map(Gravity::Still);
         }
-        if nodes.iter().any(|&node| self.depends_on_place(node)) {
-            let message = "`gravity` may depend on the time t, not on the place";
-            self.report(Diagnostic::error(Code::NOT_CONSTANT, value.span, message));
-            return None;
-        }
-        let mut start = [0.0; 3];
-        let given = Given { time: 0.0, ..Given::point([0.0; 3]) };
-        Interpreter::new(&self.module.graph, &nodes).eval_given(given, &mut start);
-        Some((DVec3::from_array(start), Some(nodes)))
+        let of_place = nodes.iter().any(|&node| self.depends_on_place(node));
+        Some(if of_place { Gravity::Field(nodes) } else { Gravity::Turning(nodes) })
     }
 
     fn truth(&mut self, block: &Block<'_>) -> Option<Option<Truth>> {

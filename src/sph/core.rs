@@ -2,9 +2,11 @@
 //! pressure is found.
 
 use fearless_simd::{Level, Simd, SimdFloat};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
+    VectorField,
     pairs::{Cloud, Columns, PairPass, Real},
     params::{Parameters, Precision},
     particles::{Particles, Vectors},
@@ -31,6 +33,8 @@ pub(super) struct Core<'a> {
     columns: Columns,
     /// Working memory: where the particles go before they collide, or what a method needs a vector for.
     pub spare: Vectors,
+    /// Gravity besides that of the parameters, m/s².
+    pub gravity_field: Option<&'a VectorField>,
     sorted_id: Vec<u32>,
 }
 
@@ -49,6 +53,7 @@ impl<'a> Core<'a> {
             level: Level::new(),
             columns: Columns::default(),
             spare: Vectors::default(),
+            gravity_field: None,
             sorted_id: Vec::new(),
         }
     }
@@ -98,6 +103,25 @@ impl<'a> Core<'a> {
             permute(order, column, &mut self.spare.x);
         }
         permute(order, id, &mut self.sorted_id);
+    }
+
+    /// What acts on a particle from afar, m/s², at the end of the present step.
+    pub fn gravity(&self, i: usize) -> DVec3 {
+        let field = self.gravity_field.map(|field| field(self.particles.position.get(i), self.boundary.time));
+        self.parameters.gravity + field.unwrap_or(DVec3::ZERO)
+    }
+
+    /// Adds to the accelerations what of gravity depends on the place, if any does.
+    pub fn pull(&mut self) {
+        let Some(field) = self.gravity_field else { return };
+        let (position, time) = (&self.particles.position, self.boundary.time);
+        let [x, y, z] = self.acceleration.components_mut();
+        x.par_iter_mut().zip(y).zip(z).enumerate().for_each(|(i, ((x, y), z))| {
+            let pull = field(position.get(i), time);
+            *x += pull.x;
+            *y += pull.y;
+            *z += pull.z;
+        });
     }
 
     /// Sums over the neighbours of every particle, in the precision of the parameters.

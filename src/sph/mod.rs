@@ -59,6 +59,9 @@ mod scenes;
 #[cfg(test)]
 mod tests;
 
+/// A vector at a place and a time, s.
+pub type VectorField = dyn Fn(glam::DVec3, f64) -> glam::DVec3 + Send + Sync;
+
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use kernel::Kernels;
 pub use params::{Dfsph, Method, NegativePressure, ParameterError, Parameters, Precision, Slip, Wcsph};
@@ -68,4 +71,4 @@ pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::{Pass, Stats};
 pub use vtp::{short_time, write_pvd, write_vtp};
-pub use walls::{Contact, Obstacle, SurfaceVelocity, Undefined, WallKernel, first_contact, push_out};
+pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};

@@ -296,11 +296,12 @@ impl Parameters {
 
     /// The longest step, s, that is stable while no particle is faster than `max_speed` (m/s).
     ///
-    /// The least of three limits:
+    /// The least of four limits:
     /// - sound and motion: h/4 / (c + max_speed);
     /// - viscosity: the relative velocity of two lone, coinciding particles decays at the rate
     ///   2·viscosity·m·∇²W(0)/ρ² with ρ = mW(0), the fastest the method can produce (denser
     ///   surroundings divide by larger ρ); one decay time, half of what an explicit step endures;
+    /// - ripples under surface tension, where pressure is not that of the paper;
     /// - gravity: ¼√(h/g).
     ///
     /// Pressure forces have no bound before the run; see [`Simulation::stable_dt`](super::Simulation::stable_dt).
@@ -309,13 +310,23 @@ impl Parameters {
             Method::Dfsph(_) => ADVECTION * self.spacing() / max_speed,
             _ => COURANT * self.support_radius / (self.sound_speed() + max_speed),
         };
-        courant.min(self.viscous_dt()).min(self.force_dt(self.gravity.length()))
+        courant.min(self.viscous_dt()).min(self.capillary_dt()).min(self.force_dt(self.gravity.length()))
     }
 
     /// The longest step for an acceleration (m/s²): ¼√(h/a), s.
     pub fn force_dt(&self, acceleration: f64) -> f64 {
         let factor = if let Method::Dfsph(_) = self.method { IMPLICIT_FORCE_FACTOR } else { FORCE_FACTOR };
         factor * (self.support_radius / acceleration).sqrt()
+    }
+
+    /// ¼√(ρ(h/2)³/2πσ): a ripple as short as the smoothing length (Brackbill et al. 1992), s. The paper's method has none.
+    fn capillary_dt(&self) -> f64 {
+        if matches!(self.method, Method::Paper) {
+            return f64::INFINITY;
+        }
+        let ripple =
+            self.rest_density * (0.5 * self.support_radius).powi(3) / (2.0 * PI * self.surface_tension);
+        0.25 * ripple.sqrt()
     }
 
     fn viscous_dt(&self) -> f64 {

@@ -10,6 +10,7 @@ use glam::DVec3;
 use crate::geom::Aabb;
 
 use super::{
+    VectorField,
     checkpoint::{Checkpoint, CheckpointError},
     core::{Core, first_non_finite},
     methods::Scheme,
@@ -243,6 +244,14 @@ impl<'a> Simulation<'a> {
     /// Turns gravity, m/s², from the next step on (a container that rotates).
     pub fn set_gravity(&mut self, gravity: DVec3) {
         self.core.parameters.gravity = gravity;
+    }
+
+    /// Adds to gravity what depends on the place, m/s².
+    pub fn set_gravity_field(&mut self, field: &'a VectorField) {
+        self.core.gravity_field = Some(field);
+        if self.core.steps == 0 {
+            self.core.pull();
+        }
     }
 
     /// A probe that may be asked for samples from now on, at most once at each instant.

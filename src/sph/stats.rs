@@ -60,10 +60,6 @@ impl Pass {
             () if dfsph => Some("the method solves for the pressure"),
             () => unless(!paper || terms.pressure, "the stiffness is zero"),
         };
-        let tension = match () {
-            () if !paper => Some("it belongs to the method paper"),
-            () => unless(terms.tension, "the surface tension is zero"),
-        };
         let shifting = match parameters.method {
             Method::Paper => Some("it belongs to the methods wcsph and dfsph"),
             Method::Wcsph(Wcsph { shifting, .. }) | Method::Dfsph(Dfsph { shifting, .. }) => {
@@ -90,7 +86,7 @@ impl Pass {
             ),
             (Self::Shifting, shifting),
             (Self::NoSlip, no_slip),
-            (Self::SurfaceTension, tension),
+            (Self::SurfaceTension, unless(terms.tension, "the surface tension is zero")),
             (Self::Gravity, unless(parameters.gravity != DVec3::ZERO, "gravity is zero")),
         ]
     }

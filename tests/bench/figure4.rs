@@ -14,7 +14,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use rfm::lower::Scene;
+use rfm::lower::{Gravity, Scene};
 use rfm::sph::{FluidBlock, Obstacle, Parameters, Simulation, Stats, carve};
 use rfm::{Engine, Program, Solid, glam::DVec3};
 
@@ -173,6 +173,7 @@ fn window(simulation: &mut Simulation<'_>) -> f64 {
 /// The drop of the scene with as many particles as wanted, around the scene's centre; what touches the pawn is
 /// carved off.
 fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a> {
+    let Gravity::Still(gravity) = scene.gravity else { panic!("the scene has gravity that stays") };
     let mut parameters = Parameters {
         rest_density: scene.fluid.density,
         particle_mass: scene.fluid.mass,
@@ -181,12 +182,12 @@ fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a
         viscosity: scene.fluid.viscosity,
         surface_tension: scene.fluid.surface_tension,
         surface_threshold: scene.fluid.threshold,
-        gravity: scene.gravity,
+        gravity,
         wall_restitution: scene.walls.restitution,
         time_step: 1.0,
         ..Parameters::default()
     };
-    let fall = (2.0 * scene.gravity.length() * scene.domain.size().z).sqrt();
+    let fall = (2.0 * gravity.length() * scene.domain.size().z).sqrt();
     parameters.time_step = parameters.stable_dt(fall);
     let radius = (0.75 / std::f64::consts::PI * count as f64).cbrt() * parameters.spacing();
     let top = scene.domain.max.z - parameters.spacing();

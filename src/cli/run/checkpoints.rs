@@ -121,7 +121,7 @@ pub(super) fn fingerprint(program: &Program, scene: &Scene, setup: &Experiment) 
     let container = scene.container.iter().map(|c| ("container", c.outside));
     let obstacles = scene.obstacles.iter().map(|o| ("obstacle", o.shape));
     let velocity = fluid.velocity.iter().map(|node| ("velocity", *node));
-    let gravity = scene.turning_gravity.iter().flatten().map(|node| ("gravity", *node));
+    let gravity = scene.gravity.formulas().into_iter().flatten().map(|node| ("gravity", *node));
     let fluid_shape = [("fluid", fluid.shape)].into_iter();
     let roots: Vec<_> =
         fluid_shape.chain(container).chain(obstacles).chain(velocity).chain(gravity).collect();

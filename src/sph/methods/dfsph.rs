@@ -26,7 +26,10 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
-use super::shifting::{depth, restore_crowding, save_crowding, shift};
+use super::{
+    shifting::{depth, restore_crowding, save_crowding, shift},
+    tension::Tension,
+};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled},
@@ -62,6 +65,7 @@ pub struct DivergenceFree {
     push: Vectors,
     /// Σ V ∇W + ∇λ, 1/m: where the particles crowd; zero at the surface.
     crowding: Vectors,
+    tension: Tension,
     /// M·v
     completed: Vectors,
     walls: Walls,
@@ -136,6 +140,7 @@ impl DivergenceFree {
             free: vec![0.0; n],
             push: Vectors::default(),
             crowding: Vectors::default(),
+            tension: Tension::default(),
             completed: Vectors::default(),
             walls: Walls::default(),
             last: Vec::new(),
@@ -215,6 +220,7 @@ impl DivergenceFree {
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + self.push.bytes()
             + self.crowding.bytes()
+            + self.tension.bytes()
             + self.completed.bytes()
             + 4 * self.walls.place.capacity()
             + size_of::<(u32, Coverage, DMat3)>() * self.walls.found.capacity()
@@ -234,8 +240,8 @@ impl DivergenceFree {
         core.particles.density = density;
     }
 
-    /// Gravity and viscosity.
-    fn find_other_accelerations(&self, core: &mut Core<'_>) {
+    /// Gravity, viscosity and tension.
+    fn find_other_accelerations(&mut self, core: &mut Core<'_>) {
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let g = core.parameters.gravity;
         let Vectors { x, y, z } = &mut acceleration;
@@ -255,6 +261,8 @@ impl DivergenceFree {
             z.fill(g.z);
         }
         core.acceleration = acceleration;
+        core.pull();
+        self.tension.act(core);
     }
 
     /// Changes velocities so that nothing is compressed, and what is too dense expands.

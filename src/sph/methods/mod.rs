@@ -3,6 +3,7 @@
 mod dfsph;
 mod paper;
 mod shifting;
+mod tension;
 mod wcsph;
 
 pub(super) use paper::Terms;

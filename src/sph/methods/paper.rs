@@ -79,6 +79,7 @@ impl Paper {
             acceleration.y.fill(g.y);
             acceleration.z.fill(g.z);
             core.acceleration = acceleration;
+            core.pull();
             return;
         }
         let mut predicted = std::mem::take(&mut core.spare);
@@ -100,6 +101,7 @@ impl Paper {
         }
         core.acceleration = acceleration;
         core.spare = predicted;
+        core.pull();
     }
 }
 

@@ -58,7 +58,8 @@ impl Tension {
         let kernel = Wendland::new(parameters.support_radius);
         let steepness = parameters.particle_mass / parameters.rest_density * kernel.steepness;
 
-        let pass = Normals { kernel, steepness, boundary: &core.boundary, position: &core.particles.position };
+        let pass =
+            Normals { kernel, steepness, boundary: &core.boundary, position: &core.particles.position };
         let (Vectors { x, y, z }, Vectors { x: dx, y: dy, z: dz }) = (&mut self.normal, &mut self.direction);
         core.sum(&pass, [], [x, y, z, dx, dy, dz, &mut self.weight]);
 

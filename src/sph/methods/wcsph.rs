@@ -27,7 +27,10 @@ use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::shifting::{depth, restore_crowding, save_crowding, shift};
+use super::{
+    shifting::{depth, restore_crowding, save_crowding, shift},
+    tension::Tension,
+};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
@@ -51,6 +54,7 @@ pub struct Weakly {
     crowding: Vectors,
     /// ρ − ρ₀ as predicted
     excess: Vec<f64>,
+    tension: Tension,
 }
 
 impl Weakly {
@@ -65,8 +69,13 @@ impl Weakly {
             *rho = core.parameters.rest_density;
         }
         core.particles.pressure.resize(n, 0.0);
-        let mut scheme =
-            Self { numbers, density_rate: vec![0.0; n], crowding: Vectors::default(), excess: Vec::new() };
+        let mut scheme = Self {
+            numbers,
+            density_rate: vec![0.0; n],
+            crowding: Vectors::default(),
+            excess: Vec::new(),
+            tension: Tension::default(),
+        };
         core.sort(&mut [&mut scheme.density_rate]);
         scheme.find_rates(core, 0.0);
         scheme.find_pressure(core);
@@ -99,7 +108,9 @@ impl Weakly {
 
     pub fn bytes(&self) -> usize {
         let columns = [&self.density_rate, &self.excess];
-        columns.map(|column| 8 * column.capacity()).iter().sum::<usize>() + self.crowding.bytes()
+        columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
+            + self.crowding.bytes()
+            + self.tension.bytes()
     }
 
     /// v += a·t, ρ += dρ/dt·t
@@ -154,6 +165,8 @@ impl Weakly {
         core.acceleration = acceleration;
         core.particles.pressure = pressure;
         core.spare = predicted;
+        core.pull();
+        self.tension.act(core);
     }
 }
 

@@ -101,7 +101,7 @@ pub fn pressure_on(core: &Core<'_>, obstacle: usize, point: DVec3) -> [f64; 6] {
         let mut faces = Faces::new();
         field.faces(particles.position.get(i), h, &mut faces);
         let wall = Coverage::of_faces(WallKernel::WendlandC2, h, &faces);
-        let by_pressure = core.acceleration.get(i) - parameters.gravity;
+        let by_pressure = core.acceleration.get(i) - core.gravity(i);
         let density = particles.density[i];
         2.0 * mass / density * (particles.pressure[i] * wall.gradient - density * (wall.spread * by_pressure))
             + friction * (wall.drag * particles.velocity.get(i))

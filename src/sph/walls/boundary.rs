@@ -22,7 +22,7 @@ use crate::{
     geom::Aabb,
 };
 
-use crate::sph::{params::Slip, particles::Vectors, probes::Contacts};
+use crate::sph::{VectorField, params::Slip, particles::Vectors, probes::Contacts};
 
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, reflect, turn_back},
@@ -38,9 +38,6 @@ const MAX_CONTACTS: usize = 4;
 
 /// A particle that a moving wall overtakes is looked for so many clearances (a support radius) away.
 const REACH: f64 = 1e6;
-
-/// The velocity of a surface within itself, m/s, at a place on it and a time, s.
-pub type SurfaceVelocity = dyn Fn(DVec3, f64) -> DVec3 + Send + Sync;
 
 /// A body in the fluid's way.
 #[derive(Clone, Copy)]
@@ -59,9 +56,9 @@ pub struct Obstacle<'a> {
     pub resolution: f64,
     /// Whether the fluid sticks to it.
     pub slip: Slip,
-    /// How its surface moves within itself, as that of a belt or of a cylinder that turns; a fluid that sticks is taken
+    /// How its surface moves within itself, m/s, as that of a belt or of a cylinder that turns; a fluid that sticks is taken
     /// along.
-    pub surface_velocity: Option<&'a SurfaceVelocity>,
+    pub surface_velocity: Option<&'a VectorField>,
 }
 
 impl<'a> Obstacle<'a> {

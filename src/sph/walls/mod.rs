@@ -11,7 +11,7 @@ mod coverage;
 mod kernel;
 
 pub(super) use boundary::Boundary;
-pub use boundary::{Obstacle, SurfaceVelocity};
+pub use boundary::Obstacle;
 pub use contact::{Contact, Undefined, first_contact, push_out};
 pub(super) use coverage::{Coverage, LEAST_FREE};
 pub use kernel::WallKernel;
