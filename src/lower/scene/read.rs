@@ -1,212 +1,19 @@
-//! Scenes: keys with units and defaults → plain data for the solver.
-//!
-//! Invariant: after this stage every number is finite and in SI units, and every size is positive.
+//! The blocks of a scene, read one after the other.
 
 use glam::DVec3;
 
-use super::Tolerance;
-use super::eval::Lowering;
-use super::probes::{Probe, Surroundings};
-use super::value::Value;
+use super::super::Tolerance;
+use super::super::eval::Lowering;
+use super::super::probes::Surroundings;
+use super::{
+    Block, Bounce, Bound, Container, Fill, Fluid, Gravity, Method, Obstacle, Precision, Run, Scene, Skin,
+    Slip, Solver, Truth,
+};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
 use crate::ir::{Node, Unary};
-use crate::syntax::ast::{self, Entry, Expr, ExprKind, Name};
-use crate::syntax::{Dimension, parse_unit};
-
-/// Acceleration of all of the fluid, m/s².
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Gravity {
-    Still(DVec3),
-    /// Formulas of t alone: a container that turns.
-    Turning([Node; 3]),
-    /// Formulas of the place, and perhaps of t: any body force.
-    Field([Node; 3]),
-}
-
-impl Gravity {
-    /// Its formulas, if it is not always the same.
-    pub fn formulas(&self) -> Option<&[Node; 3]> {
-        match self {
-            Self::Still(_) => None,
-            Self::Turning(nodes) | Self::Field(nodes) => Some(nodes),
-        }
-    }
-}
-
-/// What a simulation needs, as a file states it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scene {
-    pub name: String,
-    pub span: Span,
-    /// The container.
-    pub domain: Aabb,
-    pub domain_span: Span,
-    /// What the walls of the box do to a particle that hits them.
-    pub walls: Bounce,
-    /// Whether a fluid sticks to the walls of the box, and to obstacles that do not say otherwise.
-    pub slip: Slip,
-    /// The vessel within the box, if there is one: the fluid stays where it is positive.
-    pub container: Option<Container>,
-    pub fluid: Fluid,
-    pub obstacles: Vec<Obstacle>,
-    pub gravity: Gravity,
-    pub method: Method,
-    pub solver: Solver,
-    pub run: Run,
-    /// What is known of the flow, to be compared with.
-    pub truth: Option<Truth>,
-    pub probes: Vec<Probe>,
-    /// The largest error of ω that is accepted of its obstacles in the box, if one is stated.
-    pub tolerance: Option<Tolerance>,
-}
-
-/// What becomes of a particle at a wall.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounce {
-    /// Part of the normal speed that is given back, 0 … 1.
-    pub restitution: f64,
-    /// Coefficient of friction μ.
-    pub friction: f64,
-}
-
-/// Whether a fluid sticks to walls.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Slip {
-    Free,
-    No,
-}
-
-/// What a solid does to the fluid at its surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Skin {
-    pub bounce: Bounce,
-    pub slip: Slip,
-    /// Motion within the surface as formulas of x, y, z and t, m/s: of a belt, or of a cylinder that turns.
-    pub velocity: Option<[Node; 3]>,
-}
-
-/// A vessel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Container {
-    pub name: String,
-    /// Positive outside the vessel: what the fluid meets.
-    pub outside: Node,
-    pub span: Span,
-    pub skin: Skin,
-}
-
-/// A flow that is known, as formulas of x, y, z and t.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Truth {
-    /// Pa
-    pub pressure: Option<Node>,
-    /// m/s
-    pub velocity: Option<[Node; 3]>,
-    /// From when on it holds, s.
-    pub from: f64,
-}
-
-/// How a method is run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solver {
-    /// Mean compression that `dfsph` accepts.
-    pub compression: f64,
-    /// Of its iterations, at most.
-    pub iterations: usize,
-    /// Of sums over neighbours; the method decides if it is not given.
-    pub precision: Option<Precision>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
-    Single,
-    Double,
-}
-
-/// The defaults are table 1 of the paper for its method, and those of water and of the particles' spacing for others.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fluid {
-    pub name: String,
-    /// Positive where particles are put at the start.
-    pub shape: Node,
-    pub shape_span: Span,
-    /// Which part of the shape is taken when it has room for more particles than are wanted.
-    pub fill: Fill,
-    /// As many as fit if it is not given.
-    pub particles: Option<usize>,
-    pub particles_span: Option<Span>,
-    /// Rest density ρ₀, kg/m³.
-    pub density: f64,
-    /// Of one particle, kg.
-    pub mass: f64,
-    /// Dynamic viscosity, Pa·s.
-    pub viscosity: f64,
-    /// N/m
-    pub surface_tension: f64,
-    /// |∇c| above which a particle belongs to the surface, the paper's l.
-    pub threshold: f64,
-    /// Gas stiffness k of p = k(ρ − ρ₀), J.
-    pub stiffness: f64,
-    /// h, m
-    pub support_radius: f64,
-    /// Speed of sound of `wcsph`, m/s; ten times the speed of a fall through the box if it is not given.
-    pub sound_speed: Option<f64>,
-    /// δ of the density diffusion of `wcsph`.
-    pub density_diffusion: f64,
-    /// α of the artificial viscosity of `wcsph`.
-    pub artificial_viscosity: f64,
-    /// Strength of the particle shifting.
-    pub shifting: f64,
-    /// Whether pressure may pull.
-    pub negative_pressure: bool,
-    /// Whether the fluid starts under the pressure of its own weight, `wcsph` only: otherwise it starts without, and rings.
-    pub hydrostatic: bool,
-    /// At the start, m/s.
-    pub velocity: [Node; 3],
-    /// Random displacement of the start positions, as a part of the particle spacing.
-    pub jitter: f64,
-    pub seed: u64,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Obstacle {
-    /// The name of the solid, or `obstacle` for a shape written on the spot.
-    pub name: String,
-    pub shape: Node,
-    pub span: Span,
-    pub skin: Skin,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fill {
-    /// From below, as a vessel is filled.
-    Below,
-    /// Where ω of the shape is largest: a drop of an exact number of particles.
-    Middle,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// Equations (8)–(14) of the paper, corrected.
-    Paper,
-    /// Weakly compressible.
-    Wcsph,
-    /// Divergence-free (Bender & Koschier 2017).
-    Dfsph,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Run {
-    /// Fixed time step, s; derived from the fluid if it is not given.
-    pub dt: Option<f64>,
-    /// End of the simulated time, s.
-    pub until: f64,
-    /// Time between saved frames, s.
-    pub save_every: f64,
-    /// Time between checkpoints, s; one goes with every frame if it is not given.
-    pub checkpoint_every: Option<f64>,
-}
+use crate::syntax::Dimension;
+use crate::syntax::ast::{self, Entry, Expr, ExprKind};
 
 const SCENE_KEYS: [&str; 13] = [
     "units",
@@ -223,9 +30,6 @@ const SCENE_KEYS: [&str; 13] = [
     "probe",
     "tolerance",
 ];
-/// Keys that open a block; all others have a value.
-const BLOCKS: [&str; 9] =
-    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux"];
 const TRUTH_KEYS: [&str; 3] = ["pressure", "velocity", "from"];
 const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
 const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
@@ -255,21 +59,6 @@ const OBSTACLE_KEYS: [&str; 5] = ["solid", "restitution", "friction", "walls", "
 const FREE_SLIP: (&str, Slip) = ("free_slip", Slip::Free);
 const NO_SLIP: (&str, Slip) = ("no_slip", Slip::No);
 const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
-
-/// The entries of a block whose keys are known, each at most once unless it may be repeated.
-pub(super) struct Block<'a> {
-    pub entries: &'a [Entry],
-    what: &'static str,
-    pub span: Span,
-}
-
-/// What a number may be.
-#[derive(Clone, Copy)]
-pub(super) enum Bound {
-    Positive,
-    NotNegative,
-    Fraction,
-}
 
 impl<'a> Lowering<'a> {
     pub fn scene(&mut self, scene: &'a ast::Scene) -> Option<Scene> {
@@ -339,57 +128,6 @@ impl<'a> Lowering<'a> {
         let message = format!("`tolerance` must be positive and finite, found {number}");
         self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
         None
-    }
-
-    fn errors(&self) -> usize {
-        self.diagnostics.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error).count()
-    }
-
-    pub(super) fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
-        if block.entries.iter().any(|entry| entry.key().text == key) {
-            return; // there, but of the wrong form, which was reported
-        }
-        let message = format!("{} needs `{key}`", block.what);
-        self.report(Diagnostic::error(Code::SCENE_MISSING, block.span, message).help(help));
-    }
-
-    /// Reports unknown keys, and known ones that stand twice.
-    pub(super) fn block<'b>(
-        &mut self,
-        entries: &'b [Entry],
-        what: &'static str,
-        span: Span,
-        known: &[&'static str],
-        repeatable: &[&str],
-    ) -> Block<'b> {
-        for (i, entry) in entries.iter().enumerate() {
-            let key = entry.key();
-            if !known.contains(&key.text.as_str()) {
-                let message = format!("{what} has no key `{}`", key.text);
-                let diagnostic = Diagnostic::error(Code::SCENE_KEY, key.span, message)
-                    .help(format!("its keys are {}", known.join(", ")))
-                    .suggest(&key.text, known.iter().copied());
-                self.report(diagnostic);
-            } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
-                let (is, form) = match entry {
-                    Entry::Block { .. } => ("has a value", format!("{}: …", key.text)),
-                    Entry::Setting { .. } => ("is a block", format!("{} {{ … }}", key.text)),
-                };
-                let message = format!("`{}` {is}", key.text);
-                self.report(
-                    Diagnostic::error(Code::SCENE_KEY, key.span, message).help(format!("write `{form}`")),
-                );
-            } else if let Some(first) = entries[..i].iter().find(|e| e.key().text == key.text)
-                && !repeatable.contains(&key.text.as_str())
-            {
-                let message = format!("`{}` stands twice", key.text);
-                self.report(
-                    Diagnostic::error(Code::SCENE_REPEATED, key.span, message)
-                        .label(first.key().span, "first stated here"),
-                );
-            }
-        }
-        Block { entries, what, span }
     }
 
     fn units(&mut self, block: &Block<'_>) {
@@ -624,37 +362,6 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// The components of a vector, formulas or quantities.
-    fn components(&mut self, value: &Expr, dimension: Dimension, key: &str) -> Option<[Node; 3]> {
-        let mut nodes = Vec::new();
-        if let ExprKind::Vector(parts) = &value.kind
-            && parts.len() == 3
-        {
-            for part in parts {
-                let node = match &part.kind {
-                    ExprKind::Quantity { .. } => {
-                        let number = self.quantity_expr(part, dimension, key)?;
-                        self.module.graph.constant(number)
-                    }
-                    ExprKind::Negate(inner) if matches!(inner.kind, ExprKind::Quantity { .. }) => {
-                        let number = self.quantity_expr(part, dimension, key)?;
-                        self.module.graph.constant(number)
-                    }
-                    _ => {
-                        let value = self.expr(part);
-                        self.as_number(&value, part.span)?
-                    }
-                };
-                nodes.push(node);
-            }
-        } else {
-            let found = self.expr(value);
-            let numbers = self.constant_vector(&found, value.span, &format!("`{key}`"))?;
-            nodes.extend(numbers.map(|number| self.module.graph.constant(number)));
-        }
-        nodes.try_into().ok()
-    }
-
     fn obstacle(
         &mut self,
         entries: &'a [Entry],
@@ -676,25 +383,6 @@ impl<'a> Lowering<'a> {
         Some(Obstacle { name, shape, span: value.span, skin: skin? })
     }
 
-    /// One of a few words; the first is the default.
-    fn word_key<T: Copy>(&mut self, block: &Block<'_>, key: &str, words: &[(&str, T)]) -> Option<T> {
-        let Some((_, value)) = block.setting(key) else { return words.first().map(|(_, meaning)| *meaning) };
-        let found = match &value.kind {
-            ExprKind::Name(word) | ExprKind::Text(word) => word.as_str(),
-            _ => "",
-        };
-        let meaning = words.iter().find(|(word, _)| *word == found).map(|(_, meaning)| *meaning);
-        if meaning.is_none() {
-            let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-            let diagnostic =
-                Diagnostic::error(Code::SCENE_KEY, value.span, format!("unknown value of `{key}`"))
-                    .help(format!("this version knows {}", known.join(", ")))
-                    .suggest(found, known);
-            self.report(diagnostic);
-        }
-        meaning
-    }
-
     fn run(&mut self, block: &Block<'_>) -> Option<Run> {
         let defaults = Run { dt: None, until: 5.0, save_every: 0.05, checkpoint_every: None };
         let Some((_, entries, span)) = block.blocks("run").next() else { return Some(defaults) };
@@ -713,133 +401,5 @@ impl<'a> Lowering<'a> {
             Bound::Positive,
         );
         Some(Run { dt: dt?, until: until?, save_every: save?, checkpoint_every: checkpoint_every? })
-    }
-
-    /// The value of a key, checked; `None` was reported. A key without a default must be present.
-    pub(super) fn number_key(
-        &mut self,
-        block: &Block<'_>,
-        key: &str,
-        dimension: Dimension,
-        default: Option<f64>,
-        bound: Bound,
-    ) -> Option<f64> {
-        let Some((_, value)) = block.setting(key) else { return default };
-        let number = self.quantity_expr(value, dimension, key)?;
-        let (fits, expected) = match bound {
-            Bound::Positive => (number > 0.0, "must be positive"),
-            Bound::NotNegative => (number >= 0.0, "must not be negative"),
-            Bound::Fraction => ((0.0..=1.0).contains(&number), "must lie between 0 and 1"),
-        };
-        if fits && number.is_finite() {
-            return Some(number);
-        }
-        let message = format!("`{key}` {expected}, found {number}");
-        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
-        None
-    }
-
-    pub(super) fn vector_key(
-        &mut self,
-        block: &Block<'_>,
-        key: &str,
-        dimension: Dimension,
-        default: DVec3,
-    ) -> Option<DVec3> {
-        let Some((_, value)) = block.setting(key) else { return Some(default) };
-        let vector = if let ExprKind::Vector(parts) = &value.kind
-            && let [a, b, c] = &parts[..]
-        {
-            let parts = [a, b, c].map(|part| self.quantity_expr(part, dimension, key));
-            DVec3::new(parts[0]?, parts[1]?, parts[2]?)
-        } else {
-            let found = self.expr(value);
-            DVec3::from_array(self.constant_vector(&found, value.span, &format!("`{key}`"))?)
-        };
-        if vector.is_finite() {
-            return Some(vector);
-        }
-        let message = format!("`{key}` must be finite, found {vector}");
-        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
-        None
-    }
-
-    /// A whole number of at least `least`; the outer option is an error, the inner one an absent key.
-    fn count_key(&mut self, block: &Block<'_>, key: &str, least: u32) -> Option<Option<usize>> {
-        const MOST: f64 = 1e9;
-        let Some((_, value)) = block.setting(key) else { return Some(None) };
-        let number = self.quantity_expr(value, Dimension::NONE, key)?;
-        if number.fract() == 0.0 && number >= f64::from(least) && number <= MOST {
-            return Some(Some(number as usize));
-        }
-        let message = format!("`{key}` must be a whole number from {least} to {MOST}, found {number}");
-        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
-        None
-    }
-
-    /// A constant in SI units; a unit, where one is written, must fit.
-    pub(super) fn quantity_expr(&mut self, expr: &Expr, expected: Dimension, key: &str) -> Option<f64> {
-        match &expr.kind {
-            ExprKind::Quantity { value, unit } => {
-                let parsed = parse_unit(&unit.text)?; // the grammar admits known units only
-                if parsed.dimension != expected {
-                    let message = format!("`{}` is not a unit of `{key}`", unit.text);
-                    let help = if expected == Dimension::NONE {
-                        format!("`{key}` has no unit")
-                    } else {
-                        format!("write for example `1 {}`", example_unit(expected))
-                    };
-                    self.report(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
-                    return None;
-                }
-                Some(value * parsed.factor)
-            }
-            ExprKind::Negate(inner) => self.quantity_expr(inner, expected, key).map(|v| -v),
-            _ => {
-                let value = self.expr(expr);
-                if let Value::Text(_) | Value::Vector(_) = value {
-                    self.as_number(&value, expr.span);
-                    return None;
-                }
-                let node = self.as_number(&value, expr.span)?;
-                self.as_constant(node, expr.span, &format!("`{key}`"))
-            }
-        }
-    }
-}
-
-fn example_unit(dimension: Dimension) -> &'static str {
-    match dimension {
-        Dimension::LENGTH => "m",
-        Dimension::MASS => "kg",
-        Dimension::TIME => "s",
-        Dimension::SPEED => "m/s",
-        Dimension::ACCELERATION => "m/s^2",
-        Dimension::DENSITY => "kg/m^3",
-        Dimension::VISCOSITY => "Pa·s",
-        Dimension::TENSION => "N/m",
-        Dimension::ENERGY => "J",
-        _ => "deg",
-    }
-}
-
-impl<'a> Block<'a> {
-    pub(super) fn setting(&self, key: &str) -> Option<(&'a Name, &'a Expr)> {
-        self.entries.iter().find_map(|entry| match entry {
-            Entry::Setting { key: name, value } if name.text == key => Some((name, value)),
-            _ => None,
-        })
-    }
-
-    pub(super) fn blocks(
-        &self,
-        key: &'static str,
-    ) -> impl Iterator<Item = (Option<&'a Name>, &'a [Entry], Span)> + use<'a> {
-        self.entries.iter().filter_map(move |entry| match entry {
-            Entry::Block { key: name, label, entries, .. } if name.text == key => {
-                Some((label.as_ref(), &entries[..], name.span))
-            }
-            _ => None,
-        })
     }
 }

@@ -1,0 +1,270 @@
+//! Keys of blocks: known ones, each once, with the unit, the range or the word that it asks for.
+
+use glam::DVec3;
+
+use super::super::eval::Lowering;
+use super::super::value::Value;
+use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::ir::Node;
+use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
+use crate::syntax::{Dimension, parse_unit};
+
+/// Keys that open a block; all others have a value.
+const BLOCKS: [&str; 9] =
+    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux"];
+
+/// The entries of a block whose keys are known, each at most once unless it may be repeated.
+pub(in crate::lower) struct Block<'a> {
+    pub entries: &'a [Entry],
+    what: &'static str,
+    pub span: Span,
+}
+
+/// What a number may be.
+#[derive(Clone, Copy)]
+pub(in crate::lower) enum Bound {
+    Positive,
+    NotNegative,
+    Fraction,
+}
+
+impl<'a> Lowering<'a> {
+    pub(super) fn errors(&self) -> usize {
+        self.diagnostics.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error).count()
+    }
+
+    pub(in crate::lower) fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
+        if block.entries.iter().any(|entry| entry.key().text == key) {
+            return; // there, but of the wrong form, which was reported
+        }
+        let message = format!("{} needs `{key}`", block.what);
+        self.report(Diagnostic::error(Code::SCENE_MISSING, block.span, message).help(help));
+    }
+
+    /// Reports unknown keys, and known ones that stand twice.
+    pub(in crate::lower) fn block<'b>(
+        &mut self,
+        entries: &'b [Entry],
+        what: &'static str,
+        span: Span,
+        known: &[&'static str],
+        repeatable: &[&str],
+    ) -> Block<'b> {
+        for (i, entry) in entries.iter().enumerate() {
+            let key = entry.key();
+            if !known.contains(&key.text.as_str()) {
+                let message = format!("{what} has no key `{}`", key.text);
+                let diagnostic = Diagnostic::error(Code::SCENE_KEY, key.span, message)
+                    .help(format!("its keys are {}", known.join(", ")))
+                    .suggest(&key.text, known.iter().copied());
+                self.report(diagnostic);
+            } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
+                let (is, form) = match entry {
+                    Entry::Block { .. } => ("has a value", format!("{}: …", key.text)),
+                    Entry::Setting { .. } => ("is a block", format!("{} {{ … }}", key.text)),
+                };
+                let message = format!("`{}` {is}", key.text);
+                self.report(
+                    Diagnostic::error(Code::SCENE_KEY, key.span, message).help(format!("write `{form}`")),
+                );
+            } else if let Some(first) = entries[..i].iter().find(|e| e.key().text == key.text)
+                && !repeatable.contains(&key.text.as_str())
+            {
+                let message = format!("`{}` stands twice", key.text);
+                self.report(
+                    Diagnostic::error(Code::SCENE_REPEATED, key.span, message)
+                        .label(first.key().span, "first stated here"),
+                );
+            }
+        }
+        Block { entries, what, span }
+    }
+
+    /// The components of a vector, formulas or quantities.
+    pub(super) fn components(&mut self, value: &Expr, dimension: Dimension, key: &str) -> Option<[Node; 3]> {
+        let mut nodes = Vec::new();
+        if let ExprKind::Vector(parts) = &value.kind
+            && parts.len() == 3
+        {
+            for part in parts {
+                let node = match &part.kind {
+                    ExprKind::Quantity { .. } => {
+                        let number = self.quantity_expr(part, dimension, key)?;
+                        self.module.graph.constant(number)
+                    }
+                    ExprKind::Negate(inner) if matches!(inner.kind, ExprKind::Quantity { .. }) => {
+                        let number = self.quantity_expr(part, dimension, key)?;
+                        self.module.graph.constant(number)
+                    }
+                    _ => {
+                        let value = self.expr(part);
+                        self.as_number(&value, part.span)?
+                    }
+                };
+                nodes.push(node);
+            }
+        } else {
+            let found = self.expr(value);
+            let numbers = self.constant_vector(&found, value.span, &format!("`{key}`"))?;
+            nodes.extend(numbers.map(|number| self.module.graph.constant(number)));
+        }
+        nodes.try_into().ok()
+    }
+
+    /// One of a few words; the first is the default.
+    pub(super) fn word_key<T: Copy>(
+        &mut self,
+        block: &Block<'_>,
+        key: &str,
+        words: &[(&str, T)],
+    ) -> Option<T> {
+        let Some((_, value)) = block.setting(key) else { return words.first().map(|(_, meaning)| *meaning) };
+        let found = match &value.kind {
+            ExprKind::Name(word) | ExprKind::Text(word) => word.as_str(),
+            _ => "",
+        };
+        let meaning = words.iter().find(|(word, _)| *word == found).map(|(_, meaning)| *meaning);
+        if meaning.is_none() {
+            let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+            let diagnostic =
+                Diagnostic::error(Code::SCENE_KEY, value.span, format!("unknown value of `{key}`"))
+                    .help(format!("this version knows {}", known.join(", ")))
+                    .suggest(found, known);
+            self.report(diagnostic);
+        }
+        meaning
+    }
+
+    /// The value of a key, checked; `None` was reported. A key without a default must be present.
+    pub(in crate::lower) fn number_key(
+        &mut self,
+        block: &Block<'_>,
+        key: &str,
+        dimension: Dimension,
+        default: Option<f64>,
+        bound: Bound,
+    ) -> Option<f64> {
+        let Some((_, value)) = block.setting(key) else { return default };
+        let number = self.quantity_expr(value, dimension, key)?;
+        let (fits, expected) = match bound {
+            Bound::Positive => (number > 0.0, "must be positive"),
+            Bound::NotNegative => (number >= 0.0, "must not be negative"),
+            Bound::Fraction => ((0.0..=1.0).contains(&number), "must lie between 0 and 1"),
+        };
+        if fits && number.is_finite() {
+            return Some(number);
+        }
+        let message = format!("`{key}` {expected}, found {number}");
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
+        None
+    }
+
+    pub(in crate::lower) fn vector_key(
+        &mut self,
+        block: &Block<'_>,
+        key: &str,
+        dimension: Dimension,
+        default: DVec3,
+    ) -> Option<DVec3> {
+        let Some((_, value)) = block.setting(key) else { return Some(default) };
+        let vector = if let ExprKind::Vector(parts) = &value.kind
+            && let [a, b, c] = &parts[..]
+        {
+            let parts = [a, b, c].map(|part| self.quantity_expr(part, dimension, key));
+            DVec3::new(parts[0]?, parts[1]?, parts[2]?)
+        } else {
+            let found = self.expr(value);
+            DVec3::from_array(self.constant_vector(&found, value.span, &format!("`{key}`"))?)
+        };
+        if vector.is_finite() {
+            return Some(vector);
+        }
+        let message = format!("`{key}` must be finite, found {vector}");
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
+        None
+    }
+
+    /// A whole number of at least `least`; the outer option is an error, the inner one an absent key.
+    pub(super) fn count_key(&mut self, block: &Block<'_>, key: &str, least: u32) -> Option<Option<usize>> {
+        const MOST: f64 = 1e9;
+        let Some((_, value)) = block.setting(key) else { return Some(None) };
+        let number = self.quantity_expr(value, Dimension::NONE, key)?;
+        if number.fract() == 0.0 && number >= f64::from(least) && number <= MOST {
+            return Some(Some(number as usize));
+        }
+        let message = format!("`{key}` must be a whole number from {least} to {MOST}, found {number}");
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
+        None
+    }
+
+    /// A constant in SI units; a unit, where one is written, must fit.
+    pub(in crate::lower) fn quantity_expr(
+        &mut self,
+        expr: &Expr,
+        expected: Dimension,
+        key: &str,
+    ) -> Option<f64> {
+        match &expr.kind {
+            ExprKind::Quantity { value, unit } => {
+                let parsed = parse_unit(&unit.text)?; // the grammar admits known units only
+                if parsed.dimension != expected {
+                    let message = format!("`{}` is not a unit of `{key}`", unit.text);
+                    let help = if expected == Dimension::NONE {
+                        format!("`{key}` has no unit")
+                    } else {
+                        format!("write for example `1 {}`", example_unit(expected))
+                    };
+                    self.report(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
+                    return None;
+                }
+                Some(value * parsed.factor)
+            }
+            ExprKind::Negate(inner) => self.quantity_expr(inner, expected, key).map(|v| -v),
+            _ => {
+                let value = self.expr(expr);
+                if let Value::Text(_) | Value::Vector(_) = value {
+                    self.as_number(&value, expr.span);
+                    return None;
+                }
+                let node = self.as_number(&value, expr.span)?;
+                self.as_constant(node, expr.span, &format!("`{key}`"))
+            }
+        }
+    }
+}
+
+fn example_unit(dimension: Dimension) -> &'static str {
+    match dimension {
+        Dimension::LENGTH => "m",
+        Dimension::MASS => "kg",
+        Dimension::TIME => "s",
+        Dimension::SPEED => "m/s",
+        Dimension::ACCELERATION => "m/s^2",
+        Dimension::DENSITY => "kg/m^3",
+        Dimension::VISCOSITY => "Pa·s",
+        Dimension::TENSION => "N/m",
+        Dimension::ENERGY => "J",
+        _ => "deg",
+    }
+}
+
+impl<'a> Block<'a> {
+    pub(in crate::lower) fn setting(&self, key: &str) -> Option<(&'a Name, &'a Expr)> {
+        self.entries.iter().find_map(|entry| match entry {
+            Entry::Setting { key: name, value } if name.text == key => Some((name, value)),
+            _ => None,
+        })
+    }
+
+    pub(in crate::lower) fn blocks(
+        &self,
+        key: &'static str,
+    ) -> impl Iterator<Item = (Option<&'a Name>, &'a [Entry], Span)> + use<'a> {
+        self.entries.iter().filter_map(move |entry| match entry {
+            Entry::Block { key: name, label, entries, .. } if name.text == key => {
+                Some((label.as_ref(), &entries[..], name.span))
+            }
+            _ => None,
+        })
+    }
+}
