@@ -5,7 +5,8 @@
 //! No list of neighbours exists, hence none is built, kept or read; a step needs no memory beyond the particles.
 //!
 //! ```text
-//! Columns::sort ─▶ blocks ─▶ gather what is around a block ─▶ registers of particles ─▶ PairPass::add ─▶ PairPass::finish
+//! Columns::sort ─▶ blocks ─▶ gather what is around a block ─▶ registers of particles ─▶ what is near each
+//!                                                             ─▶ PairPass::add ─▶ PairPass::finish
 //! ```
 //!
 //! Positions are taken relative to the block before they are rounded to the precision of the pair arithmetic, so that
@@ -19,7 +20,7 @@ mod columns;
 
 use std::cell::RefCell;
 
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdFloatElement};
+use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdFloatElement, SimdMask};
 use smallvec::SmallVec;
 
 use super::particles::Vectors;
@@ -112,6 +113,68 @@ pub(super) struct Surroundings<T> {
     values: Vec<Vec<T>>,
     /// First particle and first copy of each range.
     ranges: SmallVec<[(usize, usize); 9]>,
+    /// How many copies there are; the vectors may be longer.
+    count: usize,
+    /// The copies that are near a register's particles.
+    near: Vec<u32>,
+}
+
+/// The places within the radius of the box around a register's particles: of the copies, whose ranges are boxes too, about a
+/// third lies beyond them.
+struct Reach<V> {
+    centre: [V; 3],
+    half: [V; 3],
+    /// The radius squared, and a little more than rounding can make of it.
+    squared: V,
+}
+
+impl<V> Reach<V> {
+    /// Of the first `lanes` particles.
+    #[inline(always)]
+    fn around<T: Real, S: Simd>(simd: S, here: &[V; 3], lanes: usize, radius: f64) -> Self
+    where
+        V: SimdFloat<S, Element = T>,
+    {
+        let mut centre = [V::splat(simd, T::default()); 3];
+        let mut half = centre;
+        for k in 0..3 {
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for &x in &here[k].as_slice()[..lanes] {
+                (low, high) = (low.min(x.wide()), high.max(x.wide()));
+            }
+            centre[k] = V::splat(simd, T::of(0.5 * (low + high)));
+            half[k] = V::splat(simd, T::of(0.5 * (high - low)));
+        }
+        Self { centre, half, squared: V::splat(simd, T::of(radius * radius * 1.0001)) }
+    }
+
+    /// Appends those from `start` to `end` that are within it.
+    #[inline(always)]
+    fn collect<T: Real, S: Simd>(&self, places: [&[T]; 3], (start, end): (usize, usize), near: &mut Vec<u32>)
+    where
+        V: SimdFloat<S, Element = T>,
+    {
+        let simd = self.squared.token();
+        let zero = V::splat(simd, T::default());
+        let mut at = start;
+        while at < end {
+            let mut squared = zero;
+            for k in 0..3 {
+                let place = V::from_slice(simd, &places[k][at..at + V::LEN]);
+                let beyond = ((place - self.centre[k]).abs() - self.half[k]).max(zero);
+                squared = beyond.mul_add(beyond, squared);
+            }
+            let mut within = squared.simd_lt(self.squared).to_bitmask();
+            if end - at < V::LEN {
+                within &= (1 << (end - at)) - 1;
+            }
+            while within != 0 {
+                near.push(at as u32 + within.trailing_zeros());
+                within &= within - 1;
+            }
+            at += V::LEN;
+        }
+    }
 }
 
 impl Cloud<'_> {
@@ -203,28 +266,34 @@ impl Cloud<'_> {
             }
             let mut sums = [zero; SUMS];
             let near = self.columns.ranges_around(block, extent(&self.position.z[first..last]), self.radius);
+            let reach = Reach::around(simd, &here, last - first, self.radius);
+            around.near.clear();
             for (&(start, end), &(source, copy)) in near.iter().zip(&around.ranges) {
                 let (start, end) = (start as usize - source + copy, end as usize - source + copy);
-                let x = &around.values[0][start..end];
-                let y = &around.values[1][start..end][..x.len()];
-                let z = &around.values[2][start..end][..x.len()];
-                let mut values: [&[T]; IN] = [&[]; IN];
+                let [x, y, z, ..] = &around.values[..] else { unreachable!("places come first") };
+                reach.collect([x, y, z], (start, end), &mut around.near);
+            }
+            let count = around.count;
+            let x = &around.values[0][..count];
+            let y = &around.values[1][..count];
+            let z = &around.values[2][..count];
+            let mut values: [&[T]; IN] = [&[]; IN];
+            for k in 0..IN {
+                values[k] = &around.values[3 + k][..count];
+            }
+            for &j in &around.near {
+                let j = j as usize;
+                let d = [
+                    here[0] - T::Native::<S>::splat(simd, x[j]),
+                    here[1] - T::Native::<S>::splat(simd, y[j]),
+                    here[2] - T::Native::<S>::splat(simd, z[j]),
+                ];
+                let r2 = d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]));
+                let mut other = [zero; IN];
                 for k in 0..IN {
-                    values[k] = &around.values[3 + k][start..end][..x.len()];
+                    other[k] = T::Native::<S>::splat(simd, values[k][j]);
                 }
-                for j in 0..x.len() {
-                    let d = [
-                        here[0] - T::Native::<S>::splat(simd, x[j]),
-                        here[1] - T::Native::<S>::splat(simd, y[j]),
-                        here[2] - T::Native::<S>::splat(simd, z[j]),
-                    ];
-                    let r2 = d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]));
-                    let mut other = [zero; IN];
-                    for k in 0..IN {
-                        other[k] = T::Native::<S>::splat(simd, values[k][j]);
-                    }
-                    pass.add(d, r2, &own, other, &mut sums);
-                }
+                pass.add(d, r2, &own, other, &mut sums);
             }
             for lane in 0..last - first {
                 let mut of_lane = [0.0; SUMS];
@@ -264,6 +333,7 @@ impl Cloud<'_> {
             around.ranges.push((start, count));
             count += end - start;
         }
+        around.count = count;
         // the last register of the block may reach beyond what was copied
         let room = count + lanes;
         for values in &mut around.values[..3 + IN] {
