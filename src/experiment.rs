@@ -21,8 +21,8 @@ use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Fill, Fluid, Gravity, Method, Precision, Scene, Skin, Slip};
 use crate::solid::{Bounds, MovingMap};
 use crate::sph::{
-    self, Checkpoint, FluidBlock, FluidShape, NegativePressure, Obstacle, Parameters, Particles, SeedError,
-    SetupError, Simulation, VectorField, carve, make_room,
+    self, Checkpoint, FluidBlock, FluidShape, Gradients, NegativePressure, Obstacle, Parameters, Particles,
+    SeedError, SetupError, Simulation, VectorField, carve, make_room,
 };
 use crate::{Engine, Program, Solid};
 
@@ -374,6 +374,7 @@ fn method(scene: &Scene, typical_speed: f64) -> sph::Method {
             sound_speed: scene.fluid.sound_speed.unwrap_or(10.0 * typical_speed),
             density_diffusion: scene.fluid.density_diffusion,
             artificial_viscosity: scene.fluid.artificial_viscosity,
+            gradients: if scene.fluid.differences { Gradients::Differences } else { Gradients::Pairs },
             shifting: scene.fluid.shifting,
         }),
         Method::Dfsph => sph::Method::Dfsph(sph::Dfsph {

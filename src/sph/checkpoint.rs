@@ -247,7 +247,9 @@ impl<'a> Reader<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sph::{Dfsph, Method, Parameters, Precision, SetupError, Simulation, Slip, Wcsph, scenes};
+    use crate::sph::{
+        Dfsph, Gradients, Method, Parameters, Precision, SetupError, Simulation, Slip, Wcsph, scenes,
+    };
 
     fn methods() -> [Parameters; 3] {
         let water = Parameters {
@@ -259,8 +261,13 @@ mod tests {
             precision: Precision::Single,
             ..Parameters::default()
         };
-        let wcsph =
-            Wcsph { sound_speed: 30.0, density_diffusion: 0.1, artificial_viscosity: 0.02, shifting: 1.0 };
+        let wcsph = Wcsph {
+            sound_speed: 30.0,
+            density_diffusion: 0.1,
+            artificial_viscosity: 0.02,
+            gradients: Gradients::Pairs,
+            shifting: 0.0,
+        };
         [
             Parameters::default(),
             Parameters { method: Method::Wcsph(wcsph), ..water.clone() },

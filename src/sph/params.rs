@@ -45,6 +45,18 @@ impl Method {
     }
 }
 
+/// Of which pressures the acceleration of a particle is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Gradients {
+    /// Sums p_i + p_j: what one particle gains another loses, momentum is conserved to rounding.
+    #[default]
+    Pairs,
+    /// Differences p_j − p_i in the fluid's depth: exact where pressure is linear in space, and ten times as accurate in
+    /// fluids at rest, in viscous ones and in those without a free surface. Needs shifting, and, at a free surface, an
+    /// artificial viscosity of some 0.05: without it, waves gain energy.
+    Differences,
+}
+
 /// Numbers of the weakly compressible method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wcsph {
@@ -54,8 +66,8 @@ pub struct Wcsph {
     pub density_diffusion: f64,
     /// α of the artificial viscosity (Monaghan 1992), 0.02; zero: the term is not computed.
     pub artificial_viscosity: f64,
-    /// How strongly particles drift to where there are fewer of them, which keeps them even, 1; zero: they do not, and
-    /// pressure acts in pairs that conserve momentum but not the order of the particles.
+    pub gradients: Gradients,
+    /// How strongly particles drift to where there are fewer of them, which keeps them even, 1; zero: they do not.
     pub shifting: f64,
 }
 

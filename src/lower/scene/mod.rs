@@ -159,6 +159,8 @@ pub struct Fluid {
     pub density_diffusion: f64,
     /// α of the artificial viscosity of `wcsph`.
     pub artificial_viscosity: f64,
+    /// Whether pressures act by their differences.
+    pub differences: bool,
     /// Strength of the particle shifting.
     pub shifting: f64,
     /// Whether pressure may pull.

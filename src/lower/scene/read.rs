@@ -33,7 +33,7 @@ const SCENE_KEYS: [&str; 13] = [
 const TRUTH_KEYS: [&str; 3] = ["pressure", "velocity", "from"];
 const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
 const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
-const FLUID_KEYS: [&str; 20] = [
+const FLUID_KEYS: [&str; 21] = [
     "shape",
     "fill",
     "particles",
@@ -48,6 +48,7 @@ const FLUID_KEYS: [&str; 20] = [
     "sound_speed",
     "density_diffusion",
     "artificial_viscosity",
+    "gradients",
     "shifting",
     "negative_pressure",
     "start",
@@ -260,7 +261,6 @@ impl<'a> Lowering<'a> {
         let sound_speed = number("sound_speed", Dimension::SPEED, 1.0, Positive);
         let density_diffusion = number("density_diffusion", Dimension::NONE, 0.1, NotNegative);
         let artificial_viscosity = number("artificial_viscosity", Dimension::NONE, 0.02, NotNegative);
-        let shifting = number("shifting", Dimension::NONE, 1.0, NotNegative);
         let (mass, density) = (mass?, density?);
         // a spacing says as much as a mass
         let mass = if block.setting("spacing").is_some() { density * spacing?.powi(3) } else { mass };
@@ -282,6 +282,11 @@ impl<'a> Lowering<'a> {
                     .label(first.span, "the mass is stated here"),
             );
         }
+        let differences = self.word_key(&block, "gradients", &[("pairs", false), ("differences", true)]);
+        let even = method == Method::Dfsph || differences == Some(true);
+        let own_shifting = if even { 1.0 } else { 0.0 };
+        let shifting =
+            self.number_key(&block, "shifting", Dimension::NONE, Some(own_shifting), Bound::NotNegative);
         let negative_pressure =
             self.word_key(&block, "negative_pressure", &[("clamp", false), ("keep", true)]);
         let hydrostatic = self.word_key(&block, "start", &[("free", false), ("hydrostatic", true)]);
@@ -308,6 +313,7 @@ impl<'a> Lowering<'a> {
             sound_speed,
             density_diffusion: density_diffusion?,
             artificial_viscosity: artificial_viscosity?,
+            differences: differences?,
             shifting: shifting?,
             negative_pressure: negative_pressure?,
             hydrostatic: hydrostatic?,

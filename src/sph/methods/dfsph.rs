@@ -393,19 +393,6 @@ fn stiffness(ratio: f64) -> f64 {
     1.775 * (0.5 * ratio).powi(3)
 }
 
-/// Σ W·V over a cubic lattice with so many spacings per support radius: a little more than ∫ W = 1, because a particle
-/// is always its own neighbour; body- and face-centred lattices have the same to 2e-3.
-fn lattice_sum(ratio: f64) -> f64 {
-    let reach = ratio.ceil() as i32;
-    let weight = |x: i32, y: i32, z: i32| {
-        let q = f64::from(x * x + y * y + z * z).sqrt() / ratio;
-        (1.0 - q).max(0.0).powi(4) * (1.0 + 4.0 * q)
-    };
-    let cube = || -reach..=reach;
-    let sum: f64 = cube().flat_map(|x| cube().flat_map(move |y| cube().map(move |z| weight(x, y, z)))).sum();
-    sum * Wendland::new(ratio).weight
-}
-
 #[derive(Clone, Copy)]
 struct Constants {
     kernel: Wendland,
@@ -425,7 +412,7 @@ impl Constants {
         Self {
             kernel,
             rest_density: parameters.rest_density,
-            mass_weight: m * kernel.weight / lattice_sum(h / parameters.spacing()),
+            mass_weight: m * kernel.weight / Wendland::lattice_sum(h / parameters.spacing()),
             mass_steepness: m * kernel.steepness,
             full_factor: parameters.rest_density
                 * m

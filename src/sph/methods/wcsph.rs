@@ -10,11 +10,11 @@
 //! hydrostatic part ρᴴ taken off (Fourtakas et al. 2019), so that it does not lift a fluid at rest. Viscosity: laminar
 //! (Morris et al. 1997) or artificial (Monaghan 1992).
 //!
-//! Gradients are of differences and divided by what the sum makes of the gradient of a position, G = −⅓ Σ V r·∇W + ⅓ tr K
+//! Those are gradients by differences, divided by what the sum makes of the gradient of a position, G = −⅓ Σ V r·∇W + ⅓ tr K
 //! (0.98 on a lattice at h = 2.6 spacings): a pressure that is linear in space has its exact gradient, however far above
 //! zero it lies. Such forces do not push particles apart; shifting keeps them even instead ([`super::shifting`]). At a free
-//! surface and in spray, where G is small, and everywhere without shifting, pressures act in equal pairs p_i + p_j, which
-//! conserve momentum to rounding.
+//! surface and in spray, where G is small, and everywhere if the scene says so ([`Gradients`]), pressures act in equal pairs
+//! p_i + p_j, which conserve momentum to rounding, and G is taken as one.
 //!
 //! Walls enter by λ, ∇λ and K in closed form ([`Coverage`]). The pressure beyond a wall is that of the particle,
 //! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a); since a is what is asked for, that is a linear
@@ -28,7 +28,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    shifting::{depth, restore_crowding, save_crowding, shift},
+    shifting::{depth, restore_crowding, return_rate, save_crowding, shift},
     tension::Tension,
 };
 use crate::sph::{
@@ -36,7 +36,7 @@ use crate::sph::{
     core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
     kernel::Wendland,
     pairs::{PairPass, Real},
-    params::{Method, NegativePressure, Parameters, Wcsph},
+    params::{Gradients, Method, NegativePressure, Parameters, Wcsph},
     particles::Vectors,
     simulation::StepError,
     walls::{Boundary, LEAST_FREE, WallKernel},
@@ -156,11 +156,15 @@ impl Weakly {
         let Vectors { x: cx, y: cy, z: cz } = &mut self.crowding;
         let out = [&mut x[..], y, z, &mut self.density_rate, cx, cy, cz];
         let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess);
-        match (rates.laminar > 0.0, rates.artificial > 0.0) {
-            (true, true) => core.sum(&Pairs::<true, true>(rates), fields, out),
-            (true, false) => core.sum(&Pairs::<true, false>(rates), fields, out),
-            (false, true) => core.sum(&Pairs::<false, true>(rates), fields, out),
-            (false, false) => core.sum(&Pairs::<false, false>(rates), fields, out),
+        match (rates.laminar > 0.0, rates.artificial > 0.0, rates.even) {
+            (true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
+            (true, true, false) => core.sum(&Pairs::<true, true, false>(rates), fields, out),
+            (true, false, true) => core.sum(&Pairs::<true, false, true>(rates), fields, out),
+            (true, false, false) => core.sum(&Pairs::<true, false, false>(rates), fields, out),
+            (false, true, true) => core.sum(&Pairs::<false, true, true>(rates), fields, out),
+            (false, true, false) => core.sum(&Pairs::<false, true, false>(rates), fields, out),
+            (false, false, true) => core.sum(&Pairs::<false, false, true>(rates), fields, out),
+            (false, false, false) => core.sum(&Pairs::<false, false, false>(rates), fields, out),
         }
         core.acceleration = acceleration;
         core.particles.pressure = pressure;
@@ -201,8 +205,14 @@ struct Rates<'a> {
     laminar: f64,
     /// α·h/2·c·ρ₀
     artificial: f64,
-    /// Whether shifting keeps the particles even.
-    shifting: bool,
+    /// Whether pressures act by their differences.
+    differences: bool,
+    /// Of the density to what the places say, 1/s.
+    return_rate: f64,
+    /// Σ V W on a lattice
+    lattice: f64,
+    /// Whether particles are kept even: for differences, and for shifting itself.
+    even: bool,
 }
 
 impl<'a> Rates<'a> {
@@ -232,16 +242,21 @@ impl<'a> Rates<'a> {
                 * smoothing
                 * numbers.sound_speed
                 * parameters.rest_density,
-            shifting: numbers.shifting > 0.0,
+            differences: numbers.gradients == Gradients::Differences,
+            return_rate: return_rate(numbers.shifting, core),
+            lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
+            even: numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences,
         }
     }
 }
 
-/// One pass, with laminar viscosity or without it, with the artificial one or without it. With f = (1 − q)³ and d from the
-/// neighbour it sums f·(p_j − p_i + Π)·d, f·d, f·d², f·(v_i − v_j)·d, f·(ρ_j − ρ_i) and f·(v_j − v_i).
-struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(Rates<'a>);
+/// One pass, with laminar and artificial viscosity or without, and for particles that are kept even or not. With f = (1 − q)³
+/// and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·d, f·(v_i − v_j)·d, f·(ρ_j − ρ_i), f·d², W and f·(v_j − v_i).
+struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<5, 12, 7> for Pairs<'_, LAMINAR, ARTIFICIAL> {
+impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 13, 7>
+    for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
+{
     /// The artificial viscosity is a pressure between particles that approach and a tension between those that part: with the
     /// pressure alone, noise at rest would hold up a part of the fluid's weight (3 % of it with α = 0.1).
     #[inline(always)]
@@ -251,7 +266,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<5, 12, 7> for Pairs<'
         r2: V,
         own: &[V; 5],
         other: [V; 5],
-        sums: &mut [V; 12],
+        sums: &mut [V; 13],
     ) {
         let of = V::Element::of;
         let rates = &self.0;
@@ -271,18 +286,22 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<5, 12, 7> for Pairs<'
             sums[k] = push.mul_add(d[k], sums[k]);
             sums[3 + k] = f.mul_add(d[k], sums[3 + k]);
         }
-        sums[6] = f.mul_add(r2, sums[6]);
-        sums[7] = f.mul_add(departing, sums[7]);
-        sums[8] = f.mul_add(other[4] - own[4], sums[8]);
+        sums[6] = f.mul_add(departing, sums[6]);
+        sums[7] = f.mul_add(other[4] - own[4], sums[7]);
+        if EVEN {
+            sums[8] = f.mul_add(r2, sums[8]);
+            // 1 + 4q = 5 − 4s
+            sums[9] = (f * s).mul_add(s.mul_add(of(-4.0), of(5.0)), sums[9]);
+        }
         if LAMINAR {
             for k in 0..3 {
-                sums[9 + k] = f.mul_add(other[k] - own[k], sums[9 + k]);
+                sums[10 + k] = f.mul_add(other[k] - own[k], sums[10 + k]);
             }
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; 12]) -> [f64; 7] {
-        let [px, py, pz, cx, cy, cz, squares, departing, denser, ux, uy, uz] = sums;
+    fn finish(&self, i: usize, sums: [f64; 13]) -> [f64; 7] {
+        let [px, py, pz, cx, cy, cz, departing, denser, squares, weights, ux, uy, uz] = sums;
         let rates = &self.0;
         let Rates { parameters, steepness, laminar, .. } = *rates;
         let mut crowding = -steepness * DVec3::new(cx, cy, cz);
@@ -300,24 +319,24 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<5, 12, 7> for Pairs<'
             drag /= (1.0 - wall.slippery).max(LEAST_FREE);
             drag -= 2.0 * laminar * (wall.drag * velocity - wall.haul);
         }
-        let depth = if rates.shifting { depth(spread) } else { 0.0 };
-        let mean = if depth > 0.0 { 1.0 + depth * (1.0 / spread - 1.0) } else { 1.0 };
-        let density = parameters.rest_density + depth * rates.excess[i];
+        let depth = if EVEN { depth(spread) } else { 0.0 };
+        let smooth = if rates.differences { depth } else { 0.0 };
+        let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
+        let density = parameters.rest_density + smooth * rates.excess[i];
         // where particles are not kept even, their own pressure pushes them apart
-        push -= (1.0 - depth) * 2.0 * rates.pressure[i] * crowding;
+        push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
         if let Some(wall) = &wall {
             push = wall.completion() * push;
         }
         let acceleration = mean * (push / density + drag) + parameters.gravity;
         let crowding = depth * crowding;
-        [
-            acceleration.x,
-            acceleration.y,
-            acceleration.z,
-            mean * density * compression + denser,
-            crowding.x,
-            crowding.y,
-            crowding.z,
-        ]
+        let mut rate = mean * density * compression + denser;
+        if EVEN {
+            let volume = parameters.particle_mass / parameters.rest_density;
+            let filled =
+                volume * rates.kernel.weight / rates.lattice * weights + wall.map_or(0.0, |wall| wall.part);
+            rate += depth * rates.return_rate * (parameters.rest_density * (filled - 1.0) - rates.excess[i]);
+        }
+        [acceleration.x, acceleration.y, acceleration.z, rate, crowding.x, crowding.y, crowding.z]
     }
 }

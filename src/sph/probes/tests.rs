@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::*;
 use crate::field::Field;
 use crate::sph::methods::Scheme;
-use crate::sph::{Dfsph, Obstacle, Particles, Simulation, Wcsph, scenes, walls::Boundary};
+use crate::sph::{Dfsph, Gradients, Obstacle, Particles, Simulation, Wcsph, scenes, walls::Boundary};
 
 const G: f64 = 9.81;
 const RHO: f64 = 1000.0;
@@ -33,7 +33,8 @@ fn weakly() -> Method {
         sound_speed: 30.0,
         density_diffusion: 0.1,
         artificial_viscosity: 0.0,
-        shifting: 1.0,
+        gradients: Gradients::Pairs,
+        shifting: 0.0,
     })
 }
 
@@ -164,7 +165,8 @@ fn energies_of_a_fall() {
         sound_speed: 30.0,
         density_diffusion: 0.0,
         artificial_viscosity: 0.0,
-        shifting: 1.0,
+        gradients: Gradients::Pairs,
+        shifting: 0.0,
     });
     let parameters = Parameters { precision: crate::sph::Precision::Double, ..water(method) };
     let mut simulation = Simulation::new(parameters, block, domain, Vec::new()).unwrap();
