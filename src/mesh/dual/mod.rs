@@ -15,6 +15,7 @@
 
 mod crease;
 mod loops;
+mod mend;
 mod place;
 mod project;
 mod qef;
@@ -98,13 +99,16 @@ pub fn dual_contouring(
         spoilt.dedup();
         spoilt.retain(|&v| {
             let Ok(at) = fallbacks.binary_search_by_key(&v, |&(v, _)| v) else { return false };
-            let (place, fallback) = (&mut vertices.positions[v as usize], &mut fallbacks[at].1);
-            if *place == *fallback {
+            let fallback = &mut fallbacks[at].1;
+            if vertices.positions[v as usize] == *fallback {
                 return false;
             }
             let settled = project::newton(field, *fallback, size, &mut work.gradients);
-            *fallback = settled.map_or(*fallback, |face| face.point);
-            *place = *fallback;
+            let (position, normal) =
+                settled.map_or((*fallback, DVec3::ZERO), |face| (face.point, face.normal));
+            *fallback = position;
+            vertices.positions[v as usize] = position;
+            vertices.normals[v as usize] = normal;
             true
         });
         if spoilt.is_empty() {
@@ -115,7 +119,9 @@ pub fn dual_contouring(
     work.gradients += cut.gradients + placed.iter().map(|part| part.gradients).sum::<u64>();
     let mut triangles = quads.triangles(cut, &mut vertices);
     triangles.extend(placed.iter().flat_map(|part| &part.tubes));
-    work.gradients += refine::refine(field, &mut vertices, &mut triangles, size);
+    let (left, evaluations) = refine::refine(field, &mut vertices, &mut triangles, size);
+    work.gradients += evaluations;
+    work.gradients += mend::mend(field, &mut vertices, &mut triangles, left, (size, refine::TOLERANCE * size));
     if vertices.len() > Mesh::MAX_VERTICES {
         return Err(MeshError::TooManyVertices { found: vertices.len() });
     }

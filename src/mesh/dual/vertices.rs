@@ -55,6 +55,13 @@ impl Vertices {
         self.normals.push(vertex.normal);
         self.kinds.push(vertex.kind);
     }
+
+    /// Drops the last.
+    pub fn pop(&mut self) {
+        self.positions.pop();
+        self.normals.pop();
+        self.kinds.pop();
+    }
 }
 
 /// Where the surface crosses an edge.

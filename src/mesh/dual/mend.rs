@@ -1,0 +1,246 @@
+//! Mends the places where edges stay far from the surface although nothing near their middles could cut them: collars
+//! and gaps thinner than a cell, which the grid has seen in part.
+//!
+//! One edge after the other is cut at one of several points of the surface, or turned, whichever brings the triangles
+//! beside it nearest to the surface without turning them over. A new edge that is far off again waits in the same queue.
+//!
+//! Invariant: edges are treated in the order of their numbers and an edge is turned only if its new ends were not joined
+//! yet, so the mesh stays closed and manifold and is the same on any number of threads.
+
+use std::collections::VecDeque;
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use super::super::normals::unit;
+use super::vertices::{Kind, Vertex, Vertices};
+use super::{crease, project};
+use crate::field::Field;
+
+/// Triangles that face less like the surface below them than this (cosine) count as folded, the more the less they do.
+const FACING: f64 = 0.3;
+
+/// What a fold weighs against a distance of as many cells.
+const WEIGHT: f64 = 1.0;
+
+/// A change must leave at most this share of what it is to mend.
+const LEFT: f64 = 0.9;
+
+/// No edge shorter than this is cut, in cells.
+const SHORTEST: f64 = 0.1;
+
+/// Changes for each edge that was far off at first.
+const CHANGES: usize = 12;
+
+/// Mends what is around the given edges, ascending; returns the number of evaluations of ∇ω.
+pub(super) fn mend(
+    field: &dyn Field,
+    vertices: &mut Vertices,
+    triangles: &mut Vec<[u32; 3]>,
+    edges: Vec<[u32; 2]>,
+    (size, tolerance): (f64, f64),
+) -> u64 {
+    if edges.is_empty() {
+        return 0;
+    }
+    let mut changes = CHANGES * edges.len();
+    let fans = fans(vertices.len(), triangles, &edges);
+    let mut patch = Patch { field, size, vertices, triangles, fans, count: 0 };
+    let mut queue = VecDeque::from(edges);
+    while let Some(edge) = queue.pop_front() {
+        if changes == 0 {
+            break;
+        }
+        if let Some(changed) = patch.improve(edge, tolerance) {
+            changes -= 1;
+            queue.extend(changed);
+        }
+    }
+    patch.count
+}
+
+/// The triangles around the vertices near some edges: those of the edges, their neighbours and the neighbours of these.
+fn fans(vertices: usize, triangles: &[[u32; 3]], edges: &[[u32; 2]]) -> FxHashMap<u32, Vec<u32>> {
+    let mut is_near = vec![false; vertices];
+    edges.iter().flatten().for_each(|&v| is_near[v as usize] = true);
+    for _ in 0..RINGS {
+        let beside: Vec<[u32; 3]> =
+            triangles.iter().filter(|t| t.iter().any(|&v| is_near[v as usize])).copied().collect();
+        beside.iter().flatten().for_each(|&v| is_near[v as usize] = true);
+    }
+    let mut fans: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+    for (i, t) in (0..).zip(triangles) {
+        for v in t.iter().filter(|&&v| is_near[v as usize]) {
+            fans.entry(*v).or_default().push(i);
+        }
+    }
+    fans
+}
+
+/// How far from the edges changes may spread, in edges.
+const RINGS: usize = 3;
+
+/// The mesh around the edges to mend.
+struct Patch<'a> {
+    field: &'a dyn Field,
+    size: f64,
+    vertices: &'a mut Vertices,
+    triangles: &'a mut Vec<[u32; 3]>,
+    /// Triangles around each vertex of the patch.
+    fans: FxHashMap<u32, Vec<u32>>,
+    count: u64,
+}
+
+/// The two triangles at an edge a–b: (a, b, c) and (b, a, d).
+#[derive(Clone, Copy)]
+struct Pair {
+    places: [u32; 2],
+    ends: [u32; 2],
+    apexes: [u32; 2],
+}
+
+impl Patch<'_> {
+    /// Changes an edge if it is off by more than the tolerance and a change helps; the edges that this touches.
+    fn improve(&mut self, edge: [u32; 2], tolerance: f64) -> Option<Vec<[u32; 2]>> {
+        let pair = self.pair(edge)?;
+        let ([a, b], [c, d]) = (pair.ends, pair.apexes);
+        let [p, q] = [a, b].map(|v| self.position(v));
+        let off = self.off(p.midpoint(q));
+        let old = [[a, b, c], [b, a, d]];
+        let before = self.badness(&old, off);
+        if before <= tolerance {
+            return None;
+        }
+        let mut best = (LEFT * before, None);
+        let is_joined = self.fans.get(&c)?.iter().any(|&t| self.triangles[t as usize].contains(&d));
+        if c != d && !is_joined {
+            let turned = [[a, d, c], [d, b, c]];
+            let off = self.off(self.position(c).midpoint(self.position(d)));
+            let after = self.badness(&turned, off);
+            if after < best.0 {
+                best = (after, Some(None));
+            }
+        }
+        if p.distance(q) > SHORTEST * self.size {
+            let m = self.vertices.len() as u32;
+            for vertex in self.candidates(pair) {
+                self.vertices.push(vertex);
+                let ways = [a, b, c, d].map(|v| vertex.position.midpoint(self.position(v)));
+                let off = ways.into_iter().fold(0.0, |worst, way| f64::max(worst, self.off(way)));
+                let after = self.badness(&cut(pair, m), off);
+                self.vertices.pop();
+                if after < best.0 {
+                    best = (after, Some(Some(vertex)));
+                }
+            }
+        }
+        match best.1? {
+            None => self.replace(pair, [[a, d, c], [d, b, c]], &[]),
+            Some(vertex) => {
+                let m = self.vertices.len() as u32;
+                self.vertices.push(vertex);
+                let [first, second, third, fourth] = cut(pair, m);
+                self.replace(pair, [first, second], &[third, fourth]);
+                return Some(vec![[a, c], [b, c], [a, d], [b, d], [a, m], [b, m], [c, m], [d, m]]);
+            }
+        }
+        Some(vec![[a, c], [b, c], [a, d], [b, d], [c, d]])
+    }
+
+    fn pair(&self, [a, b]: [u32; 2]) -> Option<Pair> {
+        let triangle = |t: &u32| self.triangles[*t as usize];
+        let runs = |t: [u32; 3], [a, b]: [u32; 2]| (0..3).any(|i| t[i] == a && t[(i + 1) % 3] == b);
+        let fan = self.fans.get(&a)?;
+        let first = *fan.iter().find(|t| runs(triangle(t), [a, b]))?;
+        let second = *fan.iter().find(|t| runs(triangle(t), [b, a]))?;
+        let apex = |t: u32| triangle(&t).into_iter().find(|v| *v != a && *v != b);
+        let pair = Pair { places: [first, second], ends: [a, b], apexes: [apex(first)?, apex(second)?] };
+        // caps are no part of ω = 0
+        let is_free = |v: &u32| self.fans.contains_key(v) && self.vertices.kinds[*v as usize] != Kind::Cap;
+        pair.ends.iter().chain(&pair.apexes).all(is_free).then_some(pair)
+    }
+
+    /// Puts triangles in the place of a pair, and others to the end.
+    fn replace(&mut self, pair: Pair, now: [[u32; 3]; 2], more: &[[u32; 3]]) {
+        for (place, t) in pair.places.into_iter().zip(now) {
+            for v in self.triangles[place as usize] {
+                self.fans.entry(v).or_default().retain(|&other| other != place);
+            }
+            self.triangles[place as usize] = t;
+            t.iter().for_each(|v| self.fans.entry(*v).or_default().push(place));
+        }
+        for t in more {
+            let place = self.triangles.len() as u32;
+            self.triangles.push(*t);
+            t.iter().for_each(|v| self.fans.entry(*v).or_default().push(place));
+        }
+    }
+
+    /// Points of the surface where an edge may be cut.
+    fn candidates(&mut self, pair: Pair) -> Vec<Vertex> {
+        let [a, b] = pair.ends.map(|v| self.vertices.get(v));
+        let (start, length) = (a.position.midpoint(b.position), a.position.distance(b.position));
+        let reach = length.max(self.size);
+        let mut found = Vec::new();
+        let faces = [(a, b), (b, a)].map(|(at, other)| {
+            let p = at.position.lerp(other.position, BESIDE);
+            match unit(at.normal) {
+                Some(normal) => project::onto_face(self.field, p, normal, length, &mut self.count),
+                None => project::newton(self.field, p, length, &mut self.count),
+            }
+        });
+        if let [Some(first), Some(second)] = faces {
+            let at = crease::find(self.field, start, &[first, second], reach, &mut self.count);
+            found.extend(at.map(|position| Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp }));
+        }
+        let sum = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
+        let apexes = pair.apexes.map(|v| self.position(v));
+        let outwards = pair.ends.map(|v| self.position(v));
+        let flat = (outwards[1] - outwards[0]).cross(apexes[0] - apexes[1]);
+        let ways = [unit(sum), unit(flat)].into_iter().flatten();
+        let near: Vec<_> =
+            ways.filter_map(|way| project::along(self.field, start, way, reach, &mut self.count)).collect();
+        let near = near.into_iter().chain(project::newton(self.field, start, reach, &mut self.count));
+        found.extend(near.map(|face| Vertex { position: face.point, normal: face.normal, kind: Kind::Smooth }));
+        found
+    }
+
+    fn position(&self, v: u32) -> DVec3 {
+        self.vertices.positions[v as usize]
+    }
+
+    /// About how far a point is from the surface.
+    fn off(&mut self, p: DVec3) -> f64 {
+        self.count += 1;
+        let (omega, gradient) = self.field.omega_grad(p);
+        let distance = omega.abs() / gradient.length();
+        if distance.is_finite() { distance.min(self.size) } else { 0.0 }
+    }
+
+    /// What is wrong with triangles, as a distance: how far they are from the surface and how much they turn from it.
+    fn badness(&mut self, triangles: &[[u32; 3]], mut off: f64) -> f64 {
+        let mut folds = 0.0;
+        for t in triangles {
+            let [a, b, c] = t.map(|v| self.position(v));
+            let middle = (a + b + c) / 3.0;
+            let (omega, gradient) = self.field.omega_grad(middle);
+            self.count += 2;
+            let step = gradient * (omega / gradient.length_squared());
+            off = off.max(step.length().min(self.size));
+            let below = unit(-self.field.omega_grad(middle - step).1).or(unit(-gradient));
+            if let (Some(facing), Some(normal)) = (unit((b - a).cross(c - a)), below) {
+                folds = f64::max(folds, FACING - facing.dot(normal));
+            }
+        }
+        off + WEIGHT * self.size * folds
+    }
+}
+
+/// Where on an edge the faces of its two ends are looked up, as a share of its length.
+const BESIDE: f64 = 0.1;
+
+/// The triangles of a pair whose edge is cut at a vertex.
+fn cut(pair: Pair, m: u32) -> [[u32; 3]; 4] {
+    let ([a, b], [c, d]) = (pair.ends, pair.apexes);
+    [[a, m, c], [b, m, d], [m, b, c], [m, a, d]]
+}
