@@ -10,9 +10,10 @@
 use std::collections::VecDeque;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::super::normals::unit;
+use super::super::normals::{gradients, unit};
 use super::vertices::{Kind, Vertex, Vertices};
 use super::{crease, project};
 use crate::field::Field;
@@ -99,52 +100,124 @@ struct Pair {
     apexes: [u32; 2],
 }
 
+/// A change of the mesh, and how much less is wrong after it.
+struct Change {
+    gain: f64,
+    kind: ChangeKind,
+}
+
+enum ChangeKind {
+    /// The edge joins the apexes instead.
+    Turn,
+    /// The edge is cut.
+    Cut(Vertex),
+    /// The vertex goes elsewhere.
+    Move(u32, Vertex),
+}
+
 impl Patch<'_> {
-    /// Changes an edge if it is off by more than the tolerance and a change helps; the edges that this touches.
+    /// Makes the change about an edge that helps most, if any does; the edges that this touches.
     fn improve(&mut self, edge: [u32; 2], tolerance: f64) -> Option<Vec<[u32; 2]>> {
         let pair = self.pair(edge)?;
         let ([a, b], [c, d]) = (pair.ends, pair.apexes);
-        let [p, q] = [a, b].map(|v| self.position(v));
-        let off = self.off(p.midpoint(q));
         let old = [[a, b, c], [b, a, d]];
-        let before = self.badness(&old, off);
+        let before = self.badness(&old, &[self.middle(edge)]);
         if before <= tolerance {
             return None;
         }
-        let mut best = (LEFT * before, None);
-        let is_joined = self.fans.get(&c)?.iter().any(|&t| self.triangles[t as usize].contains(&d));
-        if c != d && !is_joined {
-            let turned = [[a, d, c], [d, b, c]];
-            let off = self.off(self.position(c).midpoint(self.position(d)));
-            let after = self.badness(&turned, off);
-            if after < best.0 {
-                best = (after, Some(None));
+        let mut best: Option<Change> = None;
+        let mut consider = |before: f64, after: f64, kind: ChangeKind| {
+            let gain = before - after;
+            if after <= LEFT * before && best.as_ref().is_none_or(|best| gain > best.gain) {
+                best = Some(Change { gain, kind });
             }
+        };
+        if c != d && !self.is_edge([c, d]) {
+            let after = self.badness(&turned(pair), &[self.middle([c, d])]);
+            consider(before, after, ChangeKind::Turn);
         }
-        if p.distance(q) > SHORTEST * self.size {
-            let m = self.vertices.len() as u32;
+        let new = self.vertices.len() as u32;
+        if self.position(a).distance(self.position(b)) > SHORTEST * self.size {
             for vertex in self.candidates(pair) {
                 self.vertices.push(vertex);
-                let ways = [a, b, c, d].map(|v| vertex.position.midpoint(self.position(v)));
-                let off = ways.into_iter().fold(0.0, |worst, way| f64::max(worst, self.off(way)));
-                let after = self.badness(&cut(pair, m), off);
+                let spokes = [a, b, c, d].map(|v| self.middle([v, new]));
+                let after = self.badness(&cut(pair, new), &spokes);
                 self.vertices.pop();
-                if after < best.0 {
-                    best = (after, Some(Some(vertex)));
-                }
+                consider(before, after, ChangeKind::Cut(vertex));
             }
         }
-        match best.1? {
-            None => self.replace(pair, [[a, d, c], [d, b, c]], &[]),
-            Some(vertex) => {
-                let m = self.vertices.len() as u32;
+        for v in [a, b, c, d] {
+            if self.vertices.kinds[v as usize] != Kind::Sharp {
+                continue;
+            }
+            let Some(before) = self.badness_around(v) else { continue };
+            let old = self.vertices.get(v);
+            for vertex in self.places(v) {
+                self.vertices.set(v, vertex);
+                let after = self.badness_around(v).unwrap_or(before);
+                consider(before, after, ChangeKind::Move(v, vertex));
+            }
+            self.vertices.set(v, old);
+        }
+        let rim = [[a, c], [b, c], [a, d], [b, d]];
+        match best?.kind {
+            ChangeKind::Turn => {
+                let [first, second] = turned(pair);
+                self.replace(pair, [first, second], &[]);
+                Some([&rim[..], &[[c, d]]].concat())
+            }
+            ChangeKind::Cut(vertex) => {
                 self.vertices.push(vertex);
-                let [first, second, third, fourth] = cut(pair, m);
+                let [first, second, third, fourth] = cut(pair, new);
                 self.replace(pair, [first, second], &[third, fourth]);
-                return Some(vec![[a, c], [b, c], [a, d], [b, d], [a, m], [b, m], [c, m], [d, m]]);
+                Some([&rim[..], &[a, b, c, d].map(|v| [v, new])].concat())
+            }
+            ChangeKind::Move(v, vertex) => {
+                self.vertices.set(v, vertex);
+                let around = self.fans.get(&v)?.iter().map(|&t| self.triangles[t as usize]);
+                Some(around.flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).collect())
             }
         }
-        Some(vec![[a, c], [b, c], [a, d], [b, d], [c, d]])
+    }
+
+    fn is_edge(&self, [a, b]: [u32; 2]) -> bool {
+        self.fans.get(&a).is_some_and(|fan| fan.iter().any(|&t| self.triangles[t as usize].contains(&b)))
+    }
+
+    fn middle(&self, edge: [u32; 2]) -> DVec3 {
+        let [p, q] = edge.map(|v| self.position(v));
+        p.midpoint(q)
+    }
+
+    /// What is wrong about a vertex and its triangles.
+    fn badness_around(&mut self, v: u32) -> Option<f64> {
+        let fan = self.fans.get(&v)?;
+        let triangles: Vec<[u32; 3]> = fan.iter().map(|&t| self.triangles[t as usize]).collect();
+        let rim = triangles.iter().map(|t| (0..3).find(|&i| t[i] == v).map_or(v, |i| t[(i + 1) % 3]));
+        let mut points: Vec<DVec3> = rim.map(|other| self.middle([v, other])).collect();
+        points.push(self.position(v));
+        Some(self.badness(&triangles, &points))
+    }
+
+    /// Points of the surface where a vertex may go.
+    fn places(&mut self, v: u32) -> Vec<Vertex> {
+        let Some(fan) = self.fans.get(&v) else { return Vec::new() };
+        let (mut facing, mut middle) = (DVec3::ZERO, DVec3::ZERO);
+        for t in fan {
+            let [a, b, c] = self.triangles[*t as usize].map(|v| self.position(v));
+            facing += (b - a).cross(c - a);
+            middle += (a + b + c) / (3 * fan.len()) as f64;
+        }
+        let (at, size) = (self.position(v), self.size);
+        let mut found = Vec::new();
+        for start in [at, middle] {
+            let along = unit(facing)
+                .and_then(|facing| project::along(self.field, start, facing, size, &mut self.count));
+            found.extend(along);
+            found.extend(project::newton(self.field, start, size, &mut self.count));
+        }
+        let vertex = |face: crease::Face| Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp };
+        found.into_iter().map(vertex).collect()
     }
 
     fn pair(&self, [a, b]: [u32; 2]) -> Option<Pair> {
@@ -201,7 +274,7 @@ impl Patch<'_> {
         let near: Vec<_> =
             ways.filter_map(|way| project::along(self.field, start, way, reach, &mut self.count)).collect();
         let near = near.into_iter().chain(project::newton(self.field, start, reach, &mut self.count));
-        found.extend(near.map(|face| Vertex { position: face.point, normal: face.normal, kind: Kind::Smooth }));
+        found.extend(near.map(|face| Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp }));
         found
     }
 
@@ -209,30 +282,35 @@ impl Patch<'_> {
         self.vertices.positions[v as usize]
     }
 
-    /// About how far a point is from the surface.
-    fn off(&mut self, p: DVec3) -> f64 {
-        self.count += 1;
-        let (omega, gradient) = self.field.omega_grad(p);
-        let distance = omega.abs() / gradient.length();
-        if distance.is_finite() { distance.min(self.size) } else { 0.0 }
-    }
-
-    /// What is wrong with triangles, as a distance: how far they are from the surface and how much they turn from it.
-    fn badness(&mut self, triangles: &[[u32; 3]], mut off: f64) -> f64 {
+    /// What is wrong with triangles, as a distance: how far their middles and some more points are from the surface, at
+    /// most, and how much they turn from it in all.
+    fn badness(&mut self, triangles: &[[u32; 3]], points: &[DVec3]) -> f64 {
+        let mut off = 0.0;
+        for p in points {
+            off = f64::max(off, self.step(*p).0.length());
+        }
         let mut folds = 0.0;
         for t in triangles {
             let [a, b, c] = t.map(|v| self.position(v));
             let middle = (a + b + c) / 3.0;
-            let (omega, gradient) = self.field.omega_grad(middle);
-            self.count += 2;
-            let step = gradient * (omega / gradient.length_squared());
-            off = off.max(step.length().min(self.size));
-            let below = unit(-self.field.omega_grad(middle - step).1).or(unit(-gradient));
+            let (step, normal) = self.step(middle);
+            off = f64::max(off, step.length());
+            let below = unit(-self.field.omega_grad(middle - step).1).or(normal);
+            self.count += 1;
             if let (Some(facing), Some(normal)) = (unit((b - a).cross(c - a)), below) {
-                folds = f64::max(folds, FACING - facing.dot(normal));
+                folds += f64::max(0.0, FACING - facing.dot(normal));
             }
         }
         off + WEIGHT * self.size * folds
+    }
+
+    /// The step of Newton's method at a point, of a cell at most, and the outward normal there.
+    fn step(&mut self, p: DVec3) -> (DVec3, Option<DVec3>) {
+        self.count += 1;
+        let (omega, gradient) = self.field.omega_grad(p);
+        let step = gradient * (omega / gradient.length_squared());
+        let step = if step.is_finite() { step.clamp_length_max(self.size) } else { DVec3::ZERO };
+        (step, unit(-gradient))
     }
 }
 
@@ -243,4 +321,39 @@ const BESIDE: f64 = 0.1;
 fn cut(pair: Pair, m: u32) -> [[u32; 3]; 4] {
     let ([a, b], [c, d]) = (pair.ends, pair.apexes);
     [[a, m, c], [b, m, d], [m, b, c], [m, a, d]]
+}
+
+/// The triangles of a pair whose edge is turned.
+fn turned(pair: Pair) -> [[u32; 3]; 2] {
+    let ([a, b], [c, d]) = (pair.ends, pair.apexes);
+    [[a, d, c], [d, b, c]]
+}
+
+/// Edges of triangles that lie upside down, ascending; only vertices on creases make such.
+pub(super) fn folded(
+    field: &dyn Field,
+    vertices: &Vertices,
+    triangles: &[[u32; 3]],
+    count: &mut u64,
+) -> Vec<[u32; 2]> {
+    let kinds = |t: &&[u32; 3]| t.map(|v| vertices.kinds[v as usize]);
+    let suspects: Vec<[u32; 3]> = triangles
+        .par_iter()
+        .filter(|t| kinds(t).contains(&Kind::Sharp) && !kinds(t).contains(&Kind::Cap))
+        .copied()
+        .collect();
+    let corners = |t: [u32; 3]| t.map(|v| vertices.positions[v as usize]);
+    let middles: Vec<DVec3> = suspects.iter().map(|&t| corners(t).iter().sum::<DVec3>() / 3.0).collect();
+    *count += middles.len() as u64;
+    let below = gradients(field, &middles);
+    let is_folded = |t: [u32; 3], gradient: DVec3| {
+        let [a, b, c] = corners(t);
+        (b - a).cross(c - a).dot(gradient) > 0.0
+    };
+    let folded = suspects.into_iter().zip(below).filter(|&(t, (_, gradient))| is_folded(t, gradient));
+    let sides = folded.flat_map(|([a, b, c], _)| [[a, b], [b, c], [c, a]]);
+    let mut sides: Vec<[u32; 2]> = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    sides.sort_unstable();
+    sides.dedup();
+    sides
 }

@@ -24,7 +24,6 @@ mod refine;
 mod sharp;
 #[cfg(test)]
 mod tests;
-mod unfold;
 mod vertices;
 
 use glam::DVec3;
@@ -126,7 +125,13 @@ pub fn dual_contouring(
         return Err(MeshError::TooManyVertices { found: vertices.len() });
     }
     work.merged = merge(&mut vertices, &mut triangles, size);
-    unfold::unfold(field, &vertices, &mut triangles, &mut work.gradients);
+    for _ in 0..REPAIRS {
+        let folded = mend::folded(field, &vertices, &triangles, &mut work.gradients);
+        if folded.is_empty() {
+            break;
+        }
+        work.gradients += mend::mend(field, &mut vertices, &mut triangles, folded, (size, refine::TOLERANCE * size));
+    }
 
     let caps = (0..).zip(&vertices.kinds).filter(|(_, kind)| **kind == Kind::Cap).map(|(i, _)| i).collect();
     let Vertices { positions, normals, kinds } = vertices;

@@ -56,6 +56,11 @@ impl Vertices {
         self.kinds.push(vertex.kind);
     }
 
+    pub fn set(&mut self, v: u32, vertex: Vertex) {
+        let v = v as usize;
+        (self.positions[v], self.normals[v], self.kinds[v]) = (vertex.position, vertex.normal, vertex.kind);
+    }
+
     /// Drops the last.
     pub fn pop(&mut self) {
         self.positions.pop();
