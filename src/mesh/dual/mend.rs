@@ -30,6 +30,9 @@ const LEFT: f64 = 0.9;
 /// No edge shorter than this is cut, in cells.
 const SHORTEST: f64 = 0.1;
 
+/// Where an edge is compared with the surface, as shares of its length.
+pub(super) const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
+
 /// Changes for each edge that was far off at first.
 const CHANGES: usize = 12;
 
@@ -121,7 +124,7 @@ impl Patch<'_> {
         let pair = self.pair(edge)?;
         let ([a, b], [c, d]) = (pair.ends, pair.apexes);
         let old = [[a, b, c], [b, a, d]];
-        let before = self.badness(&old, &[self.middle(edge)]);
+        let before = self.badness(&old, &self.along(edge));
         if before <= tolerance {
             return None;
         }
@@ -133,14 +136,14 @@ impl Patch<'_> {
             }
         };
         if c != d && !self.is_edge([c, d]) {
-            let after = self.badness(&turned(pair), &[self.middle([c, d])]);
+            let after = self.badness(&turned(pair), &self.along([c, d]));
             consider(before, after, ChangeKind::Turn);
         }
         let new = self.vertices.len() as u32;
         if self.position(a).distance(self.position(b)) > SHORTEST * self.size {
             for vertex in self.candidates(pair) {
                 self.vertices.push(vertex);
-                let spokes = [a, b, c, d].map(|v| self.middle([v, new]));
+                let spokes = [a, b, c, d].map(|v| self.along([v, new])).concat();
                 let after = self.badness(&cut(pair, new), &spokes);
                 self.vertices.pop();
                 consider(before, after, ChangeKind::Cut(vertex));
@@ -184,9 +187,10 @@ impl Patch<'_> {
         self.fans.get(&a).is_some_and(|fan| fan.iter().any(|&t| self.triangles[t as usize].contains(&b)))
     }
 
-    fn middle(&self, edge: [u32; 2]) -> DVec3 {
+    /// Points spread along an edge.
+    fn along(&self, edge: [u32; 2]) -> [DVec3; 3] {
         let [p, q] = edge.map(|v| self.position(v));
-        p.midpoint(q)
+        SHARES.map(|share| p.lerp(q, share))
     }
 
     /// What is wrong about a vertex and its triangles.
@@ -194,7 +198,7 @@ impl Patch<'_> {
         let fan = self.fans.get(&v)?;
         let triangles: Vec<[u32; 3]> = fan.iter().map(|&t| self.triangles[t as usize]).collect();
         let rim = triangles.iter().map(|t| (0..3).find(|&i| t[i] == v).map_or(v, |i| t[(i + 1) % 3]));
-        let mut points: Vec<DVec3> = rim.map(|other| self.middle([v, other])).collect();
+        let mut points: Vec<DVec3> = rim.flat_map(|other| self.along([v, other])).collect();
         points.push(self.position(v));
         Some(self.badness(&triangles, &points))
     }
@@ -252,7 +256,11 @@ impl Patch<'_> {
     /// Points of the surface where an edge may be cut.
     fn candidates(&mut self, pair: Pair) -> Vec<Vertex> {
         let [a, b] = pair.ends.map(|v| self.vertices.get(v));
-        let (start, length) = (a.position.midpoint(b.position), a.position.distance(b.position));
+        let length = a.position.distance(b.position);
+        let points = self.along(pair.ends);
+        let off = points.map(|p| self.step(p).0.length());
+        let worst = (0..points.len()).max_by(|&i, &j| off[i].total_cmp(&off[j])).unwrap_or(1);
+        let start = points[worst];
         let reach = length.max(self.size);
         let mut found = Vec::new();
         let faces = [(a, b), (b, a)].map(|(at, other)| {

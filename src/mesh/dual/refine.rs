@@ -109,7 +109,9 @@ fn cuts(
             let found = gradients(field, &middles);
             let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
             let (mut bends, mut others) = (Vec::new(), Vec::new());
-            for (edge, found) in edges.into_iter().zip(found).filter(|(_, found)| off(*found)) {
+            let (far, near): (Vec<_>, Vec<_>) = edges.into_iter().zip(found).partition(|(_, found)| off(*found));
+            let mut left = far_beside(field, vertices, near.into_iter().map(|(edge, _)| edge), tolerance, &mut count);
+            for (edge, found) in far {
                 match Bend::new(vertices, edge, found) {
                     Some(bend) => bends.push(bend),
                     None => others.push(edge),
@@ -123,7 +125,6 @@ fn cuts(
                     others.push(bend.edge);
                 }
             }
-            let mut left = Vec::new();
             for edge in others {
                 match middle(field, edge.map(|v| vertices.get(v)), tolerance, &mut count) {
                     Middle::Near => {}
@@ -142,6 +143,31 @@ fn cuts(
     }
     all.cuts.sort_unstable_by_key(|cut| cut.0);
     all
+}
+
+/// Edges that leave the surface although their middles are near it: they enter a wall thinner than a cell, or a gap.
+fn far_beside(
+    field: &dyn Field,
+    vertices: &Vertices,
+    edges: impl Iterator<Item = [u32; 2]>,
+    tolerance: f64,
+    count: &mut u64,
+) -> Vec<[u32; 2]> {
+    let is_sharp = |v: u32| vertices.kinds[v as usize] == Kind::Sharp;
+    let normal = |v: u32| vertices.normals[v as usize];
+    let doubtful: Vec<[u32; 2]> =
+        edges.filter(|&[a, b]| is_sharp(a) || is_sharp(b) || normal(a).dot(normal(b)) < 0.5).collect();
+    let points: Vec<DVec3> = doubtful
+        .iter()
+        .flat_map(|edge| {
+            let [p, q] = edge.map(|v| vertices.positions[v as usize]);
+            [0.25, 0.75].map(|share| p.lerp(q, share))
+        })
+        .collect();
+    *count += points.len() as u64;
+    let found = gradients(field, &points);
+    let off = |(omega, gradient): &(f64, DVec3)| omega.abs() > 2.0 * tolerance * gradient.length();
+    doubtful.into_iter().zip(found.chunks_exact(2)).filter(|(_, pair)| pair.iter().any(off)).map(|(edge, _)| edge).collect()
 }
 
 /// Whether the surface may be farther than `tolerance` from the middle of an edge, as far as its ends tell.
