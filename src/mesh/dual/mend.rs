@@ -43,13 +43,14 @@ pub(super) fn mend(
     triangles: &mut Vec<[u32; 3]>,
     edges: Vec<[u32; 2]>,
     (size, tolerance): (f64, f64),
+    may_merge: bool,
 ) -> u64 {
     if edges.is_empty() {
         return 0;
     }
     let mut changes = CHANGES * edges.len();
     let fans = fans(vertices.len(), triangles, &edges);
-    let mut patch = Patch { field, size, vertices, triangles, fans, count: 0 };
+    let mut patch = Patch { field, size, vertices, triangles, fans, count: 0, may_merge };
     let mut queue = VecDeque::from(edges);
     while let Some(edge) = queue.pop_front() {
         if changes == 0 {
@@ -93,6 +94,7 @@ struct Patch<'a> {
     /// Triangles around each vertex of the patch.
     fans: FxHashMap<u32, Vec<u32>>,
     count: u64,
+    may_merge: bool,
 }
 
 /// The two triangles at an edge a–b: (a, b, c) and (b, a, d).
@@ -128,6 +130,7 @@ impl Patch<'_> {
         if before <= tolerance {
             return None;
         }
+        let is_folded = self.may_merge || old.iter().any(|t| self.folds(*t) > FACING);
         let mut best: Option<Change> = None;
         let mut consider = |before: f64, after: f64, kind: ChangeKind| {
             let gain = before - after;
@@ -155,7 +158,7 @@ impl Patch<'_> {
             }
             let Some(before) = self.badness_around(v) else { continue };
             let old = self.vertices.get(v);
-            for vertex in self.places(v) {
+            for vertex in self.places(v, is_folded) {
                 self.vertices.set(v, vertex);
                 let after = self.badness_around(v).unwrap_or(before);
                 consider(before, after, ChangeKind::Move(v, vertex));
@@ -176,6 +179,12 @@ impl Patch<'_> {
                 Some([&rim[..], &[a, b, c, d].map(|v| [v, new])].concat())
             }
             ChangeKind::Move(v, vertex) => {
+                for other in self.around(v) {
+                    // to be merged
+                    if self.position(other) == vertex.position {
+                        self.vertices.kinds[other as usize] = Kind::Sharp;
+                    }
+                }
                 self.vertices.set(v, vertex);
                 let around = self.fans.get(&v)?.iter().map(|&t| self.triangles[t as usize]);
                 Some(around.flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).collect())
@@ -204,8 +213,8 @@ impl Patch<'_> {
     }
 
     /// Points of the surface where a vertex may go.
-    fn places(&mut self, v: u32) -> Vec<Vertex> {
-        let Some(fan) = self.fans.get(&v) else { return Vec::new() };
+    fn places(&mut self, v: u32, may_merge: bool) -> Vec<Vertex> {
+        let Some(fan) = self.fans.get(&v).filter(|fan| !fan.is_empty()) else { return Vec::new() };
         let (mut facing, mut middle) = (DVec3::ZERO, DVec3::ZERO);
         for t in fan {
             let [a, b, c] = self.triangles[*t as usize].map(|v| self.position(v));
@@ -221,7 +230,27 @@ impl Patch<'_> {
             found.extend(project::newton(self.field, start, size, &mut self.count));
         }
         let vertex = |face: crease::Face| Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp };
-        found.into_iter().map(vertex).collect()
+        let mut found: Vec<Vertex> = found.into_iter().map(vertex).collect();
+        let around = self.around(v);
+        if !may_merge {
+            return found;
+        }
+        for &other in &around {
+            let joined = self.around(other);
+            let common = around.iter().filter(|v| joined.contains(v)).count();
+            let kind = self.vertices.kinds[other as usize];
+            if self.fans.contains_key(&other) && kind != Kind::Cap && common == 2 && around.len() > 3 {
+                found.push(Vertex { kind: Kind::Sharp, ..self.vertices.get(other) });
+            }
+        }
+        found
+    }
+
+    /// Vertices joined to one by an edge.
+    fn around(&self, v: u32) -> Vec<u32> {
+        let fan = self.fans.get(&v).map_or(&[][..], Vec::as_slice);
+        let sides = fan.iter().map(|&t| self.triangles[t as usize]);
+        sides.filter_map(|t| (0..3).find(|&i| t[i] == v).map(|i| t[(i + 1) % 3])).collect()
     }
 
     fn pair(&self, [a, b]: [u32; 2]) -> Option<Pair> {
@@ -299,17 +328,24 @@ impl Patch<'_> {
         }
         let mut folds = 0.0;
         for t in triangles {
-            let [a, b, c] = t.map(|v| self.position(v));
-            let middle = (a + b + c) / 3.0;
-            let (step, normal) = self.step(middle);
-            off = f64::max(off, step.length());
-            let below = unit(-self.field.omega_grad(middle - step).1).or(normal);
-            self.count += 1;
-            if let (Some(facing), Some(normal)) = (unit((b - a).cross(c - a)), below) {
-                folds += f64::max(0.0, FACING - facing.dot(normal));
-            }
+            let middle = t.map(|v| self.position(v)).iter().sum::<DVec3>() / 3.0;
+            off = f64::max(off, self.step(middle).0.length());
+            folds += self.folds(*t);
         }
         off + WEIGHT * self.size * folds
+    }
+
+    /// How much less a triangle faces like the surface below its middle than it should; above [`FACING`] it is folded.
+    fn folds(&mut self, t: [u32; 3]) -> f64 {
+        let [a, b, c] = t.map(|v| self.position(v));
+        let middle = (a + b + c) / 3.0;
+        let (step, normal) = self.step(middle);
+        self.count += 1;
+        let below = unit(-self.field.omega_grad(middle - step).1).or(normal);
+        match (unit((b - a).cross(c - a)), below) {
+            (Some(facing), Some(normal)) => f64::max(0.0, FACING - facing.dot(normal)),
+            _ => 0.0,
+        }
     }
 
     /// The step of Newton's method at a point, of a cell at most, and the outward normal there.

@@ -120,7 +120,7 @@ pub fn dual_contouring(
     triangles.extend(placed.iter().flat_map(|part| &part.tubes));
     let (left, evaluations) = refine::refine(field, &mut vertices, &mut triangles, size);
     work.gradients += evaluations;
-    work.gradients += mend::mend(field, &mut vertices, &mut triangles, left, (size, refine::TOLERANCE * size));
+    work.gradients += mend::mend(field, &mut vertices, &mut triangles, left, (size, refine::TOLERANCE * size), false);
     if vertices.len() > Mesh::MAX_VERTICES {
         return Err(MeshError::TooManyVertices { found: vertices.len() });
     }
@@ -130,7 +130,8 @@ pub fn dual_contouring(
         if folded.is_empty() {
             break;
         }
-        work.gradients += mend::mend(field, &mut vertices, &mut triangles, folded, (size, refine::TOLERANCE * size));
+        work.gradients += mend::mend(field, &mut vertices, &mut triangles, folded, (size, refine::TOLERANCE * size), true);
+        work.merged += merge(&mut vertices, &mut triangles, size);
     }
 
     let caps = (0..).zip(&vertices.kinds).filter(|(_, kind)| **kind == Kind::Cap).map(|(i, _)| i).collect();
