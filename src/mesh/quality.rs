@@ -278,7 +278,7 @@ fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
             }
             let foot = &mut feet[i];
             foot.position -= step;
-            foot.normal = unit(-gradient);
+            foot.normal = foot.normal.or(unit(-gradient));
             step.length()
                 > 1e-9 * foot.position.distance(points[i]) + f64::EPSILON * points[i].abs().max_element()
         });

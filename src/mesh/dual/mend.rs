@@ -30,6 +30,14 @@ const LEFT: f64 = 0.9;
 /// No edge shorter than this is cut, in cells.
 const SHORTEST: f64 = 0.1;
 
+/// Steps of Newton's method from the middle of a triangle to the surface below, and the step that needs no other after it,
+/// in cells: what faces there is to be known, not where it is.
+const STEPS: usize = 4;
+const NEAR: f64 = 0.01;
+
+/// Triangles that face less than this like the surface below them (cosine) are looked at once more.
+const DOUBT: f64 = 0.8;
+
 /// Where an edge is compared with the surface, as shares of its length.
 pub(super) const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
 
@@ -145,6 +153,10 @@ impl Patch<'_> {
         let new = self.vertices.len() as u32;
         if self.position(a).distance(self.position(b)) > SHORTEST * self.size {
             for vertex in self.candidates(pair) {
+                let is_new = |v: u32| self.position(v).distance(vertex.position) > 0.5 * SHORTEST * self.size;
+                if ![a, b, c, d].into_iter().all(is_new) {
+                    continue;
+                }
                 self.vertices.push(vertex);
                 let spokes = [a, b, c, d].map(|v| self.along([v, new])).concat();
                 let after = self.badness(&cut(pair, new), &spokes);
@@ -338,14 +350,18 @@ impl Patch<'_> {
     /// How much less a triangle faces like the surface below its middle than it should; above [`FACING`] it is folded.
     fn folds(&mut self, t: [u32; 3]) -> f64 {
         let [a, b, c] = t.map(|v| self.position(v));
-        let middle = (a + b + c) / 3.0;
-        let (step, normal) = self.step(middle);
-        self.count += 1;
-        let below = unit(-self.field.omega_grad(middle - step).1).or(normal);
-        match (unit((b - a).cross(c - a)), below) {
-            (Some(facing), Some(normal)) => f64::max(0.0, FACING - facing.dot(normal)),
-            _ => 0.0,
+        let Some(facing) = unit((b - a).cross(c - a)) else { return 0.0 };
+        let mut foot = (a + b + c) / 3.0;
+        let mut folds = 0.0;
+        for _ in 0..STEPS {
+            let (step, normal) = self.step(foot);
+            foot -= step;
+            folds = normal.map_or(folds, |normal| f64::max(folds, FACING - facing.dot(normal)));
+            if step.length() <= NEAR * self.size {
+                break;
+            }
         }
+        folds
     }
 
     /// The step of Newton's method at a point, of a cell at most, and the outward normal there.
@@ -378,24 +394,36 @@ pub(super) fn folded(
     field: &dyn Field,
     vertices: &Vertices,
     triangles: &[[u32; 3]],
+    size: f64,
     count: &mut u64,
 ) -> Vec<[u32; 2]> {
     let kinds = |t: &&[u32; 3]| t.map(|v| vertices.kinds[v as usize]);
-    let suspects: Vec<[u32; 3]> = triangles
+    let mut suspects: Vec<[u32; 3]> = triangles
         .par_iter()
         .filter(|t| kinds(t).contains(&Kind::Sharp) && !kinds(t).contains(&Kind::Cap))
         .copied()
         .collect();
     let corners = |t: [u32; 3]| t.map(|v| vertices.positions[v as usize]);
-    let middles: Vec<DVec3> = suspects.iter().map(|&t| corners(t).iter().sum::<DVec3>() / 3.0).collect();
-    *count += middles.len() as u64;
-    let below = gradients(field, &middles);
-    let is_folded = |t: [u32; 3], gradient: DVec3| {
-        let [a, b, c] = corners(t);
-        (b - a).cross(c - a).dot(gradient) > 0.0
-    };
-    let folded = suspects.into_iter().zip(below).filter(|&(t, (_, gradient))| is_folded(t, gradient));
-    let sides = folded.flat_map(|([a, b, c], _)| [[a, b], [b, c], [c, a]]);
+    let mut feet: Vec<DVec3> = suspects.iter().map(|&t| corners(t).iter().sum::<DVec3>() / 3.0).collect();
+    let mut folded = Vec::new();
+    for _ in 0..STEPS {
+        *count += feet.len() as u64;
+        let found = gradients(field, &feet);
+        let mut doubtful = Vec::new();
+        for ((t, foot), (omega, gradient)) in suspects.into_iter().zip(feet).zip(found) {
+            let [a, b, c] = corners(t);
+            let normals = unit((b - a).cross(c - a)).zip(unit(-gradient));
+            let Some(facing) = normals.map(|(facing, normal)| facing.dot(normal)) else { continue };
+            let step = gradient * (omega / gradient.length_squared());
+            if facing < 0.0 {
+                folded.push(t);
+            } else if facing < DOUBT && step.is_finite() && step.length() > NEAR * size {
+                doubtful.push((t, foot - step));
+            }
+        }
+        (suspects, feet) = doubtful.into_iter().unzip();
+    }
+    let sides = folded.into_iter().flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]);
     let mut sides: Vec<[u32; 2]> = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
     sides.sort_unstable();
     sides.dedup();

@@ -124,14 +124,14 @@ pub fn dual_contouring(
     if vertices.len() > Mesh::MAX_VERTICES {
         return Err(MeshError::TooManyVertices { found: vertices.len() });
     }
-    work.merged = merge(&mut vertices, &mut triangles, size);
+    work.merged = merge(&mut vertices, &mut triangles, TOO_CLOSE * size);
     for _ in 0..REPAIRS {
-        let folded = mend::folded(field, &vertices, &triangles, &mut work.gradients);
+        let folded = mend::folded(field, &vertices, &triangles, size, &mut work.gradients);
         if folded.is_empty() {
             break;
         }
         work.gradients += mend::mend(field, &mut vertices, &mut triangles, folded, (size, refine::TOLERANCE * size), true);
-        work.merged += merge(&mut vertices, &mut triangles, size);
+        work.merged += merge(&mut vertices, &mut triangles, 0.0);
     }
 
     let caps = (0..).zip(&vertices.kinds).filter(|(_, kind)| **kind == Kind::Cap).map(|(i, _)| i).collect();
@@ -218,7 +218,7 @@ fn place(scene: &Scene<'_>, counts: Vec<usize>) -> (Vertices, Vec<Placed>) {
 const TOO_CLOSE: f64 = 0.1;
 
 /// Merges vertices that coincide, and ends of very short edges on creases; returns how many.
-fn merge(vertices: &mut Vertices, triangles: &mut Vec<[u32; 3]>, size: f64) -> u64 {
+fn merge(vertices: &mut Vertices, triangles: &mut Vec<[u32; 3]>, too_close: f64) -> u64 {
     let sharp = (0_u32..).zip(&vertices.kinds).filter(|(_, kind)| **kind != Kind::Smooth);
     let bits = |v: u32| vertices.positions[v as usize].to_array().map(f64::to_bits);
     let mut places: Vec<([u64; 3], u32)> = sharp.map(|(v, _)| (bits(v), v)).collect();
@@ -235,7 +235,7 @@ fn merge(vertices: &mut Vertices, triangles: &mut Vec<[u32; 3]>, size: f64) -> u
             let pair = [t[i], t[(i + 1) % 3]];
             let [a, b] = pair.map(|v| vertices.positions[v as usize]);
             let is_free = !pair.iter().any(|&v| is_taken[v as usize]);
-            if is_free && a.distance(b) < TOO_CLOSE * size {
+            if is_free && a.distance(b) < too_close {
                 pair.iter().for_each(|&v| is_taken[v as usize] = true);
                 groups.push(pair.to_vec());
             }
