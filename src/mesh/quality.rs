@@ -253,7 +253,8 @@ fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality) {
     quality.flipped = parts.iter().map(|part| part.2).sum();
 }
 
-/// A point of the surface, with its outward unit normal.
+/// A point of the surface, with the outward unit normal that the distance has where the search began: that of the nearest
+/// point, while in a narrow gap the search may end on the other wall.
 #[derive(Debug, Clone, Copy)]
 struct Foot {
     position: DVec3,

@@ -109,8 +109,10 @@ fn cuts(
             let found = gradients(field, &middles);
             let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
             let (mut bends, mut others) = (Vec::new(), Vec::new());
-            let (far, near): (Vec<_>, Vec<_>) = edges.into_iter().zip(found).partition(|(_, found)| off(*found));
-            let mut left = far_beside(field, vertices, near.into_iter().map(|(edge, _)| edge), tolerance, &mut count);
+            let (far, near): (Vec<_>, Vec<_>) =
+                edges.into_iter().zip(found).partition(|(_, found)| off(*found));
+            let mut left =
+                far_beside(field, vertices, near.into_iter().map(|(edge, _)| edge), tolerance, &mut count);
             for (edge, found) in far {
                 match Bend::new(vertices, edge, found) {
                     Some(bend) => bends.push(bend),
@@ -167,7 +169,12 @@ fn far_beside(
     *count += points.len() as u64;
     let found = gradients(field, &points);
     let off = |(omega, gradient): &(f64, DVec3)| omega.abs() > 2.0 * tolerance * gradient.length();
-    doubtful.into_iter().zip(found.chunks_exact(2)).filter(|(_, pair)| pair.iter().any(off)).map(|(edge, _)| edge).collect()
+    doubtful
+        .into_iter()
+        .zip(found.chunks_exact(2))
+        .filter(|(_, pair)| pair.iter().any(off))
+        .map(|(edge, _)| edge)
+        .collect()
 }
 
 /// Whether the surface may be farther than `tolerance` from the middle of an edge, as far as its ends tell.
