@@ -253,7 +253,8 @@ fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality) {
     quality.flipped = parts.iter().map(|part| part.2).sum();
 }
 
-/// A point of the surface, with its outward unit normal.
+/// A point of the surface, with the outward unit normal that the distance has where the search began: that of the nearest
+/// point, while in a narrow gap the search may end on the other wall.
 #[derive(Debug, Clone, Copy)]
 struct Foot {
     position: DVec3,
@@ -278,7 +279,7 @@ fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
             }
             let foot = &mut feet[i];
             foot.position -= step;
-            foot.normal = unit(-gradient);
+            foot.normal = foot.normal.or(unit(-gradient));
             step.length()
                 > 1e-9 * foot.position.distance(points[i]) + f64::EPSILON * points[i].abs().max_element()
         });

@@ -3,7 +3,9 @@
 use rfm::field::Closures;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{Grid, Mesh, Resolution, check, dual_contouring, marching_cubes, measure, thin_cells};
+use rfm::mesh::{
+    Grid, Mesh, Quality, Resolution, check, dual_contouring, marching_cubes, measure, thin_cells,
+};
 use rfm::{Engine, Program, Solid};
 
 fn solid(text: &str, name: &str) -> Solid {
@@ -44,26 +46,56 @@ fn vertices_lie_on_the_surface_and_normals_are_those_of_the_contact_program() {
     }
 }
 
-/// Measured both ways against the contact program's distance. A collar thinner than a cell is not resolved: with 16 cells
-/// the pawn's is (0.158 m thick, cells of 0.1875 m), and triangles turn their backs to the faces of it that were missed.
+/// The domain of the examples' scenes.
+const DOMAIN: Aabb = Aabb { min: DVec3::ZERO, max: DVec3::splat(3.0) };
+
+/// A sharp mesh of an example in its domain, measured both ways against the contact program's distance.
+fn sharp(name: &str, cells: usize) -> Quality {
+    let solid = example(name);
+    let field = solid.surface(DOMAIN);
+    let distance = Closures {
+        omega: |p: DVec3| -solid.contact(p).distance,
+        gradient: |p: DVec3| -solid.contact(p).normal,
+    };
+    let grid = Grid::filling(&DOMAIN, Resolution::Cells(cells)).unwrap();
+    let mesh = dual_contouring(&*field, &grid, &|_| {}).unwrap();
+    let report = check(&mesh, &*field);
+    assert!(report.closed && report.manifold, "{name}, {cells} cells: {report:?}");
+    measure(&mesh, &*field, &distance, &grid).unwrap()
+}
+
 #[test]
 fn sharp_meshes_of_pawn_and_bishop_are_within_a_small_part_of_a_cell() {
-    let domain = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
     for name in ["pawn", "bishop"] {
-        let solid = example(name);
-        let field = solid.surface(domain);
-        let distance = Closures {
-            omega: |p: DVec3| -solid.contact(p).distance,
-            gradient: |p: DVec3| -solid.contact(p).normal,
-        };
-        for (cells, most) in [(20, 0.1), (128, 1.5e-3), (256, 4e-4)] {
-            let grid = Grid::filling(&domain, Resolution::Cells(cells)).unwrap();
-            let mesh = dual_contouring(&*field, &grid, &|_| {}).unwrap();
-            let report = check(&mesh, &*field);
-            assert!(report.closed && report.manifold, "{name}, {cells} cells: {report:?}");
-            let quality = measure(&mesh, &*field, &distance, &grid).unwrap();
+        for (cells, most) in [(128, 1.5e-3), (256, 4e-4)] {
+            let quality = sharp(name, cells);
             assert!(quality.hausdorff() <= most, "{name}, {cells} cells: {quality:?}");
             assert_eq!(quality.flipped, 0, "{name}, {cells} cells: {quality:?}");
+        }
+    }
+}
+
+/// The collars are 0.158 m and 0.2 m thick on the axis and thin out towards their rims, the gaps between collar and head
+/// towards their bottoms. With 32 cells and more what the nodes do not see of either is found from the edges beside it: a
+/// seventh of a cell is left where a gap is narrower than that. With fewer cells (0.19 m down to 0.125 m) whole cells of a
+/// rim lie between nodes: part of the rim is cut off, and a few triangles turn their backs to the faces that were missed.
+#[test]
+fn sharp_meshes_keep_to_thin_collars_on_coarse_grids() {
+    for name in ["pawn", "bishop"] {
+        for (cells, most, flipped) in [
+            (16, 1.0, 4),
+            (20, 0.6, 4),
+            (24, 0.6, 4),
+            (32, 0.15, 0),
+            (40, 0.15, 0),
+            (48, 0.15, 0),
+            (64, 0.15, 0),
+        ] {
+            let quality = sharp(name, cells);
+            let share = quality.hausdorff() / (3.0 / cells as f64);
+            println!("{name}, {cells} cells: {share:.3} cells, {} folded", quality.flipped);
+            assert!(share <= most, "{name}, {cells} cells: {share} cells, {quality:?}");
+            assert!(quality.flipped <= flipped, "{name}, {cells} cells: {quality:?}");
         }
     }
 }

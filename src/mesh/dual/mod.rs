@@ -2,8 +2,8 @@
 //!
 //! `crossings` finds the cells that the surface passes and its hits on their edges, as for marching cubes → `loops` tells
 //! which hits belong together → `place` gives each loop a vertex (`sharp`, `qef`, `crease`) → `quads` joins the four vertices
-//! around each hit and cuts the quad in two → `refine` cuts edges that are still too far from the surface → `unfold` turns
-//! edges of triangles that lie upside down.
+//! around each hit and cuts the quad in two → `refine` cuts edges that are still too far from the surface → `mend` looks
+//! one by one at what stays far off or lies upside down.
 //!
 //! The vertices are those of the dual of the marching-cubes mesh (Schaefer, Ju, Warren: Manifold dual contouring, IEEE
 //! TVCG 13, 2007), so the topology is the same. The quadratic error is that of Ju, Losasso, Schaefer, Warren: Dual
@@ -15,6 +15,8 @@
 
 mod crease;
 mod loops;
+mod mend;
+mod patch;
 mod place;
 mod project;
 mod qef;
@@ -23,13 +25,14 @@ mod refine;
 mod sharp;
 #[cfg(test)]
 mod tests;
-mod unfold;
 mod vertices;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use self::loops::Sheets;
+use self::mend::Aim;
+use self::patch::Patch;
 use self::place::{Placed, Scene, Slots};
 use self::quads::Quads;
 use self::vertices::{Hits, Kind, Rings, Vertices};
@@ -42,7 +45,7 @@ use super::{
 };
 use crate::field::Field;
 
-/// How often vertices may be moved back because triangles around them are upside down.
+/// How often triangles that lie upside down are looked for, to move vertices back or to mend them.
 const REPAIRS: usize = 4;
 
 /// The surface ω = 0 of a field as a closed mesh with sharp creases; empty if no node of the grid lies inside.
@@ -98,13 +101,16 @@ pub fn dual_contouring(
         spoilt.dedup();
         spoilt.retain(|&v| {
             let Ok(at) = fallbacks.binary_search_by_key(&v, |&(v, _)| v) else { return false };
-            let (place, fallback) = (&mut vertices.positions[v as usize], &mut fallbacks[at].1);
-            if *place == *fallback {
+            let fallback = &mut fallbacks[at].1;
+            if vertices.positions[v as usize] == *fallback {
                 return false;
             }
             let settled = project::newton(field, *fallback, size, &mut work.gradients);
-            *fallback = settled.map_or(*fallback, |face| face.point);
-            *place = *fallback;
+            let (position, normal) =
+                settled.map_or((*fallback, DVec3::ZERO), |face| (face.point, face.normal));
+            *fallback = position;
+            vertices.positions[v as usize] = position;
+            vertices.normals[v as usize] = normal;
             true
         });
         if spoilt.is_empty() {
@@ -115,12 +121,27 @@ pub fn dual_contouring(
     work.gradients += cut.gradients + placed.iter().map(|part| part.gradients).sum::<u64>();
     let mut triangles = quads.triangles(cut, &mut vertices);
     triangles.extend(placed.iter().flat_map(|part| &part.tubes));
-    work.gradients += refine::refine(field, &mut vertices, &mut triangles, size);
+    let (left, evaluations) = refine::refine(field, &mut vertices, &mut triangles, size);
+    work.gradients += evaluations;
+    let (place, tolerance) = ((grid.bounds(), size), refine::TOLERANCE * size);
+    if mend::is_worth(&left, &triangles) {
+        let patch = Patch::new(field, place, &mut vertices, &mut triangles, &left);
+        work.gradients += mend::mend(patch, left, tolerance, Aim::Distance);
+    }
     if vertices.len() > Mesh::MAX_VERTICES {
         return Err(MeshError::TooManyVertices { found: vertices.len() });
     }
-    work.merged = merge(&mut vertices, &mut triangles, size);
-    unfold::unfold(field, &vertices, &mut triangles, &mut work.gradients);
+    work.merged = merge(&mut vertices, &mut triangles, TOO_CLOSE * size);
+    for _ in 0..REPAIRS {
+        let (folded, evaluations) = mend::folded(field, &vertices, &triangles, size);
+        work.gradients += evaluations;
+        if !mend::is_worth(&folded, &triangles) {
+            break;
+        }
+        let patch = Patch::new(field, place, &mut vertices, &mut triangles, &folded);
+        work.gradients += mend::mend(patch, folded, tolerance, Aim::Folds);
+        work.merged += merge(&mut vertices, &mut triangles, 0.0);
+    }
 
     let caps = (0..).zip(&vertices.kinds).filter(|(_, kind)| **kind == Kind::Cap).map(|(i, _)| i).collect();
     let Vertices { positions, normals, kinds } = vertices;
@@ -205,8 +226,8 @@ fn place(scene: &Scene<'_>, counts: Vec<usize>) -> (Vertices, Vec<Placed>) {
 /// have come to nearly the same place.
 const TOO_CLOSE: f64 = 0.1;
 
-/// Merges vertices that coincide, and ends of very short edges on creases; returns how many.
-fn merge(vertices: &mut Vertices, triangles: &mut Vec<[u32; 3]>, size: f64) -> u64 {
+/// Merges vertices that coincide, and ends of edges on creases that are shorter than `too_close`; returns how many.
+fn merge(vertices: &mut Vertices, triangles: &mut Vec<[u32; 3]>, too_close: f64) -> u64 {
     let sharp = (0_u32..).zip(&vertices.kinds).filter(|(_, kind)| **kind != Kind::Smooth);
     let bits = |v: u32| vertices.positions[v as usize].to_array().map(f64::to_bits);
     let mut places: Vec<([u64; 3], u32)> = sharp.map(|(v, _)| (bits(v), v)).collect();
@@ -223,7 +244,7 @@ fn merge(vertices: &mut Vertices, triangles: &mut Vec<[u32; 3]>, size: f64) -> u
             let pair = [t[i], t[(i + 1) % 3]];
             let [a, b] = pair.map(|v| vertices.positions[v as usize]);
             let is_free = !pair.iter().any(|&v| is_taken[v as usize]);
-            if is_free && a.distance(b) < TOO_CLOSE * size {
+            if is_free && a.distance(b) < too_close {
                 pair.iter().for_each(|&v| is_taken[v as usize] = true);
                 groups.push(pair.to_vec());
             }

@@ -18,7 +18,7 @@ use crate::field::Field;
 
 /// The distance of an edge's middle from the surface above which it is cut, in cells. It bounds what is left: the pawn
 /// in [0, 3]³ at 256³ cells has a Hausdorff distance of 0.024 cells, where chords across its collar alone make 0.08.
-const TOLERANCE: f64 = 0.025;
+pub(super) const TOLERANCE: f64 = 0.025;
 
 /// Each round quarters what is left.
 const ROUNDS: usize = 3;
@@ -36,22 +36,26 @@ const LONGEST_DROP: f64 = 2.0;
 /// Where on an edge the faces of its two ends are looked up, as a share of its length.
 const BESIDE: f64 = 0.1;
 
-/// Cuts edges until the mesh is near the surface; returns the number of evaluations of ∇ω.
+/// Cuts edges until the mesh is near the surface; returns the edges that are not and could not be cut, ascending, and the
+/// number of evaluations of ∇ω.
 pub(super) fn refine(
     field: &dyn Field,
     vertices: &mut Vertices,
     triangles: &mut Vec<[u32; 3]>,
     size: f64,
-) -> u64 {
+) -> (Vec<[u32; 2]>, u64) {
     let mut evaluations = 0;
+    let mut left = Vec::new();
     // triangles whose edges have not been looked at
     let mut fresh = 0..triangles.len();
     let mut changed: Vec<u32> = Vec::new();
     for _ in 0..ROUNDS {
         let is_fresh = triangles[fresh.clone()].par_iter().copied();
         let others: Vec<[u32; 3]> = changed.iter().map(|&t| triangles[t as usize]).collect();
-        let (cuts, count) = cuts(field, vertices, is_fresh.chain(others), TOLERANCE * size);
+        let found = cuts(field, vertices, is_fresh.chain(others), TOLERANCE * size);
+        let Found { cuts, left: uncut, evaluations: count } = found;
         evaluations += count;
+        left.extend(uncut);
         if cuts.is_empty() {
             break;
         }
@@ -62,11 +66,22 @@ pub(super) fn refine(
         changed = divide(vertices, triangles, &numbers);
         fresh = whole..triangles.len();
     }
-    evaluations
+    left.sort_unstable();
+    left.dedup();
+    (left, evaluations)
 }
 
 /// An edge's ends, ascending, and the vertex that cuts it.
 type EdgeCut = ([u32; 2], Vertex);
+
+/// What is found about edges.
+#[derive(Default)]
+struct Found {
+    cuts: Vec<EdgeCut>,
+    /// Edges that are too far from the surface but have no vertex to cut them.
+    left: Vec<[u32; 2]>,
+    evaluations: u64,
+}
 
 /// The edges of some triangles to cut, ascending by their ends.
 fn cuts(
@@ -74,8 +89,8 @@ fn cuts(
     vertices: &Vertices,
     triangles: impl IndexedParallelIterator<Item = [u32; 3]>,
     tolerance: f64,
-) -> (Vec<EdgeCut>, u64) {
-    let parts: Vec<(Vec<EdgeCut>, u64)> = triangles
+) -> Found {
+    let parts: Vec<Found> = triangles
         .fold_chunks(BATCH, Vec::new, |mut edges: Vec<[u32; 2]>, t| {
             // each edge of a closed mesh is run along once in ascending order
             let sides = (0..3).map(|i| [t[i], t[(i + 1) % 3]]);
@@ -94,7 +109,11 @@ fn cuts(
             let found = gradients(field, &middles);
             let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
             let (mut bends, mut others) = (Vec::new(), Vec::new());
-            for (edge, found) in edges.into_iter().zip(found).filter(|(_, found)| off(*found)) {
+            let (far, near): (Vec<_>, Vec<_>) =
+                edges.into_iter().zip(found).partition(|(_, found)| off(*found));
+            let mut left =
+                far_beside(field, vertices, near.into_iter().map(|(edge, _)| edge), tolerance, &mut count);
+            for (edge, found) in far {
                 match Bend::new(vertices, edge, found) {
                     Some(bend) => bends.push(bend),
                     None => others.push(edge),
@@ -108,17 +127,54 @@ fn cuts(
                     others.push(bend.edge);
                 }
             }
-            cut.extend(others.into_iter().filter_map(|edge| {
-                let ends = edge.map(|v| vertices.get(v));
-                Some((edge, middle(field, ends, tolerance, &mut count)?))
-            }));
-            (cut, count)
+            for edge in others {
+                match middle(field, edge.map(|v| vertices.get(v)), tolerance, &mut count) {
+                    Middle::Near => {}
+                    Middle::At(vertex) => cut.push((edge, vertex)),
+                    Middle::Nowhere => left.push(edge),
+                }
+            }
+            Found { cuts: cut, left, evaluations: count }
         })
         .collect();
-    let count = parts.iter().map(|part| part.1).sum();
-    let mut cuts: Vec<EdgeCut> = parts.into_iter().flat_map(|part| part.0).collect();
-    cuts.sort_unstable_by_key(|cut| cut.0);
-    (cuts, count)
+    let mut all = Found::default();
+    for part in parts {
+        all.cuts.extend(part.cuts);
+        all.left.extend(part.left);
+        all.evaluations += part.evaluations;
+    }
+    all.cuts.sort_unstable_by_key(|cut| cut.0);
+    all
+}
+
+/// Edges that leave the surface although their middles are near it: they enter a wall thinner than a cell, or a gap.
+fn far_beside(
+    field: &dyn Field,
+    vertices: &Vertices,
+    edges: impl Iterator<Item = [u32; 2]>,
+    tolerance: f64,
+    count: &mut u64,
+) -> Vec<[u32; 2]> {
+    let is_sharp = |v: u32| vertices.kinds[v as usize] == Kind::Sharp;
+    let normal = |v: u32| vertices.normals[v as usize];
+    let doubtful: Vec<[u32; 2]> =
+        edges.filter(|&[a, b]| is_sharp(a) || is_sharp(b) || normal(a).dot(normal(b)) < 0.5).collect();
+    let points: Vec<DVec3> = doubtful
+        .iter()
+        .flat_map(|edge| {
+            let [p, q] = edge.map(|v| vertices.positions[v as usize]);
+            [0.25, 0.75].map(|share| p.lerp(q, share))
+        })
+        .collect();
+    *count += points.len() as u64;
+    let found = gradients(field, &points);
+    let off = |(omega, gradient): &(f64, DVec3)| omega.abs() > 2.0 * tolerance * gradient.length();
+    doubtful
+        .into_iter()
+        .zip(found.chunks_exact(2))
+        .filter(|(_, pair)| pair.iter().any(off))
+        .map(|(edge, _)| edge)
+        .collect()
 }
 
 /// Whether the surface may be farther than `tolerance` from the middle of an edge, as far as its ends tell.
@@ -214,9 +270,17 @@ fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) 
 /// A step, in tolerances, that needs no other after it: what it leaves is its square times the curvature, 1e-11 of it.
 const LAST_STEP: f64 = 1e-5;
 
-/// The vertex that cuts an edge: on the crease between the faces at its ends, or on the surface; none where the surface
-/// is near after all (the field told another face's distance), or too far off.
-fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u64) -> Option<Vertex> {
+/// Where an edge is cut.
+enum Middle {
+    At(Vertex),
+    /// The surface is near after all: the field told another face's distance.
+    Near,
+    /// No point of the surface is near enough to the middle.
+    Nowhere,
+}
+
+/// The vertex that cuts an edge: on the crease between the faces at its ends, or on the surface.
+fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u64) -> Middle {
     let (start, length) = (0.5 * (a.position + b.position), a.position.distance(b.position));
     let is_near = |p: &DVec3, reach: f64| p.distance(start) <= reach * length;
     let mut face = |p: DVec3, normal: DVec3| match unit(normal) {
@@ -230,14 +294,14 @@ fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u6
     let near =
         faces.into_iter().flatten().any(|f| project::is_within(field, start, f.normal, tolerance, count));
     if near {
-        return None;
+        return Middle::Near;
     }
     if let [Some(first), Some(second)] = faces {
         let found = crease::find(field, start, &[first, second], length, count);
         // the bottom of a groove between walls at ±angle/2 lies half a length · tan(angle/2) below the middle
         let drop = (0.5 * first.normal.angle_between(second.normal)).tan();
         if let Some(position) = found.filter(|p| is_near(p, (0.25 + 0.75 * drop).min(LONGEST_DROP))) {
-            return Some(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            return Middle::At(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
         }
     }
     let normal = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
@@ -245,8 +309,10 @@ fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u6
         Some(normal) => project::onto_face(field, start, normal, length, count),
         None => project::newton(field, start, length, count),
     };
-    let found = found.filter(|face| is_near(&face.point, LONGEST_MOVE))?;
-    Some(Vertex { position: found.point, normal: found.normal, kind: Kind::Smooth })
+    match found.filter(|face| is_near(&face.point, LONGEST_MOVE)) {
+        Some(face) => Middle::At(Vertex { position: face.point, normal: face.normal, kind: Kind::Smooth }),
+        None => Middle::Nowhere,
+    }
 }
 
 /// Divides triangles at cut edges: the first part takes the place of the whole, the others go to the end. Returns the

@@ -55,6 +55,18 @@ impl Vertices {
         self.normals.push(vertex.normal);
         self.kinds.push(vertex.kind);
     }
+
+    pub fn set(&mut self, v: u32, vertex: Vertex) {
+        let v = v as usize;
+        (self.positions[v], self.normals[v], self.kinds[v]) = (vertex.position, vertex.normal, vertex.kind);
+    }
+
+    /// Drops the last.
+    pub fn pop(&mut self) {
+        self.positions.pop();
+        self.normals.pop();
+        self.kinds.pop();
+    }
 }
 
 /// Where the surface crosses an edge.

@@ -1,0 +1,314 @@
+//! Mends the places where edges stay far from the surface although nothing near their middles could cut them, and
+//! triangles that lie upside down: about collars and gaps thinner than a cell, which the grid has seen in part.
+//!
+//! One edge after the other is turned, or cut at one of several points of the surface, or one of the vertices about it
+//! goes to another place, whichever brings the triangles beside it nearer to the surface without folding them. Edges that
+//! a change touches wait in the same queue.
+//!
+//! Invariant: edges are treated in the order of their numbers and an edge is turned only if its new ends were not joined
+//! yet, so the mesh stays closed and manifold and is the same on any number of threads.
+
+use std::collections::VecDeque;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::super::normals::{gradients, unit};
+use super::patch::{FACING, NEAR, Pair, Patch, STEPS};
+use super::vertices::{Kind, Vertex, Vertices};
+use super::{crease, project};
+use crate::field::Field;
+
+/// A change must leave at most this share of what it is to mend.
+const LEFT: f64 = 0.9;
+
+/// No edge shorter than this is cut, in cells, and no half as long made.
+const SHORTEST: f64 = 0.1;
+
+/// Edges looked at for each edge at first, and in all, which takes a second or two.
+const LOOKS: usize = 12;
+const MOST: usize = 20_000;
+
+/// With more edges to mend than this for each triangle (there are 1.5 edges to a triangle in all) the grid does not resolve
+/// the surface, and it is left alone.
+const RESOLVED: f64 = 0.3;
+
+/// What is to be mended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Aim {
+    /// Edges that are far from the surface.
+    Distance,
+    /// Folded triangles: their vertices may also be merged with others, by going where these are.
+    Folds,
+}
+
+/// Whether so few edges are to be mended that it is worth it.
+pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
+    !edges.is_empty() && edges.len() as f64 <= RESOLVED * triangles.len() as f64
+}
+
+/// Mends what is around the given edges, ascending; returns the number of evaluations.
+pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim) -> u64 {
+    let looks = MOST.min(LOOKS * edges.len());
+    let mut queue = VecDeque::from(edges);
+    for _ in 0..looks {
+        let Some(edge) = queue.pop_front() else { break };
+        let Some(pair) = patch.pair(edge) else { continue };
+        if let Some(change) = best(&mut patch, pair, tolerance, aim) {
+            queue.extend(make(&mut patch, pair, change));
+        }
+    }
+    patch.count
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Change {
+    /// The edge joins the apexes instead.
+    Turn,
+    /// The edge is cut.
+    Cut(Vertex),
+    /// A vertex goes elsewhere.
+    Move(u32, Vertex),
+}
+
+/// The change that helps most so far, and how much less is wrong after it.
+struct Choice(Option<(f64, Change)>);
+
+impl Choice {
+    fn consider(&mut self, before: f64, after: f64, change: Change) {
+        let gain = before - after;
+        if after <= LEFT * before && self.0.is_none_or(|(most, _)| gain > most) {
+            self.0 = Some((gain, change));
+        }
+    }
+}
+
+/// The change about an edge that helps most, if there is anything to mend and any helps.
+fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<Change> {
+    let old = pair.triangles();
+    let before = patch.badness(&old, &patch.along(pair.ends));
+    if before <= tolerance {
+        return None;
+    }
+    let mut choice = Choice(None);
+    let [c, d] = pair.apexes;
+    if c != d && !patch.is_edge(pair.apexes) {
+        let after = patch.badness(&pair.turned(), &patch.along(pair.apexes));
+        choice.consider(before, after, Change::Turn);
+    }
+    let [p, q] = pair.ends.map(|v| patch.position(v));
+    if p.distance(q) > SHORTEST * patch.size {
+        let new = patch.vertices.len() as u32;
+        for vertex in cuts(patch, pair) {
+            let distances = pair.corners().map(|v| patch.position(v).distance(vertex.position));
+            if distances.into_iter().any(|distance| distance < 0.5 * SHORTEST * patch.size) {
+                continue;
+            }
+            patch.vertices.push(vertex);
+            let spokes = pair.corners().map(|v| patch.along([v, new])).concat();
+            let after = patch.badness(&pair.cut(new), &spokes);
+            patch.vertices.pop();
+            choice.consider(before, after, Change::Cut(vertex));
+        }
+    }
+    let may_merge = aim == Aim::Folds || old.iter().any(|t| patch.fold(*t) > FACING);
+    for v in pair.corners() {
+        let old = patch.vertices.get(v);
+        if old.kind != Kind::Sharp {
+            continue;
+        }
+        let before = patch.badness_around(v);
+        for vertex in places(patch, v, may_merge) {
+            patch.vertices.set(v, vertex);
+            let after = patch.badness_around(v);
+            choice.consider(before, after, Change::Move(v, vertex));
+        }
+        patch.vertices.set(v, old);
+    }
+    choice.0.map(|(_, change)| change)
+}
+
+/// Makes a change; returns the edges that it touches.
+fn make(patch: &mut Patch<'_>, pair: Pair, change: Change) -> Vec<[u32; 2]> {
+    match change {
+        Change::Turn => {
+            patch.replace(pair, &pair.turned());
+            [&pair.rim()[..], &[pair.apexes]].concat()
+        }
+        Change::Cut(vertex) => {
+            let new = patch.vertices.len() as u32;
+            patch.vertices.push(vertex);
+            patch.replace(pair, &pair.cut(new));
+            [pair.rim(), pair.corners().map(|v| [v, new])].concat()
+        }
+        Change::Move(v, vertex) => patch.put(v, vertex).into_iter().flat_map(sides).collect(),
+    }
+}
+
+fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// Where on an edge the faces of its two ends are looked up, as a share of its length.
+const BESIDE: f64 = 0.1;
+
+/// Points of the surface where an edge may be cut: the crease of the faces at its ends, and what lies across the edge from
+/// the point of it that is farthest off.
+fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
+    let [a, b] = pair.ends.map(|v| patch.vertices.get(v));
+    let points = patch.along(pair.ends);
+    let off = points.map(|p| patch.step(p).0.length());
+    let start = (0..points.len()).max_by(|&i, &j| off[i].total_cmp(&off[j])).map_or(points[0], |i| points[i]);
+    let length = a.position.distance(b.position);
+    let reach = length.max(patch.size);
+    let (field, count) = (patch.field, &mut patch.count);
+    let faces = [(a, b), (b, a)].map(|(at, other)| {
+        let p = at.position.lerp(other.position, BESIDE);
+        match unit(at.normal) {
+            Some(normal) => project::onto_face(field, p, normal, length, count),
+            None => project::newton(field, p, length, count),
+        }
+    });
+    let mut found = Vec::new();
+    if let [Some(first), Some(second)] = faces {
+        let at = crease::find(field, start, &[first, second], reach, count);
+        found.extend(at.map(|position| Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp }));
+    }
+    let mean = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
+    let mut near: Vec<_> = project::newton(field, start, reach, count).into_iter().collect();
+    let [c, d] = pair.apexes.map(|v| patch.position(v));
+    let across = (b.position - a.position).cross(c - d);
+    for way in [mean, across].into_iter().filter_map(unit) {
+        near.extend(project::along(field, start, way, reach, &mut patch.count));
+    }
+    found.extend(near.into_iter().map(on_face));
+    found.retain(|vertex| patch.bounds.contains(vertex.position));
+    found
+}
+
+fn on_face(face: crease::Face) -> Vertex {
+    Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp }
+}
+
+/// Points of the surface where a vertex may go: near it, near the middle of its triangles, and where it may be merged with
+/// another.
+fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
+    let (mut facing, mut middle, mut count) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    for t in patch.fan(v) {
+        let [a, b, c] = t.map(|v| patch.position(v));
+        facing += (b - a).cross(c - a);
+        middle += (a + b + c) / 3.0;
+        count += 1.0;
+    }
+    let mut found = Vec::new();
+    for start in [patch.position(v), middle / count] {
+        if let Some(facing) = unit(facing) {
+            found.extend(project::along(patch.field, start, facing, patch.size, &mut patch.count));
+        }
+        found.extend(project::newton(patch.field, start, patch.size, &mut patch.count));
+    }
+    let mut found: Vec<Vertex> = found.into_iter().map(on_face).collect();
+    found.retain(|vertex| patch.bounds.contains(vertex.position));
+    if may_merge {
+        let others = patch.mergeable(v).into_iter();
+        found.extend(others.map(|other| Vertex { kind: Kind::Sharp, ..patch.vertices.get(other) }));
+    }
+    found
+}
+
+/// Triangles that face less than this like the surface below them (cosine) are looked at once more.
+const DOUBT: f64 = 0.8;
+
+/// Edges of triangles that lie upside down, ascending, and the number of evaluations; only vertices on creases make such.
+pub(super) fn folded(
+    field: &dyn Field,
+    vertices: &Vertices,
+    triangles: &[[u32; 3]],
+    size: f64,
+) -> (Vec<[u32; 2]>, u64) {
+    let kinds = |t: &&[u32; 3]| t.map(|v| vertices.kinds[v as usize]);
+    let mut suspects: Vec<[u32; 3]> = triangles
+        .par_iter()
+        .filter(|t| kinds(t).contains(&Kind::Sharp) && !kinds(t).contains(&Kind::Cap))
+        .copied()
+        .collect();
+    let corners = |t: [u32; 3]| t.map(|v| vertices.positions[v as usize]);
+    let mut feet: Vec<DVec3> = suspects.iter().map(|&t| corners(t).iter().sum::<DVec3>() / 3.0).collect();
+    let mut folded = Vec::new();
+    let mut evaluations = 0;
+    for _ in 0..STEPS {
+        evaluations += feet.len() as u64;
+        let found = gradients(field, &feet);
+        let mut doubtful = Vec::new();
+        for ((t, foot), (omega, gradient)) in suspects.into_iter().zip(feet).zip(found) {
+            let [a, b, c] = corners(t);
+            let directions = unit((b - a).cross(c - a)).zip(unit(-gradient));
+            let Some(facing) = directions.map(|(facing, normal)| facing.dot(normal)) else { continue };
+            let step = gradient * (omega / gradient.length_squared());
+            if facing < 0.0 {
+                folded.push(t);
+            } else if facing < DOUBT && step.is_finite() && step.length() > NEAR * size {
+                doubtful.push((t, foot - step));
+            }
+        }
+        (suspects, feet) = doubtful.into_iter().unzip();
+    }
+    let mut edges: Vec<[u32; 2]> =
+        folded.into_iter().flat_map(sides).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    (edges, evaluations)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Closures;
+    use crate::geom::Aabb;
+
+    const BOUNDS: Aabb = Aabb { min: DVec3::splat(-9.0), max: DVec3::splat(9.0) };
+
+    fn vertices(places: &[[f64; 3]]) -> Vertices {
+        let mut vertices = Vertices::default();
+        for place in places {
+            let position = DVec3::from_array(*place);
+            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+        }
+        vertices
+    }
+
+    /// Upwards facing triangles of a floor around a square that is cut so that one half is folded over: a dart whose
+    /// reflex corner lies inside the other half.
+    #[test]
+    fn a_fold_is_taken_out() {
+        let floor = Closures { omega: |p: DVec3| -p.z, gradient: |_| -DVec3::Z };
+        let mut vertices = vertices(&[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.4, 0.4, 0.0], [0.0, 2.0, 0.0]]);
+        // 1–3 is the diagonal outside the dart 0, 1, 2, 3
+        let mut triangles = vec![[0, 1, 3], [1, 2, 3]];
+        let (edges, _) = folded(&floor, &vertices, &triangles, 1.0);
+        assert_eq!(edges, [[1, 2], [1, 3], [2, 3]]);
+        let patch = Patch::new(&floor, (&BOUNDS, 1.0), &mut vertices, &mut triangles, &edges);
+        mend(patch, edges, 0.01, Aim::Folds);
+        assert_eq!(folded(&floor, &vertices, &triangles, 1.0).0, [[0; 2]; 0]);
+        assert_eq!(triangles.len(), 2);
+    }
+
+    /// A plate thinner than the edges that run around it: from its upper face to its lower one, through it.
+    #[test]
+    fn an_edge_through_a_plate_is_cut_at_its_rim() {
+        let plate = Closures {
+            omega: |p: DVec3| 1.0 - p.x * p.x - 16.0 * p.z * p.z,
+            gradient: |p: DVec3| DVec3::new(-2.0 * p.x, 0.0, -32.0 * p.z),
+        };
+        let height = (1.0_f64 - 0.4 * 0.4).sqrt() / 4.0;
+        let (up, down) = (height, -height);
+        let mut vertices = vertices(&[[0.4, 0.0, up], [0.4, 0.0, down], [0.4, 1.0, up], [0.4, -1.0, down]]);
+        let mut triangles = vec![[1, 2, 0], [1, 0, 3]];
+        let edges = vec![[0, 1]];
+        let patch = Patch::new(&plate, (&BOUNDS, 1.0), &mut vertices, &mut triangles, &edges);
+        mend(patch, edges, 0.025, Aim::Distance);
+        let farthest = vertices.positions.iter().map(|p| p.x).fold(0.0, f64::max);
+        assert!((farthest - 1.0).abs() < 1e-9, "{:?}", vertices.positions);
+        assert!(triangles.len() > 2);
+    }
+}

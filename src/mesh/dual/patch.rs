@@ -1,0 +1,241 @@
+//! The part of a mesh that is mended, and what is wrong with it.
+//!
+//! Invariant: replacing the triangles of a pair by others with the same border leaves the mesh as closed as it was.
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use super::super::normals::unit;
+use super::vertices::{Kind, Vertex, Vertices};
+use crate::field::Field;
+use crate::geom::Aabb;
+
+/// Triangles that face less like the surface below them than this (cosine) count as folded, the more the less they do.
+pub(super) const FACING: f64 = 0.3;
+
+/// Steps of Newton's method from the middle of a triangle to the surface below, and the step that needs no other after it,
+/// in cells: what faces there is to be known, not where it is.
+pub(super) const STEPS: usize = 4;
+pub(super) const NEAR: f64 = 0.01;
+
+/// Where an edge is compared with the surface, as shares of its length.
+const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
+
+/// How far from the edges to mend changes may spread, in edges.
+const RINGS: usize = 3;
+
+/// The mesh around the edges to mend.
+pub(super) struct Patch<'a> {
+    pub field: &'a dyn Field,
+    /// The grid; vertices on its border stay where they are.
+    pub bounds: &'a Aabb,
+    /// The shortest side of a cell.
+    pub size: f64,
+    pub vertices: &'a mut Vertices,
+    pub triangles: &'a mut Vec<[u32; 3]>,
+    /// Triangles around each vertex of the patch.
+    fans: FxHashMap<u32, Vec<u32>>,
+    /// Evaluations of ω and ∇ω.
+    pub count: u64,
+}
+
+/// The two triangles at an edge a–b: (a, b, c) and (b, a, d).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pair {
+    places: [u32; 2],
+    pub ends: [u32; 2],
+    pub apexes: [u32; 2],
+}
+
+impl Pair {
+    pub fn triangles(&self) -> [[u32; 3]; 2] {
+        let ([a, b], [c, d]) = (self.ends, self.apexes);
+        [[a, b, c], [b, a, d]]
+    }
+
+    /// With the edge joining the apexes instead.
+    pub fn turned(&self) -> [[u32; 3]; 2] {
+        let ([a, b], [c, d]) = (self.ends, self.apexes);
+        [[a, d, c], [d, b, c]]
+    }
+
+    /// With the edge cut at a vertex.
+    pub fn cut(&self, m: u32) -> [[u32; 3]; 4] {
+        let ([a, b], [c, d]) = (self.ends, self.apexes);
+        [[a, m, c], [b, m, d], [m, b, c], [m, a, d]]
+    }
+
+    pub fn corners(&self) -> [u32; 4] {
+        let ([a, b], [c, d]) = (self.ends, self.apexes);
+        [a, b, c, d]
+    }
+
+    /// The edges around both triangles.
+    pub fn rim(&self) -> [[u32; 2]; 4] {
+        let ([a, b], [c, d]) = (self.ends, self.apexes);
+        [[a, c], [b, c], [a, d], [b, d]]
+    }
+}
+
+impl<'a> Patch<'a> {
+    pub fn new(
+        field: &'a dyn Field,
+        (bounds, size): (&'a Aabb, f64),
+        vertices: &'a mut Vertices,
+        triangles: &'a mut Vec<[u32; 3]>,
+        edges: &[[u32; 2]],
+    ) -> Self {
+        let mut is_near = vec![false; vertices.len()];
+        edges.iter().flatten().for_each(|&v| is_near[v as usize] = true);
+        for _ in 0..RINGS {
+            let beside = triangles.iter().filter(|t| t.iter().any(|&v| is_near[v as usize]));
+            let beside: Vec<[u32; 3]> = beside.copied().collect();
+            beside.iter().flatten().for_each(|&v| is_near[v as usize] = true);
+        }
+        let mut fans: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+        for (i, t) in (0..).zip(triangles.iter()) {
+            for v in t.iter().filter(|&&v| is_near[v as usize]) {
+                fans.entry(*v).or_default().push(i);
+            }
+        }
+        Self { field, bounds, size, vertices, triangles, fans, count: 0 }
+    }
+
+    /// The triangles at an edge; none if it is gone, or leaves the patch, or touches the border.
+    pub fn pair(&self, [a, b]: [u32; 2]) -> Option<Pair> {
+        let runs = |t: [u32; 3], [a, b]: [u32; 2]| (0..3).any(|i| t[i] == a && t[(i + 1) % 3] == b);
+        let fan = self.fans.get(&a)?;
+        let find = |way: [u32; 2]| fan.iter().copied().find(|&t| runs(self.triangles[t as usize], way));
+        let places = [find([a, b])?, find([b, a])?];
+        let apex = |t: u32| self.triangles[t as usize].into_iter().find(|v| *v != a && *v != b);
+        let pair = Pair { places, ends: [a, b], apexes: [apex(places[0])?, apex(places[1])?] };
+        pair.corners().iter().all(|&v| self.is_free(v)).then_some(pair)
+    }
+
+    fn is_free(&self, v: u32) -> bool {
+        let (p, Aabb { min, max }) = (self.position(v), *self.bounds);
+        let is_within = p.cmpgt(min).all() && p.cmplt(max).all();
+        is_within && self.fans.contains_key(&v) && self.vertices.kinds[v as usize] != Kind::Cap
+    }
+
+    pub fn position(&self, v: u32) -> DVec3 {
+        self.vertices.positions[v as usize]
+    }
+
+    pub fn is_edge(&self, [a, b]: [u32; 2]) -> bool {
+        self.fan(a).any(|t| t.contains(&b))
+    }
+
+    /// The triangles around a vertex.
+    pub fn fan(&self, v: u32) -> impl Iterator<Item = [u32; 3]> {
+        let fan = self.fans.get(&v).map_or(&[][..], Vec::as_slice);
+        fan.iter().map(|&t| self.triangles[t as usize])
+    }
+
+    /// Vertices joined to one by an edge.
+    pub fn around(&self, v: u32) -> Vec<u32> {
+        self.fan(v).filter_map(|t| (0..3).find(|&i| t[i] == v).map(|i| t[(i + 1) % 3])).collect()
+    }
+
+    /// Vertices that may be merged with one: their common neighbours are the apexes of their edge, and no tetrahedron
+    /// closes.
+    pub fn mergeable(&self, v: u32) -> Vec<u32> {
+        let around = self.around(v);
+        let has_common = |other: u32| {
+            let joined = self.around(other);
+            around.iter().filter(|v| joined.contains(v)).count() == 2 && around.len() > 3
+        };
+        around.iter().copied().filter(|&other| self.is_free(other) && has_common(other)).collect()
+    }
+
+    /// Puts triangles in the place of a pair, those that are too many to the end.
+    pub fn replace(&mut self, pair: Pair, now: &[[u32; 3]]) {
+        for (place, t) in pair.places.into_iter().zip(pair.triangles()) {
+            for v in t {
+                self.fans.entry(v).or_default().retain(|&other| other != place);
+            }
+        }
+        for (i, t) in now.iter().enumerate() {
+            let place = pair.places.get(i).copied().unwrap_or(self.triangles.len() as u32);
+            match self.triangles.get_mut(place as usize) {
+                Some(old) => *old = *t,
+                None => self.triangles.push(*t),
+            }
+            t.iter().for_each(|v| self.fans.entry(*v).or_default().push(place));
+        }
+    }
+
+    /// Points spread along an edge.
+    pub fn along(&self, edge: [u32; 2]) -> [DVec3; 3] {
+        let [p, q] = edge.map(|v| self.position(v));
+        SHARES.map(|share| p.lerp(q, share))
+    }
+
+    /// What is wrong about a vertex and its triangles.
+    pub fn badness_around(&mut self, v: u32) -> f64 {
+        let triangles: Vec<[u32; 3]> = self.fan(v).collect();
+        let mut points: Vec<DVec3> =
+            self.around(v).into_iter().flat_map(|other| self.along([v, other])).collect();
+        points.push(self.position(v));
+        self.badness(&triangles, &points)
+    }
+
+    /// What is wrong with triangles, as a distance: how far their middles and some more points are from the surface, at
+    /// most, and how much they turn from it in all, a cell for a right angle or about so.
+    pub fn badness(&mut self, triangles: &[[u32; 3]], points: &[DVec3]) -> f64 {
+        let mut off = 0.0;
+        for p in points {
+            off = f64::max(off, self.step(*p).0.length());
+        }
+        let mut folds = 0.0;
+        for t in triangles {
+            let middle = t.map(|v| self.position(v)).iter().sum::<DVec3>() / 3.0;
+            off = f64::max(off, self.step(middle).0.length());
+            folds += self.fold(*t);
+        }
+        off + self.size * folds
+    }
+
+    /// How much less a triangle faces like the surface below its middle than it should; above [`FACING`] it is folded.
+    pub fn fold(&mut self, t: [u32; 3]) -> f64 {
+        let [a, b, c] = t.map(|v| self.position(v));
+        let Some(facing) = unit((b - a).cross(c - a)) else { return 0.0 };
+        let mut foot = (a + b + c) / 3.0;
+        let mut fold = 0.0;
+        for _ in 0..STEPS {
+            let (step, normal) = self.step(foot);
+            foot -= step;
+            fold = normal.map_or(fold, |normal| f64::max(fold, FACING - facing.dot(normal)));
+            if step.length() <= NEAR * self.size {
+                break;
+            }
+        }
+        fold
+    }
+
+    /// The step of Newton's method at a point, of a cell at most, and the outward normal there.
+    pub fn step(&mut self, p: DVec3) -> (DVec3, Option<DVec3>) {
+        self.count += 1;
+        let (omega, gradient) = self.field.omega_grad(p);
+        let step = gradient * (omega / gradient.length_squared());
+        let step = if step.is_finite() { step.clamp_length_max(self.size) } else { DVec3::ZERO };
+        (step, unit(-gradient))
+    }
+
+    /// Moves a vertex; returns the triangles around it. One that it comes upon is to be merged with it: both and all
+    /// around them then stay as they are, so that this remains possible.
+    pub fn put(&mut self, v: u32, vertex: Vertex) -> Vec<[u32; 3]> {
+        let fan: Vec<[u32; 3]> = self.fan(v).collect();
+        let around = self.around(v);
+        let met = around.iter().copied().find(|&other| self.position(other) == vertex.position);
+        self.vertices.set(v, vertex);
+        if let Some(met) = met {
+            self.vertices.kinds[met as usize] = Kind::Sharp;
+            let others = self.around(met);
+            around.iter().chain(&others).for_each(|v| {
+                self.fans.remove(v);
+            });
+        }
+        fan
+    }
+}
