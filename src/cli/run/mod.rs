@@ -2,6 +2,7 @@
 //!
 //! experiment (scene → simulation) → steps, with a frame, a checkpoint and samples of probes every so often → summary.
 
+mod bodies;
 mod checkpoints;
 mod frames;
 mod pace;
