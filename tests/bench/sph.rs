@@ -10,7 +10,7 @@
 
 use std::time::Instant;
 
-use rfm::field::Field;
+use rfm::field::{Faces, Field, Part};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::sph::{
@@ -200,9 +200,9 @@ fn walls(particles: usize) {
         "\nWalls and contact: a pool 0.5 m deep in the box [0, 3]³, wcsph in f32, one thread, ms per step.\n"
     );
     println!(
-        "| obstacle | particles | with it | without it | without any wall | obstacle's part | all walls' part |"
+        "| obstacle | particles | of them near it | with it | without it | without any wall | obstacle's part | all walls' part | ns per near particle |"
     );
-    println!("|---|--:|--:|--:|--:|--:|--:|");
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
     for (name, text, solid) in [("pawn", PAWN, "pawn"), ("500 posts", POSTS, "posts")] {
         let parameters = parameters(particles, wcsph(), Precision::Single);
         let field = obstacle(text, solid, parameters.support_radius);
@@ -232,13 +232,22 @@ fn walls(particles: usize) {
             middle(parts.collect()).0
         };
         let (of_obstacle, of_walls) = (part(1), part(2));
+        let near = state.position.iter().filter(|&p| is_near(&*field, p, parameters.support_radius)).count();
         let [with, without, free] = times.map(|times| 1e3 * middle(times).0);
         println!(
-            "| {name} | {} | {with:.2} | {without:.2} | {free:.2} | {of_obstacle:.1} % | {of_walls:.1} % |",
-            state.len()
+            "| {name} | {} | {near} | {with:.2} | {without:.2} | {free:.2} | {of_obstacle:.1} % | {of_walls:.1} % | {:.0} |",
+            state.len(),
+            1e6 * (with - without) / near as f64
         );
     }
     set_up(parameters(particles, wcsph(), Precision::Single).support_radius);
+}
+
+/// Whether a part of the surface lies within reach.
+fn is_near(field: &dyn Field, p: DVec3, reach: f64) -> bool {
+    let mut faces = Faces::new();
+    field.faces(p, reach, &mut faces);
+    faces.iter().any(|part| matches!(part, Part::Face(face) if face.distance < reach))
 }
 
 /// Steps before walls are measured.
