@@ -10,6 +10,7 @@
 //! ```
 
 use std::cell::RefCell;
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 
@@ -256,7 +257,7 @@ impl Experiment {
         Some(DVec3::from_array(gravity))
     }
 
-    /// Steps until a time, s, at which the last step ends; `after_step` sees each state on the way.
+    /// Steps until a time, s, at which the last step ends; `after_step` sees each state on the way, and may end it.
     ///
     /// # Errors
     /// Those of a step.
@@ -266,14 +267,16 @@ impl Experiment {
         scene: &Scene,
         simulation: &mut Simulation<'_>,
         end: f64,
-        mut after_step: impl FnMut(&Simulation<'_>),
+        mut after_step: impl FnMut(&Simulation<'_>) -> ControlFlow<()>,
     ) -> Result<(), StepError> {
         while simulation.time() < end * (1.0 - 1e-12) {
             if let Some(gravity) = self.gravity_at(program, scene, simulation.time()) {
                 simulation.set_gravity(gravity);
             }
             simulation.step_at_most(end - simulation.time())?;
-            after_step(simulation);
+            if after_step(simulation).is_break() {
+                break;
+            }
         }
         Ok(())
     }

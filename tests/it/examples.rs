@@ -1,5 +1,6 @@
 //! The files in examples/ are what a new user reads first: they check without a word and run well.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use rfm::{Engine, Experiment, Program};
@@ -125,7 +126,7 @@ fn a_box_turns_about_its_fluid() {
     let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap();
     let (mut simulation, _) = experiment.simulation(&program, scene).unwrap();
     // a second at rest and a quarter of a turn: the wall x = 3 is the floor
-    experiment.advance(&program, scene, &mut simulation, 4.0, |_| {}).unwrap();
+    experiment.advance(&program, scene, &mut simulation, 4.0, |_| ControlFlow::Continue(())).unwrap();
     let gravity = simulation.parameters().gravity;
     assert!(gravity.x > 9.8 && gravity.z.abs() < 0.1, "{gravity}");
     let x = &simulation.particles().position.x;

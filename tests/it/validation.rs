@@ -1,6 +1,8 @@
 //! Flows whose outcome is known, from examples/validation, at sizes that take seconds. What is known is a formula or a
 //! measurement, never an earlier result of this program; each tolerance says what it allows for.
 
+use std::ops::ControlFlow;
+
 use rfm::experiment::{Deviation, Deviations};
 use rfm::glam::DVec3;
 use rfm::lower::Scene;
@@ -36,7 +38,8 @@ fn watch(
     look(scene, &simulation);
     for frame in 1..=frames {
         let end = f64::from(frame) * scene.run.save_every;
-        let reached = experiment.advance(&program, scene, &mut simulation, end, |_| {});
+        let reached =
+            experiment.advance(&program, scene, &mut simulation, end, |_| ControlFlow::Continue(()));
         reached.unwrap_or_else(|e| panic!("{name}: {e}"));
         look(scene, &simulation);
         if let Some(deviation) = Deviation::of(&program, scene, &simulation) {

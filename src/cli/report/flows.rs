@@ -2,6 +2,7 @@
 //!
 //! scene with a `truth` × methods × sizes → rows → table, JSON, picture. A run that fails is a row that says so.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -14,7 +15,7 @@ use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
 use crate::diagnostic::Diagnostics;
 use crate::experiment::{Deviation, Deviations};
-use crate::lower::Scene;
+use crate::lower::{Scene, Truth};
 use crate::sph::Simulation;
 use crate::{Error, Experiment, Program};
 
@@ -24,6 +25,10 @@ const SIZE: &str = "particles";
 /// Without `--particles`: these parts of what the file states. In space two spacings differ by 4^⅓ = 1.6, in a layer of
 /// fixed number of spacings by 2.
 const PARTS: [f64; 3] = [1.0 / 16.0, 1.0 / 4.0, 1.0];
+
+/// A run stands still if so many steps take less than this part of its time: one that goes on like that has a hundred
+/// million steps before it.
+const STANDSTILL: (u64, f64) = (200, 1e-6);
 
 /// One run.
 #[derive(Debug, Clone, Serialize)]
@@ -108,6 +113,14 @@ pub(super) fn run(
         several => several.iter().copied().map(Some).collect(),
     };
     let mut study = Study { shared, scene: &scene.name, instants: 0, bar: bar(&sizes, methods.len()) };
+    let table = Table::of(&truth);
+    if !shared.json {
+        println!(
+            "{}: relative deviation from what is known, root mean square over the saved instants from {} s on",
+            scene.name, truth.from
+        );
+        table.head();
+    }
     let mut rows: Vec<Row> = Vec::new();
     for method in methods {
         let by_method = match method {
@@ -123,6 +136,10 @@ pub(super) fn run(
             if let Some(coarser) = rows.last() {
                 row.compare(coarser);
             }
+            if !shared.json {
+                // each as soon as it is known: the next may take long
+                study.bar.suspend(|| table.row(&row));
+            }
             rows.push(row);
         }
     }
@@ -135,15 +152,8 @@ pub(super) fn run(
     if shared.json {
         let threads = rayon::current_num_threads();
         output::json(&Document { schema: 1, scene: &scene.name, threads, instants, rows: &rows })?;
-    } else {
-        println!(
-            "{}: relative deviation from what is known, root mean square over {instants} saved instants from {} s on",
-            scene.name, truth.from
-        );
-        print(&rows);
-        if let Some(path) = picture {
-            println!("plot written to {}", path.display());
-        }
+    } else if let Some(path) = picture {
+        println!("plot written to {}", path.display());
     }
     let failures: Vec<String> = rows
         .iter()
@@ -193,21 +203,35 @@ impl Study<'_> {
         input::show(&Diagnostics { list: experiment.take_warnings(), sources: program.sources().clone() });
         let before = self.bar.position();
         let method = experiment.parameters.method.name();
-        let follow = |simulation: &Simulation<'_>| {
+        let (mut failure, mut mark) = (None, (0, 0.0));
+        let mut stands_still = false;
+        let mut follow = |simulation: &Simulation<'_>| {
             let done = simulation.time() / scene.run.until;
             self.bar.set_position(before + (done * work(size)) as u64);
             let particles = simulation.particles().len();
             self.bar.set_message(format!("{method}, {particles} particles, t = {:.3} s", simulation.time()));
+            if simulation.steps() >= mark.0 + STANDSTILL.0 {
+                stands_still = simulation.time() - mark.1 < STANDSTILL.1 * scene.run.until;
+                mark = (simulation.steps(), simulation.time());
+            }
+            if stands_still { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut deviations = Deviations::default();
         let (mut cpu_seconds, mut seconds) = (0.0, 0.0);
-        let mut failure = None;
         let mut frame = 0;
         while failure.is_none() && simulation.time() < scene.run.until * (1.0 - 1e-12) {
             frame += 1;
             let end = (f64::from(frame) * scene.run.save_every).min(scene.run.until);
             let (clock, processor) = (Instant::now(), processor_seconds());
-            failure = experiment.advance(program, scene, &mut simulation, end, follow).err();
+            let reached = experiment.advance(program, scene, &mut simulation, end, &mut follow);
+            failure = reached.err().map(|error| error.to_string());
+            if simulation.time() < end * (1.0 - 1e-12) && failure.is_none() {
+                failure = Some(format!(
+                    "step {}: time stands still at {:.4} s, steps have become too short",
+                    simulation.steps(),
+                    simulation.time()
+                ));
+            }
             cpu_seconds += processor_seconds() - processor;
             seconds += clock.elapsed().as_secs_f64();
             if let Some(deviation) = Deviation::of(program, scene, &simulation).filter(|_| failure.is_none())
@@ -235,7 +259,7 @@ impl Study<'_> {
             cpu_seconds,
             cpu_seconds_per_simulated_second: cpu_seconds / simulation.time(),
             seconds,
-            failure: failure.map(|error| error.to_string()),
+            failure,
         })
     }
 }
@@ -275,35 +299,45 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-fn print(rows: &[Row]) {
-    let known: Vec<usize> = (0..3).filter(|&k| rows.iter().any(|row| row.errors()[k].is_some())).collect();
-    let heads: Vec<String> =
-        known.iter().map(|&k| format!(" {:>9} {:>6}", Deviation::NAMES[k], "order")).collect();
-    println!(
-        "{:<7} {:<9} {:>9} {:>9}{} {:>8} {:>9} {:>17}",
-        "method",
-        "precision",
-        "particles",
-        "spacing",
-        heads.concat(),
-        "steps",
-        "CPU s",
-        "per simulated s"
-    );
-    for row in rows {
+/// The columns of what is known, a row at a time.
+struct Table {
+    /// Numbers in [`Deviation::NAMES`].
+    known: Vec<usize>,
+}
+
+impl Table {
+    fn of(truth: &Truth) -> Self {
+        let known = [truth.pressure.is_some(), truth.velocity.is_some(), truth.front.is_some()];
+        Self { known: (0..3).filter(|&k| known[k]).collect() }
+    }
+
+    fn head(&self) {
+        let names = self.known.iter().map(|&k| format!(" {:>9} {:>6}", Deviation::NAMES[k], "order"));
+        println!(
+            "{:<7} {:<9} {:>9} {:>9}{} {:>8} {:>9} {:>17}",
+            "method",
+            "precision",
+            "particles",
+            "spacing",
+            names.collect::<String>(),
+            "steps",
+            "CPU s",
+            "per simulated s"
+        );
+    }
+
+    fn row(&self, row: &Row) {
         let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));
         let error = |error: Option<f64>| error.map_or("failed".to_string(), |error| format!("{error:.2e}"));
-        let cells: Vec<String> = known
-            .iter()
-            .map(|&k| format!(" {:>9} {:>6}", error(row.errors()[k]), order(row.orders()[k])))
-            .collect();
+        let (errors, orders) = (row.errors(), row.orders());
+        let cells = self.known.iter().map(|&k| format!(" {:>9} {:>6}", error(errors[k]), order(orders[k])));
         println!(
             "{:<7} {:<9} {:>9} {:>9.4}{} {:>8} {:>9.2} {:>17.2}",
             row.method,
             row.precision,
             row.particles,
             row.spacing,
-            cells.concat(),
+            cells.collect::<String>(),
             row.steps,
             row.cpu_seconds,
             row.cpu_seconds_per_simulated_second,
