@@ -93,8 +93,7 @@ def splishsplash(particles, seconds, method, error):
     import pysplishsplash as sph
 
     spacing, sides = lattice(particles)
-    # it leaves out the outermost layer of the block that is stated; a particle gets 0.8 of the cube that the lattice has for
-    # it, as in its own scenes, so that water begins as foam (drawn together to the density at rest it bursts)
+    # it leaves out the outermost layer of the block that is stated
     block = {"denseMode": 0, "start": [-spacing / 2] * 3, "end": [(n + 0.5) * spacing for n in sides]}
     with tempfile.TemporaryDirectory() as folder:
         (pathlib.Path(folder) / "box.obj").write_text(unit_box())
@@ -109,11 +108,6 @@ def splishsplash(particles, seconds, method, error):
                 "cflFactor": 1,
                 # it does not ask for the speed of sound, √(7·50000/1000) m/s
                 "cflMaxTimeStepSize": 0.005 if method == 4 else 0.4 * spacing / (18.7 + FALL),
-                "maxIterations": 100,
-                "maxError": error,
-                "maxIterationsV": 100,
-                "maxErrorV": error,
-                "enableDivergenceSolver": True,
                 "stiffness": 50000,
                 "exponent": 7,
                 "boundaryHandlingMethod": 0,
@@ -145,6 +139,10 @@ def splishsplash(particles, seconds, method, error):
         simulation = sph.Simulation.getCurrent()
         fluid = simulation.getFluidModel(0)
         clock = sph.TimeManager.getCurrent()
+        if method == 4:
+            solver = simulation.getTimeStep()
+            for name in (solver.MAX_ERROR, solver.MAX_ERROR_V):
+                solver.setValueFloat(name, error)
         ends, iterations = [], []  # of each step
 
         def after_step():
@@ -157,6 +155,8 @@ def splishsplash(particles, seconds, method, error):
         base.setTimeStepCB(after_step)
         base.setValueFloat(base.STOP_AT, seconds)
         base.runSimulation()
+        if method == 4 and abs(simulation.getTimeStep().getValueFloat(solver.MAX_ERROR) - error) > 1e-6:
+            raise RuntimeError("the tolerance was not kept")
         # the first step also sets up what is left to be set up
         steps, spent = len(ends) - 1, ends[-1] - ends[0]
         models = [simulation.getBoundaryModel(i) for i in range(simulation.numberOfBoundaryModels())]

@@ -11,7 +11,7 @@ use crate::experiment::Deviation;
 /// Each method with its colour.
 const METHODS: [(&str, &str); 3] = [("wcsph", "#1b6ca8"), ("dfsph", "#c05621"), ("paper", "#2f855a")];
 
-/// How the lines of pressure, velocity and front are drawn.
+/// How the lines of the first, second and third quantity that is known are drawn.
 const DASHES: [&str; 3] = ["none", "7 4", "2 4"];
 
 /// As SVG or PNG; runs that failed or took no time that could be told are left out.
@@ -31,15 +31,15 @@ pub(super) fn draw(scene: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Fa
     plot::grid(&mut out, &x, &y, ["processor time, s", "relative deviation"]);
     let mut legend = Vec::new();
     for (method, colour) in METHODS {
-        for &k in &known {
+        for (&k, dashes) in known.iter().zip(DASHES) {
             let own: Vec<(f64, f64, usize)> = marks
                 .iter()
                 .filter(|(row, quantity, _)| row.method == method && *quantity == k)
                 .map(|(row, _, error)| (x.at(row.cpu_seconds), y.at(*error), row.particles))
                 .collect();
             if !own.is_empty() {
-                line(&mut out, &own, colour, DASHES[k]);
-                legend.push((format!("{method}, {}", Deviation::NAMES[k]), colour, DASHES[k]));
+                line(&mut out, &own, colour, dashes);
+                legend.push((format!("{method}, {}", Deviation::NAMES[k]), colour, dashes));
             }
         }
     }
