@@ -439,6 +439,17 @@ fn a_report_says_which_run_failed() {
     assert!(outcome.stderr.contains("wcsph, 216 particles: step "), "{}", outcome.stderr);
     let row = &outcome.json()["rows"][0];
     assert!(row["failure"].is_string() && row["pressure_error"].is_null(), "{row}");
+
+    // two thousand million steps to the end
+    let text = STILL.replace("until: 20 ms", "dt: 1e-11, until: 20 ms");
+    let outcome = rfm_reading(root(), &["report", "-", "--particles", "27"], text.as_bytes()).expect(3);
+    assert!(
+        outcome.stderr.contains("wcsph, 27 particles: step 200: time stands still"),
+        "{}",
+        outcome.stderr
+    );
+    let table: Vec<&str> = outcome.stdout.lines().collect();
+    assert!(table.len() == 3 && table[2].contains("failed"), "{table:?}");
 }
 
 #[test]
