@@ -20,7 +20,7 @@ use crate::codegen::CodegenError;
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source, nearest};
 use crate::geom::Aabb;
 use crate::ir::Node;
-use crate::lower::{self, Module, Options, Scene, Tolerance};
+use crate::lower::{self, Method, Module, Options, Scene, Tolerance};
 use crate::solid::{Bounds, Chosen, Engine, Solid};
 use crate::syntax::{self, Ast};
 
@@ -152,6 +152,18 @@ impl Program {
     pub fn with(&self, param: &str, value: f64) -> Result<Self, Error> {
         let mut options = self.options.clone();
         options.overrides.insert(param.to_string(), value);
+        self.lowered_again(options)
+    }
+
+    /// The same file with all its scenes run by a method, whichever they state.
+    ///
+    /// # Errors
+    /// If a scene has a key that the method does not know.
+    pub fn with_method(&self, method: Method) -> Result<Self, Error> {
+        self.lowered_again(Options { method: Some(method), ..self.options.clone() })
+    }
+
+    fn lowered_again(&self, options: Options) -> Result<Self, Error> {
         Self::lowered(self.sources.clone(), self.ast.clone(), self.syntax_messages.clone(), options)
             .map_err(Error::Diagnostics)
     }

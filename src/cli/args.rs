@@ -80,7 +80,7 @@ pub(super) enum Command {
     Mesh(Mesh),
     /// Simulate the fluid of a scene around its obstacles
     Run(Run),
-    /// Measure speed against error for every program of a solid, and for its meshes
+    /// Measure speed against error: of every program of a solid and its meshes, or of a flow that is known
     Report(Report),
     /// Explain a message, or show what a stage of the compiler makes of a file
     Explain(Explain),
@@ -290,13 +290,18 @@ pub(super) struct Run {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "A solid is judged by exact arithmetic:  rfm report examples/pawn.rfm -o pawn.svg\n\
+                        A scene by its `truth`, at growing resolution:\n  \
+                        rfm report examples/validation/free_fall.rfm:free_fall --particles 125,1000 \
+                        --methods wcsph,dfsph -o fall.svg")]
 pub(super) struct Report {
-    /// The file; `-` is standard input
-    pub file: PathBuf,
+    /// The file, with the name of a solid or a scene if it has several; `-` is standard input
+    #[arg(value_name = "FILE[:NAME]")]
+    pub subject: String,
     /// The solid [default: the only one, or the first obstacle of the scene]
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
-    /// Plot speed against error: .svg or .png
+    /// Plot speed against error, or the error of a flow against its cost: .svg or .png
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Plot the error of meshes against their cells: .svg or .png
@@ -305,6 +310,41 @@ pub(super) struct Report {
     /// Cells along the longest side of the finest mesh; the others have half as many each
     #[arg(long, value_name = "N", default_value_t = 128)]
     pub mesh_cells: usize,
+    #[command(flatten)]
+    pub flow: Flow,
+}
+
+/// What is asked of a flow.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Flows")]
+pub(super) struct Flow {
+    /// Run the scene with so many particles, by its `param particles` [default: 1/16, 1/4 and all of what the file
+    /// states]
+    #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = count, conflicts_with_all = ["solid", "mesh_plot"])]
+    pub particles: Vec<usize>,
+    /// Run the scene by these methods [default: its own]
+    #[arg(long, value_enum, value_delimiter = ',', conflicts_with_all = ["solid", "mesh_plot"])]
+    pub methods: Vec<FlowMethod>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum FlowMethod {
+    /// Equations 8–14 of the paper, corrected
+    Paper,
+    /// Weakly compressible
+    Wcsph,
+    /// Divergence-free
+    Dfsph,
+}
+
+impl From<FlowMethod> for crate::lower::Method {
+    fn from(method: FlowMethod) -> Self {
+        match method {
+            FlowMethod::Paper => Self::Paper,
+            FlowMethod::Wcsph => Self::Wcsph,
+            FlowMethod::Dfsph => Self::Dfsph,
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -341,6 +381,11 @@ const MOST_THREADS: usize = 1024;
 fn threads(text: &str) -> Result<NonZeroUsize, String> {
     let number = text.trim().parse().ok().filter(|n: &NonZeroUsize| n.get() <= MOST_THREADS);
     number.ok_or_else(|| format!("expected a whole number from 1 to {MOST_THREADS}"))
+}
+
+fn count(text: &str) -> Result<usize, String> {
+    let number = text.trim().parse().ok().filter(|&n: &usize| n > 0);
+    number.ok_or_else(|| "expected a whole number above 0".to_string())
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {

@@ -1,11 +1,31 @@
 //! Which solid or scene of a file is meant.
 
+use std::path::Path;
+
 use super::args::Shared;
 use super::{Failure, input, note};
-use crate::diagnostic::Diagnostics;
+use crate::diagnostic::{Diagnostics, nearest};
 use crate::lower::{NamedSolid, Scene};
 use crate::solid::Chosen;
 use crate::{Error, Program, Solid};
+
+/// `FILE` or `FILE:NAME`; what there is as a file is one.
+pub(super) fn subject(text: &str) -> (&Path, Option<&str>) {
+    match text.rsplit_once(':') {
+        Some((path, name)) if !Path::new(text).exists() => (Path::new(path), Some(name)),
+        _ => (Path::new(text), None),
+    }
+}
+
+/// A name that is neither a solid nor a scene of the file.
+pub(super) fn no_such(path: &Path, program: &Program, name: &str) -> Failure {
+    let module = program.module();
+    let solids = module.solids.iter().map(|s| s.name.as_str());
+    let scenes = module.scenes.iter().map(|s| s.name.as_str());
+    let near = nearest(name, solids.chain(scenes));
+    let hint = near.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
+    Failure::usage(format!("`{}` has no solid or scene `{name}`{hint}", path.display()))
+}
 
 /// The solid by name; without one, the only solid, or the first obstacle of the only scene.
 pub(super) fn solid(shared: &Shared, program: &Program, name: Option<&str>) -> Result<Solid, Failure> {

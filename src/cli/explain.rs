@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::args::{Explain, Shared, Stage};
 use super::{Failure, choose, input};
 use crate::codegen::{CodegenError, Listing, Precision, Request, Shape, target_description};
-use crate::diagnostic::{Span, explain, nearest};
+use crate::diagnostic::{Span, explain};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{Node, dump};
@@ -30,11 +30,8 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if is_code && subject[1..].bytes().all(|b| b.is_ascii_digit()) {
         return Err(Failure::usage(format!("there is no message {subject}")));
     }
-    let (path, name) = match subject.rsplit_once(':') {
-        Some((path, name)) if !Path::new(subject).exists() => (path, Some(name)),
-        _ => (subject, None),
-    };
-    let program = input::program(shared, Path::new(path))?;
+    let (path, name) = choose::subject(subject);
+    let program = input::program(shared, path)?;
     if options.show.contains(&Stage::Ast) {
         say!("{}", syntax::print(program.ast()).trim_end());
     }
@@ -45,11 +42,7 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
         Some(name) => {
             let module = program.module();
             let Some(solid) = module.solids.iter().find(|s| s.name == name) else {
-                let solids = module.solids.iter().map(|s| s.name.as_str());
-                let scenes = module.scenes.iter().map(|s| s.name.as_str());
-                let near = nearest(name, solids.chain(scenes));
-                let hint = near.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
-                return Err(Failure::usage(format!("`{path}` has no solid or scene `{name}`{hint}")));
+                return Err(choose::no_such(path, &program, name));
             };
             stages(shared, &program, solid, &options.show)
         }

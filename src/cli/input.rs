@@ -27,7 +27,8 @@ pub(super) fn read(path: &Path) -> Result<Source, Failure> {
 
 /// Checks a source with the params of the command line.
 pub(super) fn check(shared: &Shared, source: Source) -> Result<Program, Diagnostics> {
-    let options = Options { overrides: shared.define.iter().cloned().collect(), max_nodes: shared.max_nodes };
+    let overrides = shared.define.iter().cloned().collect();
+    let options = Options { overrides, max_nodes: shared.max_nodes, method: None };
     Program::check(source, options)
 }
 

@@ -13,6 +13,9 @@ pub(super) const RIGHT: f64 = 190.0;
 pub(super) const TOP: f64 = 50.0;
 pub(super) const BOTTOM: f64 = 60.0;
 
+/// Powers of ten between which there is room for more lines.
+const FEW: i32 = 3;
+
 /// The beginning of a plot: the white ground and the title.
 pub(super) fn begin(title: &str) -> String {
     format!(
@@ -53,6 +56,19 @@ impl Axis {
             (low, high) = if low == i32::MAX { (0, 1) } else { (low, low + 1) };
         }
         Self { low, high, from, to }
+    }
+
+    /// Powers of ten, and where there are few of them also twice and five times as much, each with its text.
+    fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
+        let factors: &[f64] = if self.high - self.low <= FEW { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        (self.low..=self.high)
+            .flat_map(move |power| factors.iter().map(move |factor| (factor, power)))
+            .filter(|&(factor, power)| power < self.high || *factor == 1.0)
+            .map(|(factor, power)| {
+                let digits = (-power).max(0) as usize;
+                let value = factor * 10f64.powi(power);
+                (value, format!("{value:.digits$}"))
+            })
     }
 
     pub fn at(&self, value: f64) -> f64 {
@@ -112,11 +128,17 @@ impl EvenAxis {
 
 /// Lines at the whole powers of ten, and what the axes are.
 pub(super) fn grid(out: &mut String, x: &Axis, y: &Axis, names: [&str; 2]) {
-    for power in x.low..=x.high {
-        across(out, x.at(10f64.powi(power)), &10f64.powi(power).to_string());
+    for (value, text) in x.ticks() {
+        across(out, x.at(value), &text);
     }
-    for power in (y.low..=y.high).filter(|p| (p - y.low) % 2 == 0) {
-        along(out, y.at(10f64.powi(power)), &format!("1e{power}"));
+    if y.high - y.low <= FEW {
+        for (value, text) in y.ticks() {
+            along(out, y.at(value), &text);
+        }
+    } else {
+        for power in (y.low..=y.high).filter(|p| (p - y.low) % 2 == 0) {
+            along(out, y.at(10f64.powi(power)), &format!("1e{power}"));
+        }
     }
     axis_names(out, names);
 }
@@ -166,6 +188,15 @@ fn axis_names(out: &mut String, [along, up]: [&str; 2]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn few_powers_of_ten_are_divided() {
+        let texts = |low: f64, high: f64| -> Vec<String> {
+            Axis::over([low, high].into_iter(), 0.0, 1.0).ticks().map(|tick| tick.1).collect()
+        };
+        assert_eq!(texts(0.03, 0.4), ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"]);
+        assert_eq!(texts(1e-3, 20.0), ["0.001", "0.01", "0.1", "1", "10", "100"]);
+    }
 
     #[test]
     fn ticks_are_round_and_hold_all_values() {

@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use super::Module;
 use super::names::{Kind, Names};
 use super::value::Value;
+use super::{Method, Module};
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
 use crate::syntax::ast::{AddOp, Comparison, Expr, ExprKind, Logic, MulOp, Name};
@@ -31,6 +31,8 @@ pub(super) struct Lowering<'a> {
     pub diagnostics: Vec<Diagnostic>,
     pub names: Names<'a>,
     pub scope: Scope,
+    /// Of all scenes, whatever they state.
+    pub method: Option<Method>,
     max_nodes: usize,
     budget_reported: bool,
     evaluations: usize,
@@ -70,6 +72,7 @@ impl<'a> Lowering<'a> {
             diagnostics: Vec::new(),
             names: Names::default(),
             scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
+            method: None,
             max_nodes,
             budget_reported: false,
             evaluations: 0,

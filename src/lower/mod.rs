@@ -75,11 +75,13 @@ pub struct Options {
     pub overrides: BTreeMap<String, f64>,
     /// Operations that a file may unroll to.
     pub max_nodes: usize,
+    /// The method of every scene instead of the one that it states; defaults that depend on the method follow it.
+    pub method: Option<Method>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { overrides: BTreeMap::new(), max_nodes: 1_000_000 }
+        Self { overrides: BTreeMap::new(), max_nodes: 1_000_000, method: None }
     }
 }
 
@@ -121,6 +123,7 @@ pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
 
 fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
     let mut lowering = Lowering::new(options.max_nodes);
+    lowering.method = options.method;
     for item in &prelude().items {
         lowering.item(item, options);
     }

@@ -18,6 +18,9 @@ use super::{
 /// Particles that a loop over all of them leaves to one thread together.
 pub(super) const CHUNK: usize = 2048;
 
+/// A step shorter than this part of the longest so far leads nowhere: speeds have grown a million times, or forces a million million.
+const SHORTEST: f64 = 1e-6;
+
 pub(super) struct Core<'a> {
     pub parameters: Parameters,
     pub boundary: Boundary<'a>,
@@ -29,6 +32,8 @@ pub(super) struct Core<'a> {
     pub time: f64,
     /// Of obstacles, if somebody asks.
     pub contacts: Option<Contacts>,
+    /// Of the steps that were allowed so far, s.
+    longest_dt: f64,
     level: Level,
     columns: Columns,
     /// Working memory: where the particles go before they collide, or what a method needs a vector for.
@@ -50,6 +55,7 @@ impl<'a> Core<'a> {
             steps: 0,
             time: 0.0,
             contacts: None,
+            longest_dt: 0.0,
             level: Level::new(),
             columns: Columns::default(),
             spare: Vectors::default(),
@@ -173,14 +179,21 @@ impl<'a> Core<'a> {
     }
 
     /// The step to take now, s, at most `longest`.
-    pub fn next_dt(&self, longest: f64) -> f64 {
+    ///
+    /// # Errors
+    /// If it would be shorter than any that leads somewhere.
+    pub fn next_dt(&mut self, longest: f64) -> Result<f64, StepError> {
         let stated = self.parameters.time_step;
         if !self.parameters.adaptive {
-            return stated.min(longest);
+            return Ok(stated.min(longest));
         }
         let dt = stated.min(self.stable_dt());
+        self.longest_dt = self.longest_dt.max(dt);
+        if dt < SHORTEST * self.longest_dt {
+            return Err(self.stalled(dt));
+        }
         // equal steps to the instant that is to be met, rather than full ones and a small rest
-        if longest.is_finite() { longest / (longest / dt - 1e-9).ceil().max(1.0) } else { dt }
+        Ok(if longest.is_finite() { longest / (longest / dt - 1e-9).ceil().max(1.0) } else { dt })
     }
 
     /// Memory of the state and of what belongs to all methods.
@@ -191,6 +204,13 @@ impl<'a> Core<'a> {
             + 8 * (density.capacity() + pressure.capacity())
             + 4 * (id.capacity() + self.sorted_id.capacity())
             + self.columns.bytes()
+    }
+
+    fn stalled(&self, dt: f64) -> StepError {
+        let Particles { velocity, id, .. } = &self.particles;
+        let speed = |i: &usize| velocity.get(*i).length();
+        let fastest = (0..velocity.len()).max_by(|a, b| speed(a).total_cmp(&speed(b))).unwrap_or(0);
+        StepError::Stalled { step: self.steps, dt, id: id[fastest], speed: speed(&fastest) }
     }
 
     fn non_finite(&self, index: usize, quantity: Quantity, dt: f64) -> StepError {

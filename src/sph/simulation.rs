@@ -94,12 +94,33 @@ pub enum Cause {
 /// A step that could not be completed; the state is not to be used any more.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepError {
-    NonFinite { step: u64, id: u32, quantity: Quantity, cause: Cause },
+    NonFinite {
+        step: u64,
+        id: u32,
+        quantity: Quantity,
+        cause: Cause,
+    },
+    /// The state allows only steps so short, s, that the run would never end: a particle has become too fast, m/s.
+    Stalled {
+        step: u64,
+        dt: f64,
+        id: u32,
+        speed: f64,
+    },
 }
 
 impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self::NonFinite { step, id, quantity, cause } = self;
+        let (step, id, quantity, cause) = match self {
+            Self::NonFinite { step, id, quantity, cause } => (step, id, quantity, cause),
+            Self::Stalled { step, dt, id, speed } => {
+                return write!(
+                    f,
+                    "step {step}: only steps of {dt:.1e} s are stable any more; particle {id} is the fastest, with \
+                     {speed:.2e} m/s"
+                );
+            }
+        };
         let quantity = match quantity {
             Quantity::Position => "position",
             Quantity::Density => "density",

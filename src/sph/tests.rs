@@ -8,8 +8,8 @@ use crate::{
 };
 
 use super::{
-    Cause, NegativePressure, Obstacle, Parameters, Particles, Pass, Quantity, SetupError, Simulation,
-    StepError, scenes,
+    Cause, Dfsph, Gradients, Method, NegativePressure, Obstacle, Parameters, Particles, Pass, Quantity,
+    SetupError, Simulation, StepError, Wcsph, scenes,
 };
 
 const G: f64 = 9.81;
@@ -217,10 +217,52 @@ fn an_undefined_field_is_an_error() {
     let mut simulation =
         Simulation::new(lone(0.01, 0.5), start, scenes::BOX, vec![scenes::obstacle(&hole)]).unwrap();
     let error = (0..100).find_map(|_| simulation.step().err()).unwrap();
-    let StepError::NonFinite { id, quantity, cause, .. } = error;
+    let StepError::NonFinite { id, quantity, cause, .. } = error else { panic!("{error}") };
     assert_eq!((id, quantity), (0, Quantity::Omega));
     assert!(matches!(cause, Cause::FieldUndefined { at } if at.z < 1.0));
     assert!(error.to_string().contains("no value at"), "{error}");
+}
+
+#[test]
+fn a_run_that_would_never_end_is_an_error() {
+    let fall = Parameters {
+        method: Method::Dfsph(Dfsph::default()),
+        adaptive: true,
+        time_step: 0.1,
+        ..Parameters::default()
+    };
+    let mut simulation =
+        Simulation::new(fall, one(DVec3::ONE, DVec3::ZERO), scenes::BOX, Vec::new()).unwrap();
+    simulation.step().unwrap();
+    simulation.set_gravity(DVec3::new(0.0, 0.0, 1e14));
+    let error = (0..3).find_map(|_| simulation.step().err()).unwrap();
+    assert!(matches!(error, StepError::Stalled { id: 0, dt, .. } if dt < 1e-7), "{error}");
+    assert!(error.to_string().contains("particle 0 is the fastest"), "{error}");
+}
+
+#[test]
+fn wcsph_pairs_conserve_momentum_in_free_space() {
+    let wcsph = Wcsph {
+        sound_speed: 10.0,
+        density_diffusion: 0.1,
+        artificial_viscosity: 0.1,
+        gradients: Gradients::Pairs,
+        shifting: 0.0,
+    };
+    let parameters = Parameters {
+        gravity: DVec3::ZERO,
+        surface_tension: 0.0,
+        method: Method::Wcsph(wcsph),
+        time_step: 1e-4,
+        ..Parameters::default()
+    };
+    let mut simulation = scenes::free_cloud(parameters, 400, 0.15);
+    let before = simulation.stats().momentum;
+    for _ in 0..100 {
+        simulation.step().unwrap();
+    }
+    let scale = 400.0 * 0.02; // particles of about 1 m/s
+    assert!((simulation.stats().momentum - before).length() < 1e-13 * scale);
 }
 
 #[test]
@@ -228,7 +270,7 @@ fn a_diverging_run_names_the_step_as_the_cause() {
     let wild = Parameters { stiffness: 1e300, time_step: 1e10, rest_density: 1.0, ..Parameters::default() };
     let mut simulation = scenes::free_drop(wild, 50);
     let error = (0..100).find_map(|_| simulation.step().err()).unwrap();
-    let StepError::NonFinite { cause, .. } = error;
+    let StepError::NonFinite { cause, .. } = error else { panic!("{error}") };
     assert!(matches!(cause, Cause::StepTooLong { .. }), "{error}");
 }
 

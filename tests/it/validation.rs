@@ -1,7 +1,9 @@
 //! Flows whose outcome is known, from examples/validation, at sizes that take seconds. What is known is a formula or a
 //! measurement, never an earlier result of this program; each tolerance says what it allows for.
 
-use rfm::experiment::Deviation;
+use std::ops::ControlFlow;
+
+use rfm::experiment::{Deviation, Deviations};
 use rfm::glam::DVec3;
 use rfm::lower::Scene;
 use rfm::sph::Simulation;
@@ -32,21 +34,20 @@ fn watch(
     let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
     let started = std::time::Instant::now();
     let frames = (scene.run.until / scene.run.save_every).round() as u32;
-    let mut deviations = Vec::new();
+    let mut deviations = Deviations::default();
     look(scene, &simulation);
     for frame in 1..=frames {
         let end = f64::from(frame) * scene.run.save_every;
-        while simulation.time() < end * (1.0 - 1e-12) {
-            simulation.step_at_most(end - simulation.time()).unwrap_or_else(|e| panic!("{name}: {e}"));
-        }
+        let reached =
+            experiment.advance(&program, scene, &mut simulation, end, |_| ControlFlow::Continue(()));
+        reached.unwrap_or_else(|e| panic!("{name}: {e}"));
         look(scene, &simulation);
-        deviations.extend(Deviation::of(&program, scene, &simulation));
+        if let Some(deviation) = Deviation::of(&program, scene, &simulation) {
+            deviations.add(&deviation);
+        }
     }
-    let mean = |part: fn(&Deviation) -> Option<f64>| {
-        let squares: Vec<f64> = deviations.iter().filter_map(part).map(|d| d * d).collect();
-        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
-    };
-    let found = [mean(|d| d.pressure), mean(|d| d.velocity)];
+    let Deviation { pressure, velocity, .. } = deviations.mean();
+    let found = [pressure, velocity];
     let stats = simulation.stats();
     println!(
         "{name}: {} particles, spacing {:.4}, {} steps in {:.1} s, deviations {found:?}",

@@ -1,9 +1,12 @@
-//! `rfm report`: speed against error, for every program of a solid that there is.
+//! `rfm report`: speed against error, for every program of a solid that there is, or for a flow that is known.
 //!
 //! Errors are measured against 120-digit arithmetic at random points of the box and at points on the surface;
 //! times are medians over batches of random points on one thread. Then the meshes: error and time of each method against
-//! the number of cells, with the order of convergence that they show.
+//! the number of cells, with the order of convergence that they show. A scene is run at several resolutions instead
+//! ([`flows`]).
 
+mod flow_plot;
+mod flows;
 mod meshes;
 mod plot;
 mod points;
@@ -21,6 +24,7 @@ use crate::codegen::{Form, target_description};
 use crate::geom::Aabb;
 use crate::ir::exact::{self, Exact};
 use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Node};
+use crate::lower::Scene;
 use crate::solid::{Lane, ProgramKind};
 use crate::{Engine, Program, Solid};
 use points::Points;
@@ -68,8 +72,15 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
     for path in options.output.iter().chain(&options.mesh_plot) {
         output::Picture::of(path)?;
     }
-    let program = input::program(shared, &options.file)?;
-    let reference = choose::solid(shared, &program, options.solid.as_deref())?;
+    let (path, name) = choose::subject(&options.subject);
+    let program = input::program(shared, path)?;
+    if let Some(scene) = scene(&program, name, options)? {
+        return flows::run(shared, &program, scene, &options.flow, options.output.as_deref());
+    }
+    if let Some(name) = name.filter(|name| program.module().solids.iter().all(|s| s.name != *name)) {
+        return Err(choose::no_such(path, &program, name));
+    }
+    let reference = choose::solid(shared, &program, options.solid.as_deref().or(name))?;
     let nowhere = || Failure::usage("the solid has no bounds and the file no scene: nowhere to measure");
     let over = program.domain(&reference).ok_or_else(nowhere)?;
     let bar = progress::bar(4, "measuring");
@@ -115,6 +126,35 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
         println!("plot written to {}", path.display());
     }
     Ok(())
+}
+
+/// The scene that is meant: by its name, by options that only a flow has, or because the file has no solid.
+fn scene<'a>(
+    program: &'a Program,
+    name: Option<&str>,
+    options: &Report,
+) -> Result<Option<&'a Scene>, Failure> {
+    let module = program.module();
+    if let Some(name) = name.filter(|name| module.scenes.iter().any(|s| s.name == *name)) {
+        if let Some(flag) =
+            [("--solid", options.solid.is_some()), ("--mesh-plot", options.mesh_plot.is_some())]
+                .into_iter()
+                .find_map(|(flag, given)| given.then_some(flag))
+        {
+            return Err(Failure::usage(format!("{flag} is about solids, and `{name}` is a scene")));
+        }
+        return choose::scene(program, Some(name)).map(Some);
+    }
+    let asked = !options.flow.particles.is_empty() || !options.flow.methods.is_empty();
+    match name {
+        Some(name) if asked => Err(Failure::usage(format!(
+            "--particles and --methods are about flows, and the file has no scene `{name}`"
+        ))),
+        None if asked || module.solids.is_empty() && !module.scenes.is_empty() => {
+            choose::scene(program, None).map(Some)
+        }
+        _ => Ok(None),
+    }
 }
 
 /// The forms that are compared.

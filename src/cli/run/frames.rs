@@ -1,17 +1,20 @@
-//! The files of a run: ParaView frames with their collection, pictures, the obstacle's mesh.
+//! The files of a run: ParaView frames with their collection, pictures, the obstacles' mesh; if an obstacle moves, also a
+//! frame of it for each of the fluid.
 //!
-//! Invariant: after every frame the collection lists exactly the frames that are complete.
+//! Invariant: after every frame the collections list exactly the frames that are complete.
 
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
 use super::super::args::Run;
-use super::super::{Failure, note, output};
+use super::super::{Failure, output};
+use super::bodies::Bodies;
 use super::{checkpoints, probes};
 use crate::Experiment;
+use crate::geom::Aabb;
 use crate::lower::Scene;
-use crate::mesh::{self, Grid, Mesh, Resolution, marching_cubes};
+use crate::mesh::{self, Mesh};
 use crate::render;
 use crate::sph::{self, Checkpoint, Simulation};
 
@@ -23,7 +26,7 @@ pub(super) struct Frames {
     /// Time and file of each frame, relative to the folder.
     saved: Vec<(f64, String)>,
     write_frames: bool,
-    has_obstacle: bool,
+    bodies: Bodies,
     pictures: Option<Pictures>,
     count: usize,
     last_time: f64,
@@ -31,7 +34,12 @@ pub(super) struct Frames {
 
 /// What all pictures share.
 struct Pictures {
+    /// With what stands still.
     scene: render::Scene,
+    title: String,
+    domain: Aabb,
+    /// The speed that is drawn red, m/s.
+    fastest: f64,
     radius: f64,
     count: usize,
 }
@@ -47,7 +55,8 @@ impl Frames {
         let folder = folder(options);
         let write_frames = !options.no_frames;
         // whatever can be refused comes before the first change to the folder
-        let obstacle = if write_frames { obstacle_mesh(options, setup)? } else { Mesh::default() };
+        let bodies = Bodies::new(options, setup);
+        let obstacle = if write_frames { bodies.mesh_at_start()? } else { Mesh::default() };
         let pictures = if write_frames && !options.no_pictures {
             Some(Pictures::new(scene, setup, &obstacle)?)
         } else {
@@ -57,20 +66,18 @@ impl Frames {
         if resumed.is_none() {
             remove_old(&folder)?;
         }
-        let has_obstacle = write_frames && !setup.obstacles.is_empty();
         if write_frames {
             create(&folder.join("frames"))?;
         }
         if pictures.is_some() {
             create(&folder.join("pictures"))?;
         }
-        if has_obstacle {
+        if write_frames && !bodies.is_empty() {
             output::write(&folder.join("obstacle.stl"), |mut out| mesh::stl::write(&obstacle, &mut out))?;
             output::write(&folder.join("obstacle.vtp"), |mut out| mesh::vtp::write(&obstacle, &mut out))?;
         }
         let (count, last_time) = (0, 0.0);
-        let mut frames =
-            Self { folder, saved: Vec::new(), write_frames, has_obstacle, pictures, count, last_time };
+        let mut frames = Self { folder, saved: Vec::new(), write_frames, bodies, pictures, count, last_time };
         if let Some(checkpoint) = resumed {
             frames.take_up(checkpoint)?;
         }
@@ -90,8 +97,9 @@ impl Frames {
         if let Some(pictures) = &mut self.pictures {
             pictures.count = self.count;
         }
-        self.write_collection()?;
-        remove_numbered(&self.folder.join("frames"), "particles_", ".vtp", self.count)?;
+        self.write_collections()?;
+        remove_numbered(&self.folder.join("frames"), PARTICLES, ".vtp", self.count)?;
+        remove_numbered(&self.folder.join("frames"), OBSTACLE, ".vtp", self.count)?;
         remove_numbered(&self.folder.join("pictures"), "frame_", ".png", self.count)
     }
 
@@ -123,8 +131,9 @@ impl Frames {
         if self.write_frames {
             parts.push(format!("particles.pvd and {} frames for ParaView", self.saved.len()));
         }
-        if self.has_obstacle {
-            parts.push("obstacle.stl, obstacle.vtp".to_string());
+        if self.write_frames && !self.bodies.is_empty() {
+            let moving = if self.bodies.move_about() { "obstacle.pvd, " } else { "" };
+            parts.push(format!("{moving}obstacle.stl, obstacle.vtp"));
         }
         if let Some(pictures) = &self.pictures {
             parts.push(format!("{} pictures", pictures.count));
@@ -140,18 +149,37 @@ impl Frames {
         }
         let name = frame_name(self.count);
         output::write(&self.folder.join(&name), |mut out| sph::write_vtp(&mut out, simulation.particles()))?;
+        let moved =
+            if self.bodies.move_about() { Some(self.bodies.mesh_at(simulation.time())?) } else { None };
+        if let Some(mesh) = &moved {
+            let path = self.folder.join(obstacle_name(self.count));
+            output::write(&path, |mut out| mesh::vtp::write(mesh, &mut out))?;
+        }
         self.saved.push((simulation.time(), name));
-        self.write_collection()?;
+        self.write_collections()?;
         if let Some(pictures) = &mut self.pictures {
+            if let Some(mesh) = &moved {
+                pictures.show(mesh)?;
+            }
             pictures.save(&self.folder.join(format!("pictures/frame_{:06}.png", self.count)), simulation)?;
         }
         self.count += 1;
         Ok(())
     }
 
-    fn write_collection(&self) -> Result<(), Failure> {
+    fn write_collections(&self) -> Result<(), Failure> {
         output::write(&self.folder.join("particles.pvd"), |mut out| {
             sph::write_pvd(&mut out, self.saved.iter().map(|(time, file)| (*time, file.as_str())))
+        })?;
+        if !self.bodies.move_about() {
+            return Ok(());
+        }
+        let obstacle = |file: &str| file.replace(PARTICLES, OBSTACLE);
+        let saved: Vec<_> = self.saved.iter().map(|(time, file)| (*time, obstacle(file))).collect();
+        let is_there = |file: &str| self.folder.join(file).is_file();
+        output::write(&self.folder.join("obstacle.pvd"), |mut out| {
+            let frames = saved.iter().filter(|(_, file)| is_there(file));
+            sph::write_pvd(&mut out, frames.map(|(time, file)| (*time, file.as_str())))
         })
     }
 }
@@ -162,17 +190,21 @@ impl Pictures {
     const FASTEST: f64 = 0.6;
 
     fn new(scene: &Scene, setup: &Experiment, obstacle: &Mesh) -> Result<Self, Failure> {
-        let camera =
-            render::Camera::three_quarter(&setup.domain, render::Camera::SIZE).map_err(Failure::usage)?;
-        let mesh = render::Mesh {
-            vertices: &obstacle.positions,
-            normals: &obstacle.normals,
-            triangles: &obstacle.triangles,
-        };
         let fastest = (Self::FASTEST * setup.typical_speed).max(f64::MIN_POSITIVE);
-        let legend = render::Legend { title: &scene.name, fastest };
-        let rendered = render::Scene::new(camera, &setup.domain, &mesh, &legend).map_err(Failure::usage)?;
-        Ok(Self { scene: rendered, radius: 0.5 * setup.parameters.spacing(), count: 0 })
+        Ok(Self {
+            scene: drawn(&setup.domain, &scene.name, fastest, obstacle)?,
+            title: scene.name.clone(),
+            domain: setup.domain,
+            fastest,
+            radius: 0.5 * setup.parameters.spacing(),
+            count: 0,
+        })
+    }
+
+    /// Puts the obstacles where they are now.
+    fn show(&mut self, obstacle: &Mesh) -> Result<(), Failure> {
+        self.scene = drawn(&self.domain, &self.title, self.fastest, obstacle)?;
+        Ok(())
     }
 
     fn save(&mut self, path: &Path, simulation: &Simulation<'_>) -> Result<(), Failure> {
@@ -192,6 +224,18 @@ impl Pictures {
     }
 }
 
+/// What stands still in a picture: the box, the obstacles, the legend.
+fn drawn(domain: &Aabb, title: &str, fastest: f64, obstacle: &Mesh) -> Result<render::Scene, Failure> {
+    let camera = render::Camera::three_quarter(domain, render::Camera::SIZE).map_err(Failure::usage)?;
+    let mesh = render::Mesh {
+        vertices: &obstacle.positions,
+        normals: &obstacle.normals,
+        triangles: &obstacle.triangles,
+    };
+    let legend = render::Legend { title, fastest };
+    render::Scene::new(camera, domain, &mesh, &legend).map_err(Failure::usage)
+}
+
 /// Where a run's files go: by default `pawn.rfm` → `pawn.out`, beside the file; standard input → `rfm.out`.
 pub(super) fn folder(options: &Run) -> PathBuf {
     match &options.output {
@@ -201,8 +245,16 @@ pub(super) fn folder(options: &Run) -> PathBuf {
     }
 }
 
+/// What the names of frames begin with.
+const PARTICLES: &str = "particles_";
+const OBSTACLE: &str = "obstacle_";
+
 fn frame_name(number: usize) -> String {
-    format!("frames/particles_{number:06}.vtp")
+    format!("frames/{PARTICLES}{number:06}.vtp")
+}
+
+fn obstacle_name(number: usize) -> String {
+    format!("frames/{OBSTACLE}{number:06}.vtp")
 }
 
 fn create(folder: &Path) -> Result<(), Failure> {
@@ -212,7 +264,7 @@ fn create(folder: &Path) -> Result<(), Failure> {
 
 /// Removes the files of an earlier run, which would mix with this one's, and no others.
 fn remove_old(folder: &Path) -> Result<(), Failure> {
-    for name in ["summary.json", "particles.pvd", "obstacle.stl", "obstacle.vtp"] {
+    for name in ["summary.json", "particles.pvd", "obstacle.pvd", "obstacle.stl", "obstacle.vtp"] {
         let path = folder.join(name);
         if path.is_file() {
             std::fs::remove_file(&path).map_err(|e| not_cleared(folder, &e))?;
@@ -220,7 +272,8 @@ fn remove_old(folder: &Path) -> Result<(), Failure> {
     }
     checkpoints::remove_all(folder).map_err(|e| not_cleared(folder, &e))?;
     probes::remove_old(folder).map_err(|e| not_cleared(folder, &e))?;
-    remove_numbered(&folder.join("frames"), "particles_", ".vtp", 0)?;
+    remove_numbered(&folder.join("frames"), PARTICLES, ".vtp", 0)?;
+    remove_numbered(&folder.join("frames"), OBSTACLE, ".vtp", 0)?;
     remove_numbered(&folder.join("pictures"), "frame_", ".png", 0)
 }
 
@@ -244,30 +297,4 @@ fn remove_numbered(folder: &Path, prefix: &str, suffix: &str, first: usize) -> R
 
 fn not_cleared(folder: &Path, error: &std::io::Error) -> Failure {
     Failure::usage(format!("cannot clear `{}`: {error}", folder.display()))
-}
-
-/// All obstacles as one mesh, cut off at the box.
-fn obstacle_mesh(options: &Run, setup: &Experiment) -> Result<Mesh, Failure> {
-    let mut all = Mesh::default();
-    for solid in setup.obstacles.iter().map(|body| &body.solid) {
-        let bounds = solid.bounds().aabb().unwrap_or(setup.domain);
-        let inside = setup.domain.grown(1e-3 * setup.domain.size().max_element());
-        let over = bounds.intersection(&inside);
-        let grid = if bounds == over || over.is_empty() {
-            Grid::around(&bounds, Resolution::Cells(options.mesh_cells))
-        } else {
-            Grid::filling(&over, Resolution::Cells(options.mesh_cells))
-        };
-        let grid = grid.map_err(Failure::usage)?;
-        let surface = solid.surface(*grid.bounds());
-        let mesh = marching_cubes(&*surface, &grid, &|_| {}).map_err(Failure::usage)?;
-        if mesh.triangles.is_empty() {
-            note(format!("the obstacle `{}` has no surface in the box", solid.name()));
-        }
-        let first = all.positions.len() as u32;
-        all.positions.extend(mesh.positions);
-        all.normals.extend(mesh.normals);
-        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
-    }
-    Ok(all)
 }

@@ -2,6 +2,7 @@
 //!
 //! experiment (scene → simulation) → steps, with a frame, a checkpoint and samples of probes every so often → summary.
 
+mod bodies;
 mod checkpoints;
 mod frames;
 mod pace;
@@ -16,7 +17,7 @@ use serde::Serialize;
 use super::args::{Run, Shared};
 use super::{Failure, choose, input, note, output, progress};
 use crate::diagnostic::Diagnostics;
-use crate::experiment::Deviation;
+use crate::experiment::{Deviation, Deviations};
 use crate::lower::Scene;
 use crate::sph::{Checkpoint, Simulation, Stats, StepError, short_time};
 use crate::{Error, Experiment, Program};
@@ -58,6 +59,9 @@ struct Summary {
     /// The same of the velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     velocity_error: Option<f64>,
+    /// Relative deviation of the front on the floor, likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    front_error: Option<f64>,
     passes: Vec<&'static str>,
     threads: usize,
     frames: usize,
@@ -243,7 +247,9 @@ impl Recording<'_> {
 
     fn look(&mut self, simulation: &Simulation<'_>) {
         self.watch.look(simulation);
-        self.watch.compare(Deviation::of(self.program, self.scene, simulation));
+        if let Some(deviation) = Deviation::of(self.program, self.scene, simulation) {
+            self.watch.deviations.add(&deviation);
+        }
     }
 
     /// What is left of a run that ended early.
@@ -464,9 +470,8 @@ struct Watch {
     now: Stats,
     worst: Stats,
     neighbours: (f64, usize),
-    /// Σ of squared deviations from what is known, and of how many instants.
-    deviations: ([f64; 2], usize),
-    knows: [bool; 2],
+    /// From what is known.
+    deviations: Deviations,
 }
 
 impl Watch {
@@ -479,8 +484,7 @@ impl Watch {
             energy_at_start: energy,
             most_energy: energy,
             neighbours: (stats.neighbours_per_particle, 1),
-            deviations: ([0.0; 2], 0),
-            knows: [false; 2],
+            deviations: Deviations::default(),
             now: stats.clone(),
             worst: stats,
         };
@@ -493,7 +497,7 @@ impl Watch {
     /// What a run that goes on must know of its beginning.
     fn memory(&self) -> Vec<f64> {
         let Self { spent, carved, energy_at_start, most_energy, neighbours, worst, .. } = self;
-        vec![
+        let mut memory = vec![
             spent.as_secs_f64(),
             *carved as f64,
             *energy_at_start,
@@ -506,10 +510,9 @@ impl Watch {
             worst.non_finite as f64,
             worst.max_density_error,
             worst.max_speed,
-            self.deviations.0[0],
-            self.deviations.0[1],
-            self.deviations.1 as f64,
-        ]
+        ];
+        memory.extend(self.deviations.memory());
+        memory
     }
 
     /// The other way; a memory of another length is none.
@@ -528,11 +531,9 @@ impl Watch {
                 non_finite,
                 density,
                 speed,
-                pressures,
-                velocities,
-                compared,
+                deviations @ ..,
             ],
-        ) = <[f64; 15]>::try_from(memory)
+        ) = <[f64; 18]>::try_from(memory)
         else {
             return;
         };
@@ -540,7 +541,7 @@ impl Watch {
         self.carved = carved as usize;
         (self.energy_at_start, self.most_energy) = (start, most);
         self.neighbours = (sum, looks as usize);
-        self.deviations = ([pressures, velocities], compared as usize);
+        self.deviations = Deviations::remembered(deviations);
         self.worst = Stats {
             max_penetration: depth,
             inside: inside as usize,
@@ -567,23 +568,9 @@ impl Watch {
         self.now = now;
     }
 
-    fn compare(&mut self, deviation: Option<Deviation>) {
-        let Some(Deviation { pressure, velocity }) = deviation else { return };
-        self.deviations.1 += 1;
-        for (k, found) in [pressure, velocity].into_iter().enumerate() {
-            self.knows[k] |= found.is_some();
-            self.deviations.0[k] += found.unwrap_or(0.0).powi(2);
-        }
-    }
-
-    /// Root mean square over the saved instants for which the truth holds.
-    fn deviation(&self, k: usize) -> Option<f64> {
-        let (squares, instants) = self.deviations;
-        self.knows[k].then(|| (squares[k] / instants as f64).sqrt())
-    }
-
     fn summary(&self, scene: &Scene, simulation: &Simulation<'_>, frames: usize, finished: bool) -> Summary {
         let steps = simulation.steps();
+        let deviation = self.deviations.mean();
         Summary {
             schema: 1,
             scene: scene.name.clone(),
@@ -606,8 +593,9 @@ impl Watch {
             energy_at_start: self.energy_at_start,
             energy_growth: growth(self.energy_at_start, self.most_energy),
             max_speed: self.worst.max_speed,
-            pressure_error: self.deviation(0),
-            velocity_error: self.deviation(1),
+            pressure_error: deviation.pressure,
+            velocity_error: deviation.velocity,
+            front_error: deviation.front,
             passes: pass_names(simulation),
             threads: rayon::current_num_threads(),
             frames,
@@ -648,7 +636,8 @@ fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         summary.kinetic_energy + summary.potential_energy,
         100.0 * summary.max_density_error
     );
-    for (what, error) in [("pressure", summary.pressure_error), ("velocity", summary.velocity_error)] {
+    let errors = [summary.pressure_error, summary.velocity_error, summary.front_error];
+    for (what, error) in Deviation::NAMES.into_iter().zip(errors) {
         if let Some(error) = error {
             say!(
                 "{what}: {:.2} % from what is known (relative L2, mean over the saved instants)",

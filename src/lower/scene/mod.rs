@@ -106,6 +106,8 @@ pub struct Truth {
     pub pressure: Option<Node>,
     /// m/s
     pub velocity: Option<[Node; 3]>,
+    /// How far along x the fluid has come on the floor of the box, m: a formula of t alone.
+    pub front: Option<Node>,
     /// From when on it holds, s.
     pub from: f64,
 }

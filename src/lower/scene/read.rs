@@ -30,7 +30,7 @@ const SCENE_KEYS: [&str; 13] = [
     "probe",
     "tolerance",
 ];
-const TRUTH_KEYS: [&str; 3] = ["pressure", "velocity", "from"];
+const TRUTH_KEYS: [&str; 4] = ["pressure", "velocity", "front", "from"];
 const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
 const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
 const FLUID_KEYS: [&str; 21] = [
@@ -74,7 +74,7 @@ impl<'a> Lowering<'a> {
         self.units(&block);
         let domain = self.domain(&block);
         let words = [("paper", Method::Paper), ("wcsph", Method::Wcsph), ("dfsph", Method::Dfsph)];
-        let method = self.word_key(&block, "method", &words);
+        let method = self.word_key(&block, "method", &words).map(|stated| self.method.unwrap_or(stated));
         let fluid = self.fluid(&block, method.unwrap_or(Method::Paper));
         let slip = self.word_key(&block, "walls", &[FREE_SLIP, NO_SLIP]);
         let walls = slip.unwrap_or(Slip::Free);
@@ -341,23 +341,33 @@ impl<'a> Lowering<'a> {
     fn truth(&mut self, block: &Block<'_>) -> Option<Option<Truth>> {
         let Some((_, entries, span)) = block.blocks("truth").next() else { return Some(None) };
         let block = self.block(entries, "a truth", span, &TRUTH_KEYS, &[]);
-        let pressure = match block.setting("pressure") {
+        let mut formula = |key| match block.setting(key) {
             Some((_, value)) => {
                 let found = self.expr(value);
-                Some(self.as_number(&found, value.span)?)
+                Some(Some((self.as_number(&found, value.span)?, value.span)))
             }
-            None => None,
+            None => Some(None),
         };
+        let (pressure, front) = (formula("pressure")?.map(|(node, _)| node), formula("front")?);
+        if let Some((node, span)) = front
+            && self.depends_on_place(node)
+        {
+            let message = "`front` may depend on the time t, not on the place";
+            self.report(Diagnostic::error(Code::NOT_CONSTANT, span, message));
+            return None;
+        }
+        let front = front.map(|(node, _)| node);
         let velocity = match block.setting("velocity") {
             Some((_, value)) => Some(self.components(value, Dimension::SPEED, "velocity")?),
             None => None,
         };
-        if pressure.is_none() && velocity.is_none() {
-            self.missing(&block, "pressure", "write `pressure: 1000*9.81*(1 - z)`, or `velocity: [..]`");
+        if pressure.is_none() && velocity.is_none() && front.is_none() {
+            let help = "write `pressure: 1000*9.81*(1 - z)`, `velocity: [..]` or `front: 2*t`";
+            self.missing(&block, "pressure", help);
             return None;
         }
         let from = self.number_key(&block, "from", Dimension::TIME, Some(0.0), Bound::NotNegative)?;
-        Some(Some(Truth { pressure, velocity, from }))
+        Some(Some(Truth { pressure, velocity, front, from }))
     }
 
     /// Three speeds, which may depend on the place.

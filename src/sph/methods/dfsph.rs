@@ -188,7 +188,7 @@ impl DivergenceFree {
     }
 
     pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
-        let dt = core.next_dt(longest);
+        let dt = core.next_dt(longest)?;
         self.find_other_accelerations(core);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);

@@ -41,7 +41,7 @@ impl Paper {
     }
 
     pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
-        let dt = core.next_dt(longest);
+        let dt = core.next_dt(longest)?;
         add_scaled(&mut core.particles.velocity, &core.acceleration, 0.5 * dt);
         core.move_obstacles(dt);
         core.drift(dt, None)?;

@@ -83,7 +83,7 @@ impl Weakly {
     }
 
     pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
-        let dt = core.next_dt(longest);
+        let dt = core.next_dt(longest)?;
         self.kick(core, 0.5 * dt);
         core.move_obstacles(dt);
         core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;

@@ -1,11 +1,12 @@
 //! Compares rfm with Fidget and with hand-written loops, in one run, on one thread.
 //!
 //! `cargo run --release --manifest-path tests/peers/Cargo.toml [-- --json FILE] [--only TEXT]`, with `--meshes` the
-//! meshers instead of the evaluators; what it prints is explained in `README.md` beside it.
+//! meshers instead of the evaluators, with `--flows` the fluid solvers; what it prints is explained in `README.md` beside it.
 
 mod bars;
 mod compile;
 mod fidget;
+mod flows;
 mod groups;
 mod hand;
 mod measure;
@@ -26,6 +27,10 @@ fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
     let (mut json, mut only, mut meshes) = (None, String::new(), false);
     while let Some(argument) = arguments.next() {
+        if argument == "--flows" {
+            flows::run();
+            return ExitCode::SUCCESS;
+        }
         if argument == "--meshes" {
             meshes = true;
             continue;
@@ -35,7 +40,7 @@ fn main() -> ExitCode {
             ("--only", Some(text)) => only = text,
             _ => {
                 eprintln!(
-                    "usage: peers [--meshes] [--json FILE] [--only TEXT], TEXT being part of an obstacle's title"
+                    "usage: peers [--meshes] [--flows] [--json FILE] [--only TEXT], TEXT being part of an obstacle's title"
                 );
                 return ExitCode::from(2);
             }

@@ -1,0 +1,346 @@
+//! Error against cost of a flow that is known: a scene run at growing resolution by each method.
+//!
+//! scene with a `truth` × methods × sizes → rows → table, JSON, picture. A run that fails is a row that says so.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use anstream::println;
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use super::super::args::{Flow, FlowMethod, Shared};
+use super::super::{Failure, choose, input, output, progress};
+use super::flow_plot;
+use crate::diagnostic::Diagnostics;
+use crate::experiment::{Deviation, Deviations};
+use crate::lower::{Scene, Truth};
+use crate::sph::Simulation;
+use crate::{Error, Experiment, Program};
+
+/// The param of a file that says how fine its scene is.
+const SIZE: &str = "particles";
+
+/// Without `--particles`: these parts of what the file states. In space two spacings differ by 4^⅓ = 1.6, in a layer of
+/// fixed number of spacings by 2.
+const PARTS: [f64; 3] = [1.0 / 16.0, 1.0 / 4.0, 1.0];
+
+/// A run stands still if so many steps take less than this part of its time: one that goes on like that has a hundred
+/// million steps before it.
+const STANDSTILL: (u64, f64) = (200, 1e-6);
+
+/// One run.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Row {
+    pub method: &'static str,
+    /// Of the sums over neighbours.
+    precision: &'static str,
+    pub particles: usize,
+    /// m
+    spacing: f64,
+    steps: u64,
+    /// s
+    simulated_seconds: f64,
+    pressure_error: Option<f64>,
+    velocity_error: Option<f64>,
+    front_error: Option<f64>,
+    /// p of error ∝ spacingᵖ between this run and the coarser one before it.
+    pressure_order: Option<f64>,
+    velocity_order: Option<f64>,
+    front_order: Option<f64>,
+    /// Of all threads on the processor, for the steps alone, s.
+    pub cpu_seconds: f64,
+    cpu_seconds_per_simulated_second: f64,
+    /// By the clock, s.
+    seconds: f64,
+    /// Why the run ended before its end.
+    failure: Option<String>,
+}
+
+impl Row {
+    /// In the order of [`Deviation::NAMES`]; not of a run that failed.
+    pub fn errors(&self) -> [Option<f64>; 3] {
+        [self.pressure_error, self.velocity_error, self.front_error]
+    }
+
+    fn orders(&self) -> [Option<f64>; 3] {
+        [self.pressure_order, self.velocity_order, self.front_order]
+    }
+
+    /// Finds the orders from the run before.
+    fn compare(&mut self, coarser: &Self) {
+        let halvings = (coarser.spacing / self.spacing).ln();
+        if coarser.method != self.method || halvings <= 0.0 {
+            return;
+        }
+        let order = |coarse: Option<f64>, fine: Option<f64>| {
+            Some((coarse? / fine?).ln() / halvings).filter(|order| order.is_finite())
+        };
+        self.pressure_order = order(coarser.pressure_error, self.pressure_error);
+        self.velocity_order = order(coarser.velocity_error, self.velocity_error);
+        self.front_order = order(coarser.front_error, self.front_error);
+    }
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: u32,
+    scene: &'a str,
+    threads: usize,
+    /// Saved instants for which something is known, of a run that does not fail.
+    instants: usize,
+    rows: &'a [Row],
+}
+
+pub(super) fn run(
+    shared: &Shared,
+    program: &Program,
+    scene: &Scene,
+    options: &Flow,
+    picture: Option<&Path>,
+) -> Result<(), Failure> {
+    let Some(truth) = scene.truth else {
+        return Err(Failure::usage(format!(
+            "the scene `{}` does not say what is known of its flow; write `truth {{ pressure: … }}`, with \
+             `velocity: […]` or `front: …`, formulas of x, y, z and t",
+            scene.name
+        )));
+    };
+    let sizes = sizes(program, &options.particles)?;
+    let methods: Vec<Option<FlowMethod>> = match &options.methods[..] {
+        [] => vec![None],
+        several => several.iter().copied().map(Some).collect(),
+    };
+    let mut study = Study { shared, scene: &scene.name, instants: 0, bar: bar(&sizes, methods.len()) };
+    let table = Table::of(&truth);
+    if !shared.json {
+        println!(
+            "{}: relative deviation from what is known, root mean square over the saved instants from {} s on",
+            scene.name, truth.from
+        );
+        table.head();
+    }
+    let mut rows: Vec<Row> = Vec::new();
+    for method in methods {
+        let by_method = match method {
+            Some(method) => program.with_method(method.into()).map_err(refused)?,
+            None => program.clone(),
+        };
+        for &size in &sizes {
+            let sized = match size {
+                Some(size) => by_method.with(SIZE, size as f64).map_err(refused)?,
+                None => by_method.clone(),
+            };
+            let mut row = study.measure(&sized, size)?;
+            if let Some(coarser) = rows.last() {
+                row.compare(coarser);
+            }
+            if !shared.json {
+                // each as soon as it is known: the next may take long
+                study.bar.suspend(|| table.row(&row));
+            }
+            rows.push(row);
+        }
+    }
+    study.bar.finish_and_clear();
+    if let Some(path) = picture {
+        let picture = flow_plot::draw(&scene.name, &rows, path)?;
+        output::write(path, |out| out.write_all(&picture))?;
+    }
+    let instants = study.instants;
+    if shared.json {
+        let threads = rayon::current_num_threads();
+        output::json(&Document { schema: 1, scene: &scene.name, threads, instants, rows: &rows })?;
+    } else if let Some(path) = picture {
+        println!("plot written to {}", path.display());
+    }
+    let failures: Vec<String> = rows
+        .iter()
+        .filter_map(|row| {
+            Some(format!("{}, {} particles: {}", row.method, row.particles, row.failure.as_ref()?))
+        })
+        .collect();
+    if failures.is_empty() { Ok(()) } else { Err(Failure::Numerical(failures.join("\n"))) }
+}
+
+/// The sizes asked for, or [`PARTS`] of the file's own within its range; nothing is one run as the file has it.
+fn sizes(program: &Program, asked: &[usize]) -> Result<Vec<Option<usize>>, Failure> {
+    let param = program.module().params.iter().find(|param| param.name == SIZE);
+    let mut sizes: Vec<usize> = match (param, asked) {
+        (None, []) => return Ok(vec![None]),
+        (None, _) => {
+            return Err(Failure::usage(format!(
+                "the file has no `param {SIZE}` to set its resolution by; write `param {SIZE} = 4000` and let the \
+                 fluid's `spacing` follow from it"
+            )));
+        }
+        (Some(param), []) => {
+            let least = param.range.map_or(1.0, |(low, _)| low.max(1.0));
+            PARTS.iter().map(|part| (part * param.value).max(least).ceil() as usize).collect()
+        }
+        (Some(_), asked) => asked.to_vec(),
+    };
+    sizes.sort_unstable();
+    sizes.dedup();
+    Ok(sizes.into_iter().map(Some).collect())
+}
+
+/// What all runs of a report share.
+struct Study<'a> {
+    shared: &'a Shared,
+    scene: &'a str,
+    instants: usize,
+    bar: ProgressBar,
+}
+
+impl Study<'_> {
+    /// Runs the scene to its end and looks at it whenever it would be saved.
+    fn measure(&mut self, program: &Program, size: Option<usize>) -> Result<Row, Failure> {
+        let scene = choose::scene(program, Some(self.scene))?;
+        let experiment = Experiment::of(program, scene, self.shared.engine.into()).map_err(refused)?;
+        let (mut simulation, _) = experiment.simulation(program, scene).map_err(refused)?;
+        input::show(&Diagnostics { list: experiment.take_warnings(), sources: program.sources().clone() });
+        let before = self.bar.position();
+        let method = experiment.parameters.method.name();
+        let (mut failure, mut mark) = (None, (0, 0.0));
+        let mut stands_still = false;
+        let mut follow = |simulation: &Simulation<'_>| {
+            let done = simulation.time() / scene.run.until;
+            self.bar.set_position(before + (done * work(size)) as u64);
+            let particles = simulation.particles().len();
+            self.bar.set_message(format!("{method}, {particles} particles, t = {:.3} s", simulation.time()));
+            if simulation.steps() >= mark.0 + STANDSTILL.0 {
+                stands_still = simulation.time() - mark.1 < STANDSTILL.1 * scene.run.until;
+                mark = (simulation.steps(), simulation.time());
+            }
+            if stands_still { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let mut deviations = Deviations::default();
+        let (mut cpu_seconds, mut seconds) = (0.0, 0.0);
+        let mut frame = 0;
+        while failure.is_none() && simulation.time() < scene.run.until * (1.0 - 1e-12) {
+            frame += 1;
+            let end = (f64::from(frame) * scene.run.save_every).min(scene.run.until);
+            let (clock, processor) = (Instant::now(), processor_seconds());
+            let reached = experiment.advance(program, scene, &mut simulation, end, &mut follow);
+            failure = reached.err().map(|error| error.to_string());
+            if simulation.time() < end * (1.0 - 1e-12) && failure.is_none() {
+                failure = Some(format!(
+                    "step {}: time stands still at {:.4} s, steps have become too short",
+                    simulation.steps(),
+                    simulation.time()
+                ));
+            }
+            cpu_seconds += processor_seconds() - processor;
+            seconds += clock.elapsed().as_secs_f64();
+            if let Some(deviation) = Deviation::of(program, scene, &simulation).filter(|_| failure.is_none())
+            {
+                deviations.add(&deviation);
+            }
+        }
+        self.bar.set_position(before + work(size) as u64);
+        self.instants = self.instants.max(deviations.instants());
+        let deviation = if failure.is_none() { deviations.mean() } else { Deviation::default() };
+        let parameters = simulation.parameters();
+        Ok(Row {
+            method,
+            precision: parameters.precision.name(),
+            particles: simulation.particles().len(),
+            spacing: parameters.spacing(),
+            steps: simulation.steps(),
+            simulated_seconds: simulation.time(),
+            pressure_error: deviation.pressure,
+            velocity_error: deviation.velocity,
+            front_error: deviation.front,
+            pressure_order: None,
+            velocity_order: None,
+            front_order: None,
+            cpu_seconds,
+            cpu_seconds_per_simulated_second: cpu_seconds / simulation.time(),
+            seconds,
+            failure,
+        })
+    }
+}
+
+/// About how long a run takes, in a unit of its own: N particles in steps as long as the spacing allows.
+fn work(size: Option<usize>) -> f64 {
+    (size.unwrap_or(1000) as f64).powf(4.0 / 3.0)
+}
+
+fn bar(sizes: &[Option<usize>], methods: usize) -> ProgressBar {
+    let once: u64 = sizes.iter().map(|&size| work(size) as u64).sum();
+    progress::bar(once * methods as u64, "running")
+}
+
+/// Seconds that all threads of this process have spent on processors; of the clock where the system does not tell.
+fn processor_seconds() -> f64 {
+    #[cfg(unix)]
+    {
+        let spent = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        spent.tv_sec as f64 + 1e-9 * spent.tv_nsec as f64
+    }
+    #[cfg(not(unix))]
+    {
+        static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+        START.elapsed().as_secs_f64()
+    }
+}
+
+/// Shows messages about the file and makes them findings, or a wrong command line.
+fn refused(error: Error) -> Failure {
+    match error {
+        Error::Diagnostics(diagnostics) => {
+            input::show(&diagnostics);
+            input::failure(&diagnostics)
+        }
+        other => choose::usage(other),
+    }
+}
+
+/// The columns of what is known, a row at a time.
+struct Table {
+    /// Numbers in [`Deviation::NAMES`].
+    known: Vec<usize>,
+}
+
+impl Table {
+    fn of(truth: &Truth) -> Self {
+        let known = [truth.pressure.is_some(), truth.velocity.is_some(), truth.front.is_some()];
+        Self { known: (0..3).filter(|&k| known[k]).collect() }
+    }
+
+    fn head(&self) {
+        let names = self.known.iter().map(|&k| format!(" {:>9} {:>6}", Deviation::NAMES[k], "order"));
+        println!(
+            "{:<7} {:<9} {:>9} {:>9}{} {:>8} {:>9} {:>17}",
+            "method",
+            "precision",
+            "particles",
+            "spacing",
+            names.collect::<String>(),
+            "steps",
+            "CPU s",
+            "per simulated s"
+        );
+    }
+
+    fn row(&self, row: &Row) {
+        let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));
+        let error = |error: Option<f64>| error.map_or("failed".to_string(), |error| format!("{error:.2e}"));
+        let (errors, orders) = (row.errors(), row.orders());
+        let cells = self.known.iter().map(|&k| format!(" {:>9} {:>6}", error(errors[k]), order(orders[k])));
+        println!(
+            "{:<7} {:<9} {:>9} {:>9.4}{} {:>8} {:>9.2} {:>17.2}",
+            row.method,
+            row.precision,
+            row.particles,
+            row.spacing,
+            cells.collect::<String>(),
+            row.steps,
+            row.cpu_seconds,
+            row.cpu_seconds_per_simulated_second,
+        );
+    }
+}
