@@ -101,9 +101,29 @@ scene stirred {
   run { until: 0.4 s, save_every: 0.05 s }
 }";
 
+/// A flap as wide as its tank: the nearest way out of it may lead through the tank's wall.
+const FLAP: &str = "rfm 1
+solid blade = box([-0.05, -0.2, 0], [0.05, 0.2, 0.5]).rotate_y(0.3*sin(8*t))
+scene wavy {
+  box { min: [-0.5, -0.2, 0], max: [0.5, 0.2, 0.6] }
+  obstacle { solid: blade }
+  fluid water { shape: (z <= 0.3) \\ box([-0.1, -1, 0], [0.1, 1, 1]), density: 1000, spacing: 5 cm, start: hydrostatic }
+  method: wcsph
+  run { until: 0.5 s, save_every: 0.05 s }
+}";
+
 #[test]
 fn a_turning_blade_stays_free_of_water() {
-    let program = Program::from_source("stirred.rfm", STIRRED).unwrap_or_else(|e| panic!("{e}"));
+    stays_free(STIRRED);
+}
+
+#[test]
+fn a_flap_as_wide_as_its_tank_pushes_nothing_out_of_it() {
+    stays_free(FLAP);
+}
+
+fn stays_free(text: &str) {
+    let program = Program::from_source("moving.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     let scene = &program.module().scenes[0];
     let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
     let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
@@ -113,5 +133,6 @@ fn a_turning_blade_stays_free_of_water() {
         let now = blade.at(simulation.time());
         let inside = simulation.particles().position.iter().filter(|&p| now.sign(p) > 0.0).count();
         assert_eq!(inside, 0, "after {} s", simulation.time());
+        assert!(simulation.particles().position.iter().all(|p| scene.domain.contains(p)));
     }
 }

@@ -25,7 +25,7 @@ use crate::{
 use crate::sph::{VectorField, params::Slip, particles::Vectors, probes::Contacts};
 
 use super::{
-    contact::{Contact, Undefined, first_contact, push_out, reflect, turn_back},
+    contact::{Contact, Undefined, first_contact, push_out, push_out_to, reflect, turn_back},
     coverage::Coverage,
     kernel::WallKernel,
 };
@@ -219,7 +219,10 @@ impl<'a> Boundary<'a> {
             if field.omega(at) < 0.0 {
                 continue;
             }
-            if let Some(lifted) = push_out(field, at, REACH * self.clearance, self.clearance)? {
+            // the nearest way out may lead through a wall of the box
+            let in_box = |p: DVec3| self.domain.contains(p);
+            let found = push_out_to(field, at, REACH * self.clearance, self.clearance, in_box)?;
+            if let Some(lifted) = found {
                 let wall = field.wall_velocity(lifted.point);
                 at = lifted.point;
                 velocity = wall + reflect(velocity - wall, lifted.normal, obstacle.restitution);

@@ -107,6 +107,20 @@ pub fn push_out(
     reach: f64,
     clearance: f64,
 ) -> Result<Option<Contact>, Undefined> {
+    push_out_to(field, inside, reach, clearance, |_| true)
+}
+
+/// The same, to a place that is wanted.
+///
+/// # Errors
+/// [`Undefined`] where ω is NaN.
+pub(super) fn push_out_to(
+    field: &dyn Field,
+    inside: DVec3,
+    reach: f64,
+    clearance: f64,
+    is_wanted: impl Fn(DVec3) -> bool,
+) -> Result<Option<Contact>, Undefined> {
     let contact = |from: DVec3, to: DVec3| -> Result<Contact, Undefined> {
         let (outer, inner) = (omega(field, to)?, omega(field, from)?);
         let path = Path::new(to, from, f64::INFINITY);
@@ -135,7 +149,11 @@ pub fn push_out(
             break;
         }
         if omega(field, next)? < 0.0 {
-            return contact(here, next).map(Some);
+            let found = contact(here, next)?;
+            if is_wanted(found.point) {
+                return Ok(Some(found));
+            }
+            break;
         }
         here = next;
     }
@@ -146,7 +164,10 @@ pub fn push_out(
         for direction in [DVec3::Z, DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, -DVec3::Z] {
             let outside = inside + direction * distance;
             if omega(field, outside)? < 0.0 {
-                return contact(inside, outside).map(Some);
+                let found = contact(inside, outside)?;
+                if is_wanted(found.point) {
+                    return Ok(Some(found));
+                }
             }
         }
     }
