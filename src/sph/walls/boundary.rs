@@ -207,7 +207,8 @@ impl<'a> Boundary<'a> {
                 })
                 .and_then(|(at, velocity)| self.leave_moving(at, velocity))
                 .map_err(|undefined| block.fault(k, undefined))?;
-            block.put(k, at, velocity);
+            // a point of a path may lie a rounding error beyond both of its ends
+            block.put(k, at.clamp(self.domain.min, self.domain.max), velocity);
         }
         Ok(())
     }
