@@ -56,6 +56,8 @@ pub(super) struct Cells {
     per_length: DVec3,
     /// x fastest, then y.
     grid: Vec<u32>,
+    /// First and last of the flat grid's cells that are not fluid, along each axis: most places need look no further.
+    occupied: [UVec3; 2],
     /// Eight in a row for each divided cell.
     children: Vec<u32>,
     /// What is left of the solid in near cells, each different one once, in prefix form.
@@ -166,6 +168,7 @@ impl Cells {
             domain,
             per_length: f64::from(SIDE) / domain.size(),
             grid: vec![Cell::Fluid.pack(); (SIDE * SIDE * SIDE) as usize],
+            occupied: [UVec3::MAX, UVec3::ZERO],
             children: Vec::new(),
             programs: Vec::new(),
             counts: Counts::default(),
@@ -276,6 +279,10 @@ impl Cells {
         // a cell above the flat grid fills a cube of it
         let side = 1 << (DEPTH - depth);
         let first = at * side;
+        if cell != Cell::Fluid {
+            let [low, high] = self.occupied;
+            self.occupied = [low.min(first), high.max(first + side - 1)];
+        }
         for z in first.z..first.z + side {
             for y in first.y..first.y + side {
                 let row = ((z * SIDE + y) * SIDE + first.x) as usize;
@@ -294,7 +301,9 @@ impl Cells {
         }
         let at = q.as_uvec3().min(UVec3::splat(SIDE - 1));
         let place = (at.z * SIDE + at.y) * SIDE + at.x;
-        let cell = Cell::unpack(self.grid[place as usize]);
+        let [low, high] = self.occupied;
+        let is_occupied = at.cmpge(low).all() && at.cmple(high).all();
+        let cell = if is_occupied { Cell::unpack(self.grid[place as usize]) } else { Cell::Fluid };
         match cell {
             Cell::Divided(first) => Some(self.descend(first, q - at.as_dvec3())),
             cell => Some(Found { cell, depth: DEPTH, place }),
