@@ -18,7 +18,7 @@ use super::{
 /// A method with what it keeps between steps.
 pub(super) enum Scheme {
     Paper(paper::Paper),
-    Wcsph(wcsph::Weakly),
+    Wcsph(Box<wcsph::Weakly>),
     Dfsph(Box<dfsph::DivergenceFree>),
 }
 
@@ -27,7 +27,7 @@ impl Scheme {
     pub fn start(core: &mut Core<'_>) -> Self {
         match core.parameters.method {
             Method::Paper => Self::Paper(paper::Paper::start(core)),
-            Method::Wcsph(_) => Self::Wcsph(wcsph::Weakly::start(core)),
+            Method::Wcsph(_) => Self::Wcsph(Box::new(wcsph::Weakly::start(core))),
             Method::Dfsph(_) => Self::Dfsph(Box::new(dfsph::DivergenceFree::start(core))),
         }
     }
