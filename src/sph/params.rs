@@ -79,13 +79,14 @@ pub struct Dfsph {
     pub tolerance: f64,
     /// Iterations of the solver, at most. 100.
     pub most_iterations: u32,
-    /// How strongly particles drift to where there are fewer of them, 1; zero: they do not.
+    /// How strongly particles drift to where there are fewer of them; zero: they do not. 1 halves the deviation of a fluid at
+    /// rest, and makes that of a shear flow two to three times as large.
     pub shifting: f64,
 }
 
 impl Default for Dfsph {
     fn default() -> Self {
-        Self { tolerance: 1e-4, most_iterations: 100, shifting: 1.0 }
+        Self { tolerance: 1e-4, most_iterations: 100, shifting: 0.0 }
     }
 }
 

@@ -283,8 +283,7 @@ impl<'a> Lowering<'a> {
             );
         }
         let differences = self.word_key(&block, "gradients", &[("pairs", false), ("differences", true)]);
-        let even = method == Method::Dfsph || differences == Some(true);
-        let own_shifting = if even { 1.0 } else { 0.0 };
+        let own_shifting = if method == Method::Wcsph && differences == Some(true) { 1.0 } else { 0.0 };
         let shifting =
             self.number_key(&block, "shifting", Dimension::NONE, Some(own_shifting), Bound::NotNegative);
         let negative_pressure =
