@@ -51,8 +51,8 @@ pub enum Gradients {
     /// Sums p_i + p_j: what one particle gains another loses, momentum is conserved to rounding.
     #[default]
     Pairs,
-    /// Differences p_j − p_i in the fluid's depth: exact where pressure is linear in space, and ten times as accurate in
-    /// fluids at rest, in viscous ones and in those without a free surface. Needs shifting, and, at a free surface, an
+    /// Differences p_j − p_i in the fluid's depth: exact where pressure is linear in space, and five to ten times as accurate
+    /// in fluids at rest, in viscous ones and in those without a free surface. Needs shifting, and, at a free surface, an
     /// artificial viscosity of some 0.05: without it, waves gain energy.
     Differences,
 }

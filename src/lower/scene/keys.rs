@@ -82,31 +82,27 @@ impl<'a> Lowering<'a> {
 
     /// The components of a vector, formulas or quantities.
     pub(super) fn components(&mut self, value: &Expr, dimension: Dimension, key: &str) -> Option<[Node; 3]> {
-        let mut nodes = Vec::new();
-        if let ExprKind::Vector(parts) = &value.kind
-            && parts.len() == 3
-        {
-            for part in parts {
-                let node = match &part.kind {
-                    ExprKind::Quantity { .. } => {
-                        let number = self.quantity_expr(part, dimension, key)?;
-                        self.module.graph.constant(number)
-                    }
-                    ExprKind::Negate(inner) if matches!(inner.kind, ExprKind::Quantity { .. }) => {
-                        let number = self.quantity_expr(part, dimension, key)?;
-                        self.module.graph.constant(number)
-                    }
-                    _ => {
-                        let value = self.expr(part);
-                        self.as_number(&value, part.span)?
-                    }
-                };
-                nodes.push(node);
+        let parts = match &value.kind {
+            ExprKind::Vector(parts) if parts.len() == 3 => parts,
+            _ => {
+                let found = self.expr(value);
+                return self.as_vector(&found, value.span);
             }
-        } else {
-            let found = self.expr(value);
-            let numbers = self.constant_vector(&found, value.span, &format!("`{key}`"))?;
-            nodes.extend(numbers.map(|number| self.module.graph.constant(number)));
+        };
+        let mut nodes = Vec::new();
+        for part in parts {
+            let is_quantity = match &part.kind {
+                ExprKind::Quantity { .. } => true,
+                ExprKind::Negate(inner) => matches!(inner.kind, ExprKind::Quantity { .. }),
+                _ => false,
+            };
+            nodes.push(if is_quantity {
+                let number = self.quantity_expr(part, dimension, key)?;
+                self.module.graph.constant(number)
+            } else {
+                let value = self.expr(part);
+                self.as_number(&value, part.span)?
+            });
         }
         nodes.try_into().ok()
     }
