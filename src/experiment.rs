@@ -9,6 +9,8 @@
 //! # Ok::<(), rfm::Error>(())
 //! ```
 
+mod deviation;
+
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
@@ -26,6 +28,8 @@ use crate::sph::{
     SeedError, SetupError, Simulation, StepError, VectorField, carve, make_room,
 };
 use crate::{Engine, Program, Solid};
+
+pub use deviation::{Deviation, Deviations};
 
 /// Particles start at least this part of the spacing away from an obstacle.
 const CLEARANCE: f64 = 0.5;
@@ -262,9 +266,21 @@ impl Experiment {
         }
     }
 
-    /// Gravity at a time, m/s²; nothing if the scene's does not turn.
-    pub fn gravity_at(&self, program: &Program, scene: &Scene, time: f64) -> Option<DVec3> {
-        if let Gravity::Turning(nodes) = &scene.gravity { Some(at_time(program, nodes, time)) } else { None }
+    /// One step of at most `longest` seconds, under the gravity of its beginning.
+    ///
+    /// # Errors
+    /// Those of a step.
+    pub fn step(
+        &self,
+        program: &Program,
+        scene: &Scene,
+        simulation: &mut Simulation<'_>,
+        longest: f64,
+    ) -> Result<(), StepError> {
+        if let Gravity::Turning(nodes) = &scene.gravity {
+            simulation.set_gravity(at_time(program, nodes, simulation.time()));
+        }
+        simulation.step_at_most(longest)
     }
 
     /// Steps until a time, s, at which the last step ends; `after_step` sees each state on the way, and may end it.
@@ -280,10 +296,7 @@ impl Experiment {
         mut after_step: impl FnMut(&Simulation<'_>) -> ControlFlow<()>,
     ) -> Result<(), StepError> {
         while simulation.time() < end * (1.0 - 1e-12) {
-            if let Some(gravity) = self.gravity_at(program, scene, simulation.time()) {
-                simulation.set_gravity(gravity);
-            }
-            simulation.step_at_most(end - simulation.time())?;
+            self.step(program, scene, simulation, end - simulation.time())?;
             if after_step(simulation).is_break() {
                 break;
             }
@@ -330,107 +343,6 @@ impl Experiment {
         let top = particles.position.iter().map(height).fold(f64::NEG_INFINITY, f64::max) + 0.5 * p.spacing();
         let pressure = |at: DVec3| p.rest_density * p.gravity.length() * (top - height(at));
         particles.density = particles.position.iter().map(|at| p.density_under(pressure(at))).collect();
-    }
-}
-
-/// How far a flow is from what is known of it.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Deviation {
-    /// √(Σ (p − p*)² / Σ p*²) over the particles, if the scene knows the pressure.
-    pub pressure: Option<f64>,
-    /// The same of the velocity.
-    pub velocity: Option<f64>,
-    /// |x − x*|/|x*| of the front on the floor: where the outermost of the particles in the lowest layer and a half
-    /// ends, half a spacing beyond its middle.
-    pub front: Option<f64>,
-}
-
-impl Deviation {
-    /// What may be known of a flow, in the order of [`Deviation::parts`].
-    pub const NAMES: [&str; 3] = ["pressure", "velocity", "front"];
-
-    /// All of it.
-    pub fn parts(&self) -> [Option<f64>; 3] {
-        [self.pressure, self.velocity, self.front]
-    }
-
-    /// Of the present state; nothing if the scene knows nothing, or nothing yet.
-    pub fn of(program: &Program, scene: &Scene, simulation: &Simulation<'_>) -> Option<Self> {
-        let truth = scene.truth.filter(|truth| simulation.time() >= truth.from * (1.0 - 1e-12))?;
-        let particles = simulation.particles();
-        let relative = |nodes: &[Node], found: &dyn Fn(usize, usize) -> f64| {
-            let formulas = Interpreter::new(&program.module().graph, nodes);
-            let (mut off, mut size) = (0.0, 0.0);
-            let mut known = [0.0; 3];
-            let known = &mut known[..nodes.len()];
-            for i in 0..particles.len() {
-                let point = particles.position.get(i).to_array();
-                formulas.eval_given(Given { time: simulation.time(), ..Given::point(point) }, known);
-                for (k, &known) in known.iter().enumerate() {
-                    off += (found(i, k) - known).powi(2);
-                    size += known * known;
-                }
-            }
-            (off / size).sqrt()
-        };
-        Some(Self {
-            pressure: truth.pressure.map(|node| relative(&[node], &|i, _| particles.pressure[i])),
-            velocity: truth.velocity.map(|nodes| relative(&nodes, &|i, k| particles.velocity.get(i)[k])),
-            front: truth.front.map(|node| {
-                let mut known = [0.0];
-                let now = Given { time: simulation.time(), ..Given::point([0.0; 3]) };
-                Interpreter::new(&program.module().graph, &[node]).eval_given(now, &mut known);
-                (front(scene, simulation) - known[0]).abs() / known[0].abs()
-            }),
-        })
-    }
-}
-
-/// How far along x the fluid has come on the floor of the box, m.
-fn front(scene: &Scene, simulation: &Simulation<'_>) -> f64 {
-    let (floor, spacing) = (scene.domain.min, simulation.parameters().spacing());
-    let low = simulation.particles().position.iter().filter(|p| p.z < floor.z + 1.5 * spacing);
-    low.map(|p| p.x + 0.5 * spacing).fold(floor.x, f64::max)
-}
-
-/// Deviations at several instants.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Deviations {
-    squares: [f64; 3],
-    instants: [usize; 3],
-}
-
-impl Deviations {
-    /// Takes those of another instant.
-    pub fn add(&mut self, deviation: &Deviation) {
-        for (k, found) in deviation.parts().into_iter().enumerate() {
-            self.instants[k] += usize::from(found.is_some());
-            self.squares[k] += found.unwrap_or(0.0).powi(2);
-        }
-    }
-
-    /// Root mean squares over the instants.
-    pub fn mean(&self) -> Deviation {
-        let mean =
-            |k: usize| (self.instants[k] > 0).then(|| (self.squares[k] / self.instants[k] as f64).sqrt());
-        Deviation { pressure: mean(0), velocity: mean(1), front: mean(2) }
-    }
-
-    /// Of how many instants something was known.
-    pub fn instants(&self) -> usize {
-        self.instants.into_iter().max().unwrap_or(0)
-    }
-
-    /// All that is remembered, as numbers.
-    pub fn memory(&self) -> [f64; 6] {
-        let [a, b, c] = self.squares;
-        let [i, j, k] = self.instants.map(|n| n as f64);
-        [a, b, c, i, j, k]
-    }
-
-    /// The other way.
-    pub fn remembered([a, b, c, i, j, k]: [f64; 6]) -> Self {
-        Self { squares: [a, b, c], instants: [i, j, k].map(|n| n as usize) }
     }
 }
 

@@ -15,6 +15,9 @@ use crate::{geom::Aabb, interval::Interval};
 pub use faces::{Face, Faces, Part};
 pub use sweep::{Entry, Normals, Path, last_outside, search_path};
 
+/// Radii that [`Field::clearance`] tries, each half of the one before.
+const CLEARANCES: u32 = 5;
+
 /// Borrowed points as a structure of arrays; the three slices have one length.
 #[derive(Debug, Clone, Copy)]
 pub struct Points<'a> {
@@ -138,10 +141,30 @@ pub trait Field: Sync {
         DVec3::ZERO
     }
 
-    /// Whether a point is proven to be in the fluid, farther from every surface than the distance for which the field
-    /// was prepared, at all times that it speaks of. One look-up, or no for a field that was not prepared.
-    fn is_clear(&self, _p: DVec3) -> bool {
-        false
+    /// A radius, `most` at the utmost, of a ball around a point that is proven to lie in the fluid at all times that the
+    /// field speaks of; 0 where nothing is proven.
+    ///
+    /// The default asks for ranges of the boxes around a few such balls.
+    fn clearance(&self, p: DVec3, most: f64) -> f64 {
+        let ball = |radius: f64| Aabb::new(p, p).grown(radius);
+        let mut radius = most;
+        for _ in 0..CLEARANCES {
+            let range = self.range(&ball(radius));
+            if range.hi < 0.0 {
+                return radius;
+            }
+            if range == Interval::ALL {
+                break; // it knows nothing, and will not know more
+            }
+            radius *= 0.5;
+        }
+        0.0
+    }
+
+    /// Whether a box is proven to lie in the fluid, and nothing of it nearer than `reach` to a surface, at all times that
+    /// the field speaks of.
+    fn is_far(&self, over: &Aabb, reach: f64) -> bool {
+        self.range(&over.grown(reach)).hi < 0.0
     }
 }
 
@@ -210,8 +233,12 @@ impl<F: Field + ?Sized> Field for &F {
         (**self).wall_velocity(p)
     }
 
-    fn is_clear(&self, p: DVec3) -> bool {
-        (**self).is_clear(p)
+    fn clearance(&self, p: DVec3, most: f64) -> f64 {
+        (**self).clearance(p, most)
+    }
+
+    fn is_far(&self, over: &Aabb, reach: f64) -> bool {
+        (**self).is_far(over, reach)
     }
 
     fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {

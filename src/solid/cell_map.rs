@@ -276,6 +276,19 @@ impl CellMap {
         }
     }
 
+    /// Whether a path that does not leave its cell surely stays in the fluid.
+    fn stays_out(&self, path: &Path) -> bool {
+        match (self.cells.find(path.from), self.cells.find(path.to)) {
+            (Some(from), Some(to)) if from.place == to.place => match from.cell {
+                Cell::Near(program) => {
+                    Sweep::new(&self.parts.leaves, path).stays_out(&self.cells.programs[program as usize..])
+                }
+                cell => cell == Cell::Fluid,
+            },
+            _ => false,
+        }
+    }
+
     /// The first entry on a path within the box, cell by cell.
     fn walk(&self, path: &Path) -> Option<Entry> {
         // half of what the cells were grown by: the next look-up is then surely in the next cell
@@ -411,14 +424,39 @@ impl Field for CellMap {
         }
     }
 
-    fn is_clear(&self, p: DVec3) -> bool {
-        self.place_of(p) == Place::Fluid
+    fn clearance(&self, p: DVec3, most: f64) -> f64 {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) => self.reach.min(most),
+            Some(Cell::Near(program)) => {
+                // a cube around the point, with its corners at the surface's distance, or with less than half of that;
+                // what the cell has kept is right within the reach
+                let distance = self.nearest(&mut (program as usize), p).distance.min(self.reach);
+                let is_proven = |radius: f64| {
+                    let cube = Aabb::new(p, p).grown(radius);
+                    self.parts.leaves.is_negative(&self.cells.programs[program as usize..], &cube)
+                };
+                let radii = [0.57, 0.25].map(|part| (part * distance).min(most));
+                radii.into_iter().find(|&radius| radius > 0.0 && is_proven(radius)).unwrap_or(0.0)
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn is_far(&self, over: &Aabb, reach: f64) -> bool {
+        let domain = self.cells.domain;
+        let within = domain.contains(over.min) && domain.contains(over.max);
+        within
+            && reach <= self.reach
+            && self
+                .cells
+                .touched(over, MOST_TOUCHED)
+                .is_some_and(|mut cells| cells.all(|cell| cell == Cell::Fluid))
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {
         let domain = self.cells.domain;
         if domain.contains(path.from) && domain.contains(path.to) {
-            self.walk(path)
+            if self.stays_out(path) { None } else { self.walk(path) }
         } else {
             self.twin.first_entry(path)
         }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::compiled::{LeafProgram, RangeProgram};
-use super::prefix::Word;
+use super::prefix::{self, Word};
 use super::programs::Engine;
 use crate::codegen;
 use crate::field::Path;
@@ -275,6 +275,15 @@ impl Leaves {
             }
         }
         best
+    }
+
+    /// Whether a tree in prefix form is surely negative all over a box, at all times of the stretch.
+    pub fn is_negative(&self, words: &[u32], over: &Aabb) -> bool {
+        let negative = prefix::is_negative(words, &mut 0, &mut |leaf, negated| {
+            let range = self.range(leaf, over);
+            (range != Interval::ALL).then_some(if negated { range.lo > 0.0 } else { range.hi < 0.0 })
+        });
+        negative == Some(true)
     }
 
     /// Distance, outward normal and mean curvature, see `ir::contact`.

@@ -60,6 +60,28 @@ pub(super) fn skip(words: &[u32], at: &mut usize) {
     }
 }
 
+/// Whether a tree is surely negative, of whose leaves a function knows it, given their number and whether they are negated;
+/// nothing as soon as a leaf may be NaN.
+pub(super) fn is_negative(
+    words: &[u32],
+    at: &mut usize,
+    leaf: &mut impl FnMut(u32, bool) -> Option<bool>,
+) -> Option<bool> {
+    let word = Word::read(words[*at]);
+    *at += 1;
+    let (parts, all) = match word {
+        Word::Leaf { leaf: number, negated } => return leaf(number, negated),
+        Word::All(parts) => (parts, true),
+        Word::Any(parts) => (parts, false),
+    };
+    let mut negative = !all;
+    for _ in 0..parts {
+        let part = is_negative(words, at, leaf)?;
+        negative = if all { negative || part } else { negative && part };
+    }
+    Some(negative)
+}
+
 /// What a region knows of a tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {

@@ -15,7 +15,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::leaf::Leaves;
-use super::prefix::{Word, skip};
+use super::prefix::{Word, is_negative, skip};
 use super::stretches::Met;
 use crate::field::{Entry, Normals, Path};
 
@@ -39,6 +39,19 @@ pub(super) struct Sweep<'a> {
 impl<'a> Sweep<'a> {
     pub fn new(leaves: &'a Leaves, path: &'a Path) -> Self {
         Self { leaves, path, enclosures: Cell::new(MOST_ENCLOSURES) }
+    }
+
+    /// Whether the whole path surely stays out of a tree, by bounds alone: cheaper than its stretches, and enough for
+    /// paths that are short beside their distance from the surface.
+    pub fn stays_out(&self, words: &[u32]) -> bool {
+        // NaN is not less than anything
+        let rise = |c: f64| if c < 0.0 { 0.0 } else { c };
+        let negative = is_negative(words, &mut 0, &mut |leaf, negated| {
+            let leaf = self.leaves.along(leaf, negated, self.path.from, self.path.to)?;
+            let [a, b, c] = leaf.coefficients.map(|coefficient| coefficient.hi);
+            Some(-a > (rise(b) + rise(c)) * (1.0 + 4.0 * f64::EPSILON))
+        });
+        negative == Some(true)
     }
 
     /// The first entry into a tree on a part of the path.

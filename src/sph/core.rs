@@ -8,21 +8,24 @@ use rayon::prelude::*;
 use super::{
     VectorField,
     pairs::{Cloud, Columns, PairPass, Real},
-    params::{Parameters, Precision},
+    params::{Method, Parameters, Precision},
     particles::{Particles, Vectors},
     probes::Contacts,
     simulation::{Cause, Quantity, StepError},
-    walls::Boundary,
+    walls::{Boundary, Coverage, MARKED, UNKNOWN, WallKernel},
 };
 
 /// Particles that a loop over all of them leaves to one thread together.
 pub(super) const CHUNK: usize = 2048;
 
-/// A step shorter than this part of the longest so far leads nowhere: speeds have grown a million times, or forces a million million.
+/// A step shorter than this part of the longest so far leads nowhere: speeds have grown a million times, or forces a
+/// million million.
 const SHORTEST: f64 = 1e-6;
 
 pub(super) struct Core<'a> {
     pub parameters: Parameters,
+    /// Gravity besides that of the parameters, m/s².
+    pub gravity_field: Option<&'a VectorField>,
     pub boundary: Boundary<'a>,
     pub particles: Particles,
     /// m/s²
@@ -30,16 +33,20 @@ pub(super) struct Core<'a> {
     pub steps: u64,
     /// s
     pub time: f64,
+    /// The greatest speed at the beginning of the present step, m/s.
+    pub speed: f64,
     /// Of obstacles, if somebody asks.
     pub contacts: Option<Contacts>,
     /// Of the steps that were allowed so far, s.
     longest_dt: f64,
     level: Level,
     columns: Columns,
+    /// How far each particle is from all obstacles at least, m, see [`Boundary::collide`].
+    clear: Vec<f64>,
+    /// Whether a wall may be near one of so many particles, see [`Boundary::mark`].
+    near_walls: Vec<bool>,
     /// Working memory: where the particles go before they collide, or what a method needs a vector for.
     pub spare: Vectors,
-    /// Gravity besides that of the parameters, m/s².
-    pub gravity_field: Option<&'a VectorField>,
     sorted_id: Vec<u32>,
 }
 
@@ -47,19 +54,24 @@ impl<'a> Core<'a> {
     pub fn new(parameters: Parameters, boundary: Boundary<'a>, particles: Particles) -> Self {
         let mut acceleration = Vectors::default();
         acceleration.resize(particles.len());
+        let speed = longest(&particles.velocity);
+        let clear = if boundary.obstacles.is_empty() { Vec::new() } else { vec![UNKNOWN; particles.len()] };
         Self {
             parameters,
+            gravity_field: None,
             boundary,
             particles,
             acceleration,
             steps: 0,
             time: 0.0,
+            speed,
             contacts: None,
             longest_dt: 0.0,
             level: Level::new(),
             columns: Columns::default(),
+            clear,
+            near_walls: Vec::new(),
             spare: Vectors::default(),
-            gravity_field: None,
             sorted_id: Vec::new(),
         }
     }
@@ -81,14 +93,19 @@ impl<'a> Core<'a> {
             return Err(self.non_finite(i, Quantity::Position, dt));
         }
         let Particles { position, velocity, id, .. } = &mut self.particles;
-        self.boundary.collide(position, &mut self.spare, velocity, self.contacts.as_ref()).map_err(
-            |fault| StepError::NonFinite {
-                step: self.steps,
-                id: id[fault.index],
-                quantity: Quantity::Omega,
-                cause: Cause::FieldUndefined { at: fault.at },
-            },
-        )?;
+        let met = self.boundary.collide(
+            position,
+            &mut self.spare,
+            velocity,
+            &mut self.clear,
+            self.contacts.as_ref(),
+        );
+        met.map_err(|fault| StepError::NonFinite {
+            step: self.steps,
+            id: id[fault.index],
+            quantity: Quantity::Omega,
+            cause: Cause::FieldUndefined { at: fault.at },
+        })?;
         std::mem::swap(position, &mut self.spare);
         if let Some(contacts) = &mut self.contacts {
             contacts.settle(self.parameters.particle_mass);
@@ -104,11 +121,24 @@ impl<'a> Core<'a> {
         let Particles { position, velocity, density, pressure, id } = &mut self.particles;
         let vectors =
             [position, velocity, &mut self.acceleration].into_iter().flat_map(Vectors::components_mut);
-        let scalars = [density, pressure].into_iter().chain(kept.iter_mut().map(|column| &mut **column));
+        let clear = Some(&mut self.clear).filter(|clear| !clear.is_empty());
+        let scalars =
+            [density, pressure].into_iter().chain(clear).chain(kept.iter_mut().map(|column| &mut **column));
         for column in vectors.chain(scalars) {
             permute(order, column, &mut self.spare.x);
         }
         permute(order, id, &mut self.sorted_id);
+        if self.parameters.method != Method::Paper {
+            let Self { boundary, particles, near_walls, .. } = self;
+            boundary.mark(&particles.position, self.parameters.support_radius, near_walls);
+        }
+    }
+
+    /// What walls take of the Wendland kernel of a particle; nothing if they are farther away than the support radius.
+    pub fn coverage(&self, i: usize) -> Option<Coverage> {
+        let h = self.parameters.support_radius;
+        let near = self.near_walls[i / MARKED];
+        near.then(|| self.boundary.coverage(WallKernel::WendlandC2, h, self.particles.position.get(i)))?
     }
 
     /// What acts on a particle from afar, m/s², at the end of the present step.
@@ -174,26 +204,32 @@ impl<'a> Core<'a> {
     /// The longest step that this state allows, s: the parameters' limits for the present greatest speed, and the force
     /// limit for the present greatest acceleration.
     pub fn stable_dt(&self) -> f64 {
-        let limit = self.parameters.stable_dt(longest(&self.particles.velocity));
+        self.stable_dt_at(longest(&self.particles.velocity))
+    }
+
+    /// The same, for particles of which the fastest is known.
+    fn stable_dt_at(&self, speed: f64) -> f64 {
+        let limit = self.parameters.stable_dt(speed);
         limit.min(self.parameters.force_dt(longest(&self.acceleration)))
     }
 
-    /// The step to take now, s, at most `longest`.
+    /// The step to take now, s, at most `most`.
     ///
     /// # Errors
     /// If it would be shorter than any that leads somewhere.
-    pub fn next_dt(&mut self, longest: f64) -> Result<f64, StepError> {
+    pub fn next_dt(&mut self, most: f64) -> Result<f64, StepError> {
+        self.speed = longest(&self.particles.velocity);
         let stated = self.parameters.time_step;
         if !self.parameters.adaptive {
-            return Ok(stated.min(longest));
+            return Ok(stated.min(most));
         }
-        let dt = stated.min(self.stable_dt());
+        let dt = stated.min(self.stable_dt_at(self.speed));
         self.longest_dt = self.longest_dt.max(dt);
         if dt < SHORTEST * self.longest_dt {
             return Err(self.stalled(dt));
         }
         // equal steps to the instant that is to be met, rather than full ones and a small rest
-        Ok(if longest.is_finite() { longest / (longest / dt - 1e-9).ceil().max(1.0) } else { dt })
+        Ok(if most.is_finite() { most / (most / dt - 1e-9).ceil().max(1.0) } else { dt })
     }
 
     /// Memory of the state and of what belongs to all methods.
@@ -201,7 +237,7 @@ impl<'a> Core<'a> {
         let Particles { position, velocity, density, pressure, id } = &self.particles;
         let vectors = [position, velocity, &self.acceleration, &self.spare].map(Vectors::bytes);
         vectors.iter().sum::<usize>()
-            + 8 * (density.capacity() + pressure.capacity())
+            + 8 * (density.capacity() + pressure.capacity() + self.clear.capacity())
             + 4 * (id.capacity() + self.sorted_id.capacity())
             + self.columns.bytes()
     }
@@ -291,7 +327,7 @@ pub(super) fn add_scaled_column(to: &mut [f64], from: &[f64], t: f64) {
 }
 
 /// Of the longest vector.
-pub(super) fn longest(vectors: &Vectors) -> f64 {
+fn longest(vectors: &Vectors) -> f64 {
     let longest =
         |range: std::ops::Range<usize>| range.map(|i| vectors.get(i).length_squared()).fold(0.0, f64::max);
     let n = vectors.len();

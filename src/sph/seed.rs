@@ -262,7 +262,7 @@ pub fn carve(
                 continue 'particles;
             }
             // away from surfaces a map of cells knows no more of ω than its sign
-            let near = clearance > 0.0 && !obstacle.field.is_clear(p);
+            let near = clearance > 0.0 && obstacle.field.clearance(p, clearance) < clearance;
             if near && -w < clearance * obstacle.field.omega_grad(p).1.length() {
                 carved.too_close += 1;
                 continue 'particles;
@@ -281,7 +281,7 @@ pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle
     for i in 0..particles.len() {
         let mut p = particles.position.get(i);
         for obstacle in obstacles {
-            if obstacle.field.is_clear(p) {
+            if obstacle.field.clearance(p, clearance) >= clearance {
                 continue;
             }
             let (w, gradient) = obstacle.field.omega_grad(p);

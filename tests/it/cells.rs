@@ -210,6 +210,60 @@ fn contacts_are_those_of_the_solid() {
     }
 }
 
+/// Of the balls that are said to be free no place is in the solid or on it, whether a map knows it or ranges alone; and
+/// boxes that are said to be far have no near place.
+#[test]
+fn what_is_said_to_be_clear_is_clear() {
+    let example = |name: &str| {
+        let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
+        Program::from_path(path).unwrap_or_else(|e| panic!("{e}")).solid(name).unwrap()
+    };
+    let reach = 0.09;
+    for (solid, name) in [
+        (solid(&many(500), "many", Engine::Auto), "500 balls"),
+        (example("pawn"), "pawn"),
+        (example("bishop"), "bishop"),
+    ] {
+        let map = CellMap::with_reach(&solid, domain(), reach).unwrap();
+        let fields: [(&dyn Field, bool); 2] = [(&map, true), (&solid, false)];
+        let mut random = Random(5);
+        for (field, is_map) in fields {
+            let (mut partly, mut near, mut far) = (0, 0, 0);
+            for _ in 0..1_500 {
+                let p = random.point(&domain());
+                let radius = field.clearance(p, reach);
+                assert!((0.0..=reach).contains(&radius), "{name}: {radius}");
+                let truth = solid.contact(p).distance;
+                let in_reach = truth > 1e-3 && truth < reach;
+                near += usize::from(in_reach && is_map);
+                partly += usize::from(in_reach && is_map && radius > 0.2 * truth);
+                if radius > 0.0 {
+                    for _ in 0..20 {
+                        let cube = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
+                        let q = p + radius * random.point(&cube).clamp_length_max(1.0);
+                        assert!(
+                            solid.sign(q) < 0.0,
+                            "{name}: {q} is {} from {p}, of {radius}",
+                            p.distance(q)
+                        );
+                    }
+                }
+                let cube = Aabb::new(p, p).grown(0.02);
+                if field.is_far(&cube, reach) {
+                    far += 1;
+                    for corner in cube.corners() {
+                        let distance = solid.contact(corner).distance;
+                        // estimates of leaves that have no zero within reach may be smaller
+                        assert!(distance > 0.5 * reach && solid.sign(corner) < 0.0, "{name}: {corner}");
+                    }
+                }
+            }
+            println!("{name}: {near} within reach, {partly} of them partly clear, {far} boxes far");
+            assert!(far > 100 && 10 * partly >= 9 * near, "{name}: {partly} of {near}, {far}");
+        }
+    }
+}
+
 #[test]
 fn no_scene_makes_a_map_explode() {
     // 3000 spheres on one another: no cell at the surface can drop any of them

@@ -21,8 +21,8 @@ fn program(name: &str, params: &[(&str, f64)]) -> Program {
     params.iter().fold(program, |p, (param, value)| p.with(param, *value).unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// Runs a scene to its end and looks at it whenever it would be saved; afterwards the root mean square of its deviations
-/// from what is known.
+/// Runs a scene to its end and looks at it whenever it would be saved; afterwards how far it was from
+/// what is known.
 fn watch(
     name: &str,
     params: &[(&str, f64)],
@@ -42,11 +42,9 @@ fn watch(
             experiment.advance(&program, scene, &mut simulation, end, |_| ControlFlow::Continue(()));
         reached.unwrap_or_else(|e| panic!("{name}: {e}"));
         look(scene, &simulation);
-        if let Some(deviation) = Deviation::of(&program, scene, &simulation) {
-            deviations.add(&deviation);
-        }
+        deviations.look(&program, scene, &simulation);
     }
-    let Deviation { pressure, velocity, .. } = deviations.mean();
+    let Deviation { pressure, velocity, .. } = deviations.total();
     let found = [pressure, velocity];
     let stats = simulation.stats();
     println!(

@@ -116,7 +116,7 @@ pub(super) fn run(
     let table = Table::of(&truth);
     if !shared.json {
         println!(
-            "{}: relative deviation from what is known, root mean square over the saved instants from {} s on",
+            "{}: relative deviation from what is known, over all particles and the saved instants from {} s on",
             scene.name, truth.from
         );
         table.head();
@@ -234,14 +234,13 @@ impl Study<'_> {
             }
             cpu_seconds += processor_seconds() - processor;
             seconds += clock.elapsed().as_secs_f64();
-            if let Some(deviation) = Deviation::of(program, scene, &simulation).filter(|_| failure.is_none())
-            {
-                deviations.add(&deviation);
+            if failure.is_none() {
+                deviations.look(program, scene, &simulation);
             }
         }
         self.bar.set_position(before + work(size) as u64);
         self.instants = self.instants.max(deviations.instants());
-        let deviation = if failure.is_none() { deviations.mean() } else { Deviation::default() };
+        let deviation = if failure.is_none() { deviations.total() } else { Deviation::default() };
         let parameters = simulation.parameters();
         Ok(Row {
             method,

@@ -38,7 +38,7 @@ use crate::sph::{
     params::{Dfsph, Method, Parameters},
     particles::{Particles, Vectors},
     simulation::StepError,
-    walls::{Coverage, LEAST_FREE, WallKernel},
+    walls::{Coverage, LEAST_FREE},
 };
 
 /// A density that is off comes back within so many steps.
@@ -92,15 +92,14 @@ const NONE: u32 = u32::MAX;
 
 impl Walls {
     fn find(&mut self, core: &Core<'_>) {
-        let h = core.parameters.support_radius;
-        let position = &core.particles.position;
+        let n = core.particles.len();
         self.found.clear();
-        self.found.par_extend((0..position.len()).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
-            let wall = core.boundary.coverage(WallKernel::WendlandC2, h, position.get(i))?;
+        self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
+            let wall = core.coverage(i)?;
             Some((i as u32, wall, wall.completion()))
         }));
         self.place.clear();
-        self.place.resize(position.len(), NONE);
+        self.place.resize(n, NONE);
         for (place, (i, ..)) in self.found.iter().enumerate() {
             self.place[*i as usize] = place as u32;
         }

@@ -12,7 +12,7 @@
 
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
-    core::{Core, longest},
+    core::Core,
     particles::Vectors,
 };
 
@@ -25,11 +25,7 @@ const RETURN: f64 = 0.3;
 
 /// The rate of return for the present speeds, 1/s.
 pub(super) fn return_rate(strength: f64, core: &Core<'_>) -> f64 {
-    if strength > 0.0 {
-        RETURN * longest(&core.particles.velocity) / core.parameters.support_radius
-    } else {
-        0.0
-    }
+    if strength > 0.0 { RETURN * core.speed / core.parameters.support_radius } else { 0.0 }
 }
 
 /// How far a particle belongs to the fluid's depth, 0 to 1, from its G: one in the depth, a half at a flat surface.
@@ -41,7 +37,7 @@ pub(super) fn depth(spread: f64) -> f64 {
 /// The drift as a field and its factor: Σ V ∇W + ∇λ, 1/m, times a diffusivity, m²/s. None without shifting.
 pub(super) fn shift<'a>(strength: f64, crowding: &'a Vectors, core: &Core<'_>) -> Option<(&'a Vectors, f64)> {
     let strength = strength * 2.0 * core.parameters.support_radius;
-    (strength > 0.0).then(|| (crowding, -strength * longest(&core.particles.velocity)))
+    (strength > 0.0).then(|| (crowding, -strength * core.speed))
 }
 
 /// In a checkpoint.

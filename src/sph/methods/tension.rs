@@ -16,12 +16,11 @@ use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
 use crate::sph::{
-    core::Core,
+    core::{Core, add_scaled},
     kernel::Wendland,
     pairs::{PairPass, Real},
     params::Parameters,
     particles::Vectors,
-    walls::{Boundary, WallKernel},
 };
 
 /// Of |n|·h: a flat surface has 1.5 where the particle lies in it, and noise in the depth has some 0.05. Below the first
@@ -58,8 +57,7 @@ impl Tension {
         let kernel = Wendland::new(parameters.support_radius);
         let steepness = parameters.particle_mass / parameters.rest_density * kernel.steepness;
 
-        let pass =
-            Normals { kernel, steepness, boundary: &core.boundary, position: &core.particles.position };
+        let pass = Normals { kernel, steepness, core };
         let (Vectors { x, y, z }, Vectors { x: dx, y: dy, z: dz }) = (&mut self.normal, &mut self.direction);
         core.sum(&pass, [], [x, y, z, dx, dy, dz, &mut self.weight]);
 
@@ -68,11 +66,7 @@ impl Tension {
         let Vectors { x, y, z } = &mut self.force;
         core.sum(&pass, [&dx[..], dy, dz, &self.weight], [x, y, z]);
 
-        for (a, force) in core.acceleration.components_mut().into_iter().zip(self.force.components()) {
-            for (a, force) in a.iter_mut().zip(force) {
-                *a += force;
-            }
-        }
+        add_scaled(&mut core.acceleration, &self.force, 1.0);
     }
 
     pub fn bytes(&self) -> usize {
@@ -86,8 +80,7 @@ struct Normals<'a> {
     kernel: Wendland,
     /// V·c
     steepness: f64,
-    boundary: &'a Boundary<'a>,
-    position: &'a Vectors,
+    core: &'a Core<'a>,
 }
 
 impl PairPass<0, 3, 7> for Normals<'_> {
@@ -109,9 +102,7 @@ impl PairPass<0, 3, 7> for Normals<'_> {
 
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 7] {
         let mut normal = -self.steepness * DVec3::from_array(sums);
-        if let Some(wall) =
-            self.boundary.coverage(WallKernel::WendlandC2, self.kernel.h, self.position.get(i))
-        {
+        if let Some(wall) = self.core.coverage(i) {
             normal += wall.gradient;
         }
         let length = normal.length();

@@ -39,7 +39,7 @@ use crate::sph::{
     params::{Gradients, Method, NegativePressure, Parameters, Wcsph},
     particles::Vectors,
     simulation::StepError,
-    walls::{Boundary, LEAST_FREE, WallKernel},
+    walls::LEAST_FREE,
 };
 
 /// The exponent of Tait's equation for water.
@@ -188,8 +188,7 @@ fn tait(numbers: &Wcsph, parameters: &Parameters, density: f64) -> f64 {
 /// The sums over neighbours and what is made of them.
 struct Rates<'a> {
     parameters: &'a Parameters,
-    boundary: &'a Boundary<'a>,
-    position: &'a Vectors,
+    core: &'a Core<'a>,
     velocity: &'a Vectors,
     pressure: &'a [f64],
     /// ρ − ρ₀
@@ -228,8 +227,7 @@ impl<'a> Rates<'a> {
         let smoothing = 0.5 * parameters.support_radius;
         Self {
             parameters,
-            boundary: &core.boundary,
-            position: &core.particles.position,
+            core,
             velocity,
             pressure,
             excess,
@@ -310,7 +308,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let mut spread = steepness * squares / 3.0;
         let mut compression = -steepness * departing;
         let mut drag = 2.0 * laminar * steepness * DVec3::new(ux, uy, uz);
-        let wall = rates.boundary.coverage(WallKernel::WendlandC2, rates.kernel.h, rates.position.get(i));
+        let wall = rates.core.coverage(i);
         if let Some(wall) = &wall {
             let velocity = rates.velocity.get(i);
             crowding += wall.gradient;

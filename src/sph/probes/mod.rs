@@ -128,8 +128,10 @@ impl Gauge {
 /// The kernel of a method, from the square of a distance.
 #[derive(Clone, Copy)]
 struct Weight {
-    kernels: Kernels,
+    poly6: Kernels,
+    wendland: Wendland,
     kernel: WallKernel,
+    h: f64,
 }
 
 impl Weight {
@@ -138,15 +140,13 @@ impl Weight {
             Method::Paper => WallKernel::Poly6,
             Method::Wcsph(_) | Method::Dfsph(_) => WallKernel::WendlandC2,
         };
-        Self { kernels: Kernels::new(parameters.support_radius), kernel }
+        let h = parameters.support_radius;
+        Self { poly6: Kernels::new(h), wendland: Wendland::new(h), kernel, h }
     }
 
     /// 1/m³
     fn at(&self, r2: f64) -> f64 {
-        if self.kernel == WallKernel::Poly6 {
-            return self.kernels.poly6(r2);
-        }
-        Wendland::new(self.kernels.h).at(r2)
+        if self.kernel == WallKernel::Poly6 { self.poly6.poly6(r2) } else { self.wendland.at(r2) }
     }
 }
 
@@ -154,7 +154,7 @@ impl Weight {
 fn filling(core: &Core<'_>, weight: &Weight, at: DVec3, particles: impl Iterator<Item = DVec3>) -> f64 {
     let volume = core.parameters.particle_mass / core.parameters.rest_density;
     let filled: f64 = particles.map(|p| volume * weight.at(p.distance_squared(at))).sum();
-    let covered = core.boundary.coverage(weight.kernel, weight.kernels.h, at).map_or(0.0, |walls| walls.part);
+    let covered = core.boundary.coverage(weight.kernel, weight.h, at).map_or(0.0, |walls| walls.part);
     filled / (1.0 - covered.min(MOST_COVERED))
 }
 
@@ -242,10 +242,10 @@ impl<'a> Neighbourhood<'a> {
 
 /// ∫ W over the plane is the slope of what a wall there would take of the kernel.
 fn flux(core: &Core<'_>, point: DVec3, normal: DVec3) -> f64 {
-    let Weight { kernel, kernels } = Weight::of(&core.parameters);
+    let Weight { kernel, h, .. } = Weight::of(&core.parameters);
     let particles = core.particles.position.iter().zip(core.particles.velocity.iter());
-    let passing = particles.map(|(x, v)| v.dot(normal) * kernel.slope((x - point).dot(normal) / kernels.h));
-    core.parameters.particle_mass / kernels.h * passing.sum::<f64>()
+    let passing = particles.map(|(x, v)| v.dot(normal) * kernel.slope((x - point).dot(normal) / h));
+    core.parameters.particle_mass / h * passing.sum::<f64>()
 }
 
 fn elastic_energy(core: &Core<'_>) -> f64 {

@@ -1,7 +1,8 @@
 //! Collision: particles that a step has carried into an obstacle or out of the box are put back.
 //!
-//! A block of particles asks the field for its range over all its paths first; a block that is surely in the
-//! fluid costs that one call. Otherwise each path is swept.
+//! A particle keeps the radius of a ball around it that is proven to lie in the fluid, less what it has moved since: as long
+//! as that lasts no obstacle need be asked, and none is needed for a block of particles whose paths all lie in a box of
+//! which the field's range knows that it is fluid. Other paths are swept.
 //!
 //! At a contact the particle stops on the surface, its velocity is reflected, and the rest of its path goes on
 //! along the surface: without that, a particle that slides would touch at once in every step and never move.
@@ -33,11 +34,21 @@ use super::{
 /// Particles whose common way is asked about first.
 const BLOCK: usize = 128;
 
+/// Particles of which [`Boundary::mark`] knows together whether a wall may be near.
+pub(in crate::sph) const MARKED: usize = 32;
+
 /// Contacts of one particle in one step, before it is left where it is.
 const MAX_CONTACTS: usize = 4;
 
-/// A particle that a moving wall overtakes is looked for so many clearances (a support radius) away.
+/// A particle that a moving wall overtakes is looked for so many clearances (a support radius) away, and as far a ball may
+/// reach of which it is asked whether it is free.
 const REACH: f64 = 1e6;
+
+/// How far a particle is from all obstacles, if that is not known.
+pub(in crate::sph) const UNKNOWN: f64 = -1.0;
+
+/// Of a radius that is proven, the part that is used: the rest is for the rounding of many subtractions.
+const SURELY: f64 = 1.0 - 1e-9;
 
 /// A body in the fluid's way.
 #[derive(Clone, Copy)]
@@ -121,7 +132,8 @@ impl<'a> Boundary<'a> {
     }
 
     /// Moves particles from `position` to `target` and corrects both target and velocity where they collide; what
-    /// obstacles do to velocities is added to `contacts`, if somebody asks.
+    /// obstacles do to velocities is added to `contacts`, if somebody asks. `clear` holds for each particle how far it is
+    /// from all obstacles at least, m, or [`UNKNOWN`]; without obstacles nothing.
     ///
     /// # Errors
     /// The first particle, in the order of the arrays, at which a field is undefined.
@@ -130,21 +142,60 @@ impl<'a> Boundary<'a> {
         position: &Vectors,
         target: &mut Vectors,
         velocity: &mut Vectors,
+        clear: &mut [f64],
         contacts: Option<&Contacts>,
     ) -> Result<(), Fault> {
+        self.hold(target, velocity);
+        if self.obstacles.is_empty() {
+            return Ok(());
+        }
         let [tx, ty, tz] = target.components_mut().map(|c| c.par_chunks_mut(BLOCK));
         let [vx, vy, vz] = velocity.components_mut().map(|c| c.par_chunks_mut(BLOCK));
         let fault = tx
             .zip(ty)
             .zip(tz)
             .zip(vx.zip(vy).zip(vz))
+            .zip(clear.par_chunks_mut(BLOCK))
             .enumerate()
-            .filter_map(|(b, (((x, y), z), ((u, v), w)))| {
-                let mut block = Block { first: b * BLOCK, position, target: [x, y, z], velocity: [u, v, w] };
+            .filter_map(|(b, ((((x, y), z), ((u, v), w)), clear))| {
+                let (target, velocity) = ([x, y, z], [u, v, w]);
+                let mut block = Block { first: b * BLOCK, position, target, velocity, clear };
                 self.collide_block(&mut block, contacts).err()
             })
             .min_by_key(|fault| fault.index);
         fault.map_or(Ok(()), Err)
+    }
+
+    /// Keeps all particles in the box.
+    fn hold(&self, target: &mut Vectors, velocity: &mut Vectors) {
+        let [tx, ty, tz] = target.components_mut().map(|c| c.par_chunks_mut(BLOCK));
+        let [vx, vy, vz] = velocity.components_mut().map(|c| c.par_chunks_mut(BLOCK));
+        tx.zip(ty).zip(tz).zip(vx.zip(vy).zip(vz)).for_each(|(((x, y), z), ((u, v), w))| {
+            let sides = [&*x, &*y, &*z].map(bounds);
+            let within = (0..3).all(|c| sides[c].0 >= self.domain.min[c] && sides[c].1 <= self.domain.max[c]);
+            if within {
+                return;
+            }
+            for k in 0..x.len() {
+                let (at, velocity) =
+                    self.hold_in_box(DVec3::new(x[k], y[k], z[k]), DVec3::new(u[k], v[k], w[k]));
+                [x[k], y[k], z[k]] = at.to_array();
+                [u[k], v[k], w[k]] = velocity.to_array();
+            }
+        });
+    }
+
+    /// Finds the blocks of [`MARKED`] particles in which one may be nearer than h to the box or an obstacle: most blocks need
+    /// be asked no more than that.
+    pub fn mark(&self, position: &Vectors, h: f64, is_near: &mut Vec<bool>) {
+        is_near.resize(position.len().div_ceil(MARKED), true);
+        let [x, y, z] = position.components().map(|c| c.par_chunks(MARKED));
+        x.zip(y).zip(z).zip(is_near).with_min_len(64).for_each(|(((x, y), z), is_near)| {
+            let [x, y, z] = [x, y, z].map(bounds);
+            let block = Aabb::new(DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
+            let in_box = self.domain.union(&block.grown(h)) == self.domain;
+            *is_near = !(in_box && self.fields().all(|field| field.is_far(&block, h)));
+        });
     }
 
     /// What the box and the obstacles take of the kernel of a particle; nothing if they are farther away than h.
@@ -189,18 +240,31 @@ impl<'a> Boundary<'a> {
     }
 
     fn collide_block(&self, block: &mut Block<'_>, contacts: Option<&Contacts>) -> Result<(), Fault> {
-        let mut swept = Aabb::EMPTY;
-        for k in 0..block.len() {
-            let (target, velocity) = self.hold_in_box(block.target(k), block.velocity(k));
-            block.put(k, target, velocity);
-            swept = swept.including(block.from(k)).including(target);
+        if block.stays_clear() {
+            return Ok(());
         }
+        let swept = block.swept();
+        // a ball that is free now says nothing of the next step of an obstacle that moves
+        let at_rest = self.obstacles.iter().all(|obstacle| obstacle.moving.is_none());
+        let most = REACH * self.clearance;
         if self.fields().all(|field| field.range(&swept).hi < 0.0) {
+            let is_far = at_rest && self.fields().all(|field| field.is_far(&swept, most));
+            block.clear.fill(if is_far { SURELY * most } else { UNKNOWN });
             return Ok(());
         }
         for k in 0..block.len() {
+            if block.clear[k] >= 0.0 {
+                continue;
+            }
+            let (from, to) = (block.from(k), block.target(k));
+            let free = SURELY * self.fields().map(|field| field.clearance(from, most)).fold(most, f64::min);
+            let left = free - from.distance(to);
+            if left >= 0.0 {
+                block.clear[k] = if at_rest { left } else { UNKNOWN };
+                continue;
+            }
             let (at, velocity) = self
-                .resolve(block.from(k), block.target(k), block.velocity(k), |obstacle, change, at| {
+                .resolve(from, to, block.velocity(k), |obstacle, change, at| {
                     if let Some(contacts) = contacts {
                         contacts.add(block.first + k, obstacle, change, at);
                     }
@@ -209,6 +273,7 @@ impl<'a> Boundary<'a> {
                 .map_err(|undefined| block.fault(k, undefined))?;
             // a point of a path may lie a rounding error beyond both of its ends
             block.put(k, at.clamp(self.domain.min, self.domain.max), velocity);
+            block.clear[k] = UNKNOWN;
         }
         Ok(())
     }
@@ -325,17 +390,61 @@ fn rubbed(before: DVec3, after: DVec3, normal: DVec3, friction: f64) -> DVec3 {
     if friction == 0.0 || speed == 0.0 { after } else { after - along * (friction * change / speed).min(1.0) }
 }
 
+/// The smallest and the largest of some numbers.
+fn bounds(values: &[f64]) -> (f64, f64) {
+    // side by side, for vector instructions
+    const LANES: usize = 8;
+    let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+    let mut take = |values: &[f64]| {
+        for ((low, high), &value) in low.iter_mut().zip(&mut high).zip(values) {
+            *low = if value < *low { value } else { *low };
+            *high = if value > *high { value } else { *high };
+        }
+    };
+    let (whole, rest) = values.as_chunks::<LANES>();
+    whole.iter().for_each(|values| take(values));
+    take(rest);
+    (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max))
+}
+
 /// A block's particles: where they were, where they go, how fast.
 struct Block<'a> {
     first: usize,
     position: &'a Vectors,
     target: [&'a mut [f64]; 3],
     velocity: [&'a mut [f64]; 3],
+    clear: &'a mut [f64],
 }
 
 impl Block<'_> {
     fn len(&self) -> usize {
         self.target[0].len()
+    }
+
+    /// The box around all of its paths.
+    fn swept(&self) -> Aabb {
+        let own = self.first..self.first + self.len();
+        let begin = self.position.components().map(|column| bounds(&column[own.clone()]));
+        let end = self.target.each_ref().map(|column| bounds(column));
+        let side = |pick: fn((f64, f64)) -> f64, join: fn(f64, f64) -> f64| {
+            DVec3::from_array(std::array::from_fn(|c| join(pick(begin[c]), pick(end[c]))))
+        };
+        Aabb::new(side(|b| b.0, f64::min), side(|b| b.1, f64::max))
+    }
+
+    /// Takes the paths' lengths off what is clear; whether all of it lasts.
+    fn stays_clear(&mut self) -> bool {
+        let own = self.first..self.first + self.len();
+        let [x, y, z] = self.position.components().map(|column| &column[own.clone()]);
+        let [tx, ty, tz] = self.target.each_ref().map(|column| &column[..x.len()]);
+        let clear = &mut self.clear[..x.len()];
+        let mut lasts = true;
+        for k in 0..x.len() {
+            let (dx, dy, dz) = (tx[k] - x[k], ty[k] - y[k], tz[k] - z[k]);
+            clear[k] -= (dx * dx + dy * dy + dz * dz).sqrt();
+            lasts &= clear[k] >= 0.0;
+        }
+        lasts
     }
 
     fn from(&self, k: usize) -> DVec3 {

@@ -10,8 +10,8 @@ mod contact;
 mod coverage;
 mod kernel;
 
-pub(super) use boundary::Boundary;
 pub use boundary::Obstacle;
+pub(super) use boundary::{Boundary, MARKED, UNKNOWN};
 pub use contact::{Contact, Undefined, first_contact, push_out};
 pub(super) use coverage::{Coverage, LEAST_FREE};
 pub use kernel::WallKernel;
