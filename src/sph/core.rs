@@ -258,6 +258,7 @@ impl<'a> Core<'a> {
 }
 
 /// How many others are within the radius.
+#[derive(Clone, Copy)]
 struct Count {
     radius: f64,
 }

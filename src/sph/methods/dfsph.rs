@@ -425,6 +425,7 @@ impl Constants {
 }
 
 /// ρ, the factor, and where the particles crowd.
+#[derive(Clone, Copy)]
 struct Densities<'a> {
     constants: Constants,
     walls: &'a Walls,
@@ -474,6 +475,7 @@ impl PairPass<0, 6, 5> for Densities<'_> {
 }
 
 /// a(s)
+#[derive(Clone, Copy)]
 struct Push<'a> {
     constants: Constants,
     walls: &'a Walls,
@@ -511,6 +513,7 @@ impl PairPass<1, 3, 3> for Push<'_> {
 }
 
 /// dρ/dt
+#[derive(Clone, Copy)]
 struct Squeeze<'a> {
     constants: Constants,
     walls: &'a Walls,
@@ -548,6 +551,7 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
 }
 
 /// Laminar viscosity (Morris et al. 1997) and gravity.
+#[derive(Clone, Copy)]
 struct Drag<'a> {
     constants: Constants,
     walls: &'a Walls,

@@ -128,6 +128,7 @@ impl Terms {
 }
 
 /// ρ_i = Σ_j m W_poly6(r_ij), i included (equation 8), kg/m³.
+#[derive(Clone, Copy)]
 struct Density {
     kernels: Kernels,
     mass: f64,
@@ -155,6 +156,7 @@ impl PairPass<0, 1, 1> for Density {
 }
 
 /// Pressure, viscosity and surface tension (equations 10–14), and gravity.
+#[derive(Clone, Copy)]
 struct Forces<'a, const VISCOSITY: bool, const TENSION: bool> {
     kernels: Kernels,
     parameters: &'a Parameters,

@@ -76,6 +76,7 @@ impl Tension {
 }
 
 /// n, n̂ and its weight.
+#[derive(Clone, Copy)]
 struct Normals<'a> {
     kernel: Wendland,
     /// V·c
@@ -114,6 +115,7 @@ impl PairPass<0, 3, 7> for Normals<'_> {
 }
 
 /// a by tension.
+#[derive(Clone, Copy)]
 struct Curvature<'a> {
     kernel: Wendland,
     /// V·c

@@ -186,6 +186,7 @@ fn tait(numbers: &Wcsph, parameters: &Parameters, density: f64) -> f64 {
 }
 
 /// The sums over neighbours and what is made of them.
+#[derive(Clone, Copy)]
 struct Rates<'a> {
     parameters: &'a Parameters,
     core: &'a Core<'a>,
@@ -250,6 +251,7 @@ impl<'a> Rates<'a> {
 
 /// One pass, with laminar and artificial viscosity or without, and for particles that are kept even or not. With f = (1 − q)³
 /// and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·d, f·(v_i − v_j)·d, f·(ρ_j − ρ_i), f·d², W and f·(v_j − v_i).
+#[derive(Clone, Copy)]
 struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
 
 impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 13, 7>

@@ -80,7 +80,7 @@ real!(f64);
 
 /// What is summed over neighbours: `IN` numbers are read of each particle besides its position, `SUMS` are summed, and
 /// `OUT` are made of them.
-pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>: Sync {
+pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>: Copy + Sync {
     /// Adds what one neighbour gives to several particles. `d` points from the neighbour to them, r2 = |d|². To be
     /// `#[inline(always)]`, and zero from the support radius on.
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
@@ -249,6 +249,8 @@ impl Cloud<'_> {
     {
         // Loops over the few fields are written out: what a closure holds would not be compiled for the wide registers.
         let lanes = T::Native::<S>::LEN;
+        // a copy of its own: what the pass's numbers come to is then found before the loop over neighbours, not in it
+        let pass = *pass;
         let particles = block.particles();
         let own_copy = self.gather(fields, block, lanes, around);
         let zero = T::Native::<S>::splat(simd, T::default());
