@@ -48,6 +48,8 @@ pub(super) struct Cut {
     pub spoilt: Vec<u32>,
     /// Corners of fans, around their hits.
     fans: Vec<(u32, Vec<u32>)>,
+    /// Quads on no smooth surface, in the order of their hits.
+    doubtful: Vec<Quad>,
     pub gradients: u64,
 }
 
@@ -104,6 +106,7 @@ impl<'a> Quads<'a> {
                 self.cut_doubtful(vertices, &doubtful, gradients, &mut cut, |hit, pair| {
                     triangles[2 * (hit - first) as usize..][..2].copy_from_slice(&pair);
                 });
+                cut.doubtful = doubtful;
                 cut
             })
             .collect();
@@ -111,41 +114,21 @@ impl<'a> Quads<'a> {
         for part in parts {
             cut.spoilt.extend(part.spoilt);
             cut.fans.extend(part.fans);
+            cut.doubtful.extend(part.doubtful);
             cut.gradients += part.gradients;
         }
         cut
     }
 
-    /// Cuts the quads around vertices that have moved once more. `moved` are ascending.
+    /// Cuts the quads around vertices that have moved once more. `moved` are ascending, and none is smooth: their quads
+    /// are among the doubtful, or all on a cap, where nothing changes.
     pub fn cut_again(&self, vertices: &Vertices, moved: &[u32], cut: &mut Cut) {
-        let mut is_moved = vec![false; vertices.len()];
-        moved.iter().for_each(|&v| is_moved[v as usize] = true);
-        let touched: Vec<Vec<Quad>> = self
-            .crossed
-            .tasks
-            .par_iter()
-            .map(|task| {
-                let mut touched = Vec::new();
-                self.for_each_quad(task, |quad, rim| {
-                    if rim.is_none() && quad.1.iter().any(|&v| is_moved[v as usize]) {
-                        touched.push(quad);
-                    }
-                });
-                touched
-            })
-            .collect();
-        let mut doubtful = Vec::new();
-        for quad in touched.into_iter().flatten() {
-            match self.cut_smooth(vertices, quad) {
-                Some(along_first) => {
-                    cut.triangles[2 * quad.0 as usize..][..2].copy_from_slice(&halves(quad.1, along_first));
-                }
-                None => doubtful.push(quad),
-            }
-        }
+        let is_moved = |v: &u32| moved.binary_search(v).is_ok();
+        let touched = cut.doubtful.iter().filter(|quad| quad.1.iter().any(is_moved));
+        let touched: Vec<Quad> = touched.copied().collect();
         let mut triangles = std::mem::take(&mut cut.triangles);
         cut.spoilt.clear();
-        self.cut_doubtful(vertices, &doubtful, &mut Gradients::default(), cut, |hit, pair| {
+        self.cut_doubtful(vertices, &touched, &mut Gradients::default(), cut, |hit, pair| {
             triangles[2 * hit as usize..][..2].copy_from_slice(&pair);
         });
         cut.triangles = triangles;

@@ -329,9 +329,14 @@ fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 
     };
     let position = |v: u32| vertices.positions[v as usize];
     let distance = |a: u32, b: u32| position(a).distance(position(b));
+    // a pass without branches: few triangles have two ends of cut edges
+    let ends = |t: &[u32; 3]| t.iter().map(|&v| u8::from(is_end[v as usize])).sum::<u8>();
+    let touched: Vec<usize> =
+        triangles.par_iter().enumerate().filter(|(_, t)| ends(t) >= 2).map(|(i, _)| i).collect();
     let mut changed = Vec::new();
     let mut others = Vec::new();
-    for (t, triangle) in triangles.iter_mut().enumerate() {
+    for t in touched {
+        let triangle = &mut triangles[t];
         let [a, b, c] = *triangle;
         // turned so that the first side is cut if one is, and the third is whole if one is
         let turns = [[a, b, c], [b, c, a], [c, a, b]];
