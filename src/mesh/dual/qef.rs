@@ -53,16 +53,23 @@ fn eigen(mut m: DMat3) -> (DVec3, DMat3) {
             let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
             let c = 1.0 / (t * t + 1.0).sqrt();
             let s = t * c;
-            let mut rotation = DMat3::IDENTITY;
-            rotation.col_mut(p)[p] = c;
-            rotation.col_mut(q)[q] = c;
-            rotation.col_mut(q)[p] = s;
-            rotation.col_mut(p)[q] = -s;
-            m = rotation.transpose() * m * rotation;
-            vectors *= rotation;
+            // R^T m R for the rotation R in the plane of axes p and q, first from the left
+            for column in 0..3 {
+                let (mp, mq) = (m.col(column)[p], m.col(column)[q]);
+                m.col_mut(column)[p] = c * mp - s * mq;
+                m.col_mut(column)[q] = s * mp + c * mq;
+            }
+            rotate_columns(&mut m, (p, q), (c, s));
+            rotate_columns(&mut vectors, (p, q), (c, s));
         }
     }
     (DVec3::new(m.col(0)[0], m.col(1)[1], m.col(2)[2]), vectors)
+}
+
+/// m·R for the rotation R by the angle of the given cosine and sine in the plane of two axes.
+fn rotate_columns(m: &mut DMat3, (p, q): (usize, usize), (c, s): (f64, f64)) {
+    let (mp, mq) = (m.col(p), m.col(q));
+    (*m.col_mut(p), *m.col_mut(q)) = (c * mp - s * mq, s * mp + c * mq);
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::normals::{gradients, unit};
+use super::super::normals::{Gradients, gradients, unit};
 use super::crease;
 
 use super::project;
@@ -50,9 +50,8 @@ pub(super) fn refine(
     let mut fresh = 0..triangles.len();
     let mut changed: Vec<u32> = Vec::new();
     for _ in 0..ROUNDS {
-        let is_fresh = triangles[fresh.clone()].par_iter().copied();
         let others: Vec<[u32; 3]> = changed.iter().map(|&t| triangles[t as usize]).collect();
-        let found = cuts(field, vertices, is_fresh.chain(others), TOLERANCE * size);
+        let found = cuts(field, vertices, (&triangles[fresh.clone()], &others), TOLERANCE * size);
         let Found { cuts, left: uncut, evaluations: count } = found;
         evaluations += count;
         left.extend(uncut);
@@ -87,55 +86,26 @@ struct Found {
 fn cuts(
     field: &dyn Field,
     vertices: &Vertices,
-    triangles: impl IndexedParallelIterator<Item = [u32; 3]>,
+    (fresh, changed): (&[[u32; 3]], &[[u32; 3]]),
     tolerance: f64,
 ) -> Found {
-    let parts: Vec<Found> = triangles
-        .fold_chunks(BATCH, Vec::new, |mut edges: Vec<[u32; 2]>, t| {
-            // each edge of a closed mesh is run along once in ascending order
-            let sides = (0..3).map(|i| [t[i], t[(i + 1) % 3]]);
-            edges.extend(sides.filter(|&[a, b]| a < b && may_bulge(vertices, [a, b], tolerance)));
-            edges
-        })
-        .map(|edges| {
-            let middles: Vec<DVec3> = edges
-                .iter()
-                .map(|edge| {
-                    let [a, b] = edge.map(|v| vertices.positions[v as usize]);
-                    0.5 * (a + b)
-                })
-                .collect();
-            let mut count = middles.len() as u64;
-            let found = gradients(field, &middles);
-            let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
-            let (mut bends, mut others) = (Vec::new(), Vec::new());
-            let (far, near): (Vec<_>, Vec<_>) =
-                edges.into_iter().zip(found).partition(|(_, found)| off(*found));
-            let mut left =
-                far_beside(field, vertices, near.into_iter().map(|(edge, _)| edge), tolerance, &mut count);
-            for (edge, found) in far {
-                match Bend::new(vertices, edge, found) {
-                    Some(bend) => bends.push(bend),
-                    None => others.push(edge),
+    let parts: Vec<Found> = fresh
+        .par_chunks(BATCH)
+        .chain(changed.par_chunks(BATCH))
+        .map_init(
+            || (Vec::new(), Gradients::default()),
+            |(edges, gradients), triangles| {
+                edges.clear();
+                for t in triangles {
+                    // each edge of a closed mesh is run along once in ascending order
+                    let sides = [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+                    edges.extend(
+                        sides.iter().filter(|&&[a, b]| a < b && may_bulge(vertices, [a, b], tolerance)),
+                    );
                 }
-            }
-            let mut cut = Vec::with_capacity(bends.len() + others.len());
-            for (bend, settled) in settle(field, bends, tolerance, &mut count) {
-                if settled {
-                    cut.extend(bend.cut(tolerance));
-                } else {
-                    others.push(bend.edge);
-                }
-            }
-            for edge in others {
-                match middle(field, edge.map(|v| vertices.get(v)), tolerance, &mut count) {
-                    Middle::Near => {}
-                    Middle::At(vertex) => cut.push((edge, vertex)),
-                    Middle::Nowhere => left.push(edge),
-                }
-            }
-            Found { cuts: cut, left, evaluations: count }
-        })
+                cuts_of(field, vertices, edges, gradients, tolerance)
+            },
+        )
         .collect();
     let mut all = Found::default();
     for part in parts {
@@ -145,6 +115,50 @@ fn cuts(
     }
     all.cuts.sort_unstable_by_key(|cut| cut.0);
     all
+}
+
+/// The edges to cut among those that may bulge, in no order.
+fn cuts_of(
+    field: &dyn Field,
+    vertices: &Vertices,
+    edges: &[[u32; 2]],
+    gradients: &mut Gradients,
+    tolerance: f64,
+) -> Found {
+    let middle_of = |edge: &[u32; 2]| {
+        let [a, b] = edge.map(|v| vertices.positions[v as usize]);
+        0.5 * (a + b)
+    };
+    let middles: Vec<DVec3> = edges.iter().map(middle_of).collect();
+    let mut count = middles.len() as u64;
+    let (mut bends, mut others, mut near) = (Vec::new(), Vec::new(), Vec::new());
+    for (&edge, (omega, gradient)) in edges.iter().zip(gradients.at(field, &middles)) {
+        if omega.abs() > tolerance * gradient.length() {
+            match Bend::new(vertices, edge, (omega, gradient)) {
+                Some(bend) => bends.push(bend),
+                None => others.push(edge),
+            }
+        } else {
+            near.push(edge);
+        }
+    }
+    let mut left = far_beside(field, vertices, near.into_iter(), tolerance, &mut count);
+    let mut cut = Vec::with_capacity(bends.len() + others.len());
+    for (bend, settled) in settle(field, bends, tolerance, &mut count) {
+        if settled {
+            cut.extend(bend.cut(tolerance));
+        } else {
+            others.push(bend.edge);
+        }
+    }
+    for edge in others {
+        match middle(field, edge.map(|v| vertices.get(v)), tolerance, &mut count) {
+            Middle::Near => {}
+            Middle::At(vertex) => cut.push((edge, vertex)),
+            Middle::Nowhere => left.push(edge),
+        }
+    }
+    Found { cuts: cut, left, evaluations: count }
 }
 
 /// Edges that leave the surface although their middles are near it: they enter a wall thinner than a cell, or a gap.
