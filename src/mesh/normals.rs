@@ -78,8 +78,15 @@ pub(super) fn add(field: &dyn Field, mesh: &mut Mesh, vertices: &[u32]) {
     fill_missing(mesh);
 }
 
+/// Squares of lengths of which neither a part underflows nor the sum overflows.
+const SAFE: std::ops::Range<f64> = 1e-200..1e200;
+
 /// The unit vector along `v`, also where |v|² would underflow; none for zero, infinite and NaN vectors.
 pub(super) fn unit(v: DVec3) -> Option<DVec3> {
+    let squared = v.length_squared();
+    if SAFE.contains(&squared) {
+        return Some(v / squared.sqrt());
+    }
     let largest = v.abs().max_element();
     if !v.is_finite() || largest == 0.0 {
         return None;

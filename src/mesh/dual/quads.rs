@@ -194,8 +194,11 @@ impl<'a> Quads<'a> {
         if corners.iter().any(|&v| vertices.kinds[v] != Kind::Smooth) {
             return None;
         }
-        let positions = corners.map(|v| vertices.positions[v]);
-        let normals = corners.map(|v| vertices.normals[v]);
+        // written out: `map` over four vectors becomes a call
+        let [a, b, c, d] = corners;
+        let [positions, normals] = [&vertices.positions, &vertices.normals];
+        let positions = [positions[a], positions[b], positions[c], positions[d]];
+        let normals = [normals[a], normals[b], normals[c], normals[d]];
         let chords = [positions[2] - positions[0], positions[3] - positions[1]];
         // how far the surface bulges over a chord, from the normals at its ends
         let bulges =
@@ -207,10 +210,11 @@ impl<'a> Quads<'a> {
         // twice the areas: of the triangle after corner i on the way around
         let normal = self.hits.normals[hit as usize];
         let sides: [DVec3; 4] = std::array::from_fn(|i| positions[(i + 1) % 4] - positions[i]);
-        let faces_out = |i: usize| sides[i].cross(sides[(i + 1) % 4]).dot(normal) > 0.0;
+        let faces_out: [bool; 4] =
+            std::array::from_fn(|i| sides[i].cross(sides[(i + 1) % 4]).dot(normal) > 0.0);
         let is_good = |along_first: bool| {
             let i = usize::from(!along_first);
-            faces_out(i) && faces_out(i + 2)
+            faces_out[i] & faces_out[i + 2]
         };
         [along_first, !along_first].into_iter().find(|&first| is_good(first))
     }
@@ -251,8 +255,10 @@ impl<'a> Quads<'a> {
 }
 
 /// The triangles of a quad cut along its first diagonal (from corner 0) or its second.
-fn halves([a, b, c, d]: [u32; 4], along_first: bool) -> [[u32; 3]; 2] {
-    if along_first { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] }
+fn halves(quad: [u32; 4], along_first: bool) -> [[u32; 3]; 2] {
+    // indices rather than a branch, which would be taken as often as not
+    let corner = |i: usize| quad[(i + usize::from(!along_first)) % 4];
+    [[corner(0), corner(1), corner(2)], [corner(0), corner(2), corner(3)]]
 }
 
 /// A bulge below this share of a chord is none: the shorter diagonal makes the better triangles.

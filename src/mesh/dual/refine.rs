@@ -96,13 +96,7 @@ fn cuts(
             || (Vec::new(), Gradients::default()),
             |(edges, gradients), triangles| {
                 edges.clear();
-                for t in triangles {
-                    // each edge of a closed mesh is run along once in ascending order
-                    let sides = [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
-                    edges.extend(
-                        sides.iter().filter(|&&[a, b]| a < b && may_bulge(vertices, [a, b], tolerance)),
-                    );
-                }
+                triangles.iter().for_each(|t| add_bulging(vertices, *t, tolerance, edges));
                 cuts_of(field, vertices, edges, gradients, tolerance)
             },
         )
@@ -191,18 +185,28 @@ fn far_beside(
         .collect()
 }
 
-/// Whether the surface may be farther than `tolerance` from the middle of an edge, as far as its ends tell.
-fn may_bulge(vertices: &Vertices, edge: [u32; 2], tolerance: f64) -> bool {
-    let [a, b] = edge.map(|v| v as usize);
-    let chord = vertices.positions[b] - vertices.positions[a];
-    match (vertices.kinds[a], vertices.kinds[b]) {
-        (Kind::Smooth, Kind::Smooth) => {
-            (vertices.normals[b] - vertices.normals[a]).dot(chord).abs() > 4.0 * tolerance
+/// Adds those edges of a triangle, run along in ascending order, from whose middle the surface may be farther than
+/// `tolerance`, as far as their ends tell. Each edge of a closed mesh is run along once in ascending order.
+fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec<[u32; 2]>) {
+    let [a, b, c] = t.map(|v| v as usize);
+    let Vertices { positions, normals, kinds } = vertices;
+    let positions = [positions[a], positions[b], positions[c]];
+    let normals = [normals[a], normals[b], normals[c]];
+    let kinds = [kinds[a], kinds[b], kinds[c]];
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        let chord = positions[j] - positions[i];
+        let bulges = (normals[j] - normals[i]).dot(chord).abs() > 4.0 * tolerance;
+        let may_bulge = match (kinds[i], kinds[j]) {
+            (Kind::Smooth, Kind::Smooth) => bulges,
+            // a cap is no part of ω = 0
+            (Kind::Cap, _) | (_, Kind::Cap) => false,
+            // sheets that touch
+            _ => chord != DVec3::ZERO,
+        };
+        // half of all edges ascend: a branch on that alone would be taken as often as not
+        if may_bulge & (t[i] < t[j]) {
+            edges.push([t[i], t[j]]);
         }
-        // a cap is no part of ω = 0
-        (Kind::Cap, _) | (_, Kind::Cap) => false,
-        // sheets that touch
-        _ => chord != DVec3::ZERO,
     }
 }
 
