@@ -75,6 +75,11 @@ enum Change {
 struct Choice(Option<(f64, Change)>);
 
 impl Choice {
+    /// The most that may be wrong after a change for it to be the choice.
+    fn limit(&self, before: f64) -> f64 {
+        f64::min(LEFT * before, before - self.0.map_or(0.0, |(most, _)| most))
+    }
+
     fn consider(&mut self, before: f64, after: f64, change: Change) {
         let gain = before - after;
         if after <= LEFT * before && self.0.is_none_or(|(most, _)| gain > most) {
@@ -86,14 +91,14 @@ impl Choice {
 /// The change about an edge that helps most, if there is anything to mend and any helps.
 fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<Change> {
     let old = pair.triangles();
-    let before = patch.badness(&old, &patch.along(pair.ends));
+    let before = patch.badness(&old, &patch.along(pair.ends), f64::INFINITY);
     if before <= tolerance {
         return None;
     }
     let mut choice = Choice(None);
     let [c, d] = pair.apexes;
     if c != d && !patch.is_edge(pair.apexes) {
-        let after = patch.badness(&pair.turned(), &patch.along(pair.apexes));
+        let after = patch.badness(&pair.turned(), &patch.along(pair.apexes), choice.limit(before));
         choice.consider(before, after, Change::Turn);
     }
     let [p, q] = pair.ends.map(|v| patch.position(v));
@@ -106,7 +111,7 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
             }
             patch.vertices.push(vertex);
             let spokes = pair.corners().map(|v| patch.along([v, new])).concat();
-            let after = patch.badness(&pair.cut(new), &spokes);
+            let after = patch.badness(&pair.cut(new), &spokes, choice.limit(before));
             patch.vertices.pop();
             choice.consider(before, after, Change::Cut(vertex));
         }
@@ -117,10 +122,10 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
         if old.kind != Kind::Sharp {
             continue;
         }
-        let before = patch.badness_around(v);
+        let before = patch.badness_around(v, f64::INFINITY);
         for vertex in places(patch, v, may_merge) {
             patch.vertices.set(v, vertex);
-            let after = patch.badness_around(v);
+            let after = patch.badness_around(v, choice.limit(before));
             choice.consider(before, after, Change::Move(v, vertex));
         }
         patch.vertices.set(v, old);

@@ -171,27 +171,34 @@ impl<'a> Patch<'a> {
         SHARES.map(|share| p.lerp(q, share))
     }
 
-    /// What is wrong about a vertex and its triangles.
-    pub fn badness_around(&mut self, v: u32) -> f64 {
+    /// What is wrong about a vertex and its triangles; infinite if more than `limit`.
+    pub fn badness_around(&mut self, v: u32, limit: f64) -> f64 {
         let triangles: Vec<[u32; 3]> = self.fan(v).collect();
         let mut points: Vec<DVec3> =
             self.around(v).into_iter().flat_map(|other| self.along([v, other])).collect();
         points.push(self.position(v));
-        self.badness(&triangles, &points)
+        self.badness(&triangles, &points, limit)
     }
 
     /// What is wrong with triangles, as a distance: how far their middles and some more points are from the surface, at
-    /// most, and how much they turn from it in all, a cell for a right angle or about so.
-    pub fn badness(&mut self, triangles: &[[u32; 3]], points: &[DVec3]) -> f64 {
+    /// most, and how much they turn from it in all, a cell for a right angle or about so. Infinite if more than `limit`:
+    /// most changes are seen to be none after a point or two.
+    pub fn badness(&mut self, triangles: &[[u32; 3]], points: &[DVec3], limit: f64) -> f64 {
         let mut off = 0.0;
         for p in points {
             off = f64::max(off, self.step(*p).0.length());
+            if off > limit {
+                return f64::INFINITY;
+            }
         }
         let mut folds = 0.0;
         for t in triangles {
             let middle = t.map(|v| self.position(v)).iter().sum::<DVec3>() / 3.0;
             off = f64::max(off, self.step(middle).0.length());
             folds += self.fold(*t);
+            if off + self.size * folds > limit {
+                return f64::INFINITY;
+            }
         }
         off + self.size * folds
     }
