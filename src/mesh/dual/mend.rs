@@ -12,6 +12,7 @@ use std::collections::VecDeque;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 use super::super::normals::{gradients, unit};
 use super::patch::{FACING, NEAR, Pair, Patch, STEPS};
@@ -50,12 +51,15 @@ pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
 /// Mends what is around the given edges, ascending; returns the number of evaluations.
 pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim) -> u64 {
     let looks = MOST.min(LOOKS * edges.len());
+    let mut waiting: FxHashSet<[u32; 2]> = edges.iter().copied().collect();
     let mut queue = VecDeque::from(edges);
     for _ in 0..looks {
         let Some(edge) = queue.pop_front() else { break };
+        waiting.remove(&edge);
         let Some(pair) = patch.pair(edge) else { continue };
         if let Some(change) = best(&mut patch, pair, tolerance, aim) {
-            queue.extend(make(&mut patch, pair, change));
+            let touched = make(&mut patch, pair, change).into_iter().map(|[a, b]| [a.min(b), a.max(b)]);
+            queue.extend(touched.filter(|edge| waiting.insert(*edge)));
         }
     }
     patch.count
