@@ -199,6 +199,9 @@ fn on_face(face: crease::Face) -> Vertex {
     Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp }
 }
 
+/// A vertex nearer to the surface than this, in cells, has no place near it to go to.
+const ON_SURFACE: f64 = 1e-6;
+
 /// Points of the surface where a vertex may go: near it, near the middle of its triangles, and where it may be merged with
 /// another.
 fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
@@ -209,8 +212,10 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
         middle += (a + b + c) / 3.0;
         count += 1.0;
     }
+    let here = patch.position(v);
+    let is_off = patch.step(here).0.length() > ON_SURFACE * patch.size;
     let mut found = Vec::new();
-    for start in [patch.position(v), middle / count] {
+    for start in [here, middle / count].into_iter().skip(usize::from(!is_off)) {
         if let Some(facing) = unit(facing) {
             found.extend(project::along(patch.field, start, facing, patch.size, &mut patch.count));
         }
