@@ -216,10 +216,14 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
     let is_off = patch.step(here).0.length() > ON_SURFACE * patch.size;
     let mut found = Vec::new();
     for start in [here, middle / count].into_iter().skip(usize::from(!is_off)) {
-        if let Some(facing) = unit(facing) {
+        let nearest = project::newton(patch.field, start, patch.size, &mut patch.count);
+        // the line along a normal leads to where Newton's method does, unless that is on another face
+        let other =
+            unit(facing).filter(|f| nearest.is_none_or(|face| face.normal.dot(*f) < project::SAME_FACE));
+        if let Some(facing) = other {
             found.extend(project::along(patch.field, start, facing, patch.size, &mut patch.count));
         }
-        found.extend(project::newton(patch.field, start, patch.size, &mut patch.count));
+        found.extend(nearest);
     }
     let mut found: Vec<Vertex> = found.into_iter().map(on_face).collect();
     found.retain(|vertex| patch.bounds.contains(vertex.position));
