@@ -166,7 +166,7 @@ const BESIDE: f64 = 0.1;
 fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
     let [a, b] = pair.ends.map(|v| patch.vertices.get(v));
     let points = patch.along(pair.ends);
-    let off = points.map(|p| patch.step(p).0.length());
+    let off = points.map(|p| patch.distance(p));
     let start = (0..points.len()).max_by(|&i, &j| off[i].total_cmp(&off[j])).map_or(points[0], |i| points[i]);
     let length = a.position.distance(b.position);
     let reach = length.max(patch.size);
@@ -213,7 +213,7 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
         count += 1.0;
     }
     let here = patch.position(v);
-    let is_off = patch.step(here).0.length() > ON_SURFACE * patch.size;
+    let is_off = patch.distance(here) > ON_SURFACE * patch.size;
     let mut found = Vec::new();
     for start in [here, middle / count].into_iter().skip(usize::from(!is_off)) {
         let nearest = project::newton(patch.field, start, patch.size, &mut patch.count);
