@@ -26,8 +26,9 @@ const LEFT: f64 = 0.9;
 /// No edge shorter than this is cut, in cells, and no half as long made.
 const SHORTEST: f64 = 0.1;
 
-/// Edges looked at for each edge at first, and in all, which takes a second or two.
-const LOOKS: usize = 12;
+/// Edges looked at for each edge at first, of which few are left unless the grid resolves nothing, and in all, which takes
+/// a second.
+const LOOKS: usize = 40;
 const MOST: usize = 20_000;
 
 /// With more edges to mend than this for each triangle (there are 1.5 edges to a triangle in all) the grid does not resolve
