@@ -38,10 +38,11 @@ impl Gradients {
     }
 
     fn evaluate(&mut self, field: &dyn Field, positions: &[DVec3]) {
-        for (axis, column) in self.points.iter_mut().enumerate() {
-            column.clear();
-            column.extend(positions.iter().map(|p| p[axis]));
-        }
+        self.points.iter_mut().for_each(Vec::clear);
+        let [x, y, z] = &mut self.points;
+        x.extend(positions.iter().map(|p| p.x));
+        y.extend(positions.iter().map(|p| p.y));
+        z.extend(positions.iter().map(|p| p.z));
         self.found.iter_mut().for_each(|column| column.resize(positions.len(), 0.0));
         let [x, y, z] = &self.points;
         let [omega, gx, gy, gz] = &mut self.found;

@@ -259,11 +259,11 @@ impl Scene<'_> {
             moving.retain(|&v| {
                 let Some((omega, gradient)) = found.next() else { return false };
                 let squared = gradient.length_squared();
-                let step = gradient * (omega / squared);
-                slots.positions[v] -= step;
-                let normal = -gradient / squared.sqrt();
+                let slope = squared.sqrt();
+                slots.positions[v] -= gradient * (omega / squared);
+                let normal = -gradient / slope;
                 slots.normals[v] = if normal.is_finite() { normal } else { DVec3::ZERO };
-                step.length() > LAST_STEP * size
+                omega.abs() > LAST_STEP * size * slope
             });
             drop(found);
             positions.clear();
