@@ -32,7 +32,7 @@ pub(super) fn minimiser(planes: impl Iterator<Item = (DVec3, DVec3)>, around: DV
     (around + step, rank)
 }
 
-/// Sweeps of Jacobi's method; a symmetric 3×3 matrix is diagonal to the last digit after five or six.
+/// Sweeps of Jacobi's method at most; a symmetric 3×3 matrix is diagonal to the last digit after four or five.
 const SWEEPS: usize = 10;
 
 /// Eigenvalues and orthonormal eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.
@@ -41,7 +41,8 @@ fn eigen(mut m: DMat3) -> (DVec3, DMat3) {
     for _ in 0..SWEEPS {
         let off = m.col(1)[0].abs() + m.col(2)[0].abs() + m.col(2)[1].abs();
         let trace = m.col(0)[0].abs() + m.col(1)[1].abs() + m.col(2)[2].abs();
-        if off <= f64::EPSILON * f64::EPSILON * trace {
+        // each sweep squares what is left, so less than this would change no digit
+        if off <= f64::EPSILON * trace {
             break;
         }
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
