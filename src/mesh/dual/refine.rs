@@ -347,13 +347,23 @@ fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 
     };
     let position = |v: u32| vertices.positions[v as usize];
     let distance = |a: u32, b: u32| position(a).distance(position(b));
-    // a pass without branches: few triangles have two ends of cut edges
-    let ends = |t: &[u32; 3]| t.iter().map(|&v| u8::from(is_end[v as usize])).sum::<u8>();
-    let touched: Vec<usize> =
-        triangles.par_iter().enumerate().filter(|(_, t)| ends(t) >= 2).map(|(i, _)| i).collect();
+    // few triangles have two ends of cut edges: counting them takes no branches
+    let is_touched = |[a, b, c]: [u32; 3]| {
+        u8::from(is_end[a as usize]) + u8::from(is_end[b as usize]) + u8::from(is_end[c as usize]) >= 2
+    };
+    let find = |(batch, part): (usize, &[[u32; 3]])| {
+        let mut touched = Vec::new();
+        for (i, t) in (batch * BATCH..).zip(part) {
+            if is_touched(*t) {
+                touched.push(i);
+            }
+        }
+        touched
+    };
+    let touched: Vec<Vec<usize>> = triangles.par_chunks(BATCH).enumerate().map(find).collect();
     let mut changed = Vec::new();
     let mut others = Vec::new();
-    for t in touched {
+    for t in touched.into_iter().flatten() {
         let triangle = &mut triangles[t];
         let [a, b, c] = *triangle;
         // turned so that the first side is cut if one is, and the third is whole if one is
