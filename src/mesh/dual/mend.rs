@@ -235,6 +235,9 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
     found
 }
 
+/// Triangles looked at together.
+const BATCH: usize = 2048;
+
 /// Triangles that face less than this like the surface below them (cosine) are looked at once more.
 const DOUBT: f64 = 0.8;
 
@@ -245,12 +248,18 @@ pub(super) fn folded(
     triangles: &[[u32; 3]],
     size: f64,
 ) -> (Vec<[u32; 2]>, u64) {
-    let kinds = |t: &&[u32; 3]| t.map(|v| vertices.kinds[v as usize]);
-    let mut suspects: Vec<[u32; 3]> = triangles
-        .par_iter()
-        .filter(|t| kinds(t).contains(&Kind::Sharp) && !kinds(t).contains(&Kind::Cap))
-        .copied()
-        .collect();
+    let find = |part: &[[u32; 3]]| {
+        let mut suspects = Vec::new();
+        for t in part {
+            let kinds = t.map(|v| vertices.kinds[v as usize]);
+            if kinds.contains(&Kind::Sharp) && !kinds.contains(&Kind::Cap) {
+                suspects.push(*t);
+            }
+        }
+        suspects
+    };
+    let suspects: Vec<Vec<[u32; 3]>> = triangles.par_chunks(BATCH).map(find).collect();
+    let mut suspects = suspects.concat();
     let corners = |t: [u32; 3]| t.map(|v| vertices.positions[v as usize]);
     let mut feet: Vec<DVec3> = suspects.iter().map(|&t| corners(t).iter().sum::<DVec3>() / 3.0).collect();
     let mut folded = Vec::new();
