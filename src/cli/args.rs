@@ -191,7 +191,7 @@ pub(super) struct Mesh {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// How the surface is found
-    #[arg(long, value_enum, default_value_t = MeshMethod::Mc)]
+    #[arg(long, value_enum, default_value_t = MeshMethod::Dc)]
     pub method: MeshMethod,
     /// Contract thin triangles; all vertices stay on the surface
     #[arg(long)]
@@ -250,9 +250,9 @@ pub(super) struct Frames {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum MeshMethod {
-    /// Marching cubes with vertices on the exact surface
+    /// Marching cubes with vertices on the exact surface: a third of the time at as many cells, but edges are cut off
     Mc,
-    /// Dual contouring: also edges and corners are exact
+    /// Dual contouring: also edges and corners are exact, so an eighth of the cells do for the same error
     Dc,
 }
 

@@ -198,7 +198,7 @@ impl<T> Task<T> {
         for brick in &self.bricks {
             let mut vertex = brick.first;
             brick.for_each_edge(|axis, node| {
-                let low = [0, 1, 2].map(|a| brick.low[a] + node[a]);
+                let low = [brick.low[0] + node[0], brick.low[1] + node[1], brick.low[2] + node[2]];
                 let mut high = low;
                 high[axis] += 1;
                 let position = lattice.position(low);

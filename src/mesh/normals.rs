@@ -38,10 +38,11 @@ impl Gradients {
     }
 
     fn evaluate(&mut self, field: &dyn Field, positions: &[DVec3]) {
-        for (axis, column) in self.points.iter_mut().enumerate() {
-            column.clear();
-            column.extend(positions.iter().map(|p| p[axis]));
-        }
+        self.points.iter_mut().for_each(Vec::clear);
+        let [x, y, z] = &mut self.points;
+        x.extend(positions.iter().map(|p| p.x));
+        y.extend(positions.iter().map(|p| p.y));
+        z.extend(positions.iter().map(|p| p.z));
         self.found.iter_mut().for_each(|column| column.resize(positions.len(), 0.0));
         let [x, y, z] = &self.points;
         let [omega, gx, gy, gz] = &mut self.found;
@@ -78,8 +79,15 @@ pub(super) fn add(field: &dyn Field, mesh: &mut Mesh, vertices: &[u32]) {
     fill_missing(mesh);
 }
 
+/// Squares of lengths of which neither a part underflows nor the sum overflows.
+const SAFE: std::ops::Range<f64> = 1e-200..1e200;
+
 /// The unit vector along `v`, also where |v|² would underflow; none for zero, infinite and NaN vectors.
 pub(super) fn unit(v: DVec3) -> Option<DVec3> {
+    let squared = v.length_squared();
+    if SAFE.contains(&squared) {
+        return Some(v / squared.sqrt());
+    }
     let largest = v.abs().max_element();
     if !v.is_finite() || largest == 0.0 {
         return None;

@@ -69,7 +69,8 @@ impl Lattice {
 
     /// The place of an extended node.
     pub(super) fn position(&self, extended: [usize; 3]) -> DVec3 {
-        DVec3::from_array([0, 1, 2].map(|axis| self.coordinate(axis, extended[axis])))
+        let [x, y, z] = extended;
+        DVec3::new(self.coordinate(0, x), self.coordinate(1, y), self.coordinate(2, z))
     }
 
     /// The part of a brick's nodes on one axis that lies in the grid, counted from the brick's first.

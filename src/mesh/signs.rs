@@ -256,7 +256,8 @@ impl Around {
     }
 
     fn corners_below(&self, z: usize) -> [u64; 4] {
-        let [own, x, y, xy] = [0, 1, 2, 3].map(|i| self.planes[i][z]);
+        let [own, x, y, xy] = &self.planes;
+        let (own, x, y, xy) = (own[z], x[z], y[z], xy[z]);
         let along_x = |own: u64, next: u64| own >> 1 & !(FIRST_COLUMN << 7) | (next & FIRST_COLUMN) << 7;
         let along_y = |own: u64, next: u64| own >> 8 | next << 56;
         let shifted = along_x(own, x);

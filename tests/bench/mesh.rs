@@ -10,10 +10,11 @@
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-use rfm::field::{Field, GradientsMut, Points};
+use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{Grid, Mesh, Resolution, check, dual_contouring, marching_cubes, measure};
+use rfm::solid::Depth;
 use rfm::{Engine, Program, Solid};
 
 /// True volumes by quadrature of the profiles, independent of this program.
@@ -111,29 +112,6 @@ fn methods() {
                     if report.closed && report.manifold { "yes" } else { "NO" },
                 );
             }
-        }
-    }
-}
-
-/// A solid as its distance, positive inside: what a mesh is measured against.
-struct Depth<'a>(&'a Solid);
-
-impl Field for Depth<'_> {
-    fn omega(&self, p: DVec3) -> f64 {
-        -self.0.contact(p).distance
-    }
-
-    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let contact = self.0.contact(p);
-        (-contact.distance, -contact.normal)
-    }
-
-    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
-        let GradientsMut { omega, x, y, z } = out;
-        let mut curvature = vec![0.0; points.len()];
-        self.0.contact_many([points.x, points.y, points.z], [omega, x, y, z, &mut curvature]);
-        for column in [omega, x, y, z] {
-            column.iter_mut().for_each(|value| *value = -*value);
         }
     }
 }

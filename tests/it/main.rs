@@ -12,6 +12,7 @@ mod diagnostics;
 mod examples;
 mod fluid_surface;
 mod hard_cases;
+mod mesh_properties;
 mod meshes;
 mod moving;
 mod numbers;

@@ -7,19 +7,17 @@ mod simplified;
 
 use std::time::Instant;
 
-use glam::DVec3;
 use serde::Serialize;
 
 use super::args::{Mesh as Options, MeshMethod, Shared};
 use super::{Failure, choose, input, note, output, progress};
-use crate::Solid;
-use crate::field::{Field, GradientsMut, Points};
+use crate::field::Field;
 use crate::geom::Aabb;
 use crate::mesh::{
     self, Grid, Mesh, MeshError, Quality, Reference, Report, Resolution, ThinCells, dual_contouring,
     marching_cubes,
 };
-use crate::solid::Bounds;
+use crate::solid::{Bounds, Depth};
 pub(super) use format::Format;
 use simplified::{Simplified, simplified};
 
@@ -90,37 +88,6 @@ impl MeshMethod {
         match self {
             Self::Mc => marching_cubes(field, grid, progress),
             Self::Dc => dual_contouring(field, grid, progress),
-        }
-    }
-}
-
-/// A solid as its distance, positive inside: exact near quadrics, whatever the scales of the leaves.
-pub(super) struct Depth<'a>(pub &'a Solid);
-
-impl Field for Depth<'_> {
-    fn omega(&self, p: DVec3) -> f64 {
-        -self.0.contact(p).distance
-    }
-
-    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let contact = self.0.contact(p);
-        (-contact.distance, -contact.normal)
-    }
-
-    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
-        const RUN: usize = 256;
-        let mut unused = [0.0; RUN];
-        let GradientsMut { omega, x, y, z } = out;
-        for start in (0..points.len()).step_by(RUN) {
-            let run = start..points.len().min(start + RUN);
-            let at = [points.x, points.y, points.z].map(|column| &column[run.clone()]);
-            let curvature = &mut unused[..run.len()];
-            let (omega, x) = (&mut omega[run.clone()], &mut x[run.clone()]);
-            let (y, z) = (&mut y[run.clone()], &mut z[run.clone()]);
-            self.0.contact_many(at, [omega, x, y, z, curvature]);
-        }
-        for column in [omega, x, y, z] {
-            column.iter_mut().for_each(|value| *value = -*value);
         }
     }
 }

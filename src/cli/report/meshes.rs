@@ -8,11 +8,11 @@ use anstream::println;
 use serde::Serialize;
 
 use super::super::args::MeshMethod;
-use super::super::mesh::Depth;
 use super::super::plot::{self, Axis};
 use super::super::{Failure, progress};
 use crate::Solid;
 use crate::mesh::{self, Grid, Quality, Resolution};
+use crate::solid::Depth;
 
 /// Resolutions of each method, each twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;

@@ -12,6 +12,7 @@ use std::collections::VecDeque;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 use super::super::normals::{gradients, unit};
 use super::patch::{FACING, NEAR, Pair, Patch, STEPS};
@@ -25,8 +26,9 @@ const LEFT: f64 = 0.9;
 /// No edge shorter than this is cut, in cells, and no half as long made.
 const SHORTEST: f64 = 0.1;
 
-/// Edges looked at for each edge at first, and in all, which takes a second or two.
-const LOOKS: usize = 12;
+/// Edges looked at for each edge at first, of which few are left unless the grid resolves nothing, and in all, which takes
+/// a second.
+const LOOKS: usize = 40;
 const MOST: usize = 20_000;
 
 /// With more edges to mend than this for each triangle (there are 1.5 edges to a triangle in all) the grid does not resolve
@@ -50,12 +52,15 @@ pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
 /// Mends what is around the given edges, ascending; returns the number of evaluations.
 pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim) -> u64 {
     let looks = MOST.min(LOOKS * edges.len());
+    let mut waiting: FxHashSet<[u32; 2]> = edges.iter().copied().collect();
     let mut queue = VecDeque::from(edges);
     for _ in 0..looks {
         let Some(edge) = queue.pop_front() else { break };
+        waiting.remove(&edge);
         let Some(pair) = patch.pair(edge) else { continue };
         if let Some(change) = best(&mut patch, pair, tolerance, aim) {
-            queue.extend(make(&mut patch, pair, change));
+            let touched = make(&mut patch, pair, change).into_iter().map(|[a, b]| [a.min(b), a.max(b)]);
+            queue.extend(touched.filter(|edge| waiting.insert(*edge)));
         }
     }
     patch.count
@@ -75,6 +80,11 @@ enum Change {
 struct Choice(Option<(f64, Change)>);
 
 impl Choice {
+    /// The most that may be wrong after a change for it to be the choice.
+    fn limit(&self, before: f64) -> f64 {
+        f64::min(LEFT * before, before - self.0.map_or(0.0, |(most, _)| most))
+    }
+
     fn consider(&mut self, before: f64, after: f64, change: Change) {
         let gain = before - after;
         if after <= LEFT * before && self.0.is_none_or(|(most, _)| gain > most) {
@@ -86,14 +96,14 @@ impl Choice {
 /// The change about an edge that helps most, if there is anything to mend and any helps.
 fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<Change> {
     let old = pair.triangles();
-    let before = patch.badness(&old, &patch.along(pair.ends));
+    let before = patch.badness(&old, &patch.along(pair.ends), f64::INFINITY);
     if before <= tolerance {
         return None;
     }
     let mut choice = Choice(None);
     let [c, d] = pair.apexes;
     if c != d && !patch.is_edge(pair.apexes) {
-        let after = patch.badness(&pair.turned(), &patch.along(pair.apexes));
+        let after = patch.badness(&pair.turned(), &patch.along(pair.apexes), choice.limit(before));
         choice.consider(before, after, Change::Turn);
     }
     let [p, q] = pair.ends.map(|v| patch.position(v));
@@ -106,7 +116,7 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
             }
             patch.vertices.push(vertex);
             let spokes = pair.corners().map(|v| patch.along([v, new])).concat();
-            let after = patch.badness(&pair.cut(new), &spokes);
+            let after = patch.badness(&pair.cut(new), &spokes, choice.limit(before));
             patch.vertices.pop();
             choice.consider(before, after, Change::Cut(vertex));
         }
@@ -117,10 +127,10 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
         if old.kind != Kind::Sharp {
             continue;
         }
-        let before = patch.badness_around(v);
+        let before = patch.badness_around(v, f64::INFINITY);
         for vertex in places(patch, v, may_merge) {
             patch.vertices.set(v, vertex);
-            let after = patch.badness_around(v);
+            let after = patch.badness_around(v, choice.limit(before));
             choice.consider(before, after, Change::Move(v, vertex));
         }
         patch.vertices.set(v, old);
@@ -157,7 +167,7 @@ const BESIDE: f64 = 0.1;
 fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
     let [a, b] = pair.ends.map(|v| patch.vertices.get(v));
     let points = patch.along(pair.ends);
-    let off = points.map(|p| patch.step(p).0.length());
+    let off = points.map(|p| patch.distance(p));
     let start = (0..points.len()).max_by(|&i, &j| off[i].total_cmp(&off[j])).map_or(points[0], |i| points[i]);
     let length = a.position.distance(b.position);
     let reach = length.max(patch.size);
@@ -190,6 +200,9 @@ fn on_face(face: crease::Face) -> Vertex {
     Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp }
 }
 
+/// A vertex nearer to the surface than this, in cells, has no place near it to go to.
+const ON_SURFACE: f64 = 1e-6;
+
 /// Points of the surface where a vertex may go: near it, near the middle of its triangles, and where it may be merged with
 /// another.
 fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
@@ -200,12 +213,18 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
         middle += (a + b + c) / 3.0;
         count += 1.0;
     }
+    let here = patch.position(v);
+    let is_off = patch.distance(here) > ON_SURFACE * patch.size;
     let mut found = Vec::new();
-    for start in [patch.position(v), middle / count] {
-        if let Some(facing) = unit(facing) {
+    for start in [here, middle / count].into_iter().skip(usize::from(!is_off)) {
+        let nearest = project::newton(patch.field, start, patch.size, &mut patch.count);
+        // the line along a normal leads to where Newton's method does, unless that is on another face
+        let other =
+            unit(facing).filter(|f| nearest.is_none_or(|face| face.normal.dot(*f) < project::SAME_FACE));
+        if let Some(facing) = other {
             found.extend(project::along(patch.field, start, facing, patch.size, &mut patch.count));
         }
-        found.extend(project::newton(patch.field, start, patch.size, &mut patch.count));
+        found.extend(nearest);
     }
     let mut found: Vec<Vertex> = found.into_iter().map(on_face).collect();
     found.retain(|vertex| patch.bounds.contains(vertex.position));
@@ -215,6 +234,9 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
     }
     found
 }
+
+/// Triangles looked at together.
+const BATCH: usize = 2048;
 
 /// Triangles that face less than this like the surface below them (cosine) are looked at once more.
 const DOUBT: f64 = 0.8;
@@ -226,12 +248,18 @@ pub(super) fn folded(
     triangles: &[[u32; 3]],
     size: f64,
 ) -> (Vec<[u32; 2]>, u64) {
-    let kinds = |t: &&[u32; 3]| t.map(|v| vertices.kinds[v as usize]);
-    let mut suspects: Vec<[u32; 3]> = triangles
-        .par_iter()
-        .filter(|t| kinds(t).contains(&Kind::Sharp) && !kinds(t).contains(&Kind::Cap))
-        .copied()
-        .collect();
+    let find = |part: &[[u32; 3]]| {
+        let mut suspects = Vec::new();
+        for t in part {
+            let kinds = t.map(|v| vertices.kinds[v as usize]);
+            if kinds.contains(&Kind::Sharp) && !kinds.contains(&Kind::Cap) {
+                suspects.push(*t);
+            }
+        }
+        suspects
+    };
+    let suspects: Vec<Vec<[u32; 3]>> = triangles.par_chunks(BATCH).map(find).collect();
+    let mut suspects = suspects.concat();
     let corners = |t: [u32; 3]| t.map(|v| vertices.positions[v as usize]);
     let mut feet: Vec<DVec3> = suspects.iter().map(|&t| corners(t).iter().sum::<DVec3>() / 3.0).collect();
     let mut folded = Vec::new();

@@ -171,46 +171,71 @@ impl<'a> Patch<'a> {
         SHARES.map(|share| p.lerp(q, share))
     }
 
-    /// What is wrong about a vertex and its triangles.
-    pub fn badness_around(&mut self, v: u32) -> f64 {
+    /// What is wrong about a vertex and its triangles; infinite if more than `limit`.
+    pub fn badness_around(&mut self, v: u32, limit: f64) -> f64 {
         let triangles: Vec<[u32; 3]> = self.fan(v).collect();
         let mut points: Vec<DVec3> =
             self.around(v).into_iter().flat_map(|other| self.along([v, other])).collect();
         points.push(self.position(v));
-        self.badness(&triangles, &points)
+        self.badness(&triangles, &points, limit)
     }
 
     /// What is wrong with triangles, as a distance: how far their middles and some more points are from the surface, at
-    /// most, and how much they turn from it in all, a cell for a right angle or about so.
-    pub fn badness(&mut self, triangles: &[[u32; 3]], points: &[DVec3]) -> f64 {
+    /// most, and how much they turn from it in all, a cell for a right angle or about so. Infinite if more than `limit`:
+    /// most changes are seen to be none after a point or two.
+    pub fn badness(&mut self, triangles: &[[u32; 3]], points: &[DVec3], limit: f64) -> f64 {
         let mut off = 0.0;
         for p in points {
-            off = f64::max(off, self.step(*p).0.length());
+            off = f64::max(off, self.distance(*p));
+            if off > limit {
+                return f64::INFINITY;
+            }
         }
         let mut folds = 0.0;
         for t in triangles {
-            let middle = t.map(|v| self.position(v)).iter().sum::<DVec3>() / 3.0;
-            off = f64::max(off, self.step(middle).0.length());
-            folds += self.fold(*t);
+            let (distance, fold) = self.middle(*t);
+            off = f64::max(off, distance);
+            folds += fold;
+            if off + self.size * folds > limit {
+                return f64::INFINITY;
+            }
         }
         off + self.size * folds
     }
 
     /// How much less a triangle faces like the surface below its middle than it should; above [`FACING`] it is folded.
     pub fn fold(&mut self, t: [u32; 3]) -> f64 {
+        self.middle(t).1
+    }
+
+    /// How far the middle of a triangle is from the surface, and its fold.
+    fn middle(&mut self, t: [u32; 3]) -> (f64, f64) {
         let [a, b, c] = t.map(|v| self.position(v));
-        let Some(facing) = unit((b - a).cross(c - a)) else { return 0.0 };
+        let facing = unit((b - a).cross(c - a));
         let mut foot = (a + b + c) / 3.0;
-        let mut fold = 0.0;
-        for _ in 0..STEPS {
+        let (mut distance, mut fold) = (0.0, 0.0);
+        for i in 0..STEPS {
             let (step, normal) = self.step(foot);
+            let length = step.length();
+            if i == 0 {
+                distance = length;
+            }
+            let Some(facing) = facing else { break };
             foot -= step;
             fold = normal.map_or(fold, |normal| f64::max(fold, FACING - facing.dot(normal)));
-            if step.length() <= NEAR * self.size {
+            if length <= NEAR * self.size {
                 break;
             }
         }
-        fold
+        (distance, fold)
+    }
+
+    /// About how far a point is from the surface, a cell at most: the length of [`Self::step`].
+    pub fn distance(&mut self, p: DVec3) -> f64 {
+        self.count += 1;
+        let (omega, gradient) = self.field.omega_grad(p);
+        let distance = omega.abs() / gradient.length();
+        if distance.is_finite() { f64::min(distance, self.size) } else { 0.0 }
     }
 
     /// The step of Newton's method at a point, of a cell at most, and the outward normal there.

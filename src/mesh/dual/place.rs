@@ -148,24 +148,34 @@ impl Scene<'_> {
         let base = edge_slot(0, [cell.1 % BRICK, cell.1 / BRICK, cell.0]);
         let hit = |e: u8| scratch.table[base + SLOT_OF_EDGE[usize::from(e)]];
         let (mut position, mut normal) = (DVec3::ZERO, DVec3::ZERO);
-        for &e in &around.edges {
-            let hit = hit(e);
-            self.rings.set(hit, e, vertex);
-            position += self.hits.positions[hit as usize];
-            normal += self.hits.normals[hit as usize];
+        let mut numbers = [0; EDGES];
+        let count = around.edges.len();
+        for (&e, number) in around.edges.iter().zip(&mut numbers) {
+            *number = hit(e) as usize;
+            self.rings.set(*number as u32, e, vertex);
+            position += self.hits.positions[*number];
+            normal += self.hits.normals[*number];
         }
+        let numbers = &numbers[..count];
         for pair in &around.twice {
             let mut segment = pair.map(|i| hit(around.edges[usize::from(i)]));
             segment.sort_unstable();
             placed.twice.push(Twice { segment, vertex });
         }
-        let mean = position / around.edges.len() as f64;
+        let mean = position / count as f64;
         let length = normal.length();
-        let is_flat = |e: &u8| self.hits.normals[hit(*e) as usize].dot(normal) > NEARLY_FLAT * length;
+        let normal = normal / length;
+        // over a bend the tangent planes of the hits pass as far above the surface as their mean lies below
+        let (mut least_agreement, mut height) = (f64::INFINITY, 0.0);
+        for &number in numbers {
+            let of_hit = self.hits.normals[number];
+            least_agreement = f64::min(least_agreement, of_hit.dot(normal));
+            height += of_hit.dot(self.hits.positions[number] - mean);
+        }
         let low = cell_low(brick.low, cell);
-        let is_smooth = around.edges.iter().all(is_flat) && !self.is_border(low);
-        slots.positions[place] = mean;
-        slots.normals[place] = normal / length;
+        let is_smooth = length > 0.0 && least_agreement > NEARLY_FLAT && !self.is_border(low);
+        slots.positions[place] = mean + (0.5 * height / count as f64) * normal;
+        slots.normals[place] = normal;
         if !is_smooth {
             scratch.hits.clear();
             scratch.hits.extend(around.edges.iter().map(|&e| self.hits.get(hit(e))));
@@ -249,11 +259,11 @@ impl Scene<'_> {
             moving.retain(|&v| {
                 let Some((omega, gradient)) = found.next() else { return false };
                 let squared = gradient.length_squared();
-                let step = gradient * (omega / squared);
-                slots.positions[v] -= step;
-                let normal = -gradient / squared.sqrt();
+                let slope = squared.sqrt();
+                slots.positions[v] -= gradient * (omega / squared);
+                let normal = -gradient / slope;
                 slots.normals[v] = if normal.is_finite() { normal } else { DVec3::ZERO };
-                step.length() > LAST_STEP * size
+                omega.abs() > LAST_STEP * size * slope
             });
             drop(found);
             positions.clear();

@@ -32,7 +32,7 @@ pub(super) fn minimiser(planes: impl Iterator<Item = (DVec3, DVec3)>, around: DV
     (around + step, rank)
 }
 
-/// Sweeps of Jacobi's method; a symmetric 3×3 matrix is diagonal to the last digit after five or six.
+/// Sweeps of Jacobi's method at most; a symmetric 3×3 matrix is diagonal to the last digit after four or five.
 const SWEEPS: usize = 10;
 
 /// Eigenvalues and orthonormal eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.
@@ -41,7 +41,8 @@ fn eigen(mut m: DMat3) -> (DVec3, DMat3) {
     for _ in 0..SWEEPS {
         let off = m.col(1)[0].abs() + m.col(2)[0].abs() + m.col(2)[1].abs();
         let trace = m.col(0)[0].abs() + m.col(1)[1].abs() + m.col(2)[2].abs();
-        if off <= f64::EPSILON * f64::EPSILON * trace {
+        // each sweep squares what is left, so less than this would change no digit
+        if off <= f64::EPSILON * trace {
             break;
         }
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
@@ -53,16 +54,23 @@ fn eigen(mut m: DMat3) -> (DVec3, DMat3) {
             let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
             let c = 1.0 / (t * t + 1.0).sqrt();
             let s = t * c;
-            let mut rotation = DMat3::IDENTITY;
-            rotation.col_mut(p)[p] = c;
-            rotation.col_mut(q)[q] = c;
-            rotation.col_mut(q)[p] = s;
-            rotation.col_mut(p)[q] = -s;
-            m = rotation.transpose() * m * rotation;
-            vectors *= rotation;
+            // R^T m R for the rotation R in the plane of axes p and q, first from the left
+            for column in 0..3 {
+                let (mp, mq) = (m.col(column)[p], m.col(column)[q]);
+                m.col_mut(column)[p] = c * mp - s * mq;
+                m.col_mut(column)[q] = s * mp + c * mq;
+            }
+            rotate_columns(&mut m, (p, q), (c, s));
+            rotate_columns(&mut vectors, (p, q), (c, s));
         }
     }
     (DVec3::new(m.col(0)[0], m.col(1)[1], m.col(2)[2]), vectors)
+}
+
+/// m·R for the rotation R by the angle of the given cosine and sine in the plane of two axes.
+fn rotate_columns(m: &mut DMat3, (p, q): (usize, usize), (c, s): (f64, f64)) {
+    let (mp, mq) = (m.col(p), m.col(q));
+    (*m.col_mut(p), *m.col_mut(q)) = (c * mp - s * mq, s * mp + c * mq);
 }
 
 #[cfg(test)]

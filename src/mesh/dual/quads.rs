@@ -48,6 +48,8 @@ pub(super) struct Cut {
     pub spoilt: Vec<u32>,
     /// Corners of fans, around their hits.
     fans: Vec<(u32, Vec<u32>)>,
+    /// Quads on no smooth surface, in the order of their hits.
+    doubtful: Vec<Quad>,
     pub gradients: u64,
 }
 
@@ -104,6 +106,7 @@ impl<'a> Quads<'a> {
                 self.cut_doubtful(vertices, &doubtful, gradients, &mut cut, |hit, pair| {
                     triangles[2 * (hit - first) as usize..][..2].copy_from_slice(&pair);
                 });
+                cut.doubtful = doubtful;
                 cut
             })
             .collect();
@@ -111,41 +114,21 @@ impl<'a> Quads<'a> {
         for part in parts {
             cut.spoilt.extend(part.spoilt);
             cut.fans.extend(part.fans);
+            cut.doubtful.extend(part.doubtful);
             cut.gradients += part.gradients;
         }
         cut
     }
 
-    /// Cuts the quads around vertices that have moved once more. `moved` are ascending.
+    /// Cuts the quads around vertices that have moved once more. `moved` are ascending, and none is smooth: their quads
+    /// are among the doubtful, or all on a cap, where nothing changes.
     pub fn cut_again(&self, vertices: &Vertices, moved: &[u32], cut: &mut Cut) {
-        let mut is_moved = vec![false; vertices.len()];
-        moved.iter().for_each(|&v| is_moved[v as usize] = true);
-        let touched: Vec<Vec<Quad>> = self
-            .crossed
-            .tasks
-            .par_iter()
-            .map(|task| {
-                let mut touched = Vec::new();
-                self.for_each_quad(task, |quad, rim| {
-                    if rim.is_none() && quad.1.iter().any(|&v| is_moved[v as usize]) {
-                        touched.push(quad);
-                    }
-                });
-                touched
-            })
-            .collect();
-        let mut doubtful = Vec::new();
-        for quad in touched.into_iter().flatten() {
-            match self.cut_smooth(vertices, quad) {
-                Some(along_first) => {
-                    cut.triangles[2 * quad.0 as usize..][..2].copy_from_slice(&halves(quad.1, along_first));
-                }
-                None => doubtful.push(quad),
-            }
-        }
+        let is_moved = |v: &u32| moved.binary_search(v).is_ok();
+        let touched = cut.doubtful.iter().filter(|quad| quad.1.iter().any(is_moved));
+        let touched: Vec<Quad> = touched.copied().collect();
         let mut triangles = std::mem::take(&mut cut.triangles);
         cut.spoilt.clear();
-        self.cut_doubtful(vertices, &doubtful, &mut Gradients::default(), cut, |hit, pair| {
+        self.cut_doubtful(vertices, &touched, &mut Gradients::default(), cut, |hit, pair| {
             triangles[2 * hit as usize..][..2].copy_from_slice(&pair);
         });
         cut.triangles = triangles;
@@ -211,8 +194,11 @@ impl<'a> Quads<'a> {
         if corners.iter().any(|&v| vertices.kinds[v] != Kind::Smooth) {
             return None;
         }
-        let positions = corners.map(|v| vertices.positions[v]);
-        let normals = corners.map(|v| vertices.normals[v]);
+        // written out: `map` over four vectors becomes a call
+        let [a, b, c, d] = corners;
+        let [positions, normals] = [&vertices.positions, &vertices.normals];
+        let positions = [positions[a], positions[b], positions[c], positions[d]];
+        let normals = [normals[a], normals[b], normals[c], normals[d]];
         let chords = [positions[2] - positions[0], positions[3] - positions[1]];
         // how far the surface bulges over a chord, from the normals at its ends
         let bulges =
@@ -224,10 +210,11 @@ impl<'a> Quads<'a> {
         // twice the areas: of the triangle after corner i on the way around
         let normal = self.hits.normals[hit as usize];
         let sides: [DVec3; 4] = std::array::from_fn(|i| positions[(i + 1) % 4] - positions[i]);
-        let faces_out = |i: usize| sides[i].cross(sides[(i + 1) % 4]).dot(normal) > 0.0;
+        let faces_out: [bool; 4] =
+            std::array::from_fn(|i| sides[i].cross(sides[(i + 1) % 4]).dot(normal) > 0.0);
         let is_good = |along_first: bool| {
             let i = usize::from(!along_first);
-            faces_out(i) && faces_out(i + 2)
+            faces_out[i] & faces_out[i + 2]
         };
         [along_first, !along_first].into_iter().find(|&first| is_good(first))
     }
@@ -268,8 +255,10 @@ impl<'a> Quads<'a> {
 }
 
 /// The triangles of a quad cut along its first diagonal (from corner 0) or its second.
-fn halves([a, b, c, d]: [u32; 4], along_first: bool) -> [[u32; 3]; 2] {
-    if along_first { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] }
+fn halves(quad: [u32; 4], along_first: bool) -> [[u32; 3]; 2] {
+    // indices rather than a branch, which would be taken as often as not
+    let corner = |i: usize| quad[(i + usize::from(!along_first)) % 4];
+    [[corner(0), corner(1), corner(2)], [corner(0), corner(2), corner(3)]]
 }
 
 /// A bulge below this share of a chord is none: the shorter diagonal makes the better triangles.

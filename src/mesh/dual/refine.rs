@@ -9,7 +9,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::normals::{gradients, unit};
+use super::super::normals::{Gradients, gradients, unit};
 use super::crease;
 
 use super::project;
@@ -50,9 +50,8 @@ pub(super) fn refine(
     let mut fresh = 0..triangles.len();
     let mut changed: Vec<u32> = Vec::new();
     for _ in 0..ROUNDS {
-        let is_fresh = triangles[fresh.clone()].par_iter().copied();
         let others: Vec<[u32; 3]> = changed.iter().map(|&t| triangles[t as usize]).collect();
-        let found = cuts(field, vertices, is_fresh.chain(others), TOLERANCE * size);
+        let found = cuts(field, vertices, (&triangles[fresh.clone()], &others), TOLERANCE * size);
         let Found { cuts, left: uncut, evaluations: count } = found;
         evaluations += count;
         left.extend(uncut);
@@ -87,55 +86,20 @@ struct Found {
 fn cuts(
     field: &dyn Field,
     vertices: &Vertices,
-    triangles: impl IndexedParallelIterator<Item = [u32; 3]>,
+    (fresh, changed): (&[[u32; 3]], &[[u32; 3]]),
     tolerance: f64,
 ) -> Found {
-    let parts: Vec<Found> = triangles
-        .fold_chunks(BATCH, Vec::new, |mut edges: Vec<[u32; 2]>, t| {
-            // each edge of a closed mesh is run along once in ascending order
-            let sides = (0..3).map(|i| [t[i], t[(i + 1) % 3]]);
-            edges.extend(sides.filter(|&[a, b]| a < b && may_bulge(vertices, [a, b], tolerance)));
-            edges
-        })
-        .map(|edges| {
-            let middles: Vec<DVec3> = edges
-                .iter()
-                .map(|edge| {
-                    let [a, b] = edge.map(|v| vertices.positions[v as usize]);
-                    0.5 * (a + b)
-                })
-                .collect();
-            let mut count = middles.len() as u64;
-            let found = gradients(field, &middles);
-            let off = |(omega, gradient): (f64, DVec3)| omega.abs() > tolerance * gradient.length();
-            let (mut bends, mut others) = (Vec::new(), Vec::new());
-            let (far, near): (Vec<_>, Vec<_>) =
-                edges.into_iter().zip(found).partition(|(_, found)| off(*found));
-            let mut left =
-                far_beside(field, vertices, near.into_iter().map(|(edge, _)| edge), tolerance, &mut count);
-            for (edge, found) in far {
-                match Bend::new(vertices, edge, found) {
-                    Some(bend) => bends.push(bend),
-                    None => others.push(edge),
-                }
-            }
-            let mut cut = Vec::with_capacity(bends.len() + others.len());
-            for (bend, settled) in settle(field, bends, tolerance, &mut count) {
-                if settled {
-                    cut.extend(bend.cut(tolerance));
-                } else {
-                    others.push(bend.edge);
-                }
-            }
-            for edge in others {
-                match middle(field, edge.map(|v| vertices.get(v)), tolerance, &mut count) {
-                    Middle::Near => {}
-                    Middle::At(vertex) => cut.push((edge, vertex)),
-                    Middle::Nowhere => left.push(edge),
-                }
-            }
-            Found { cuts: cut, left, evaluations: count }
-        })
+    let parts: Vec<Found> = fresh
+        .par_chunks(BATCH)
+        .chain(changed.par_chunks(BATCH))
+        .map_init(
+            || (Vec::new(), Gradients::default()),
+            |(edges, gradients), triangles| {
+                edges.clear();
+                triangles.iter().for_each(|t| add_bulging(vertices, *t, tolerance, edges));
+                cuts_of(field, vertices, edges, gradients, tolerance)
+            },
+        )
         .collect();
     let mut all = Found::default();
     for part in parts {
@@ -145,6 +109,50 @@ fn cuts(
     }
     all.cuts.sort_unstable_by_key(|cut| cut.0);
     all
+}
+
+/// The edges to cut among those that may bulge, in no order.
+fn cuts_of(
+    field: &dyn Field,
+    vertices: &Vertices,
+    edges: &[[u32; 2]],
+    gradients: &mut Gradients,
+    tolerance: f64,
+) -> Found {
+    let middle_of = |edge: &[u32; 2]| {
+        let [a, b] = edge.map(|v| vertices.positions[v as usize]);
+        0.5 * (a + b)
+    };
+    let middles: Vec<DVec3> = edges.iter().map(middle_of).collect();
+    let mut count = middles.len() as u64;
+    let (mut bends, mut others, mut near) = (Vec::new(), Vec::new(), Vec::new());
+    for (&edge, (omega, gradient)) in edges.iter().zip(gradients.at(field, &middles)) {
+        if omega.abs() > tolerance * gradient.length() {
+            match Bend::new(vertices, edge, (omega, gradient)) {
+                Some(bend) => bends.push(bend),
+                None => others.push(edge),
+            }
+        } else {
+            near.push(edge);
+        }
+    }
+    let mut left = far_beside(field, vertices, near.into_iter(), tolerance, &mut count);
+    let mut cut = Vec::with_capacity(bends.len() + others.len());
+    for (bend, settled) in settle(field, bends, tolerance, &mut count) {
+        if settled {
+            cut.extend(bend.cut(tolerance));
+        } else {
+            others.push(bend.edge);
+        }
+    }
+    for edge in others {
+        match middle(field, edge.map(|v| vertices.get(v)), tolerance, &mut count) {
+            Middle::Near => {}
+            Middle::At(vertex) => cut.push((edge, vertex)),
+            Middle::Nowhere => left.push(edge),
+        }
+    }
+    Found { cuts: cut, left, evaluations: count }
 }
 
 /// Edges that leave the surface although their middles are near it: they enter a wall thinner than a cell, or a gap.
@@ -177,18 +185,28 @@ fn far_beside(
         .collect()
 }
 
-/// Whether the surface may be farther than `tolerance` from the middle of an edge, as far as its ends tell.
-fn may_bulge(vertices: &Vertices, edge: [u32; 2], tolerance: f64) -> bool {
-    let [a, b] = edge.map(|v| v as usize);
-    let chord = vertices.positions[b] - vertices.positions[a];
-    match (vertices.kinds[a], vertices.kinds[b]) {
-        (Kind::Smooth, Kind::Smooth) => {
-            (vertices.normals[b] - vertices.normals[a]).dot(chord).abs() > 4.0 * tolerance
+/// Adds those edges of a triangle, run along in ascending order, from whose middle the surface may be farther than
+/// `tolerance`, as far as their ends tell. Each edge of a closed mesh is run along once in ascending order.
+fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec<[u32; 2]>) {
+    let [a, b, c] = t.map(|v| v as usize);
+    let Vertices { positions, normals, kinds } = vertices;
+    let positions = [positions[a], positions[b], positions[c]];
+    let normals = [normals[a], normals[b], normals[c]];
+    let kinds = [kinds[a], kinds[b], kinds[c]];
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        let chord = positions[j] - positions[i];
+        let bulges = (normals[j] - normals[i]).dot(chord).abs() > 4.0 * tolerance;
+        let may_bulge = match (kinds[i], kinds[j]) {
+            (Kind::Smooth, Kind::Smooth) => bulges,
+            // a cap is no part of ω = 0
+            (Kind::Cap, _) | (_, Kind::Cap) => false,
+            // sheets that touch
+            _ => chord != DVec3::ZERO,
+        };
+        // half of all edges ascend: a branch on that alone would be taken as often as not
+        if may_bulge & (t[i] < t[j]) {
+            edges.push([t[i], t[j]]);
         }
-        // a cap is no part of ω = 0
-        (Kind::Cap, _) | (_, Kind::Cap) => false,
-        // sheets that touch
-        _ => chord != DVec3::ZERO,
     }
 }
 
@@ -329,9 +347,24 @@ fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 
     };
     let position = |v: u32| vertices.positions[v as usize];
     let distance = |a: u32, b: u32| position(a).distance(position(b));
+    // few triangles have two ends of cut edges: counting them takes no branches
+    let is_touched = |[a, b, c]: [u32; 3]| {
+        u8::from(is_end[a as usize]) + u8::from(is_end[b as usize]) + u8::from(is_end[c as usize]) >= 2
+    };
+    let find = |(batch, part): (usize, &[[u32; 3]])| {
+        let mut touched = Vec::new();
+        for (i, t) in (batch * BATCH..).zip(part) {
+            if is_touched(*t) {
+                touched.push(i);
+            }
+        }
+        touched
+    };
+    let touched: Vec<Vec<usize>> = triangles.par_chunks(BATCH).enumerate().map(find).collect();
     let mut changed = Vec::new();
     let mut others = Vec::new();
-    for (t, triangle) in triangles.iter_mut().enumerate() {
+    for t in touched.into_iter().flatten() {
+        let triangle = &mut triangles[t];
         let [a, b, c] = *triangle;
         // turned so that the first side is cut if one is, and the third is whole if one is
         let turns = [[a, b, c], [b, c, a], [c, a, b]];

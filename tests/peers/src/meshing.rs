@@ -15,13 +15,13 @@ use isosurface::math::Vec3;
 use isosurface::sampler::Sampler;
 use isosurface::source::ScalarSource;
 use nalgebra::{Matrix4, Vector3};
-use rfm::field::{Field, GradientsMut, Points};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
     Grid, Mesh, Quality, Reference, Resolution, dual_contouring, is_closed_manifold, marching_cubes, shells,
 };
-use rfm::{Engine, Program, Solid};
+use rfm::solid::Depth;
+use rfm::{Engine, Program};
 
 use crate::fidget::{self as peer, Joins};
 use crate::scenes;
@@ -187,32 +187,6 @@ fn print(scene: &Scene, cells: usize, rows: &[Row<'_>], reference: &Reference<'_
             100.0 * error,
             if is_closed_manifold(&row.found) { "yes" } else { "no" },
         );
-    }
-}
-
-/// The distance inside, which Newton's method likes.
-struct Depth<'a>(&'a Solid);
-
-impl Field for Depth<'_> {
-    fn omega(&self, p: DVec3) -> f64 {
-        -self.0.contact(p).distance
-    }
-
-    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let contact = self.0.contact(p);
-        (-contact.distance, -contact.normal)
-    }
-
-    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
-        let mut curvature = vec![0.0; points.len()];
-        let GradientsMut { omega, x, y, z } = out;
-        self.0.contact_many(
-            [points.x, points.y, points.z],
-            [&mut *omega, &mut *x, &mut *y, &mut *z, &mut curvature],
-        );
-        for column in [omega, x, y, z] {
-            column.iter_mut().for_each(|value| *value = -*value);
-        }
     }
 }
 
