@@ -210,7 +210,7 @@ impl<'a> Core<'a> {
     /// The same, for particles of which the fastest is known.
     fn stable_dt_at(&self, speed: f64) -> f64 {
         let limit = self.parameters.stable_dt(speed);
-        limit.min(self.parameters.force_dt(longest(&self.acceleration)))
+        limit.min(self.parameters.present_force_dt(longest(&self.acceleration)))
     }
 
     /// The step to take now, s, at most `most`.

@@ -10,7 +10,7 @@
 //! 2ρ₀ (M_i v_i)·∇λ.
 //!
 //! One solve does the work of their two. A velocity free of divergence is asked for, and besides that a density that is
-//! off comes back within τ = 10 steps (Baumgarte 1972). Where a density is to be right after a single step, as in their
+//! off comes back within some time τ (Baumgarte 1972). Where a density is to be right after a single step, as in their
 //! second solver, each small error of it becomes a speed: a fluid at rest simmers, and its pressure with it.
 //!
 //! Walls enter by λ, ∇λ and M = (1 − K)⁻¹: a pressure that is linear in space goes on behind the wall. The rate of density
@@ -40,9 +40,6 @@ use crate::sph::{
     simulation::StepError,
     walls::{Coverage, LEAST_FREE},
 };
-
-/// A density that is off comes back within so many steps.
-const RELAXATION_STEPS: f64 = 10.0;
 
 /// Walls and disorder make the system stiffer than the even fluid that [`stiffness`] speaks of.
 const STIFFNESS: f64 = 1.5;
@@ -186,8 +183,8 @@ impl DivergenceFree {
         core.particles.pressure.fill(0.0);
     }
 
-    pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
-        let dt = core.next_dt(longest)?;
+    pub fn step(&mut self, core: &mut Core<'_>, most: f64) -> Result<f64, StepError> {
+        let dt = core.next_dt(most)?;
         self.find_other_accelerations(core);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);
@@ -268,11 +265,12 @@ impl DivergenceFree {
     fn keep_density(&mut self, core: &mut Core<'_>, dt: f64) {
         let rest = core.parameters.rest_density;
         let mut pressure = std::mem::take(&mut self.specific);
+        let relaxation = core.parameters.relaxation_time(core.speed, dt);
         // the compression to come without pressure; that which s takes away is found in each iteration
         self.find_rate_of(core, &core.particles.velocity, true);
         let mut free = std::mem::take(&mut self.free);
         for ((free, rate), rho) in free.iter_mut().zip(&self.rate).zip(&core.particles.density) {
-            *free = (rho - rest) / (RELAXATION_STEPS * dt) + rate;
+            *free = (rho - rest) / relaxation + rate;
         }
         self.iterations = self.solve(core, &mut pressure, &free, dt, self.numbers.tolerance * rest / dt);
         self.free = free;
