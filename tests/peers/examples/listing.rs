@@ -46,7 +46,16 @@ fn main() {
 fn assembly(solid: &Solid, kind: ProgramKind, form: Form, precision: Precision) -> String {
     let (graph, outputs) = solid.graph(kind);
     let (shape, inputs) = (Shape::Point, &[][..]);
-    let request = Request { graph, inputs, outputs, precision, shape, forms: &Forms::all(form), parameters: false, uniforms: false };
+    let request = Request {
+        graph,
+        inputs,
+        outputs,
+        precision,
+        shape,
+        forms: &Forms::all(form),
+        parameters: false,
+        uniforms: false,
+    };
     Listing::of(request).unwrap_or_else(|e| panic!("{e}")).assembly
 }
 

@@ -45,7 +45,9 @@ struct Row {
 /// Measures and prints a table.
 pub fn run() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    println!("| solver | particles | on walls | step, ms | ms per step | ns per particle·neighbour | / rfm dfsph |");
+    println!(
+        "| solver | particles | on walls | step, ms | ms per step | ns per particle·neighbour | / rfm dfsph |"
+    );
     println!("|---|--:|--:|--:|--:|--:|--:|");
     for particles in [10_000, 105_000] {
         let spacing = (COLUMN.volume() / particles as f64).cbrt();

@@ -44,8 +44,8 @@ struct Scene {
     hand: Option<fn([f32; 3]) -> f32>,
     volume: Option<f64>,
     cells: &'static [usize],
-    /// Cells of the mesh whose vertices stand for the surface are half as large as these.
-    measured_in: usize,
+    /// Cells of the mesh whose vertices stand for the surface are half as large as these; none if finding them takes minutes.
+    measured_in: Option<usize>,
 }
 
 /// A mesher on a scene.
@@ -82,7 +82,7 @@ fn scenes() -> Vec<Scene> {
             hand: Some(pawn),
             volume: Some(0.442701),
             cells: &[128, 256],
-            measured_in: 256,
+            measured_in: Some(256),
         },
         Scene {
             name: "bishop",
@@ -91,7 +91,7 @@ fn scenes() -> Vec<Scene> {
             hand: Some(bishop),
             volume: Some(0.601689),
             cells: &[128, 256],
-            measured_in: 256,
+            measured_in: Some(256),
         },
         Scene {
             name: "500 balls",
@@ -104,7 +104,7 @@ fn scenes() -> Vec<Scene> {
             hand: None,
             volume: None,
             cells: &[512],
-            measured_in: 256,
+            measured_in: None,
         },
     ]
 }
@@ -151,9 +151,10 @@ fn measure(scene: &Scene, cells: usize) {
     }
     let surface = solid.surface(bounds);
     let depth = Depth(&solid);
-    let reference =
-        Reference::new(&*surface, &depth, &grid(scene.measured_in)).unwrap_or_else(|e| panic!("{e}"));
-    print(scene, cells, &rows, &reference);
+    let reference = scene
+        .measured_in
+        .map(|cells| Reference::new(&*surface, &depth, &grid(cells)).unwrap_or_else(|e| panic!("{e}")));
+    print(scene, cells, &rows, reference.as_ref());
 }
 
 /// Seconds that this thread has run, waiting left out; nothing where the system does not tell.
@@ -166,25 +167,25 @@ fn row<'a>(name: &'static str, work: Box<dyn FnMut() -> Mesh + 'a>) -> Row<'a> {
     Row { name, work, times: Vec::new(), found: Mesh::default() }
 }
 
-fn print(scene: &Scene, cells: usize, rows: &[Row<'_>], reference: &Reference<'_>) {
+fn print(scene: &Scene, cells: usize, rows: &[Row<'_>], reference: Option<&Reference<'_>>) {
     println!("\n{} in {cells}³ cells\n", scene.name);
     println!("| | ms | / ours | triangles | Hausdorff | rms to surface | volume error | closed manifold |");
     println!("|---|--:|--:|--:|--:|--:|--:|---|");
     for row in rows {
-        let quality: Quality = reference.measure(&row.found);
+        let quality: Option<Quality> = reference.map(|reference| reference.measure(&row.found));
         let volume: f64 = shells(&row.found).iter().map(|shell| shell.volume).sum();
-        let error = scene.volume.map_or(quality.volume_error, |truth| volume / truth - 1.0);
+        let error = scene.volume.map(|truth| format!("{:+.3} %", 100.0 * (volume / truth - 1.0)));
+        let metres = |of: fn(&Quality) -> f64| quality.as_ref().map(|quality| format!("{:.1e}", of(quality)));
+        let [hausdorff, rms, error] = [metres(Quality::hausdorff), metres(|q| q.to_surface.rms), error]
+            .map(|figure| figure.unwrap_or_else(|| "–".into()));
         // turn by turn: what else the machine does disturbs both
         let ratio =
             crate::measure::median(row.times.iter().zip(&rows[0].times).map(|(t, o)| t / o).collect());
         println!(
-            "| {} | {:.1} | {ratio:.1} | {} | {:.1e} | {:.1e} | {:+.3} % | {} |",
+            "| {} | {:.1} | {ratio:.1} | {} | {hausdorff} | {rms} | {error} | {} |",
             row.name,
             row.times.iter().copied().fold(f64::INFINITY, f64::min),
             row.found.triangles.len(),
-            quality.hausdorff(),
-            quality.to_surface.rms,
-            100.0 * error,
             if is_closed_manifold(&row.found) { "yes" } else { "no" },
         );
     }
