@@ -146,19 +146,7 @@ pub trait Field: Sync {
     ///
     /// The default asks for ranges of the boxes around a few such balls.
     fn clearance(&self, p: DVec3, most: f64) -> f64 {
-        let ball = |radius: f64| Aabb::new(p, p).grown(radius);
-        let mut radius = most;
-        for _ in 0..CLEARANCES {
-            let range = self.range(&ball(radius));
-            if range.hi < 0.0 {
-                return radius;
-            }
-            if range == Interval::ALL {
-                break; // it knows nothing, and will not know more
-            }
-            radius *= 0.5;
-        }
-        0.0
+        clearance_by_ranges(self, p, most)
     }
 
     /// Whether a box is proven to lie in the fluid, and nothing of it nearer than `reach` to a surface, at all times that
@@ -166,6 +154,23 @@ pub trait Field: Sync {
     fn is_far(&self, over: &Aabb, reach: f64) -> bool {
         self.range(&over.grown(reach)).hi < 0.0
     }
+}
+
+/// The largest of `most`, its half and so on that a field's ranges prove to be free around a point: what
+/// [`Field::clearance`] does unless a field knows better.
+pub(crate) fn clearance_by_ranges<F: Field + ?Sized>(field: &F, p: DVec3, most: f64) -> f64 {
+    let mut radius = most;
+    for _ in 0..CLEARANCES {
+        let range = field.range(&Aabb::new(p, p).grown(radius));
+        if range.hi < 0.0 {
+            return radius;
+        }
+        if range == Interval::ALL && radius == most && field.range(&Aabb::new(p, p)) == Interval::ALL {
+            break; // it knows nothing, and will not know more
+        }
+        radius *= 0.5;
+    }
+    0.0
 }
 
 /// An obstacle that may move.

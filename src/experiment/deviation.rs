@@ -75,7 +75,10 @@ impl Deviations {
 
     /// Over all instants so far.
     pub fn total(&self) -> Deviation {
-        let relative = |k: usize| (self.size[k] > 0.0).then(|| (self.off[k] / self.size[k]).sqrt());
+        // not known at all: both sums are as they began
+        let relative = |k: usize| {
+            (self.off[k] != 0.0 || self.size[k] != 0.0).then(|| (self.off[k] / self.size[k]).sqrt())
+        };
         Deviation { pressure: relative(0), velocity: relative(1), front: relative(2) }
     }
 

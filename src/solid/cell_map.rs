@@ -15,7 +15,7 @@ use super::leaf::Leaves;
 use super::prefix::Word;
 use super::sweep::Sweep;
 use super::{Contact, Parts, Solid, Twin};
-use crate::field::{Entry, Faces, Field, Normals, Path, Points};
+use crate::field::{Entry, Faces, Field, Normals, Path, Points, clearance_by_ranges};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
@@ -426,7 +426,8 @@ impl Field for CellMap {
 
     fn clearance(&self, p: DVec3, most: f64) -> f64 {
         match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Fluid) => self.reach.min(most),
+            Some(Cell::Fluid) if most <= self.reach => most,
+            Some(Cell::Fluid) => clearance_by_ranges(self, p, most).max(self.reach),
             Some(Cell::Near(program)) => {
                 // a cube around the point, with its corners at the surface's distance, or with less than half of that;
                 // what the cell has kept is right within the reach

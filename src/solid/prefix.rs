@@ -61,7 +61,8 @@ pub(super) fn skip(words: &[u32], at: &mut usize) {
 }
 
 /// Whether a tree is surely negative, of whose leaves a function knows it, given their number and whether they are negated;
-/// nothing as soon as a leaf may be NaN.
+/// nothing as soon
+/// as nothing is known of a leaf, which may be NaN then.
 pub(super) fn is_negative(
     words: &[u32],
     at: &mut usize,

@@ -238,6 +238,7 @@ impl<'a> Core<'a> {
         let vectors = [position, velocity, &self.acceleration, &self.spare].map(Vectors::bytes);
         vectors.iter().sum::<usize>()
             + 8 * (density.capacity() + pressure.capacity() + self.clear.capacity())
+            + self.near_walls.capacity()
             + 4 * (id.capacity() + self.sorted_id.capacity())
             + self.columns.bytes()
     }

@@ -230,6 +230,10 @@ const RELAXATION_STEPS: [f64; 2] = [4.0, 10.0];
 /// once, and with ten steps a column of eighty layers bursts at its start.
 const RELAXATION_FALLS: f64 = 2.0;
 
+/// … but not in more steps than these, in a gravity that is next to nothing; where a column bursts, steps are so short
+/// that the time of a fall has some sixty.
+const MOST_RELAXATION_STEPS: f64 = 100.0;
+
 impl Parameters {
     /// # Errors
     /// The first parameter that is not finite, or lies outside the values the method is defined for.
@@ -344,7 +348,9 @@ impl Parameters {
     pub(super) fn relaxation_time(&self, speed: f64, dt: f64) -> f64 {
         let [moving, at_rest] = RELAXATION_STEPS;
         let fall = (self.support_radius / self.gravity.length()).sqrt();
-        let slow = (at_rest * dt).max(if fall.is_finite() { RELAXATION_FALLS * fall } else { 0.0 });
+        let falls =
+            if fall.is_finite() { (RELAXATION_FALLS * fall).min(MOST_RELAXATION_STEPS * dt) } else { 0.0 };
+        let slow = falls.max(at_rest * dt);
         let courant = (dt * speed / (ADVECTION * self.spacing())).min(1.0);
         slow + (moving * dt - slow) * courant
     }

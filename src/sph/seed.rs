@@ -234,7 +234,7 @@ pub struct Carved {
 }
 
 /// Removes particles that lie outside the box, in an obstacle, or nearer to one than `clearance` metres
-/// (by the estimate −ω/|∇ω|); the rest are numbered anew.
+/// (by the estimate −ω/|∇ω|, unless a ball of that radius is proven to be free); the rest are numbered anew.
 ///
 /// # Errors
 /// [`SeedError::NothingLeft`], or [`SeedError::Undefined`] where an obstacle has no value.
@@ -261,11 +261,13 @@ pub fn carve(
                 carved.inside += 1;
                 continue 'particles;
             }
-            // away from surfaces a map of cells knows no more of ω than its sign
-            let near = clearance > 0.0 && obstacle.field.clearance(p, clearance) < clearance;
-            if near && -w < clearance * obstacle.field.omega_grad(p).1.length() {
-                carved.too_close += 1;
-                continue 'particles;
+            if clearance > 0.0 && obstacle.field.clearance(p, clearance) < clearance {
+                // taken together: away from surfaces a map of cells has a value of its own, without a gradient to it
+                let (w, gradient) = obstacle.field.omega_grad(p);
+                if -w < clearance * gradient.length() {
+                    carved.too_close += 1;
+                    continue 'particles;
+                }
             }
         }
         kept.push(p, particles.velocity.get(i));

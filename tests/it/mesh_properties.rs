@@ -80,8 +80,7 @@ proptest! {
     #![proptest_config(config(30))]
 
     /// Where the mesh is near the surface everywhere, so that no tip of a wedge is cut off, and no part is a speck of a cell
-    /// or two, at most one triangle in a
-    /// thousand faces away from the surface below it.
+    /// or two, at most one triangle in a thousand faces away from the surface below it.
     #[test]
     fn sharp_meshes_of_random_solids_are_hardly_folded(text in csg(), cells in 12..28_usize) {
         let solid = solid(&text, false);

@@ -112,6 +112,52 @@ scene wavy {
   run { until: 2 s, save_every: 0.05 s }
 }";
 
+/// Balls in a corner, enough of them for a map of cells that knows only their sign, and coarse particles far away from them.
+const FAR_BALLS: &str = "rfm 1
+solid balls = any i in 0..40: ball([0.05 + 0.01*i, 0.1, 0.1], 0.02)
+scene apart {
+  box { min: [0, 0, 0], max: [3, 3, 3] }
+  obstacle { solid: balls }
+  fluid water { shape: box([1.5, 1.5, 1.5], [2.9, 2.9, 2.9]), density: 1000, spacing: 0.2, viscosity: 0, surface_tension: 0 }
+  method: paper
+  run { until: 0.01 s, save_every: 0.01 s }
+}";
+
+#[test]
+fn what_is_far_from_many_balls_is_not_too_close_to_them() {
+    let program = Program::from_source("apart.rfm", FAR_BALLS).unwrap_or_else(|e| panic!("{e}"));
+    let scene = &program.module().scenes[0];
+    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let (simulation, carved) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
+    assert!(carved == 0 && simulation.particles().len() > 300, "{carved} carved");
+}
+
+/// A lone stone floats, quite still; a wall comes along and must not pass over it.
+const STONE: &str = "rfm 1
+solid wall = box([-0.1, -1, -0.1], [0, 1, 0.5]).move([-0.2 + 0.5*t, 0, 0])
+scene pushed {
+  box { min: [-0.5, -0.2, 0], max: [0.6, 0.2, 0.5], restitution: 0, friction: 1 }
+  obstacle { solid: wall, restitution: 0 }
+  fluid stone { shape: ball([0, 0, 0.1], 0.01), particles: 1, fill: middle, spacing: 0.01, viscosity: 0, surface_tension: 0 }
+  gravity: [0, 0, 0]
+  method: paper
+  run { until: 0.8 s, save_every: 0.1 s, dt: 1 ms }
+}";
+
+#[test]
+fn a_wall_takes_along_what_lies_still() {
+    let program = Program::from_source("stone.rfm", STONE).unwrap_or_else(|e| panic!("{e}"));
+    let scene = &program.module().scenes[0];
+    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
+    while simulation.time() < scene.run.until {
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+        let front = -0.2 + 0.5 * simulation.time();
+        let at = simulation.particles().position.get(0);
+        assert!(at.x > front, "{at} behind {front} after {} s", simulation.time());
+    }
+}
+
 #[test]
 fn a_turning_blade_stays_free_of_water() {
     stays_free(STIRRED);

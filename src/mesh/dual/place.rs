@@ -1,10 +1,9 @@
 //! Where the vertex of a loop goes: onto the surface, and onto its crease or corner where the loop encloses one.
 //!
-//! Loops whose hits face nearly the same way take the mean of the hits, moved onto the surface by Newton's method,
-//! all of a task together; the others are left to `sharp`.
+//! Loops whose hits face nearly the same way take the mean of the hits, raised by half the mean height of the hits' tangent
+//! planes there and moved onto the surface by Newton's method, all of a task together; the others are left to `sharp`.
 //!
-//! Invariant: a vertex lies within [`SLIDE`] of its cell or of the mean of its hits, on the border if its cell is in the
-//! ring.
+//! Invariant: a vertex lies within [`SLIDE`] of its cell or of where it began, on the border if its cell is in the ring.
 
 use glam::DVec3;
 

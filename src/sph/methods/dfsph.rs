@@ -160,6 +160,7 @@ impl DivergenceFree {
         let dt = core.parameters.force_dt(core.parameters.gravity.length().max(1e-3));
         let gravity = std::mem::take(&mut core.parameters.gravity);
         let mut velocity = core.particles.velocity.clone();
+        let speed = std::mem::take(&mut core.speed);
         for _ in 0..ROUNDS {
             let rest = core.parameters.rest_density;
             let worst =
@@ -177,7 +178,7 @@ impl DivergenceFree {
             self.settle(core, &mut [x, y, z]);
             self.specific.fill(0.0);
         }
-        core.particles.velocity = velocity;
+        (core.particles.velocity, core.speed) = (velocity, speed);
         core.parameters.gravity = gravity;
         core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
         core.particles.pressure.fill(0.0);

@@ -259,7 +259,8 @@ impl<'a> Boundary<'a> {
             let (from, to) = (block.from(k), block.target(k));
             let free = SURELY * self.fields().map(|field| field.clearance(from, most)).fold(most, f64::min);
             let left = free - from.distance(to);
-            if left >= 0.0 {
+            // a particle that does not move needs a proof, too: a wall may come to it
+            if free > 0.0 && left >= 0.0 {
                 block.clear[k] = if at_rest { left } else { UNKNOWN };
                 continue;
             }
