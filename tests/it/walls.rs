@@ -3,6 +3,7 @@
 
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
+use rfm::lower::Scene;
 use rfm::sph::{Obstacle, Parameters, Particles, Simulation};
 use rfm::{Engine, Experiment, Field, Program, Solid};
 
@@ -125,11 +126,18 @@ scene apart {
 
 #[test]
 fn what_is_far_from_many_balls_is_not_too_close_to_them() {
-    let program = Program::from_source("apart.rfm", FAR_BALLS).unwrap_or_else(|e| panic!("{e}"));
+    with_scene(FAR_BALLS, |_, _, simulation, carved| {
+        assert!(carved == 0 && simulation.particles().len() > 300, "{carved} carved");
+    });
+}
+
+/// Hands over a file's scene at its start, with the number of particles that were carved off.
+fn with_scene(text: &str, look: impl FnOnce(&Program, &Scene, &mut Simulation<'_>, usize)) {
+    let program = Program::from_source("scene.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     let scene = &program.module().scenes[0];
     let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    let (simulation, carved) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
-    assert!(carved == 0 && simulation.particles().len() > 300, "{carved} carved");
+    let (mut simulation, carved) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
+    look(&program, scene, &mut simulation, carved);
 }
 
 /// A lone stone floats, quite still; a wall comes along and must not pass over it.
@@ -146,16 +154,14 @@ scene pushed {
 
 #[test]
 fn a_wall_takes_along_what_lies_still() {
-    let program = Program::from_source("stone.rfm", STONE).unwrap_or_else(|e| panic!("{e}"));
-    let scene = &program.module().scenes[0];
-    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
-    while simulation.time() < scene.run.until {
-        simulation.step().unwrap_or_else(|e| panic!("{e}"));
-        let front = -0.2 + 0.5 * simulation.time();
-        let at = simulation.particles().position.get(0);
-        assert!(at.x > front, "{at} behind {front} after {} s", simulation.time());
-    }
+    with_scene(STONE, |_, scene, simulation, _| {
+        while simulation.time() < scene.run.until {
+            simulation.step().unwrap_or_else(|e| panic!("{e}"));
+            let front = -0.2 + 0.5 * simulation.time();
+            let at = simulation.particles().position.get(0);
+            assert!(at.x > front, "{at} behind {front} after {} s", simulation.time());
+        }
+    });
 }
 
 #[test]
@@ -169,17 +175,15 @@ fn a_flap_as_wide_as_its_tank_pushes_nothing_out_of_it() {
 }
 
 fn stays_free(text: &str) {
-    let program = Program::from_source("moving.rfm", text).unwrap_or_else(|e| panic!("{e}"));
-    let scene = &program.module().scenes[0];
-    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
-    let blade = program.solid("blade").unwrap();
-    while simulation.time() < scene.run.until {
-        simulation.step().unwrap_or_else(|e| panic!("{e}"));
-        let now = blade.at(simulation.time());
-        let inside = simulation.particles().position.iter().filter(|&p| now.sign(p) > 0.0).count();
-        assert_eq!(inside, 0, "after {} s", simulation.time());
-        let outside = simulation.particles().position.iter().find(|p| !scene.domain.contains(*p));
-        assert_eq!(outside, None, "after {} s", simulation.time());
-    }
+    with_scene(text, |program, scene, simulation, _| {
+        let blade = program.solid("blade").unwrap();
+        while simulation.time() < scene.run.until {
+            simulation.step().unwrap_or_else(|e| panic!("{e}"));
+            let now = blade.at(simulation.time());
+            let inside = simulation.particles().position.iter().filter(|&p| now.sign(p) > 0.0).count();
+            assert_eq!(inside, 0, "after {} s", simulation.time());
+            let outside = simulation.particles().position.iter().find(|p| !scene.domain.contains(*p));
+            assert_eq!(outside, None, "after {} s", simulation.time());
+        }
+    });
 }

@@ -44,7 +44,7 @@ const MAX_CONTACTS: usize = 4;
 /// reach of which it is asked whether it is free.
 const REACH: f64 = 1e6;
 
-/// How far a particle is from all obstacles, if that is not known.
+/// How far a particle is from all obstacles, if that is not known; less than nothing says the same.
 pub(in crate::sph) const UNKNOWN: f64 = -1.0;
 
 /// Of a radius that is proven, the part that is used: the rest is for the rounding of many subtractions.
@@ -248,8 +248,9 @@ impl<'a> Boundary<'a> {
         let at_rest = self.obstacles.iter().all(|obstacle| obstacle.moving.is_none());
         let most = REACH * self.clearance;
         if self.fields().all(|field| field.range(&swept).hi < 0.0) {
-            let is_far = at_rest && self.fields().all(|field| field.is_far(&swept, most));
-            block.clear.fill(if is_far { SURELY * most } else { UNKNOWN });
+            if at_rest && self.fields().all(|field| field.is_far(&swept, most)) {
+                block.clear.fill(SURELY * most);
+            }
             return Ok(());
         }
         for k in 0..block.len() {
