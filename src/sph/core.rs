@@ -12,7 +12,7 @@ use super::{
     particles::{Particles, Vectors},
     probes::Contacts,
     simulation::{Cause, Quantity, StepError},
-    walls::{Boundary, Coverage, MARKED, UNKNOWN, WallKernel},
+    walls::{Boundary, Coverage, MARKED, UNKNOWN, Wall, WallKernel},
 };
 
 /// Particles that a loop over all of them leaves to one thread together.
@@ -136,9 +136,21 @@ impl<'a> Core<'a> {
 
     /// What walls take of the Wendland kernel of a particle; nothing if they are farther away than the support radius.
     pub fn coverage(&self, i: usize) -> Option<Coverage> {
-        let h = self.parameters.support_radius;
         let near = self.near_walls[i / MARKED];
-        near.then(|| self.boundary.coverage(WallKernel::WendlandC2, h, self.particles.position.get(i)))?
+        near.then(|| self.boundary.coverage(&self.wall(), self.particles.position.get(i)))?
+    }
+
+    /// What walls are to the method's sums. Divergence-free fluids stand right at a wall in layers only; differences of
+    /// pressure are steady only at one that is continuous (with layers a standing wave grows noise at the walls).
+    pub fn wall(&self) -> Wall {
+        let Parameters { support_radius: h, method, .. } = self.parameters;
+        match method {
+            Method::Paper => Wall { kernel: WallKernel::Poly6, h, layer: None },
+            Method::Wcsph(_) => Wall { kernel: WallKernel::WendlandC2, h, layer: None },
+            Method::Dfsph(_) => {
+                Wall { kernel: WallKernel::WendlandC2, h, layer: Some(self.parameters.spacing() / h) }
+            }
+        }
     }
 
     /// What acts on a particle from afar, m/s², at the end of the present step.

@@ -106,8 +106,8 @@ fn water_over_a_pawn_stays_out_of_it() {
 
 #[test]
 fn a_fluid_without_compression_bears_its_own_weight() {
-    // sixteen layers; the motion in which the lattice is lost has not ended
-    pressure_within("hydrostatic_dfsph", 256.0, 0.2);
+    // sixteen layers; forty are off by 1.6 %
+    pressure_within("hydrostatic_dfsph", 256.0, 0.04);
 }
 
 /// Eighty layers on a lattice: their first steps are the hardest that `dfsph` knows. (With densities that came back within ten

@@ -10,7 +10,7 @@ use crate::{
     sph::{
         core::{CHUNK, Core},
         params::{Method, Slip},
-        walls::{Coverage, WallKernel},
+        walls::{Coverage, Wall},
     },
 };
 
@@ -93,6 +93,8 @@ pub fn pressure_on(core: &Core<'_>, obstacle: usize, point: DVec3) -> [f64; 6] {
     }
     let field = core.boundary.field(obstacle);
     let (h, mass) = (parameters.support_radius, parameters.particle_mass);
+    // an integral over the surface, whatever the walls are to the sums
+    let surface = Wall { layer: None, ..core.wall() };
     let friction = match core.boundary.obstacles[obstacle].slip {
         Slip::Free => 0.0,
         Slip::No => 2.0 * mass * parameters.viscosity / parameters.rest_density,
@@ -100,7 +102,7 @@ pub fn pressure_on(core: &Core<'_>, obstacle: usize, point: DVec3) -> [f64; 6] {
     let on_obstacle = |i: usize| {
         let mut faces = Faces::new();
         field.faces(particles.position.get(i), h, &mut faces);
-        let wall = Coverage::of_faces(WallKernel::WendlandC2, h, &faces);
+        let wall = Coverage::of_faces(&surface, &faces);
         let by_pressure = core.acceleration.get(i) - core.gravity(i);
         let density = particles.density[i];
         2.0 * mass / density * (particles.pressure[i] * wall.gradient - density * (wall.spread * by_pressure))

@@ -28,7 +28,7 @@ use crate::sph::{VectorField, params::Slip, particles::Vectors, probes::Contacts
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, push_out_to, reflect, turn_back},
     coverage::Coverage,
-    kernel::WallKernel,
+    kernel::Wall,
 };
 
 /// Particles whose common way is asked about first.
@@ -199,7 +199,8 @@ impl<'a> Boundary<'a> {
     }
 
     /// What the box and the obstacles take of the kernel of a particle; nothing if they are farther away than h.
-    pub fn coverage(&self, kernel: WallKernel, h: f64, p: DVec3) -> Option<Coverage> {
+    pub fn coverage(&self, wall: &Wall, p: DVec3) -> Option<Coverage> {
+        let h = wall.h;
         let mut whole = Coverage::default();
         for axis in 0..3 {
             for (distance, side) in
@@ -209,7 +210,7 @@ impl<'a> Boundary<'a> {
                     let mut normal = DVec3::ZERO;
                     normal[axis] = side;
                     let face = Face { distance, normal, mean_curvature: 0.0 };
-                    whole = whole.or(&Coverage::of_face(kernel, h, &face));
+                    whole = whole.or(&Coverage::of_face(wall, &face));
                 }
             }
         }
@@ -224,7 +225,7 @@ impl<'a> Boundary<'a> {
             if faces.is_empty() {
                 continue;
             }
-            let mut coverage = Coverage::of_faces(kernel, h, &faces);
+            let mut coverage = Coverage::of_faces(wall, &faces);
             if obstacle.slip == Slip::Free {
                 coverage.let_slip();
             }

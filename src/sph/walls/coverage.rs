@@ -1,4 +1,4 @@
-//! What the walls around a particle take of its kernel: the closed forms of [`WallKernel`] for each face that is near,
+//! What the walls around a particle take of its kernel: the closed forms of [`Wall`] for each face that is near,
 //! joined as the faces are joined.
 //!
 //! For two faces A and B the part of the kernel behind both is λ_A·λ_B where they meet at a right angle, the smaller of
@@ -10,13 +10,15 @@
 //! parts over a half-space leaves K = λ·1 + d·(A/h)·n⊗n. With K a pressure that is linear in space is continued into the
 //! wall: a column of fluid at rest stays so, whatever the shape of its vessel.
 //!
+//! (So for a wall that is continuous; of one in layers both terms are sums over them, see [`Wall`].)
+//!
 //! Invariant: 0 ≤ λ ≤ 1; beyond the support radius of every face all is zero.
 
 use glam::{DMat3, DVec3};
 
 use crate::field::{Face, Faces, Part};
 
-use super::kernel::WallKernel;
+use super::kernel::{OfFace, Wall};
 
 /// Curvatures are believed up to this part of 1/h: beyond it the series behind the correction does not hold.
 const MOST_CURVED: f64 = 0.4;
@@ -63,21 +65,21 @@ impl Default for Coverage {
 
 impl Coverage {
     /// One face.
-    pub fn of_face(kernel: WallKernel, h: f64, face: &Face) -> Self {
+    pub fn of_face(wall: &Wall, face: &Face) -> Self {
+        let h = wall.h;
         let delta = face.distance / h;
         if delta >= 1.0 {
             return Self::default();
         }
         let curvature = (face.mean_curvature * h).clamp(-MOST_CURVED, MOST_CURVED);
-        let part = kernel.covered_by_curved(delta, curvature).clamp(0.0, 1.0);
-        let area = kernel.slope(delta) / h * (1.0 - curvature * delta);
+        let OfFace { part, area, spread } = wall.of_face(delta, curvature);
         let n = face.normal;
         let along = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
         Self {
             part,
-            gradient: -area * n,
-            spread: face.distance * area * along,
-            drag: area / face.distance.max(NEAREST * h) * (DMat3::IDENTITY - along),
+            gradient: -area / h * n,
+            spread: spread * along,
+            drag: area / (h * face.distance.max(NEAREST * h)) * (DMat3::IDENTITY - along),
             ..Self::default()
         }
     }
@@ -101,21 +103,21 @@ impl Coverage {
     }
 
     /// A tree of faces, from its front.
-    pub fn of_faces(kernel: WallKernel, h: f64, faces: &Faces) -> Self {
-        if faces.is_empty() { Self::default() } else { Self::of_tree(kernel, h, faces, &mut 0) }
+    pub fn of_faces(wall: &Wall, faces: &Faces) -> Self {
+        if faces.is_empty() { Self::default() } else { Self::of_tree(wall, faces, &mut 0) }
     }
 
-    fn of_tree(kernel: WallKernel, h: f64, faces: &[Part], at: &mut usize) -> Self {
+    fn of_tree(wall: &Wall, faces: &[Part], at: &mut usize) -> Self {
         let part = faces[*at];
         *at += 1;
         let (parts, all) = match part {
-            Part::Face(face) => return Self::of_face(kernel, h, &face),
+            Part::Face(face) => return Self::of_face(wall, &face),
             Part::All(parts) => (parts, true),
             Part::Any(parts) => (parts, false),
         };
-        let mut whole = Self::of_tree(kernel, h, faces, at);
+        let mut whole = Self::of_tree(wall, faces, at);
         for _ in 1..parts {
-            let next = Self::of_tree(kernel, h, faces, at);
+            let next = Self::of_tree(wall, faces, at);
             whole = if all { whole.and(&next) } else { whole.or(&next) };
         }
         whole
@@ -188,8 +190,10 @@ fn common(a: f64, b: f64, cosine: f64) -> (f64, f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sph::walls::WallKernel;
 
     const H: f64 = 0.3;
+    const WALL: Wall = Wall { kernel: WallKernel::WendlandC2, h: H, layer: None };
 
     fn face(distance: f64, normal: DVec3) -> Part {
         Part::Face(Face { distance, normal: normal.normalize(), mean_curvature: 0.0 })
@@ -222,7 +226,7 @@ mod tests {
         let far = face(1.1 * H, DVec3::X);
         let near = face(0.1 * H, DVec3::Y);
         for faces in [&[][..], &[far], &[Part::All(2), far, near]] {
-            let coverage = Coverage::of_faces(WallKernel::WendlandC2, H, &Faces::from_slice(faces));
+            let coverage = Coverage::of_faces(&WALL, &Faces::from_slice(faces));
             assert_eq!((coverage.part, coverage.gradient.length()), (0.0, 0.0));
             assert_eq!((coverage.spread, coverage.drag), (DMat3::ZERO, DMat3::ZERO));
         }
@@ -232,8 +236,7 @@ mod tests {
     fn one_face_is_exact_with_its_moment() {
         let n = DVec3::new(0.6, 0.0, 0.8);
         for distance in [0.0, 0.05, 0.2] {
-            let coverage =
-                Coverage::of_faces(WallKernel::WendlandC2, H, &Faces::from_slice(&[face(distance, n)]));
+            let coverage = Coverage::of_faces(&WALL, &Faces::from_slice(&[face(distance, n)]));
             let (part, gradient, moment) = brute_force(|y| y.dot(n) < -distance);
             // the grid cuts cells at the face: some 1/N of them
             assert!((coverage.part - part).abs() < 3e-3, "{} {part}", coverage.part);
@@ -251,7 +254,7 @@ mod tests {
             let behind = |y: DVec3| (y.dot(n) < -a, y.dot(m) < -b);
             let head = if all { Part::All(2) } else { Part::Any(2) };
             let faces = Faces::from_slice(&[head, face(a, n), face(b, m)]);
-            let found = Coverage::of_faces(WallKernel::WendlandC2, H, &faces).part;
+            let found = Coverage::of_faces(&WALL, &faces).part;
             let (exact, ..) = brute_force(|y| {
                 let (first, second) = behind(y);
                 if all { first && second } else { first || second }

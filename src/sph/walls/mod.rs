@@ -14,4 +14,5 @@ pub use boundary::Obstacle;
 pub(super) use boundary::{Boundary, MARKED, UNKNOWN};
 pub use contact::{Contact, Undefined, first_contact, push_out};
 pub(super) use coverage::{Coverage, LEAST_FREE};
+pub(super) use kernel::Wall;
 pub use kernel::WallKernel;
