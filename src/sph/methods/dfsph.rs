@@ -43,7 +43,7 @@ use crate::sph::{
     params::{Dfsph, Method, Parameters},
     particles::{Particles, Vectors},
     simulation::StepError,
-    walls::{Coverage, LEAST_FREE},
+    walls::{Coverage, Friction, WallDrag},
 };
 
 /// Walls and disorder make the system stiffer than the even fluid that [`stiffness`] speaks of.
@@ -92,8 +92,10 @@ struct Walls {
     /// Place in `found` of each particle; `NONE`: no wall is near.
     place: Vec<u32>,
     /// Particle, what walls take of its kernel, and M = (1 − K)⁻¹.
-    found: Vec<(u32, Coverage, DMat3)>,
+    found: Vec<(u32, WallsNear, DMat3)>,
 }
+
+type WallsNear = Coverage<WallDrag>;
 
 const NONE: u32 = u32::MAX;
 
@@ -102,7 +104,7 @@ impl Walls {
         let n = core.particles.len();
         self.found.clear();
         self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
-            let wall = core.coverage(i)?;
+            let wall: WallsNear = core.coverage(i)?;
             Some((i as u32, wall, wall.completion()))
         }));
         self.place.clear();
@@ -113,7 +115,7 @@ impl Walls {
     }
 
     #[inline]
-    fn near(&self, i: usize) -> Option<(&Coverage, &DMat3)> {
+    fn near(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
         let place = self.place[i];
         (place != NONE).then(|| {
             let (_, wall, completion) = &self.found[place as usize];
@@ -231,7 +233,7 @@ impl DivergenceFree {
             + self.tension.bytes()
             + self.completed.bytes()
             + 4 * self.walls.place.capacity()
-            + size_of::<(u32, Coverage, DMat3)>() * self.walls.found.capacity()
+            + size_of::<(u32, WallsNear, DMat3)>() * self.walls.found.capacity()
     }
 
     /// Order, walls, densities and factors of the present positions.
@@ -554,7 +556,7 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
 
     fn finish(&self, i: usize, [sum]: [f64; 1]) -> [f64; 1] {
         let rate = -self.constants.mass_steepness * sum;
-        let mirrored = |(wall, _): (&Coverage, &DMat3)| {
+        let mirrored = |(wall, _): (&WallsNear, &DMat3)| {
             // walls move with a velocity, and nothing moves with an acceleration by pressure
             let sweep = if self.with_walls { wall.sweep } else { 0.0 };
             2.0 * self.constants.rest_density * (wall.gradient.dot(self.completed.get(i)) - sweep)
@@ -595,8 +597,7 @@ impl PairPass<3, 3, 3> for Drag<'_> {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
         let mut drag = 2.0 * self.kinematic * mass_steepness / rest_density * DVec3::from_array(sums);
         if let Some((wall, _)) = self.walls.near(i) {
-            drag /= (1.0 - wall.slippery).max(LEAST_FREE);
-            drag -= 2.0 * self.kinematic * (wall.drag * self.velocity.get(i) - wall.haul);
+            drag = wall.friction.complete(drag, self.velocity.get(i), self.kinematic);
         }
         (drag + self.gravity).to_array()
     }

@@ -103,7 +103,7 @@ impl PairPass<0, 3, 7> for Normals<'_> {
 
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 7] {
         let mut normal = -self.steepness * DVec3::from_array(sums);
-        if let Some(wall) = self.core.coverage(i) {
+        if let Some(wall) = self.core.coverage::<()>(i) {
             normal += wall.gradient;
         }
         let length = normal.length();

@@ -39,7 +39,7 @@ use crate::sph::{
     params::{Gradients, Method, NegativePressure, Parameters, Wcsph},
     particles::Vectors,
     simulation::StepError,
-    walls::LEAST_FREE,
+    walls::{Friction, WallDrag},
 };
 
 /// The exponent of Tait's equation for water.
@@ -140,14 +140,23 @@ impl Weakly {
         self.crowding.resize(n);
         let mut pressure = std::mem::take(&mut core.particles.pressure);
         let (numbers, parameters) = (&self.numbers, &core.parameters);
-        self.excess.par_chunks_mut(CHUNK).zip(pressure.par_chunks_mut(CHUNK)).for_each(
-            |(excess, pressure)| {
-                for (excess, pressure) in excess.iter_mut().zip(pressure) {
-                    *pressure = tait(numbers, parameters, *excess);
-                    *excess -= parameters.rest_density;
+        let even = is_kept_even(numbers);
+        // of fluids that are not kept even only differences of it are asked for, less that of a fluid at rest
+        let (at_rest, from) = (at_rest(numbers, parameters), core.boundary.domain.min);
+        let Vectors { x, y, z } = &core.particles.position;
+        let places = x.par_chunks(CHUNK).zip(y.par_chunks(CHUNK)).zip(z.par_chunks(CHUNK));
+        let columns = self.excess.par_chunks_mut(CHUNK).zip(pressure.par_chunks_mut(CHUNK));
+        columns.zip(places).for_each(|((excess, pressure), ((x, y), z))| {
+            for (excess, pressure) in excess.iter_mut().zip(pressure) {
+                *pressure = tait(numbers, parameters, *excess);
+                *excess -= parameters.rest_density;
+            }
+            if !even {
+                for (((excess, x), y), z) in excess.iter_mut().zip(x).zip(y).zip(z) {
+                    *excess -= at_rest.dot(DVec3::new(*x, *y, *z) - from);
                 }
-            },
-        );
+            }
+        });
 
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let Vectors { x: vx, y: vy, z: vz } = &predicted;
@@ -174,6 +183,16 @@ impl Weakly {
     }
 }
 
+/// Whether particles are kept even: for differences, and for shifting itself.
+fn is_kept_even(numbers: &Wcsph) -> bool {
+    numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences
+}
+
+/// ρ₀/c²·g: how the density of a fluid at rest grows with the depth, kg/m⁴.
+fn at_rest(numbers: &Wcsph, parameters: &Parameters) -> DVec3 {
+    parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity
+}
+
 /// p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1), not below zero unless that is kept.
 #[inline]
 fn tait(numbers: &Wcsph, parameters: &Parameters, density: f64) -> f64 {
@@ -192,15 +211,14 @@ struct Rates<'a> {
     core: &'a Core<'a>,
     velocity: &'a Vectors,
     pressure: &'a [f64],
-    /// ρ − ρ₀
+    /// ρ − ρ₀; of particles that are not kept even, less what a fluid at rest would have
     excess: &'a [f64],
     kernel: Wendland,
     /// V·c of V∇W = −V·c·(1 − q)³·r
     steepness: f64,
     /// 2δ·h/2·c·ρ₀ of the diffusion, over ρ₀
     diffusion: f64,
-    /// ρ₀/c²·g: how the density of a fluid at rest grows with the depth
-    hydrostatic: DVec3,
+    at_rest: DVec3,
     /// ν = μ/ρ₀, m²/s
     laminar: f64,
     /// α·h/2·c·ρ₀
@@ -211,7 +229,7 @@ struct Rates<'a> {
     return_rate: f64,
     /// Σ V W on a lattice
     lattice: f64,
-    /// Whether particles are kept even: for differences, and for shifting itself.
+    /// [`is_kept_even`]
     even: bool,
 }
 
@@ -235,7 +253,7 @@ impl<'a> Rates<'a> {
             kernel,
             steepness: parameters.particle_mass / parameters.rest_density * kernel.steepness,
             diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
-            hydrostatic: parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity,
+            at_rest: at_rest(numbers, parameters),
             laminar: parameters.viscosity / parameters.rest_density,
             artificial: numbers.artificial_viscosity
                 * smoothing
@@ -244,13 +262,14 @@ impl<'a> Rates<'a> {
             differences: numbers.gradients == Gradients::Differences,
             return_rate: return_rate(numbers.shifting, core),
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
-            even: numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences,
+            even: is_kept_even(numbers),
         }
     }
 }
 
 /// One pass, with laminar and artificial viscosity or without, and for particles that are kept even or not. With f = (1 − q)³
-/// and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·d, f·(v_i − v_j)·d, f·(ρ_j − ρ_i), f·d², W and f·(v_j − v_i).
+/// and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d, f·(ρ_j − ρ_i), f·d, f·d², W and f·(v_j − v_i);
+/// for particles that are not kept even p_j + p_i instead, and neither f·d nor what comes after it.
 #[derive(Clone, Copy)]
 struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
 
@@ -275,7 +294,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let departing = (own[0] - other[0]) * d[0];
         let departing = (own[1] - other[1]).mul_add(d[1], departing);
         let departing = (own[2] - other[2]).mul_add(d[2], departing);
-        let mut push = other[3] - own[3];
+        let mut push = if EVEN { other[3] - own[3] } else { other[3] + own[3] };
         if ARTIFICIAL {
             let least = of(0.01 * (0.5 * rates.kernel.h).powi(2));
             // a viscosity made up needs no more than the twelve digits of an estimate in single precision
@@ -284,11 +303,13 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let push = push * f;
         for k in 0..3 {
             sums[k] = push.mul_add(d[k], sums[k]);
-            sums[3 + k] = f.mul_add(d[k], sums[3 + k]);
         }
-        sums[6] = f.mul_add(departing, sums[6]);
-        sums[7] = f.mul_add(other[4] - own[4], sums[7]);
+        sums[3] = f.mul_add(departing, sums[3]);
+        sums[4] = f.mul_add(other[4] - own[4], sums[4]);
         if EVEN {
+            for k in 0..3 {
+                sums[5 + k] = f.mul_add(d[k], sums[5 + k]);
+            }
             sums[8] = f.mul_add(r2, sums[8]);
             // 1 + 4q = 5 − 4s
             sums[9] = (f * s).mul_add(s.mul_add(of(-4.0), of(5.0)), sums[9]);
@@ -301,29 +322,39 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
     }
 
     fn finish(&self, i: usize, sums: [f64; 13]) -> [f64; 7] {
-        let [px, py, pz, cx, cy, cz, departing, denser, squares, weights, ux, uy, uz] = sums;
+        let [px, py, pz, departing, denser, cx, cy, cz, squares, weights, ux, uy, uz] = sums;
         let rates = &self.0;
         let Rates { parameters, steepness, laminar, .. } = *rates;
         let mut crowding = -steepness * DVec3::new(cx, cy, cz);
-        let denser = rates.diffusion * steepness * (denser - rates.hydrostatic.dot(crowding) / steepness);
+        let mut denser = rates.diffusion * steepness * denser;
+        if EVEN {
+            denser -= rates.diffusion * rates.at_rest.dot(crowding);
+        }
         let mut push = steepness * DVec3::new(px, py, pz);
         let mut spread = steepness * squares / 3.0;
         let mut compression = -steepness * departing;
         let mut drag = 2.0 * laminar * steepness * DVec3::new(ux, uy, uz);
-        let wall = rates.core.coverage(i);
+        let velocity = rates.velocity.get(i);
+        // a fluid without viscosity feels no friction, and most have none
+        let wall = if LAMINAR {
+            rates.core.coverage::<WallDrag>(i).map(|wall| {
+                drag = wall.friction.complete(drag, velocity, laminar);
+                wall.without_friction()
+            })
+        } else {
+            rates.core.coverage::<()>(i)
+        };
         if let Some(wall) = &wall {
-            let velocity = rates.velocity.get(i);
             crowding += wall.gradient;
             spread += wall.share();
             compression += wall.gradient.dot(velocity) - wall.sweep;
-            drag /= (1.0 - wall.slippery).max(LEAST_FREE);
-            drag -= 2.0 * laminar * (wall.drag * velocity - wall.haul);
         }
         let depth = if EVEN { depth(spread) } else { 0.0 };
         let smooth = if rates.differences { depth } else { 0.0 };
         let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
         let density = parameters.rest_density + smooth * rates.excess[i];
-        // where particles are not kept even, their own pressure pushes them apart
+        // where particles are not kept even, their own pressure pushes them apart (what `crowding` lacks of it without
+        // EVEN is in the sums)
         push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
         if let Some(wall) = &wall {
             push = wall.completion() * push;

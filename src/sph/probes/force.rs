@@ -10,7 +10,7 @@ use crate::{
     sph::{
         core::{CHUNK, Core},
         params::{Method, Slip},
-        walls::{Coverage, Wall},
+        walls::{Coverage, Wall, WallDrag},
     },
 };
 
@@ -102,11 +102,11 @@ pub fn pressure_on(core: &Core<'_>, obstacle: usize, point: DVec3) -> [f64; 6] {
     let on_obstacle = |i: usize| {
         let mut faces = Faces::new();
         field.faces(particles.position.get(i), h, &mut faces);
-        let wall = Coverage::of_faces(&surface, &faces);
+        let wall = Coverage::<WallDrag>::of_faces(&surface, &faces);
         let by_pressure = core.acceleration.get(i) - core.gravity(i);
         let density = particles.density[i];
         2.0 * mass / density * (particles.pressure[i] * wall.gradient - density * (wall.spread * by_pressure))
-            + friction * (wall.drag * particles.velocity.get(i))
+            + friction * (wall.friction.tensor * particles.velocity.get(i))
     };
     let forces: Vec<DVec3> =
         (0..particles.len()).into_par_iter().with_min_len(CHUNK / 4).map(on_obstacle).collect();

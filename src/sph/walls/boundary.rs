@@ -28,6 +28,7 @@ use crate::sph::{VectorField, params::Slip, particles::Vectors, probes::Contacts
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, push_out_to, reflect, turn_back},
     coverage::Coverage,
+    friction::Friction,
     kernel::Wall,
 };
 
@@ -199,9 +200,9 @@ impl<'a> Boundary<'a> {
     }
 
     /// What the box and the obstacles take of the kernel of a particle; nothing if they are farther away than h.
-    pub fn coverage(&self, wall: &Wall, p: DVec3) -> Option<Coverage> {
+    pub fn coverage<F: Friction>(&self, wall: &Wall, p: DVec3) -> Option<Coverage<F>> {
         let h = wall.h;
-        let mut whole = Coverage::default();
+        let mut whole = Coverage::<F>::default();
         for axis in 0..3 {
             for (distance, side) in
                 [(p[axis] - self.domain.min[axis], 1.0), (self.domain.max[axis] - p[axis], -1.0)]
@@ -225,7 +226,7 @@ impl<'a> Boundary<'a> {
             if faces.is_empty() {
                 continue;
             }
-            let mut coverage = Coverage::of_faces(wall, &faces);
+            let mut coverage = Coverage::<F>::of_faces(wall, &faces);
             if obstacle.slip == Slip::Free {
                 coverage.let_slip();
             }
@@ -233,7 +234,7 @@ impl<'a> Boundary<'a> {
                 coverage.set_in_motion(field.wall_velocity(p));
             }
             if let Some(velocity) = obstacle.surface_velocity {
-                coverage.take_along(velocity(nearest_place(p, &faces), self.time));
+                coverage.friction.take_along(velocity(nearest_place(p, &faces), self.time));
             }
             whole = whole.or(&coverage);
         }

@@ -8,11 +8,14 @@
 mod boundary;
 mod contact;
 mod coverage;
+mod friction;
 mod kernel;
+mod symmetric;
 
 pub use boundary::Obstacle;
 pub(super) use boundary::{Boundary, MARKED, UNKNOWN};
 pub use contact::{Contact, Undefined, first_contact, push_out};
-pub(super) use coverage::{Coverage, LEAST_FREE};
+pub(super) use coverage::Coverage;
+pub(super) use friction::{Friction, WallDrag};
 pub(super) use kernel::Wall;
 pub use kernel::WallKernel;

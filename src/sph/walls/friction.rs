@@ -1,0 +1,81 @@
+//! What walls do to a viscous fluid that sticks to them or slips along them; a fluid without viscosity carries none of it.
+
+use glam::DVec3;
+
+use crate::field::Face;
+
+use super::{coverage::LEAST_FREE, symmetric::Symmetric};
+
+/// A face nearer than this part of the support radius counts as so near where a velocity's slope is asked for.
+const NEAREST: f64 = 0.1;
+
+/// A part of [`super::Coverage`]: of the faces near a particle, joined as they are. `()` for a fluid without viscosity.
+pub(in crate::sph) trait Friction: Copy + Default {
+    /// One face, of which ∇λ has the length `area`, 1/m.
+    fn of_face(face: &Face, area: f64, h: f64) -> Self;
+
+    /// Two walls in common, of whose λ the derivatives by theirs are `da` and `db`.
+    fn joined(&self, other: &Self, da: f64, db: f64) -> Self;
+
+    /// All of these walls move with one velocity, besides any other motion.
+    fn take_along(&mut self, velocity: DVec3);
+
+    /// The fluid slips along all of these walls, which have this λ.
+    fn let_slip(&mut self, part: f64);
+
+    /// What a fluid of this velocity feels, m/s², from its friction with itself alone and its kinematic viscosity, m²/s.
+    fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3;
+}
+
+impl Friction for () {
+    fn of_face(_: &Face, _: f64, _: f64) -> Self {}
+
+    fn joined(&self, (): &Self, _: f64, _: f64) -> Self {}
+
+    fn take_along(&mut self, _: DVec3) {}
+
+    fn let_slip(&mut self, _: f64) {}
+
+    fn complete(&self, drag: DVec3, _: DVec3, _: f64) -> DVec3 {
+        drag
+    }
+}
+
+/// The friction of a viscous fluid with walls.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::sph) struct WallDrag {
+    /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks: what it feels of a velocity.
+    pub tensor: Symmetric,
+    /// λ of the walls along which the fluid slips.
+    slippery: f64,
+    /// The drag of the walls' own velocity, 1/(m·s).
+    haul: DVec3,
+}
+
+impl Friction for WallDrag {
+    fn of_face(face: &Face, area: f64, h: f64) -> Self {
+        let along = Symmetric::IDENTITY - Symmetric::square(face.normal);
+        Self { tensor: area / face.distance.max(NEAREST * h) * along, ..Self::default() }
+    }
+
+    fn joined(&self, other: &Self, da: f64, db: f64) -> Self {
+        Self {
+            tensor: da * self.tensor + db * other.tensor,
+            slippery: da * self.slippery + db * other.slippery,
+            haul: da * self.haul + db * other.haul,
+        }
+    }
+
+    fn take_along(&mut self, velocity: DVec3) {
+        self.haul += self.tensor * velocity;
+    }
+
+    fn let_slip(&mut self, part: f64) {
+        *self = Self { slippery: part, ..Self::default() };
+    }
+
+    fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3 {
+        let completed = drag / (1.0 - self.slippery).max(LEAST_FREE);
+        completed - 2.0 * viscosity * (self.tensor * velocity - self.haul)
+    }
+}
