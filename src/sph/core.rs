@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     VectorField,
-    pairs::{Cloud, Columns, PairPass, Real},
+    pairs::{Cloud, Columns, Near, PairPass, Real},
     params::{Method, Parameters, Precision},
     particles::{Particles, Vectors},
     probes::Contacts,
@@ -41,6 +41,9 @@ pub(super) struct Core<'a> {
     longest_dt: f64,
     level: Level,
     columns: Columns,
+    /// What is near each particle, where a method has asked for it, see [`Core::find_near`].
+    near: Near,
+    near_is_known: bool,
     /// How far each particle is from all obstacles at least, m, see [`Boundary::collide`].
     clear: Vec<f64>,
     /// Whether a wall may be near one of so many particles, see [`Boundary::mark`].
@@ -69,6 +72,8 @@ impl<'a> Core<'a> {
             longest_dt: 0.0,
             level: Level::new(),
             columns: Columns::default(),
+            near: Near::default(),
+            near_is_known: false,
             clear,
             near_walls: Vec::new(),
             spare: Vectors::default(),
@@ -116,6 +121,7 @@ impl<'a> Core<'a> {
     /// Brings all that belongs to a particle into the order of the columns: position, velocity, acceleration, number,
     /// and what a method keeps besides.
     pub fn sort(&mut self, kept: &mut [&mut Vec<f64>]) {
+        self.near_is_known = false;
         self.columns.sort(&self.particles.position, self.parameters.support_radius);
         let order = self.columns.order();
         let Particles { position, velocity, density, pressure, id } = &mut self.particles;
@@ -181,15 +187,31 @@ impl<'a> Core<'a> {
     ) where
         P: PairPass<IN, SUMS, OUT>,
     {
-        let cloud = Cloud {
+        let cloud = Cloud { near: self.near_is_known.then_some(&self.near), ..self.cloud() };
+        match self.parameters.precision {
+            Precision::Single => cloud.sum::<f32, P, IN, SUMS, OUT>(pass, fields, out),
+            Precision::Double => cloud.sum::<f64, P, IN, SUMS, OUT>(pass, fields, out),
+        }
+    }
+
+    /// Finds what is near each particle, once for all sums until particles move.
+    pub fn find_near(&mut self) {
+        let mut near = std::mem::take(&mut self.near);
+        match self.parameters.precision {
+            Precision::Single => self.cloud().find_near::<f32>(&mut near),
+            Precision::Double => self.cloud().find_near::<f64>(&mut near),
+        }
+        self.near = near;
+        self.near_is_known = true;
+    }
+
+    fn cloud(&self) -> Cloud<'_> {
+        Cloud {
             level: self.level,
             columns: &self.columns,
             position: &self.particles.position,
             radius: self.parameters.support_radius,
-        };
-        match self.parameters.precision {
-            Precision::Single => cloud.sum::<f32, P, IN, SUMS, OUT>(pass, fields, out),
-            Precision::Double => cloud.sum::<f64, P, IN, SUMS, OUT>(pass, fields, out),
+            near: None,
         }
     }
 
@@ -255,6 +277,7 @@ impl<'a> Core<'a> {
             + self.near_walls.capacity()
             + 4 * (id.capacity() + self.sorted_id.capacity())
             + self.columns.bytes()
+            + self.near.bytes()
     }
 
     fn stalled(&self, dt: f64) -> StepError {

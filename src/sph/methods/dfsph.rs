@@ -241,6 +241,7 @@ impl DivergenceFree {
         let mut columns: SmallVec<[&mut Vec<f64>; 4]> = smallvec![&mut self.specific];
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
+        core.find_near();
         self.walls.find(core);
         let mut density = std::mem::take(&mut core.particles.density);
         let pass = Densities { constants: Constants::of(&core.parameters), walls: &self.walls };

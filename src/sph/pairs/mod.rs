@@ -17,15 +17,20 @@
 //! same bits for any number of threads. A particle is among its own neighbours, with the distance zero.
 
 mod columns;
+mod near;
 
 use std::cell::RefCell;
+use std::ops::Range;
 
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdFloatElement, SimdMask};
+use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdFloatElement};
+use rayon::prelude::*;
 use smallvec::SmallVec;
 
 use super::particles::Vectors;
 
 pub(super) use columns::{Block, Columns};
+pub(super) use near::Near;
+use near::{OfBlock, Reach};
 
 /// Compiles an expression for three widths of registers (512, 256 and 128 bits on x86-64) and runs the widest that the
 /// processor has. Each width of each pass is code of its own: the levels in between are not worth theirs.
@@ -96,6 +101,9 @@ pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>:
     fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; OUT];
 }
 
+/// So many blocks are one task: small enough to balance, large enough to forget.
+const TASK: usize = 4;
+
 /// Where the particles are, and how they are sorted.
 #[derive(Clone, Copy)]
 pub(super) struct Cloud<'a> {
@@ -105,6 +113,8 @@ pub(super) struct Cloud<'a> {
     pub position: &'a Vectors,
     /// Support radius, m.
     pub radius: f64,
+    /// What is near each particle, if it was found before; of the same places and the same precision.
+    pub near: Option<&'a Near>,
 }
 
 /// Copies of what is around a block: positions relative to it, and the fields that a pass reads.
@@ -119,64 +129,6 @@ pub(super) struct Surroundings<T> {
     near: Vec<u32>,
 }
 
-/// The places within the radius of the box around a register's particles: of the copies, whose ranges are boxes too, about a
-/// third lies beyond them.
-struct Reach<V> {
-    centre: [V; 3],
-    half: [V; 3],
-    /// The radius squared, and a little more than rounding can make of it.
-    squared: V,
-}
-
-impl<V> Reach<V> {
-    /// Of the first `lanes` particles.
-    #[inline(always)]
-    fn around<T: Real, S: Simd>(simd: S, here: &[V; 3], lanes: usize, radius: f64) -> Self
-    where
-        V: SimdFloat<S, Element = T>,
-    {
-        let mut centre = [V::splat(simd, T::default()); 3];
-        let mut half = centre;
-        for k in 0..3 {
-            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            for &x in &here[k].as_slice()[..lanes] {
-                (low, high) = (low.min(x.wide()), high.max(x.wide()));
-            }
-            centre[k] = V::splat(simd, T::of(0.5 * (low + high)));
-            half[k] = V::splat(simd, T::of(0.5 * (high - low)));
-        }
-        Self { centre, half, squared: V::splat(simd, T::of(radius * radius * 1.0001)) }
-    }
-
-    /// Appends those from `start` to `end` that are within it.
-    #[inline(always)]
-    fn collect<T: Real, S: Simd>(&self, places: [&[T]; 3], (start, end): (usize, usize), near: &mut Vec<u32>)
-    where
-        V: SimdFloat<S, Element = T>,
-    {
-        let simd = self.squared.token();
-        let zero = V::splat(simd, T::default());
-        let mut at = start;
-        while at < end {
-            let mut squared = zero;
-            for k in 0..3 {
-                let place = V::from_slice(simd, &places[k][at..at + V::LEN]);
-                let beyond = ((place - self.centre[k]).abs() - self.half[k]).max(zero);
-                squared = beyond.mul_add(beyond, squared);
-            }
-            let mut within = squared.simd_lt(self.squared).to_bitmask();
-            if end - at < V::LEN {
-                within &= (1 << (end - at)) - 1;
-            }
-            while within != 0 {
-                near.push(at as u32 + within.trailing_zeros());
-                within &= within - 1;
-            }
-            at += V::LEN;
-        }
-    }
-}
-
 impl Cloud<'_> {
     /// Runs a pass over all pairs nearer than the radius; `fields` and `out` are in the order of the particles.
     pub fn sum<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
@@ -188,14 +140,70 @@ impl Cloud<'_> {
         T: Real,
         P: PairPass<IN, SUMS, OUT>,
     {
-        self.sum_blocks::<T, P, IN, SUMS, OUT>(pass, fields, self.columns.blocks(), 0, out);
+        self.sum_blocks::<T, P, IN, SUMS, OUT>(pass, fields, 0, self.columns.blocks(), 0, out);
     }
 
-    /// Halves the blocks among the threads. `out` begins with particle `first`.
+    /// Finds what is near each particle, for passes to come: worth it from three of them on.
+    pub fn find_near<T: Real>(&self, near: &mut Near) {
+        let blocks = self.columns.blocks();
+        near.of_blocks.resize_with(blocks.len(), OfBlock::default);
+        blocks.par_iter().zip(&mut near.of_blocks).with_min_len(TASK).for_each(|(block, of_block)| {
+            T::with_surroundings(|around| {
+                at_level!(self.level, simd => self.find_near_block::<T, _>(simd, block, around, of_block));
+            });
+        });
+    }
+
+    #[inline(always)]
+    fn find_near_block<T: Real, S: Simd>(
+        &self,
+        simd: S,
+        block: &Block,
+        around: &mut Surroundings<T>,
+        of_block: &mut OfBlock,
+    ) {
+        let lanes = T::Native::<S>::LEN;
+        let particles = block.particles();
+        let own_copy = self.gather([], block, lanes, around);
+        let OfBlock { copies, ends } = of_block;
+        copies.clear();
+        ends.clear();
+        let mut first = particles.start;
+        while first < particles.end {
+            let last = (first + lanes).min(particles.end);
+            let here = places_of(simd, around, own_copy + first - particles.start);
+            self.collect_near(simd, block, first..last, &here, around, copies);
+            ends.push(copies.len() as u32);
+            first = last;
+        }
+    }
+
+    /// Appends the copies that are near the particles of a register, which are `here`.
+    #[inline(always)]
+    fn collect_near<T: Real, S: Simd>(
+        &self,
+        simd: S,
+        block: &Block,
+        particles: Range<usize>,
+        here: &[T::Native<S>; 3],
+        around: &Surroundings<T>,
+        copies: &mut Vec<u32>,
+    ) {
+        let reach = Reach::around(simd, here, particles.len(), self.radius);
+        let ranges = self.columns.ranges_around(block, extent(&self.position.z[particles]), self.radius);
+        let [x, y, z, ..] = &around.values[..] else { unreachable!("places come first") };
+        for (&(start, end), &(source, copy)) in ranges.iter().zip(&around.ranges) {
+            let (start, end) = (start as usize - source + copy, end as usize - source + copy);
+            reach.collect([x, y, z], (start, end), copies);
+        }
+    }
+
+    /// Halves the blocks among the threads. `blocks` begin with block `number`, `out` with particle `first`.
     fn sum_blocks<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
         &self,
         pass: &P,
         fields: [&[f64]; IN],
+        number: usize,
         blocks: &[Block],
         first: usize,
         mut out: [&mut [f64]; OUT],
@@ -203,8 +211,6 @@ impl Cloud<'_> {
         T: Real,
         P: PairPass<IN, SUMS, OUT>,
     {
-        /// So many blocks are one task: small enough to balance, large enough to forget.
-        const TASK: usize = 4;
         if blocks.len() > TASK {
             let (left, right) = blocks.split_at(blocks.len() / 2);
             let middle = right[0].first as usize;
@@ -218,17 +224,27 @@ impl Cloud<'_> {
                 (low[k], high[k]) = (a, b);
             }
             rayon::join(
-                || self.sum_blocks::<T, P, IN, SUMS, OUT>(pass, fields, left, first, low),
-                || self.sum_blocks::<T, P, IN, SUMS, OUT>(pass, fields, right, middle, high),
+                || self.sum_blocks::<T, P, IN, SUMS, OUT>(pass, fields, number, left, first, low),
+                || {
+                    self.sum_blocks::<T, P, IN, SUMS, OUT>(
+                        pass,
+                        fields,
+                        number + left.len(),
+                        right,
+                        middle,
+                        high,
+                    )
+                },
             );
             return;
         }
         T::with_surroundings(|around| {
-            for block in blocks {
+            for (k, block) in blocks.iter().enumerate() {
+                let found = self.near.map(|near| &near.of_blocks[number + k]);
                 let at = block.first as usize - first;
                 let own = at..at + block.len as usize;
                 let out = out.each_mut().map(|out| &mut out[own.clone()]);
-                at_level!(self.level, simd => self.sum_block::<T, _, P, IN, SUMS, OUT>(simd, pass, fields, block, around, out));
+                at_level!(self.level, simd => self.sum_block::<T, _, P, IN, SUMS, OUT>(simd, pass, fields, (block, found), around, out));
             }
         });
     }
@@ -239,7 +255,7 @@ impl Cloud<'_> {
         simd: S,
         pass: &P,
         fields: [&[f64]; IN],
-        block: &Block,
+        (block, found): (&Block, Option<&OfBlock>),
         around: &mut Surroundings<T>,
         mut out: [&mut [f64]; OUT],
     ) where
@@ -258,23 +274,22 @@ impl Cloud<'_> {
         while first < particles.end {
             let last = (first + lanes).min(particles.end);
             let at = own_copy + first - particles.start;
-            let mut here = [zero; 3];
-            for k in 0..3 {
-                here[k] = T::Native::<S>::from_slice(simd, &around.values[k][at..at + lanes]);
-            }
+            let here = places_of(simd, around, at);
             let mut own = [zero; IN];
             for k in 0..IN {
                 own[k] = T::Native::<S>::from_slice(simd, &around.values[3 + k][at..at + lanes]);
             }
             let mut sums = [zero; SUMS];
-            let near = self.columns.ranges_around(block, extent(&self.position.z[first..last]), self.radius);
-            let reach = Reach::around(simd, &here, last - first, self.radius);
-            around.near.clear();
-            for (&(start, end), &(source, copy)) in near.iter().zip(&around.ranges) {
-                let (start, end) = (start as usize - source + copy, end as usize - source + copy);
-                let [x, y, z, ..] = &around.values[..] else { unreachable!("places come first") };
-                reach.collect([x, y, z], (start, end), &mut around.near);
+            if found.is_none() {
+                let mut near = std::mem::take(&mut around.near);
+                near.clear();
+                self.collect_near(simd, block, first..last, &here, around, &mut near);
+                around.near = near;
             }
+            let near = match found {
+                Some(of_block) => of_block.register((first - particles.start) / lanes),
+                None => &around.near,
+            };
             let count = around.count;
             let x = &around.values[0][..count];
             let y = &around.values[1][..count];
@@ -283,7 +298,7 @@ impl Cloud<'_> {
             for k in 0..IN {
                 values[k] = &around.values[3 + k][..count];
             }
-            for &j in &around.near {
+            for &j in near {
                 let j = j as usize;
                 let d = [
                     here[0] - T::Native::<S>::splat(simd, x[j]),
@@ -355,6 +370,16 @@ impl Cloud<'_> {
         }
         own
     }
+}
+
+/// The places of a register's particles, of which the first is this copy.
+#[inline(always)]
+fn places_of<T: Real, S: Simd>(simd: S, around: &Surroundings<T>, copy: usize) -> [T::Native<S>; 3] {
+    let mut here = [T::Native::<S>::splat(simd, T::default()); 3];
+    for k in 0..3 {
+        here[k] = T::Native::<S>::from_slice(simd, &around.values[k][copy..copy + T::Native::<S>::LEN]);
+    }
+    here
 }
 
 /// Least and greatest.

@@ -1,0 +1,98 @@
+//! What is near a register's particles: of what is gathered around their block, about a third lies beyond them.
+
+use fearless_simd::{Simd, SimdFloat, SimdMask};
+
+use super::Real;
+
+/// The places within the radius of the box around a register's particles: of the copies, whose ranges are boxes too, about a
+/// third lies beyond them.
+pub(super) struct Reach<V> {
+    centre: [V; 3],
+    half: [V; 3],
+    /// The radius squared, and a little more than rounding can make of it.
+    squared: V,
+}
+
+impl<V> Reach<V> {
+    /// Of the first `lanes` particles.
+    #[inline(always)]
+    pub fn around<T: Real, S: Simd>(simd: S, here: &[V; 3], lanes: usize, radius: f64) -> Self
+    where
+        V: SimdFloat<S, Element = T>,
+    {
+        let mut centre = [V::splat(simd, T::default()); 3];
+        let mut half = centre;
+        for k in 0..3 {
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for &x in &here[k].as_slice()[..lanes] {
+                (low, high) = (low.min(x.wide()), high.max(x.wide()));
+            }
+            centre[k] = V::splat(simd, T::of(0.5 * (low + high)));
+            half[k] = V::splat(simd, T::of(0.5 * (high - low)));
+        }
+        Self { centre, half, squared: V::splat(simd, T::of(radius * radius * 1.0001)) }
+    }
+
+    /// Appends those from `start` to `end` that are within it.
+    #[inline(always)]
+    pub fn collect<T: Real, S: Simd>(
+        &self,
+        places: [&[T]; 3],
+        (start, end): (usize, usize),
+        near: &mut Vec<u32>,
+    ) where
+        V: SimdFloat<S, Element = T>,
+    {
+        let simd = self.squared.token();
+        let zero = V::splat(simd, T::default());
+        let mut at = start;
+        while at < end {
+            let mut squared = zero;
+            for k in 0..3 {
+                let place = V::from_slice(simd, &places[k][at..at + V::LEN]);
+                let beyond = ((place - self.centre[k]).abs() - self.half[k]).max(zero);
+                squared = beyond.mul_add(beyond, squared);
+            }
+            let mut within = squared.simd_lt(self.squared).to_bitmask();
+            if end - at < V::LEN {
+                within &= (1 << (end - at)) - 1;
+            }
+            while within != 0 {
+                near.push(at as u32 + within.trailing_zeros());
+                within &= within - 1;
+            }
+            at += V::LEN;
+        }
+    }
+}
+
+/// What is near the registers of each block, kept for several passes over the same places.
+#[derive(Default)]
+pub(in crate::sph) struct Near {
+    pub(super) of_blocks: Vec<OfBlock>,
+}
+
+#[derive(Default)]
+pub(super) struct OfBlock {
+    /// Numbers of copies, register after register.
+    pub copies: Vec<u32>,
+    /// Past the last copy of each register.
+    pub ends: Vec<u32>,
+}
+
+impl OfBlock {
+    /// Of the register of this number.
+    #[inline(always)]
+    pub fn register(&self, number: usize) -> &[u32] {
+        let begin = number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.copies[begin as usize..self.ends[number] as usize]
+    }
+}
+
+impl Near {
+    pub fn bytes(&self) -> usize {
+        let of_blocks = self.of_blocks.iter();
+        let lists: usize = of_blocks.map(|of| 4 * (of.copies.capacity() + of.ends.capacity())).sum();
+        lists + size_of::<OfBlock>() * self.of_blocks.capacity()
+    }
+}
