@@ -40,6 +40,7 @@ pub(super) struct Core<'a> {
     /// Of the steps that were allowed so far, s.
     longest_dt: f64,
     level: Level,
+    wall: Wall,
     columns: Columns,
     /// What is near each particle, where a method has asked for it, see [`Core::find_near`].
     near: Near,
@@ -58,6 +59,7 @@ impl<'a> Core<'a> {
         let mut acceleration = Vectors::default();
         acceleration.resize(particles.len());
         let speed = longest(&particles.velocity);
+        let wall = wall_of(&parameters);
         let clear = if boundary.obstacles.is_empty() { Vec::new() } else { vec![UNKNOWN; particles.len()] };
         Self {
             parameters,
@@ -71,6 +73,7 @@ impl<'a> Core<'a> {
             contacts: None,
             longest_dt: 0.0,
             level: Level::new(),
+            wall,
             columns: Columns::default(),
             near: Near::default(),
             near_is_known: false,
@@ -112,6 +115,7 @@ impl<'a> Core<'a> {
             cause: Cause::FieldUndefined { at: fault.at },
         })?;
         std::mem::swap(position, &mut self.spare);
+        self.near_is_known = false;
         if let Some(contacts) = &mut self.contacts {
             contacts.settle(self.parameters.particle_mass);
         }
@@ -140,23 +144,15 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// What walls take of the Wendland kernel of a particle; nothing if they are farther away than the support radius.
+    /// What walls take of the kernel of a particle; nothing if they are farther away than the support radius.
     pub fn coverage<F: Friction>(&self, i: usize) -> Option<Coverage<F>> {
         let near = self.near_walls[i / MARKED];
-        near.then(|| self.boundary.coverage(&self.wall(), self.particles.position.get(i)))?
+        near.then(|| self.boundary.coverage(&self.wall, self.particles.position.get(i)))?
     }
 
-    /// What walls are to the method's sums. Divergence-free fluids stand right at a wall in layers only; differences of
-    /// pressure are steady only at one that is continuous (with layers a standing wave grows noise at the walls).
-    pub fn wall(&self) -> Wall {
-        let Parameters { support_radius: h, method, .. } = self.parameters;
-        match method {
-            Method::Paper => Wall { kernel: WallKernel::Poly6, h, layer: None },
-            Method::Wcsph(_) => Wall { kernel: WallKernel::WendlandC2, h, layer: None },
-            Method::Dfsph(_) => {
-                Wall { kernel: WallKernel::WendlandC2, h, layer: Some(self.parameters.spacing() / h) }
-            }
-        }
+    /// What walls are to the method's sums.
+    pub fn wall(&self) -> &Wall {
+        &self.wall
     }
 
     /// What acts on a particle from afar, m/s², at the end of the present step.
@@ -295,6 +291,17 @@ impl<'a> Core<'a> {
     }
 }
 
+/// Divergence-free fluids stand right at a wall in layers only; differences of pressure are steady only at one that is
+/// continuous (with layers a standing wave grows noise at the walls).
+fn wall_of(parameters: &Parameters) -> Wall {
+    let h = parameters.support_radius;
+    match parameters.method {
+        Method::Paper => Wall { kernel: WallKernel::Poly6, h, layer: None },
+        Method::Wcsph(_) => Wall { kernel: WallKernel::WendlandC2, h, layer: None },
+        Method::Dfsph(_) => Wall { kernel: WallKernel::WendlandC2, h, layer: Some(parameters.spacing() / h) },
+    }
+}
+
 /// How many others are within the radius.
 #[derive(Clone, Copy)]
 struct Count {
@@ -382,7 +389,7 @@ pub(super) fn first_non_finite(vectors: &Vectors) -> Option<usize> {
     (0..vectors.len()).find(|&i| !vectors.get(i).is_finite())
 }
 
-/// Asked of every particle in every step: so many at a time, and nobody asks which.
+/// Asked of every particle in every step; which one it is not is looked for only when one is not.
 fn all_finite(values: &[f64]) -> bool {
     const LANES: usize = 8;
     let is_finite = |chunk: &[f64]| {
@@ -397,4 +404,24 @@ fn all_finite(values: &[f64]) -> bool {
         zeros.iter().chain(rest).all(|x| x.is_finite())
     };
     values.par_chunks(CHUNK).all(is_finite)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_is_not_finite_is_found_wherever_it_is() {
+        for len in [0, 1, 29, CHUNK - 1, CHUNK + 13] {
+            let mut values = vec![1e300; len];
+            assert!(all_finite(&values));
+            for i in (0..len).filter(|i| i % 64 < 30 || i + 30 > len) {
+                for odd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                    let before = std::mem::replace(&mut values[i], odd);
+                    assert!(!all_finite(&values), "{odd} at {i} of {len}");
+                    values[i] = before;
+                }
+            }
+        }
+    }
 }

@@ -344,7 +344,7 @@ impl Parameters {
     }
 
     /// How long a density that is off may take to come back, s, after a step of the length `dt` with this greatest speed; for
-    /// methods that solve for the pressure.
+    /// methods that solve for the pressure, which they tell as a mean over this time.
     pub(super) fn relaxation_time(&self, speed: f64, dt: f64) -> f64 {
         let [moving, at_rest] = RELAXATION_STEPS;
         let fall = (self.support_radius / self.gravity.length()).sqrt();

@@ -157,7 +157,7 @@ impl<'a> Simulation<'a> {
         domain: Aabb,
         obstacles: Vec<Obstacle<'a>>,
     ) -> Result<Self, SetupError> {
-        Self::at(parameters, particles, domain, obstacles, (0, 0.0))
+        Self::at(parameters, particles, domain, obstacles, None)
     }
 
     /// After so many steps, at a time.
@@ -166,8 +166,9 @@ impl<'a> Simulation<'a> {
         particles: Particles,
         domain: Aabb,
         obstacles: Vec<Obstacle<'a>>,
-        (steps, time): (u64, f64),
+        instant: Option<(u64, f64)>,
     ) -> Result<Self, SetupError> {
+        let (steps, time) = instant.unwrap_or((0, 0.0));
         parameters.validate().map_err(SetupError::Parameter)?;
         let clearance = CLEARANCE * parameters.support_radius;
         let mut boundary = Boundary {
@@ -184,7 +185,7 @@ impl<'a> Simulation<'a> {
         check_setup(&boundary, &particles)?;
         let mut core = Core::new(parameters, boundary, particles);
         (core.steps, core.time) = (steps, time);
-        let scheme = Scheme::start(&mut core);
+        let scheme = Scheme::start(&mut core, instant.is_none());
         Ok(Self { core, scheme })
     }
 
@@ -201,7 +202,7 @@ impl<'a> Simulation<'a> {
     ) -> Result<Self, SetupError> {
         let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
         // sorting leaves in their places what was sorted before
-        let instant = (checkpoint.steps, checkpoint.time);
+        let instant = Some((checkpoint.steps, checkpoint.time));
         let mut simulation = Self::at(parameters, particles, domain, obstacles, instant)?;
         let restored = checkpoint.restore(&mut simulation.core);
         restored.and_then(|()| simulation.scheme.restore(checkpoint)).map_err(SetupError::Checkpoint)?;

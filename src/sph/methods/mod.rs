@@ -23,12 +23,12 @@ pub(super) enum Scheme {
 }
 
 impl Scheme {
-    /// Finds densities and forces of the first instant.
-    pub fn start(core: &mut Core<'_>) -> Self {
+    /// Finds densities and forces of the first instant; of a fluid that is not new, those that a checkpoint has replace them.
+    pub fn start(core: &mut Core<'_>, is_new: bool) -> Self {
         match core.parameters.method {
             Method::Paper => Self::Paper(paper::Paper::start(core)),
             Method::Wcsph(_) => Self::Wcsph(Box::new(wcsph::Weakly::start(core))),
-            Method::Dfsph(_) => Self::Dfsph(Box::new(dfsph::DivergenceFree::start(core))),
+            Method::Dfsph(_) => Self::Dfsph(Box::new(dfsph::DivergenceFree::start(core, is_new))),
         }
     }
 

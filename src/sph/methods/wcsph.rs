@@ -353,8 +353,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let smooth = if rates.differences { depth } else { 0.0 };
         let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
         let density = parameters.rest_density + smooth * rates.excess[i];
-        // where particles are not kept even, their own pressure pushes them apart (what `crowding` lacks of it without
-        // EVEN is in the sums)
+        // where particles are not kept even, their own pressure pushes them apart; without EVEN the pairs' part of that is
+        // in the sums already
         push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
         if let Some(wall) = &wall {
             push = wall.completion() * push;

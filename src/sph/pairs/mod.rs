@@ -2,7 +2,8 @@
 //!
 //! A register holds several particles that lie close together: consecutive ones of one column. Whatever is near any of
 //! them goes past, one at a time, and is added to all: kernels of finite support give zero to those that are too far.
-//! No list of neighbours exists, hence none is built, kept or read; a step needs no memory beyond the particles.
+//! No list of neighbours exists, hence none is kept from step to step. A method that sums many times over the same places
+//! may have found once what is near each register ([`Near`]: a third of a list of neighbours, shared by 16 particles).
 //!
 //! ```text
 //! Columns::sort ─▶ blocks ─▶ gather what is around a block ─▶ registers of particles ─▶ what is near each

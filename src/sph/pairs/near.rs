@@ -1,4 +1,4 @@
-//! What is near a register's particles: of what is gathered around their block, about a third lies beyond them.
+//! What is near a register's particles, of all that is gathered around their block.
 
 use fearless_simd::{Simd, SimdFloat, SimdMask};
 

@@ -94,7 +94,7 @@ pub fn pressure_on(core: &Core<'_>, obstacle: usize, point: DVec3) -> [f64; 6] {
     let field = core.boundary.field(obstacle);
     let (h, mass) = (parameters.support_radius, parameters.particle_mass);
     // an integral over the surface, whatever the walls are to the sums
-    let surface = Wall { layer: None, ..core.wall() };
+    let surface = Wall { layer: None, ..*core.wall() };
     let friction = match core.boundary.obstacles[obstacle].slip {
         Slip::Free => 0.0,
         Slip::No => 2.0 * mass * parameters.viscosity / parameters.rest_density,

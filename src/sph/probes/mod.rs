@@ -16,9 +16,9 @@ use crate::geom::Aabb;
 use super::{
     core::Core,
     kernel::{Kernels, Wendland},
-    params::{Method, NegativePressure, Parameters},
+    params::{Method, NegativePressure},
     stats::energies,
-    walls::WallKernel,
+    walls::{Wall, WallKernel},
 };
 
 pub(super) use force::Contacts;
@@ -43,7 +43,8 @@ pub enum Probe {
     /// What the fluid does to an obstacle, N, and its torque about a point, N·m.
     ///
     /// Counted are the fluid's pressure on the obstacle's faces, the friction where the fluid sticks to walls, and the
-    /// contacts of particles, averaged over the time since the last sample. The paper's method knows contacts only.
+    /// contacts of particles, averaged over the time since the last sample. The paper's method knows contacts only. Pressures
+    /// of `dfsph` are means over the time in which a density comes back: of an impact it tells that much later.
     Force { obstacle: usize, about: DVec3 },
     /// Mass per second through a plane, along its normal, kg/s: ∫ ρ v·n over the plane with the density and velocity
     /// that the kernel makes of the particles.
@@ -135,12 +136,8 @@ struct Weight {
 }
 
 impl Weight {
-    fn of(parameters: &Parameters) -> Self {
-        let kernel = match parameters.method {
-            Method::Paper => WallKernel::Poly6,
-            Method::Wcsph(_) | Method::Dfsph(_) => WallKernel::WendlandC2,
-        };
-        let h = parameters.support_radius;
+    fn of(core: &Core<'_>) -> Self {
+        let Wall { kernel, h, .. } = *core.wall();
         Self { poly6: Kernels::new(h), wendland: Wendland::new(h), kernel, h }
     }
 
@@ -154,13 +151,13 @@ impl Weight {
 fn filling(core: &Core<'_>, weight: &Weight, at: DVec3, particles: impl Iterator<Item = DVec3>) -> f64 {
     let volume = core.parameters.particle_mass / core.parameters.rest_density;
     let filled: f64 = particles.map(|p| volume * weight.at(p.distance_squared(at))).sum();
-    let covered = core.boundary.coverage::<()>(&core.wall(), at).map_or(0.0, |walls| walls.part);
+    let covered = core.boundary.coverage::<()>(core.wall(), at).map_or(0.0, |walls| walls.part);
     filled / (1.0 - covered.min(MOST_COVERED))
 }
 
 fn height(core: &Core<'_>, x: f64, y: f64) -> f64 {
     let h = core.parameters.support_radius;
-    let weight = Weight::of(&core.parameters);
+    let weight = Weight::of(core);
     let beside = |p: &DVec3| (p.x - x).hypot(p.y - y) < h;
     let column: Vec<DVec3> = core.particles.position.iter().filter(beside).collect();
     let Aabb { min, max } = core.boundary.domain;
@@ -194,7 +191,7 @@ struct Neighbourhood<'a> {
 
 impl<'a> Neighbourhood<'a> {
     fn around(core: &'a Core<'a>, at: DVec3) -> Self {
-        let weight = Weight::of(&core.parameters);
+        let weight = Weight::of(core);
         let h2 = core.parameters.support_radius.powi(2);
         let position = &core.particles.position;
         let near: Vec<(usize, f64)> = (0..position.len())
@@ -242,7 +239,7 @@ impl<'a> Neighbourhood<'a> {
 
 /// ∫ W over the plane is the slope of what a wall there would take of the kernel.
 fn flux(core: &Core<'_>, point: DVec3, normal: DVec3) -> f64 {
-    let Weight { kernel, h, .. } = Weight::of(&core.parameters);
+    let Weight { kernel, h, .. } = Weight::of(core);
     let particles = core.particles.position.iter().zip(core.particles.velocity.iter());
     let passing = particles.map(|(x, v)| v.dot(normal) * kernel.slope((x - point).dot(normal) / h));
     core.parameters.particle_mass / h * passing.sum::<f64>()

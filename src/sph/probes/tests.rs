@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::field::Field;
+use crate::sph::Parameters;
 use crate::sph::methods::Scheme;
 use crate::sph::{Dfsph, Gradients, Obstacle, Particles, Simulation, Wcsph, scenes, walls::Boundary};
 
@@ -81,7 +82,7 @@ fn state_around(
     let mut core = Core::new(water(method), boundary, particles);
     // not the first step: dfsph would move the particles of a start apart
     core.steps = 1;
-    Scheme::start(&mut core);
+    Scheme::start(&mut core, true);
     core.particles.density.fill(RHO);
     core
 }

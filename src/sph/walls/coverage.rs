@@ -134,7 +134,7 @@ impl<F: Friction> Coverage<F> {
     pub fn completion(&self) -> DMat3 {
         let free = DMat3::from_diagonal(DVec3::splat((1.0 - self.part).max(LEAST_FREE)));
         let moment = free - self.spread.to_matrix();
-        // along a face's normal K is at most ½ in the fluid; in corners the sum of several is held back
+        // along a face's normal K is hardly more than ½ in the fluid; in corners the sum of several is held back
         let largest = DMat3::from_diagonal(DVec3::splat(1.0 / LEAST_FREE));
         if moment.determinant() < LEAST_FREE.powi(3) { largest } else { moment.inverse() }
     }
@@ -237,6 +237,20 @@ mod tests {
         for i in 0..=1000 {
             let x = f64::from(i) / 1000.0;
             assert!((arcsine(x) - x.asin()).abs() < 7e-5, "{x}");
+        }
+    }
+
+    #[test]
+    fn faces_far_behind_change_nothing() {
+        let wall = Wall { layer: Some(1.0 / 2.2), ..WALL };
+        let near = face(0.1 * H, DVec3::X);
+        let alone = Coverage::of_faces(&wall, &Faces::from_slice(&[near]));
+        // a slab's other side, and its rim
+        for far in [face(-1.2 * H, -DVec3::X), face(-3.0 * H, DVec3::Y), face(-1e30, DVec3::Z)] {
+            let slab = Coverage::of_faces(&wall, &Faces::from_slice(&[Part::All(2), near, far]));
+            // all but the rounding of a + 1 − 1
+            assert!((slab.part - alone.part).abs() < 1e-15, "{slab:?} {alone:?}");
+            assert_eq!(Coverage { part: alone.part, ..slab }, alone);
         }
     }
 

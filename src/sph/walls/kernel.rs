@@ -142,15 +142,35 @@ impl Wall {
     /// Of a face at the distance δ = d/h with the mean curvature H·h.
     #[inline]
     pub fn of_face(&self, delta: f64, curvature: f64) -> OfFace {
+        if delta <= -1.0 {
+            return OfFace { part: 1.0, area: 0.0, spread: 0.0 };
+        }
         let Some(layer) = self.layer else {
             let area = self.kernel.slope(delta) * (1.0 - curvature * delta);
             let part = self.kernel.covered_by_curved(delta, curvature);
             return OfFace { part: part.clamp(0.0, 1.0), area, spread: delta * area };
         };
+        let layered = self.of_layers(layer, delta, curvature);
+        if delta >= 0.0 {
+            return layered;
+        }
+        // behind a face all layers together are one but for half a hundredth, by where they happen to lie: the deeper the
+        // particle is, the more of the wall counts as continuous
+        let whole = Wall { layer: None, ..*self }.of_face(delta, curvature);
+        let mix = |layered: f64, whole: f64| layered + delta * (layered - whole);
+        OfFace {
+            part: mix(layered.part, whole.part),
+            area: mix(layered.area, whole.area),
+            spread: mix(layered.spread, whole.spread),
+        }
+    }
+
+    /// The midpoint rule, for δ > −1.
+    #[inline]
+    fn of_layers(&self, layer: f64, delta: f64, curvature: f64) -> OfFace {
         // Σ A, Σ −A′, Σ δA and Σ −δA′
         let [mut slopes, mut steeps, mut moments, mut spreads] = [0.0; 4];
-        // whatever is farther than the support behind the particle takes nothing
-        let mut at = delta + layer * (0.5 + ((-1.0 - delta) / layer).max(0.0).floor());
+        let mut at = delta + 0.5 * layer;
         while at < 1.0 {
             let (slope, steep) = self.kernel.slope_and_steepness(at);
             slopes += slope;
@@ -257,7 +277,7 @@ mod tests {
         let kernel = WallKernel::WendlandC2;
         let (layer, h) = (1.0 / 2.2, 1.0);
         let wall = Wall { kernel, h, layer: Some(layer) };
-        for delta in [-0.6, -0.1, 0.0, 0.5 * layer, 0.4, 1.5 * layer, 0.95] {
+        for delta in [0.0, 0.1, 0.5 * layer, 0.4, 1.5 * layer, 0.95] {
             // each layer is a plane of the wall's thickness: its weight by discs
             let planes = (0..12).map(|k| delta + (f64::from(k) + 0.5) * layer);
             let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
@@ -273,6 +293,24 @@ mod tests {
             assert!((area - repelled).abs() < 1e-6, "{delta}: {area} {repelled}");
             let moment = sum(&|z, q| z * steep(z, q));
             assert!((spread + covered - moment).abs() < 1e-6, "{delta}: {spread} {moment}");
+        }
+    }
+
+    #[test]
+    fn a_particle_deep_behind_a_face_is_wholly_covered() {
+        let wall = Wall { kernel: WallKernel::WendlandC2, h: 1.0, layer: Some(1.0 / 2.2) };
+        for delta in [-1.0, -1.3, -5.0, -1e30, f64::NEG_INFINITY] {
+            let OfFace { part, area, .. } = wall.of_face(delta, 0.0);
+            assert_eq!((part, area), (1.0, 0.0), "{delta}");
+        }
+        let mut last = wall.of_face(-1.0, 0.0);
+        for i in 1..=2000 {
+            let delta = -1.0 + f64::from(i) * 1e-3;
+            let next = wall.of_face(delta, 0.0);
+            // slopes of A and below: no step anywhere
+            assert!((next.part - last.part).abs() < 2e-3, "{delta}: {last:?} {next:?}");
+            assert!((next.area - last.area).abs() < 6e-3, "{delta}: {last:?} {next:?}");
+            last = next;
         }
     }
 

@@ -20,14 +20,15 @@
 //! mirrored pressure but not the mirrored velocity the column boils.)
 //!
 //! The particles' pressure is what follows from that: G·ρ²s, because the sums make G·∇p of a pressure that is linear in
-//! space (G = 0.98 in a fluid that has left the lattice), and its mean over the time τ, because what is left of a velocity's
+//! space (G = 0.98 in the depth of a fluid that has left the lattice), and its mean over the time τ, because what is left of a velocity's
 //! divergence in one step is a pressure in the next: of a fluid at rest single steps differ by a tenth, their sum is its
 //! weight.
 //!
 //! Invariant: the density belongs to the positions.
 
-use fearless_simd::{Simd, SimdFloat};
-use glam::{DMat3, DVec3};
+mod passes;
+mod walls;
+
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
@@ -38,19 +39,16 @@ use super::{
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled},
-    kernel::Wendland,
-    pairs::{PairPass, Real},
-    params::{Dfsph, Method, Parameters},
+    params::{Dfsph, Method},
     particles::{Particles, Vectors},
     simulation::StepError,
-    walls::{Coverage, Friction, WallDrag},
 };
+
+use passes::{Constants, Densities, Drag, Push, Squeeze};
+use walls::Walls;
 
 /// Walls and disorder make the system stiffer than the even fluid that [`stiffness`] speaks of.
 const STIFFNESS: f64 = 1.5;
-
-/// G is believed from here on: below it a particle belongs to a surface or flies alone.
-const LEAST_SPREAD: f64 = 0.85;
 
 /// A particle without neighbours has no pressure to find: a factor below this part of that in a full neighbourhood.
 const LONELY: f64 = 1e-3;
@@ -86,54 +84,9 @@ pub struct DivergenceFree {
     pub iterations: u32,
 }
 
-/// Walls near particles, found once for all passes of a step.
-#[derive(Default)]
-struct Walls {
-    /// Place in `found` of each particle; `NONE`: no wall is near.
-    place: Vec<u32>,
-    /// Particle, what walls take of its kernel, and M = (1 − K)⁻¹.
-    found: Vec<(u32, WallsNear, DMat3)>,
-}
-
-type WallsNear = Coverage<WallDrag>;
-
-const NONE: u32 = u32::MAX;
-
-impl Walls {
-    fn find(&mut self, core: &Core<'_>) {
-        let n = core.particles.len();
-        self.found.clear();
-        self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
-            let wall: WallsNear = core.coverage(i)?;
-            Some((i as u32, wall, wall.completion()))
-        }));
-        self.place.clear();
-        self.place.resize(n, NONE);
-        for (place, (i, ..)) in self.found.iter().enumerate() {
-            self.place[*i as usize] = place as u32;
-        }
-    }
-
-    #[inline]
-    fn near(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
-        let place = self.place[i];
-        (place != NONE).then(|| {
-            let (_, wall, completion) = &self.found[place as usize];
-            (wall, completion)
-        })
-    }
-
-    /// M·v, into `completed`.
-    fn complete(&self, v: &Vectors, completed: &mut Vectors) {
-        completed.clone_from(v);
-        for &(i, _, completion) in &self.found {
-            completed.set(i as usize, completion * v.get(i as usize));
-        }
-    }
-}
-
 impl DivergenceFree {
-    pub fn start(core: &mut Core<'_>) -> Self {
+    /// A scheme for a fluid that is new, or that goes on from a state which will be restored.
+    pub fn start(core: &mut Core<'_>, is_new: bool) -> Self {
         let Method::Dfsph(numbers) = core.parameters.method else {
             unreachable!("the method decides which scheme is made")
         };
@@ -159,7 +112,7 @@ impl DivergenceFree {
         };
         scheme.push.resize(n);
         scheme.settle(core, &mut []);
-        if core.steps == 0 {
+        if is_new {
             scheme.relax(core);
         }
         scheme
@@ -232,8 +185,7 @@ impl DivergenceFree {
             + self.crowding.bytes()
             + self.tension.bytes()
             + self.completed.bytes()
-            + 4 * self.walls.place.capacity()
-            + size_of::<(u32, WallsNear, DMat3)>() * self.walls.found.capacity()
+            + self.walls.bytes()
     }
 
     /// Order, walls, densities and factors of the present positions.
@@ -296,7 +248,7 @@ impl DivergenceFree {
         // at first a mean since the start
         let share = (dt / relaxation.min(core.time + dt)).min(1.0);
         for (((p, s), rho), g) in p.iter_mut().zip(&pressure).zip(density).zip(&self.spread) {
-            *p += share * (g.clamp(LEAST_SPREAD, 1.0 / LEAST_SPREAD) * s * *rho * *rho - *p);
+            *p += share * ((1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho - *p);
         }
         self.specific = pressure;
     }
@@ -406,200 +358,4 @@ impl DivergenceFree {
 /// length 1.65 h, by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
 fn stiffness(ratio: f64) -> f64 {
     1.775 * (0.5 * ratio).powi(3)
-}
-
-#[derive(Clone, Copy)]
-struct Constants {
-    kernel: Wendland,
-    rest_density: f64,
-    /// m·w, over the sum on a lattice: an even fluid has its rest density.
-    mass_weight: f64,
-    /// m·c
-    mass_steepness: f64,
-    /// Σ m²|∇W|² in a full neighbourhood: mρ₀·c²·4π∫(1 − q)⁶r⁴ dr, where ∫q⁴(1 − q)⁶ dq = 1/2310.
-    full_factor: f64,
-}
-
-impl Constants {
-    fn of(parameters: &Parameters) -> Self {
-        let (h, m) = (parameters.support_radius, parameters.particle_mass);
-        let kernel = Wendland::new(h);
-        Self {
-            kernel,
-            rest_density: parameters.rest_density,
-            mass_weight: m * kernel.weight / Wendland::lattice_sum(h / parameters.spacing()),
-            mass_steepness: m * kernel.steepness,
-            full_factor: parameters.rest_density
-                * m
-                * kernel.steepness.powi(2)
-                * 4.0
-                * std::f64::consts::PI
-                * h.powi(5)
-                / 2310.0,
-        }
-    }
-}
-
-/// ρ, the factor, where the particles crowd, and their moment.
-#[derive(Clone, Copy)]
-struct Densities<'a> {
-    constants: Constants,
-    walls: &'a Walls,
-}
-
-impl PairPass<0, 6, 6> for Densities<'_> {
-    #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
-        &self,
-        d: [V; 3],
-        r2: V,
-        _: &[V; 0],
-        _: [V; 0],
-        sums: &mut [V; 6],
-    ) {
-        let of = V::Element::of;
-        let s = self.constants.kernel.nearness(r2);
-        let f = s * s * s;
-        // 1 + 4q = 5 − 4s
-        sums[0] = (f * s).mul_add(s.mul_add(of(-4.0), of(5.0)), sums[0]);
-        for k in 0..3 {
-            sums[1 + k] = f.mul_add(d[k], sums[1 + k]);
-        }
-        sums[4] = (f * f).mul_add(r2, sums[4]);
-        sums[5] = f.mul_add(r2, sums[5]);
-    }
-
-    fn finish(&self, i: usize, [weight, x, y, z, mut squares, spread]: [f64; 6]) -> [f64; 6] {
-        let Constants { mass_weight, mass_steepness, rest_density, .. } = self.constants;
-        let mut density = mass_weight * weight;
-        let slope = -mass_steepness * DVec3::new(x, y, z);
-        let mut crowding = slope / rest_density;
-        let mut spread = mass_steepness / rest_density * spread / 3.0;
-        let mut own = slope;
-        if let Some((wall, completion)) = self.walls.near(i) {
-            density += rest_density * wall.part;
-            crowding += wall.gradient;
-            spread += wall.share();
-            // the neighbours are completed about as much as the particle itself
-            squares *= completion.determinant().max(1.0).cbrt().powi(2);
-            own = *completion * (slope + 2.0 * rest_density * wall.gradient);
-        }
-        let factor = own.length_squared() + mass_steepness.powi(2) * squares;
-        let crowding = depth(spread) * crowding;
-        [density, factor, crowding.x, crowding.y, crowding.z, spread]
-    }
-}
-
-/// a(s)
-#[derive(Clone, Copy)]
-struct Push<'a> {
-    constants: Constants,
-    walls: &'a Walls,
-    pressure: &'a [f64],
-}
-
-impl PairPass<1, 3, 3> for Push<'_> {
-    #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
-        &self,
-        d: [V; 3],
-        r2: V,
-        own: &[V; 1],
-        other: [V; 1],
-        sums: &mut [V; 3],
-    ) {
-        let s = self.constants.kernel.nearness(r2);
-        let push = (own[0] + other[0]) * s * s * s;
-        for k in 0..3 {
-            sums[k] = push.mul_add(d[k], sums[k]);
-        }
-    }
-
-    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
-        let push = self.constants.mass_steepness * DVec3::from_array(sums);
-        let push = match self.walls.near(i) {
-            None => push,
-            Some((wall, completion)) => {
-                let wall_push = -2.0 * self.constants.rest_density * self.pressure[i] * wall.gradient;
-                *completion * (push + wall_push)
-            }
-        };
-        push.to_array()
-    }
-}
-
-/// dρ/dt
-#[derive(Clone, Copy)]
-struct Squeeze<'a> {
-    constants: Constants,
-    walls: &'a Walls,
-    /// M·v
-    completed: &'a Vectors,
-    with_walls: bool,
-}
-
-impl PairPass<3, 1, 1> for Squeeze<'_> {
-    #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
-        &self,
-        d: [V; 3],
-        r2: V,
-        own: &[V; 3],
-        other: [V; 3],
-        sums: &mut [V; 1],
-    ) {
-        let s = self.constants.kernel.nearness(r2);
-        let departing = (own[0] - other[0]) * d[0];
-        let departing = (own[1] - other[1]).mul_add(d[1], departing);
-        let departing = (own[2] - other[2]).mul_add(d[2], departing);
-        sums[0] = (s * s * s).mul_add(departing, sums[0]);
-    }
-
-    fn finish(&self, i: usize, [sum]: [f64; 1]) -> [f64; 1] {
-        let rate = -self.constants.mass_steepness * sum;
-        let mirrored = |(wall, _): (&WallsNear, &DMat3)| {
-            // walls move with a velocity, and nothing moves with an acceleration by pressure
-            let sweep = if self.with_walls { wall.sweep } else { 0.0 };
-            2.0 * self.constants.rest_density * (wall.gradient.dot(self.completed.get(i)) - sweep)
-        };
-        [rate + self.walls.near(i).map_or(0.0, mirrored)]
-    }
-}
-
-/// Laminar viscosity (Morris et al. 1997) and gravity.
-#[derive(Clone, Copy)]
-struct Drag<'a> {
-    constants: Constants,
-    walls: &'a Walls,
-    velocity: &'a Vectors,
-    /// ν, m²/s
-    kinematic: f64,
-    gravity: DVec3,
-}
-
-impl PairPass<3, 3, 3> for Drag<'_> {
-    #[inline(always)]
-    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
-        &self,
-        _: [V; 3],
-        r2: V,
-        own: &[V; 3],
-        other: [V; 3],
-        sums: &mut [V; 3],
-    ) {
-        let s = self.constants.kernel.nearness(r2);
-        let f = s * s * s;
-        for k in 0..3 {
-            sums[k] = f.mul_add(other[k] - own[k], sums[k]);
-        }
-    }
-
-    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
-        let Constants { mass_steepness, rest_density, .. } = self.constants;
-        let mut drag = 2.0 * self.kinematic * mass_steepness / rest_density * DVec3::from_array(sums);
-        if let Some((wall, _)) = self.walls.near(i) {
-            drag = wall.friction.complete(drag, self.velocity.get(i), self.kinematic);
-        }
-        (drag + self.gravity).to_array()
-    }
 }

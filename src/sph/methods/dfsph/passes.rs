@@ -1,0 +1,211 @@
+//! Sums over neighbours: densities, pressure's push, what it does to densities, viscosity.
+
+use fearless_simd::{Simd, SimdFloat};
+use glam::{DMat3, DVec3};
+
+use crate::sph::{
+    kernel::Wendland,
+    methods::shifting::depth,
+    pairs::{PairPass, Real},
+    params::Parameters,
+    particles::Vectors,
+    walls::Friction,
+};
+
+use super::walls::{Walls, WallsNear};
+
+#[derive(Clone, Copy)]
+pub(super) struct Constants {
+    pub kernel: Wendland,
+    pub rest_density: f64,
+    /// m·w, over the sum on a lattice: an even fluid has its rest density.
+    pub mass_weight: f64,
+    /// m·c
+    pub mass_steepness: f64,
+    /// Σ m²|∇W|² in a full neighbourhood: mρ₀·c²·4π∫(1 − q)⁶r⁴ dr, where ∫q⁴(1 − q)⁶ dq = 1/2310.
+    pub full_factor: f64,
+}
+
+impl Constants {
+    pub fn of(parameters: &Parameters) -> Self {
+        let (h, m) = (parameters.support_radius, parameters.particle_mass);
+        let kernel = Wendland::new(h);
+        Self {
+            kernel,
+            rest_density: parameters.rest_density,
+            mass_weight: m * kernel.weight / Wendland::lattice_sum(h / parameters.spacing()),
+            mass_steepness: m * kernel.steepness,
+            full_factor: parameters.rest_density
+                * m
+                * kernel.steepness.powi(2)
+                * 4.0
+                * std::f64::consts::PI
+                * h.powi(5)
+                / 2310.0,
+        }
+    }
+}
+
+/// ρ, the factor, where the particles crowd, and their moment.
+#[derive(Clone, Copy)]
+pub(super) struct Densities<'a> {
+    pub constants: Constants,
+    pub walls: &'a Walls,
+}
+
+impl PairPass<0, 6, 6> for Densities<'_> {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        _: &[V; 0],
+        _: [V; 0],
+        sums: &mut [V; 6],
+    ) {
+        let of = V::Element::of;
+        let s = self.constants.kernel.nearness(r2);
+        let f = s * s * s;
+        // 1 + 4q = 5 − 4s
+        sums[0] = (f * s).mul_add(s.mul_add(of(-4.0), of(5.0)), sums[0]);
+        for k in 0..3 {
+            sums[1 + k] = f.mul_add(d[k], sums[1 + k]);
+        }
+        sums[4] = (f * f).mul_add(r2, sums[4]);
+        sums[5] = f.mul_add(r2, sums[5]);
+    }
+
+    fn finish(&self, i: usize, [weight, x, y, z, mut squares, spread]: [f64; 6]) -> [f64; 6] {
+        let Constants { mass_weight, mass_steepness, rest_density, .. } = self.constants;
+        let mut density = mass_weight * weight;
+        let slope = -mass_steepness * DVec3::new(x, y, z);
+        let mut crowding = slope / rest_density;
+        let mut spread = mass_steepness / rest_density * spread / 3.0;
+        let mut own = slope;
+        if let Some((wall, completion)) = self.walls.near(i) {
+            density += rest_density * wall.part;
+            crowding += wall.gradient;
+            spread += wall.share();
+            // the neighbours are completed about as much as the particle itself
+            squares *= completion.determinant().max(1.0).cbrt().powi(2);
+            own = *completion * (slope + 2.0 * rest_density * wall.gradient);
+        }
+        let factor = own.length_squared() + mass_steepness.powi(2) * squares;
+        let crowding = depth(spread) * crowding;
+        [density, factor, crowding.x, crowding.y, crowding.z, spread]
+    }
+}
+
+/// a(s)
+#[derive(Clone, Copy)]
+pub(super) struct Push<'a> {
+    pub constants: Constants,
+    pub walls: &'a Walls,
+    pub pressure: &'a [f64],
+}
+
+impl PairPass<1, 3, 3> for Push<'_> {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        own: &[V; 1],
+        other: [V; 1],
+        sums: &mut [V; 3],
+    ) {
+        let s = self.constants.kernel.nearness(r2);
+        let push = (own[0] + other[0]) * s * s * s;
+        for k in 0..3 {
+            sums[k] = push.mul_add(d[k], sums[k]);
+        }
+    }
+
+    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
+        let push = self.constants.mass_steepness * DVec3::from_array(sums);
+        let push = match self.walls.near(i) {
+            None => push,
+            Some((wall, completion)) => {
+                let wall_push = -2.0 * self.constants.rest_density * self.pressure[i] * wall.gradient;
+                *completion * (push + wall_push)
+            }
+        };
+        push.to_array()
+    }
+}
+
+/// dρ/dt
+#[derive(Clone, Copy)]
+pub(super) struct Squeeze<'a> {
+    pub constants: Constants,
+    pub walls: &'a Walls,
+    /// M·v
+    pub completed: &'a Vectors,
+    pub with_walls: bool,
+}
+
+impl PairPass<3, 1, 1> for Squeeze<'_> {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        own: &[V; 3],
+        other: [V; 3],
+        sums: &mut [V; 1],
+    ) {
+        let s = self.constants.kernel.nearness(r2);
+        let departing = (own[0] - other[0]) * d[0];
+        let departing = (own[1] - other[1]).mul_add(d[1], departing);
+        let departing = (own[2] - other[2]).mul_add(d[2], departing);
+        sums[0] = (s * s * s).mul_add(departing, sums[0]);
+    }
+
+    fn finish(&self, i: usize, [sum]: [f64; 1]) -> [f64; 1] {
+        let rate = -self.constants.mass_steepness * sum;
+        let mirrored = |(wall, _): (&WallsNear, &DMat3)| {
+            // walls move with a velocity, and nothing moves with an acceleration by pressure
+            let sweep = if self.with_walls { wall.sweep } else { 0.0 };
+            2.0 * self.constants.rest_density * (wall.gradient.dot(self.completed.get(i)) - sweep)
+        };
+        [rate + self.walls.near(i).map_or(0.0, mirrored)]
+    }
+}
+
+/// Laminar viscosity (Morris et al. 1997) and gravity.
+#[derive(Clone, Copy)]
+pub(super) struct Drag<'a> {
+    pub constants: Constants,
+    pub walls: &'a Walls,
+    pub velocity: &'a Vectors,
+    /// ν, m²/s
+    pub kinematic: f64,
+    pub gravity: DVec3,
+}
+
+impl PairPass<3, 3, 3> for Drag<'_> {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        _: [V; 3],
+        r2: V,
+        own: &[V; 3],
+        other: [V; 3],
+        sums: &mut [V; 3],
+    ) {
+        let s = self.constants.kernel.nearness(r2);
+        let f = s * s * s;
+        for k in 0..3 {
+            sums[k] = f.mul_add(other[k] - own[k], sums[k]);
+        }
+    }
+
+    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
+        let Constants { mass_steepness, rest_density, .. } = self.constants;
+        let mut drag = 2.0 * self.kinematic * mass_steepness / rest_density * DVec3::from_array(sums);
+        if let Some((wall, _)) = self.walls.near(i) {
+            drag = wall.friction.complete(drag, self.velocity.get(i), self.kinematic);
+        }
+        (drag + self.gravity).to_array()
+    }
+}

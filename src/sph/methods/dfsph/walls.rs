@@ -1,0 +1,60 @@
+//! Walls near particles, found once for all passes of a step.
+
+use glam::DMat3;
+use rayon::prelude::*;
+
+use crate::sph::{
+    core::{CHUNK, Core},
+    particles::Vectors,
+    walls::{Coverage, WallDrag},
+};
+
+/// What walls take of the kernels of the particles near them.
+#[derive(Default)]
+pub(super) struct Walls {
+    /// Place in `found` of each particle; `NONE`: no wall is near.
+    place: Vec<u32>,
+    /// Particle, what walls take of its kernel, and M = (1 − K)⁻¹.
+    found: Vec<(u32, WallsNear, DMat3)>,
+}
+
+pub(super) type WallsNear = Coverage<WallDrag>;
+
+const NONE: u32 = u32::MAX;
+
+impl Walls {
+    pub fn find(&mut self, core: &Core<'_>) {
+        let n = core.particles.len();
+        self.found.clear();
+        self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
+            let wall: WallsNear = core.coverage(i)?;
+            Some((i as u32, wall, wall.completion()))
+        }));
+        self.place.clear();
+        self.place.resize(n, NONE);
+        for (place, (i, ..)) in self.found.iter().enumerate() {
+            self.place[*i as usize] = place as u32;
+        }
+    }
+
+    #[inline]
+    pub fn near(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
+        let place = self.place[i];
+        (place != NONE).then(|| {
+            let (_, wall, completion) = &self.found[place as usize];
+            (wall, completion)
+        })
+    }
+
+    /// M·v, into `completed`.
+    pub fn complete(&self, v: &Vectors, completed: &mut Vectors) {
+        completed.clone_from(v);
+        for &(i, _, completion) in &self.found {
+            completed.set(i as usize, completion * v.get(i as usize));
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        4 * self.place.capacity() + size_of::<(u32, WallsNear, DMat3)>() * self.found.capacity()
+    }
+}
