@@ -313,9 +313,9 @@ impl Experiment {
     ) -> Result<usize, Error> {
         let span = scene.fluid.shape_span;
         let mut clearance = CLEARANCE * self.parameters.spacing();
-        if self.parameters.method != sph::Method::Paper {
-            // the volume counts: those too near move, and only what finds no place goes. (Where that makes them dense,
-            // dfsph moves them apart; to wcsph places say nothing of the density.)
+        if let sph::Method::Wcsph(_) = self.parameters.method {
+            // its density does not follow from where particles are: those too near may move, and only what finds no
+            // place goes. (dfsph would bear the volume, but bursts from the pairs that come too close.)
             make_room(particles, &self.domain, obstacles, clearance);
             clearance *= 0.5;
         }
