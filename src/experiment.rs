@@ -21,13 +21,13 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
 use crate::field::{Field, Moving};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
-use crate::lower::{Fill, Fluid, Gravity, Method, Precision, Scene, Skin, Slip};
+use crate::lower::{Fill, Fluid, Gravity, Method, Scene, Skin, Slip};
 use crate::solid::{Bounds, MovingMap};
 use crate::sph::{
     self, Checkpoint, FluidBlock, FluidShape, Gradients, NegativePressure, Obstacle, Parameters, Particles,
     SeedError, SetupError, Simulation, StepError, VectorField, carve, make_room,
 };
-use crate::{Engine, Program, Solid};
+use crate::{Engine, Precision, Program, Solid};
 
 pub use deviation::{Deviation, Deviations};
 
@@ -132,8 +132,8 @@ impl Experiment {
             method: method(scene, typical_speed),
             slip: slip(scene.slip),
             precision: match (scene.solver.precision, scene.method) {
-                (Some(Precision::Double), _) | (None, Method::Paper) => sph::Precision::Double,
-                _ => sph::Precision::Single,
+                (Some(Precision::F64), _) | (None, Method::Paper) => Precision::F64,
+                _ => Precision::F32,
             },
         };
         let stable = parameters.stable_dt(typical_speed);

@@ -3,10 +3,12 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::mesh::Format;
 use crate::geom::Aabb;
+use crate::precision::Precision;
 use crate::slice::{Axis, Plane};
 use crate::syntax::{Dimension, parse_unit};
 use glam::DVec3;
@@ -161,10 +163,14 @@ pub(super) enum What {
     Normal,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Precision {
-    F32,
-    F64,
+impl ValueEnum for Precision {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::F32, Self::F64]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()))
+    }
 }
 
 #[derive(Debug, Args)]

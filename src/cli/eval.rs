@@ -5,11 +5,11 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::args::{Eval, Precision, Shared, What};
+use super::args::{Eval, Shared, What};
 use super::{Failure, choose, input, output};
 use crate::ir::Unary;
 use crate::solid::Chosen;
-use crate::{Field, Solid};
+use crate::{Field, Precision, Solid};
 
 /// Points evaluated at a time: memory stays small for any number of points.
 const CHUNK: usize = 4096;

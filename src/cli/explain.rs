@@ -67,7 +67,8 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     text.programs();
     let (value, value_outputs) = solid.graph(ProgramKind::Value);
     let (gradient, gradient_outputs) = solid.graph(ProgramKind::Gradient);
-    for (precision, name) in [(Precision::F64, "f64"), (Precision::F32, "f32")] {
+    for precision in [Precision::F64, Precision::F32] {
+        let name = precision.name();
         let scaled = solid.forms(ProgramKind::Value, precision).exceptions();
         if scaled > 0 {
             say!("  scaled: {scaled} operations in {name}, where squares may leave the range");

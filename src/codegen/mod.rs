@@ -30,12 +30,7 @@ pub use translate::{Listing, compile};
 
 pub use crate::ir::{Form, Forms};
 use crate::ir::{Graph, Node};
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Precision {
-    F32,
-    F64,
-}
+pub use crate::precision::Precision;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Shape {

@@ -19,8 +19,7 @@ use std::sync::OnceLock;
 
 pub use probes::{Measured, Probe};
 pub use scene::{
-    Bounce, Container, Fill, Fluid, Gravity, Method, Obstacle, Precision, Run, Scene, Skin, Slip, Solver,
-    Truth,
+    Bounce, Container, Fill, Fluid, Gravity, Method, Obstacle, Run, Scene, Skin, Slip, Solver, Truth,
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};

@@ -258,7 +258,7 @@ mod tests {
             surface_tension: 0.0,
             slip: Slip::No,
             adaptive: true,
-            precision: Precision::Single,
+            precision: Precision::F32,
             ..Parameters::default()
         };
         let wcsph = Wcsph {

@@ -5,10 +5,12 @@ use fearless_simd::{Level, Simd, SimdFloat};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::precision::Precision;
+
 use super::{
     VectorField,
     pairs::{Cloud, Columns, Near, PairPass, Real},
-    params::{Method, Parameters, Precision},
+    params::{Method, Parameters},
     particles::{Particles, Vectors},
     probes::Contacts,
     simulation::{Cause, Quantity, StepError},
@@ -185,8 +187,8 @@ impl<'a> Core<'a> {
     {
         let cloud = Cloud { near: self.near_is_known.then_some(&self.near), ..self.cloud() };
         match self.parameters.precision {
-            Precision::Single => cloud.sum::<f32, P, IN, SUMS, OUT>(pass, fields, out),
-            Precision::Double => cloud.sum::<f64, P, IN, SUMS, OUT>(pass, fields, out),
+            Precision::F32 => cloud.sum::<f32, P, IN, SUMS, OUT>(pass, fields, out),
+            Precision::F64 => cloud.sum::<f64, P, IN, SUMS, OUT>(pass, fields, out),
         }
     }
 
@@ -194,8 +196,8 @@ impl<'a> Core<'a> {
     pub fn find_near(&mut self) {
         let mut near = std::mem::take(&mut self.near);
         match self.parameters.precision {
-            Precision::Single => self.cloud().find_near::<f32>(&mut near),
-            Precision::Double => self.cloud().find_near::<f64>(&mut near),
+            Precision::F32 => self.cloud().find_near::<f32>(&mut near),
+            Precision::F64 => self.cloud().find_near::<f64>(&mut near),
         }
         self.near = near;
         self.near_is_known = true;

@@ -62,11 +62,10 @@ mod tests;
 /// A vector at a place and a time, s.
 pub type VectorField = dyn Fn(glam::DVec3, f64) -> glam::DVec3 + Send + Sync;
 
+pub use crate::precision::Precision;
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use kernel::Kernels;
-pub use params::{
-    Dfsph, Gradients, Method, NegativePressure, ParameterError, Parameters, Precision, Slip, Wcsph,
-};
+pub use params::{Dfsph, Gradients, Method, NegativePressure, ParameterError, Parameters, Slip, Wcsph};
 pub use particles::{Particles, Vectors};
 pub use probes::{Gauge, Probe};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};

@@ -7,6 +7,7 @@ use std::{error, f64::consts::PI, fmt};
 use glam::DVec3;
 
 use super::kernel::Kernels;
+use crate::precision::Precision;
 
 /// What the equation of state answers where the density is below the rest density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -100,25 +101,6 @@ pub enum Slip {
     No,
 }
 
-/// Of the sums over neighbours; state and motion are always in double precision.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Precision {
-    /// 32 bits: distances have seven digits relative to a few support radii.
-    Single,
-    /// 64 bits.
-    #[default]
-    Double,
-}
-
-impl Precision {
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Single => "f32",
-            Self::Double => "f64",
-        }
-    }
-}
-
 /// Everything a step needs to know of the fluid. Defaults are table 1 of the paper where it has a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
@@ -158,6 +140,8 @@ pub struct Parameters {
     /// Coefficient of friction μ of the container's walls: of the speed along the wall, μ times what the wall takes of
     /// the speed into it is lost. Zero: none.
     pub wall_friction: f64,
+    /// Of the sums over neighbours; state and motion are always in `f64`. `f32` has seven digits relative to a few support
+    /// radii.
     pub precision: Precision,
 }
 
@@ -179,7 +163,7 @@ impl Default for Parameters {
             method: Method::Paper,
             slip: Slip::Free,
             wall_friction: 0.0,
-            precision: Precision::Double,
+            precision: Precision::F64,
         }
     }
 }

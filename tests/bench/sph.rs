@@ -153,7 +153,7 @@ fn methods(sizes: &[usize]) {
             ("dfsph, 0.01 %", dfsph(1e-4)),
             ("paper", Method::Paper),
         ] {
-            for precision in [Precision::Single, Precision::Double] {
+            for precision in [Precision::F32, Precision::F64] {
                 row(name, particles, method, precision);
             }
         }
@@ -167,7 +167,7 @@ fn threads(sizes: &[usize]) {
     println!("|--:|--:|--:|--:|");
     let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap());
     for &particles in sizes {
-        let mut simulation = dam_break(particles, wcsph(Gradients::Pairs), Precision::Single);
+        let mut simulation = dam_break(particles, wcsph(Gradients::Pairs), Precision::F32);
         let steps = steps_per_repetition(&mut simulation);
         let mut times = [Vec::new(), Vec::new()];
         for _ in 0..REPETITIONS {
@@ -207,7 +207,7 @@ fn walls(particles: usize) {
     );
     println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
     for (name, text, solid) in [("pawn", PAWN, "pawn"), ("500 posts", POSTS, "posts")] {
-        let parameters = parameters(particles, wcsph(Gradients::Pairs), Precision::Single);
+        let parameters = parameters(particles, wcsph(Gradients::Pairs), Precision::F32);
         let field = obstacle(text, solid, parameters.support_radius);
         let obstacle = || Obstacle::at_rest(&*field, 0.05 * parameters.support_radius);
         let mut fluid = FluidBlock::filling(FluidShape::Box(POOL)).seed(&parameters, BOX).unwrap();
@@ -243,7 +243,7 @@ fn walls(particles: usize) {
             1e6 * (with - without) / near as f64
         );
     }
-    set_up(parameters(particles, wcsph(Gradients::Pairs), Precision::Single).support_radius);
+    set_up(parameters(particles, wcsph(Gradients::Pairs), Precision::F32).support_radius);
 }
 
 /// Whether a part of the surface lies within reach.
@@ -295,7 +295,7 @@ fn main() {
         head();
         one.install(|| {
             for particles in [105_000, 1_000_000] {
-                row("wcsph", particles, wcsph(Gradients::Pairs), Precision::Single);
+                row("wcsph", particles, wcsph(Gradients::Pairs), Precision::F32);
             }
         });
         threads(&[1_000_000]);

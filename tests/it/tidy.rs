@@ -15,19 +15,20 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("diagnostic", &[]),
     ("geom", &[]),
     ("interval", &[]),
+    ("precision", &[]),
     ("field", &["geom", "interval"]),
     ("syntax", &["diagnostic"]),
     ("ir", &["diagnostic", "geom", "interval"]),
-    ("lower", &["syntax", "ir", "diagnostic", "geom"]),
+    ("lower", &["syntax", "ir", "diagnostic", "geom", "precision"]),
     ("simplify", &["ir", "diagnostic"]),
-    ("codegen", &["ir", "diagnostic", "geom"]),
-    ("solid", &["diagnostic", "ir", "simplify", "codegen", "field", "geom", "interval"]),
+    ("codegen", &["ir", "diagnostic", "geom", "precision"]),
+    ("solid", &["diagnostic", "ir", "simplify", "codegen", "field", "geom", "interval", "precision"]),
     ("compile", &["diagnostic", "geom", "syntax", "ir", "lower", "simplify", "codegen", "solid"]),
     ("slice", &["field", "geom", "interval"]),
     ("mesh", &["field", "geom", "interval"]),
     ("fluid_surface", &["geom", "mesh"]),
-    ("sph", &["field", "geom", "interval"]),
-    ("experiment", &["compile", "diagnostic", "field", "geom", "ir", "lower", "solid", "sph"]),
+    ("sph", &["field", "geom", "interval", "precision"]),
+    ("experiment", &["compile", "diagnostic", "field", "geom", "ir", "lower", "solid", "sph", "precision"]),
     ("render", &["field", "geom"]),
     ("cli", &["*"]),
     ("lib", &["*"]),
@@ -35,13 +36,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
 ];
 
 /// Names that the crate's root re-exports, and the modules they come from.
-const REEXPORTED: [(&str, &str); 6] = [
+const REEXPORTED: [(&str, &str); 7] = [
     ("Experiment", "experiment"),
     ("Program", "compile"),
     ("Error", "compile"),
     ("Solid", "solid"),
     ("Engine", "solid"),
     ("Field", "field"),
+    ("Precision", "precision"),
 ];
 
 fn sources() -> Vec<(PathBuf, String)> {

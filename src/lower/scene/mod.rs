@@ -16,6 +16,7 @@ use super::probes::Probe;
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
 use crate::ir::Node;
+use crate::precision::Precision;
 
 /// Acceleration of all of the fluid, m/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,12 +122,6 @@ pub struct Solver {
     pub iterations: usize,
     /// Of sums over neighbours; the method decides if it is not given.
     pub precision: Option<Precision>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
-    Single,
-    Double,
 }
 
 /// The defaults are table 1 of the paper for its method, and those of water and of the particles' spacing for others.

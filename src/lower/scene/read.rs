@@ -6,12 +6,13 @@ use super::super::Tolerance;
 use super::super::eval::Lowering;
 use super::super::probes::Surroundings;
 use super::{
-    Block, Bounce, Bound, Container, Fill, Fluid, Gravity, Method, Obstacle, Precision, Run, Scene, Skin,
-    Slip, Solver, Truth,
+    Block, Bounce, Bound, Container, Fill, Fluid, Gravity, Method, Obstacle, Run, Scene, Skin, Slip, Solver,
+    Truth,
 };
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
 use crate::ir::{Node, Unary};
+use crate::precision::Precision;
 use crate::syntax::Dimension;
 use crate::syntax::ast::{self, Entry, Expr, ExprKind};
 
@@ -211,7 +212,7 @@ impl<'a> Lowering<'a> {
         let precision = self.word_key(
             &block,
             "precision",
-            &[("auto", None), ("f32", Some(Precision::Single)), ("f64", Some(Precision::Double))],
+            &[("auto", None), ("f32", Some(Precision::F32)), ("f64", Some(Precision::F64))],
         );
         Some(Solver {
             compression: compression?,

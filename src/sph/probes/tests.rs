@@ -169,7 +169,7 @@ fn energies_of_a_fall() {
         gradients: Gradients::Pairs,
         shifting: 0.0,
     });
-    let parameters = Parameters { precision: crate::sph::Precision::Double, ..water(method) };
+    let parameters = Parameters { precision: crate::sph::Precision::F64, ..water(method) };
     let mut simulation = Simulation::new(parameters, block, domain, Vec::new()).unwrap();
     let mut gauge = simulation.gauge(Probe::Energy).unwrap();
     let [_, potential, elastic, total] = simulation.sample(&mut gauge)[..] else { panic!() };

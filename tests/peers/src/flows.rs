@@ -54,10 +54,10 @@ pub fn run() {
         let dt = COURANT * spacing / (2.0 * 9.81 * COLUMN.size().z).sqrt();
         pool.install(|| {
             let mut rows = vec![
-                ours("rfm dfsph, f32", spacing, dt, dfsph(), Precision::Single),
-                ours("rfm dfsph, f64", spacing, dt, dfsph(), Precision::Double),
+                ours("rfm dfsph, f32", spacing, dt, dfsph(), Precision::F32),
+                ours("rfm dfsph, f64", spacing, dt, dfsph(), Precision::F64),
                 salva(spacing, dt),
-                ours("rfm wcsph, f32", spacing, f64::INFINITY, wcsph(), Precision::Single),
+                ours("rfm wcsph, f32", spacing, f64::INFINITY, wcsph(), Precision::F32),
             ];
             measure(&mut rows);
             print(&rows, dt);
