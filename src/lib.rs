@@ -26,6 +26,7 @@ pub mod ir;
 pub mod lower;
 pub mod mesh;
 pub mod precision;
+pub mod quantity;
 pub mod render;
 pub mod simplify;
 pub mod slice;

@@ -18,12 +18,11 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 pub use probes::{Measured, Probe};
-pub use scene::{
-    Bounce, Container, Fill, Fluid, Gravity, Method, Obstacle, Run, Scene, Skin, Slip, Solver, Truth,
-};
+pub use scene::{Bounce, Container, Fluid, Gravity, Obstacle, Run, Scene, Skin, Solver, Truth};
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 use crate::ir::{Graph, Node};
+use crate::sph::Method;
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Attribute, Definition, Function, Item, Name, Param};
 use eval::Lowering;

@@ -102,7 +102,7 @@ impl Checkpoint {
     }
 
     /// All that belongs to every method.
-    pub(super) fn of(core: &Core<'_>) -> Self {
+    pub(super) fn of(core: &Core) -> Self {
         let Core { particles, acceleration, steps, time, .. } = core;
         let mut checkpoint =
             Self { steps: *steps, time: *time, ids: particles.id.clone(), ..Self::default() };
@@ -119,7 +119,7 @@ impl Checkpoint {
     }
 
     /// The same, the other way; the core has as many particles.
-    pub(super) fn restore(&self, core: &mut Core<'_>) -> Result<(), CheckpointError> {
+    pub(super) fn restore(&self, core: &mut Core) -> Result<(), CheckpointError> {
         core.particles = self.particles()?;
         let components = core.acceleration.components_mut();
         for (name, column) in VECTORS[6..].iter().zip(components) {
@@ -247,9 +247,7 @@ impl<'a> Reader<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sph::{
-        Dfsph, Gradients, Method, Parameters, Precision, SetupError, Simulation, Slip, Wcsph, scenes,
-    };
+    use crate::sph::{Dfsph, Method, Parameters, Precision, SetupError, Simulation, Slip, Wcsph, scenes};
 
     fn methods() -> [Parameters; 3] {
         let water = Parameters {
@@ -261,13 +259,7 @@ mod tests {
             precision: Precision::F32,
             ..Parameters::default()
         };
-        let wcsph = Wcsph {
-            sound_speed: 30.0,
-            density_diffusion: 0.1,
-            artificial_viscosity: 0.02,
-            gradients: Gradients::Pairs,
-            shifting: 0.0,
-        };
+        let wcsph = Wcsph { sound_speed: Some(30.0), ..Wcsph::default() };
         [
             Parameters::default(),
             Parameters { method: Method::Wcsph(wcsph), ..water.clone() },

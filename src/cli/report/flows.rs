@@ -10,13 +10,12 @@ use anstream::println;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::super::args::{Flow, FlowMethod, Shared};
+use super::super::args::{Flow, Shared};
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
-use crate::diagnostic::Diagnostics;
 use crate::experiment::{Deviation, Deviations};
 use crate::lower::{Scene, Truth};
-use crate::sph::Simulation;
+use crate::sph::{Method, Simulation};
 use crate::{Error, Experiment, Program};
 
 /// The param of a file that says how fine its scene is.
@@ -108,7 +107,7 @@ pub(super) fn run(
         )));
     };
     let sizes = sizes(program, &options.particles)?;
-    let methods: Vec<Option<FlowMethod>> = match &options.methods[..] {
+    let methods: Vec<Option<Method>> = match &options.methods[..] {
         [] => vec![None],
         several => several.iter().copied().map(Some).collect(),
     };
@@ -124,7 +123,7 @@ pub(super) fn run(
     let mut rows: Vec<Row> = Vec::new();
     for method in methods {
         let by_method = match method {
-            Some(method) => program.with_method(method.into()).map_err(refused)?,
+            Some(method) => program.with_method(method).map_err(refused)?,
             None => program.clone(),
         };
         for &size in &sizes {
@@ -198,14 +197,16 @@ impl Study<'_> {
     /// Runs the scene to its end and looks at it whenever it would be saved.
     fn measure(&mut self, program: &Program, size: Option<usize>) -> Result<Row, Failure> {
         let scene = choose::scene(program, Some(self.scene))?;
-        let experiment = Experiment::of(program, scene, self.shared.engine.into()).map_err(refused)?;
-        let (mut simulation, _) = experiment.simulation(program, scene).map_err(refused)?;
-        input::show(&Diagnostics { list: experiment.take_warnings(), sources: program.sources().clone() });
+        let experiment = Experiment::new(program, &scene.name, self.shared.engine.into()).map_err(refused)?;
+        let start = experiment.start().map_err(refused)?;
+        input::show(&experiment.warnings());
+        input::show(&start.warnings);
+        let mut simulation = start.simulation;
         let before = self.bar.position();
-        let method = experiment.parameters.method.name();
+        let method = experiment.parameters().method.name();
         let (mut failure, mut mark) = (None, (0, 0.0));
         let mut stands_still = false;
-        let mut follow = |simulation: &Simulation<'_>| {
+        let mut follow = |simulation: &Simulation| {
             let done = simulation.time() / scene.run.until;
             self.bar.set_position(before + (done * work(size)) as u64);
             let particles = simulation.particles().len();
@@ -223,7 +224,7 @@ impl Study<'_> {
             frame += 1;
             let end = (f64::from(frame) * scene.run.save_every).min(scene.run.until);
             let (clock, processor) = (Instant::now(), processor_seconds());
-            let reached = experiment.advance(program, scene, &mut simulation, end, &mut follow);
+            let reached = simulation.advance(end, &mut follow);
             failure = reached.err().map(|error| error.to_string());
             if simulation.time() < end * (1.0 - 1e-12) && failure.is_none() {
                 failure = Some(format!(
@@ -235,7 +236,7 @@ impl Study<'_> {
             cpu_seconds += processor_seconds() - processor;
             seconds += clock.elapsed().as_secs_f64();
             if failure.is_none() {
-                deviations.look(program, scene, &simulation);
+                deviations.look(&experiment, &simulation);
             }
         }
         self.bar.set_position(before + work(size) as u64);
