@@ -347,8 +347,11 @@ fn flow_method() -> impl TypedValueParser<Value = Method> {
 #[derive(Debug, Args)]
 pub(super) struct Explain {
     /// The code of a message (E0201), or a file, FILE:SOLID or FILE:SCENE
-    #[arg(value_name = "CODE|FILE[:NAME]")]
-    pub subject: String,
+    #[arg(value_name = "CODE|FILE[:NAME]", required_unless_present = "methods")]
+    pub subject: Option<String>,
+    /// List the methods of the fluid solver, with the keys, units, defaults and passes of each, as Markdown
+    #[arg(long, conflicts_with = "subject")]
+    pub methods: bool,
     /// Stages to print
     #[arg(long, value_enum, value_delimiter = ',')]
     pub show: Vec<Stage>,

@@ -15,6 +15,7 @@ use crate::ir::{Node, dump};
 use crate::lower::{NamedSolid, Scene};
 use crate::simplify::{Exactness, MOST_PLACES, simplify};
 use crate::solid::{Bounds, Left, ProgramKind};
+use crate::sph::methods_reference;
 use crate::syntax;
 use crate::{Program, Solid};
 
@@ -22,7 +23,10 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if shared.json {
         return Err(Failure::usage("explanations are for people: `rfm explain` has no --json"));
     }
-    let subject = options.subject.as_str();
+    let Some(subject) = options.subject.as_deref() else {
+        say!("{}", methods_reference().trim_end());
+        return Ok(());
+    };
     if let Some(text) = explain(subject) {
         say!("{}\n\n{text}", subject.to_uppercase());
         return Ok(());

@@ -296,6 +296,22 @@ mod tests {
     }
 
     #[test]
+    fn a_method_saves_what_it_declares() {
+        let pawn = scenes::pawn();
+        let names = |parameters: &Parameters| {
+            let checkpoint = scenes::drop_on(&pawn, parameters.clone(), 50).checkpoint();
+            checkpoint.columns.into_iter().map(|(name, _)| name).collect::<Vec<_>>()
+        };
+        let [paper, ..] = &methods();
+        let of_all_methods = names(paper);
+        for parameters in methods() {
+            let own: Vec<String> =
+                names(&parameters).into_iter().filter(|name| !of_all_methods.contains(name)).collect();
+            assert_eq!(own, parameters.method.info().saves, "{}", parameters.method.name());
+        }
+    }
+
+    #[test]
     fn a_checkpoint_of_another_method_is_refused() {
         let pawn = scenes::pawn();
         let [paper, wcsph, dfsph] = methods();

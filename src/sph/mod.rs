@@ -74,6 +74,7 @@ pub use methods::{
     Dfsph, FluidDefaults, Gradients, KeyBlock, KeyInfo, KeyReader, Method, MethodInfo, NegativePressure,
     Paper, Support, Wcsph,
 };
+pub use methods::{overview as methods_overview, reference as methods_reference};
 pub use params::{ParameterError, Parameters, Slip};
 pub use particles::{Particles, Vectors};
 pub use passes::Pass;

@@ -9,6 +9,7 @@ mod dfsph;
 mod negative_pressure;
 mod numerics;
 mod paper;
+mod reference;
 mod shifting;
 mod tension;
 mod wcsph;
@@ -17,6 +18,7 @@ pub use declaration::{FluidDefaults, KeyBlock, KeyInfo, KeyReader, MethodInfo, S
 pub use dfsph::Dfsph;
 pub use negative_pressure::NegativePressure;
 pub use paper::Paper;
+pub use reference::{overview, reference};
 pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read};
