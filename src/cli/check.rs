@@ -8,7 +8,8 @@ use glam::DVec2;
 use serde::Serialize;
 
 use super::args::{Check, Deny, Shared};
-use super::{Failure, choose, input, note, output};
+use super::failure::{Failure, complain, note};
+use super::{choose, input, output};
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
 use crate::field::Field;
 use crate::geom::Aabb;
@@ -121,7 +122,7 @@ fn watch(shared: &Shared, options: &Check) -> Result<(), Failure> {
         }
         match once(shared, options) {
             Ok(()) | Err(Failure::Findings) => {}
-            Err(Failure::Usage(message)) => super::complain(&message), // the file may be back in a moment
+            Err(Failure::Usage(message)) => complain(&message), // the file may be back in a moment
             Err(other) => return Err(other),
         }
         note("watching; press Ctrl-C to end");

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::args::Shared;
-use super::{Failure, input, note};
+use super::failure::{Failure, note};
+use super::input;
 use crate::diagnostic::{Diagnostics, nearest};
 use crate::lower::{NamedSolid, Scene};
 use crate::solid::Chosen;

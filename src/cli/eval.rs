@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::args::{Eval, Shared, What};
-use super::{Failure, choose, input, output};
+use super::failure::Failure;
+use super::{choose, input, output};
 use crate::ir::Unary;
 use crate::solid::Chosen;
 use crate::{Field, Precision, Solid};

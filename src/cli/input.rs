@@ -3,8 +3,8 @@
 use std::io::{IsTerminal, Read};
 use std::path::Path;
 
-use super::Failure;
 use super::args::Shared;
+use super::failure::{Failure, note};
 use crate::Program;
 use crate::compile::text_of;
 use crate::diagnostic::{Code, Diagnostics, Source, Style, render};
@@ -65,7 +65,7 @@ pub(super) fn show(diagnostics: &Diagnostics) {
     if diagnostics.list.len() > MOST_SHOWN {
         let first = diagnostics.list[..MOST_SHOWN].to_vec();
         show(&Diagnostics { list: first, sources: diagnostics.sources.clone() });
-        super::note(format!("{} more messages are not shown", diagnostics.list.len() - MOST_SHOWN));
+        note(format!("{} more messages are not shown", diagnostics.list.len() - MOST_SHOWN));
         return;
     }
     // anstream takes the colours out where they are not wanted; the line drawing is for terminals only

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::Failure;
+use super::failure::{Failure, complain};
 
 /// Writes a file through a callback. If anything fails, the file that was there before is untouched.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
@@ -76,7 +76,7 @@ pub(super) fn line(words: std::fmt::Arguments<'_>) {
         if error.kind() == io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }
-        super::complain(&format!("cannot write to standard output: {error}"));
+        complain(&format!("cannot write to standard output: {error}"));
         std::process::exit(2);
     }
 }

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{Failure, output};
+use super::failure::Failure;
+use super::output;
 use crate::slice;
 
 pub(super) const WIDTH: f64 = 760.0;

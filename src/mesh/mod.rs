@@ -4,7 +4,7 @@
 //! crossed edges by the case table, or by the corners' values where the table leaves a choice, puts each vertex on the
 //! surface by a root search on ω itself, merges vertices that coincide in a node and adds normals −∇ω/|∇ω| →
 //! [`remove_slivers`] or [`simplify()`] if asked → [`check`] reports topology, volume and distance, [`thin_cells`] what the grid cannot
-//! see, [`measure`] the distance both ways → the [`formats`] write. [`dual_contouring`] does what [`marching_cubes`]
+//! see, [`measure`] the distance both ways → the [`FORMATS`] write. [`dual_contouring`] does what [`marching_cubes`]
 //! does, with sharp creases.
 //!
 //! Promises: the mesh is closed, every edge lies in exactly two triangles that run along it in opposite
@@ -35,7 +35,7 @@ mod collapse;
 mod crossings;
 mod dual;
 mod extract;
-pub mod formats;
+mod formats;
 mod grid;
 mod normals;
 mod patches;
@@ -58,7 +58,7 @@ use glam::DVec3;
 pub use check::{Report, check, is_closed_manifold};
 pub use dual::dual_contouring;
 pub use extract::marching_cubes;
-pub use formats::{glb, obj, ply, stl, threemf, vtp};
+pub use formats::*;
 pub use grid::{Grid, GridError, Resolution};
 pub use quality::{Distances, Quality, Reference, measure};
 pub use shells::{Shell, shells};

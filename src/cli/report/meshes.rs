@@ -8,8 +8,9 @@ use anstream::println;
 use serde::Serialize;
 
 use super::super::args::MeshMethod;
+use super::super::failure::Failure;
 use super::super::plot::{self, Axis};
-use super::super::{Failure, progress};
+use super::super::progress;
 use crate::Solid;
 use crate::mesh::{self, Grid, Quality, Resolution};
 use crate::solid::Depth;

@@ -19,7 +19,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::args::{Report, Shared};
-use super::{Failure, choose, input, output, progress};
+use super::failure::Failure;
+use super::{choose, input, output, progress};
 use crate::codegen::{Form, target_description};
 use crate::geom::Aabb;
 use crate::ir::exact::{self, Exact};

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::super::Failure;
+use super::super::failure::Failure;
 use super::super::plot::{Axis, BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, begin, end, grid};
 use super::Row;
 

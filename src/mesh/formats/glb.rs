@@ -10,6 +10,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::super::Mesh;
+use super::Format;
 
 const MAGIC: &[u8; 4] = b"glTF";
 const VERSION: u32 = 2;
@@ -19,11 +20,15 @@ const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
+/// The entry of the table of formats.
+pub const FORMAT: Format =
+    Format { ending: "glb", purpose: "For viewers and browsers", write, write_text: None };
+
 /// Writes a mesh as GLB.
 ///
 /// # Errors
-/// What the writer reports; [`io::ErrorKind::FileTooLarge`] beyond the 4 GiB of the format.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream, and [`io::ErrorKind::FileTooLarge`] beyond the 4 GiB of the format.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let mut binary = Vec::with_capacity(24 * mesh.positions.len() + 12 * mesh.triangles.len());
     for vectors in [&mesh.positions, &mesh.normals] {
         binary.extend(vectors.iter().flat_map(|v| v.as_vec3().to_array()).flat_map(f32::to_le_bytes));
@@ -46,7 +51,7 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn chunk(out: &mut impl Write, kind: &[u8; 4], data: &[u8], length: u32) -> io::Result<()> {
+fn chunk(out: &mut dyn Write, kind: &[u8; 4], data: &[u8], length: u32) -> io::Result<()> {
     out.write_all(&length.to_le_bytes())?;
     out.write_all(kind)?;
     out.write_all(data)

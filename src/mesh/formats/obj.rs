@@ -5,12 +5,17 @@
 use std::io::{self, Write};
 
 use super::super::Mesh;
+use super::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format =
+    Format { ending: "obj", purpose: "Shared vertices with normals, text", write, write_text: None };
 
 /// Writes a mesh as OBJ with one normal for each vertex.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "# rfm, metres, outward normals")?;
     for p in &mesh.positions {
         writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;

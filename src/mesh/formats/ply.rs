@@ -8,12 +8,17 @@
 use std::io::{self, Write};
 
 use super::super::Mesh;
+use super::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format =
+    Format { ending: "ply", purpose: "Shared vertices with normals, binary", write, write_text: None };
 
 /// Writes a mesh as PLY.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\ncomment rfm, metres, outward normals\n\

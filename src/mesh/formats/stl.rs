@@ -8,12 +8,21 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::super::{Mesh, normals::unit};
+use super::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format = Format {
+    ending: "stl",
+    purpose: "Triangles as records, for nearly every program",
+    write,
+    write_text: Some(write_ascii),
+};
 
 /// Writes a mesh as binary STL.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     // A header that began with "solid" would be taken for the text form.
     let mut header = [b' '; 80];
     let title = b"binary STL by rfm";
@@ -35,8 +44,8 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
 /// Writes a mesh as STL text: ten times as large, for readers and people that want it.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write_ascii(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write_ascii(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "solid rfm")?;
     for triangle in &mesh.triangles {
         let [n, a, b, c] = facet(mesh, *triangle).map(|v| v.as_vec3());

@@ -10,12 +10,16 @@ use base64::prelude::BASE64_STANDARD;
 use base64::write::EncoderWriter;
 
 use super::super::Mesh;
+use super::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format = Format { ending: "vtp", purpose: "For ParaView", write, write_text: None };
 
 /// Writes a mesh as VTP with one normal for each vertex.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let (points, polys) = (mesh.positions.len(), mesh.triangles.len());
     write!(
         out,
@@ -41,7 +45,7 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
 
 /// An array as base64: the number of its bytes, and its bytes.
 fn array<const N: usize>(
-    out: &mut impl Write,
+    out: &mut dyn Write,
     kind: &str,
     name: &str,
     components: usize,
