@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::args::{Check, Deny, Shared};
 use super::failure::{Failure, complain, note};
 use super::{choose, input, output};
-use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
+use crate::diagnostic::{Code, Diagnostic, Diagnostics, Source};
 use crate::field::Field;
 use crate::geom::Aabb;
 use crate::ir::{FloatType, Growth};
@@ -234,36 +234,37 @@ fn solids(
             Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),
             None => {}
         }
-        let warning = |code, message| Diagnostic {
-            severity: Severity::Warning,
-            ..Diagnostic::error(code, named.span, message)
-        };
-        match solid.bounds() {
-            Bounds::Empty => {
-                let message = format!("solid `{}` is empty: ω is nowhere positive", named.name);
-                diagnostics.list.push(warning(Code::EMPTY_SOLID, message));
-            }
-            Bounds::Unbounded => {
-                let message = format!("solid `{}` could not be proven to end anywhere", named.name);
-                diagnostics.list.push(
-                    warning(Code::UNBOUNDED_SOLID, message)
-                        .help("intersect it with a box, or mesh it with --box"),
-                );
-            }
-            Bounds::Within(_) => {}
-        }
-        if thin.count > 0 {
-            let message = format!(
-                "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
-                named.name, VOLUME_CELLS[0], thin.count, thin.bounds.min, thin.bounds.max
-            );
-            diagnostics.list.push(
-                warning(Code::THIN_PARTS, message).help("mesh it with more --cells, until `thin_cells` is 0"),
-            );
-        }
+        diagnostics.list.extend(remarks(named, &solid, &thin));
         facts.push(found);
     }
     Ok(facts)
+}
+
+/// Warnings about a solid that is empty, unbounded or thin.
+fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnostic> {
+    let warning = |code, message| Diagnostic::warning(code, named.span, message);
+    let mut found = Vec::new();
+    match solid.bounds() {
+        Bounds::Empty => {
+            let message = format!("solid `{}` is empty: ω is nowhere positive", named.name);
+            found.push(warning(Code::EMPTY_SOLID, message));
+        }
+        Bounds::Unbounded => {
+            let message = format!("solid `{}` could not be proven to end anywhere", named.name);
+            let help = "intersect it with a box, or mesh it with --box";
+            found.push(warning(Code::UNBOUNDED_SOLID, message).help(help));
+        }
+        Bounds::Within(_) => {}
+    }
+    if thin.count > 0 {
+        let message = format!(
+            "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
+            named.name, VOLUME_CELLS[0], thin.count, thin.bounds.min, thin.bounds.max
+        );
+        let help = "mesh it with more --cells, until `thin_cells` is 0";
+        found.push(warning(Code::THIN_PARTS, message).help(help));
+    }
+    found
 }
 
 /// A warning if ω may leave the range of numbers although its leaves do not.

@@ -39,14 +39,14 @@ pub(super) fn end(mut svg: String, path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// A logarithmic axis over whole powers of ten.
-pub(super) struct Axis {
+pub(super) struct LogAxis {
     low: i32,
     high: i32,
     from: f64,
     to: f64,
 }
 
-impl Axis {
+impl LogAxis {
     pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (mut low, mut high) = (i32::MAX, i32::MIN);
         for value in values {
@@ -128,7 +128,7 @@ impl EvenAxis {
 }
 
 /// Lines at the whole powers of ten, and what the axes are.
-pub(super) fn grid(out: &mut String, x: &Axis, y: &Axis, names: [&str; 2]) {
+pub(super) fn grid(out: &mut String, x: &LogAxis, y: &LogAxis, names: [&str; 2]) {
     for (value, text) in x.ticks() {
         across(out, x.at(value), &text);
     }
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn few_powers_of_ten_are_divided() {
         let texts = |low: f64, high: f64| -> Vec<String> {
-            Axis::over([low, high].into_iter(), 0.0, 1.0).ticks().map(|tick| tick.1).collect()
+            LogAxis::over([low, high].into_iter(), 0.0, 1.0).ticks().map(|tick| tick.1).collect()
         };
         assert_eq!(texts(0.03, 0.4), ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"]);
         assert_eq!(texts(1e-3, 20.0), ["0.001", "0.01", "0.1", "1", "10", "100"]);

@@ -6,7 +6,7 @@ use roxmltree::Document;
 
 /// One file of a collection.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct FrameEntry {
     /// Seconds.
     pub time: f64,
     /// Relative to the folder of the collection.
@@ -37,7 +37,7 @@ impl std::error::Error for CollectionError {}
 ///
 /// # Errors
 /// See [`CollectionError`].
-pub fn read_collection(text: &str) -> Result<Vec<Entry>, CollectionError> {
+pub fn read_collection(text: &str) -> Result<Vec<FrameEntry>, CollectionError> {
     let document =
         Document::parse(text).map_err(|error| CollectionError::NotACollection(error.to_string()))?;
     let root = document.root_element();
@@ -50,7 +50,7 @@ pub fn read_collection(text: &str) -> Result<Vec<Entry>, CollectionError> {
         .map(|(index, set)| {
             let time = set.attribute("timestep").and_then(|t| t.trim().parse::<f64>().ok());
             let file = set.attribute("file").map(str::to_string);
-            let entry = time.zip(file).map(|(time, file)| Entry { time, file });
+            let entry = time.zip(file).map(|(time, file)| FrameEntry { time, file });
             entry.ok_or(CollectionError::Entry { index })
         })
         .collect()

@@ -21,7 +21,7 @@ use splashsurf_lib::{GridDecompositionParameters, Parameters, SpatialDecompositi
 use crate::geom::Aabb;
 use crate::mesh::Mesh;
 
-pub use collection::{CollectionError, Entry, read_collection};
+pub use collection::{CollectionError, FrameEntry, read_collection};
 pub use frame::{FrameError, read_points};
 
 /// What a surface is made with; lengths in metres.

@@ -158,7 +158,7 @@ fn collections_are_read_in_their_order() {
     let text = "<VTKFile type=\"Collection\"><Collection>\
                 <DataSet timestep=\"0\" part=\"0\" file=\"frames/a.vtp\"/>\
                 <DataSet timestep=\"0.04\" part=\"0\" file=\"b&amp;c.vtp\"/></Collection></VTKFile>";
-    let entry = |time: f64, file: &str| Entry { time, file: file.to_string() };
+    let entry = |time: f64, file: &str| FrameEntry { time, file: file.to_string() };
     assert_eq!(read_collection(text), Ok(vec![entry(0.0, "frames/a.vtp"), entry(0.04, "b&c.vtp")]));
     let broken = text.replace("0.04", "late");
     assert_eq!(read_collection(&broken), Err(CollectionError::Entry { index: 1 }));

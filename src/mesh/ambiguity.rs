@@ -248,7 +248,7 @@ mod tests {
 
     /// Points of one kind.
     #[derive(Debug, Clone, Copy)]
-    struct Parts {
+    struct PointSet {
         /// Of points, edges, filled squares and filled cubes.
         euler: i64,
         /// Parts that hang together along the axes, and across corners as well.
@@ -256,7 +256,7 @@ mod tests {
         across_corners: usize,
     }
 
-    fn parts(positive: &[bool], side: usize, kind: bool) -> Parts {
+    fn parts(positive: &[bool], side: usize, kind: bool) -> PointSet {
         let steps = [1, side, side * side];
         let is = |at: usize| positive[at] == kind;
         let mut parent: Vec<u32> = (0..positive.len() as u32).collect();
@@ -296,7 +296,7 @@ mod tests {
                 alike.for_each(|other| unite(&mut parent, first, other));
             }
         }
-        Parts { euler, along_axes, across_corners: count(&parent) }
+        PointSet { euler, along_axes, across_corners: count(&parent) }
     }
 
     fn find(parent: &mut [u32], mut at: usize) -> usize {

@@ -84,7 +84,7 @@ pub(super) struct Tunnel {
 
 /// Where a vertex within the cell belongs, before it is put on the surface.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Inner {
+pub(super) enum InnerVertex {
     /// In the middle of the vertices on these edges.
     Amidst(Vec<usize>),
     /// At a point of the cell [0, 1]³.
@@ -93,13 +93,13 @@ pub(super) enum Inner {
 
 /// Triangles of one cell whose corners' values had to be asked.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Patch {
+pub(super) struct CellTriangles {
     /// Edges of the cell, and from [`EDGES`] on inner vertices.
     pub triangles: Vec<[u8; 3]>,
-    pub inner: Vec<Inner>,
+    pub inner: Vec<InnerVertex>,
 }
 
-impl Patch {
+impl CellTriangles {
     /// Discs for all loops but the two that bound a tunnel.
     pub(super) fn new(loops: &[Vec<usize>], tunnel: Option<Tunnel>) -> Self {
         let mut patch = Self { triangles: Vec::new(), inner: Vec::new() };
@@ -123,7 +123,7 @@ impl Patch {
                 let centre = (EDGES + self.inner.len()) as u8;
                 let next = polygon.iter().cycle().skip(1);
                 self.triangles.extend(polygon.iter().zip(next).map(|(&a, &b)| [a as u8, b as u8, centre]));
-                self.inner.push(Inner::Amidst(polygon.to_vec()));
+                self.inner.push(InnerVertex::Amidst(polygon.to_vec()));
             }
         }
     }
@@ -144,7 +144,7 @@ impl Patch {
             Some((one.0 + other.0, [one.1, other.1]))
         });
         if let Some((_, both)) = tubes.min_by_key(|(cost, _)| *cost) {
-            self.inner.extend(waist.map(Inner::At));
+            self.inner.extend(waist.map(InnerVertex::At));
             self.triangles.extend(both.into_iter().flatten());
         }
     }
@@ -430,7 +430,7 @@ mod tests {
         for inside in 0..=255_u8 {
             for faces in choices(inside) {
                 let polygons = loops(inside, faces);
-                let patch = Patch::new(&polygons, None);
+                let patch = CellTriangles::new(&polygons, None);
                 check_triangles(inside, faces, &patch.triangles);
                 assert_eq!(euler(&patch.triangles), polygons.len() as i32);
                 assert!(
@@ -459,10 +459,10 @@ mod tests {
                 let polygons = loops(inside, faces);
                 for (a, b) in (0..polygons.len()).flat_map(|b| (0..b).map(move |a| (a, b))) {
                     let (loops, choice) = ([a, b], usize::from(inside) % 2);
-                    let patch = Patch::new(&polygons, Some(Tunnel { loops, waist: waists[choice] }));
+                    let patch = CellTriangles::new(&polygons, Some(Tunnel { loops, waist: waists[choice] }));
                     check_triangles(inside, faces, &patch.triangles);
                     assert_eq!(euler(&patch.triangles), polygons.len() as i32 - 2);
-                    let ring = patch.inner.iter().any(|inner| matches!(inner, Inner::At(_)));
+                    let ring = patch.inner.iter().any(|inner| matches!(inner, InnerVertex::At(_)));
                     *(if ring { &mut at_waist } else { &mut direct }) += 1;
                 }
             }

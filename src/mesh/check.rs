@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     Mesh,
-    normals::{Gradients, unit},
+    normals::{GradientColumns, unit},
     shells::{Roots, shells},
 };
 use crate::field::Field;
@@ -48,7 +48,7 @@ pub struct Report {
 /// Examines a mesh of the surface of `field`.
 pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
     let shells = shells(mesh);
-    let edges = Edges::of(mesh);
+    let edges = EdgeFindings::of(mesh);
     let used: usize = shells.iter().map(|shell| shell.vertices).sum();
     let (max_distance, rms_distance) = distances(mesh, field);
     let coincide = |t: &[u32; 3]| {
@@ -75,13 +75,13 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
 
 /// Whether a mesh is closed and manifold, see [`Report`].
 pub fn is_closed_manifold(mesh: &Mesh) -> bool {
-    let edges = Edges::of(mesh);
+    let edges = EdgeFindings::of(mesh);
     let used: usize = shells(mesh).iter().map(|shell| shell.vertices).sum();
     edges.closed && edges.two_sided && edges.fans == used
 }
 
 /// Findings about a mesh's edges.
-struct Edges {
+struct EdgeFindings {
     count: usize,
     closed: bool,
     two_sided: bool,
@@ -92,13 +92,13 @@ struct Edges {
 /// One triangle's side: its ends in ascending order, whether the triangle runs up along it, and its corner
 /// (3·triangle + place) at the lower and at the higher end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+struct TriangleSide {
     ends: (u32, u32),
     runs_up: bool,
     corners: [u32; 2],
 }
 
-impl Edges {
+impl EdgeFindings {
     fn of(mesh: &Mesh) -> Self {
         let side = |triangle: usize, place: usize| {
             let (from, to) = (mesh.triangles[triangle][place], mesh.triangles[triangle][(place + 1) % 3]);
@@ -106,9 +106,9 @@ impl Edges {
             let runs_up = from < to;
             let (ends, corners) =
                 if runs_up { ((from, to), corners) } else { ((to, from), [corners[1], corners[0]]) };
-            Side { ends, runs_up, corners }
+            TriangleSide { ends, runs_up, corners }
         };
-        let mut sides: Vec<Side> =
+        let mut sides: Vec<TriangleSide> =
             (0..mesh.triangles.len()).flat_map(|t| (0..3).map(move |place| side(t, place))).collect();
         sides.par_sort_unstable();
 
@@ -157,7 +157,7 @@ const NEWTON_STEPS: usize = 8;
 fn project(field: &dyn Field, points: &[DVec3]) -> Vec<f64> {
     let mut at = points.to_vec();
     let mut directions = vec![DVec3::ZERO; points.len()];
-    let mut gradients = Gradients::default();
+    let mut gradients = GradientColumns::default();
     for step in 0..NEWTON_STEPS {
         let mut moved = false;
         let found: Vec<(f64, DVec3)> = gradients.at(field, &at).collect();

@@ -18,8 +18,8 @@ use super::{
     MeshError,
     collapse::AtNode,
     prune::{Bricks, Lattice},
-    roots::{Edges, RootFinder},
-    signs::{Around, Brick, Samples, Signs},
+    roots::{AxisEdges, RootFinder},
+    signs::{Around, Brick, SignSampler, Signs},
 };
 use crate::field::Field;
 
@@ -27,7 +27,7 @@ use crate::field::Field;
 pub(super) const BRICKS_PER_TASK: usize = 16;
 
 /// A part of the work, for who waits for it.
-pub(super) struct Stage<'a> {
+pub(super) struct ProgressPart<'a> {
     tasks: usize,
     done: AtomicUsize,
     /// The shares done before it and after it.
@@ -35,7 +35,7 @@ pub(super) struct Stage<'a> {
     progress: &'a (dyn Fn(f64) + Sync),
 }
 
-impl<'a> Stage<'a> {
+impl<'a> ProgressPart<'a> {
     /// A part in which [`Self::advance`] will be called `tasks` times.
     pub(super) fn new(tasks: usize, shares: Range<f64>, progress: &'a (dyn Fn(f64) + Sync)) -> Self {
         Self { tasks, done: AtomicUsize::new(0), shares, progress }
@@ -63,7 +63,7 @@ pub(super) fn sample(
     let mut signs = vec![Signs::default(); bricks.near.len()];
     let tasks = signs.par_chunks_mut(BRICKS_PER_TASK).zip(bricks.near.par_chunks(BRICKS_PER_TASK));
     let counts: Vec<Result<u64, MeshError>> = tasks
-        .map_init(Samples::default, |samples, (signs, bricks)| {
+        .map_init(SignSampler::default, |samples, (signs, bricks)| {
             let mut count = 0;
             for (signs, brick) in signs.iter_mut().zip(bricks) {
                 *signs = samples.take(field, lattice, brick, &mut count)?;
@@ -170,7 +170,7 @@ pub(super) struct OnEdges {
 #[derive(Default)]
 pub(super) struct EdgeScratch {
     /// Crossed edges by axis, without those that leave the grid.
-    edges: [Edges; 3],
+    edges: [AxisEdges; 3],
     /// For each of them its vertex and its low end.
     ends: [Vec<(u32, [usize; 3])>; 3],
     roots: Vec<f64>,
@@ -191,7 +191,7 @@ impl<T> Task<T> {
         scratch: &mut EdgeScratch,
     ) -> Result<OnEdges, MeshError> {
         let EdgeScratch { edges, ends, roots, finder } = scratch;
-        edges.iter_mut().for_each(Edges::clear);
+        edges.iter_mut().for_each(AxisEdges::clear);
         ends.iter_mut().for_each(Vec::clear);
         let mut found = OnEdges::default();
         let first = self.first as u32;

@@ -85,14 +85,6 @@ pub struct Mesh {
 impl Mesh {
     /// Most vertices of a mesh: the corners of twice as many triangles then still have 32-bit numbers.
     pub const MAX_VERTICES: usize = 1 << 29;
-
-    /// A mesh of no field: each normal is the area-weighted mean of the triangles around.
-    pub fn from_triangles(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let normals = vec![DVec3::ZERO; positions.len()];
-        let mut mesh = Self { positions, normals, triangles, ..Self::default() };
-        normals::fill_missing(&mut mesh);
-        mesh
-    }
 }
 
 /// Counts of work, the same on any machine.
@@ -121,6 +113,13 @@ pub enum MeshError {
     },
 }
 
+impl MeshError {
+    /// Refuses more vertices than a mesh can have.
+    pub(crate) fn check_vertices(found: usize) -> Result<(), Self> {
+        if found > Mesh::MAX_VERTICES { Err(Self::TooManyVertices { found }) } else { Ok(()) }
+    }
+}
+
 impl fmt::Display for MeshError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -131,7 +130,7 @@ impl fmt::Display for MeshError {
                 write!(
                     f,
                     "the mesh would have {found} vertices; at most {} are possible, use larger cells",
-                    i32::MAX
+                    Mesh::MAX_VERTICES
                 )
             }
         }

@@ -10,13 +10,13 @@ use crate::field::{Field, GradientsMut, Points};
 
 /// Columns for gradients at many points, kept from one call to the next.
 #[derive(Debug, Default)]
-pub(super) struct Gradients {
+pub(super) struct GradientColumns {
     points: [Vec<f64>; 3],
     /// ω and its derivatives.
     found: [Vec<f64>; 4],
 }
 
-impl Gradients {
+impl GradientColumns {
     /// Writes −∇ω/|∇ω| at each position, zero where the field gives no direction.
     pub(super) fn normals(&mut self, field: &dyn Field, positions: &[DVec3], normals: &mut [DVec3]) {
         self.evaluate(field, positions);
@@ -50,9 +50,19 @@ impl Gradients {
     }
 }
 
+impl Mesh {
+    /// A mesh that stands for no field: each normal is the area-weighted mean of the triangles around its vertex.
+    pub fn from_triangles(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let normals = vec![DVec3::ZERO; positions.len()];
+        let mut mesh = Self { positions, normals, triangles, ..Self::default() };
+        fill_missing(&mut mesh);
+        mesh
+    }
+}
+
 /// ω and ∇ω at each position.
 pub(super) fn gradients(field: &dyn Field, positions: &[DVec3]) -> Vec<(f64, DVec3)> {
-    Gradients::default().at(field, positions).collect()
+    GradientColumns::default().at(field, positions).collect()
 }
 
 /// Vertices evaluated together.
@@ -62,7 +72,7 @@ const BATCH: usize = 1024;
 pub(super) fn add(field: &dyn Field, mesh: &mut Mesh, vertices: &[u32]) {
     let parts: Vec<Vec<DVec3>> = vertices
         .par_chunks(BATCH)
-        .map_init(Gradients::default, |gradients, part| {
+        .map_init(GradientColumns::default, |gradients, part| {
             let positions: Vec<DVec3> = part.iter().map(|&v| mesh.positions[v as usize]).collect();
             let mut normals = vec![DVec3::ZERO; part.len()];
             gradients.normals(field, &positions, &mut normals);

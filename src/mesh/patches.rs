@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::{
     ambiguity,
-    cases::{Inner, Patch, Tunnel, edge, face_corners, loops},
+    cases::{CellTriangles, InnerVertex, Tunnel, edge, face_corners, loops},
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, set_positions},
 };
@@ -33,9 +33,9 @@ pub(super) fn find(
 ) -> Vec<CellPatch> {
     let mut found = Vec::new();
     for (z, bit) in undecided(around) {
-        let cell = Cell::new(field, lattice, cell_low(low, (z, bit)));
+        let cell = CellValues::new(field, lattice, cell_low(low, (z, bit)));
         *evaluations += 8;
-        let Patch { triangles, inner } = cell.patch();
+        let CellTriangles { triangles, inner } = cell.patch();
         let inner =
             inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
         found.push(CellPatch { cell: (z, bit), triangles, inner });
@@ -73,13 +73,13 @@ pub(super) fn undecided_cells(corners: &[u64; 8]) -> u64 {
 }
 
 /// A cell with the values at its corners.
-pub(super) struct Cell {
+pub(super) struct CellValues {
     low: DVec3,
     high: DVec3,
     values: ambiguity::Corners,
 }
 
-impl Cell {
+impl CellValues {
     pub(super) fn new(field: &dyn Field, lattice: &Lattice, low: [usize; 3]) -> Self {
         let ends = [low, low.map(|n| n + 1)];
         let at = |corner: usize| [0, 1, 2].map(|axis: usize| ends[corner >> axis & 1][axis]);
@@ -100,19 +100,19 @@ impl Cell {
         (polygons, tunnel)
     }
 
-    fn patch(&self) -> Patch {
+    fn patch(&self) -> CellTriangles {
         let (polygons, tunnel) = self.loops();
-        Patch::new(&polygons, tunnel)
+        CellTriangles::new(&polygons, tunnel)
     }
 
     fn corner(&self, corner: usize) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|axis: usize| [self.low, self.high][corner >> axis & 1][axis]))
     }
 
-    fn place(&self, inner: &Inner) -> DVec3 {
+    fn place(&self, inner: &InnerVertex) -> DVec3 {
         match inner {
-            Inner::At(share) => self.low + DVec3::from_array(*share) * (self.high - self.low),
-            Inner::Amidst(edges) => {
+            InnerVertex::At(share) => self.low + DVec3::from_array(*share) * (self.high - self.low),
+            InnerVertex::Amidst(edges) => {
                 edges.iter().map(|&e| self.on_edge(e)).sum::<DVec3>() / edges.len() as f64
             }
         }

@@ -22,7 +22,7 @@ const BOXES_PER_TASK: usize = 64;
 
 /// What is known of a brick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum BrickKind {
     /// ω > 0 throughout.
     Solid,
     /// ω ≤ 0 throughout.
@@ -96,7 +96,7 @@ impl Lattice {
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Cell {
+enum Octant {
     Solid,
     Fluid,
     Near(u32),
@@ -108,7 +108,7 @@ enum Cell {
 #[derive(Debug)]
 pub(super) struct Bricks {
     /// Eight children in a row for each divided cell; the root is the first.
-    cells: Vec<Cell>,
+    cells: Vec<Octant>,
     /// Bricks along the root's side are two to this power.
     levels: u32,
     /// Near bricks, neighbours close to one another in the list.
@@ -130,7 +130,7 @@ impl Bricks {
     pub(super) fn classify(field: &dyn Field, lattice: &Lattice) -> Self {
         let most = lattice.counts().into_iter().max().unwrap_or(1);
         let levels = most.next_power_of_two().trailing_zeros();
-        let mut found = Self { cells: vec![Cell::Fluid], levels, near: Vec::new() };
+        let mut found = Self { cells: vec![Octant::Fluid], levels, near: Vec::new() };
         let mut open = vec![(0_usize, [0_usize; 3])];
         for level in (0..=levels).rev() {
             let size = 1_usize << level;
@@ -151,18 +151,18 @@ impl Bricks {
             let mut next = Vec::new();
             for ((slot, at), finding) in open.into_iter().zip(findings) {
                 found.cells[slot] = match finding {
-                    Finding::Solid => Cell::Solid,
-                    Finding::Fluid => Cell::Fluid,
+                    Finding::Solid => Octant::Solid,
+                    Finding::Fluid => Octant::Fluid,
                     _ if level == 0 => {
                         found.near.push(NearBrick { at, solid: finding == Finding::SolidAtBorder });
-                        Cell::Near(found.near.len() as u32 - 1)
+                        Octant::Near(found.near.len() as u32 - 1)
                     }
                     _ => {
                         let first = found.cells.len();
-                        found.cells.resize(first + 8, Cell::Fluid);
+                        found.cells.resize(first + 8, Octant::Fluid);
                         let child = |i: usize| [0, 1, 2].map(|axis| at[axis] + (i >> axis & 1) * size / 2);
                         next.extend((0..8).map(|i| (first + i, child(i))));
-                        Cell::Divided(first as u32)
+                        Octant::Divided(first as u32)
                     }
                 };
             }
@@ -172,18 +172,18 @@ impl Bricks {
     }
 
     /// What is known of a brick; fluid beyond the grid.
-    pub(super) fn place(&self, at: [usize; 3]) -> Place {
+    pub(super) fn place(&self, at: [usize; 3]) -> BrickKind {
         if at.iter().any(|b| b >> self.levels != 0) {
-            return Place::Fluid;
+            return BrickKind::Fluid;
         }
         let mut cell = self.cells[0];
         let mut level = self.levels;
         loop {
             match cell {
-                Cell::Solid => return Place::Solid,
-                Cell::Fluid => return Place::Fluid,
-                Cell::Near(number) => return Place::Near(number),
-                Cell::Divided(first) => {
+                Octant::Solid => return BrickKind::Solid,
+                Octant::Fluid => return BrickKind::Fluid,
+                Octant::Near(number) => return BrickKind::Near(number),
+                Octant::Divided(first) => {
                     level -= 1;
                     let [x, y, z] = at.map(|b| b >> level & 1);
                     cell = self.cells[first as usize + (z << 2 | y << 1 | x)];
@@ -222,15 +222,15 @@ mod tests {
         let bricks = Bricks::classify(&HalfSpace, &lattice);
         // the plane lies between nodes 16 and 17 of the grid, which is extended node 17 and 18
         let found = [0, 1, 2, 3, 5, 6, 7].map(|x| bricks.place([x, 3, 3]));
-        let near = |place| matches!(place, Place::Near(_));
+        let near = |place| matches!(place, BrickKind::Near(_));
         assert_eq!(found.map(near), [false, false, true, false, false, true, false]);
-        assert_eq!([found[0], found[3], found[6]], [Place::Fluid, Place::Solid, Place::Fluid]);
+        assert_eq!([found[0], found[3], found[6]], [BrickKind::Fluid, BrickKind::Solid, BrickKind::Fluid]);
         // at the border nothing is sampled, but the solid is closed there
         let solid = bricks.near.iter().filter(|brick| brick.solid).count();
         let border = 7 * 7 + 3 * (7 * 7 - 5 * 5);
         assert_eq!((solid, bricks.near.len()), (border, border + 49));
         for (i, brick) in bricks.near.iter().enumerate() {
-            assert_eq!(bricks.place(brick.at), Place::Near(i as u32));
+            assert_eq!(bricks.place(brick.at), BrickKind::Near(i as u32));
         }
     }
 

@@ -309,9 +309,9 @@ fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid) -> Vec<DVec3> 
 }
 
 /// A triangle in the index.
-struct Place([DVec3; 3]);
+struct IndexedTriangle([DVec3; 3]);
 
-impl RTreeObject for Place {
+impl RTreeObject for IndexedTriangle {
     type Envelope = AABB<[f64; 3]>;
 
     fn envelope(&self) -> Self::Envelope {
@@ -320,7 +320,7 @@ impl RTreeObject for Place {
     }
 }
 
-impl PointDistance for Place {
+impl PointDistance for IndexedTriangle {
     fn distance_2(&self, point: &[f64; 3]) -> f64 {
         let p = DVec3::from_array(*point);
         p.distance_squared(nearest_point(self.0, p))
@@ -328,7 +328,7 @@ impl PointDistance for Place {
 }
 
 fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
-    let index = RTree::bulk_load(mesh.triangles.iter().map(|&t| Place(corners(mesh, t))).collect());
+    let index = RTree::bulk_load(mesh.triangles.iter().map(|&t| IndexedTriangle(corners(mesh, t))).collect());
     let parts: Vec<Sums> = points
         .par_chunks(BATCH)
         .map(|points| {

@@ -16,7 +16,7 @@ use crate::field::{Field, Points};
 
 /// Edges along one axis, with ω > 0 at exactly one end of each.
 #[derive(Debug, Default, Clone)]
-pub(super) struct Edges {
+pub(super) struct AxisEdges {
     /// Coordinates of the ends on the axis.
     pub low: Vec<f64>,
     pub high: Vec<f64>,
@@ -48,7 +48,7 @@ const MAX_INTERPOLATIONS: usize = 40;
 /// Edges in a batch: enough to fill vector code, few enough to stay in the nearest cache.
 const BATCH: usize = 512;
 
-impl Edges {
+impl AxisEdges {
     pub(super) fn clear(&mut self) {
         self.low.clear();
         self.high.clear();
@@ -91,7 +91,7 @@ pub(super) struct RootFinder {
     tried: [Vec<f64>; 3],
     /// dω/dt of the parabola at its root.
     slopes: Vec<f64>,
-    searches: Vec<Search>,
+    searches: Vec<RootSearch>,
     columns: [Vec<f64>; 3],
 }
 
@@ -104,7 +104,7 @@ impl RootFinder {
         &mut self,
         field: &dyn Field,
         axis: usize,
-        edges: &Edges,
+        edges: &AxisEdges,
         roots: &mut Vec<f64>,
     ) -> Result<u64, MeshError> {
         let mut evaluations = 0;
@@ -122,7 +122,7 @@ impl RootFinder {
         &mut self,
         field: &dyn Field,
         axis: usize,
-        edges: &Edges,
+        edges: &AxisEdges,
         batch: Range<usize>,
     ) -> Result<u64, MeshError> {
         let across = edges.across.each_ref().map(|column| &column[batch.clone()]);
@@ -162,7 +162,7 @@ impl RootFinder {
     }
 
     /// Takes the roots that lie between the parabola's and the step; lists searches for the others.
-    fn confirm(&mut self, edges: &Edges, batch: Range<usize>, roots: &mut Vec<f64>) {
+    fn confirm(&mut self, edges: &AxisEdges, batch: Range<usize>, roots: &mut Vec<f64>) {
         self.searches.clear();
         for (i, edge) in batch.enumerate() {
             let at = |k: usize| (self.tried[k][i], self.omega[k + 2][i]);
@@ -181,7 +181,7 @@ impl RootFinder {
                 false => (low, parabola),
             };
             roots.push(f64::NAN);
-            self.searches.push(Search::new(
+            self.searches.push(RootSearch::new(
                 edge,
                 roots.len() - 1,
                 [step, other, previous],
@@ -195,7 +195,7 @@ impl RootFinder {
         &mut self,
         field: &dyn Field,
         axis: usize,
-        edges: &Edges,
+        edges: &AxisEdges,
         roots: &mut [f64],
     ) -> Result<u64, MeshError> {
         let mut evaluations = 0;
@@ -262,7 +262,7 @@ fn parabola_root(f0: f64, f1: f64, s: f64, f: f64) -> (f64, f64) {
 
 /// One edge's search. `newest` and `other` bracket the root, `previous` is the point last given up.
 #[derive(Debug, Clone, Copy)]
-struct Search {
+struct RootSearch {
     edge: usize,
     /// Where the root is written.
     slot: usize,
@@ -277,7 +277,7 @@ struct Search {
     next: f64,
 }
 
-impl Search {
+impl RootSearch {
     /// Goes on from the newest point, the one that brackets the root with it, and the one given up.
     fn new(edge: usize, slot: usize, [newest, other, previous]: [(f64, f64); 3], tolerance: f64) -> Self {
         let least_step = FIRST_STEP * tolerance;
@@ -345,7 +345,7 @@ mod tests {
 
     fn solve(field: &dyn Field, count: usize) -> Result<(Vec<f64>, u64), MeshError> {
         let column = |value| vec![value; count];
-        let edges = Edges { low: column(0.0), high: column(1.0), across: [column(3.0), column(2.0)] };
+        let edges = AxisEdges { low: column(0.0), high: column(1.0), across: [column(3.0), column(2.0)] };
         let mut roots = Vec::new();
         let evaluations = RootFinder::default().solve(field, 1, &edges, &mut roots)?;
         Ok((roots, evaluations))
@@ -394,7 +394,7 @@ mod tests {
         let at = DVec3::new(1.0, 2.0, 3.0);
         for axis in 0..3 {
             let across = [1, 2].map(|next| vec![at[(axis + next) % 3]]);
-            let edges = Edges { low: vec![0.0], high: vec![5.0], across };
+            let edges = AxisEdges { low: vec![0.0], high: vec![5.0], across };
             let mut roots = Vec::new();
             RootFinder::default().solve(&field, axis, &edges, &mut roots).unwrap();
             assert!((roots[0] - at[axis]).abs() < 1e-14, "axis {axis}: {}", roots[0]);

@@ -9,7 +9,7 @@
 use super::{
     MeshError,
     cases::{EDGES, edge},
-    prune::{BRICK, Bricks, Lattice, NearBrick, Place},
+    prune::{BRICK, BrickKind, Bricks, Lattice, NearBrick},
 };
 use crate::field::{Field, Points};
 
@@ -22,14 +22,14 @@ const FIRST_ROW: u64 = 0xff;
 
 /// Points of a brick, and ω there.
 #[derive(Debug, Default)]
-pub(super) struct Samples {
+pub(super) struct SignSampler {
     x: Vec<f64>,
     y: Vec<f64>,
     z: Vec<f64>,
     omega: Vec<f64>,
 }
 
-impl Samples {
+impl SignSampler {
     /// Samples a brick's own nodes, or takes their proven sign; adds to the number of evaluations.
     ///
     /// # Errors
@@ -93,7 +93,7 @@ pub(super) struct Brick {
     /// How many crossed edges come before each word of `edges`.
     before: [[u16; BRICK]; 3],
     /// The bricks above: at i − 1 the one that is higher on the axes whose bits are set in i.
-    upper: [Place; 7],
+    upper: [BrickKind; 7],
     /// The number of its first vertex: those on edges come first, then the inner ones.
     pub first: u32,
     /// How many vertices lie within its cells.
@@ -185,9 +185,9 @@ impl Brick {
     /// Signs of the brick and of the nodes above that its cells use.
     pub(super) fn around(&self, signs: &[Signs]) -> Around {
         let above = |i: usize, z: usize| match self.upper[i - 1] {
-            Place::Solid => u64::MAX,
-            Place::Fluid => 0,
-            Place::Near(neighbour) => signs[neighbour as usize][z],
+            BrickKind::Solid => u64::MAX,
+            BrickKind::Fluid => 0,
+            BrickKind::Near(neighbour) => signs[neighbour as usize][z],
         };
         let mut around = Around { planes: [[0; BRICK + 1]; 4] };
         around.planes[0][..BRICK].copy_from_slice(&signs[self.number]);
@@ -211,7 +211,7 @@ impl Brick {
             next += 1;
         });
         for (i, place) in (1..8_usize).zip(self.upper) {
-            let Place::Near(neighbour) = place else { continue };
+            let BrickKind::Near(neighbour) = place else { continue };
             let Some(neighbour) = crossed(neighbour) else { continue };
             let offset = [0, 1, 2].map(|axis: usize| (i >> axis & 1) * BRICK);
             let mut touching = u64::MAX;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::{
     Grid, MeshError,
     crossings::sample,
-    prune::{BRICK, Bricks, Lattice, Place},
+    prune::{BRICK, BrickKind, Bricks, Lattice},
     signs::{Brick, Signs, crossed_cells},
 };
 use crate::{field::Field, geom::Aabb, interval::Interval};
@@ -65,7 +65,7 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
             }
             let rows = crossed_rows(&near, &crossed, brick.at);
             let untouched = std::array::from_fn(|z| untouched_plane(&rows, z));
-            let search = Search {
+            let search = HiddenSearch {
                 field,
                 lattice: &lattice,
                 low: brick.at.map(|b| b * BRICK),
@@ -87,7 +87,7 @@ fn crossed_rows(near: &Bricks, crossed: &[Signs], at: [usize; 3]) -> Rows {
         if (0..3).any(|axis| at[axis] + step[axis] == 0) {
             continue;
         }
-        let Place::Near(number) = near.place([0, 1, 2].map(|axis| at[axis] + step[axis] - 1)) else {
+        let BrickKind::Near(number) = near.place([0, 1, 2].map(|axis| at[axis] + step[axis] - 1)) else {
             continue;
         };
         let planes = &crossed[number as usize];
@@ -125,7 +125,7 @@ fn untouched_plane(rows: &Rows, z: usize) -> u64 {
 }
 
 /// The search for hidden surfaces in one brick.
-struct Search<'a> {
+struct HiddenSearch<'a> {
     field: &'a dyn Field,
     lattice: &'a Lattice,
     /// Extended indices of the brick's first node.
@@ -137,7 +137,7 @@ struct Search<'a> {
     signs: &'a Signs,
 }
 
-impl Search<'_> {
+impl HiddenSearch<'_> {
     /// Thin cells in a cube of cells, counted from the brick's first.
     fn count(&self, first: [usize; 3], size: usize) -> ThinCells {
         let row = ((1_u64 << size) - 1) << first[0];
@@ -195,12 +195,12 @@ mod tests {
     use crate::mesh::Resolution;
 
     /// A shell between two balls, with its exact range (up to rounding).
-    struct Shell {
+    struct HollowBall {
         inner: f64,
         outer: f64,
     }
 
-    impl Field for Shell {
+    impl Field for HollowBall {
         fn omega(&self, p: DVec3) -> f64 {
             let r = p.length();
             (self.outer - r).min(r - self.inner)
@@ -224,19 +224,19 @@ mod tests {
     #[test]
     fn a_ball_and_a_thick_shell_hide_nothing() {
         for cells in [5, 16, 40, 64] {
-            assert_eq!(thin(&Shell { inner: -1.0, outer: 0.83 }, cells), ThinCells::NONE);
+            assert_eq!(thin(&HollowBall { inner: -1.0, outer: 0.83 }, cells), ThinCells::NONE);
         }
-        assert_eq!(thin(&Shell { inner: 0.6, outer: 0.83 }, 40), ThinCells::NONE);
+        assert_eq!(thin(&HollowBall { inner: 0.6, outer: 0.83 }, 40), ThinCells::NONE);
     }
 
     #[test]
     fn a_shell_thinner_than_a_cell_is_found_where_it_is() {
         // cells of 1/20, a wall of 1/1000
-        let found = thin(&Shell { inner: 0.8, outer: 0.801 }, 40);
+        let found = thin(&HollowBall { inner: 0.8, outer: 0.801 }, 40);
         // the sphere meets some 6·π·0.8²·20² cells, of which few see a node inside
         assert!(found.count > 1000, "{found:?}");
         assert!(found.bounds.max.max_element() < 0.86 && found.bounds.min.min_element() > -0.86, "{found:?}");
-        assert_eq!(thin(&Shell { inner: 0.8, outer: 0.86 }, 160), ThinCells::NONE);
+        assert_eq!(thin(&HollowBall { inner: 0.8, outer: 0.86 }, 160), ThinCells::NONE);
     }
 
     #[test]

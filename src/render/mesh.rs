@@ -10,7 +10,7 @@ use super::{
 
 /// A triangle mesh by reference, in the scene's length unit.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Mesh<'a> {
+pub struct MeshView<'a> {
     pub vertices: &'a [DVec3],
     /// Outward normals of any length, one a vertex; if there are fewer, the mesh is shaded flat.
     pub normals: &'a [DVec3],
@@ -35,7 +35,7 @@ struct Facet {
 }
 
 impl Facets {
-    pub fn new(mesh: &Mesh<'_>, camera: &Camera) -> Self {
+    pub fn new(mesh: &MeshView<'_>, camera: &Camera) -> Self {
         let seen: Vec<_> = mesh.vertices.iter().map(|vertex| camera.look(*vertex)).collect();
         let smooth = mesh.normals.len() >= mesh.vertices.len();
         let facet = |triangle: &[u32; 3]| {

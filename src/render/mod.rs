@@ -10,6 +10,7 @@
 //! Invariant: a band depends on its inputs alone, so a picture has the same bits on any number of threads; this
 //! module takes plain slices, opens no file and reads no clock.
 
+mod backdrop;
 mod camera;
 mod colour;
 mod image;
@@ -17,18 +18,18 @@ mod mesh;
 mod overlay;
 mod particles;
 mod raster;
-mod scene;
 mod shade;
 
 use std::{fmt, io};
 
 pub use self::{
+    backdrop::Backdrop,
     camera::Camera,
     colour::{Rgb, UNKNOWN_SPEED, speed_colour},
     image::Image,
-    mesh::Mesh,
-    particles::Particles,
-    scene::{Legend, Moment, Scene},
+    mesh::MeshView,
+    overlay::{Caption, Legend},
+    particles::ParticlesView,
 };
 use crate::geom::Aabb;
 

@@ -10,12 +10,23 @@ use resvg::{
     usvg::{Options, Tree, fontdb},
 };
 
-use super::{
-    RenderError,
-    colour::STOPS,
-    image::Layer,
-    scene::{Legend, Moment},
-};
+use super::{RenderError, colour::STOPS, image::Layer};
+
+/// What is written beside the picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Legend<'a> {
+    pub title: &'a str,
+    /// The speed shown in red, in m/s: fixed for a run, so that its frames can be compared.
+    pub fastest: f64,
+}
+
+/// What is written under a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Caption {
+    /// Simulated time in seconds.
+    pub time: f64,
+    pub step: u64,
+}
 
 const INK: &str = "#1c1c1c";
 
@@ -90,7 +101,7 @@ pub fn bar(legend: &Legend<'_>, scale: f64) -> Result<Layer, RenderError> {
 pub const CAPTION_HEIGHT: f64 = 44.0;
 
 /// Time, step and number of particles, in columns that stay where they are while the numbers change.
-pub fn caption(moment: &Moment, particles: usize, scale: f64) -> Result<Layer, RenderError> {
+pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, RenderError> {
     let body = format!(
         r#"<g font-size="18"><text x="32" y="22">t = {:.3} s</text><text x="172" y="22">step {}</text><text x="312" y="22">N = {}</text></g>"#,
         moment.time,
@@ -159,7 +170,7 @@ mod tests {
     #[test]
     fn any_title_and_moment_can_be_set() {
         assert!(title("a<b & \"c\"\u{0}", 400.0, 1.0).is_ok());
-        let layer = caption(&Moment { time: f64::NAN, step: u64::MAX }, 0, 0.1).unwrap();
+        let layer = caption(&Caption { time: f64::NAN, step: u64::MAX }, 0, 0.1).unwrap();
         assert_eq!((layer.width, layer.height), (52, 5));
     }
 }

@@ -12,7 +12,7 @@ use crate::field::Points;
 
 /// Particles by reference.
 #[derive(Debug, Clone, Copy)]
-pub struct Particles<'a> {
+pub struct ParticlesView<'a> {
     /// In the scene's length unit.
     pub positions: Points<'a>,
     /// In the unit of [`Legend::fastest`](super::Legend::fastest); particles beyond the slice's end are grey.
@@ -37,7 +37,7 @@ pub struct Disc {
 const MIN_RADIUS: f32 = 0.9;
 
 /// The discs of all particles that the camera sees, in the particles' order.
-pub fn discs(particles: &Particles<'_>, camera: &Camera, fastest: f64) -> Vec<Disc> {
+pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, fastest: f64) -> Vec<Disc> {
     let radius = if particles.radius.is_finite() { particles.radius.max(0.0) } else { 0.0 };
     let disc = |i: usize| {
         let seen = camera.look(particles.positions.get(i))?;

@@ -7,7 +7,6 @@ use std::fmt;
 
 use glam::{DVec2, DVec3};
 
-use super::SliceError;
 use crate::geom::Aabb;
 
 /// A coordinate axis of the scene.
@@ -88,24 +87,6 @@ impl Window {
     pub fn size(&self) -> DVec2 {
         self.max - self.min
     }
-
-    /// Columns and rows of samples for `samples` along the longer side and nearly square cells.
-    ///
-    /// # Errors
-    /// [`SliceError::Window`] for a window without area or with infinite sides, [`SliceError::Resolution`] for
-    /// fewer than 2 or more than 8192 samples.
-    pub fn grid(&self, samples: usize) -> Result<(usize, usize), SliceError> {
-        let size = self.size();
-        if !(size.is_finite() && self.min.is_finite() && size.x > 0.0 && size.y > 0.0) {
-            return Err(SliceError::Window(*self));
-        }
-        if !(2..=8192).contains(&samples) {
-            return Err(SliceError::Resolution(samples));
-        }
-        let cells = (samples - 1) as f64;
-        let along = |side: f64| (cells * side / size.max_element()).round().max(1.0) as usize + 1;
-        Ok((along(size.x), along(size.y)))
-    }
 }
 
 #[cfg(test)]
@@ -123,17 +104,5 @@ mod tests {
             assert_eq!(window.max, DVec2::new(1.0, 2.0));
         }
         assert_eq!(Plane::new(Axis::Z, 0.5).to_string(), "z = 0.5");
-    }
-
-    #[test]
-    fn bad_windows_and_resolutions_are_errors() {
-        let flat = Window::new(DVec2::ZERO, DVec2::new(1.0, 0.0));
-        assert!(matches!(flat.grid(10), Err(SliceError::Window(_))));
-        let endless = Window::new(DVec2::ZERO, DVec2::new(f64::INFINITY, 1.0));
-        assert!(matches!(endless.grid(10), Err(SliceError::Window(_))));
-        let unit = Window::new(DVec2::ZERO, DVec2::ONE);
-        assert!(matches!(unit.grid(1), Err(SliceError::Resolution(1))));
-        let wide = Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0));
-        assert_eq!(wide.grid(101).unwrap(), (101, 51));
     }
 }

@@ -53,6 +53,26 @@ pub(super) fn sample_grid(
     samples
 }
 
+impl Window {
+    /// Columns and rows of samples for `samples` along the longer side and nearly square cells.
+    ///
+    /// # Errors
+    /// [`SliceError::Window`] for a window without area or with infinite sides, [`SliceError::Resolution`] for
+    /// fewer than 2 or more than 8192 samples.
+    pub fn grid(&self, samples: usize) -> Result<(usize, usize), SliceError> {
+        let size = self.size();
+        if !(size.is_finite() && self.min.is_finite() && size.x > 0.0 && size.y > 0.0) {
+            return Err(SliceError::Window(*self));
+        }
+        if !(2..=8192).contains(&samples) {
+            return Err(SliceError::Resolution(samples));
+        }
+        let cells = (samples - 1) as f64;
+        let along = |side: f64| (cells * side / size.max_element()).round().max(1.0) as usize + 1;
+        Ok((along(size.x), along(size.y)))
+    }
+}
+
 impl Samples {
     pub fn get(&self, column: usize, row: usize) -> f64 {
         self.omega[row * self.columns + column]
@@ -105,5 +125,17 @@ mod tests {
             pool.install(|| sample(&disc(), plane, window, 65).unwrap())
         };
         assert_eq!(on(1), on(2));
+    }
+
+    #[test]
+    fn bad_windows_and_resolutions_are_errors() {
+        let flat = Window::new(DVec2::ZERO, DVec2::new(1.0, 0.0));
+        assert!(matches!(flat.grid(10), Err(SliceError::Window(_))));
+        let endless = Window::new(DVec2::ZERO, DVec2::new(f64::INFINITY, 1.0));
+        assert!(matches!(endless.grid(10), Err(SliceError::Window(_))));
+        let unit = Window::new(DVec2::ZERO, DVec2::ONE);
+        assert!(matches!(unit.grid(1), Err(SliceError::Resolution(1))));
+        let wide = Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0));
+        assert_eq!(wide.grid(101).unwrap(), (101, 51));
     }
 }

@@ -9,9 +9,9 @@ use glam::DVec2;
 
 use super::{
     Outline, Rgb, Samples, Scale,
-    axes::{self, Frame, INK},
+    axes::{self, INK, PlotFrame},
     isolines::outlines,
-    labels::{Label, Placer},
+    labels::{LevelLabel, Placer},
     paths,
 };
 use crate::field::Field;
@@ -26,7 +26,7 @@ const BAND: [f64; 2] = [26.0, 15.0];
 
 /// The slice as an SVG document; `name` becomes part of the title. The samples must be the field's own.
 pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
-    let frame = Frame::new(samples.window, DVec2::new(LEFT, TOP));
+    let frame = PlotFrame::new(samples.window, DVec2::new(LEFT, TOP));
     let scale = Scale::for_samples(samples);
     let bar = Bar::new(&frame, &scale);
     let width = frame.right() + BAR.iter().sum::<f64>() + 8.0;
@@ -50,10 +50,10 @@ pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
     out
 }
 
-fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame: &Frame, scale: &Scale) {
+fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame: &PlotFrame, scale: &Scale) {
     let levels: Vec<Vec<Outline>> =
         scale.levels().iter().map(|&level| outlines(field, samples, level)).collect();
-    let Frame { origin, size, .. } = *frame;
+    let PlotFrame { origin, size, .. } = *frame;
     let _ = writeln!(
         out,
         r#"<rect x="{}" y="{}" width="{}" height="{}" fill="{}"/>"#,
@@ -98,13 +98,19 @@ fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame
     labels(out, frame, scale, zero, &lines);
 }
 
-fn labels(out: &mut String, frame: &Frame, scale: &Scale, zero: usize, lines: &[Vec<(Vec<DVec2>, bool)>]) {
+fn labels(
+    out: &mut String,
+    frame: &PlotFrame,
+    scale: &Scale,
+    zero: usize,
+    lines: &[Vec<(Vec<DVec2>, bool)>],
+) {
     let lines: Vec<Vec<Vec<DVec2>>> =
         lines.iter().map(|level| level.iter().map(|(points, _)| points.clone()).collect()).collect();
     let mut placer = Placer::new(frame, &lines);
     let mut text = String::new();
     for (k, level) in scale.decimals().iter().enumerate().filter(|(k, _)| *k != zero) {
-        let Some(Label { at, angle, text: label }) = placer.place(k, &level.to_string()) else {
+        let Some(LevelLabel { at, angle, text: label }) = placer.place(k, &level.to_string()) else {
             continue;
         };
         // The halo has the colour of the ground, so the line seems to be interrupted.
@@ -127,7 +133,7 @@ fn labels(out: &mut String, frame: &Frame, scale: &Scale, zero: usize, lines: &[
 }
 
 /// Grey hatching over every cell with a corner that has no value; cells side by side make one rectangle.
-fn undefined_cells(out: &mut String, samples: &Samples, frame: &Frame) {
+fn undefined_cells(out: &mut String, samples: &Samples, frame: &PlotFrame) {
     if samples.undefined() == 0 {
         return;
     }
@@ -161,7 +167,7 @@ struct Bar {
 }
 
 impl Bar {
-    fn new(frame: &Frame, scale: &Scale) -> Self {
+    fn new(frame: &PlotFrame, scale: &Scale) -> Self {
         let bands = scale.bands() as f64;
         let band = (frame.size.y / bands).clamp(BAND[1], BAND[0]).floor();
         // Centred beside the plot; below its upper edge if the plot is lower than the bar.
@@ -221,7 +227,7 @@ impl Bar {
     }
 }
 
-fn on_page(frame: &Frame, points: &[DVec2]) -> Vec<DVec2> {
+fn on_page(frame: &PlotFrame, points: &[DVec2]) -> Vec<DVec2> {
     points.iter().map(|&uv| frame.page(uv)).collect()
 }
 

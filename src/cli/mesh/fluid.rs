@@ -12,13 +12,13 @@ use super::super::args::{Frames, Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
 use super::super::{output, progress};
 use super::format;
-use crate::fluid_surface::{Entry, Reconstruction, read_collection, read_points};
+use crate::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
 use crate::mesh::{WriteMesh, is_closed_manifold, shells, vtp};
 use crate::sph;
 
 /// The JSON document. Lengths are in metres, volumes in cubic metres.
 #[derive(Debug, Serialize)]
-struct Summary {
+struct FluidSummary {
     schema: u32,
     /// The number of frames that were meshed.
     frames: usize,
@@ -28,12 +28,12 @@ struct Summary {
     support_radius: f64,
     cell: f64,
     format: &'static str,
-    surfaces: Vec<Surface>,
+    surfaces: Vec<FrameSurface>,
 }
 
 /// One frame.
 #[derive(Debug, Serialize)]
-struct Surface {
+struct FrameSurface {
     frame: usize,
     time: f64,
     file: String,
@@ -61,7 +61,7 @@ struct RunFigures {
 }
 
 /// How large the particles are.
-struct Scale {
+struct ParticleScale {
     surface: Reconstruction,
     /// Mass over rest density, m³.
     particle_volume: f64,
@@ -72,7 +72,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let write = format::writer(format, options.ascii)?;
     let folder = options.file.as_path();
     let entries = chosen(collection(folder)?, options.frames)?;
-    let scale = Scale::new(folder, options)?;
+    let scale = ParticleScale::new(folder, options)?;
     check_frames(folder, &entries)?;
     let target = options.output.clone().unwrap_or_else(|| folder.join("surface"));
     let job = Job { folder, target, ending: format.ending, write, scale };
@@ -82,7 +82,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     if left_out > 0 {
         note(format!("{left_out} positions are not numbers and were left out"));
     }
-    let summary = Summary {
+    let summary = FluidSummary {
         schema: 1,
         frames: surfaces.len(),
         triangles: surfaces.iter().map(|surface| surface.triangles).sum(),
@@ -102,7 +102,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
 }
 
 /// The frames of a run, from its `particles.pvd`.
-fn collection(folder: &Path) -> Result<Vec<Entry>, Failure> {
+fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
     let shown = folder.display();
     if !folder.exists() {
         return Err(Failure::usage(format!(
@@ -132,7 +132,7 @@ fn collection(folder: &Path) -> Result<Vec<Entry>, Failure> {
 }
 
 /// Refuses frames whose file is missing.
-fn check_frames(folder: &Path, entries: &[(usize, Entry)]) -> Result<(), Failure> {
+fn check_frames(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<(), Failure> {
     for (_, entry) in entries {
         let file = folder.join(&entry.file);
         if !file.is_file() {
@@ -145,7 +145,7 @@ fn check_frames(folder: &Path, entries: &[(usize, Entry)]) -> Result<(), Failure
 }
 
 /// The entries that are asked for, with their numbers.
-fn chosen(entries: Vec<Entry>, frames: Option<Frames>) -> Result<Vec<(usize, Entry)>, Failure> {
+fn chosen(entries: Vec<FrameEntry>, frames: Option<Frames>) -> Result<Vec<(usize, FrameEntry)>, Failure> {
     let count = entries.len();
     let Frames { first, end } = frames.unwrap_or_default();
     let end = end.unwrap_or(count);
@@ -158,7 +158,7 @@ fn chosen(entries: Vec<Entry>, frames: Option<Frames>) -> Result<Vec<(usize, Ent
     Ok(entries.into_iter().enumerate().take(end).skip(first).collect())
 }
 
-impl Scale {
+impl ParticleScale {
     /// The scale that the flags give, and otherwise the one in the run's summary.
     fn new(folder: &Path, options: &Options) -> Result<Self, Failure> {
         let path = folder.join("summary.json");
@@ -200,14 +200,14 @@ struct Job<'a> {
     /// The ending of their files.
     ending: &'static str,
     write: WriteMesh,
-    scale: Scale,
+    scale: ParticleScale,
 }
 
 impl Job<'_> {
     /// Meshes all frames, and lists the files in a collection if ParaView reads their format.
-    fn surfaces(&self, entries: &[(usize, Entry)]) -> Result<Vec<Surface>, Failure> {
+    fn surfaces(&self, entries: &[(usize, FrameEntry)]) -> Result<Vec<FrameSurface>, Failure> {
         let bar = progress::bar(entries.len() as u64, "surfaces");
-        let mut surfaces: Vec<Surface> = Vec::new();
+        let mut surfaces: Vec<FrameSurface> = Vec::new();
         for (frame, entry) in entries {
             let made = self.surface(*frame, entry);
             let made = made.map_err(|failure| with_kept(failure, surfaces.len(), &self.target))?;
@@ -225,7 +225,7 @@ impl Job<'_> {
     }
 
     /// Reads one frame, meshes it and writes the mesh.
-    fn surface(&self, frame: usize, entry: &Entry) -> Result<Surface, Failure> {
+    fn surface(&self, frame: usize, entry: &FrameEntry) -> Result<FrameSurface, Failure> {
         let started = Instant::now();
         let path = self.folder.join(&entry.file);
         let failed = |error: String| {
@@ -242,7 +242,7 @@ impl Job<'_> {
         let parts = shells(&mesh);
         let volume = parts.iter().fold(0.0, |sum, shell| sum + shell.volume);
         let particle_volume = finite.len() as f64 * self.scale.particle_volume;
-        Ok(Surface {
+        Ok(FrameSurface {
             frame,
             time: entry.time,
             file,
@@ -275,7 +275,7 @@ fn with_kept(failure: Failure, kept: usize, target: &Path) -> Failure {
     }
 }
 
-fn print(summary: &Summary) {
+fn print(summary: &FluidSummary) {
     let ratios = summary.surfaces.iter().filter_map(|surface| surface.volume_ratio);
     let (least, most) =
         ratios.fold((f64::INFINITY, 0.0), |(least, most), ratio| (ratio.min(least), ratio.max(most)));

@@ -21,7 +21,7 @@ use crate::mesh::{
 use crate::solid::{Bounds, Depth};
 pub(super) use format::{ascii_help, output_help};
 use simplified::{Simplified, simplified};
-use summary::Summary;
+use summary::MeshSummary;
 
 impl MeshMethod {
     /// The name on the command line and in JSON.
@@ -80,7 +80,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         output::write(path, |out| write(&mesh, out))?;
     }
     let names = (solid.name(), options.method.name());
-    let summary = Summary::new(names, &report, thin.count, quality, simplified.as_ref(), milliseconds);
+    let summary = MeshSummary::new(names, &report, thin.count, quality, simplified.as_ref(), milliseconds);
     if shared.json {
         return output::json(&summary);
     }

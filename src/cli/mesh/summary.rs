@@ -7,7 +7,7 @@ use crate::mesh::{Quality, Report};
 
 /// The JSON document. Lengths are in metres, areas in m², volumes in m³.
 #[derive(Serialize)]
-pub(super) struct Summary {
+pub(super) struct MeshSummary {
     schema: u32,
     solid: String,
     vertices: usize,
@@ -55,7 +55,7 @@ impl From<&Simplified> for SimplifiedFigures {
     }
 }
 
-impl Summary {
+impl MeshSummary {
     /// The figures of a mesh that `method` made in some milliseconds, with `thin_cells` cells that hide a surface.
     pub fn new(
         (solid, method): (&str, &'static str),

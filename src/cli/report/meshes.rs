@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::super::args::MeshMethod;
 use super::super::failure::Failure;
-use super::super::plot::{self, Axis};
+use super::super::plot::{self, LogAxis};
 use super::super::progress;
 use crate::Solid;
 use crate::mesh::{self, Grid, Quality, Resolution};
@@ -21,9 +21,9 @@ const RESOLUTIONS: u32 = 4;
 /// Timed repetitions of which the fastest counts.
 const REPETITIONS: usize = 3;
 
-/// One mesh.
+/// The error and the time of one mesh, a row of the report.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Row {
+pub(super) struct MeshFigures {
     method: &'static str,
     cells: usize,
     /// Side of a cell.
@@ -43,10 +43,10 @@ pub(super) struct Row {
 }
 
 /// Meshes a solid by each method with up to `finest` cells. Nothing for a solid without bounds.
-pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<Row>, Failure> {
+pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, Failure> {
     let Some(bounds) = solid.bounds().aabb() else { return Ok(Vec::new()) };
     let bar = progress::bar(u64::from(2 * RESOLUTIONS), "meshing");
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<MeshFigures> = Vec::new();
     for method in [MeshMethod::Mc, MeshMethod::Dc] {
         for halvings in (0..RESOLUTIONS).rev() {
             let cells = (finest >> halvings).max(Grid::MIN_CELLS);
@@ -68,7 +68,7 @@ fn order(coarse: f64, fine: f64) -> Option<f64> {
     Some((coarse / fine).log2()).filter(|order| order.is_finite())
 }
 
-fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<Row, Failure> {
+fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<MeshFigures, Failure> {
     let surface = solid.surface(*grid.bounds());
     let mut fastest = f64::INFINITY;
     let mut mesh = mesh::Mesh::default();
@@ -79,7 +79,7 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<R
     }
     let report = mesh::check(&mesh, &*surface);
     let quality = mesh::measure(&mesh, &*surface, &Depth(solid), grid).map_err(Failure::usage)?;
-    Ok(Row {
+    Ok(MeshFigures {
         method: method.name(),
         cells,
         spacing: grid.spacing().min_element(),
@@ -95,7 +95,7 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<R
     })
 }
 
-pub(super) fn print(rows: &[Row]) {
+pub(super) fn print(rows: &[MeshFigures]) {
     if rows.is_empty() {
         return println!("no meshes: the solid has no bounds");
     }
@@ -139,14 +139,15 @@ pub(super) fn print(rows: &[Row]) {
 }
 
 /// Hausdorff distance against cells, a line for each method, as SVG or PNG.
-pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
-    let marks: Vec<(&Row, f64)> = rows
+pub(super) fn draw(solid: &str, rows: &[MeshFigures], path: &Path) -> Result<Vec<u8>, Failure> {
+    let marks: Vec<(&MeshFigures, f64)> = rows
         .iter()
         .map(|row| (row, row.quality.hausdorff()))
         .filter(|(_, error)| *error > 0.0 && error.is_finite())
         .collect();
-    let x = Axis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);
-    let y = Axis::over(marks.iter().map(|(_, error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
+    let x =
+        LogAxis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);
+    let y = LogAxis::over(marks.iter().map(|(_, error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
     let mut out = plot::begin(&format!("{solid}: error of its meshes"));
     plot::grid(&mut out, &x, &y, ["cells along the longest side", "Hausdorff distance"]);
     let legend = plot::WIDTH - plot::RIGHT + 22.0;

@@ -4,8 +4,8 @@ use glam::DVec3;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use crate::Solid;
 use crate::geom::Aabb;
+use crate::{Precision, Solid};
 
 /// Points of a timed batch: enough to fill the pipelines, few enough to stay in the nearest cache.
 const TIMED: usize = 4096;
@@ -16,7 +16,7 @@ const JUDGED: usize = 600;
 /// Points on the surface whose errors are measured.
 const ON_SURFACE: usize = 400;
 
-pub(super) struct Points {
+pub(super) struct SamplePoints {
     pub over: Aabb,
     pub random: Vec<DVec3>,
     /// How many of the random points are judged; they come first.
@@ -25,7 +25,7 @@ pub(super) struct Points {
     pub surface: Vec<DVec3>,
 }
 
-impl Points {
+impl SamplePoints {
     /// The same points for the same solid and box.
     pub fn choose(solid: &Solid, over: Aabb) -> Self {
         let mut generator = Pcg64::seed_from_u64(1);
@@ -44,10 +44,13 @@ impl Points {
         Self { over, random, random_judged: JUDGED, surface }
     }
 
-    /// The points whose errors are measured, random ones first; rounded to `f32` if the program will see them so.
-    pub fn judged(&self, single: bool) -> impl Iterator<Item = DVec3> + '_ {
+    /// The points whose errors are measured, random ones first, as programs of a precision see them.
+    pub fn judged(&self, precision: Precision) -> impl Iterator<Item = DVec3> + '_ {
         let points = self.random[..self.random_judged].iter().chain(&self.surface);
-        points.map(move |p| if single { p.as_vec3().as_dvec3() } else { *p })
+        points.map(move |p| match precision {
+            Precision::F32 => p.as_vec3().as_dvec3(),
+            Precision::F64 => *p,
+        })
     }
 }
 

@@ -10,17 +10,8 @@
 use glam::{DMat3, DVec3};
 
 use super::super::normals::unit;
-use super::project;
+use super::project::{self, FacePoint};
 use crate::field::Field;
-
-/// A face beside a crease.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Face {
-    /// A point of the face: it tells on which side of the crease the face lies.
-    pub point: DVec3,
-    /// Unit normal.
-    pub normal: DVec3,
-}
 
 /// The distances δ of the probes from the crease, in sizes. Each is much larger than the error that the one before
 /// leaves (κ·size is below 1 where a grid resolves the surface at all), so that probes fall on their own faces; the last
@@ -40,11 +31,11 @@ const RESIDUAL: f64 = 1e-9;
 pub(super) fn find(
     field: &dyn Field,
     start: DVec3,
-    faces: &[Face],
+    faces: &[FacePoint],
     size: f64,
     count: &mut u64,
 ) -> Option<DVec3> {
-    let mut planes: [Face; 3] = [faces[0]; 3];
+    let mut planes: [FacePoint; 3] = [faces[0]; 3];
     planes[..faces.len()].copy_from_slice(faces);
     let planes = &mut planes[..faces.len()];
     let mut at = meeting_point(start, planes)?;
@@ -67,20 +58,20 @@ pub(super) fn find(
 /// The tangent plane of the face near a probe, which misses the face by the square of their distance, as a plane that
 /// touches it would at δ from the crease. Where the field there is another face's, the face is sought at most δ away:
 /// farther, the point may be on another.
-fn tangent(field: &dyn Field, probe: DVec3, normal: DVec3, delta: f64, count: &mut u64) -> Option<Face> {
+fn tangent(field: &dyn Field, probe: DVec3, normal: DVec3, delta: f64, count: &mut u64) -> Option<FacePoint> {
     *count += 1;
     let (omega, gradient) = field.omega_grad(probe);
     let found = unit(-gradient)
-        .map(|normal| Face { point: probe - gradient * (omega / gradient.length_squared()), normal });
-    let is_same = |face: &Face| {
+        .map(|normal| FacePoint { point: probe - gradient * (omega / gradient.length_squared()), normal });
+    let is_same = |face: &FacePoint| {
         face.normal.dot(normal) > project::SAME_FACE && face.point.distance(probe) <= 0.5 * delta
     };
     found.filter(is_same).or_else(|| project::onto_face(field, probe, normal, delta, count))
 }
 
 /// The point nearest to `from` in two or three planes; none where they are nearly parallel.
-fn meeting_point(from: DVec3, planes: &[Face]) -> Option<DVec3> {
-    let height = |face: &Face| face.normal.dot(face.point - from);
+fn meeting_point(from: DVec3, planes: &[FacePoint]) -> Option<DVec3> {
+    let height = |face: &FacePoint| face.normal.dot(face.point - from);
     let (a, b) = (&planes[0], &planes[1]);
     let cosine = a.normal.dot(b.normal);
     if cosine.abs() > SMOOTH {
@@ -122,8 +113,11 @@ mod tests {
     #[test]
     fn the_rim_of_a_can_is_found_to_the_last_digits() {
         let faces = [
-            Face { point: DVec3::new(0.9, 0.0, 0.0), normal: DVec3::Z },
-            Face { point: DVec3::new(0.99, 0.14, -0.1), normal: DVec3::new(0.99, 0.14, 0.0).normalize() },
+            FacePoint { point: DVec3::new(0.9, 0.0, 0.0), normal: DVec3::Z },
+            FacePoint {
+                point: DVec3::new(0.99, 0.14, -0.1),
+                normal: DVec3::new(0.99, 0.14, 0.0).normalize(),
+            },
         ];
         let start = DVec3::new(0.97, 0.05, -0.03);
         let found = find(&can(), start, &faces, 0.1, &mut 0).unwrap();
@@ -135,7 +129,7 @@ mod tests {
     fn a_smooth_bend_is_no_crease() {
         let ball = Closures { omega: |p: DVec3| 0.01 - p.length_squared(), gradient: |p: DVec3| -2.0 * p };
         let at = |angle: f64| DVec3::new(angle.cos(), angle.sin(), 0.0);
-        let faces = [0.0, 0.9].map(|angle| Face { point: 0.1 * at(angle), normal: at(angle) });
+        let faces = [0.0, 0.9].map(|angle| FacePoint { point: 0.1 * at(angle), normal: at(angle) });
         assert_eq!(find(&ball, DVec3::new(0.095, 0.05, 0.0), &faces, 0.1, &mut 0), None);
     }
 
@@ -148,7 +142,7 @@ mod tests {
         let faces = [0, 1, 2].map(|axis| {
             let mut point = DVec3::splat(-0.3);
             point[axis] = 0.0;
-            Face { point, normal: DVec3::AXES[axis] }
+            FacePoint { point, normal: DVec3::AXES[axis] }
         });
         let found = find(&corner, DVec3::splat(-0.1), &faces, 1.0, &mut 0).unwrap();
         assert!(found.length() < 1e-15, "{found}");

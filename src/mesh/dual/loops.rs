@@ -10,7 +10,7 @@ use smallvec::SmallVec;
 
 use super::super::{
     cases::{Ambiguous, FACES, loops, needs_values},
-    patches::{self, Cell},
+    patches::{self, CellValues},
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, inside_corners, set_positions},
 };
@@ -60,7 +60,7 @@ impl Sheets {
     pub fn find(field: &dyn Field, lattice: &Lattice, low: [usize; 3], around: &Around) -> Self {
         let mut sheets = Self { undecided: Vec::new(), vertices: 0, evaluations: 0 };
         for cell in patches::undecided(around) {
-            let (polygons, tunnel) = Cell::new(field, lattice, patches::cell_low(low, cell)).loops();
+            let (polygons, tunnel) = CellValues::new(field, lattice, patches::cell_low(low, cell)).loops();
             let found = CellLoops {
                 cell,
                 loops: polygons.iter().map(|polygon| Loop::of(polygon)).collect(),

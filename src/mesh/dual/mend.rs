@@ -16,7 +16,7 @@ use rustc_hash::FxHashSet;
 
 use super::super::normals::{gradients, unit};
 use super::patch::{FACING, NEAR, Pair, Patch, STEPS};
-use super::vertices::{Kind, Vertex, Vertices};
+use super::vertices::{Vertex, VertexKind, Vertices};
 use super::{crease, project};
 use crate::field::Field;
 
@@ -124,7 +124,7 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
     let may_merge = aim == Aim::Folds || old.iter().any(|t| patch.fold(*t) > FACING);
     for v in pair.corners() {
         let old = patch.vertices.get(v);
-        if old.kind != Kind::Sharp {
+        if old.kind != VertexKind::Sharp {
             continue;
         }
         let before = patch.badness_around(v, f64::INFINITY);
@@ -182,7 +182,7 @@ fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
     let mut found = Vec::new();
     if let [Some(first), Some(second)] = faces {
         let at = crease::find(field, start, &[first, second], reach, count);
-        found.extend(at.map(|position| Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp }));
+        found.extend(at.map(|position| Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp }));
     }
     let mean = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
     let mut near: Vec<_> = project::newton(field, start, reach, count).into_iter().collect();
@@ -196,8 +196,8 @@ fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
     found
 }
 
-fn on_face(face: crease::Face) -> Vertex {
-    Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp }
+fn on_face(face: project::FacePoint) -> Vertex {
+    Vertex { position: face.point, normal: face.normal, kind: VertexKind::Sharp }
 }
 
 /// A vertex nearer to the surface than this, in cells, has no place near it to go to.
@@ -230,7 +230,7 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
     found.retain(|vertex| patch.bounds.contains(vertex.position));
     if may_merge {
         let others = patch.mergeable(v).into_iter();
-        found.extend(others.map(|other| Vertex { kind: Kind::Sharp, ..patch.vertices.get(other) }));
+        found.extend(others.map(|other| Vertex { kind: VertexKind::Sharp, ..patch.vertices.get(other) }));
     }
     found
 }
@@ -252,7 +252,7 @@ pub(super) fn folded(
         let mut suspects = Vec::new();
         for t in part {
             let kinds = t.map(|v| vertices.kinds[v as usize]);
-            if kinds.contains(&Kind::Sharp) && !kinds.contains(&Kind::Cap) {
+            if kinds.contains(&VertexKind::Sharp) && !kinds.contains(&VertexKind::Cap) {
                 suspects.push(*t);
             }
         }
@@ -300,7 +300,7 @@ mod tests {
         let mut vertices = Vertices::default();
         for place in places {
             let position = DVec3::from_array(*place);
-            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
         }
         vertices
     }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 use super::super::normals::unit;
-use super::vertices::{Kind, Vertex, Vertices};
+use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 use crate::geom::Aabb;
 
@@ -115,7 +115,7 @@ impl<'a> Patch<'a> {
     fn is_free(&self, v: u32) -> bool {
         let (p, Aabb { min, max }) = (self.position(v), *self.bounds);
         let is_within = p.cmpgt(min).all() && p.cmplt(max).all();
-        is_within && self.fans.contains_key(&v) && self.vertices.kinds[v as usize] != Kind::Cap
+        is_within && self.fans.contains_key(&v) && self.vertices.kinds[v as usize] != VertexKind::Cap
     }
 
     pub fn position(&self, v: u32) -> DVec3 {
@@ -255,7 +255,7 @@ impl<'a> Patch<'a> {
         let met = around.iter().copied().find(|&other| self.position(other) == vertex.position);
         self.vertices.set(v, vertex);
         if let Some(met) = met {
-            self.vertices.kinds[met as usize] = Kind::Sharp;
+            self.vertices.kinds[met as usize] = VertexKind::Sharp;
             let others = self.around(met);
             around.iter().chain(&others).for_each(|v| {
                 self.fans.remove(v);

@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::super::{
     cases::{EDGES, tube},
     crossings::{Crossed, Task},
-    normals::Gradients,
+    normals::GradientColumns,
     patches::cell_low,
     prune::{BRICK, Lattice},
     signs::{
@@ -19,16 +19,14 @@ use super::super::{
     },
 };
 use super::loops::{CellLoops, LOOPS, Loop, Sheets};
-use super::vertices::{Hit, Hits, Kind, Rings, Vertex};
-use super::{project, sharp};
+use super::project;
+use super::sharp::{self, SLIDE};
+use super::vertices::{Hit, Hits, Rings, Vertex, VertexKind};
 use crate::field::Field;
 use crate::geom::Aabb;
 
 /// Hits whose normals all lie within this of their mean (cosine of 10°) see a smooth surface.
 const NEARLY_FLAT: f64 = 0.985;
-
-/// How far from its cell a point may slide onto the surface, in cells.
-pub(super) const SLIDE: f64 = 0.5;
 
 /// Newton steps onto a smooth surface.
 const STEPS: usize = 4;
@@ -46,7 +44,7 @@ pub(super) struct Slots<'a> {
     pub first: u32,
     pub positions: &'a mut [DVec3],
     pub normals: &'a mut [DVec3],
-    pub kinds: &'a mut [Kind],
+    pub kinds: &'a mut [VertexKind],
 }
 
 /// What the cells of a task give besides vertices.
@@ -72,20 +70,20 @@ pub(super) struct Twice {
 }
 
 /// Memory that a thread keeps from task to task.
-pub(super) struct Scratch {
+pub(super) struct PlacementScratch {
     table: Box<VertexTable>,
-    gradients: Gradients,
+    gradients: GradientColumns,
     hits: Vec<Hit>,
 }
 
-impl Default for Scratch {
+impl Default for PlacementScratch {
     fn default() -> Self {
-        Self { table: vertex_table(), gradients: Gradients::default(), hits: Vec::new() }
+        Self { table: vertex_table(), gradients: GradientColumns::default(), hits: Vec::new() }
     }
 }
 
 /// What all tasks read, and the rings that they fill.
-pub(super) struct Scene<'a> {
+pub(super) struct Placement<'a> {
     pub field: &'a dyn Field,
     pub lattice: &'a Lattice,
     pub signs: &'a [Signs],
@@ -96,9 +94,9 @@ pub(super) struct Scene<'a> {
     pub spacing: DVec3,
 }
 
-impl Scene<'_> {
+impl Placement<'_> {
     /// Places the vertices of a task's cells.
-    pub fn place(&self, task: &Task<Sheets>, mut slots: Slots<'_>, scratch: &mut Scratch) -> Placed {
+    pub fn place(&self, task: &Task<Sheets>, mut slots: Slots<'_>, scratch: &mut PlacementScratch) -> Placed {
         let mut placed = Placed::default();
         let mut next = 0;
         for (brick, sheets) in task.bricks.iter().zip(&task.kept) {
@@ -140,7 +138,7 @@ impl Scene<'_> {
         around: &Loop,
         place: usize,
         slots: &mut Slots<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut PlacementScratch,
         placed: &mut Placed,
     ) {
         let vertex = slots.first + place as u32;
@@ -197,7 +195,7 @@ impl Scene<'_> {
         around: &Loop,
         place: usize,
         slots: &mut Slots<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut PlacementScratch,
         placed: &mut Placed,
     ) {
         let base = edge_slot(0, [cell.1 % BRICK, cell.1 / BRICK, cell.0]);
@@ -215,7 +213,7 @@ impl Scene<'_> {
             let start = at(i).midpoint(at(i + 1)).lerp(mean, INTO_CELL);
             let found = project::newton(self.field, start, INTO_CELL * size, &mut placed.gradients);
             let position = found.map_or(start, |face| face.point);
-            slots.set(place + i, Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            slots.set(place + i, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
             placed.fallbacks.push((vertex, start));
         }
     }
@@ -244,10 +242,10 @@ impl Scene<'_> {
     }
 
     /// Moves the vertices of smooth cells onto the surface, together.
-    fn settle_smooth(&self, slots: &mut Slots<'_>, gradients: &mut Gradients, placed: &mut Placed) {
+    fn settle_smooth(&self, slots: &mut Slots<'_>, gradients: &mut GradientColumns, placed: &mut Placed) {
         let size = self.spacing.min_element();
         let mut moving: Vec<usize> =
-            (0..slots.kinds.len()).filter(|&v| slots.kinds[v] == Kind::Smooth).collect();
+            (0..slots.kinds.len()).filter(|&v| slots.kinds[v] == VertexKind::Smooth).collect();
         let hints: Vec<DVec3> = moving.iter().map(|&v| slots.normals[v]).collect();
         let starts: Vec<DVec3> = moving.iter().map(|&v| slots.positions[v]).collect();
         let smooth = moving.clone();
@@ -273,7 +271,7 @@ impl Scene<'_> {
             if !is_near || slots.normals[v].dot(hint) < NEARLY_FLAT {
                 let found = project::along(self.field, start, hint, SLIDE * size, &mut placed.gradients);
                 let (position, normal) = found.map_or((start, DVec3::ZERO), |face| (face.point, face.normal));
-                slots.set(v, Vertex { position, normal, kind: Kind::Sharp });
+                slots.set(v, Vertex { position, normal, kind: VertexKind::Sharp });
                 placed.fallbacks.push((slots.first + v as u32, start));
             }
         }

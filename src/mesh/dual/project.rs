@@ -7,7 +7,6 @@
 use glam::DVec3;
 
 use super::super::normals::unit;
-use super::crease::Face;
 use crate::field::Field;
 
 /// Newton steps; twice as many as a smooth surface takes.
@@ -25,8 +24,17 @@ const FIRST_STEP: f64 = 1.0 / 64.0;
 /// Steps of the bracketed search: bisection alone would be done with fewer.
 const BRACKETED: usize = 80;
 
+/// A point of the surface and the face that it lies on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FacePoint {
+    /// Beside a crease, the point tells on which side of the crease the face lies.
+    pub point: DVec3,
+    /// The outward unit normal at the point.
+    pub normal: DVec3,
+}
+
 /// Newton's method within `size` of `start`.
-pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64) -> Option<Face> {
+pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64) -> Option<FacePoint> {
     let mut at = start;
     for _ in 0..STEPS {
         *count += 1;
@@ -37,7 +45,7 @@ pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64
             return None;
         }
         if step.length() <= LAST_STEP * size {
-            return Some(Face { point: at, normal: unit(-gradient)? });
+            return Some(FacePoint { point: at, normal: unit(-gradient)? });
         }
     }
     None
@@ -50,7 +58,7 @@ pub(super) fn along(
     normal: DVec3,
     size: f64,
     count: &mut u64,
-) -> Option<Face> {
+) -> Option<FacePoint> {
     if !(size > 0.0 && size.is_finite()) {
         return None; // steps of no length would never end
     }
@@ -96,7 +104,7 @@ pub(super) fn along(
     let t = if ends[0].0 <= ends[1].0 { ends[0].1 } else { ends[1].1 };
     *count += 1;
     let point = start + t * normal;
-    Some(Face { point, normal: unit(-field.omega_grad(point).1)? })
+    Some(FacePoint { point, normal: unit(-field.omega_grad(point).1)? })
 }
 
 /// The surface near `start` where it faces about as `normal` does.
@@ -106,8 +114,8 @@ pub(super) fn onto_face(
     normal: DVec3,
     size: f64,
     count: &mut u64,
-) -> Option<Face> {
-    let faces_alike = |face: &Face| face.normal.dot(normal) > SAME_FACE;
+) -> Option<FacePoint> {
+    let faces_alike = |face: &FacePoint| face.normal.dot(normal) > SAME_FACE;
     newton(field, start, size, count)
         .filter(faces_alike)
         .or_else(|| along(field, start, normal, size, count).filter(faces_alike))

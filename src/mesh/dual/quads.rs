@@ -15,18 +15,18 @@ use rayon::prelude::*;
 
 use super::super::{
     crossings::{self, Crossed, Task},
-    normals::{Gradients, unit},
+    normals::{GradientColumns, unit},
     prune::BRICK,
     signs::Signs,
 };
 use super::loops::Sheets;
 use super::place::Placed;
-use super::vertices::{Hit, Hits, Kind, NONE, Rings, Vertex, Vertices};
+use super::vertices::{Hit, Hits, NONE, Rings, Vertex, VertexKind, Vertices};
 use crate::field::Field;
 
 /// What the quads are made of.
 pub(super) struct Quads<'a> {
-    field: &'a dyn Field,
+    pub field: &'a dyn Field,
     signs: &'a [Signs],
     crossed: &'a Crossed<Sheets>,
     hits: &'a Hits,
@@ -73,7 +73,7 @@ impl<'a> Quads<'a> {
             let middle = vertices.len() as u32;
             let ends = pair[0].segment.map(|hit| hits.get(hit).position);
             let position = ends[0].midpoint(ends[1]);
-            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
             for hit in pair[0].segment {
                 middles.insert((hit, [pair[0].vertex, pair[1].vertex]), middle);
             }
@@ -89,7 +89,7 @@ impl<'a> Quads<'a> {
         let counts = self.crossed.tasks.iter().map(|task| 2 * task.vertices);
         let jobs = self.crossed.tasks.par_iter().zip(crossings::parts(&mut triangles, counts));
         let parts: Vec<Cut> = jobs
-            .map_init(Gradients::default, |gradients, (task, triangles)| {
+            .map_init(GradientColumns::default, |gradients, (task, triangles)| {
                 let mut cut = Cut::default();
                 let mut doubtful = Vec::new();
                 let first = task.first as u32;
@@ -128,7 +128,7 @@ impl<'a> Quads<'a> {
         let touched: Vec<Quad> = touched.copied().collect();
         let mut triangles = std::mem::take(&mut cut.triangles);
         cut.spoilt.clear();
-        self.cut_doubtful(vertices, &touched, &mut Gradients::default(), cut, |hit, pair| {
+        self.cut_doubtful(vertices, &touched, &mut GradientColumns::default(), cut, |hit, pair| {
             triangles[2 * hit as usize..][..2].copy_from_slice(&pair);
         });
         cut.triangles = triangles;
@@ -143,7 +143,7 @@ impl<'a> Quads<'a> {
         for (hit, rim) in fans {
             let centre = vertices.len() as u32;
             let Hit { position, normal, .. } = self.hits.get(hit);
-            vertices.push(Vertex { position, normal, kind: Kind::Sharp });
+            vertices.push(Vertex { position, normal, kind: VertexKind::Sharp });
             let next = rim.iter().cycle().skip(1);
             triangles.extend(rim.iter().zip(next).map(|(&a, &b)| [centre, a, b]));
         }
@@ -189,9 +189,9 @@ impl<'a> Quads<'a> {
     fn cut_smooth(&self, vertices: &Vertices, (hit, corners): Quad) -> Option<bool> {
         let corners = corners.map(|v| v as usize);
         if self.hits.is_cap[hit as usize] {
-            return Some(true).filter(|_| corners.iter().all(|&v| vertices.kinds[v] == Kind::Cap));
+            return Some(true).filter(|_| corners.iter().all(|&v| vertices.kinds[v] == VertexKind::Cap));
         }
-        if corners.iter().any(|&v| vertices.kinds[v] != Kind::Smooth) {
+        if corners.iter().any(|&v| vertices.kinds[v] != VertexKind::Smooth) {
             return None;
         }
         // written out: `map` over four vectors becomes a call
@@ -224,7 +224,7 @@ impl<'a> Quads<'a> {
         &self,
         vertices: &Vertices,
         quads: &[Quad],
-        gradients: &mut Gradients,
+        gradients: &mut GradientColumns,
         cut: &mut Cut,
         mut write: impl FnMut(u32, [[u32; 3]; 2]),
     ) {
@@ -248,7 +248,7 @@ impl<'a> Quads<'a> {
             let (first, second) = (agreement[0].min(agreement[1]), agreement[2].min(agreement[3]));
             write(hit, halves(quad, first >= second));
             if first.max(second) < 0.0 {
-                cut.spoilt.extend(quad.iter().filter(|&&v| vertices.kinds[v as usize] == Kind::Sharp));
+                cut.spoilt.extend(quad.iter().filter(|&&v| vertices.kinds[v as usize] == VertexKind::Sharp));
             }
         }
     }

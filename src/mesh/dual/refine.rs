@@ -9,11 +9,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::normals::{Gradients, gradients, unit};
+use super::super::normals::{GradientColumns, gradients, unit};
 use super::crease;
 
 use super::project;
-use super::vertices::{Kind, Vertex, Vertices};
+use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 
 /// The distance of an edge's middle from the surface above which it is cut, in cells. It bounds what is left: the pawn
@@ -52,7 +52,7 @@ pub(super) fn refine(
     for _ in 0..ROUNDS {
         let others: Vec<[u32; 3]> = changed.iter().map(|&t| triangles[t as usize]).collect();
         let found = cuts(field, vertices, (&triangles[fresh.clone()], &others), TOLERANCE * size);
-        let Found { cuts, left: uncut, evaluations: count } = found;
+        let FoundEdges { cuts, left: uncut, evaluations: count } = found;
         evaluations += count;
         left.extend(uncut);
         if cuts.is_empty() {
@@ -75,7 +75,7 @@ type EdgeCut = ([u32; 2], Vertex);
 
 /// What is found about edges.
 #[derive(Default)]
-struct Found {
+struct FoundEdges {
     cuts: Vec<EdgeCut>,
     /// Edges that are too far from the surface but have no vertex to cut them.
     left: Vec<[u32; 2]>,
@@ -88,12 +88,12 @@ fn cuts(
     vertices: &Vertices,
     (fresh, changed): (&[[u32; 3]], &[[u32; 3]]),
     tolerance: f64,
-) -> Found {
-    let parts: Vec<Found> = fresh
+) -> FoundEdges {
+    let parts: Vec<FoundEdges> = fresh
         .par_chunks(BATCH)
         .chain(changed.par_chunks(BATCH))
         .map_init(
-            || (Vec::new(), Gradients::default()),
+            || (Vec::new(), GradientColumns::default()),
             |(edges, gradients), triangles| {
                 edges.clear();
                 triangles.iter().for_each(|t| add_bulging(vertices, *t, tolerance, edges));
@@ -101,7 +101,7 @@ fn cuts(
             },
         )
         .collect();
-    let mut all = Found::default();
+    let mut all = FoundEdges::default();
     for part in parts {
         all.cuts.extend(part.cuts);
         all.left.extend(part.left);
@@ -116,9 +116,9 @@ fn cuts_of(
     field: &dyn Field,
     vertices: &Vertices,
     edges: &[[u32; 2]],
-    gradients: &mut Gradients,
+    gradients: &mut GradientColumns,
     tolerance: f64,
-) -> Found {
+) -> FoundEdges {
     let middle_of = |edge: &[u32; 2]| {
         let [a, b] = edge.map(|v| vertices.positions[v as usize]);
         0.5 * (a + b)
@@ -152,7 +152,7 @@ fn cuts_of(
             Middle::Nowhere => left.push(edge),
         }
     }
-    Found { cuts: cut, left, evaluations: count }
+    FoundEdges { cuts: cut, left, evaluations: count }
 }
 
 /// Edges that leave the surface although their middles are near it: they enter a wall thinner than a cell, or a gap.
@@ -163,7 +163,7 @@ fn far_beside(
     tolerance: f64,
     count: &mut u64,
 ) -> Vec<[u32; 2]> {
-    let is_sharp = |v: u32| vertices.kinds[v as usize] == Kind::Sharp;
+    let is_sharp = |v: u32| vertices.kinds[v as usize] == VertexKind::Sharp;
     let normal = |v: u32| vertices.normals[v as usize];
     let doubtful: Vec<[u32; 2]> =
         edges.filter(|&[a, b]| is_sharp(a) || is_sharp(b) || normal(a).dot(normal(b)) < 0.5).collect();
@@ -197,9 +197,9 @@ fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec
         let chord = positions[j] - positions[i];
         let bulges = (normals[j] - normals[i]).dot(chord).abs() > 4.0 * tolerance;
         let may_bulge = match (kinds[i], kinds[j]) {
-            (Kind::Smooth, Kind::Smooth) => bulges,
+            (VertexKind::Smooth, VertexKind::Smooth) => bulges,
             // a cap is no part of ω = 0
-            (Kind::Cap, _) | (_, Kind::Cap) => false,
+            (VertexKind::Cap, _) | (_, VertexKind::Cap) => false,
             // sheets that touch
             _ => chord != DVec3::ZERO,
         };
@@ -227,7 +227,7 @@ impl Bend {
     /// The bend of an edge, if it is one, one step of Newton's method on; `found` are ω and ∇ω at its middle.
     fn new(vertices: &Vertices, edge: [u32; 2], found: (f64, DVec3)) -> Option<Self> {
         let [a, b] = edge.map(|v| vertices.get(v));
-        if a.kind != Kind::Smooth || b.kind != Kind::Smooth {
+        if a.kind != VertexKind::Smooth || b.kind != VertexKind::Smooth {
             return None;
         }
         let (mean, normal) = (unit(a.normal + b.normal)?, unit(-found.1)?);
@@ -254,7 +254,7 @@ impl Bend {
     fn cut(&self, tolerance: f64) -> Option<EdgeCut> {
         let Self { edge, start, position, normal, .. } = *self;
         (position.distance(start) > tolerance)
-            .then_some((edge, Vertex { position, normal, kind: Kind::Smooth }))
+            .then_some((edge, Vertex { position, normal, kind: VertexKind::Smooth }))
     }
 }
 
@@ -319,7 +319,7 @@ fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u6
         // the bottom of a groove between walls at ±angle/2 lies half a length · tan(angle/2) below the middle
         let drop = (0.5 * first.normal.angle_between(second.normal)).tan();
         if let Some(position) = found.filter(|p| is_near(p, (0.25 + 0.75 * drop).min(LONGEST_DROP))) {
-            return Middle::At(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            return Middle::At(Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
         }
     }
     let normal = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
@@ -328,13 +328,15 @@ fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u6
         None => project::newton(field, start, length, count),
     };
     match found.filter(|face| is_near(&face.point, LONGEST_MOVE)) {
-        Some(face) => Middle::At(Vertex { position: face.point, normal: face.normal, kind: Kind::Smooth }),
+        Some(face) => {
+            Middle::At(Vertex { position: face.point, normal: face.normal, kind: VertexKind::Smooth })
+        }
         None => Middle::Nowhere,
     }
 }
 
-/// Divides triangles at cut edges: the first part takes the place of the whole, the others go to the end. Returns the
-/// places of those that were divided. `middles` are sorted by their edges.
+/// Divides triangles at cut edges. The first part takes the place of the whole, the others go to the end. Returns the
+/// numbers of the triangles that were divided. `middles` are sorted by their edges.
 fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 2], u32)]) -> Vec<u32> {
     let mut is_end = vec![false; vertices.len()];
     middles.iter().flat_map(|m| m.0).for_each(|v| is_end[v as usize] = true);
@@ -345,9 +347,22 @@ fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 
         let at = middles.binary_search_by_key(&[a.min(b), a.max(b)], |m| m.0).ok()?;
         Some(middles[at].1)
     };
-    let position = |v: u32| vertices.positions[v as usize];
-    let distance = |a: u32, b: u32| position(a).distance(position(b));
-    // few triangles have two ends of cut edges: counting them takes no branches
+    let mut changed = Vec::new();
+    let mut others = Vec::new();
+    for t in with_cut_ends(triangles, &is_end) {
+        let triangle = &mut triangles[t];
+        if let Some(first) = divide_one(vertices, *triangle, middle, &mut others) {
+            *triangle = first;
+            changed.push(t as u32);
+        }
+    }
+    triangles.extend(others);
+    changed
+}
+
+/// The triangles that have at least two ends of cut edges, ascending.
+fn with_cut_ends(triangles: &[[u32; 3]], is_end: &[bool]) -> Vec<usize> {
+    // few triangles have two such ends: counting them takes no branches
     let is_touched = |[a, b, c]: [u32; 3]| {
         u8::from(is_end[a as usize]) + u8::from(is_end[b as usize]) + u8::from(is_end[c as usize]) >= 2
     };
@@ -361,44 +376,49 @@ fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 
         touched
     };
     let touched: Vec<Vec<usize>> = triangles.par_chunks(BATCH).enumerate().map(find).collect();
-    let mut changed = Vec::new();
-    let mut others = Vec::new();
-    for t in touched.into_iter().flatten() {
-        let triangle = &mut triangles[t];
-        let [a, b, c] = *triangle;
-        // turned so that the first side is cut if one is, and the third is whole if one is
-        let turns = [[a, b, c], [b, c, a], [c, a, b]];
-        let cuts = turns.map(|[p, q, _]| middle(p, q));
-        let turn = match cuts.map(|m| m.is_some()) {
-            [false, false, false] => continue,
-            [false, true, _] => 1,
-            [_, false, true] => 2,
-            _ => 0,
-        };
-        changed.push(t as u32);
-        let [a, b, c] = turns[turn];
-        match [cuts[turn], cuts[(turn + 1) % 3], cuts[(turn + 2) % 3]] {
-            [Some(ab), Some(bc), Some(ca)] => {
-                *triangle = [a, ab, ca];
-                others.extend([[ab, b, bc], [bc, c, ca], [ab, bc, ca]]);
-            }
-            [Some(ab), Some(bc), None] if distance(ab, c) <= distance(a, bc) => {
-                *triangle = [ab, b, bc];
-                others.extend([[ab, bc, c], [a, ab, c]]);
-            }
-            [Some(ab), Some(bc), None] => {
-                *triangle = [ab, b, bc];
-                others.extend([[a, ab, bc], [a, bc, c]]);
-            }
-            [Some(ab), _, _] => {
-                *triangle = [a, ab, c];
-                others.push([ab, b, c]);
-            }
-            _ => {}
+    touched.concat()
+}
+
+/// Divides one triangle: returns its first part and adds the rest to `others`. `None` if `middle`, which gives the
+/// vertex that cuts an edge, knows of no cut on its sides.
+fn divide_one(
+    vertices: &Vertices,
+    [a, b, c]: [u32; 3],
+    middle: impl Fn(u32, u32) -> Option<u32>,
+    others: &mut Vec<[u32; 3]>,
+) -> Option<[u32; 3]> {
+    // turned so that the first side is cut if one is, and the third is whole if one is
+    let turns = [[a, b, c], [b, c, a], [c, a, b]];
+    let cuts = turns.map(|[p, q, _]| middle(p, q));
+    let turn = match cuts.map(|m| m.is_some()) {
+        [false, false, false] => return None,
+        [false, true, _] => 1,
+        [_, false, true] => 2,
+        [true, ..] => 0,
+    };
+    let [a, b, c] = turns[turn];
+    let ab = cuts[turn]?;
+    let position = |v: u32| vertices.positions[v as usize];
+    let distance = |a: u32, b: u32| position(a).distance(position(b));
+    let first = match [cuts[(turn + 1) % 3], cuts[(turn + 2) % 3]] {
+        [Some(bc), Some(ca)] => {
+            others.extend([[ab, b, bc], [bc, c, ca], [ab, bc, ca]]);
+            [a, ab, ca]
         }
-    }
-    triangles.extend(others);
-    changed
+        [Some(bc), None] if distance(ab, c) <= distance(a, bc) => {
+            others.extend([[ab, bc, c], [a, ab, c]]);
+            [ab, b, bc]
+        }
+        [Some(bc), None] => {
+            others.extend([[a, ab, bc], [a, bc, c]]);
+            [ab, b, bc]
+        }
+        [None, _] => {
+            others.push([ab, b, c]);
+            [a, ab, c]
+        }
+    };
+    Some(first)
 }
 
 #[cfg(test)]
@@ -411,7 +431,7 @@ mod tests {
             [DVec3::ZERO, DVec3::X, DVec3::Y, 0.5 * DVec3::X, DVec3::new(0.5, 0.5, 0.0), 0.5 * DVec3::Y];
         let mut vertices = Vertices::default();
         for position in places {
-            vertices.push(Vertex { position, normal: DVec3::Z, kind: Kind::Smooth });
+            vertices.push(Vertex { position, normal: DVec3::Z, kind: VertexKind::Smooth });
         }
         let sides = [([0, 1], 3), ([0, 2], 5), ([1, 2], 4)];
         for chosen in 0..8 {

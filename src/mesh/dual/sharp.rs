@@ -7,11 +7,14 @@
 use glam::DVec3;
 
 use super::super::normals::unit;
-use super::crease::{self, Face};
-use super::vertices::{Hit, Kind, Vertex};
-use super::{place::SLIDE, qef};
+use super::project::FacePoint;
+use super::vertices::{Hit, Vertex, VertexKind};
+use super::{crease, qef};
 use crate::field::Field;
 use crate::geom::Aabb;
+
+/// How far from its cell a point may slide onto the surface, in cells.
+pub(super) const SLIDE: f64 = 0.5;
 
 /// Normals that differ less than this from each face found so far belong to one of them (cosine of 25°).
 const NEW_FACE: f64 = 0.906;
@@ -46,7 +49,7 @@ pub(super) fn at_crease(
     let lies_within = |p: DVec3, reach: f64| {
         p.cmpge(cell.min - reach * spacing).all() && p.cmple(cell.max + reach * spacing).all()
     };
-    let sharp = |position| Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp };
+    let sharp = |position| Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp };
 
     let planes = hits.iter().filter(|hit| hit.normal != DVec3::ZERO);
     let (least, rank) = qef::minimiser(planes.map(|hit| (hit.position, hit.normal)), mean);
@@ -65,7 +68,7 @@ pub(super) fn at_crease(
         _ => &[],
     };
     for chosen in pairs {
-        let few: Vec<Face> = chosen.iter().map(|&i| faces[i]).collect();
+        let few: Vec<FacePoint> = chosen.iter().map(|&i| faces[i]).collect();
         let mut start = mean;
         for _ in 0..TRIES {
             let Some(found) = crease::find(field, start, &few, size, count) else { break };
@@ -82,7 +85,7 @@ pub(super) fn at_crease(
     for start in [inside, mean] {
         let settled = settle(field, start, DVec3::ONE, size, count);
         if let Some((position, normal)) = settled.filter(|(p, _)| lies_within(*p, SLIDE)) {
-            return Vertex { position, normal, kind: Kind::Sharp };
+            return Vertex { position, normal, kind: VertexKind::Sharp };
         }
     }
     sharp(mean)
@@ -103,14 +106,14 @@ pub(super) fn on_border(
     if on_surface.is_empty() {
         let normal = unit(hits.iter().map(|hit| hit.normal).sum()).unwrap_or(DVec3::ZERO);
         let position = clamped(mean);
-        return (Vertex { position, normal, kind: Kind::Cap }, position);
+        return (Vertex { position, normal, kind: VertexKind::Cap }, position);
     }
     let mean = clamped(on_surface.iter().sum::<DVec3>() / on_surface.len() as f64);
     let free = DVec3::select(cell.size().cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO);
     let size = cell.size().max_element();
     let settled = settle(field, mean, free, size, count).filter(|(p, _)| clamped(*p) == *p);
     let position = settled.map_or(mean, |(p, _)| p);
-    (Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp }, mean)
+    (Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp }, mean)
 }
 
 /// The surface near a point by Newton's method along the free axes, with its normal.
@@ -150,16 +153,16 @@ fn middle_within(p: DVec3, along: DVec3, cell: &Aabb, margin: DVec3) -> Option<D
 }
 
 /// Up to three faces that the hits lie on: the two that differ most, and one that differs from both.
-fn faces(hits: &[Hit]) -> Vec<Face> {
-    let faces: Vec<Face> = hits
+fn faces(hits: &[Hit]) -> Vec<FacePoint> {
+    let faces: Vec<FacePoint> = hits
         .iter()
         .filter(|hit| hit.normal != DVec3::ZERO)
-        .map(|hit| Face { point: hit.position, normal: hit.normal })
+        .map(|hit| FacePoint { point: hit.position, normal: hit.normal })
         .collect();
     let pairs = (0..faces.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
     let cosine = |(i, j): &(usize, usize)| faces[*i].normal.dot(faces[*j].normal);
     let Some((a, b)) = pairs.min_by(|p, q| cosine(p).total_cmp(&cosine(q))) else { return Vec::new() };
-    let likeness = |face: &&Face| face.normal.dot(faces[a].normal).max(face.normal.dot(faces[b].normal));
+    let likeness = |face: &&FacePoint| face.normal.dot(faces[a].normal).max(face.normal.dot(faces[b].normal));
     let third = faces.iter().min_by(|p, q| likeness(p).total_cmp(&likeness(q)));
     let mut found = vec![faces[a], faces[b]];
     found.extend(third.filter(|face| likeness(face) < NEW_FACE));

@@ -13,11 +13,11 @@ pub(super) struct Vertex {
     pub position: DVec3,
     /// Outward unit normal; zero on creases and where there is none.
     pub normal: DVec3,
-    pub kind: Kind,
+    pub kind: VertexKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum VertexKind {
     /// The surface is smooth in the cell.
     Smooth,
     /// The surface may have a crease there.
@@ -31,14 +31,14 @@ pub(super) enum Kind {
 pub(super) struct Vertices {
     pub positions: Vec<DVec3>,
     pub normals: Vec<DVec3>,
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<VertexKind>,
 }
 
 impl Vertices {
     pub fn new(count: usize) -> Self {
         // rayon writes the zeros, so each thread touches memory of its own for the first time
         let zeros = || rayon::iter::repeat_n(DVec3::ZERO, count).collect();
-        Self { positions: zeros(), normals: zeros(), kinds: vec![Kind::Smooth; count] }
+        Self { positions: zeros(), normals: zeros(), kinds: vec![VertexKind::Smooth; count] }
     }
 
     pub fn len(&self) -> usize {

@@ -10,7 +10,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::super::Mesh;
-use super::Format;
+use super::format::Format;
 
 const MAGIC: &[u8; 4] = b"glTF";
 const VERSION: u32 = 2;

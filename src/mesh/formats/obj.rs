@@ -5,7 +5,7 @@
 use std::io::{self, Write};
 
 use super::super::Mesh;
-use super::Format;
+use super::format::Format;
 
 /// The entry of the table of formats.
 pub const FORMAT: Format =

@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::super::{Mesh, normals::unit};
-use super::Format;
+use super::format::Format;
 
 /// The entry of the table of formats.
 pub const FORMAT: Format = Format {

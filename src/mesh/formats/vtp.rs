@@ -10,7 +10,7 @@ use base64::prelude::BASE64_STANDARD;
 use base64::write::EncoderWriter;
 
 use super::super::Mesh;
-use super::Format;
+use super::format::Format;
 
 /// The entry of the table of formats.
 pub const FORMAT: Format = Format { ending: "vtp", purpose: "For ParaView", write, write_text: None };

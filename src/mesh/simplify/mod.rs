@@ -24,7 +24,7 @@ use glam::DVec3;
 use super::{
     Mesh,
     collapse::{Fans, compact},
-    normals::{Gradients, unit},
+    normals::{GradientColumns, unit},
     quality::nearest_point,
     slivers,
 };
@@ -59,7 +59,7 @@ pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize 
         return 0;
     }
     let original = mesh.positions.clone();
-    let samples = Samples::of(mesh);
+    let samples = OriginalVertices::of(mesh);
     let origin = mesh.positions.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p)).centre();
     let mut work = Contraction {
         is_fixed: fixed(mesh),
@@ -72,7 +72,7 @@ pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize 
         origin,
         original,
         samples,
-        gradients: Gradients::default(),
+        gradients: GradientColumns::default(),
     };
     let mut left = before;
     for _ in 0..PASSES {
@@ -113,9 +113,9 @@ fn quadrics(mesh: &Mesh, origin: DVec3) -> Vec<Quadric> {
 }
 
 /// For each triangle the vertices of the first mesh that it stands for.
-struct Samples(Vec<Vec<u32>>);
+struct OriginalVertices(Vec<Vec<u32>>);
 
-impl Samples {
+impl OriginalVertices {
     fn of(mesh: &Mesh) -> Self {
         let mut of_triangle = vec![Vec::new(); mesh.triangles.len()];
         let mut is_given = vec![false; mesh.positions.len()];
@@ -132,32 +132,32 @@ impl Samples {
 
 /// An edge in the queue: the cheapest first, then the one with the lowest vertices.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+struct EdgeCandidate {
     cost: f64,
     ends: [u32; 2],
     /// Those of the ends when the cost was found; a vertex that has changed since has another.
     versions: [u32; 2],
 }
 
-impl Ord for Candidate {
+impl Ord for EdgeCandidate {
     fn cmp(&self, other: &Self) -> Ordering {
         self.cost.total_cmp(&other.cost).then(self.ends.cmp(&other.ends))
     }
 }
 
-impl PartialOrd for Candidate {
+impl PartialOrd for EdgeCandidate {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Candidate {
+impl PartialEq for EdgeCandidate {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Candidate {}
+impl Eq for EdgeCandidate {}
 
 struct Contraction<'a> {
     fans: Fans<'a>,
@@ -166,18 +166,18 @@ struct Contraction<'a> {
     origin: DVec3,
     /// Vertices of the first mesh.
     original: Vec<DVec3>,
-    samples: Samples,
+    samples: OriginalVertices,
     quadrics: Vec<Quadric>,
     is_fixed: Vec<bool>,
     /// How often a vertex has changed.
     version: Vec<u32>,
-    queue: BinaryHeap<Reverse<Candidate>>,
-    gradients: Gradients,
+    queue: BinaryHeap<Reverse<EdgeCandidate>>,
+    gradients: GradientColumns,
 }
 
 /// Where a contracted edge goes: a vertex with its normal.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct NewVertex {
     position: DVec3,
     normal: DVec3,
 }
@@ -231,13 +231,13 @@ impl Contraction<'_> {
         let cost = least + LENGTH * quadric.area * p.distance_squared(q);
         let ends = [a.min(b), a.max(b)];
         let versions = ends.map(|v| self.version[v as usize]);
-        self.queue.push(Reverse(Candidate { cost, ends, versions }));
+        self.queue.push(Reverse(EdgeCandidate { cost, ends, versions }));
     }
 
     /// Empties the queue; returns how many vertices went.
     fn contract_all(&mut self) -> usize {
         let mut taken = 0;
-        while let Some(Reverse(Candidate { ends, versions, .. })) = self.queue.pop() {
+        while let Some(Reverse(EdgeCandidate { ends, versions, .. })) = self.queue.pop() {
             let is_fresh = (0..2).all(|i| {
                 let v = ends[i] as usize;
                 !self.fans.is_lost[v] && self.version[v] == versions[i]
@@ -294,8 +294,9 @@ impl Contraction<'_> {
     }
 
     /// Places for the contracted edge, the one that the quadrics like best first.
-    fn places(&self, a: u32, b: u32) -> Vec<Place> {
-        let end = |v: u32| Place { position: self.position(v), normal: self.fans.mesh.normals[v as usize] };
+    fn places(&self, a: u32, b: u32) -> Vec<NewVertex> {
+        let end =
+            |v: u32| NewVertex { position: self.position(v), normal: self.fans.mesh.normals[v as usize] };
         match (self.is_fixed[a as usize], self.is_fixed[b as usize]) {
             (true, true) => return Vec::new(),
             (true, false) => return vec![end(a)],
@@ -306,13 +307,13 @@ impl Contraction<'_> {
         let middle = 0.5 * (self.position(a) + self.position(b)) - self.origin;
         let mut places = vec![end(a), end(b)];
         places.extend(self.onto_surface(quadric.least(middle) + self.origin));
-        let error = |place: &Place| quadric.at(place.position - self.origin);
+        let error = |place: &NewVertex| quadric.at(place.position - self.origin);
         places.sort_by(|p, q| error(p).total_cmp(&error(q)));
         places
     }
 
     /// Newton's method from a point that is about a tolerance off.
-    fn onto_surface(&self, start: DVec3) -> Option<Place> {
+    fn onto_surface(&self, start: DVec3) -> Option<NewVertex> {
         const STEPS: usize = 8;
         /// Below this part of the coordinates ω is noise.
         const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -325,14 +326,14 @@ impl Contraction<'_> {
                 return None;
             }
             if step.length() <= ROUNDING * at.abs().max_element() {
-                return Some(Place { position: at, normal: unit(-gradient)? });
+                return Some(NewVertex { position: at, normal: unit(-gradient)? });
             }
         }
         None
     }
 
     /// Whether the ring may be drawn to a place; the samples of each staying triangle after that.
-    fn accepts(&mut self, ring: &Ring, place: &Place) -> Option<Vec<Vec<u32>>> {
+    fn accepts(&mut self, ring: &Ring, place: &NewVertex) -> Option<Vec<Vec<u32>>> {
         let corners: Vec<[DVec3; 3]> = ring
             .staying
             .iter()

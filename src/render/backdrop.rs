@@ -1,11 +1,11 @@
 //! A scene whose fixed parts are drawn once, and its frames.
 
 use super::{
-    Image, Mesh, Particles, RenderError, Rgb,
+    Image, MeshView, ParticlesView, RenderError, Rgb,
     camera::{Camera, SUBPIXELS, Seen},
     image::Layer,
     mesh::Facets,
-    overlay,
+    overlay::{self, Caption, Legend},
     particles::{discs, draw},
     raster::{BAND_ROWS, Band, Canvas, Corner, mix},
 };
@@ -21,25 +21,9 @@ const EDGE_THICKNESS: f64 = 2.8;
 /// The floor gives way to anything that lies on it.
 const FLOOR_BEHIND: f64 = 1.0 - 1e-4;
 
-/// What is written beside the picture.
-#[derive(Debug, Clone, Copy)]
-pub struct Legend<'a> {
-    pub title: &'a str,
-    /// The speed shown in red, in m/s: fixed for a run, so that its frames can be compared.
-    pub fastest: f64,
-}
-
-/// What is written under a frame.
-#[derive(Debug, Clone, Copy)]
-pub struct Moment {
-    /// Simulated time in seconds.
-    pub time: f64,
-    pub step: u64,
-}
-
 /// Camera, box, obstacle and legend, ready for frames.
 #[derive(Debug)]
-pub struct Scene {
+pub struct Backdrop {
     camera: Camera,
     fastest: f64,
     /// Floor and mesh. The edges of the box are drawn last, also over particles: their soft borders need the colour
@@ -54,7 +38,7 @@ pub struct Scene {
     pub skipped_triangles: usize,
 }
 
-impl Scene {
+impl Backdrop {
     /// Draws what does not move. The mesh may be empty.
     ///
     /// # Errors
@@ -62,7 +46,7 @@ impl Scene {
     pub fn new(
         camera: Camera,
         bounds: &Aabb,
-        mesh: &Mesh<'_>,
+        mesh: &MeshView<'_>,
         legend: &Legend<'_>,
     ) -> Result<Self, RenderError> {
         let (width, height) = camera.subpixels();
@@ -96,7 +80,7 @@ impl Scene {
     ///
     /// Particles whose position is not finite or lies behind the eye are left out and counted; those whose speed is
     /// NaN are grey.
-    pub fn frame(&self, particles: &Particles<'_>, moment: &Moment) -> Image {
+    pub fn frame(&self, particles: &ParticlesView<'_>, moment: &Caption) -> Image {
         let discs = discs(particles, &self.camera, self.fastest);
         let total = particles.positions.len();
         let mut image = Image {
@@ -110,7 +94,7 @@ impl Scene {
         image
     }
 
-    fn write_on(&self, image: &mut Image, moment: &Moment, particles: usize) {
+    fn write_on(&self, image: &mut Image, moment: &Caption, particles: usize) {
         let scale = unit(&self.camera);
         let (width, height) = (f64::from(image.width), f64::from(image.height));
         let place = |units: f64, from: f64| (from - units * scale).max(0.0) as usize;
@@ -194,7 +178,7 @@ mod tests {
     use super::*;
     use crate::field::Points;
 
-    const MOMENT: Moment = Moment { time: 0.0, step: 0 };
+    const MOMENT: Caption = Caption { time: 0.0, step: 0 };
     const LEGEND: Legend<'_> = Legend { title: "test", fastest: 1.0 };
 
     fn cube() -> Aabb {
@@ -202,17 +186,17 @@ mod tests {
     }
 
     /// Looks along −x at the cube from +x: y to the right, z up.
-    fn scene(mesh: &Mesh<'_>) -> Scene {
+    fn scene(mesh: &MeshView<'_>) -> Backdrop {
         let camera = Camera::new(&cube(), DVec3::X, (320, 240)).unwrap();
-        Scene::new(camera, &cube(), mesh, &LEGEND).unwrap()
+        Backdrop::new(camera, &cube(), mesh, &LEGEND).unwrap()
     }
 
-    fn frame(scene: &Scene, points: &[DVec3], speeds: &[f64]) -> Image {
+    fn frame(scene: &Backdrop, points: &[DVec3], speeds: &[f64]) -> Image {
         let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<_>>());
-        scene.frame(&Particles { positions: Points::new(&x, &y, &z), speeds, radius: 0.2 }, &MOMENT)
+        scene.frame(&ParticlesView { positions: Points::new(&x, &y, &z), speeds, radius: 0.2 }, &MOMENT)
     }
 
-    fn centre(image: &Image, scene: &Scene) -> Rgb {
+    fn centre(image: &Image, scene: &Backdrop) -> Rgb {
         let at = scene.camera.look(DVec3::ZERO).unwrap().at / SUBPIXELS as f64;
         image.pixel(at.x as u32, at.y as u32).unwrap()
     }
@@ -223,7 +207,7 @@ mod tests {
 
     #[test]
     fn the_nearer_particle_hides_the_farther_whatever_the_order() {
-        let scene = scene(&Mesh::default());
+        let scene = scene(&MeshView::default());
         let (near, far) = (DVec3::X * 0.5, DVec3::X * -0.5);
         for (points, speeds) in [([near, far], [1.0, 0.0]), ([far, near], [0.0, 1.0])] {
             assert!(is_red(centre(&frame(&scene, &points, &speeds), &scene)));
@@ -235,7 +219,7 @@ mod tests {
     fn the_mesh_hides_what_is_behind_it_and_is_drawn_from_both_sides() {
         let vertices = [(-0.9, -0.9), (0.9, -0.9), (0.0, 0.9)].map(|(y, z)| DVec3::new(0.0, y, z));
         for triangles in [[[0, 1, 2]], [[0, 2, 1]]] {
-            let scene = scene(&Mesh { vertices: &vertices, normals: &[], triangles: &triangles });
+            let scene = scene(&MeshView { vertices: &vertices, normals: &[], triangles: &triangles });
             assert!(is_red(centre(&frame(&scene, &[DVec3::X * 0.5], &[1.0]), &scene)));
             let [r, g, b] = centre(&frame(&scene, &[DVec3::X * -0.5], &[1.0]), &scene);
             assert!(r.abs_diff(b) < 40 && (100..230).contains(&g), "the mesh is grey: {r} {g} {b}");
@@ -245,8 +229,11 @@ mod tests {
     #[test]
     fn bad_positions_speeds_and_triangles_are_skipped_and_counted() {
         let vertices = [DVec3::ZERO, DVec3::Y, DVec3::NAN];
-        let scene =
-            scene(&Mesh { vertices: &vertices, normals: &[], triangles: &[[0, 1, 2], [0, 1, 9], [1, 1, 1]] });
+        let scene = scene(&MeshView {
+            vertices: &vertices,
+            normals: &[],
+            triangles: &[[0, 1, 2], [0, 1, 9], [1, 1, 1]],
+        });
         assert_eq!(scene.skipped_triangles, 2);
         let points = [DVec3::NAN, DVec3::X * 1e9, DVec3::ZERO, DVec3::new(0.0, f64::INFINITY, 0.0)];
         let image = frame(&scene, &points, &[0.0, 0.0, f64::NAN]);
@@ -257,18 +244,18 @@ mod tests {
 
     #[test]
     fn no_particles_and_odd_radii_make_a_picture() {
-        let scene = scene(&Mesh::default());
+        let scene = scene(&MeshView::default());
         assert_eq!(frame(&scene, &[], &[]).pixels.len(), 3 * 320 * 240);
         for radius in [f64::NAN, -1.0, 0.0, 1e300] {
             let one = [0.0];
-            let particles = Particles { positions: Points::new(&one, &one, &one), speeds: &one, radius };
+            let particles = ParticlesView { positions: Points::new(&one, &one, &one), speeds: &one, radius };
             assert_eq!(scene.frame(&particles, &MOMENT).skipped, 0);
         }
     }
 
     #[test]
     fn particles_beside_the_picture_leave_it_as_it_is() {
-        let scene = scene(&Mesh::default());
+        let scene = scene(&MeshView::default());
         let nothing = frame(&scene, &[], &[]).pixels;
         let far = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         for z in [-1.0, 0.0, 1.0] {
@@ -289,7 +276,7 @@ mod tests {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let scene = scene(&Mesh { vertices: &vertices, normals: &[], triangles: &[[0, 1, 2]] });
+                let scene = scene(&MeshView { vertices: &vertices, normals: &[], triangles: &[[0, 1, 2]] });
                 frame(&scene, &points, &speeds)
             })
         };
