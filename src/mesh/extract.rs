@@ -1,11 +1,11 @@
 //! Marching cubes: from signs at the nodes to triangles whose vertices lie on ω = 0.
 //!
-//! Bricks that may hold the surface are worked on in parallel, three times: signs at their nodes → crossed edges and the
-//! cells that need values, whose vertices and triangles are numbered → vertices, normals and triangles, written to where
-//! their numbers say.
+//! Bricks that may hold the surface are worked on in parallel, three times. First come the signs at their
+//! nodes; then the crossed edges and the cells that need values, whose vertices and triangles are numbered;
+//! then the vertices, normals and triangles, which are written to the places that their numbers say.
 //!
-//! Invariant: bricks and tasks depend on the grid and the field alone, never on the number of threads; each task writes
-//! to its own part of the mesh.
+//! Invariant: bricks and tasks depend on the grid and the field alone, never on the number of threads; each
+//! task writes to its own part of the mesh.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -25,11 +25,12 @@ use super::{
 };
 use crate::field::Field;
 
-/// The surface ω = 0 of a field as a closed mesh; empty if no node of the grid lies inside.
+/// The surface ω = 0 of a field as a closed mesh. It is empty if no node of the grid lies inside.
 ///
-/// Inside is strictly ω > 0; everything outside the grid counts as outside, so a solid cut by the border is
+/// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
 /// closed by faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of tasks
-/// done, in (0, 1], not always in ascending order.
+/// done, in (0, 1], not always in ascending order. Source: W. Lorensen, H. Cline, Marching cubes, SIGGRAPH
+/// 1987, with the decisions about ambiguous cells of `ambiguity`.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,
@@ -88,10 +89,10 @@ pub fn marching_cubes(
     Ok(mesh)
 }
 
-/// What is known of a brick's cells before its vertices have places.
+/// The triangles of a brick's cells, before its vertices have positions.
 struct BrickTriangles {
     patches: Vec<CellPatch>,
-    /// Number of triangles.
+    /// The number of triangles, with those of the patches.
     triangles: usize,
     evaluations: u64,
 }
@@ -119,7 +120,7 @@ struct ExtractionJob<'a> {
     triangles: &'a mut [[u32; 3]],
 }
 
-/// What all tasks read.
+/// What every task reads.
 struct Extraction<'a> {
     field: &'a dyn Field,
     lattice: &'a Lattice,
@@ -167,7 +168,7 @@ impl Extraction<'_> {
         Ok(found)
     }
 
-    /// Triangles of all cells of a brick, written to their places.
+    /// Writes the triangles of all cells of a brick to their places.
     fn fill_triangles<'a>(
         &self,
         brick: &Brick,

@@ -1,6 +1,6 @@
-//! The frame of a plot: where (u, v) lies on the page, and the ticks and labels around it.
+//! The frame of a plot: the place of (u, v) on the page, and the ticks and labels around it.
 //!
-//! Page units are CSS pixels, y downwards.
+//! Page units are CSS pixels, with y downwards.
 
 use std::fmt::Write;
 
@@ -46,7 +46,7 @@ impl PlotFrame {
     }
 }
 
-/// Border, ticks with numbers, and the names of the axes.
+/// Draws the border, ticks with numbers, and the names of the axes.
 pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
     let (right, up) = plane.axis.right_and_up();
     let PlotFrame { window, origin, size } = *frame;
@@ -98,7 +98,7 @@ pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
     );
 }
 
-/// Lines and text: a little softer than black.
+/// The colour of lines and text, a little softer than black.
 pub const INK: &str = "#1c1c1c";
 
 #[cfg(test)]

@@ -9,12 +9,13 @@ use super::Window;
 pub enum SliceError {
     /// The window has no area or is not finite.
     Window(Window),
-    /// The number of samples is outside 2 ..= 8192.
+    /// The number of samples along the longer side is outside 2 ..= 8192.
     Resolution(usize),
-    /// The picture of this many pixels per unit of the drawing cannot be made.
+    /// A picture with this many pixels per unit of the drawing cannot be made.
     Scale(f32),
-    /// The drawing that we wrote is not accepted: a bug of ours.
+    /// The rasteriser refused the drawing. For drawings of this module that is a bug of ours.
     Drawing(String),
+    /// The output could not be written.
     Io(io::Error),
 }
 

@@ -1,25 +1,26 @@
-//! The numbers on isolines: one a level at most, where the line is straight and there is room.
+//! The numbers on isolines: at most one for each level, where the line is straight and there is room.
 //!
-//! Invariant: a label keeps away from the frame, from the lines of other levels and from the labels before it.
+//! Invariant: a label keeps away from the frame, from the lines of other levels and from the labels before
+//! it.
 
 use glam::DVec2;
 
 use super::axes::PlotFrame;
 
-/// A number on the page, turned with its line but never upside down.
+/// A number on the page. It is turned with its line, but never upside down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelLabel {
     pub at: DVec2,
-    /// Degrees, clockwise, −90 to 90.
+    /// In degrees, clockwise, −90 to 90.
     pub angle: f64,
     pub text: String,
 }
 
-/// Width of a character and height of the labels, for type of 10 units.
+/// The width of a character and the height of a label in type of 10 units.
 const CHARACTER: f64 = 5.6;
 const HEIGHT: f64 = 11.0;
 
-/// Collects labels that do not disturb each other.
+/// Finds places for labels that do not disturb each other.
 #[derive(Debug)]
 pub struct Placer<'a> {
     frame: &'a PlotFrame,
@@ -34,7 +35,7 @@ impl<'a> Placer<'a> {
         Self { frame, lines, taken: Vec::new() }
     }
 
-    /// The best place for a text on the lines of a level, if there is any.
+    /// The best label for a text on the lines of a level. `None` if there is no room.
     pub fn place(&mut self, level: usize, text: &str) -> Option<LevelLabel> {
         let width = CHARACTER * text.chars().count() as f64;
         let candidates = self.lines[level].iter().flat_map(|line| stations(line, width));
@@ -72,7 +73,8 @@ impl<'a> Placer<'a> {
         })
     }
 
-    /// Straight and level places are easy to read; the right half of the picture decides between equals.
+    /// How good a place is. Straight and level places are easy to read, and among equals those further to the
+    /// right win.
     fn merit(&self, station: &Station) -> f64 {
         let place = ((station.at - self.frame.origin) / self.frame.size).x;
         4.0 * station.straightness + station.direction.x.abs() + 0.25 * place

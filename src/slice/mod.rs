@@ -5,8 +5,8 @@
 //!                      └──────terminal──▶ characters
 //! ```
 //!
-//! Invariant: this module sees a [`Field`] and nothing of how it was made; it opens no file
-//! and asks no terminal; the same field gives the same bytes on any number of threads.
+//! Invariant: this module sees a [`Field`] and nothing of how it was made. It opens no file and queries no
+//! terminal. The same field gives the same bytes on any number of threads.
 
 mod axes;
 mod colour;
@@ -34,13 +34,14 @@ pub use self::{
 use crate::field::Field;
 pub use png::rasterise;
 
-/// Samples along the longer side that make a plot smooth at the printed size.
+/// The number of samples along the longer side that makes a plot smooth at the printed size.
 pub const DEFAULT_SAMPLES: usize = 320;
 
-/// Writes a slice as an SVG document.
+/// Writes a slice as an SVG document, with `samples` samples along the window's longer side. `name` is part
+/// of the title.
 ///
 /// # Errors
-/// Those of [`sample`] and of the writer.
+/// Those of [`sample`] and of `out`.
 pub fn write_svg(
     field: &dyn Field,
     name: &str,
@@ -53,10 +54,10 @@ pub fn write_svg(
     Ok(())
 }
 
-/// Writes a slice as a PNG picture: the drawing of [`write_svg`] at `scale` pixels per unit (2 prints well).
+/// Writes a slice as a PNG picture: the drawing of [`write_svg`] at `scale` pixels per unit. 2 prints well.
 ///
 /// # Errors
-/// Those of [`sample`] and of the writer, and [`SliceError::Scale`].
+/// Those of [`sample`] and of `out`, and [`SliceError::Scale`].
 pub fn write_png(
     field: &dyn Field,
     name: &str,
@@ -80,7 +81,7 @@ mod tests {
         Closures { omega, gradient: |_| DVec3::ZERO }
     }
 
-    /// A ball of radius 1/2: its slices through the middle are discs.
+    /// A ball of radius 1/2. Its slices through the middle are discs.
     pub fn disc() -> impl Field {
         field(|p| 0.25 - p.length_squared())
     }

@@ -17,8 +17,8 @@ use crate::geom::Aabb;
 /// How often folded triangles are looked for and mended.
 const REPAIRS: usize = 4;
 
-/// Vertices on a crease that an edge shorter than this joins are merged, in cells. Two cells, or two cut edges, may
-/// have put them at nearly the same point.
+/// Vertices on a crease that an edge shorter than this joins are merged, in cells. Two cells, or two cut
+/// edges, may have put them at nearly the same point.
 const TOO_CLOSE: f64 = 0.1;
 
 /// A mesh that is still worked on.
@@ -46,8 +46,8 @@ impl<'a> Draft<'a> {
         Self { field, bounds, size, vertices, triangles, work }
     }
 
-    /// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be cut,
-    /// ascending.
+    /// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be
+    /// cut, ascending.
     pub fn refine(&mut self) -> Vec<[u32; 2]> {
         let (left, evaluations) =
             refine::refine(self.field, &mut self.vertices, &mut self.triangles, self.size);

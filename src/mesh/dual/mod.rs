@@ -1,20 +1,21 @@
-//! Manifold dual contouring: one vertex for each sheet of the surface in a cell, placed on creases and corners.
+//! Manifold dual contouring: one vertex for each sheet of the surface in a cell, placed on creases and
+//! corners.
 //!
 //! [`dual_contouring`] has five stages:
-//! 1. [`Crossing::find`]: the cells that the surface passes and its hits on their edges, as for marching cubes;
-//!    `loops` tells which hits belong together.
+//! 1. [`Crossing::find`]: the cells that the surface passes and its hits on their edges, as for marching
+//!    cubes; `loops` finds which hits belong together.
 //! 2. [`place`](fn@place): a vertex for each loop, by `place`, `sharp`, `qef` and `crease`.
 //! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two.
 //! 4. [`Draft::refine`]: edges that are still too far from the surface are cut (`refine`).
 //! 5. [`Draft::mend`]: what stays far off or lies upside down is looked at one by one (`mend`).
 //!
-//! The vertices are those of the dual of the marching-cubes mesh (Schaefer, Ju, Warren: Manifold dual contouring, IEEE
-//! TVCG 13, 2007), so the topology is that of marching cubes. The quadratic error is that of Ju, Losasso, Schaefer,
-//! Warren: Dual contouring of Hermite data, SIGGRAPH 2002. In addition, vertices at creases are moved onto them by
-//! probes beside them, so they are exact also where faces are curved.
+//! The vertices are those of the dual of the marching-cubes mesh (Schaefer, Ju, Warren: Manifold dual
+//! contouring, IEEE TVCG 13, 2007), so the topology is that of marching cubes. The quadratic error is that of
+//! Ju, Losasso, Schaefer, Warren: Dual contouring of Hermite data, SIGGRAPH 2002. In addition, vertices at
+//! creases are moved onto them by probes beside them, so they are exact also where faces are curved.
 //!
-//! Invariant: bricks are numbered in order and each task writes to its own part of the mesh, so the mesh is the same
-//! for any number of threads.
+//! Invariant: bricks are numbered in order and each task writes to its own part of the mesh, so the mesh is
+//! the same for any number of threads.
 
 mod crease;
 mod draft;
@@ -48,11 +49,12 @@ use super::{
 };
 use crate::field::Field;
 
-/// The surface ω = 0 of a field as a closed mesh with sharp creases. It is empty if no node of the grid lies inside.
+/// The surface ω = 0 of a field as a closed mesh with sharp creases. It is empty if no node of the grid lies
+/// inside.
 ///
-/// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is closed by
-/// faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of the surface found, in
-/// (0, 1], not always in ascending order.
+/// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
+/// closed by faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of the
+/// surface found, in (0, 1], not always in ascending order.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,
@@ -127,8 +129,8 @@ fn sheet_counts(crossed: &Crossed<Sheets>) -> impl Iterator<Item = usize> {
     crossed.tasks.iter().map(|task| task.kept.iter().map(|sheets| sheets.vertices).sum())
 }
 
-/// The points of the surface on all crossed edges, and its normals there. On the border the normal is the direction of
-/// the edge.
+/// The points of the surface on all crossed edges, and its normals there. On the border the normal is the
+/// direction of the edge.
 fn hits(
     field: &dyn Field,
     lattice: &Lattice,
@@ -222,8 +224,9 @@ fn join(
 /// How often vertices are moved back because triangles lie upside down.
 const RETREATS: usize = 4;
 
-/// Moves vertices whose triangles lie upside down either way to their fallbacks, first onto the surface near them and
-/// then to the fallbacks themselves, and cuts the quads around them again. Fallbacks ascend by vertex.
+/// Moves vertices whose triangles lie upside down either way to their fallbacks, first onto the surface near
+/// them and then to the fallbacks themselves, and cuts the quads around them again. Fallbacks ascend by
+/// vertex.
 fn move_spoilt(
     quads: &Quads<'_>,
     cut: &mut Cut,

@@ -1,9 +1,11 @@
-//! Where the vertex of a loop goes: onto the surface, and onto its crease or corner where the loop encloses one.
+//! The vertex of a loop: on the surface, and on its crease or corner if the loop encloses one.
 //!
-//! Loops whose hits face nearly the same way take the mean of the hits, raised by half the mean height of the hits' tangent
-//! planes there and moved onto the surface by Newton's method, all of a task together; the others are left to `sharp`.
+//! A loop whose hits face nearly the same way takes the mean of the hits, raised by half the mean height of
+//! the hits' tangent planes there. Newton's method moves it onto the surface, together with the others of the
+//! task. All other loops are left to `sharp`.
 //!
-//! Invariant: a vertex lies within [`SLIDE`] of its cell or of where it began, on the border if its cell is in the ring.
+//! Invariant: a vertex lies within [`SLIDE`] of its cell or of the point where it began, and on the border if
+//! its cell is in the ring.
 
 use glam::DVec3;
 
@@ -25,38 +27,39 @@ use super::vertices::{Hit, Hits, Rings, Vertex, VertexKind};
 use crate::field::Field;
 use crate::geom::Aabb;
 
-/// Hits whose normals all lie within this of their mean (cosine of 10°) see a smooth surface.
+/// Hits whose normals all lie within this of their mean (the cosine of 10°) belong to a smooth surface.
 const NEARLY_FLAT: f64 = 0.985;
 
-/// Newton steps onto a smooth surface.
+/// Newton steps onto a smooth surface, at most.
 const STEPS: usize = 4;
 
-/// A step of Newton's method onto a smooth surface that needs no other after it, in cells: what it leaves is the step's
+/// The step of Newton's method onto a smooth surface that needs no other after it, in cells. It leaves its
 /// square times the curvature per cell, which is below 1/3 in a cell with normals within [`NEARLY_FLAT`].
 const LAST_STEP: f64 = 3e-6;
 
-/// How far from a face into its cell the ends of a tunnel lie, as a share of the way to the middle.
+/// The ends of a tunnel lie this far from a face into the cell, as a share of the way to the middle.
 const INTO_CELL: f64 = 0.25;
 
-/// Where the vertices of a task go.
+/// The places for the vertices of a task.
 pub(super) struct Slots<'a> {
-    /// The number of the first.
+    /// The number of the first vertex.
     pub first: u32,
     pub positions: &'a mut [DVec3],
     pub normals: &'a mut [DVec3],
     pub kinds: &'a mut [VertexKind],
 }
 
-/// What the cells of a task give besides vertices.
+/// The results of a task besides its vertices.
 #[derive(Default)]
 pub(super) struct Placed {
-    /// For vertices that are not smooth where they go if the triangles around cannot do with their place, ascending.
+    /// For each vertex that is not smooth, ascending, the point to which it moves if the triangles around it
+    /// lie upside down.
     pub fallbacks: Vec<(u32, DVec3)>,
     pub twice: Vec<Twice>,
-    /// By hit and vertex: at the end of a tunnel a cell has two vertices at a hit, the one where the loop goes on and
-    /// this one, where it came from.
+    /// Second vertices of a cell by hit and first vertex. At the end of a tunnel a cell has two vertices at a
+    /// hit: the first is where the loop goes on, the second where it came from.
     pub seconds: Vec<((u32, u32), u32)>,
-    /// Triangles of tunnels.
+    /// The triangles of tunnels.
     pub tubes: Vec<[u32; 3]>,
     pub gradients: u64,
 }
@@ -90,7 +93,7 @@ pub(super) struct Placement<'a> {
     pub crossed: &'a Crossed<Sheets>,
     pub hits: &'a Hits,
     pub rings: &'a Rings,
-    /// Side lengths of a cell.
+    /// The side lengths of a cell.
     pub spacing: DVec3,
 }
 
@@ -162,7 +165,8 @@ impl Placement<'_> {
         let mean = position / count as f64;
         let length = normal.length();
         let normal = normal / length;
-        // over a bend the tangent planes of the hits pass as far above the surface as their mean lies below
+        // over a bend the tangent planes of the hits pass as far above the surface as the mean of the hits
+        // lies below it
         let (mut least_agreement, mut height) = (f64::INFINITY, 0.0);
         for &number in numbers {
             let of_hit = self.hits.normals[number];
@@ -188,7 +192,8 @@ impl Placement<'_> {
         }
     }
 
-    /// Adds a vertex for each passage of a tunnel's end through a face: where the passage is, a little into the cell.
+    /// Adds a vertex for each passage of a tunnel's end through a face. It lies at the passage, a little into
+    /// the cell.
     fn add_ring(
         &self,
         cell: (usize, usize),
@@ -227,7 +232,7 @@ impl Placement<'_> {
         };
         let places: Vec<usize> = ends.into_iter().flat_map(ring).collect();
         let (a, b) = (ring(ends[0]).len(), ring(ends[1]).len());
-        // the tube's vertices count as inner ones: none of its cross edges lies in a face
+        // the tube's vertices count as inner ones, because none of its cross edges lies in a face
         let numbers: Vec<usize> = (EDGES..EDGES + a + b).collect();
         let low = slots.positions[places[0]];
         let place = |v: usize| ((slots.positions[places[v - EDGES]] - low) / self.spacing).to_array();

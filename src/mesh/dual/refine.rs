@@ -1,10 +1,11 @@
 //! Cuts edges in two where the mesh is farther from the surface than it should be.
 //!
-//! A chord of length h misses a surface of radius R by h²/8R: a tight bend that is only a cell or two wide keeps a
-//! large error in a mesh that is fine elsewhere. The middle of such an edge moves onto the surface; that of an edge
-//! across a crease which no vertex has caught moves onto the crease.
+//! A chord of length h misses a surface of radius R by h²/8R. A tight bend that is only a cell or two wide
+//! therefore keeps a large error in a mesh that is fine elsewhere. The middle of such an edge moves onto the
+//! surface. If the edge crosses a crease that no vertex has caught, its middle moves onto the crease.
 //!
-//! Invariant: cutting edges and the triangles beside them changes neither topology nor the order of what was there.
+//! Invariant: cutting edges and the triangles beside them changes neither topology nor the order of what was
+//! there.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,28 +17,30 @@ use super::project;
 use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 
-/// The distance of an edge's middle from the surface above which it is cut, in cells. It bounds what is left: the pawn
-/// in [0, 3]³ at 256³ cells has a Hausdorff distance of 0.024 cells, where chords across its collar alone make 0.08.
+/// An edge is cut if its middle is farther from the surface than this, in cells. This bounds the error that
+/// is left: the pawn in [0, 3]³ at 256³ cells has a Hausdorff distance of 0.024 cells, while chords across
+/// its collar alone would make 0.08.
 pub(super) const TOLERANCE: f64 = 0.025;
 
-/// Each round quarters what is left.
+/// Rounds of cutting. Each round quarters the error that is left.
 const ROUNDS: usize = 3;
 
-/// Triangles looked at together.
+/// Triangles in a batch.
 const BATCH: usize = 2048;
 
-/// How far a middle may move on a smooth surface, in lengths of its edge: farther, and triangles would turn over.
+/// The longest move of a middle on a smooth surface, in lengths of its edge. Beyond it triangles would turn
+/// over.
 const LONGEST_MOVE: f64 = 0.4;
 
-/// How far it may drop onto a crease at most: an edge that bridges a narrow groove drops to its bottom, and the
-/// triangles beside it come to lie on the walls.
+/// The longest drop of a middle onto a crease, in lengths of its edge. An edge that bridges a narrow groove
+/// drops to its bottom, and the triangles beside it come to lie on the walls.
 const LONGEST_DROP: f64 = 2.0;
 
-/// Where on an edge the faces of its two ends are looked up, as a share of its length.
+/// The face of an edge's end is looked up at this share of the edge's length from the end.
 const BESIDE: f64 = 0.1;
 
-/// Cuts edges until the mesh is near the surface; returns the edges that are not and could not be cut, ascending, and the
-/// number of evaluations of ∇ω.
+/// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be cut,
+/// ascending, and the number of evaluations of ∇ω.
 pub(super) fn refine(
     field: &dyn Field,
     vertices: &mut Vertices,
@@ -46,7 +49,7 @@ pub(super) fn refine(
 ) -> (Vec<[u32; 2]>, u64) {
     let mut evaluations = 0;
     let mut left = Vec::new();
-    // triangles whose edges have not been looked at
+    // triangles whose edges have not been looked at yet
     let mut fresh = 0..triangles.len();
     let mut changed: Vec<u32> = Vec::new();
     for _ in 0..ROUNDS {
@@ -73,16 +76,16 @@ pub(super) fn refine(
 /// An edge's ends, ascending, and the vertex that cuts it.
 type EdgeCut = ([u32; 2], Vertex);
 
-/// What is found about edges.
+/// The findings about edges.
 #[derive(Default)]
 struct FoundEdges {
     cuts: Vec<EdgeCut>,
-    /// Edges that are too far from the surface but have no vertex to cut them.
+    /// Edges that are too far from the surface, but for which no vertex to cut them was found.
     left: Vec<[u32; 2]>,
     evaluations: u64,
 }
 
-/// The edges of some triangles to cut, ascending by their ends.
+/// The cuts of the edges of some triangles, ascending by their ends.
 fn cuts(
     field: &dyn Field,
     vertices: &Vertices,
@@ -111,7 +114,7 @@ fn cuts(
     all
 }
 
-/// The edges to cut among those that may bulge, in no order.
+/// The cuts among the edges that may bulge, in no particular order.
 fn cuts_of(
     field: &dyn Field,
     vertices: &Vertices,
@@ -155,7 +158,8 @@ fn cuts_of(
     FoundEdges { cuts: cut, left, evaluations: count }
 }
 
-/// Edges that leave the surface although their middles are near it: they enter a wall thinner than a cell, or a gap.
+/// Edges that leave the surface although their middles are near it, because they enter a wall or a gap that
+/// is thinner than a cell.
 fn far_beside(
     field: &dyn Field,
     vertices: &Vertices,
@@ -185,8 +189,9 @@ fn far_beside(
         .collect()
 }
 
-/// Adds those edges of a triangle, run along in ascending order, from whose middle the surface may be farther than
-/// `tolerance`, as far as their ends tell. Each edge of a closed mesh is run along once in ascending order.
+/// Adds those edges of a triangle whose middles may be farther than `tolerance` from the surface, as far as
+/// the ends show. Only edges that the triangle runs along in ascending order are added; each edge of a closed
+/// mesh is such an edge of one triangle.
 fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec<[u32; 2]>) {
     let [a, b, c] = t.map(|v| v as usize);
     let Vertices { positions, normals, kinds } = vertices;
@@ -203,35 +208,37 @@ fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec
             // sheets that touch
             _ => chord != DVec3::ZERO,
         };
-        // half of all edges ascend: a branch on that alone would be taken as often as not
+        // half of all edges ascend, so a branch on that alone could not be predicted
         if may_bulge & (t[i] < t[j]) {
             edges.push([t[i], t[j]]);
         }
     }
 }
 
-/// An edge over a smooth bend: the normal at its middle is about the mean of those at its ends, where across a crease it
-/// would be one of them.
+/// An edge over a smooth bend. The normal below its middle is about the mean of the normals at its ends,
+/// while across a crease it would be one of them.
 struct Bend {
     edge: [u32; 2],
     start: DVec3,
     /// The edge's length.
     length: f64,
-    /// Mean of the normals at the ends.
+    /// The mean of the normals at the ends.
     mean: DVec3,
     position: DVec3,
     normal: DVec3,
 }
 
 impl Bend {
-    /// The bend of an edge, if it is one, one step of Newton's method on; `found` are ω and ∇ω at its middle.
+    /// The bend of an edge after one step of Newton's method. `None` if the edge is not over a smooth bend.
+    /// `found` are ω and ∇ω at its middle.
     fn new(vertices: &Vertices, edge: [u32; 2], found: (f64, DVec3)) -> Option<Self> {
         let [a, b] = edge.map(|v| vertices.get(v));
         if a.kind != VertexKind::Smooth || b.kind != VertexKind::Smooth {
             return None;
         }
         let (mean, normal) = (unit(a.normal + b.normal)?, unit(-found.1)?);
-        // nearer to the mean than to either: half of the way from the mean to an end
+        // the cosine of half the way from the mean to an end: within it the normal is nearer to the mean than
+        // to either end
         let half_way = unit(mean + a.normal)?.dot(mean).min(unit(mean + b.normal)?.dot(mean));
         let start = 0.5 * (a.position + b.position);
         let mut bend =
@@ -243,14 +250,14 @@ impl Bend {
         })
     }
 
-    /// One step of Newton's method; its length.
+    /// Makes one step of Newton's method and returns its length.
     fn step(&mut self, (omega, gradient): (f64, DVec3)) -> f64 {
         let step = gradient * (omega / gradient.length_squared());
         self.position -= step;
         step.length()
     }
 
-    /// The cut at the point that was found; none if the surface is near after all.
+    /// The cut at the point that was found. `None` if the surface is near after all.
     fn cut(&self, tolerance: f64) -> Option<EdgeCut> {
         let Self { edge, start, position, normal, .. } = *self;
         (position.distance(start) > tolerance)
@@ -258,10 +265,10 @@ impl Bend {
     }
 }
 
-/// Steps of Newton's method on bends.
+/// Steps of Newton's method on bends, at most.
 const STEPS: usize = 6;
 
-/// Moves bends onto the surface, together; tells of each whether that went well.
+/// Moves bends onto the surface, all together. Returns for each whether it settled.
 fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) -> Vec<(Bend, bool)> {
     let mut bends: Vec<(Bend, bool)> = bends.into_iter().map(|bend| (bend, false)).collect();
     for _ in 0..STEPS {
@@ -285,13 +292,14 @@ fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) 
     bends
 }
 
-/// A step, in tolerances, that needs no other after it: what it leaves is its square times the curvature, 1e-11 of it.
+/// A step in tolerances that needs no other after it. It leaves its square times the curvature, which is
+/// 1e-11 of a tolerance.
 const LAST_STEP: f64 = 1e-5;
 
 /// Where an edge is cut.
 enum Middle {
     At(Vertex),
-    /// The surface is near after all: the field told another face's distance.
+    /// The surface is near after all. The field had the distance of another face.
     Near,
     /// No point of the surface is near enough to the middle.
     Nowhere,
@@ -335,8 +343,8 @@ fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u6
     }
 }
 
-/// Divides triangles at cut edges. The first part takes the place of the whole, the others go to the end. Returns the
-/// numbers of the triangles that were divided. `middles` are sorted by their edges.
+/// Divides triangles at cut edges. The first part takes the place of the whole, the others go to the end.
+/// Returns the numbers of the triangles that were divided. `middles` are sorted by their edges.
 fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 2], u32)]) -> Vec<u32> {
     let mut is_end = vec![false; vertices.len()];
     middles.iter().flat_map(|m| m.0).for_each(|v| is_end[v as usize] = true);
@@ -379,8 +387,8 @@ fn with_cut_ends(triangles: &[[u32; 3]], is_end: &[bool]) -> Vec<usize> {
     touched.concat()
 }
 
-/// Divides one triangle: returns its first part and adds the rest to `others`. `None` if `middle`, which gives the
-/// vertex that cuts an edge, knows of no cut on its sides.
+/// Divides one triangle: returns its first part and adds the rest to `others`. `None` if `middle`, which
+/// gives the vertex that cuts an edge, knows of no cut on its sides.
 fn divide_one(
     vertices: &Vertices,
     [a, b, c]: [u32; 3],

@@ -1,8 +1,8 @@
-//! Where the vertex of a loop goes that encloses a crease or a corner, or lies on the border.
+//! The vertex of a loop that encloses a crease or a corner, or lies on the border.
 //!
-//! The candidates are tried in turn: the minimiser of the quadratic error if it lies on the surface already (plane faces,
-//! tips of cones), the crease of the two or three faces that the hits show, the minimiser moved onto the surface, the mean
-//! of the hits.
+//! Four candidates are tried in turn: the minimiser of the quadratic error if it lies on the surface already
+//! (plane faces, tips of cones); the crease of the two or three faces that the hits show; the minimiser moved
+//! onto the surface; the mean of the hits.
 
 use glam::DVec3;
 
@@ -16,27 +16,31 @@ use crate::geom::Aabb;
 /// How far from its cell a point may slide onto the surface, in cells.
 pub(super) const SLIDE: f64 = 0.5;
 
-/// Normals that differ less than this from each face found so far belong to one of them (cosine of 25°).
+/// A normal that differs less than this from that of a face found before belongs to that face (the cosine of
+/// 25°).
 const NEW_FACE: f64 = 0.906;
 
-/// How far from its cell a vertex may lie, in cells: creases that curve pass a little beside the hits that show them.
+/// A vertex may lie this far from its cell, in cells, because creases that curve pass a little beside the
+/// hits that show them.
 const REACH: f64 = 0.05;
 
-/// Corners must lie in their cells up to rounding, in cells: else two cells would place a vertex in the same one.
+/// A corner may lie this far from its cell, in cells, which is rounding. Otherwise two cells would place a
+/// vertex in the same corner.
 const CORNER_REACH: f64 = 1e-9;
 
-/// How often a crease is sought. The point of it nearest to the middle may lie outside the cell although the crease cuts
-/// off one of its corners: then it is followed into the cell, or left for the cell's nearest point where it bends too much
-/// for that, and found once more.
+/// How often a crease is sought. Its point nearest to the middle may lie outside the cell although the crease
+/// cuts off one of the cell's corners. Then the crease is sought again from a point farther along it in the
+/// cell, or from the cell's nearest point if it bends too much for that.
 const TRIES: usize = 4;
 
-/// Newton steps: twice as many as a smooth surface takes.
+/// Newton steps at most: twice as many as a smooth surface takes.
 const STEPS: usize = 8;
 
-/// A distance from the surface that is none, in cells: plane faces give 1e-15.
+/// A point nearer to the surface than this, in cells, is on it. Plane faces give 1e-15.
 const ON_SURFACE: f64 = 1e-11;
 
-/// The vertex of a loop whose hits do not face the same way. `mean` is theirs, `count` counts evaluations.
+/// The vertex of a loop whose hits do not face the same way. `mean` is the mean of the hits, and `count`
+/// counts evaluations.
 pub(super) fn at_crease(
     field: &dyn Field,
     cell: &Aabb,
@@ -91,9 +95,10 @@ pub(super) fn at_crease(
     sharp(mean)
 }
 
-/// The vertex of a cell of the ring: on the border, and on the surface where that meets the border in the cell.
+/// The vertex of a cell of the ring. It lies on the border, and on the surface if that meets the border in
+/// the cell.
 ///
-/// Also where the vertex goes if the triangles around it cannot do with that.
+/// The second result is the point to which the vertex moves if the triangles around it lie upside down.
 pub(super) fn on_border(
     field: &dyn Field,
     cell: &Aabb,
@@ -116,7 +121,8 @@ pub(super) fn on_border(
     (Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp }, mean)
 }
 
-/// The surface near a point by Newton's method along the free axes, with its normal.
+/// The surface near a point by Newton's method along the free axes, and its normal there. `None` if the
+/// method leads more than `size` away or does not converge.
 fn settle(
     field: &dyn Field,
     start: DVec3,
@@ -144,7 +150,8 @@ fn settle(
     None
 }
 
-/// The middle of the part of a line through `p` that lies in a box with a margin.
+/// The middle of the part of a line through `p` that lies in a box with a margin. `None` if the line misses
+/// it.
 fn middle_within(p: DVec3, along: DVec3, cell: &Aabb, margin: DVec3) -> Option<DVec3> {
     let (a, b) = ((cell.min - margin - p) / along, (cell.max + margin - p) / along);
     let (from, to) = (a.min(b).max_element(), a.max(b).min_element());
@@ -152,7 +159,7 @@ fn middle_within(p: DVec3, along: DVec3, cell: &Aabb, margin: DVec3) -> Option<D
     (from <= to && middle.is_finite()).then_some(middle)
 }
 
-/// Up to three faces that the hits lie on: the two that differ most, and one that differs from both.
+/// Up to three faces on which the hits lie: the two that differ most, and one that differs from both.
 fn faces(hits: &[Hit]) -> Vec<FacePoint> {
     let faces: Vec<FacePoint> = hits
         .iter()

@@ -47,7 +47,7 @@ mod tests {
         });
         let (models, _) = load.unwrap();
         let [model] = &models[..] else { panic!("{} models", models.len()) };
-        // the reader numbers vertices anew in the order of faces
+        // the reader numbers vertices in the order of faces
         let corner = |flat: &[f64], index: u32| DVec3::from_slice(&flat[3 * index as usize..]);
         assert_eq!(model.mesh.indices.len(), 3 * mesh.triangles.len());
         for (i, v) in mesh.triangles.iter().flatten().enumerate() {

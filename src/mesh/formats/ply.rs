@@ -1,9 +1,10 @@
 //! Binary little-endian PLY with vertex normals.
 //!
-//! Positions are `double`, since exact vertices are the point of this mesher and `float` would move them by
-//! 1e-7 of their size; normals are `float`, since 1e-7 radians matter to nobody.
+//! Positions are `double`, because vertices are exact and `float` would move them by 1e-7 of their size.
+//! Normals are `float`, because 1e-7 radians matter to nobody.
 //!
-//! Invariant: indices are written as `int`, which more readers accept than `uint`; meshes are small enough.
+//! Invariant: indices are written as `int`, which more readers accept than `uint`. [`Mesh::MAX_VERTICES`]
+//! fits it.
 
 use std::io::{self, Write};
 

@@ -1,7 +1,7 @@
 //! 3MF, for printers: a zip archive with the triangles as XML, in metres.
 //!
-//! Invariant: every number is written with the fewest digits that read back to the same `f64`; the same mesh gives
-//! the same bytes, since the archive holds no date.
+//! Invariant: every number is written with the fewest digits that read back to the same `f64`. Equal meshes
+//! give equal bytes, because the archive holds no date.
 
 use std::io::{self, Cursor, Write};
 
@@ -21,7 +21,7 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 /// The entry of the table of formats.
 pub const FORMAT: Format = Format { ending: "3mf", purpose: "For printers", write, write_text: None };
 
-/// Writes a mesh as 3MF; a mesh without triangles as a model without objects.
+/// Writes a mesh as 3MF. A mesh without triangles becomes a model without objects.
 ///
 /// # Errors
 /// Those of the stream.
@@ -77,7 +77,7 @@ mod tests {
         let mesh = pawn_mesh();
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();
-        // from the package's root to the model, as a reader goes
+        // from the package's root to the model, as a reader does
         let relations = part(&bytes, "_rels/.rels");
         let relations = roxmltree::Document::parse(&relations).unwrap();
         let target = relations.descendants().find_map(|n| n.attribute("Target")).unwrap();

@@ -1,8 +1,8 @@
 //! VTK polygonal data (`.vtp`) with its numbers as base64, for ParaView.
 //!
-//! Positions are `double`, since exact vertices are the point of this mesher; normals are `float`.
+//! Positions are `double`, because vertices are exact; normals are `float`.
 //!
-//! Invariant: everything is little-endian; the same mesh gives the same bytes.
+//! Invariant: everything is little-endian. Equal meshes give equal bytes.
 
 use std::io::{self, Write};
 
@@ -43,7 +43,7 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>")
 }
 
-/// An array as base64: the number of its bytes, and its bytes.
+/// Writes an array as base64: the number of its bytes, then its bytes.
 fn array<const N: usize>(
     out: &mut dyn Write,
     kind: &str,
