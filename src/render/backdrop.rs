@@ -1,4 +1,4 @@
-//! A scene whose fixed parts are drawn once, and its frames.
+//! The fixed parts of a picture, which are drawn once, and the frames with particles in front of them.
 
 use super::{
     Image, MeshView, ParticlesView, RenderError, Rgb,
@@ -13,36 +13,38 @@ use crate::geom::Aabb;
 
 const PAPER: Rgb = [255, 255, 255];
 const FLOOR: Rgb = [241, 240, 237];
-/// Edges of the box close to the eye and far from it.
+/// The colours of the box's edges close to the eye and far from it.
 const EDGE_NEAR: Rgb = [58, 58, 58];
 const EDGE_FAR: Rgb = [186, 186, 186];
-/// Of an edge, in sub-pixels of a picture 960 high.
+/// The thickness of an edge, in sub-pixels of a picture 960 high.
 const EDGE_THICKNESS: f64 = 2.8;
-/// The floor gives way to anything that lies on it.
+/// The floor's nearness is reduced by this factor, so that it gives way to anything that lies on it.
 const FLOOR_BEHIND: f64 = 1.0 - 1e-4;
 
-/// Camera, box, obstacle and legend, ready for frames.
+/// The camera, the box, the obstacle and the legend, ready for frames.
 #[derive(Debug)]
 pub struct Backdrop {
     camera: Camera,
     fastest: f64,
-    /// Floor and mesh. The edges of the box are drawn last, also over particles: their soft borders need the colour
-    /// behind them.
+    /// The floor and the mesh. The edges of the box are drawn last, over particles too, because their soft
+    /// borders need the colour behind them.
     canvas: Canvas,
     edges: Vec<Edge>,
-    /// Canvas and edges as pixels.
+    /// The canvas and the edges as pixels.
     still: Vec<u8>,
     title: Layer,
     bar: Layer,
-    /// Triangles of the mesh that are not drawn: a corner is not finite, behind the eye, or does not exist.
+    /// The number of triangles of the mesh that are not drawn because a corner is not finite, lies behind the
+    /// eye, or does not exist.
     pub skipped_triangles: usize,
 }
 
 impl Backdrop {
-    /// Draws what does not move. The mesh may be empty.
+    /// Draws what does not move: the box with the corners of `bounds` in metres, and the mesh, which may be
+    /// empty.
     ///
     /// # Errors
-    /// [`RenderError::Legend`], a bug of ours.
+    /// [`RenderError::Legend`], which is a bug of ours.
     pub fn new(
         camera: Camera,
         bounds: &Aabb,
@@ -76,10 +78,10 @@ impl Backdrop {
         })
     }
 
-    /// The picture with the particles in it.
+    /// The picture with particles in it, and the caption of its moment.
     ///
-    /// Particles whose position is not finite or lies behind the eye are left out and counted; those whose speed is
-    /// NaN are grey.
+    /// Particles whose position is not finite or lies behind the eye are left out and counted in
+    /// [`Image::skipped`]. Those whose speed is NaN are grey.
     pub fn frame(&self, particles: &ParticlesView<'_>, moment: &Caption) -> Image {
         let discs = discs(particles, &self.camera, self.fastest);
         let total = particles.positions.len();
@@ -101,14 +103,14 @@ impl Backdrop {
         image.lay(&self.title, 0, 0);
         let bar_top = 0.5 * height - 0.5 * overlay::BAR_HEIGHT * scale;
         image.lay(&self.bar, place(overlay::BAR_WIDTH, width), bar_top.max(0.0) as usize);
-        // Digits and letters of ours always make a caption.
+        // our own digits and letters always make a caption
         if let Ok(caption) = overlay::caption(moment, particles, scale) {
             image.lay(&caption, 0, place(overlay::CAPTION_HEIGHT, height));
         }
     }
 }
 
-/// Pixels for a unit of the layout, which is meant for a height of 960.
+/// The pixels for a unit of the layout, which is made for a height of 960.
 fn unit(camera: &Camera) -> f64 {
     f64::from(camera.height) / 960.0
 }
@@ -135,7 +137,7 @@ struct Edge {
     thickness: f64,
 }
 
-/// The twelve edges of the box, paler with distance.
+/// The twelve edges of the box. They are paler with distance.
 fn edges(bounds: &Aabb, camera: &Camera) -> Vec<Edge> {
     let Some(corners) = see(bounds, camera) else { return Vec::new() };
     let nearest = corners.iter().map(|c| c.nearness).fold(f64::NEG_INFINITY, f64::max);
@@ -158,7 +160,7 @@ fn draw_edges(edges: &[Edge], band: &mut Band<'_>) {
     }
 }
 
-/// The bottom of the box, seen from above only.
+/// The bottom of the box as two triangles. It is drawn only if it is seen from above.
 fn floor(bounds: &Aabb, camera: &Camera) -> Vec<[Corner; 3]> {
     let above = camera.to_eye(bounds.min).z > 0.0;
     let Some(corners) = see(bounds, camera).filter(|_| above) else { return Vec::new() };
@@ -185,7 +187,7 @@ mod tests {
         Aabb::new(DVec3::splat(-1.0), DVec3::ONE)
     }
 
-    /// Looks along −x at the cube from +x: y to the right, z up.
+    /// A view of the cube along −x, with y to the right and z up.
     fn scene(mesh: &MeshView<'_>) -> Backdrop {
         let camera = Camera::new(&cube(), DVec3::X, (320, 240)).unwrap();
         Backdrop::new(camera, &cube(), mesh, &LEGEND).unwrap()
@@ -261,7 +263,7 @@ mod tests {
         for z in [-1.0, 0.0, 1.0] {
             let points = far.map(|p| 30.0 * p + z * DVec3::ONE);
             let mut image = frame(&scene, &points, &[0.0; 4]);
-            // The caption differs in the number of particles.
+            // the captions differ in the number of particles
             image.pixels.truncate(3 * 320 * 220);
             assert!(image.pixels == nothing[..3 * 320 * 220]);
         }
