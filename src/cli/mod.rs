@@ -1,7 +1,7 @@
 //! The command line: one file for each command. Only this part of the crate touches files and terminals.
 //!
-//! Data goes to standard output, messages and progress bars go to standard error. Exit codes: 0 fine; 1 the input
-//! has findings; 2 usage or file error; 3 numerical failure in a run; 130 interrupted.
+//! Data goes to standard output, messages and progress bars go to standard error. Exit codes: 0 fine; 1 the
+//! input has findings; 2 usage or file error; 3 numerical failure in a run; 130 interrupted.
 
 /// Prints one line of data on standard output.
 macro_rules! say {

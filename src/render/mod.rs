@@ -23,10 +23,10 @@ mod shade;
 
 use std::{fmt, io};
 
+use self::colour::Rgb;
 pub use self::{
     backdrop::Backdrop,
     camera::Camera,
-    colour::{Rgb, UNKNOWN_SPEED, speed_colour},
     image::Image,
     mesh::MeshView,
     overlay::{Caption, Legend},

@@ -23,16 +23,19 @@ pub mod terminal;
 
 use std::io;
 
-pub use self::{
+use self::{
     colour::{Rgb, Scale, UNDEFINED},
+    isolines::Outline,
+    svg::svg,
+};
+pub use self::{
     error::SliceError,
-    isolines::{Outline, Polyline, isolines, outlines},
+    isolines::{Polyline, isolines},
     plane::{Axis, Plane, Window},
     sample::{Samples, sample},
-    svg::{escaped, svg},
 };
+pub(crate) use self::{png::rasterise, svg::escaped};
 use crate::field::Field;
-pub use png::rasterise;
 
 /// The number of samples along the longer side that makes a plot smooth at the printed size.
 pub const DEFAULT_SAMPLES: usize = 320;

@@ -1,4 +1,5 @@
-//! `rfm mesh DIR --fluid`: the frames that `rfm run` wrote → surfaces of the fluid, one file for each frame.
+//! `rfm mesh DIR --fluid`: surfaces of the fluid from the frames that `rfm run` wrote, one file for each
+//! frame.
 //!
 //! The list of frames is read and checked before the first file is written. Each file is whole or not there.
 
@@ -47,8 +48,8 @@ struct FrameSurface {
     volume: f64,
     /// The number of particles times mass over rest density.
     particle_volume: f64,
-    /// `volume` over `particle_volume`, null without particles. It shows the error of the surface together with the
-    /// fluid's own compression.
+    /// `volume` over `particle_volume`, null without particles. It shows the error of the surface together
+    /// with the fluid's own compression.
     volume_ratio: Option<f64>,
     milliseconds: f64,
 }
@@ -63,7 +64,7 @@ struct RunFigures {
 /// How large the particles are.
 struct ParticleScale {
     surface: Reconstruction,
-    /// Mass over rest density, m³.
+    /// The mass of a particle over the rest density, in m³.
     particle_volume: f64,
 }
 

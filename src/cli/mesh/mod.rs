@@ -1,5 +1,5 @@
-//! `rfm mesh`: a closed triangle mesh of a solid, in the format that the file's ending names. With `--fluid` it makes
-//! surfaces of the particles of a run.
+//! `rfm mesh`: a closed triangle mesh of a solid, in the format that the file's ending names. With `--fluid`
+//! it makes surfaces of the particles of a run.
 
 mod fluid;
 mod format;
@@ -137,7 +137,8 @@ fn meshed(solid: &Solid, surface: &dyn Field, grid: &Grid, options: &Options) ->
     Ok(mesh)
 }
 
-/// Simplifies the mesh if that is asked for, and measures it. The quality is `None` if only `--simplify` needed it.
+/// Simplifies the mesh if that is asked for, and measures it. The quality is `None` if only `--simplify`
+/// needed it.
 fn measured(
     mesh: &mut Mesh,
     solid: &Solid,

@@ -1,4 +1,5 @@
-//! `--simplify`: fewer triangles within a stated distance of the surface. The distance is measured, not only aimed at.
+//! `--simplify`: fewer triangles within a stated distance of the surface. The distance is measured, not only
+//! aimed at.
 
 use std::time::Instant;
 
@@ -30,12 +31,12 @@ impl Tolerance {
     }
 }
 
-/// Parts of the tolerance to aim at, in turn. The measure has other samples than the simplification, and some of them
-/// lie a few hundredths further off.
+/// Parts of the tolerance to aim at, in turn. The measure has other samples than the simplification, and some
+/// of them lie a few hundredths further off.
 const AIMS: [f64; 3] = [0.9, 0.75, 0.5];
 
-/// Simplifies a mesh as far as the tolerance allows. If the measured distance is too large at every aim, the mesh stays
-/// as it was.
+/// Simplifies a mesh as far as the tolerance allows. If the measured distance is too large at every aim, the
+/// mesh stays as it was.
 pub(super) fn simplified(
     mesh: &mut Mesh,
     tolerance: Tolerance,

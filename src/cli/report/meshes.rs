@@ -1,4 +1,4 @@
-//! Error and time of both ways of meshing against the number of cells.
+//! The error and the time of both meshing methods against the number of cells.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -15,10 +15,10 @@ use crate::Solid;
 use crate::mesh::{self, Grid, Quality, Resolution};
 use crate::solid::Depth;
 
-/// Resolutions of each method, each twice as fine as the one before.
+/// Resolutions for each method. Each is twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;
 
-/// Timed repetitions of which the fastest counts.
+/// Timed repetitions, of which the fastest counts.
 const REPETITIONS: usize = 3;
 
 /// The error and the time of one mesh, a row of the report.
@@ -26,7 +26,7 @@ const REPETITIONS: usize = 3;
 pub(super) struct MeshFigures {
     method: &'static str,
     cells: usize,
-    /// Side of a cell.
+    /// The side of a cell in metres.
     spacing: f64,
     triangles: usize,
     closed: bool,
@@ -36,13 +36,13 @@ pub(super) struct MeshFigures {
     evaluations: u64,
     gradients: u64,
     milliseconds: f64,
-    /// log₂ of how much smaller the Hausdorff distance is than with half the cells.
+    /// log₂ of the Hausdorff distance with half the cells over the one with these.
     order: Option<f64>,
-    /// The same for the root mean square from the mesh to the surface.
+    /// The order of the root mean square from the mesh to the surface.
     order_rms: Option<f64>,
 }
 
-/// Meshes a solid by each method with up to `finest` cells. Nothing for a solid without bounds.
+/// Meshes a solid by each method with up to `finest` cells. Empty for a solid without bounds.
 pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, Failure> {
     let Some(bounds) = solid.bounds().aabb() else { return Ok(Vec::new()) };
     let bar = progress::bar(u64::from(2 * RESOLUTIONS), "meshing");
@@ -138,7 +138,7 @@ pub(super) fn print(rows: &[MeshFigures]) {
     }
 }
 
-/// Hausdorff distance against cells, a line for each method, as SVG or PNG.
+/// Plots the Hausdorff distance against the cells, with a line for each method, as SVG or PNG.
 pub(super) fn draw(solid: &str, rows: &[MeshFigures], path: &Path) -> Result<Vec<u8>, Failure> {
     let marks: Vec<(&MeshFigures, f64)> = rows
         .iter()

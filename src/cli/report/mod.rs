@@ -1,9 +1,9 @@
-//! `rfm report`: speed against error, for every program of a solid that there is, or for a flow that is known.
+//! `rfm report`: speed against error, for every program of a solid, or for a flow whose truth is known.
 //!
-//! Errors are measured against 120-digit arithmetic at random points of the box and at points on the surface;
-//! times are medians over batches of random points on one thread. Then the meshes: error and time of each method against
-//! the number of cells, with the order of convergence that they show. A scene is run at several resolutions instead
-//! ([`flows`]).
+//! Errors of programs are measured against 120-digit arithmetic at random points of the box and at points on
+//! the surface. Times are medians over batches of random points on one thread. For meshes the report gives
+//! the error and the time of each method against the number of cells, and the order of convergence. A scene
+//! is run at several resolutions instead ([`flows`]).
 
 mod flow_plot;
 mod flows;
@@ -112,7 +112,8 @@ fn all_programs(
     Ok(rows)
 }
 
-/// The scene that is meant: by its name, by options that only a flow has, or because the file has no solid.
+/// The scene to report on, if one is meant: by its name, by options that only a flow has, or because the file
+/// has no solid.
 fn scene<'a>(
     program: &'a Program,
     name: Option<&str>,

@@ -1,4 +1,4 @@
-//! Speed against error as a picture: one mark for each program.
+//! Speed against error as a picture, with a mark for each program.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -7,10 +7,10 @@ use super::super::failure::Failure;
 use super::super::plot::{BOTTOM, HEIGHT, LEFT, LogAxis, RIGHT, TOP, WIDTH, begin, end, grid};
 use super::programs::ProgramFigures;
 
-/// Errors below this are drawn at it: an exact answer has no place on a logarithmic axis.
+/// Smaller errors are drawn at this one, because an exact answer has no place on a logarithmic axis.
 const LEAST_ERROR: f64 = 1e-17;
 
-/// The plot as SVG or PNG, as the ending of the path says.
+/// The plot as SVG or PNG, by the ending of the path.
 pub(super) fn draw(solid: &str, rows: &[ProgramFigures], path: &Path) -> Result<Vec<u8>, Failure> {
     end(svg(solid, rows), path)
 }
@@ -32,7 +32,7 @@ fn svg(solid: &str, rows: &[ProgramFigures]) -> String {
     out
 }
 
-/// Colour tells the program, shape the form; interpreters are hollow.
+/// Draws a mark. Its colour stands for the program, its shape for the form, and interpreters are hollow.
 fn mark(out: &mut String, row: &ProgramFigures, x: f64, y: f64) {
     let colour = colour(row);
     let fill = if row.engine == "interp" { "#ffffff" } else { colour };

@@ -1,4 +1,4 @@
-//! Every program of a solid: how long a point takes, and how far the result is from the truth.
+//! Every program of a solid: the time per point, and the distance of the results from the truth.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -15,10 +15,10 @@ use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Node}
 use crate::solid::{Lane, ProgramKind};
 use crate::{Engine, Precision, Program, Solid};
 
-/// Distances from the surface below this many rounding errors of the coordinates decide nothing.
+/// A point nearer to the surface than this many rounding errors of its coordinates has no sign to compare.
 const ROUNDING: f64 = 8.0;
 
-/// Timed repetitions of which the median counts.
+/// Timed repetitions, of which the median counts.
 const REPETITIONS: usize = 25;
 
 /// The speed and the errors of one program, a row of the report.
@@ -28,17 +28,18 @@ pub(super) struct ProgramFigures {
     pub precision: &'static str,
     pub engine: &'static str,
     pub form: &'static str,
-    /// One point at a time, or many.
+    /// `one` point at a time, or `many`.
     pub shape: &'static str,
     pub ns_per_point: f64,
-    /// Over random points of the box.
+    /// The largest error over random points of the box.
     pub max_abs_error: Option<f64>,
+    /// The largest relative error over random points of the box.
     pub max_rel_error: Option<f64>,
-    /// What the error of ω is certified not to exceed anywhere in the box, for coordinates of the row's precision.
+    /// The certified bound of the error of ω in the box, for coordinates of the row's precision.
     pub certified_error: Option<f64>,
-    /// Over random points and points on the surface.
+    /// The number of wrong signs at random points and points on the surface.
     pub sign_mismatches: Option<usize>,
-    /// How far the surface is displaced: |error of ω|/|∇ω| on it.
+    /// The largest displacement |error of ω|/|∇ω| of the surface, in metres.
     pub max_distance_error: Option<f64>,
 }
 
@@ -50,7 +51,7 @@ const FORMS: [(&str, Form); 4] = [
     ("scaled", Form::Scaled),
 ];
 
-/// The same solid in every form and on every engine.
+/// The solid in every form and on every engine, with the names of these variants.
 pub(super) fn variants(program: &Program, solid: &Solid) -> Result<Vec<(&'static str, Solid)>, Failure> {
     let node = program.module().solids.iter().find(|s| s.name == solid.name()).map(|s| s.node);
     let Some(node) = node else { return Err(Failure::usage("the solid has no definition of its own")) };
@@ -65,7 +66,7 @@ pub(super) fn variants(program: &Program, solid: &Solid) -> Result<Vec<(&'static
     Ok(all)
 }
 
-/// Exact ω and ∇ω at the points of both precisions.
+/// Exact ω and ∇ω at the points of both precisions. `None` where there is no exact value.
 pub(super) struct ExactValues {
     pub double: Vec<Option<[Exact; 4]>>,
     pub single: Vec<Option<[Exact; 4]>>,
@@ -74,7 +75,7 @@ pub(super) struct ExactValues {
 impl ExactValues {
     pub fn at(solid: &Solid, points: &SamplePoints) -> Self {
         let (graph, outputs) = if solid.moves() {
-            // programs do not know the time, the formula does
+            // only the formula depends on the time, programs do not
             let (formula, root) = solid.formula();
             let mut graph = formula.clone();
             let [x, y, z] = ir::gradient(&mut graph, root);
@@ -102,8 +103,8 @@ struct Variant<'a> {
     form: &'static str,
 }
 
-/// The figures of all programs of one solid in one precision. `name` is that of [`variants`], and `truth` is for the
-/// judged points of the precision.
+/// The figures of all programs of one solid in one precision. `name` is that of [`variants`], and `truth` is
+/// for the judged points of the precision.
 pub(super) fn measure<T: Lane>(
     solid: &Solid,
     name: &'static str,
@@ -212,7 +213,7 @@ impl Variant<'_> {
     }
 }
 
-/// The certificate of a program over the box and what rounding its points to the type adds to it.
+/// The certified bound of a program over the box. The box is grown by the rounding of its points to the type.
 fn certified<T: Lane>(solid: &Solid, over: Aabb) -> Option<f64> {
     let float = match T::PRECISION {
         Precision::F32 => FloatType::F32,
@@ -226,7 +227,8 @@ fn certified<T: Lane>(solid: &Solid, over: Aabb) -> Option<f64> {
     bound.is_finite().then_some(bound)
 }
 
-/// Ranges of small boxes around the points: a violation is a point whose exact ω is not in the range.
+/// The figures of ranges, for small boxes around the points. A point whose ω is not in the range counts as a
+/// wrong sign.
 pub(super) fn range_row(solid: &Solid, points: &SamplePoints) -> ProgramFigures {
     let half = 0.02 * points.over.size();
     let boxes: Vec<Aabb> = points.random.iter().map(|&p| Aabb::new(p - half, p + half)).collect();
@@ -326,7 +328,8 @@ fn slope(truth: &[Exact; 4]) -> f64 {
     DVec3::new(truth[1].to_f64(), truth[2].to_f64(), truth[3].to_f64()).length()
 }
 
-/// Wrong signs among the points that are farther from the surface than their own coordinates are rounded.
+/// The number of wrong signs among the points that are farther from the surface than the rounding of their
+/// coordinates.
 fn sign_mismatches<T: Lane>(found: &[T], truth: &[Option<[Exact; 4]>], at: &[DVec3]) -> usize {
     let epsilon = match T::PRECISION {
         Precision::F32 => f64::from(f32::EPSILON),
@@ -342,7 +345,7 @@ fn sign_mismatches<T: Lane>(found: &[T], truth: &[Option<[Exact; 4]>], at: &[DVe
     (0..found.len()).filter(wrong).count()
 }
 
-/// Nanoseconds per point, the median of many repetitions after one that is not counted.
+/// The median time in nanoseconds per point over many repetitions, after one that does not count.
 fn median_ns(points: usize, work: &mut dyn FnMut()) -> f64 {
     work();
     let mut times: Vec<f64> = (0..REPETITIONS)
