@@ -74,6 +74,7 @@ pub use thin::{ThinCells, thin_cells};
 /// A triangle mesh with shared vertices.
 ///
 /// `positions` and `normals` have the same length. Meshes made here are closed manifolds, see [`check`].
+/// Functions that take a mesh panic if one of its triangles names a vertex that does not exist.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// The vertices, in metres.

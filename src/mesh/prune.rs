@@ -175,7 +175,7 @@ impl Bricks {
     }
 
     /// What is known about a brick. Beyond the grid there is fluid.
-    pub(super) fn place(&self, at: [usize; 3]) -> BrickKind {
+    pub(super) fn kind(&self, at: [usize; 3]) -> BrickKind {
         if at.iter().any(|b| b >> self.levels != 0) {
             return BrickKind::Fluid;
         }
@@ -224,7 +224,7 @@ mod tests {
         assert_eq!(lattice.counts(), [7; 3]);
         let bricks = Bricks::classify(&HalfSpace, &lattice);
         // the plane lies between nodes 16 and 17 of the grid, whose extended indices are 17 and 18
-        let found = [0, 1, 2, 3, 5, 6, 7].map(|x| bricks.place([x, 3, 3]));
+        let found = [0, 1, 2, 3, 5, 6, 7].map(|x| bricks.kind([x, 3, 3]));
         let near = |place| matches!(place, BrickKind::Near(_));
         assert_eq!(found.map(near), [false, false, true, false, false, true, false]);
         assert_eq!([found[0], found[3], found[6]], [BrickKind::Fluid, BrickKind::Solid, BrickKind::Fluid]);
@@ -233,7 +233,7 @@ mod tests {
         let border = 7 * 7 + 3 * (7 * 7 - 5 * 5);
         assert_eq!((solid, bricks.near.len()), (border, border + 49));
         for (i, brick) in bricks.near.iter().enumerate() {
-            assert_eq!(bricks.place(brick.at), BrickKind::Near(i as u32));
+            assert_eq!(bricks.kind(brick.at), BrickKind::Near(i as u32));
         }
     }
 

@@ -137,7 +137,7 @@ impl Brick {
     pub(super) fn new(bricks: &Bricks, signs: &[Signs], number: usize) -> Self {
         let at = bricks.near[number].at;
         let upper = [1, 2, 3, 4, 5, 6, 7]
-            .map(|i| bricks.place([0, 1, 2].map(|axis: usize| at[axis] + (i >> axis & 1))));
+            .map(|i| bricks.kind([0, 1, 2].map(|axis: usize| at[axis] + (i >> axis & 1))));
         let mut brick = Self {
             number,
             low: at.map(|b| b * BRICK),

@@ -90,7 +90,7 @@ fn crossed_rows(near: &Bricks, crossed: &[Signs], at: [usize; 3]) -> Rows {
         if (0..3).any(|axis| at[axis] + step[axis] == 0) {
             continue;
         }
-        let BrickKind::Near(number) = near.place([0, 1, 2].map(|axis| at[axis] + step[axis] - 1)) else {
+        let BrickKind::Near(number) = near.kind([0, 1, 2].map(|axis| at[axis] + step[axis] - 1)) else {
             continue;
         };
         let planes = &crossed[number as usize];

@@ -54,7 +54,8 @@ use crate::field::Field;
 ///
 /// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
 /// closed by faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of the
-/// surface found, in (0, 1], not always in ascending order.
+/// surface found, in (0, 1], not always in ascending order. Sources: Ju, Losasso, Schaefer, Warren, SIGGRAPH
+/// 2002; Schaefer, Ju, Warren, IEEE TVCG 13, 2007.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,

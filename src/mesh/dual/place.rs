@@ -85,6 +85,13 @@ impl Default for PlacementScratch {
     }
 }
 
+/// What a task writes.
+struct Output<'s, 'm> {
+    slots: Slots<'s>,
+    scratch: &'m mut PlacementScratch,
+    placed: Placed,
+}
+
 /// What all tasks read, and the rings that they fill.
 pub(super) struct Placement<'a> {
     pub field: &'a dyn Field,
@@ -99,18 +106,18 @@ pub(super) struct Placement<'a> {
 
 impl Placement<'_> {
     /// Places the vertices of a task's cells.
-    pub fn place(&self, task: &Task<Sheets>, mut slots: Slots<'_>, scratch: &mut PlacementScratch) -> Placed {
-        let mut placed = Placed::default();
+    pub fn place(&self, task: &Task<Sheets>, slots: Slots<'_>, scratch: &mut PlacementScratch) -> Placed {
+        let mut output = Output { slots, scratch, placed: Placed::default() };
         let mut next = 0;
         for (brick, sheets) in task.bricks.iter().zip(&task.kept) {
-            brick.number_vertices(|number| self.crossed.get(number), &mut scratch.table);
+            brick.number_vertices(|number| self.crossed.get(number), &mut output.scratch.table);
             let around = brick.around(self.signs);
             let loops = &*LOOPS;
             for z in 0..BRICK {
                 let corners = around.corners(z);
                 for bit in set_positions(crossed_cells(&corners)) {
                     for of_cell in &loops[usize::from(inside_corners(&corners, bit))] {
-                        self.add(brick, (z, bit), of_cell, next, &mut slots, scratch, &mut placed);
+                        self.add(brick, (z, bit), of_cell, next, &mut output);
                         next += 1;
                     }
                 }
@@ -119,31 +126,30 @@ impl Placement<'_> {
                 let first = next;
                 for (number, of_cell) in cell.loops.iter().enumerate() {
                     if cell.opens(number) {
-                        self.add_ring(cell.cell, of_cell, next, &mut slots, scratch, &mut placed);
+                        self.add_ring(cell.cell, of_cell, next, &mut output);
                     } else {
-                        self.add(brick, cell.cell, of_cell, next, &mut slots, scratch, &mut placed);
+                        self.add(brick, cell.cell, of_cell, next, &mut output);
                     }
                     next += cell.vertices(number);
                 }
-                self.add_tube(cell, first, &slots, &mut placed);
+                self.add_tube(cell, first, &mut output);
             }
         }
+        let Output { mut slots, scratch, mut placed } = output;
         self.settle_smooth(&mut slots, &mut scratch.gradients, &mut placed);
         placed
     }
 
     /// Adds the vertex of a loop.
-    #[expect(clippy::too_many_arguments)]
     fn add(
         &self,
         brick: &Brick,
         cell: (usize, usize),
         around: &Loop,
         place: usize,
-        slots: &mut Slots<'_>,
-        scratch: &mut PlacementScratch,
-        placed: &mut Placed,
+        output: &mut Output<'_, '_>,
     ) {
+        let Output { slots, scratch, placed } = output;
         let vertex = slots.first + place as u32;
         let base = edge_slot(0, [cell.1 % BRICK, cell.1 / BRICK, cell.0]);
         let hit = |e: u8| scratch.table[base + SLOT_OF_EDGE[usize::from(e)]];
@@ -165,8 +171,7 @@ impl Placement<'_> {
         let mean = position / count as f64;
         let length = normal.length();
         let normal = normal / length;
-        // over a bend the tangent planes of the hits pass as far above the surface as the mean of the hits
-        // lies below it
+        // over a bend the tangent planes of the hits pass as far above the surface as the mean of the hits lies below it
         let (mut least_agreement, mut height) = (f64::INFINITY, 0.0);
         for &number in numbers {
             let of_hit = self.hits.normals[number];
@@ -178,18 +183,31 @@ impl Placement<'_> {
         slots.positions[place] = mean + (0.5 * height / count as f64) * normal;
         slots.normals[place] = normal;
         if !is_smooth {
-            scratch.hits.clear();
-            scratch.hits.extend(around.edges.iter().map(|&e| self.hits.get(hit(e))));
-            let high = self.lattice.position(low.map(|n| n + 1));
-            let cell = Aabb::new(self.lattice.position(low), high);
-            let (hits, count) = (&scratch.hits, &mut placed.gradients);
-            let (found, fallback) = match cell.size().min_element() > 0.0 {
-                true => (sharp::at_crease(self.field, &cell, self.spacing, hits, mean, count), mean),
-                false => sharp::on_border(self.field, &cell, hits, mean, count),
-            };
-            slots.set(place, found);
-            placed.fallbacks.push((vertex, fallback));
+            self.move_to_crease(low, numbers, mean, place, output);
         }
+    }
+
+    /// Moves the vertex of a loop that is not smooth to a crease or a corner, or onto the border. `low` are the extended
+    /// indices of the cell's low corner, and `mean` is the mean of the loop's hits.
+    fn move_to_crease(
+        &self,
+        low: [usize; 3],
+        numbers: &[usize],
+        mean: DVec3,
+        place: usize,
+        Output { slots, scratch, placed }: &mut Output<'_, '_>,
+    ) {
+        scratch.hits.clear();
+        scratch.hits.extend(numbers.iter().map(|&number| self.hits.get(number as u32)));
+        let high = self.lattice.position(low.map(|n| n + 1));
+        let cell = Aabb::new(self.lattice.position(low), high);
+        let (hits, count) = (&scratch.hits, &mut placed.gradients);
+        let (found, fallback) = match cell.size().min_element() > 0.0 {
+            true => (sharp::at_crease(self.field, &cell, self.spacing, hits, mean, count), mean),
+            false => sharp::on_border(self.field, &cell, hits, mean, count),
+        };
+        slots.set(place, found);
+        placed.fallbacks.push((slots.first + place as u32, fallback));
     }
 
     /// Adds a vertex for each passage of a tunnel's end through a face. It lies at the passage, a little into
@@ -199,9 +217,7 @@ impl Placement<'_> {
         cell: (usize, usize),
         around: &Loop,
         place: usize,
-        slots: &mut Slots<'_>,
-        scratch: &mut PlacementScratch,
-        placed: &mut Placed,
+        Output { slots, scratch, placed }: &mut Output<'_, '_>,
     ) {
         let base = edge_slot(0, [cell.1 % BRICK, cell.1 / BRICK, cell.0]);
         let n = around.edges.len();
@@ -224,7 +240,7 @@ impl Placement<'_> {
     }
 
     /// Joins the rings at both ends of a tunnel. `first` is the place of the cell's first vertex.
-    fn add_tube(&self, cell: &CellLoops, first: usize, slots: &Slots<'_>, placed: &mut Placed) {
+    fn add_tube(&self, cell: &CellLoops, first: usize, Output { slots, placed, .. }: &mut Output<'_, '_>) {
         let Some(ends) = cell.tunnel else { return };
         let ring = |end: usize| {
             let before: usize = (0..end).map(|number| cell.vertices(number)).sum();
