@@ -1,5 +1,5 @@
-//! Closed intervals with outward rounding. They enclose the results of real arithmetic and are never
-//! narrower.
+//! Closed intervals with outward rounding. They enclose the results of real arithmetic and are
+//! never narrower.
 //!
 //! The result of every operation contains the exact image of its operands: results of the correctly rounded
 //! operations (+ − × ÷ √) are widened by one unit in the last place, those of library functions by four.

@@ -1,5 +1,5 @@
-//! The common parts of all plots: the ground with its title, the margins, the axes, and SVG or PNG at the
-//! end.
+//! The common parts of all plots: the ground with its title, the margins, the axes, and SVG or PNG at
+//! the end.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Messages of the compiler to people: one type for every message about a file, one renderer, one list of
-//! codes.
+//! Messages of the compiler to people: one type for every message about a file, one renderer, one list
+//! of codes.
 //!
 //! Messages are in lower case without a full stop. They say what was found and what would be accepted.
 

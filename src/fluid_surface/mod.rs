@@ -2,9 +2,9 @@
 //!
 //! [`read_collection`] lists the frames of a run, [`read_points`] reads the positions of one, and
 //! [`Reconstruction::mesh`] lays a surface around them with the crate `splashsurf_lib`. A kernel sum gives
-//! the density over the rest density, which marching cubes mesh at a threshold, as Löschner, Böttcher, Jeske
-//! and Bender describe ("Weighted Laplacian Smoothing for Surface Reconstruction of Particle-based Fluids",
-//! 2023).
+//! the density over the rest density, which marching cubes mesh at a threshold, as Löschner, Böttcher,
+//! Jeske and Bender describe ("Weighted Laplacian Smoothing for Surface Reconstruction of Particle-based
+//! Fluids", 2023).
 //!
 //! Invariant: the mesh is closed, its triangles are counter-clockwise as seen from outside the fluid, and the
 //! same particles give the same bits on any number of threads. The crate returns vertices in the order in

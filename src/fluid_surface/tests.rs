@@ -54,8 +54,8 @@ fn the_surface_does_not_depend_on_threads() {
 #[test]
 fn single_and_coincident_particles_have_a_surface() {
     assert_eq!(advised().mesh(&[]), Ok(Mesh::default()));
-    // a single particle has the density of its own kernel only, by which splashsurf divides, so a ball
-    // remains
+    // a single particle has the density of its own kernel only, by which splashsurf divides, so a
+    // ball remains
     for particles in [vec![DVec3::ZERO], vec![DVec3::ONE; 2], vec![DVec3::splat(1e6); 3]] {
         let mesh = advised().mesh(&particles).unwrap();
         assert!(is_closed_manifold(&mesh) && volume(&mesh) > 0.0, "{particles:?}");

@@ -245,8 +245,8 @@ mod tests {
             }
         }
         let [solid, fluid] = [true, false].map(|kind| parts(&positive, side, kind));
-        // the complement of a solid in space has the solid's characteristic, plus one for the ball at
-        // infinity
+        // the complement of a solid in space has the solid's characteristic, plus one for the ball
+        // at infinity
         let agree =
             solid.euler == fluid.euler - 1 && [solid, fluid].iter().all(|p| p.along_axes == p.across_corners);
         agree.then_some(Topology { euler: solid.euler, solids: solid.along_axes, fluids: fluid.along_axes })
@@ -257,8 +257,8 @@ mod tests {
     struct PointSet {
         /// The Euler characteristic of points, edges, filled squares and filled cubes.
         euler: i64,
-        /// The number of parts if points are joined along the axes, and if they are joined across corners as
-        /// well.
+        /// The number of parts if points are joined along the axes, and if they are joined across corners
+        /// as well.
         along_axes: usize,
         across_corners: usize,
     }
@@ -319,8 +319,8 @@ mod tests {
         parent[a.max(b)] = a.min(b) as u32;
     }
 
-    /// Refines until `in_a_row` resolutions agree. `None` for fields that are too near to a change of
-    /// topology.
+    /// Refines until `in_a_row` resolutions agree. `None` for fields that are too near to a change
+    /// of topology.
     fn true_topology(values: &Values, resolutions: &[usize], in_a_row: usize) -> Option<Topology> {
         let mut agreeing: Vec<Topology> = Vec::new();
         for &per_cell in resolutions {

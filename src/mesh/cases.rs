@@ -21,8 +21,8 @@ pub(super) const EDGES: usize = 12;
 /// The number of faces of a cell.
 pub(super) const FACES: usize = 6;
 
-/// The decision on a face whose inside corners lie on one diagonal and whose outside corners lie on the
-/// other.
+/// The decision on a face whose inside corners lie on one diagonal and whose outside corners lie on
+/// the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ambiguous {
     /// There is solid on both sides of a strip of fluid.
@@ -58,8 +58,8 @@ impl Cases {
         Self { triangles, first }
     }
 
-    /// The triangles of a cell; bit c of `inside` is set if corner c has ω > 0. Empty for cells that need
-    /// values.
+    /// The triangles of a cell; bit c of `inside` is set if corner c has ω > 0. Empty for cells that
+    /// need values.
     pub(super) fn triangles(&self, inside: u8) -> &[[u8; 3]] {
         let case = usize::from(inside);
         &self.triangles[self.first[case]..self.first[case + 1]]

@@ -87,8 +87,8 @@ struct EdgeFindings {
     count: usize,
     closed: bool,
     two_sided: bool,
-    /// The number of fans of triangles around vertices, joined across edges. A manifold has as many as
-    /// vertices.
+    /// The number of fans of triangles around vertices, joined across edges. A manifold has as many
+    /// as vertices.
     fans: usize,
 }
 
@@ -287,8 +287,8 @@ mod tests {
         };
         let plain = wall_at_one(|s| 50.0 * s, |_| 50.0);
         assert!((plain - 1e-3).abs() < 1e-12, "{plain}");
-        // triple root: Newton's steps shrink by a third, and the change of sign is found within a factor of
-        // two
+        // triple root: Newton's steps shrink by a third, and the change of sign is found within a factor
+        // of two
         let flat = wall_at_one(|s| s.powi(3), |s| 3.0 * s * s);
         assert!((1e-3..=2e-3).contains(&flat) || (flat - 1e-3).abs() < 1e-4, "{flat}");
         let kinked = wall_at_one(|s| s.min(100.0 * s), |s| if s > 0.0 { 1.0 } else { 100.0 });

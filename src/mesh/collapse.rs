@@ -1,5 +1,5 @@
-//! Merges vertices that coincide in a node of the grid, so that no triangle has zero area where that can be
-//! avoided.
+//! Merges vertices that coincide in a node of the grid, so that no triangle has zero area where that can
+//! be avoided.
 //!
 //! Where ω = 0 in a node, all roots on the edges around it fall onto the node. Where a solid leaves the grid
 //! across an edge of its box, two or three cap vertices fall onto a node. Sheets that only touch in the node

@@ -159,8 +159,8 @@ impl Grid {
     }
 }
 
-/// Refuses a side that moves a coordinate of the box by only a few units in the last place: nodes would
-/// coincide.
+/// Refuses a side that moves a coordinate of the box by only a few units in the last place: nodes
+/// would coincide.
 fn check_side(side: f64, bounds: &Aabb) -> Result<(), GridError> {
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
     if side.is_finite() && side > 1e-12 * largest { Ok(()) } else { Err(GridError::BadSpacing(side)) }

@@ -10,13 +10,13 @@
 //! each vertex on the surface, vertices that coincide in a node are merged, and normals are −∇ω/|∇ω|.
 //!
 //! What is promised: the mesh is closed; every edge lies in exactly two triangles, which run along it in
-//! opposite directions; triangles are counter-clockwise as seen from the fluid; the topology is that of the
-//! trilinear interpolant of ω at the nodes; the same field and grid give the same bits on any number of
-//! threads.
+//! opposite directions; triangles are counter-clockwise as seen from the fluid; the topology is that of
+//! the trilinear interpolant of ω at the nodes; the same field and grid give the same bits on any number
+//! of threads.
 //!
 //! What is not promised: marching cubes cut creases between nodes; features thinner than a cell may be
-//! missed, although they are counted; there is no surface where the field touches zero without a change of
-//! sign.
+//! missed, although they are counted; there is no surface where the field touches zero without a change
+//! of sign.
 //!
 //! ```
 //! use rfm::{field::Closures, geom::Aabb, glam::DVec3, mesh};
@@ -103,8 +103,8 @@ pub struct Work {
     pub evaluations: u64,
     /// Evaluations of ∇ω.
     pub gradients: u64,
-    /// Vertices that were merged because they coincided in a node of the grid, or dropped as a speck without
-    /// extent.
+    /// Vertices that were merged because they coincided in a node of the grid, or dropped as a speck
+    /// without extent.
     pub merged: u64,
 }
 

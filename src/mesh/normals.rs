@@ -1,5 +1,5 @@
-//! Vertex normals: n = −∇ω/|∇ω|, or the mean of the triangles around a vertex where the field gives no
-//! direction.
+//! Vertex normals: n = −∇ω/|∇ω|, or the mean of the triangles around a vertex where the field gives
+//! no direction.
 //!
 //! Invariant: every normal is a finite unit vector.
 
@@ -52,8 +52,8 @@ impl GradientColumns {
 }
 
 impl Mesh {
-    /// A mesh that stands for no field: each normal is the area-weighted mean of the triangles around its
-    /// vertex.
+    /// A mesh that stands for no field: each normal is the area-weighted mean of the triangles around
+    /// its vertex.
     pub fn from_triangles(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
         let normals = vec![DVec3::ZERO; positions.len()];
         let mut mesh = Self { positions, normals, triangles, ..Self::default() };

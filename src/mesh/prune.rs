@@ -64,8 +64,8 @@ impl Lattice {
         extended == 0 || extended > self.nodes[axis].len()
     }
 
-    /// The coordinate of an extended node. Nodes of the ring have no coordinates of their own and lie on the
-    /// border.
+    /// The coordinate of an extended node. Nodes of the ring have no coordinates of their own and lie on
+    /// the border.
     pub(super) fn coordinate(&self, axis: usize, extended: usize) -> f64 {
         self.nodes[axis][extended.clamp(1, self.nodes[axis].len()) - 1]
     }

@@ -60,8 +60,8 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// The Hausdorff distance in metres, as far as samples show: the larger of the largest distances both
-    /// ways.
+    /// The Hausdorff distance in metres, as far as samples show: the larger of the largest distances
+    /// both ways.
     pub fn hausdorff(&self) -> f64 {
         self.to_surface.max.max(self.from_surface.max)
     }
@@ -137,8 +137,8 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// Measures one mesh of `field` in `grid`. Several meshes of one surface are measured faster with a
-/// [`Reference`].
+/// Measures one mesh of `field` in `grid`. Several meshes of one surface are measured faster with
+/// a [`Reference`].
 ///
 /// # Errors
 /// Those of [`Reference::new`].

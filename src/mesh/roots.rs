@@ -24,11 +24,11 @@ pub(super) struct AxisEdges {
     pub across: [Vec<f64>; 2],
 }
 
-/// The width of the final bracket relative to the edge's coordinates: a few times the rounding of an R0 field
-/// divided by its slope. In a narrower bracket the search wanders in that rounding and takes 13 evaluations
-/// for each edge of the pawn instead of 8. The root itself is mostly right to the last digit. A root that is
-/// so near to an edge's end is put on it, so that vertices which meet in a node coincide exactly and can be
-/// merged.
+/// The width of the final bracket relative to the edge's coordinates: a few times the rounding of an R0
+/// field divided by its slope. In a narrower bracket the search wanders in that rounding and takes 13
+/// evaluations for each edge of the pawn instead of 8. The root itself is mostly right to the last digit. A
+/// root that is so near to an edge's end is put on it, so that vertices which meet in a node coincide
+/// exactly and can be merged.
 const BRACKET: f64 = 32.0 * f64::EPSILON;
 
 /// The first step across a root that interpolation seems to have found, as a share of the final bracket.
@@ -98,8 +98,8 @@ pub(super) struct RootFinder {
 }
 
 impl RootFinder {
-    /// Appends the surface's coordinate on each edge along `axis` to `roots`; returns the number of
-    /// evaluations.
+    /// Appends the surface's coordinate on each edge along `axis` to `roots`; returns the number
+    /// of evaluations.
     ///
     /// # Errors
     /// [`MeshError::NotANumber`] at the first NaN found.
@@ -243,8 +243,8 @@ fn evaluate(field: &dyn Field, points: Points<'_>, omega: &mut Vec<f64>) -> Resu
     Ok(points.len() as u64)
 }
 
-/// The share of an edge at which the straight line through the values at its ends is zero. It is kept off the
-/// ends.
+/// The share of an edge at which the straight line through the values at its ends is zero. It is kept off
+/// the ends.
 fn line_share(f0: f64, f1: f64) -> f64 {
     let share = f0 / (f0 - f1);
     // not a number when an end is infinite
@@ -283,8 +283,8 @@ struct RootSearch {
 }
 
 impl RootSearch {
-    /// Goes on from the newest point, the point that brackets the root with it, and the point that was given
-    /// up.
+    /// Goes on from the newest point, the point that brackets the root with it, and the point that was
+    /// given up.
     fn new(edge: usize, slot: usize, [newest, other, previous]: [(f64, f64); 3], tolerance: f64) -> Self {
         let least_step = FIRST_STEP * tolerance;
         let mut search = Self { edge, slot, newest, other, previous, tolerance, least_step, next: 0.0 };

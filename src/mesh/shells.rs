@@ -52,8 +52,8 @@ pub fn shells(mesh: &Mesh) -> Vec<Shell> {
             found.len() - 1
         });
         let shell = &mut found[index];
-        // volumes about a vertex of the shell itself, so that a small shell far from the origin keeps its
-        // digits
+        // volumes about a vertex of the shell itself, so that a small shell far from the origin keeps
+        // its digits
         let origin = mesh.positions[root as usize];
         let [p, q, r] = [a, b, c].map(|v| mesh.positions[v as usize] - origin);
         shell.triangles += 1;

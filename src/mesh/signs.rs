@@ -1,9 +1,9 @@
 //! The signs at a brick's nodes, one bit each, and what follows from them: crossed edges, their numbers, and
 //! the cells that the surface passes through.
 //!
-//! A plane of a brick's nodes is a word: bit x + 8·y is set if node (x, y) lies inside. An edge belongs to
-//! the brick of its low end, a cell to the brick of its low corner. Both may reach into the seven bricks
-//! above.
+//! A plane of a brick's nodes is a word: bit x + 8·y is set if node (x, y) lies inside. An edge belongs
+//! to the brick of its low end, a cell to the brick of its low corner. Both may reach into the seven
+//! bricks above.
 //!
 //! Invariant: a bit is set exactly where ω > 0, whether sampled or proven; the ring's bits are zero.
 
@@ -101,8 +101,8 @@ pub(super) struct Brick {
     pub inner: u32,
 }
 
-/// The vertices on edges of a brick, and on the edges of the bricks above that its cells use, by
-/// [`edge_slot`].
+/// The vertices on edges of a brick, and on the edges of the bricks above that its cells use,
+/// by [`edge_slot`].
 pub(super) type VertexTable = [u32; 3 * SLOTS];
 
 const SLOTS_ALONG: usize = BRICK + 1;

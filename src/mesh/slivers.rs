@@ -25,8 +25,8 @@ const LARGEST_TURN: f64 = 0.7;
 /// Passes over the mesh at most. After the third few slivers give way.
 const PASSES: usize = 4;
 
-/// The roundness 4√3 · area / (sum of the squared sides): 1 for an equilateral triangle, 0 for one without
-/// area.
+/// The roundness 4√3 · area / (sum of the squared sides): 1 for an equilateral triangle, 0 for one
+/// without area.
 pub(super) fn roundness([a, b, c]: [DVec3; 3]) -> f64 {
     let sides = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
     let twice_area = (b - a).cross(c - a).length();

@@ -304,8 +304,8 @@ fn the_limit_of_vertices_is_the_one_that_the_error_names() {
         error.to_string(),
         "the mesh would have 536870913 vertices; at most 536870912 are possible, use larger cells"
     );
-    // what the limit is for: `check` numbers the corners of twice as many triangles, PLY and VTP write signed
-    // indices
+    // what the limit is for: `check` numbers the corners of twice as many triangles, PLY and VTP write
+    // signed indices
     assert!(u32::try_from(3 * 2 * Mesh::MAX_VERTICES).is_ok() && i32::try_from(Mesh::MAX_VERTICES).is_ok());
 }
 

@@ -40,8 +40,8 @@ pub struct Backdrop {
 }
 
 impl Backdrop {
-    /// Draws what does not move: the box with the corners of `bounds` in metres, and the mesh, which may be
-    /// empty.
+    /// Draws what does not move: the box with the corners of `bounds` in metres, and the mesh, which may
+    /// be empty.
     ///
     /// # Errors
     /// [`RenderError::Legend`], which is a bug of ours.

@@ -11,8 +11,8 @@ use crate::geom::Aabb;
 /// Sub-pixels per pixel in each direction.
 pub(super) const SUBPIXELS: usize = 2;
 
-/// The distance of the eye from the centre of the box, in diagonals of the box. Parallel lines stay nearly
-/// parallel.
+/// The distance of the eye from the centre of the box, in diagonals of the box. Parallel lines stay
+/// nearly parallel.
 const DISTANCE: f64 = 3.0;
 /// The margins around the box in a picture 960 high: left, top, right (colour bar), bottom (caption).
 const MARGINS: [f64; 4] = [48.0, 56.0, 150.0, 72.0];
@@ -93,8 +93,8 @@ impl Camera {
         self.centre = DVec2::new(left, top) + 0.5 * room - 0.5 * self.focal * (low + high);
     }
 
-    /// A point on the screen. `None` for points that are not finite, and for those behind or very near the
-    /// eye.
+    /// A point on the screen. `None` for points that are not finite, and for those behind or very near
+    /// the eye.
     pub(super) fn look(&self, p: DVec3) -> Option<Seen> {
         let d = p - self.eye;
         let nearness = 1.0 / -d.dot(self.back);

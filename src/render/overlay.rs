@@ -18,8 +18,8 @@ use super::{RenderError, colour::STOPS, image::Layer};
 pub struct Legend<'a> {
     /// The title over the picture.
     pub title: &'a str,
-    /// The speed that is shown in red, in m/s. Frames of a run can be compared if it is the same for all of
-    /// them.
+    /// The speed that is shown in red, in m/s. Frames of a run can be compared if it is the same for all
+    /// of them.
     pub fastest: f64,
 }
 

@@ -15,8 +15,8 @@ use crate::field::Points;
 pub struct ParticlesView<'a> {
     /// The positions in metres.
     pub positions: Points<'a>,
-    /// The speeds, in the unit of [`Legend::fastest`](super::Legend::fastest). Particles without a speed are
-    /// grey.
+    /// The speeds, in the unit of [`Legend::fastest`](super::Legend::fastest). Particles without a speed
+    /// are grey.
     pub speeds: &'a [f64],
     /// The radius of every ball in metres. Neighbours touch if it is half their spacing.
     pub radius: f64,

@@ -13,8 +13,8 @@ use super::{
     camera::{SUBPIXELS, Seen},
 };
 
-/// Rows of sub-pixels in a band. The number is fixed, so that pictures do not depend on the number of
-/// threads.
+/// Rows of sub-pixels in a band. The number is fixed, so that pictures do not depend on the number
+/// of threads.
 pub const BAND_ROWS: usize = 32;
 
 /// All sub-pixels of a picture. Nearness 0 is infinitely far away.
@@ -211,8 +211,8 @@ fn is_top_or_left(a: Corner, b: Corner) -> bool {
     b.y < a.y || (b.y == a.y && b.x > a.x)
 }
 
-/// The whole numbers of lo..=hi within first..end. The result is always a range inside that, and may be
-/// empty.
+/// The whole numbers of lo..=hi within first..end. The result is always a range inside that, and may
+/// be empty.
 fn clip(lo: f64, hi: f64, first: usize, end: usize) -> Range<usize> {
     // `as` saturates, and turns NaN into 0
     let end = ((hi.ceil() + 1.0).max(0.0) as usize).clamp(first, end);

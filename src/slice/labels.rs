@@ -1,7 +1,7 @@
 //! The numbers on isolines: at most one for each level, where the line is straight and there is room.
 //!
-//! Invariant: a label keeps away from the frame, from the lines of other levels and from the labels before
-//! it.
+//! Invariant: a label keeps away from the frame, from the lines of other levels and from the labels
+//! before it.
 
 use glam::DVec2;
 

@@ -73,8 +73,8 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// About `count`/2 to `count` round numbers from `min` to `max`, evenly spaced and with the same number of
-/// digits.
+/// About `count`/2 to `count` round numbers from `min` to `max`, evenly spaced and with the same number
+/// of digits.
 pub fn ticks(min: f64, max: f64, count: usize) -> Vec<Decimal> {
     let span = max - min;
     let Some(mut step) = Decimal::below(span / count as f64) else { return Vec::new() };

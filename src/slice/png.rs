@@ -26,8 +26,8 @@ static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
 /// Writes an SVG drawing with an opaque ground as an RGB PNG, with `scale` pixels per unit of the drawing.
 ///
 /// # Errors
-/// [`SliceError::Drawing`] if the drawing is no SVG, [`SliceError::Scale`] outside 0.1 … 16, and those of
-/// `out`.
+/// [`SliceError::Drawing`] if the drawing is no SVG, [`SliceError::Scale`] outside 0.1 … 16, and those
+/// of `out`.
 pub fn rasterise(svg: &str, scale: f32, out: impl io::Write) -> Result<(), SliceError> {
     if !(0.1..=16.0).contains(&scale) {
         return Err(SliceError::Scale(scale));

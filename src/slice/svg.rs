@@ -132,8 +132,8 @@ fn labels(
     }
 }
 
-/// Draws grey hatching over every cell with a corner that has no value. Cells side by side make one
-/// rectangle.
+/// Draws grey hatching over every cell with a corner that has no value. Cells side by side make
+/// one rectangle.
 fn undefined_cells(out: &mut String, samples: &Samples, frame: &PlotFrame) {
     if samples.undefined() == 0 {
         return;

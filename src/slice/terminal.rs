@@ -63,8 +63,8 @@ fn blocks(samples: &Samples, scale: &Scale, out: &mut impl Write) -> io::Result<
         let mut last = None;
         for column in 0..samples.columns {
             let [upper, lower] = [2 * line + 1, 2 * line].map(|row| scale.colour(samples.get(column, row)));
-            // most neighbours have the same colours, and repeating the codes would make the output ten times
-            // longer
+            // most neighbours have the same colours, and repeating the codes would make the output ten
+            // times longer
             if last.replace((upper, lower)) != Some((upper, lower)) {
                 let ([r, g, b], [s, h, c]) = (upper, lower);
                 write!(out, "\x1b[38;2;{r};{g};{b};48;2;{s};{h};{c}m")?;

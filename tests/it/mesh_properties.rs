@@ -1,5 +1,5 @@
-//! Sharp meshes of random solids are closed, manifold, of the topology that marching cubes find, and not
-//! folded.
+//! Sharp meshes of random solids are closed, manifold, of the topology that marching cubes find, and
+//! not folded.
 
 use std::cell::Cell;
 

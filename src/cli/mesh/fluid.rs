@@ -1,5 +1,5 @@
-//! `rfm mesh DIR --fluid`: surfaces of the fluid from the frames that `rfm run` wrote, one file for each
-//! frame.
+//! `rfm mesh DIR --fluid`: surfaces of the fluid from the frames that `rfm run` wrote, one file for
+//! each frame.
 //!
 //! The list of frames is read and checked before the first file is written. Each file is whole or not there.
 

@@ -56,8 +56,8 @@ impl From<&Simplified> for SimplifiedFigures {
 }
 
 impl MeshSummary {
-    /// The figures of a mesh that `method` made in some milliseconds, with `thin_cells` cells that hide a
-    /// surface.
+    /// The figures of a mesh that `method` made in some milliseconds, with `thin_cells` cells that hide
+    /// a surface.
     pub fn new(
         (solid, method): (&str, &'static str),
         report: &Report,

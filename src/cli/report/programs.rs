@@ -328,8 +328,8 @@ fn slope(truth: &[Exact; 4]) -> f64 {
     DVec3::new(truth[1].to_f64(), truth[2].to_f64(), truth[3].to_f64()).length()
 }
 
-/// The number of wrong signs among the points that are farther from the surface than the rounding of their
-/// coordinates.
+/// The number of wrong signs among the points that are farther from the surface than the rounding of
+/// their coordinates.
 fn sign_mismatches<T: Lane>(found: &[T], truth: &[Option<[Exact; 4]>], at: &[DVec3]) -> usize {
     let epsilon = match T::PRECISION {
         Precision::F32 => f64::from(f32::EPSILON),

@@ -1,5 +1,5 @@
-//! Manifold dual contouring: one vertex for each sheet of the surface in a cell, placed on creases and
-//! corners.
+//! Manifold dual contouring: one vertex for each sheet of the surface in a cell, placed on creases
+//! and corners.
 //!
 //! [`dual_contouring`] has five stages:
 //! 1. [`Crossing::find`]: the cells that the surface passes and its hits on their edges, as for marching
@@ -49,8 +49,8 @@ use super::{
 };
 use crate::field::Field;
 
-/// The surface ω = 0 of a field as a closed mesh with sharp creases. It is empty if no node of the grid lies
-/// inside.
+/// The surface ω = 0 of a field as a closed mesh with sharp creases. It is empty if no node of the grid
+/// lies inside.
 ///
 /// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
 /// closed by faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of the
@@ -225,9 +225,9 @@ fn join(
 /// How often vertices are moved back because triangles lie upside down.
 const RETREATS: usize = 4;
 
-/// Moves vertices whose triangles lie upside down either way to their fallbacks, first onto the surface near
-/// them and then to the fallbacks themselves, and cuts the quads around them again. Fallbacks ascend by
-/// vertex.
+/// Moves vertices whose triangles lie upside down either way to their fallbacks, first onto the surface
+/// near them and then to the fallbacks themselves, and cuts the quads around them again. Fallbacks ascend
+/// by vertex.
 fn move_spoilt(
     quads: &Quads<'_>,
     cut: &mut Cut,

@@ -33,8 +33,8 @@ pub(super) struct FacePoint {
     pub normal: DVec3,
 }
 
-/// The surface by Newton's method, within `size` of `start`. `None` if it leads farther away or does not
-/// converge.
+/// The surface by Newton's method, within `size` of `start`. `None` if it leads farther away or does
+/// not converge.
 pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64) -> Option<FacePoint> {
     let mut at = start;
     for _ in 0..STEPS {
@@ -108,8 +108,8 @@ pub(super) fn along(
     Some(FacePoint { point, normal: unit(-field.omega_grad(point).1)? })
 }
 
-/// The surface within `size` of `start` where it faces about as `normal` does. `None` if no such point is
-/// found.
+/// The surface within `size` of `start` where it faces about as `normal` does. `None` if no such point
+/// is found.
 pub(super) fn onto_face(
     field: &dyn Field,
     start: DVec3,

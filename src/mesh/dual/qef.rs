@@ -8,10 +8,10 @@
 use glam::{DMat3, DVec3};
 
 /// Eigenvalues below this share of the largest count as zero. For two faces at an angle θ the ratio is
-/// tan²(θ/2), so creases down to 8° are sharp. A smooth surface that bends by θ within the cell has the same
-/// ratio and no crease. Evidence from the pawn in [0, 3]³ at 128³ cells: with 0.0005 (2.6°) 0.30 % of the
-/// triangles are slivers and their normals are off by 2.8° rms; with 0.005, as with 0.1, it is 0.13 % and
-/// 1.1°.
+/// tan²(θ/2), so creases down to 8° are sharp. A smooth surface that bends by θ within the cell has the
+/// same ratio and no crease. Evidence from the pawn in [0, 3]³ at 128³ cells: with 0.0005 (2.6°) 0.30 % of
+/// the triangles are slivers and their normals are off by 2.8° rms; with 0.005, as with 0.1, it is 0.13 %
+/// and 1.1°.
 const TRUNCATED: f64 = 0.005;
 
 /// The minimiser nearest to `around`, and the rank that was kept: 1 on a plane, 2 on an edge, 3 in a corner.
@@ -36,8 +36,8 @@ pub(super) fn minimiser(planes: impl Iterator<Item = (DVec3, DVec3)>, around: DV
     (around + step, rank)
 }
 
-/// Sweeps of Jacobi's method at most. A symmetric 3×3 matrix is diagonal to the last digit after four or
-/// five.
+/// Sweeps of Jacobi's method at most. A symmetric 3×3 matrix is diagonal to the last digit after four
+/// or five.
 const SWEEPS: usize = 10;
 
 /// Eigenvalues and orthonormal eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.

@@ -161,8 +161,8 @@ impl<'a> Quads<'a> {
             brick.for_each_edge(|_, [x, y, z]| {
                 let around = self.rings.get(hit);
                 if !around.contains(&NONE) {
-                    // counter-clockwise as seen from the high end, where the fluid is if the low end is
-                    // inside
+                    // counter-clockwise as seen from the high end, where the fluid is if the low end
+                    // is inside
                     let [a, b, c, d] = around;
                     let is_inside = inside[z] >> (BRICK * y + x) & 1 == 1;
                     let corners = if is_inside { [d, c, a, b] } else { [b, a, c, d] };

@@ -4,8 +4,8 @@
 //! therefore keeps a large error in a mesh that is fine elsewhere. The middle of such an edge moves onto the
 //! surface. If the edge crosses a crease that no vertex has caught, its middle moves onto the crease.
 //!
-//! Invariant: cutting edges and the triangles beside them changes neither topology nor the order of what was
-//! there.
+//! Invariant: cutting edges and the triangles beside them changes neither topology nor the order of what
+//! was there.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -28,8 +28,8 @@ const ROUNDS: usize = 3;
 /// Triangles in a batch.
 const BATCH: usize = 2048;
 
-/// The longest move of a middle on a smooth surface, in lengths of its edge. Beyond it triangles would turn
-/// over.
+/// The longest move of a middle on a smooth surface, in lengths of its edge. Beyond it triangles would
+/// turn over.
 const LONGEST_MOVE: f64 = 0.4;
 
 /// The longest drop of a middle onto a crease, in lengths of its edge. An edge that bridges a narrow groove

@@ -16,8 +16,8 @@ use crate::geom::Aabb;
 /// How far from its cell a point may slide onto the surface, in cells.
 pub(super) const SLIDE: f64 = 0.5;
 
-/// A normal that differs less than this from that of a face found before belongs to that face (the cosine of
-/// 25°).
+/// A normal that differs less than this from that of a face found before belongs to that face (the cosine
+/// of 25°).
 const NEW_FACE: f64 = 0.906;
 
 /// A vertex may lie this far from its cell, in cells, because creases that curve pass a little beside the
@@ -150,8 +150,8 @@ fn settle(
     None
 }
 
-/// The middle of the part of a line through `p` that lies in a box with a margin. `None` if the line misses
-/// it.
+/// The middle of the part of a line through `p` that lies in a box with a margin. `None` if the line
+/// misses it.
 fn middle_within(p: DVec3, along: DVec3, cell: &Aabb, margin: DVec3) -> Option<DVec3> {
     let (a, b) = ((cell.min - margin - p) / along, (cell.max + margin - p) / along);
     let (from, to) = (a.min(b).max_element(), a.max(b).min_element());

@@ -67,8 +67,8 @@ fn a_ball_has_exact_vertices_and_its_volume() {
     }
 }
 
-/// Planes meet in edges and corners without any error. An edge that no hit shows may be missed by `TOLERANCE`
-/// cells.
+/// Planes meet in edges and corners without any error. An edge that no hit shows may be missed by
+/// `TOLERANCE` cells.
 #[test]
 fn boxes_have_exact_vertices_at_any_angle() {
     let half = DVec3::new(0.5, 0.7, 0.3);
@@ -208,8 +208,8 @@ fn threads_change_no_bit() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
 
-    /// Noise has every case, every neighbourhood of cases, faces passed twice and every way to meet the
-    /// border.
+    /// Noise has every case, every neighbourhood of cases, faces passed twice and every way to meet
+    /// the border.
     #[test]
     fn random_grids_are_closed_and_manifold(values in prop::collection::vec(-1.0..1.0_f64, 125)) {
         let domain = Aabb::new(DVec3::ZERO, DVec3::splat(4.0));

@@ -2,10 +2,10 @@
 //!
 //! Edges are contracted in the order of their quadric error (see `quadric`). An edge goes to the point that
 //! the quadrics prefer, moved back onto ω = 0, or to one of its ends. A contraction is made only if
-//! - it meets the link condition (see `collapse`), so that the mesh stays closed, manifold and of the same
-//!   topology;
-//! - no triangle turns over, against its former self or against the surface below it, and none becomes a
-//!   sliver;
+//! - it meets the link condition (see `collapse`), so that the mesh stays closed, manifold and of the
+//!   same topology;
+//! - no triangle turns over, against its former self or against the surface below it, and none becomes
+//!   a sliver;
 //! - every vertex of the first mesh, all of which lie on the surface, keeps a triangle within the tolerance:
 //!   each is listed with the triangle nearest to it, and the lists follow every contraction;
 //! - points spread over the new triangles are within the tolerance of the surface, by ω/|∇ω|.
@@ -35,8 +35,8 @@ use crate::field::Field;
 use crate::geom::Aabb;
 use quadric::Quadric;
 
-/// Passes over all edges at most. What a first pass had to refuse may be possible once the neighbours are
-/// gone.
+/// Passes over all edges at most. What a first pass had to refuse may be possible once the neighbours
+/// are gone.
 const PASSES: usize = 4;
 
 /// A pass that removes less than this part of the vertices is the last.
@@ -49,8 +49,8 @@ const LARGEST_TURN: f64 = 0.5;
 /// [`slivers::roundness`]).
 const WORST_SHAPE: f64 = 0.2;
 
-/// An edge is tried if quadrics give up to this many tolerances. They measure from planes, which is often too
-/// much.
+/// An edge is tried if quadrics give up to this many tolerances. They measure from planes, which is often
+/// too much.
 const HOPEFUL: f64 = 2.0;
 
 /// Intervals between sample points along a new triangle's side.
@@ -341,8 +341,8 @@ impl Contraction<'_> {
         None
     }
 
-    /// The samples of each staying triangle after the ring is drawn to a new vertex. `None` if that is not
-    /// allowed.
+    /// The samples of each staying triangle after the ring is drawn to a new vertex. `None` if that is
+    /// not allowed.
     fn accepts(&mut self, ring: &Ring, place: &NewVertex) -> Option<Vec<Vec<u32>>> {
         let corners: Vec<[DVec3; 3]> = ring
             .staying
