@@ -12,12 +12,12 @@ use super::{Failure, choose, input, note, output};
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
 use crate::field::Field;
 use crate::geom::Aabb;
-use crate::ir::{FloatType, Growth};
+use crate::ir::Growth;
 use crate::lower::NamedSolid;
 use crate::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
 use crate::slice::{self, Plane, Window};
 use crate::solid::{Bounds, ProgramKind};
-use crate::{Program, Solid};
+use crate::{Precision, Program, Solid};
 
 /// Cells of the meshes that volumes are measured on; the second is for their error.
 const VOLUME_CELLS: [usize; 2] = [96, 48];
@@ -272,7 +272,7 @@ fn overflow(program: &Program, named: &NamedSolid, solid: &Solid) -> Option<Diag
         Some(over) => Growth::over(&graph, &over),
         None => Growth::within_reach(&graph),
     };
-    let node = growth.overflow(&graph, FloatType::F64)?;
+    let node = growth.overflow(&graph, Precision::F64)?;
     let message = format!(
         "ω of solid `{}` may leave the range of numbers here: it doubles with each operation inside the next",
         named.name

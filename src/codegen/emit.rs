@@ -10,6 +10,7 @@ use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, types};
 use cranelift_frontend::FunctionBuilder;
 
+use super::math_calls::HostFunction;
 use super::r0::{Junction, Parts};
 use super::{Forms, Precision};
 use crate::ir::{Binary, Expr, Graph, Node, Unary};
@@ -19,21 +20,26 @@ pub(super) struct Emitter<'a, 'f> {
     pub builder: &'a mut FunctionBuilder<'f>,
     pub precision: Precision,
     pub forms: &'a Forms,
+    /// The functions that the program calls.
+    hosts: &'a Hosts,
     /// Intermediate results of R₀ for a pair of operands: value and weights share them.
     pub(super) parts: HashMap<(Node, Node, Junction), Parts>,
     /// Pairs whose weights will be asked for: their value uses the same quotient.
     pub(super) weighted: HashSet<(Node, Node, Junction)>,
 }
 
-/// A node's number, and the value that holds it.
+/// The functions of the mathematical library that were declared in a program.
+pub(super) type Hosts = HashMap<HostFunction, FuncRef>;
+
+/// A node, and the value that holds it.
 pub(super) type Operand = (Node, Value);
 
 impl<'a, 'f> Emitter<'a, 'f> {
     pub fn new(
         builder: &'a mut FunctionBuilder<'f>,
         precision: Precision,
-        forms: &'a Forms,
-        graph: &Graph,
+        (graph, forms): (&Graph, &'a Forms),
+        hosts: &'a Hosts,
     ) -> Self {
         let weights = graph.nodes().filter_map(|(_, expr)| match expr {
             Expr::Binary(Binary::AndWeight, u, v) => Some((u, v, Junction::And)),
@@ -41,7 +47,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
             _ => None,
         });
         let weighted = weights.flat_map(|(u, v, junction)| [(u, v, junction), (v, u, junction)]).collect();
-        Self { builder, precision, forms, parts: HashMap::new(), weighted }
+        Self { builder, precision, forms, hosts, parts: HashMap::new(), weighted }
     }
 
     pub fn lane_type(&self) -> Type {
@@ -76,24 +82,17 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.builder.ins().splat(vector, scalar)
     }
 
-    pub fn unary(&mut self, op: Unary, a: Value, host: Option<FuncRef>) -> Value {
-        if let Some(host) = host {
-            return self.call(host, &[a]);
-        }
+    pub fn unary(&mut self, op: Unary, a: Value) -> Value {
         match op {
             Unary::Neg => self.negate(a),
             Unary::Abs => self.abs(a),
             Unary::Sqrt => self.builder.ins().sqrt(a),
             Unary::Sign => self.sign(a),
-            // the others have a host function
-            _ => self.constant(f64::NAN),
+            Unary::Call(function) => self.call(HostFunction::Unary(function), &[a]),
         }
     }
 
-    pub fn binary(&mut self, op: Binary, (u, a): Operand, (v, b): Operand, host: Option<FuncRef>) -> Value {
-        if let Some(host) = host {
-            return self.call(host, &[a, b]);
-        }
+    pub fn binary(&mut self, op: Binary, (u, a): Operand, (v, b): Operand) -> Value {
         match op {
             Binary::Add => self.builder.ins().fadd(a, b),
             Binary::Sub => self.builder.ins().fsub(a, b),
@@ -118,8 +117,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
             Binary::Or => self.r0_value((u, a), (v, b), Junction::Or),
             Binary::AndWeight => self.r0_weight((u, a), (v, b), Junction::And),
             Binary::OrWeight => self.r0_weight((u, a), (v, b), Junction::Or),
-            // the others have a host function
-            Binary::Pow | Binary::Atan2 => self.constant(f64::NAN),
+            Binary::Call(function) => self.call(HostFunction::Binary(function), &[a, b]),
         }
     }
 
@@ -181,25 +179,26 @@ impl<'a, 'f> Emitter<'a, 'f> {
     }
 
     /// A host function, lane by lane.
-    fn call(&mut self, function: FuncRef, operands: &[Value]) -> Value {
-        let mut result = None;
-        for lane in 0..self.precision.lanes() as u8 {
-            let arguments: Vec<Value> =
-                operands.iter().map(|&v| self.builder.ins().extractlane(v, lane)).collect();
-            let call = self.builder.ins().call(function, &arguments);
-            let value = self.builder.inst_results(call)[0];
-            result = Some(match result {
-                None => {
-                    let vector = self.vector_type();
-                    self.builder.ins().scalar_to_vector(vector, value)
-                }
-                Some(so_far) => self.builder.ins().insertlane(so_far, value, lane),
-            });
+    ///
+    /// # Panics
+    /// If it was not declared: a bug of the caller.
+    fn call(&mut self, function: HostFunction, operands: &[Value]) -> Value {
+        let function = self.hosts[&function];
+        let vector = self.vector_type();
+        let first = self.call_in_lane(function, operands, 0);
+        let mut result = self.builder.ins().scalar_to_vector(vector, first);
+        for lane in 1..self.precision.lanes() as u8 {
+            let value = self.call_in_lane(function, operands, lane);
+            result = self.builder.ins().insertlane(result, value, lane);
         }
-        match result {
-            Some(value) => value,
-            None => self.constant(f64::NAN),
-        }
+        result
+    }
+
+    fn call_in_lane(&mut self, function: FuncRef, operands: &[Value], lane: u8) -> Value {
+        let arguments: Vec<Value> =
+            operands.iter().map(|&v| self.builder.ins().extractlane(v, lane)).collect();
+        let call = self.builder.ins().call(function, &arguments);
+        self.builder.inst_results(call)[0]
     }
 }
 

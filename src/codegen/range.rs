@@ -16,7 +16,7 @@ use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
 use cranelift_frontend::FunctionBuilder;
 use glam::DVec3;
 
-use super::emit::Emitter;
+use super::emit::{Emitter, Hosts};
 use super::translate::pointers;
 use super::{Precision, Request};
 use crate::geom::Aabb;
@@ -62,17 +62,111 @@ pub fn supports(graph: &Graph, root: Node) -> bool {
 
 /// Whether every operation of a graph is one that range programs have.
 pub fn knows(graph: &Graph) -> bool {
-    let is_number = |node| matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_));
-    graph.nodes().all(|(_, expr)| match expr {
-        Expr::Coordinate(Axis::T) => false,
-        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => true,
-        Expr::Unary(op, _) => matches!(op, Unary::Neg | Unary::Abs | Unary::Sqrt),
-        Expr::Binary(Binary::Div, _, b) => is_number(b),
-        Expr::Binary(op, ..) => {
-            use Binary::{Add, And, Max, Min, Mul, Or, PlainMax, PlainMin, Sub};
-            matches!(op, Add | Sub | Mul | Min | Max | PlainMin | PlainMax | And | Or)
+    Instructions::of(graph).is_some()
+}
+
+/// What a range program does for one node.
+#[derive(Clone, Copy)]
+enum Instruction {
+    Constant(f64),
+    /// The range of x, y or z: its number.
+    Coordinate(usize),
+    Parameter(u32),
+    Uniform(u32),
+    Square(Node),
+    Slab {
+        of: Node,
+        first: Affine,
+        second: Affine,
+    },
+    Unary(RangeUnary, Node),
+    Binary(RangeBinary, Node, Node),
+    /// By a constant or a parameter.
+    Divide(Node, Node),
+}
+
+/// The operations on one range.
+#[derive(Clone, Copy)]
+enum RangeUnary {
+    Neg,
+    Abs,
+    Sqrt,
+}
+
+/// The operations on two ranges.
+#[derive(Clone, Copy)]
+enum RangeBinary {
+    Add,
+    Sub,
+    Mul,
+    Min,
+    Max,
+    And,
+    Or,
+}
+
+/// The instructions for all nodes of a graph, in its order.
+#[derive(Default)]
+pub(super) struct Instructions(Vec<Instruction>);
+
+impl Instructions {
+    /// `None` if the graph has an operation that range programs do not have.
+    pub fn of(graph: &Graph) -> Option<Self> {
+        graph.nodes().map(|(_, expr)| Instruction::of(graph, expr)).collect::<Option<_>>().map(Self)
+    }
+}
+
+impl Instruction {
+    fn of(graph: &Graph, expr: Expr) -> Option<Self> {
+        Some(match RangeStep::of(graph, expr) {
+            RangeStep::Square(a) => Self::Square(a),
+            RangeStep::Slab { of, first, second } => Self::Slab { of, first, second },
+            RangeStep::Plain(Expr::Constant(bits)) => Self::Constant(f64::from_bits(bits)),
+            RangeStep::Plain(Expr::Coordinate(axis)) => {
+                Self::Coordinate(Axis::SPACE.into_iter().position(|place| place == axis)?)
+            }
+            RangeStep::Plain(Expr::Parameter(i)) => Self::Parameter(i),
+            RangeStep::Plain(Expr::Uniform(i)) => Self::Uniform(i),
+            RangeStep::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
+            RangeStep::Plain(Expr::Binary(Binary::Div, a, b)) => {
+                let by_number = matches!(graph.expr(b), Expr::Constant(_) | Expr::Parameter(_));
+                by_number.then_some(Self::Divide(a, b))?
+            }
+            RangeStep::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
+        })
+    }
+}
+
+impl RangeUnary {
+    fn of(op: Unary) -> Option<Self> {
+        match op {
+            Unary::Neg => Some(Self::Neg),
+            Unary::Abs => Some(Self::Abs),
+            Unary::Sqrt => Some(Self::Sqrt),
+            Unary::Sign | Unary::Call(_) => None,
         }
-    })
+    }
+}
+
+impl RangeBinary {
+    fn of(op: Binary) -> Option<Self> {
+        match op {
+            Binary::Add => Some(Self::Add),
+            Binary::Sub => Some(Self::Sub),
+            Binary::Mul => Some(Self::Mul),
+            Binary::Min | Binary::PlainMin => Some(Self::Min),
+            Binary::Max | Binary::PlainMax => Some(Self::Max),
+            Binary::And => Some(Self::And),
+            Binary::Or => Some(Self::Or),
+            Binary::Div
+            | Binary::DivOrZero
+            | Binary::MinWeight
+            | Binary::MaxWeight
+            | Binary::AndWeight
+            | Binary::OrWeight
+            | Binary::Call(_) => None,
+        }
+    }
 }
 
 /// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by zero is
@@ -89,6 +183,7 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
             Expr::Binary(Binary::And | Binary::Or, a, b) => {
                 within(a, LARGEST_OPERAND) && within(b, LARGEST_OPERAND)
             }
+            // all others overflow only where their result does
             _ => true,
         };
         operands_fit && within(node, LARGEST)
@@ -97,7 +192,12 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
 
 /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the root out;
 /// pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as there are any.
-pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, rounding: Rounding) {
+pub(super) fn emit(
+    builder: &mut FunctionBuilder<'_>,
+    request: Request<'_>,
+    Instructions(instructions): &Instructions,
+    rounding: Rounding,
+) {
     let block = builder.create_block();
     builder.append_block_params_for_function_params(block);
     builder.switch_to_block(block);
@@ -105,7 +205,8 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
     let arguments = builder.block_params(block).to_vec();
     let (input, output) = (arguments[0], arguments[1]);
     let [parameters, uniforms] = pointers(request, &arguments[2..]);
-    let emitter = Emitter::new(builder, Precision::F64, request.forms, request.graph);
+    let hosts = Hosts::default(); // no instruction calls a function
+    let emitter = Emitter::new(builder, Precision::F64, (request.graph, request.forms), &hosts);
     let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
     // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
     let axes: [Value; 3] = std::array::from_fn(|i| {
@@ -118,24 +219,20 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
         let pair = ranges.emitter.builder.ins().insertlane(low, high, 1);
         ranges.flip(pair, Lane::Low)
     });
-    for (node, expr) in request.graph.nodes() {
-        let value = match RangeStep::of(request.graph, expr) {
-            RangeStep::Square(a) => ranges.square(ranges.values[&a]),
-            RangeStep::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
-            RangeStep::Plain(Expr::Coordinate(Axis::X)) => axes[0],
-            RangeStep::Plain(Expr::Coordinate(Axis::Y)) => axes[1],
-            RangeStep::Plain(Expr::Coordinate(Axis::Z)) => axes[2],
-            RangeStep::Plain(Expr::Constant(bits)) => {
-                ranges.number(node, Number::Constant(f64::from_bits(bits)))
-            }
-            RangeStep::Plain(Expr::Coordinate(Axis::T)) => ranges.pair(f64::NAN, f64::NAN), // `knows` refuses
-            RangeStep::Plain(Expr::Uniform(i)) => ranges.uniform(uniforms, i),
-            RangeStep::Plain(Expr::Parameter(i)) => {
+    for ((node, _), &instruction) in std::iter::zip(request.graph.nodes(), instructions) {
+        let value = match instruction {
+            Instruction::Constant(c) => ranges.number(node, Number::Constant(c)),
+            Instruction::Coordinate(axis) => axes[axis],
+            Instruction::Parameter(i) => {
                 let splat = ranges.emitter.parameter(parameters, i);
                 ranges.number(node, Number::Parameter(splat))
             }
-            RangeStep::Plain(Expr::Unary(op, a)) => ranges.unary(op, ranges.values[&a]),
-            RangeStep::Plain(Expr::Binary(op, a, b)) => ranges.binary(op, a, b),
+            Instruction::Uniform(i) => ranges.uniform(uniforms, i),
+            Instruction::Square(a) => ranges.square(ranges.values[&a]),
+            Instruction::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
+            Instruction::Unary(op, a) => ranges.unary(op, ranges.values[&a]),
+            Instruction::Binary(op, a, b) => ranges.binary(op, a, b),
+            Instruction::Divide(a, number) => ranges.divide(ranges.values[&a], ranges.numbers[&number]),
         };
         ranges.values.insert(node, value);
     }
@@ -168,45 +265,41 @@ struct Ranges<'a, 'f> {
 }
 
 impl Ranges<'_, '_> {
-    fn unary(&mut self, op: Unary, a: Value) -> Value {
+    fn unary(&mut self, op: RangeUnary, a: Value) -> Value {
         match op {
-            Unary::Neg => self.swap(a),
-            Unary::Abs => self.magnitudes(a),
-            _ => self.sqrt(a), // the last one that `knows` lets through
+            RangeUnary::Neg => self.swap(a),
+            RangeUnary::Abs => self.magnitudes(a),
+            RangeUnary::Sqrt => self.sqrt(a),
         }
     }
 
-    fn binary(&mut self, op: Binary, u: Node, v: Node) -> Value {
+    fn binary(&mut self, op: RangeBinary, u: Node, v: Node) -> Value {
         let (a, b) = (self.values[&u], self.values[&v]);
         match op {
-            Binary::Add => self.add(a, b),
-            Binary::Sub => {
+            RangeBinary::Add => self.add(a, b),
+            RangeBinary::Sub => {
                 let b = match self.numbers.get(&v) {
                     Some(&Number::Constant(c)) => self.pair(c, -c),
                     _ => self.swap(b),
                 };
                 self.add(a, b)
             }
-            Binary::Mul => match (self.numbers.get(&u).copied(), self.numbers.get(&v).copied()) {
+            RangeBinary::Mul => match (self.numbers.get(&u).copied(), self.numbers.get(&v).copied()) {
                 (Some(number), _) => self.times(b, number),
                 (_, Some(number)) => self.times(a, number),
                 _ => self.multiply(a, b),
             },
-            Binary::Div => match self.numbers.get(&v).copied() {
-                Some(number) => self.divide(a, number),
-                None => self.pair(f64::NAN, f64::NAN), // `knows` refuses
-            },
-            Binary::Min | Binary::PlainMin => {
+            RangeBinary::Min => {
                 // −min(lo) = max(−lo)
                 let (low, high) = (self.emitter.max(a, b), self.min(a, b));
                 self.lanes(low, high)
             }
-            Binary::Max | Binary::PlainMax => {
+            RangeBinary::Max => {
                 let (low, high) = (self.min(a, b), self.emitter.max(a, b));
                 self.lanes(low, high)
             }
-            Binary::And => self.r0(a, b, Lane::High),
-            _ => self.r0(a, b, Lane::Low),
+            RangeBinary::And => self.r0(a, b, Lane::High),
+            RangeBinary::Or => self.r0(a, b, Lane::Low),
         }
     }
 
@@ -422,7 +515,7 @@ impl Ranges<'_, '_> {
         match (affine.slope < 0.0, affine.minus) {
             (false, false) => self.fadd(e, offset),
             (false, true) => self.emitter.builder.ins().fsub(e, offset),
-            _ => self.emitter.builder.ins().fsub(offset, e),
+            (true, _) => self.emitter.builder.ins().fsub(offset, e),
         }
     }
 

@@ -7,6 +7,7 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::function_rules::{Chain, ChainOfTwo};
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
 
@@ -86,7 +87,7 @@ fn contributions(
 
 /// adjoint · ∂op(a)/∂a
 fn unary(graph: &mut Graph, op: Unary, node: Node, a: Node, adjoint: Node) -> Node {
-    use Binary::{Add, Div, DivOrZero, Mul, Sub};
+    use Binary::{Add, DivOrZero, Mul};
     match op {
         Unary::Neg => graph.unary(Unary::Neg, adjoint),
         Unary::Abs => {
@@ -98,37 +99,7 @@ fn unary(graph: &mut Graph, op: Unary, node: Node, a: Node, adjoint: Node) -> No
             graph.binary(DivOrZero, adjoint, twice)
         }
         Unary::Sign => graph.constant(0.0),
-        Unary::Sin => {
-            let cos = graph.unary(Unary::Cos, a);
-            graph.binary(Mul, adjoint, cos)
-        }
-        Unary::Cos => {
-            let sin = graph.unary(Unary::Sin, a);
-            let product = graph.binary(Mul, adjoint, sin);
-            graph.unary(Unary::Neg, product)
-        }
-        Unary::Tan => {
-            let one = graph.constant(1.0);
-            let square = graph.binary(Mul, node, node);
-            let factor = graph.binary(Add, one, square);
-            graph.binary(Mul, adjoint, factor)
-        }
-        Unary::Asin | Unary::Acos => {
-            let one = graph.constant(1.0);
-            let square = graph.binary(Mul, a, a);
-            let rest = graph.binary(Sub, one, square);
-            let root = graph.unary(Unary::Sqrt, rest);
-            let quotient = graph.binary(DivOrZero, adjoint, root);
-            if op == Unary::Asin { quotient } else { graph.unary(Unary::Neg, quotient) }
-        }
-        Unary::Atan => {
-            let one = graph.constant(1.0);
-            let square = graph.binary(Mul, a, a);
-            let sum = graph.binary(Add, one, square);
-            graph.binary(Div, adjoint, sum)
-        }
-        Unary::Exp => graph.binary(Mul, adjoint, node),
-        Unary::Ln => graph.binary(Div, adjoint, a),
+        Unary::Call(function) => function.derivative(graph, Chain { adjoint, operand: a, value: node }),
     }
 }
 
@@ -148,8 +119,8 @@ fn binary(
     adjoint: Node,
 ) -> Option<Node> {
     use Binary::{
-        Add, And, AndWeight, Atan2, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight,
-        PlainMax, PlainMin, Pow, Sub,
+        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight,
+        PlainMax, PlainMin, Sub,
     };
     let first = side == Side::First;
     // (this operand, the other one)
@@ -174,25 +145,8 @@ fn binary(
         And => weighted(graph, AndWeight),
         Or => weighted(graph, OrWeight),
         MinWeight | MaxWeight => return None,
-        Pow if first => {
-            // b·a^(b−1)
-            let one = graph.constant(1.0);
-            let exponent = graph.binary(Sub, b, one);
-            let power = graph.binary(Pow, a, exponent);
-            let factor = graph.binary(Mul, b, power);
-            graph.binary(Mul, adjoint, factor)
-        }
-        Pow => {
-            let ln = graph.unary(Unary::Ln, a);
-            let factor = graph.binary(Mul, node, ln);
-            graph.binary(Mul, adjoint, factor)
-        }
-        Atan2 => {
-            // atan2(a, b): ∂a = b/(a² + b²), ∂b = −a/(a² + b²)
-            let sum = sum_of_squares(graph, a, b);
-            let product = graph.binary(Mul, adjoint, other);
-            let quotient = graph.binary(DivOrZero, product, sum);
-            if first { quotient } else { graph.unary(Unary::Neg, quotient) }
+        Call(function) => {
+            function.derivative(graph, ChainOfTwo { adjoint, operands: [a, b], value: node }, first)
         }
         // w = 1 ∓ a/h with h² = a² + b²: ∂a = ∓b²/h³, ∂b = ±ab/h³
         AndWeight | OrWeight => {
@@ -215,7 +169,7 @@ fn sum_of_squares(graph: &mut Graph, a: Node, b: Node) -> Node {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::{Axis, Given, Interpreter};
+    use crate::ir::{Axis, BinaryFunction, Given, Interpreter};
 
     /// Derivatives against central differences at smooth points: h = 1e-5 leaves ~1e-9 of either error.
     #[test]
@@ -228,15 +182,15 @@ mod tests {
         let t = graph.coordinate(Axis::T);
         let tz2 = graph.binary(Binary::Add, z2, t);
         let inner = graph.binary(Binary::Add, y, tz2);
-        for op in Unary::ALL {
+        for op in Unary::all() {
             let inside = graph.unary(op, x);
             roots.push((op.name(), graph.binary(Binary::Mul, inside, inner)));
         }
-        for op in Binary::ALL {
+        for op in Binary::all() {
             let inside = graph.binary(op, x, inner);
             roots.push((op.name(), graph.binary(Binary::Add, inside, z)));
             let negative = graph.unary(Unary::Neg, inner);
-            if op != Binary::Pow {
+            if op != Binary::Call(BinaryFunction::Pow) {
                 roots.push((op.name(), graph.binary(op, x, negative)));
             }
         }

@@ -19,7 +19,7 @@ use rustc_hash::FxHashMap;
 use super::adjoint::{gradient, gradient_and_rate};
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
-use super::twin::sign_operands;
+use super::sign::SignRule;
 
 /// What is known of the surface nearest to a point, as nodes.
 #[derive(Debug, Clone, Copy)]
@@ -58,6 +58,24 @@ struct Builder<'g> {
     known: FxHashMap<Node, Surface>,
 }
 
+/// How a shape is made of others.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// A product of two factors that vary, split into its faces.
+    Product(Node, Node),
+    Signs(SignRule),
+}
+
+impl Kind {
+    fn operands(self) -> impl Iterator<Item = Node> {
+        let (faces, rule) = match self {
+            Self::Product(p, q) => ([Some(p), Some(q)], SignRule::Leaf),
+            Self::Signs(rule) => ([None; 2], rule),
+        };
+        faces.into_iter().flatten().chain(rule.operands())
+    }
+}
+
 impl Builder<'_> {
     /// Logic nodes below the root in an order in which operands come first: no recursion, trees may be deep.
     fn surface(&mut self, root: Node) -> Surface {
@@ -67,11 +85,10 @@ impl Builder<'_> {
                 stack.pop();
                 continue;
             }
-            let operands = self.operands(node);
-            let missing: Vec<Node> =
-                operands.iter().copied().filter(|o| !self.known.contains_key(o)).collect();
+            let kind = self.kind(node);
+            let missing: Vec<Node> = kind.operands().filter(|o| !self.known.contains_key(o)).collect();
             if missing.is_empty() {
-                let surface = self.combine(node, &operands);
+                let surface = self.combine(node, kind);
                 self.known.insert(node, surface);
                 stack.pop();
             } else {
@@ -81,12 +98,11 @@ impl Builder<'_> {
         self.known[&root]
     }
 
-    /// The shapes that a node is made of; none for a leaf.
-    fn operands(&self, node: Node) -> Vec<Node> {
-        if let Some((p, q)) = self.faces(node) {
-            return vec![p, q];
+    fn kind(&self, node: Node) -> Kind {
+        match self.faces(node) {
+            Some((p, q)) => Kind::Product(p, q),
+            None => Kind::Signs(SignRule::of(self.graph, node)),
         }
-        sign_operands(self.graph, node)
     }
 
     /// The factors of a product, both of which vary.
@@ -100,25 +116,21 @@ impl Builder<'_> {
         }
     }
 
-    fn combine(&mut self, node: Node, operands: &[Node]) -> Surface {
-        let of: Vec<Surface> = operands.iter().map(|o| self.known[o]).collect();
-        match (self.graph.expr(node), &of[..]) {
-            (Expr::Binary(Binary::Mul, ..), &[p, q]) => {
+    fn combine(&mut self, node: Node, kind: Kind) -> Surface {
+        match kind {
+            Kind::Product(p, q) => {
+                let (p, q) = (self.known[&p], self.known[&q]);
                 let both = self.nearer(p, q, Binary::Min);
                 let (p, q) = (self.negated(p), self.negated(q));
                 let neither = self.nearer(p, q, Binary::Min);
                 self.nearer(both, neither, Binary::Max)
             }
-            (Expr::Binary(Binary::And | Binary::Min | Binary::PlainMin, ..), &[u, v]) => {
-                self.nearer(u, v, Binary::Min)
-            }
-            (Expr::Binary(Binary::Or | Binary::Max | Binary::PlainMax, ..), &[u, v]) => {
-                self.nearer(u, v, Binary::Max)
-            }
-            (Expr::Unary(Unary::Neg, _), &[u]) => self.negated(u),
+            Kind::Signs(SignRule::All(u, v)) => self.nearer(self.known[&u], self.known[&v], Binary::Min),
+            Kind::Signs(SignRule::Any(u, v)) => self.nearer(self.known[&u], self.known[&v], Binary::Max),
+            Kind::Signs(SignRule::Not(u)) => self.negated(self.known[&u]),
             // a positive factor moves nothing
-            (_, &[u]) => u,
-            _ => self.leaf(node),
+            Kind::Signs(SignRule::Same(u)) => self.known[&u],
+            Kind::Signs(SignRule::Leaf) => self.leaf(node),
         }
     }
 

@@ -49,7 +49,7 @@ impl Interpreter {
     pub fn with_forms(graph: &Graph, outputs: &[Node], forms: [&Forms; 2]) -> Self {
         let step = |expr| match expr {
             Expr::Binary(_, a, b) => (expr, forms.map(|forms| forms.of(a, b))),
-            _ => (expr, [Form::Stable; 2]),
+            expr => (expr, [Form::Stable; 2]),
         };
         Self { steps: graph.nodes().map(|(_, expr)| step(expr)).collect(), outputs: outputs.to_vec() }
     }

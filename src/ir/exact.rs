@@ -4,15 +4,9 @@
 //! it shares no formula with the programs that it judges. A point where an operation has no value, or where a
 //! derivative has no limit, has no truth.
 
-use dashu_float::{FBig, round::mode::HalfEven};
-
+use super::big::{Big, PRECISION, big, one};
 use super::graph::{Axis, Expr, Graph, Node};
 use super::op::{Binary, Unary};
-
-type Big = FBig<HalfEven, 2>;
-
-/// Bits of every intermediate result.
-const PRECISION: usize = 400;
 
 /// A real number to 120 digits.
 #[derive(Debug, Clone)]
@@ -76,21 +70,9 @@ pub fn evaluate_at(graph: &Graph, outputs: &[Node], point: [f64; 3], time: f64) 
     outputs.iter().map(|output| values[output.index()].clone().map(Exact)).collect()
 }
 
-fn big(x: f64) -> Option<Big> {
-    if !x.is_finite() {
-        return None;
-    }
-    Some(Big::try_from(x).ok()?.with_precision(PRECISION).value())
-}
-
-fn one() -> Big {
-    Big::ONE.with_precision(PRECISION).value()
-}
-
 fn unary(op: Unary, a: &Big) -> Option<Big> {
     let positive = *a > Big::ZERO;
     let zero = *a == Big::ZERO;
-    let within_one = *a >= -one() && *a <= one();
     Some(match op {
         Unary::Neg => -a,
         Unary::Abs => {
@@ -110,15 +92,8 @@ fn unary(op: Unary, a: &Big) -> Option<Big> {
                 -one()
             }
         }
-        Unary::Sin => a.sin(),
-        Unary::Cos => a.cos(),
-        Unary::Tan => a.tan(),
-        Unary::Asin if within_one => a.asin(),
-        Unary::Acos if within_one => a.acos(),
-        Unary::Atan => a.atan(),
-        Unary::Exp => a.exp(),
-        Unary::Ln if positive => a.ln(),
-        Unary::Sqrt | Unary::Asin | Unary::Acos | Unary::Ln => return None,
+        Unary::Sqrt => return None,
+        Unary::Call(function) => function.exact(a)?,
     })
 }
 
@@ -145,10 +120,7 @@ fn binary(op: Binary, a: &Big, b: &Big) -> Option<Big> {
         Binary::Max | Binary::PlainMax => (if a > b { a } else { b }).clone(),
         Binary::MinWeight => step(a < b)?,
         Binary::MaxWeight => step(a > b)?,
-        Binary::Pow if *a > Big::ZERO => a.powf(b),
-        Binary::Pow => return None,
-        Binary::Atan2 if *a != Big::ZERO || *b != Big::ZERO => a.atan2(b),
-        Binary::Atan2 => Big::ZERO,
+        Binary::Call(function) => function.exact(a, b)?,
         Binary::And => a + b - hypotenuse(),
         Binary::Or => a + b + hypotenuse(),
         Binary::AndWeight => one() - cosine()?,
@@ -178,7 +150,7 @@ mod tests {
     fn functions_agree_with_doubles() {
         let mut graph = Graph::default();
         let x = graph.coordinate(Axis::X);
-        for op in Unary::ALL {
+        for op in Unary::all() {
             let root = graph.unary(op, x);
             let value = evaluate(&graph, &[root], [0.7, 0.0, 0.0]).unwrap()[0].to_f64();
             assert!((value - op.eval(0.7)).abs() < 1e-15, "{}: {value}", op.name());

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::graph::{Graph, Node};
-use super::op::Binary;
+use super::op::{Binary, R0};
 use super::r0;
 use super::real::Real;
 
@@ -95,17 +95,17 @@ impl Form {
 
     /// The value of an operation with R₀ in this form; other operations have one value.
     pub fn eval<T: Real>(self, op: Binary, u: T, v: T) -> T {
-        use Binary::{And, AndWeight, Or, OrWeight};
-        match (self, op) {
-            (Self::Scaled, And) => r0::and_scaled(u, v),
-            (Self::Scaled, Or) => r0::or_scaled(u, v),
-            (Self::Scaled, AndWeight) => r0::and_weights_scaled(u, v).0,
-            (Self::Scaled, OrWeight) => r0::or_weights_scaled(u, v).0,
-            (Self::Textbook, And) => r0::and_textbook(u, v),
-            (Self::Textbook, Or) => r0::or_textbook(u, v),
-            (Self::Textbook, AndWeight) => r0::and_weight_textbook(u, v),
-            (Self::Textbook, OrWeight) => r0::or_weight_textbook(u, v),
-            _ => op.eval(u, v),
+        let Some(r0) = op.r0() else { return op.eval(u, v) };
+        match (self, r0) {
+            (Self::Stable | Self::Guarded, _) => op.eval(u, v),
+            (Self::Scaled, R0::And) => r0::and_scaled(u, v),
+            (Self::Scaled, R0::Or) => r0::or_scaled(u, v),
+            (Self::Scaled, R0::AndWeight) => r0::and_weights_scaled(u, v).0,
+            (Self::Scaled, R0::OrWeight) => r0::or_weights_scaled(u, v).0,
+            (Self::Textbook, R0::And) => r0::and_textbook(u, v),
+            (Self::Textbook, R0::Or) => r0::or_textbook(u, v),
+            (Self::Textbook, R0::AndWeight) => r0::and_weight_textbook(u, v),
+            (Self::Textbook, R0::OrWeight) => r0::or_weight_textbook(u, v),
         }
     }
 }

@@ -347,7 +347,7 @@ mod tests {
     fn extraction_leaves_out_the_unused() {
         let mut graph = Graph::default();
         let x = graph.coordinate(Axis::X);
-        let unused = graph.unary(Unary::Sin, x);
+        let unused = graph.unary(crate::ir::UnaryFunction::Sin.into(), x);
         let root = graph.unary(Unary::Neg, x);
         let (small, roots) = graph.extract(&[root]);
         assert_eq!(small.len(), 2);

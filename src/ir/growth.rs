@@ -6,31 +6,14 @@
 
 use glam::DVec3;
 
+use super::float::FloatType;
 use super::forms::{Form, Forms};
 use super::graph::{Expr, Graph, Node};
 use super::op::{Binary, Unary};
 use super::range::{RangeEvaluator, Region};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-
-/// What the analysis of a computation needs to know of its floating-point type.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FloatType {
-    /// Half the distance of 1 from the next number: the relative error of one rounding.
-    pub unit: f64,
-    /// The smallest positive number: not less than the error of a rounding that underflows.
-    pub smallest: f64,
-    pub largest: f64,
-}
-
-impl FloatType {
-    pub const F64: Self = Self { unit: 0.5 * f64::EPSILON, smallest: f64::from_bits(1), largest: f64::MAX };
-    pub const F32: Self = Self {
-        unit: 0.5 * f32::EPSILON as f64,
-        smallest: f32::from_bits(1) as f64,
-        largest: f32::MAX as f64,
-    };
-}
+use crate::precision::Precision;
 
 /// Where forms are chosen for a solid of which nothing else is known: within this distance of the origin, and within
 /// as many seconds of the beginning.
@@ -68,7 +51,8 @@ impl Growth {
 
     /// The default form, but the scaled one where squares of operands leave the range of the type: where they may
     /// overflow, or are bound to underflow. Where nothing is known the default stays.
-    pub fn forms(&self, graph: &Graph, default: Form, float: FloatType) -> Forms {
+    pub fn forms(&self, graph: &Graph, default: Form, precision: Precision) -> Forms {
+        let float = FloatType::of(precision);
         let mut forms = Forms::all(default);
         // u² + v² ≤ 2·M²
         let too_large = 0.5 * (float.largest.log2() - 1.0);
@@ -84,8 +68,9 @@ impl Growth {
     }
 
     /// The first operation ∧ or ∨ whose value may leave the range of the type although its operands do not.
-    pub fn overflow(&self, graph: &Graph, float: FloatType) -> Option<Node> {
-        let fits = |node| self.exponent(node) < float.largest.log2();
+    pub fn overflow(&self, graph: &Graph, precision: Precision) -> Option<Node> {
+        let largest = FloatType::of(precision).largest;
+        let fits = |node| self.exponent(node) < largest.log2();
         let found = junctions(graph)
             .find(|&(node, u, v)| self.exponent(node).is_finite() && !fits(node) && fits(u) && fits(v));
         found.map(|(node, ..)| node)
@@ -95,9 +80,7 @@ impl Growth {
 /// ∧, ∨ and their weights, with their operands.
 fn junctions(graph: &Graph) -> impl Iterator<Item = (Node, Node, Node)> + '_ {
     graph.nodes().filter_map(|(node, expr)| match expr {
-        Expr::Binary(Binary::And | Binary::Or | Binary::AndWeight | Binary::OrWeight, u, v) => {
-            Some((node, u, v))
-        }
+        Expr::Binary(op, u, v) => op.r0().map(|_| (node, u, v)),
         _ => None,
     })
 }
@@ -122,10 +105,19 @@ fn exponent(graph: &Graph, expr: Expr, range: Interval, known: &[f64]) -> f64 {
                 Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax => large,
                 // |M|·(1 + q + √(1 + q²))
                 Binary::And | Binary::Or => large + (1.0 + q + (1.0 + q * q).sqrt()).log2(),
-                _ => f64::INFINITY,
+                Binary::DivOrZero
+                | Binary::MinWeight
+                | Binary::MaxWeight
+                | Binary::AndWeight
+                | Binary::OrWeight
+                | Binary::Call(_) => f64::INFINITY,
             }
         }
-        _ => f64::INFINITY,
+        Expr::Unary(Unary::Sign | Unary::Call(_), _)
+        | Expr::Constant(_)
+        | Expr::Coordinate(_)
+        | Expr::Parameter(_)
+        | Expr::Uniform(_) => f64::INFINITY,
     }
 }
 
@@ -155,17 +147,17 @@ mod tests {
         let (graph, nodes) = left_fold(1000);
         let growth = Growth::over(&graph, &unit_box());
         let x = nodes[0];
-        for (float, first) in [(FloatType::F64, 512.0), (FloatType::F32, 64.0)] {
+        for (float, first) in [(Precision::F64, 512.0), (Precision::F32, 64.0)] {
             let forms = growth.forms(&graph, Form::Stable, float);
             let scaled = nodes.windows(2).filter(|w| forms.of(w[0], x) == Form::Scaled).count() as f64;
             // value n is 2ⁿ, a few of which make up for the first, smaller steps
             assert!((scaled - (999.0 - first)).abs() < 4.0, "{scaled}");
         }
-        assert_eq!(growth.overflow(&graph, FloatType::F64), None);
-        let first = growth.overflow(&graph, FloatType::F32).unwrap();
+        assert_eq!(growth.overflow(&graph, Precision::F64), None);
+        let first = growth.overflow(&graph, Precision::F32).unwrap();
         assert!((first.index() as f64 - 128.0).abs() < 4.0, "{first:?}");
         let (graph, _) = left_fold(1100);
-        let first = Growth::over(&graph, &unit_box()).overflow(&graph, FloatType::F64).unwrap();
+        let first = Growth::over(&graph, &unit_box()).overflow(&graph, Precision::F64).unwrap();
         assert!((first.index() as f64 - 1024.0).abs() < 4.0, "{first:?}");
     }
 
@@ -177,11 +169,11 @@ mod tests {
         graph.binary(Binary::And, quotient, x);
         graph.binary(Binary::Or, x, y);
         let plain = Forms::all(Form::Stable);
-        for float in [FloatType::F64, FloatType::F32] {
+        for float in [Precision::F64, Precision::F32] {
             assert_eq!(Growth::within_reach(&graph).forms(&graph, Form::Stable, float), plain);
         }
         let tiny = Growth::over(&graph, &Aabb::new(DVec3::splat(-1e-24), DVec3::splat(1e-24)));
-        assert_eq!(tiny.forms(&graph, Form::Stable, FloatType::F64), plain);
-        assert_eq!(tiny.forms(&graph, Form::Stable, FloatType::F32).of(x, y), Form::Scaled);
+        assert_eq!(tiny.forms(&graph, Form::Stable, Precision::F64), plain);
+        assert_eq!(tiny.forms(&graph, Form::Stable, Precision::F32).of(x, y), Form::Scaled);
     }
 }

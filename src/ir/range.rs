@@ -230,17 +230,7 @@ pub(super) fn unary(op: Unary, a: Interval) -> Interval {
         Unary::Abs => a.abs(),
         Unary::Sqrt => a.sqrt(),
         Unary::Sign => Interval { lo: Unary::Sign.eval(a.lo), hi: Unary::Sign.eval(a.hi) },
-        // of what may have overflowed, sine and cosine are not numbers
-        Unary::Sin | Unary::Cos if a.lo == f64::NEG_INFINITY || a.hi == f64::INFINITY => Interval::ALL,
-        Unary::Sin => a.sin(),
-        Unary::Cos => a.cos(),
-        Unary::Atan => a.increasing(libm::atan),
-        Unary::Exp => a.increasing(libm::exp),
-        Unary::Ln if a.lo > 0.0 => a.increasing(libm::log),
-        Unary::Asin if a.lo >= -1.0 && a.hi <= 1.0 => a.increasing(libm::asin),
-        Unary::Acos if a.lo >= -1.0 && a.hi <= 1.0 => (-a).increasing(|x| libm::acos(-x)),
-        Unary::Tan if a.lo > -1.57 && a.hi < 1.57 => a.increasing(libm::tan),
-        Unary::Ln | Unary::Asin | Unary::Acos | Unary::Tan => Interval::ALL,
+        Unary::Call(function) => function.range(a),
     }
 }
 
@@ -269,15 +259,7 @@ pub(super) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
         Binary::AndWeight | Binary::OrWeight if is_infinite(a) && is_infinite(b) => Interval::ALL,
         Binary::MinWeight | Binary::MaxWeight => Interval { lo: 0.0, hi: 1.0 },
         Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() },
-        Binary::Atan2 => Interval::new(-std::f64::consts::PI, std::f64::consts::PI).widened(1),
-        Binary::Pow if a.lo > 0.0 => {
-            let corners =
-                [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)].map(|(a, b)| libm::pow(a, b));
-            let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
-            let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            Interval::new(lo, hi).widened(4)
-        }
-        Binary::Pow => Interval::ALL,
+        Binary::Call(function) => function.range(a, b),
     }
 }
 
@@ -317,7 +299,7 @@ fn conjunction(a: Interval, b: Interval) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::Interpreter;
+    use crate::ir::{Interpreter, UnaryFunction};
     use glam::DVec3;
     use proptest::prelude::*;
 
@@ -333,7 +315,11 @@ mod tests {
         let a = g.binary(Binary::Sub, quarter, y2);
         let ball = g.binary(Binary::Sub, a, z2);
         let both = g.binary(Binary::And, slab, ball);
-        let (sin, abs, cos) = (g.unary(Unary::Sin, x), g.unary(Unary::Abs, y), g.unary(Unary::Cos, z));
+        let (sin, abs, cos) = (
+            g.unary(UnaryFunction::Sin.into(), x),
+            g.unary(Unary::Abs, y),
+            g.unary(UnaryFunction::Cos.into(), z),
+        );
         let two = g.constant(2.0);
         let below = g.binary(Binary::Add, two, cos);
         let top = g.binary(Binary::Mul, abs, z);

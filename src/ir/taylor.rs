@@ -127,11 +127,12 @@ fn half(a: Interval) -> Interval {
 fn chain(
     a: Jet,
     value: impl Fn(Interval) -> Interval,
-    derivatives: impl Fn(Interval, Interval) -> [Interval; 2],
+    derivatives: impl Fn(Interval, Interval) -> Option<[Interval; 2]>,
 ) -> Jet {
     let (at, over) = (value(a.at[0]), value(a.over[0]));
-    let [p, _] = derivatives(a.at[0], at);
-    let [slope, bend] = derivatives(a.over[0], over);
+    let (Some([p, _]), Some([slope, bend])) = (derivatives(a.at[0], at), derivatives(a.over[0], over)) else {
+        return Jet::rough(at, over);
+    };
     Jet {
         at: [at, p * a.at[1]],
         over: [over, slope * a.over[1], slope * a.over[2] + bend * a.over[1].square()],
@@ -154,33 +155,21 @@ fn unary(op: Unary, a: Jet) -> Jet {
         }
         Unary::Sqrt => chain(a, value, |a, root| {
             let slope = half(one / root);
-            [slope, -half(half(slope / a))]
+            Some([slope, -half(half(slope / a))])
         }),
         Unary::Sign => {
             let (at, over) = (value(a.at[0]), value(a.over[0]));
             if over.lo == over.hi { Jet::constant(over.lo) } else { Jet::rough(at, over) }
         }
-        Unary::Sin => chain(a, value, |a, sin| [a.cos(), -half(sin)]),
-        Unary::Cos => chain(a, value, |a, cos| [-a.sin(), -half(cos)]),
-        Unary::Tan => chain(a, value, |_, tan| {
-            let slope = one + tan.square();
-            [slope, tan * slope]
-        }),
-        Unary::Atan => chain(a, value, |a, _| {
-            let slope = one / (one + a.square());
-            [slope, -(a * slope.square())]
-        }),
-        Unary::Exp => chain(a, value, |_, exp| [exp, half(exp)]),
-        Unary::Ln => chain(a, value, |a, _| {
-            let slope = one / a;
-            [slope, -half(slope.square())]
-        }),
-        Unary::Asin | Unary::Acos => Jet::rough(value(a.at[0]), value(a.over[0])),
+        Unary::Call(function) => chain(a, value, |a, value| function.slope_and_bend(a, value)),
     }
 }
 
 fn binary(op: Binary, a: Jet, b: Jet) -> Jet {
-    use Binary::{Add, And, Div, DivOrZero, Max, Min, Mul, Or, PlainMax, PlainMin, Sub};
+    use Binary::{
+        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight,
+        PlainMax, PlainMin, Sub,
+    };
     let (at, over) = (range::binary(op, a.at[0], b.at[0]), range::binary(op, a.over[0], b.over[0]));
     match op {
         Add => {
@@ -224,7 +213,8 @@ fn binary(op: Binary, a: Jet, b: Jet) -> Jet {
                 over: [over, mixed(1, |jet, k| jet.over[k], smooth.over[1]), smooth.over[2]],
             }
         }
-        _ => Jet::rough(at, over),
+        // these jump, or nothing is known of their derivatives
+        MinWeight | MaxWeight | AndWeight | OrWeight | Call(_) => Jet::rough(at, over),
     }
 }
 
@@ -249,14 +239,14 @@ mod tests {
         let positive = graph.binary(Binary::Add, inner, half);
         let t = graph.coordinate(Axis::T);
         let mut roots = Vec::new();
-        for op in Unary::ALL {
+        for op in Unary::all() {
             let inside = graph.unary(op, positive);
             roots.push((op.name(), graph.binary(Binary::Mul, inside, x)));
             let moving = graph.binary(Binary::Add, positive, t);
             let inside = graph.unary(op, moving);
             roots.push((op.name(), graph.binary(Binary::Mul, inside, x)));
         }
-        for op in Binary::ALL {
+        for op in Binary::all() {
             let inside = graph.binary(op, positive, x);
             roots.push((op.name(), graph.binary(Binary::Add, inside, z)));
         }

@@ -5,8 +5,9 @@
 //! that of one leaf. Its value away from the surface is another one.
 
 use super::graph::{Expr, Graph, Node};
-use super::op::{Binary, Unary};
+use super::op::Binary;
 use super::range::{RangeEvaluator, Region};
+use super::sign::SignRule;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use glam::DVec3;
@@ -33,45 +34,24 @@ pub fn twin(graph: &mut Graph, root: Node) -> Node {
         let node = graph.node(i);
         let of = |operand: Node| image[operand.index()].unwrap_or((operand, finite[operand.index()]));
         let span = graph.span(node);
-        let result = match (graph.expr(node), sign_operands(graph, node)) {
-            (Expr::Binary(op @ (Binary::And | Binary::Or | Binary::Min | Binary::Max), u, v), _) => {
-                let ((u, u_is_number), (v, v_is_number)) = (of(u), of(v));
-                let numbers = u_is_number && v_is_number;
-                let op = match (op, numbers) {
-                    (Binary::And | Binary::Min, true) => Binary::PlainMin,
-                    (Binary::And | Binary::Min, false) => Binary::Min,
-                    (_, true) => Binary::PlainMax,
-                    (_, false) => Binary::Max,
-                };
-                (graph.intern(Expr::Binary(op, u, v), span), numbers)
-            }
-            (expr, operands) if !operands.is_empty() => {
-                let number = operands.iter().all(|&operand| of(operand).1);
-                let mapped =
-                    expr.map(|operand| if operands.contains(&operand) { of(operand).0 } else { operand });
+        let joined = |graph: &mut Graph, [u, v]: [Node; 2], plain: Binary, careful: Binary| {
+            let ((u, u_is_number), (v, v_is_number)) = (of(u), of(v));
+            let numbers = u_is_number && v_is_number;
+            (graph.intern(Expr::Binary(if numbers { plain } else { careful }, u, v), span), numbers)
+        };
+        let result = match SignRule::of(graph, node) {
+            SignRule::All(u, v) => joined(graph, [u, v], Binary::PlainMin, Binary::Min),
+            SignRule::Any(u, v) => joined(graph, [u, v], Binary::PlainMax, Binary::Max),
+            SignRule::Not(u) | SignRule::Same(u) => {
+                let (new, number) = of(u);
+                let mapped = graph.expr(node).map(|operand| if operand == u { new } else { operand });
                 (graph.intern(mapped, span), number)
             }
-            _ => (node, finite[i]),
+            SignRule::Leaf => (node, finite[i]),
         };
         image[i] = Some(result);
     }
     image[root.index()].map_or(root, |(node, _)| node)
-}
-
-/// The operands that alone decide the sign of a node; none if its value does.
-pub fn sign_operands(graph: &Graph, node: Node) -> Vec<Node> {
-    let positive = |node| graph.as_constant(node).is_some_and(|c| c > 0.0 && c.is_finite());
-    match graph.expr(node) {
-        Expr::Binary(
-            Binary::And | Binary::Or | Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax,
-            u,
-            v,
-        ) => vec![u, v],
-        Expr::Unary(Unary::Neg, u) => vec![u],
-        Expr::Binary(Binary::Mul, u, v) if positive(u) && u != v => vec![v],
-        Expr::Binary(Binary::Mul | Binary::Div, u, v) if positive(v) && u != v => vec![u],
-        _ => Vec::new(),
-    }
 }
 
 /// Nodes of which only the sign matters for the sign of the root, the leaves included.
@@ -80,7 +60,7 @@ fn logic_nodes(graph: &Graph, root: Node) -> Vec<bool> {
     logic[root.index()] = true;
     for i in (0..=root.index()).rev() {
         if logic[i] {
-            for operand in sign_operands(graph, graph.node(i)) {
+            for operand in SignRule::of(graph, graph.node(i)).operands() {
                 logic[operand.index()] = true;
             }
         }
@@ -105,7 +85,7 @@ fn finite_nodes(graph: &Graph, root: Node) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::{Axis, dump};
+    use crate::ir::{Axis, Unary, dump};
     use crate::simplify::simplify;
 
     #[track_caller]

@@ -6,7 +6,7 @@ use super::names::{Kind, Names};
 use super::value::Value;
 use super::{Method, Module};
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
-use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
+use crate::ir::{Axis, Binary, BinaryFunction, Expr as Operation, Node, Unary};
 use crate::syntax::ast::{AddOp, Comparison, Expr, ExprKind, Logic, MulOp, Name};
 use crate::syntax::{Dimension, parse_unit};
 
@@ -415,14 +415,14 @@ impl<'a> Lowering<'a> {
 
     pub fn raise(&mut self, a: Node, b: Node, span: Span) -> Node {
         let Some(exponent) = self.module.graph.constant_value(b) else {
-            return self.binary(Binary::Pow, a, b, span);
+            return self.binary(BinaryFunction::Pow.into(), a, b, span);
         };
         if exponent == 0.5 {
             return self.unary(Unary::Sqrt, a, span);
         }
         let whole = exponent.abs();
         if whole.fract() != 0.0 || whole > 64.0 {
-            return self.binary(Binary::Pow, a, b, span);
+            return self.binary(BinaryFunction::Pow.into(), a, b, span);
         }
         let power = self.whole_power(a, whole as u32, span);
         if exponent < 0.0 {

@@ -53,13 +53,6 @@ impl Plan {
         let local = if self.local { " in local coordinates" } else { "" };
         format!("{precision} {}{local}", self.form.name())
     }
-
-    fn float(self) -> FloatType {
-        match self.precision {
-            Precision::F32 => FloatType::F32,
-            Precision::F64 => FloatType::F64,
-        }
-    }
 }
 
 /// No program keeps the tolerance.
@@ -92,7 +85,7 @@ struct Candidate {
     inputs: Inputs,
     /// In the coordinates of the program.
     over: Aabb,
-    float: FloatType,
+    precision: Precision,
     /// Of the solid.
     time: Interval,
     /// What the programs need to know of it.
@@ -133,7 +126,6 @@ impl Solid {
 impl Candidate {
     fn new(solid: &Solid, plan: Plan, over: &Aabb) -> Self {
         let (graph, root) = solid.formula();
-        let float = plan.float();
         // few digits, so that constants fold without error
         let origin = if plan.local { over.centre().as_vec3().as_dvec3() } else { DVec3::ZERO };
         let (graph, root) =
@@ -145,7 +137,7 @@ impl Candidate {
             let [double, _] = super::programs::forms(&graph, Form::Stable);
             double
         } else {
-            Growth::over(&graph, &over).forms(&graph, plan.form, float)
+            Growth::over(&graph, &over).forms(&graph, plan.form, plan.precision)
         };
         let inputs = match (plan.precision, plan.local) {
             (Precision::F64, _) => Inputs::Exact,
@@ -153,17 +145,28 @@ impl Candidate {
             (Precision::F32, true) => Inputs::Shifted,
         };
         let (time, uniforms) = (solid.moment.interval(), UniformValues::NONE);
-        Self { graph, root, origin, programs: None, forms, inputs, over, float, time, uniforms }
+        Self {
+            graph,
+            root,
+            origin,
+            programs: None,
+            forms,
+            inputs,
+            over,
+            precision: plan.precision,
+            time,
+            uniforms,
+        }
     }
 
     fn certify(&self, enough: f64) -> f64 {
         // programs add the coordinates up to see whether they are finite
         let reach = self.over.min.abs().max(self.over.max.abs()).element_sum();
-        let finite = 4.0 * reach < self.float.largest;
+        let finite = 4.0 * reach < FloatType::of(self.precision).largest;
         if self.over.is_empty() || !finite {
             return f64::INFINITY;
         }
-        let arithmetic = Arithmetic { float: self.float, forms: &self.forms, inputs: self.inputs };
+        let arithmetic = Arithmetic { precision: self.precision, forms: &self.forms, inputs: self.inputs };
         ErrorAnalysis::new(&self.graph, self.root, arithmetic).during(self.time).certify(&self.over, enough)
     }
 

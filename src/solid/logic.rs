@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use crate::ir::{Binary, Expr, Graph, Node, Unary, sign_operands};
+use crate::ir::{Graph, Node, SignRule};
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Logic {
@@ -40,19 +40,16 @@ impl Reader<'_> {
         if depth > DEEPEST {
             return None;
         }
-        let operands = sign_operands(self.graph, node);
-        match (self.graph.expr(node), &operands[..]) {
-            (Expr::Unary(Unary::Neg, _), &[a]) => self.read(a, !negated, depth + 1),
+        match SignRule::of(self.graph, node) {
+            SignRule::Not(a) => self.read(a, !negated, depth + 1),
+            SignRule::Same(a) => self.read(a, negated, depth + 1),
             // min(a, a) = a: the value of a ∧ a is another, its sign is not
-            (Expr::Binary(..), &[a, b]) if a == b => self.read(a, negated, depth + 1),
-            (Expr::Binary(op, ..), &[a, b]) => {
+            SignRule::All(a, b) | SignRule::Any(a, b) if a == b => self.read(a, negated, depth + 1),
+            rule @ (SignRule::All(a, b) | SignRule::Any(a, b)) => {
                 let (a, b) = (self.read(a, negated, depth + 1)?, self.read(b, negated, depth + 1)?);
-                let all = matches!(op, Binary::And | Binary::Min | Binary::PlainMin) != negated;
-                Some(if all { flat(a, b, true) } else { flat(a, b, false) })
+                Some(flat(a, b, matches!(rule, SignRule::All(..)) != negated))
             }
-            // a positive factor
-            (_, &[a]) => self.read(a, negated, depth + 1),
-            _ => {
+            SignRule::Leaf => {
                 self.written += 1;
                 if self.written > MOST_LEAVES {
                     return None;

@@ -5,9 +5,7 @@ use std::sync::OnceLock;
 use super::blocks::BlockProgram;
 use super::compiled::{BatchProgram, Lane, PointProgram};
 use crate::codegen::{CodegenError, Form, Forms, Precision};
-use crate::ir::{
-    self, Axis, Binary, Expr, FloatType, Graph, Growth, Hoisted, Interpreter, Node, Unary, Uniforms,
-};
+use crate::ir::{self, Axis, Binary, Expr, Graph, Growth, Hoisted, Interpreter, Node, Unary, Uniforms};
 
 /// What evaluates a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -69,7 +67,7 @@ pub fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
         return [Forms::all(form), Forms::all(form)];
     }
     let growth = Growth::within_reach(graph);
-    [FloatType::F64, FloatType::F32].map(|float| growth.forms(graph, form, float))
+    [Precision::F64, Precision::F32].map(|precision| growth.forms(graph, form, precision))
 }
 
 type Slot<P> = OnceLock<Result<P, CodegenError>>;

@@ -18,7 +18,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("precision", &[]),
     ("field", &["geom", "interval"]),
     ("syntax", &["diagnostic"]),
-    ("ir", &["diagnostic", "geom", "interval"]),
+    ("ir", &["diagnostic", "geom", "interval", "precision"]),
     ("lower", &["syntax", "ir", "diagnostic", "geom", "precision"]),
     ("simplify", &["ir", "diagnostic"]),
     ("codegen", &["ir", "diagnostic", "geom", "precision"]),

@@ -19,18 +19,17 @@
 //! different places, so a box is divided where its bound is largest, until no point would do much better.
 
 mod step;
-mod upper;
 mod weights;
 
 use std::collections::BinaryHeap;
 
 use super::forms::Forms;
 use super::graph::{Expr, Graph, Node};
-use super::growth::FloatType;
 use super::op::Binary;
 use super::range::{RangeEvaluator, Region};
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::precision::Precision;
 use step::{Operand, Step};
 
 /// How the coordinates of a point reach the program.
@@ -48,7 +47,7 @@ pub enum Inputs {
 /// One way to compute a node.
 #[derive(Debug, Clone, Copy)]
 pub struct Arithmetic<'a> {
-    pub float: FloatType,
+    pub precision: Precision,
     pub forms: &'a Forms,
     pub inputs: Inputs,
 }
@@ -172,7 +171,7 @@ mod tests {
 
     fn bound(graph: &Graph, root: Node, form: Form, over: Aabb) -> f64 {
         let forms = Forms::all(form);
-        let arithmetic = Arithmetic { float: FloatType::F64, forms: &forms, inputs: Inputs::Exact };
+        let arithmetic = Arithmetic { precision: Precision::F64, forms: &forms, inputs: Inputs::Exact };
         ErrorAnalysis::new(graph, root, arithmetic).bound(&over)
     }
 
@@ -234,7 +233,7 @@ mod tests {
         let root = graph.binary(Binary::And, either, neither);
         let undefined = graph.unary(Unary::Sqrt, y);
         let forms = Forms::all(Form::Stable);
-        let arithmetic = Arithmetic { float: FloatType::F64, forms: &forms, inputs: Inputs::Exact };
+        let arithmetic = Arithmetic { precision: Precision::F64, forms: &forms, inputs: Inputs::Exact };
         let analysis = ErrorAnalysis::new(&graph, root, arithmetic);
         let over = cube(-1.0, 1.0);
         let (whole, divided) = (analysis.bound(&over), analysis.certify(&over, 0.0));

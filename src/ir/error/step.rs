@@ -1,13 +1,14 @@
 //! One operation: the errors of its operands and its own rounding.
 
+use super::super::float::FloatType;
 use super::super::forms::Form;
 use super::super::graph::{Expr, Node};
-use super::super::growth::FloatType;
 use super::super::op::{Binary, Unary};
-use super::upper::{add, compound, div, magnitude, mul, root};
+use super::super::upper::{add, compound, div, magnitude, mul, root, smallest_magnitude};
 use super::weights::through_weights;
 use super::{Arithmetic, Error, FOLDING, Inputs};
 use crate::interval::Interval;
+use crate::precision::Precision;
 
 /// Relative error of a host function, in units of the roundoff.
 const HOST_ROUNDINGS: f64 = 4.0;
@@ -47,14 +48,7 @@ impl Operand {
 
     /// A lower bound of the magnitude, exact or computed.
     fn smallest(&self) -> f64 {
-        let reach = self.reach();
-        if reach.lo > 0.0 {
-            reach.lo
-        } else if reach.hi < 0.0 {
-            -reach.hi
-        } else {
-            0.0
-        }
+        smallest_magnitude(self.reach())
     }
 }
 
@@ -94,7 +88,16 @@ impl Step<'_> {
                 let by_form = match op {
                     Binary::Mul => a == b || both,
                     Binary::Add | Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax => both,
-                    _ => false,
+                    Binary::Sub
+                    | Binary::Div
+                    | Binary::DivOrZero
+                    | Binary::MinWeight
+                    | Binary::MaxWeight
+                    | Binary::And
+                    | Binary::Or
+                    | Binary::AndWeight
+                    | Binary::OrWeight
+                    | Binary::Call(_) => false,
                 };
                 (self.binary(op, u, v, form), by_form)
             }
@@ -114,20 +117,24 @@ impl Step<'_> {
             Inputs::Exact | Inputs::Rounded => largest,
         };
         let absolute = error.absolute.min(add(mul(error.relative, scale), error.remainder));
-        if add(largest, absolute) < self.arithmetic.float.largest {
+        if add(largest, absolute) < self.float().largest {
             Error { absolute, ..error }
         } else {
             Error::UNKNOWN
         }
     }
 
+    fn float(&self) -> FloatType {
+        FloatType::of(self.arithmetic.precision)
+    }
+
     fn unit(&self) -> f64 {
-        self.arithmetic.float.unit
+        self.float().unit
     }
 
     /// An error of the operands with the rounding of one operation whose result may underflow.
     fn rounded(&self, error: Error) -> Error {
-        let tiny = self.arithmetic.float.smallest;
+        let tiny = self.float().smallest;
         let Error { absolute, relative, remainder } = self.rounded_sum(error);
         Error { absolute: add(absolute, tiny), relative, remainder: add(remainder, tiny) }
     }
@@ -144,9 +151,9 @@ impl Step<'_> {
     }
 
     fn constant(&self, value: f64) -> Error {
-        let rounded = match self.arithmetic.float {
-            FloatType::F64 => value,
-            _ => f64::from(value as f32),
+        let rounded = match self.arithmetic.precision {
+            Precision::F64 => value,
+            Precision::F32 => f64::from(value as f32),
         };
         if !rounded.is_finite() {
             return Error::UNKNOWN;
@@ -161,11 +168,11 @@ impl Step<'_> {
     }
 
     fn coordinate(&self) -> Error {
-        let (unit, tiny) = (self.unit(), self.arithmetic.float.smallest);
+        let (unit, tiny) = (self.unit(), self.float().smallest);
         let relative = match self.arithmetic.inputs {
             Inputs::Exact => return Error::NONE,
             Inputs::Rounded => unit,
-            Inputs::Shifted => compound(unit, FloatType::F64.unit),
+            Inputs::Shifted => compound(unit, FloatType::of(Precision::F64).unit),
         };
         let absolute = add(mul(relative, magnitude(self.range)), tiny);
         Error { absolute, relative, remainder: tiny }
@@ -179,25 +186,15 @@ impl Step<'_> {
             Unary::Sqrt => self.sqrt(a),
             Unary::Sign if reach.lo > 0.0 || reach.hi < 0.0 => Error::NONE,
             Unary::Sign => Error::absolute(2.0),
-            Unary::Sin | Unary::Cos | Unary::Atan => self.host(e),
-            Unary::Tan if magnitude(reach) < 1.57 => {
-                let steepest = magnitude(reach.increasing(libm::tan));
-                self.host(mul(e, add(1.0, mul(steepest, steepest))))
-            }
-            Unary::Exp => self.host(mul(e, reach.increasing(libm::exp).hi)),
-            Unary::Ln if reach.lo > 0.0 => self.host(div(e, reach.lo)),
-            Unary::Asin | Unary::Acos if magnitude(reach) < 1.0 => {
-                let rest = (Interval::point(1.0) - reach.square()).sqrt();
-                self.host(div(e, rest.lo))
-            }
-            Unary::Tan | Unary::Ln | Unary::Asin | Unary::Acos => Error::UNKNOWN,
+            Unary::Call(function) => self.host(function.propagated(reach, e)),
         }
     }
 
-    /// A function of the mathematical library whose operands' errors amount to `propagated`.
-    fn host(&self, propagated: f64) -> Error {
+    /// A function of the mathematical library that hands on this error of its operands, if a bound of it is known.
+    fn host(&self, propagated: Option<f64>) -> Error {
+        let Some(propagated) = propagated else { return Error::UNKNOWN };
         let computed = add(magnitude(self.range), mul(2.0, propagated));
-        let own = add(mul(HOST_ROUNDINGS * self.unit(), computed), self.arithmetic.float.smallest);
+        let own = add(mul(HOST_ROUNDINGS * self.unit(), computed), self.float().smallest);
         Error::absolute(add(propagated, own))
     }
 
@@ -231,8 +228,10 @@ impl Step<'_> {
             },
             Binary::And => self.r0(a.reach(), b.reach(), a, b, form),
             Binary::Or => self.r0(-a.reach(), -b.reach(), a, b, form),
-            Binary::Pow => self.power(a, b),
-            Binary::Atan2 => self.angle(a, b),
+            Binary::Call(function) => {
+                let errors = [a.error.absolute, b.error.absolute];
+                self.host(function.propagated([a.reach(), b.reach()], errors, self.range))
+            }
             // derivatives jump: programs of gradients have no certificate
             Binary::MinWeight | Binary::MaxWeight | Binary::AndWeight | Binary::OrWeight => Error::UNKNOWN,
         }
@@ -280,40 +279,14 @@ impl Step<'_> {
         if below > 0.0 { self.rounded(Error { absolute, relative, remainder }) } else { Error::UNKNOWN }
     }
 
-    /// a^b = exp(b·ln a)
-    fn power(&self, a: Operand, b: Operand) -> Error {
-        let reach = a.reach();
-        if reach.lo <= 0.0 {
-            return Error::UNKNOWN;
-        }
-        let logarithm = magnitude(reach.increasing(libm::log));
-        let change = add(mul(b.largest(), div(a.error.absolute, reach.lo)), mul(logarithm, b.error.absolute));
-        // eᵗ − 1 ≤ t·(1 + t) and eᵗ ≤ 1 + 2t for t ≤ 1
-        if change > 1.0 {
-            return Error::UNKNOWN;
-        }
-        let largest = mul(magnitude(self.range), add(1.0, mul(2.0, change)));
-        self.host(mul(largest, mul(change, add(1.0, change))))
-    }
-
-    /// atan2(a, b), whose gradient is as long as 1/√(a² + b²), away from its cut.
-    fn angle(&self, a: Operand, b: Operand) -> Error {
-        let (above, right) = (a.reach(), b.reach());
-        if right.lo <= 0.0 && above.contains(0.0) {
-            return Error::UNKNOWN;
-        }
-        let distance = (a.smallest().powi(2) + b.smallest().powi(2)).sqrt() * (1.0 - 1e-15);
-        self.host(div(add(a.error.absolute, b.error.absolute), distance))
-    }
-
     /// u ∧ v with the operands' reaches; u ∨ v with both negated.
     fn r0(&self, u: Interval, v: Interval, a: Operand, b: Operand, form: Form) -> Error {
         let (e, f) = (a.error, b.error);
-        let (unit, tiny) = (self.unit(), self.arithmetic.float.smallest);
+        let (unit, tiny) = (self.unit(), self.float().smallest);
         let propagated = through_weights(u, v, e.absolute, f.absolute);
         let computed = add(magnitude(self.range), mul(2.0, propagated));
         let (larger, both) = (magnitude(u).max(magnitude(v)), add(magnitude(u), magnitude(v)));
-        let squares_fit = mul(mul(2.1, larger), larger) < self.arithmetic.float.largest;
+        let squares_fit = mul(mul(2.1, larger), larger) < self.float().largest;
         // what squares lose where they underflow, in h and so in the result
         let underflow = mul(4.0, root(tiny));
         let (own, own_relative, own_remainder) = match form {

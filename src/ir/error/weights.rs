@@ -1,6 +1,6 @@
 //! How R₀ hands errors of its operands on: the largest weights over two ranges.
 
-use super::upper::{add, mul, root};
+use super::super::upper::{add, mul, root};
 use crate::interval::Interval;
 
 /// The largest w_u·e + w_v·f over two ranges of the operands of ∧.

@@ -11,7 +11,7 @@
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
-use crate::ir::{Binary, Expr, Form, Forms, Graph, Node, Unary};
+use crate::ir::{Binary, Expr, Form, Forms, Graph, Node, R0, Unary};
 
 /// Up to this many pieces one program computes them all: it shares what they have in common, such as x² + y².
 const FEW_PIECES: usize = 16;
@@ -123,7 +123,7 @@ fn is_step(graph: &Graph, expr: Expr, many: bool, is_junction: &[bool]) -> bool 
 }
 
 fn is_r0(op: Binary) -> bool {
-    matches!(op, Binary::And | Binary::Or | Binary::AndWeight | Binary::OrWeight)
+    op.r0().is_some()
 }
 
 fn is_choice(op: Binary) -> bool {
@@ -282,7 +282,8 @@ impl Planner<'_> {
         if self.parts.junction[node.index()] {
             return match self.parts.graph.expr(node) {
                 Expr::Binary(op, u, v) => self.junction(node, op, u, v),
-                expr => self.push_junction(Operation::Negate, [expr.operands().next(); 2], node),
+                Expr::Unary(Unary::Neg, a) => self.push_junction(Operation::Negate, [Some(a); 2], node),
+                expr => unreachable!("{expr:?} is no step of its own"),
             };
         }
         if let Some((program, constants)) = self.parts.shared.get(&node) {
@@ -305,10 +306,10 @@ impl Planner<'_> {
 
     /// Value and both weights of R₀ share most of their work: one step computes all that are used.
     fn junction(&mut self, node: Node, op: Binary, u: Node, v: Node) -> Vec<Node> {
-        let (value_op, weight_op) = match op {
-            Binary::And | Binary::AndWeight => (Binary::And, Binary::AndWeight),
-            Binary::Or | Binary::OrWeight => (Binary::Or, Binary::OrWeight),
-            other => (other, other),
+        let (value_op, weight_op) = match op.r0() {
+            Some(R0::And | R0::AndWeight) => (Binary::And, Binary::AndWeight),
+            Some(R0::Or | R0::OrWeight) => (Binary::Or, Binary::OrWeight),
+            None => (op, op),
         };
         let operands = [Some(u), Some(v)];
         let graph = self.parts.graph;

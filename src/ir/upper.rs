@@ -41,3 +41,14 @@ pub fn compound(a: f64, b: f64) -> f64 {
 pub fn magnitude(range: Interval) -> f64 {
     range.lo.abs().max(range.hi.abs())
 }
+
+/// The smallest |x| of an interval.
+pub fn smallest_magnitude(range: Interval) -> f64 {
+    if range.lo > 0.0 {
+        range.lo
+    } else if range.hi < 0.0 {
+        -range.hi
+    } else {
+        0.0
+    }
+}
