@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
-use crate::field::{Field, Moving};
+use crate::field::{Moving, Walls};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Fill, Fluid, Gravity, Method, Scene, Skin, Slip};
@@ -43,7 +43,7 @@ pub struct Body {
     /// As it is at the start.
     pub solid: Solid,
     /// What answers for it in the box.
-    field: Box<dyn Field>,
+    field: Box<dyn Walls>,
     moving: Option<Box<dyn Moving>>,
     /// What it does to a particle, and to the fluid that moves along it.
     pub skin: Skin,
@@ -91,7 +91,7 @@ impl Experiment {
         {
             let whole = compile(name, shape)?;
             let solid = whole.at(0.0);
-            let field: Box<dyn Field> = if reach > 0.0 {
+            let field: Box<dyn Walls> = if reach > 0.0 {
                 solid.walls(scene.domain, reach)
             } else if solid.has_many_leaves() {
                 // ω itself for a few leaves; for many, only those that matter where a particle is

@@ -15,7 +15,7 @@ use crate::{
 /// A field from ω alone; ∇ω by central differences, good enough for normals and Newton steps.
 pub(super) struct Formula<F>(pub F);
 
-impl<F: Fn(DVec3) -> f64 + Sync> Field for Formula<F> {
+impl<F: Fn(DVec3) -> f64 + Send + Sync> Field for Formula<F> {
     fn omega(&self, p: DVec3) -> f64 {
         (self.0)(p)
     }

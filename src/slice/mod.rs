@@ -117,7 +117,7 @@ mod tests {
     use super::*;
     use crate::field::Closures;
 
-    pub fn field(omega: impl Fn(DVec3) -> f64 + Sync) -> impl Field {
+    pub fn field(omega: impl Fn(DVec3) -> f64 + Send + Sync) -> impl Field {
         Closures { omega, gradient: |_| DVec3::ZERO }
     }
 

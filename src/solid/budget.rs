@@ -295,10 +295,6 @@ impl Field for Chosen {
     fn range(&self, over: &Aabb) -> Interval {
         self.solid.range(over)
     }
-
-    fn wall_velocity(&self, p: DVec3) -> DVec3 {
-        self.solid.wall_velocity(p)
-    }
 }
 
 impl std::fmt::Debug for Chosen {

@@ -15,7 +15,7 @@ use super::leaf::Leaves;
 use super::prefix::Word;
 use super::sweep::Sweep;
 use super::{Contact, Parts, Solid, Twin};
-use crate::field::{Entry, Faces, Field, Normals, Path, Points, clearance_by_ranges};
+use crate::field::{Entry, Faces, Field, Normals, Path, Points, Walls, clearance_by_ranges};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
@@ -378,17 +378,6 @@ impl Field for CellMap {
         self.twin.omega(p)
     }
 
-    /// For a `reach` up to that of the map; farther away it knows of no face.
-    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
-        match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Near(program)) => {
-                self.parts.leaves.add_faces(&self.cells.programs, program as usize, p, reach, faces);
-            }
-            Some(Cell::Fluid) => {}
-            _ => self.parts.leaves.add_faces(&self.parts.words, 0, p, reach, faces),
-        }
-    }
-
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
         self.evaluate(points, omega, |depth| self.cells.shortest_side(depth));
     }
@@ -405,6 +394,19 @@ impl Field for CellMap {
             Some(Cell::Fluid) if touched.all(|cell| cell == Cell::Fluid) => Interval::point(-free),
             Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Interval::point(free),
             _ => Interval::ALL,
+        }
+    }
+}
+
+impl Walls for CellMap {
+    /// For a `reach` up to that of the map; farther away it knows of no face.
+    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Near(program)) => {
+                self.parts.leaves.add_faces(&self.cells.programs, program as usize, p, reach, faces);
+            }
+            Some(Cell::Fluid) => {}
+            _ => self.parts.leaves.add_faces(&self.parts.words, 0, p, reach, faces),
         }
     }
 

@@ -39,7 +39,7 @@ pub use moving_map::MovingMap;
 pub use programs::{Engine, ProgramKind};
 
 use crate::codegen::{CodegenError, Form, Forms, Precision};
-use crate::field::{self, Entry, Faces, Field, GradientsMut, Moving, Path, Points};
+use crate::field::{self, Entry, Faces, Field, GradientsMut, Moving, Path, Points, Walls};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{self, Graph, Node, Uniforms};
@@ -315,7 +315,7 @@ impl Solid {
 
     /// The cheapest field with exactly the sign, zero set and surface gradient of ω in a box: the twin for a few
     /// leaves, a [`CellMap`] for many. Off the surface its value is another one.
-    pub fn surface(&self, over: Aabb) -> Box<dyn Field> {
+    pub fn surface(&self, over: Aabb) -> Box<dyn Walls> {
         match if self.has_many_leaves() { CellMap::new(self, over) } else { None } {
             Some(map) => Box::new(map),
             None => Box::new(self.twin()),
@@ -323,7 +323,7 @@ impl Solid {
     }
 
     /// The field that a fluid solver needs in a box: as [`Solid::surface`], and its faces within `reach`.
-    pub fn walls(&self, over: Aabb, reach: f64) -> Box<dyn Field> {
+    pub fn walls(&self, over: Aabb, reach: f64) -> Box<dyn Walls> {
         match CellMap::with_reach(self, over, reach) {
             Some(map) => Box::new(map),
             None => Box::new(self.clone()),
@@ -458,7 +458,7 @@ impl Solid {
     /// Nothing of the path before the entry is in the solid, and a path without one does not touch it: proven, however
     /// thin the solid and long the path.
     pub fn first_entry(&self, from: DVec3, to: DVec3) -> Option<Entry> {
-        Field::first_entry(self, &Path::new(from, to, f64::INFINITY))
+        Walls::first_entry(self, &Path::new(from, to, f64::INFINITY))
     }
 
     /// Where the solid is; found on first use by subdivision, then kept.
@@ -500,7 +500,9 @@ impl Field for Solid {
     fn range(&self, over: &Aabb) -> Interval {
         self.range(over)
     }
+}
 
+impl Walls for Solid {
     fn first_entry(&self, path: &Path) -> Option<Entry> {
         self.twin().first_entry(path)
     }
@@ -527,7 +529,7 @@ impl Field for Solid {
 }
 
 impl Moving for Solid {
-    fn during(&self, from: f64, to: f64) -> Box<dyn Field + Send + '_> {
+    fn during(&self, from: f64, to: f64) -> Box<dyn Walls> {
         Box::new(self.between(from, to))
     }
 
@@ -576,17 +578,19 @@ impl Field for Twin {
         self.solid.evaluate_many(ProgramKind::SignGradient, [points.x, points.y, points.z], columns);
     }
 
+    fn range(&self, over: &Aabb) -> Interval {
+        let Solid { inner, moment } = &self.solid;
+        self.solid.twin_function().range(inner.engine, over, moment, true)
+    }
+}
+
+impl Walls for Twin {
     fn on_path(&self, path: &Path, t: f64) -> f64 {
         self.solid.then(t).twin().omega(path.at(t))
     }
 
     fn wall_velocity(&self, p: DVec3) -> DVec3 {
         self.solid.wall_velocity(p)
-    }
-
-    fn range(&self, over: &Aabb) -> Interval {
-        let Solid { inner, moment } = &self.solid;
-        self.solid.twin_function().range(inner.engine, over, moment, true)
     }
 
     fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {

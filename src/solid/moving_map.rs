@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::Solid;
 use super::cell_map::{CellMap, CellStats, margin};
 use super::cells::{Cells, Pending};
-use crate::field::{Field, Moving};
+use crate::field::{Moving, Walls};
 use crate::geom::Aabb;
 
 /// A solid that moves, prepared for a box and a run.
@@ -95,7 +95,7 @@ impl MovingMap {
 }
 
 impl Moving for MovingMap {
-    fn during(&self, from: f64, to: f64) -> Box<dyn Field + Send + '_> {
+    fn during(&self, from: f64, to: f64) -> Box<dyn Walls> {
         match self.between(from, to) {
             Some(map) => Box::new(map),
             None => Box::new(self.solid.between(from, to)),

@@ -7,7 +7,7 @@ use rand_pcg::{
 };
 
 use crate::{
-    field::{Closures, Field},
+    field::{Closures, Walls},
     geom::Aabb,
 };
 
@@ -49,7 +49,7 @@ pub fn free_drop(parameters: Parameters, count: usize) -> Simulation<'static> {
 }
 
 /// (R² − r²)/2R: gradient of length one on the surface, none at the centre.
-pub fn sphere(centre: DVec3, radius: f64) -> impl Field {
+pub fn sphere(centre: DVec3, radius: f64) -> impl Walls {
     Closures {
         omega: move |p: DVec3| (radius * radius - p.distance_squared(centre)) / (2.0 * radius),
         gradient: move |p: DVec3| (centre - p) / radius,
@@ -57,7 +57,7 @@ pub fn sphere(centre: DVec3, radius: f64) -> impl Field {
 }
 
 /// The half-space below the plane through the origin with this unit normal.
-pub fn half_space(origin: DVec3, normal: DVec3) -> impl Field {
+pub fn half_space(origin: DVec3, normal: DVec3) -> impl Walls {
     Closures { omega: move |p: DVec3| (origin - p).dot(normal), gradient: move |_: DVec3| -normal }
 }
 
@@ -69,7 +69,7 @@ fn r0(sign: f64, (u, du): (f64, DVec3), (v, dv): (f64, DVec3)) -> (f64, DVec3) {
 }
 
 /// The paper's pawn, equation (5).
-pub fn pawn() -> impl Field {
+pub fn pawn() -> impl Walls {
     let both = |p: DVec3| {
         let (x, y, z) = (p.x - 1.5, p.y - 1.5, p.z);
         let r2 = x * x + y * y;
@@ -85,12 +85,12 @@ pub fn pawn() -> impl Field {
     Closures { omega: move |p: DVec3| both(p).0, gradient: move |p: DVec3| both(p).1 }
 }
 
-pub fn obstacle(field: &dyn Field) -> Obstacle<'_> {
+pub fn obstacle(field: &dyn Walls) -> Obstacle<'_> {
     Obstacle::at_rest(field, 0.005)
 }
 
 /// A drop of the paper's fluid above the pawn, the drop's lowest point near the pawn's head.
-pub fn drop_on<'a>(pawn: &'a dyn Field, parameters: Parameters, count: usize) -> Simulation<'a> {
+pub fn drop_on<'a>(pawn: &'a dyn Walls, parameters: Parameters, count: usize) -> Simulation<'a> {
     let mut drop = FluidBlock::drop(DVec3::new(1.5, 1.5, 2.2), count).seed(&parameters, BOX).unwrap();
     carve(&mut drop, &BOX, &[obstacle(pawn)], 0.0).unwrap();
     Simulation::new(parameters, drop, BOX, vec![obstacle(pawn)]).unwrap()

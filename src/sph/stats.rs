@@ -190,7 +190,7 @@ pub(super) fn energies(core: &Core<'_>) -> [f64; 2] {
 impl Boundary<'_> {
     /// Largest ω/|∇ω| of the obstacles that hold the point, m; zero in the fluid.
     fn penetration(&self, p: DVec3) -> f64 {
-        let depth = |field: &dyn crate::field::Field| {
+        let depth = |field: &dyn crate::field::Walls| {
             if field.omega(p) > 0.0 {
                 let (w, gradient) = field.omega_grad(p);
                 // a vanishing gradient gives an infinite depth: deep inside

@@ -10,7 +10,7 @@
 
 use std::time::Instant;
 
-use rfm::field::{Faces, Field, Part};
+use rfm::field::{Faces, Part, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::sph::{
@@ -247,7 +247,7 @@ fn walls(particles: usize) {
 }
 
 /// Whether a part of the surface lies within reach.
-fn is_near(field: &dyn Field, p: DVec3, reach: f64) -> bool {
+fn is_near(field: &dyn Walls, p: DVec3, reach: f64) -> bool {
     let mut faces = Faces::new();
     field.faces(p, reach, &mut faces);
     faces.iter().any(|part| matches!(part, Part::Face(face) if face.distance < reach))
@@ -256,7 +256,7 @@ fn is_near(field: &dyn Field, p: DVec3, reach: f64) -> bool {
 /// Steps before walls are measured.
 const SETTLED: usize = 150;
 
-fn obstacle(text: &str, solid: &str, reach: f64) -> Box<dyn Field> {
+fn obstacle(text: &str, solid: &str, reach: f64) -> Box<dyn Walls> {
     let program = Program::from_source("obstacle.rfm", text).unwrap();
     program.solid_with(solid, Engine::Auto).unwrap().walls(BOX, reach)
 }

@@ -7,11 +7,11 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use rfm::field::{Closures, Path};
+use rfm::Program;
+use rfm::field::{Closures, Path, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::solid::CellMap;
-use rfm::{Field, Program};
 
 const PATHS: usize = 20_000;
 const ROUNDS: usize = 15;
@@ -24,7 +24,7 @@ fn main() {
     let sampled = Closures { omega: |p: DVec3| pawn.omega(p), gradient: |p: DVec3| pawn.omega_grad(p).1 };
     let domain = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
     let map = CellMap::new(&pawn, domain).unwrap_or_else(|| panic!("the pawn can be taken apart"));
-    let ways: [(&str, &dyn Field); 3] = [("swept", &twin), ("swept, cell map", &map), ("sampled", &sampled)];
+    let ways: [(&str, &dyn Walls); 3] = [("swept", &twin), ("swept, cell map", &map), ("sampled", &sampled)];
     println!(
         "\npawn, {PATHS} paths, ns per path (best of {ROUNDS}); missed: hits that only the sweep finds\n"
     );
@@ -50,7 +50,7 @@ fn main() {
 }
 
 /// Paths that begin in the fluid.
-fn paths(domain: &Aabb, length: f64, solid: &dyn Field) -> Vec<Path> {
+fn paths(domain: &Aabb, length: f64, solid: &dyn Walls) -> Vec<Path> {
     let mut seed = 3u64;
     let mut random = || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -69,7 +69,7 @@ fn paths(domain: &Aabb, length: f64, solid: &dyn Field) -> Vec<Path> {
 }
 
 /// Nanoseconds for each portion of the paths; what was shorter before stays.
-fn time(field: &dyn Field, paths: &[Path], best: &mut Vec<f64>) {
+fn time(field: &dyn Walls, paths: &[Path], best: &mut Vec<f64>) {
     const PORTION: usize = 100;
     best.resize(paths.len().div_ceil(PORTION), f64::INFINITY);
     for (paths, best) in paths.chunks(PORTION).zip(best) {

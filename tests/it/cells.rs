@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use rfm::field::Points;
+use rfm::field::{Points, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{Grid, Resolution, check, marching_cubes};
@@ -124,7 +124,7 @@ fn the_mesh_is_the_same() {
     let solid = solid(&many(60), "many", Engine::Jit);
     let map = CellMap::new(&solid, domain()).unwrap();
     let grid = Grid::filling(&domain(), Resolution::Cells(80)).unwrap();
-    let [with, without] = [&map as &dyn Field, &solid.twin()].map(|field| {
+    let [with, without] = [&map as &dyn Walls, &solid.twin()].map(|field| {
         let mesh = marching_cubes(field, &grid, &|_| {}).unwrap();
         check(&mesh, field)
     });
@@ -225,7 +225,7 @@ fn what_is_said_to_be_clear_is_clear() {
         (example("bishop"), "bishop"),
     ] {
         let map = CellMap::with_reach(&solid, domain(), reach).unwrap();
-        let fields: [(&dyn Field, bool); 2] = [(&map, true), (&solid, false)];
+        let fields: [(&dyn Walls, bool); 2] = [(&map, true), (&solid, false)];
         let mut random = Random(5);
         for (field, is_map) in fields {
             let (mut partly, mut near, mut far) = (0, 0, 0);

@@ -2,7 +2,7 @@
 //! arithmetic and brute force.
 
 use glam::DVec3;
-use rfm::field::{Field, Moving, Path, Still};
+use rfm::field::{Field, Moving, Path, Still, Walls};
 use rfm::geom::Aabb;
 use rfm::ir::{self, Given, Interpreter, exact};
 use rfm::solid::{CellMap, Engine, MovingMap, Place};

@@ -1,6 +1,6 @@
 //! Swept contact: no hit is missed, no clear miss is reported, and the time of entry is that of exact arithmetic.
 
-use rfm::field::{Entry, Path};
+use rfm::field::{Entry, Path, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::exact;

@@ -1,11 +1,12 @@
 //! Walls a thousandth of a millimetre thick, corners and cusps hold particles at 100 m/s: judged after every step, by
 //! where the particles are and not by what the solver says of itself.
 
+use rfm::field::Walls;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::lower::Scene;
 use rfm::sph::{Obstacle, Parameters, Particles, Simulation};
-use rfm::{Engine, Experiment, Field, Program, Solid};
+use rfm::{Engine, Experiment, Program, Solid};
 
 use crate::sweep::Random;
 
@@ -32,7 +33,7 @@ fn solid(name: &str) -> Solid {
 }
 
 /// Free particles at 100 m/s among obstacles; `check` is asked for every particle after every step.
-fn fly(field: &dyn Field, starts: &[DVec3], steps: usize, check: &dyn Fn(DVec3, DVec3) -> bool) {
+fn fly(field: &dyn Walls, starts: &[DVec3], steps: usize, check: &dyn Fn(DVec3, DVec3) -> bool) {
     let mut random = Random(17);
     let mut fluid = Particles::default();
     for &start in starts {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::*;
-use crate::field::Field;
+use crate::field::Walls;
 use crate::sph::Parameters;
 use crate::sph::methods::Scheme;
 use crate::sph::{Dfsph, Gradients, Obstacle, Particles, Simulation, Wcsph, scenes, walls::Boundary};
@@ -206,7 +206,7 @@ fn elastic_energy_is_the_integral_of_pressure() {
     }
 }
 
-fn floor(z: f64) -> impl Field {
+fn floor(z: f64) -> impl Walls {
     scenes::half_space(DVec3::Z * z, DVec3::Z)
 }
 
@@ -252,7 +252,7 @@ fn a_shear_drags_a_block_that_it_sticks_to() {
 }
 
 /// A particle without neighbours above a block.
-fn lone(height: f64, restitution: f64, block: &dyn Field) -> Simulation<'_> {
+fn lone(height: f64, restitution: f64, block: &dyn Walls) -> Simulation<'_> {
     let parameters = Parameters {
         stiffness: 0.0,
         viscosity: 0.0,

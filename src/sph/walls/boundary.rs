@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use glam::DVec3;
 
 use crate::{
-    field::{Face, Faces, Field, Moving, Part, Path},
+    field::{Face, Faces, Moving, Part, Path, Walls},
     geom::Aabb,
 };
 
@@ -55,7 +55,7 @@ const SURELY: f64 = 1.0 - 1e-9;
 #[derive(Clone, Copy)]
 pub struct Obstacle<'a> {
     /// ω > 0 inside the body; of one that moves, as it is at the start.
-    pub field: &'a dyn Field,
+    pub field: &'a dyn Walls,
     /// The body as it moves, if it does.
     pub moving: Option<&'a dyn Moving>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
@@ -75,7 +75,7 @@ pub struct Obstacle<'a> {
 
 impl<'a> Obstacle<'a> {
     /// A body at rest: the fluid slips along it, and half of a speed into it is given back.
-    pub fn at_rest(field: &'a dyn Field, resolution: f64) -> Self {
+    pub fn at_rest(field: &'a dyn Walls, resolution: f64) -> Self {
         Self {
             field,
             moving: None,
@@ -97,7 +97,7 @@ pub(in crate::sph) struct Boundary<'a> {
     pub slip: Slip,
     pub obstacles: Vec<Obstacle<'a>>,
     /// The obstacles that move, during the present step.
-    pub during: Vec<Option<Box<dyn Field + Send + 'a>>>,
+    pub during: Vec<Option<Box<dyn Walls>>>,
     /// The end of the present step, s.
     pub time: f64,
     /// Distance from an obstacle's surface, m, at which particles stop.
@@ -120,7 +120,7 @@ impl<'a> Boundary<'a> {
     }
 
     /// An obstacle during the present step.
-    pub fn field(&self, k: usize) -> &dyn Field {
+    pub fn field(&self, k: usize) -> &dyn Walls {
         match self.during.get(k) {
             Some(Some(moving)) => &**moving,
             _ => self.obstacles[k].field,
@@ -128,7 +128,7 @@ impl<'a> Boundary<'a> {
     }
 
     /// All of them.
-    pub fn fields(&self) -> impl Iterator<Item = &dyn Field> {
+    pub fn fields(&self) -> impl Iterator<Item = &dyn Walls> {
         (0..self.obstacles.len()).map(|k| self.field(k))
     }
 

@@ -1,6 +1,6 @@
 //! One path against one field: where it first meets the obstacle, and the way out for a point inside.
 //!
-//! The field finds the meeting itself ([`Field::first_entry`]): for compiled solids it is proven that no wall is passed,
+//! The field finds the meeting itself ([`Walls::first_entry`]): for compiled solids it is proven that no wall is passed,
 //! however thin; a closure, of whose range nothing is known, is sampled, and its `resolution` is the thinnest wall that
 //! surely holds.
 //!
@@ -13,7 +13,7 @@
 
 use glam::DVec3;
 
-use crate::field::{Entry, Field, Normals, Path, last_outside};
+use crate::field::{Entry, Normals, Path, Walls, last_outside};
 
 /// A bracket shorter than this part of the coordinates' size is a point.
 const POINT: f64 = 4.0 * f64::EPSILON;
@@ -45,7 +45,7 @@ pub struct Undefined {
 ///
 /// # Errors
 /// [`Undefined`] where ω is NaN, or ∇ω at the contact is not finite.
-pub fn first_contact(field: &dyn Field, path: &Path, clearance: f64) -> Result<Option<Contact>, Undefined> {
+pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<Option<Contact>, Undefined> {
     let mut rest = *path;
     for _ in 0..MOST_DOUBTS {
         let Some(entry) = field.first_entry(&rest) else {
@@ -59,7 +59,9 @@ pub fn first_contact(field: &dyn Field, path: &Path, clearance: f64) -> Result<O
         if entry.certain {
             return stop(field, path, &entry, clearance).map(Some);
         }
-        if let Some((t, w)) = entry.first_sample_met(field, path).filter(|(t, w)| w.is_nan() || *t > 0.0) {
+        if let Some((t, w)) =
+            entry.first_sample_met(path, |t| field.on_path(path, t)).filter(|(t, w)| w.is_nan() || *t > 0.0)
+        {
             if w.is_nan() {
                 return Err(Undefined { at: path.at(t) });
             }
@@ -75,7 +77,7 @@ pub fn first_contact(field: &dyn Field, path: &Path, clearance: f64) -> Result<O
 }
 
 /// The place to stop before an entry.
-fn stop(field: &dyn Field, path: &Path, entry: &Entry, clearance: f64) -> Result<Contact, Undefined> {
+fn stop(field: &dyn Walls, path: &Path, entry: &Entry, clearance: f64) -> Result<Contact, Undefined> {
     let step = path.to - path.from;
     let normal = match entry.normals.mean() {
         Some(normal) => normal,
@@ -102,7 +104,7 @@ fn stop(field: &dyn Field, path: &Path, entry: &Entry, clearance: f64) -> Result
 /// # Errors
 /// [`Undefined`] where ω is NaN.
 pub fn push_out(
-    field: &dyn Field,
+    field: &dyn Walls,
     inside: DVec3,
     reach: f64,
     clearance: f64,
@@ -115,7 +117,7 @@ pub fn push_out(
 /// # Errors
 /// [`Undefined`] where ω is NaN.
 pub(super) fn push_out_to(
-    field: &dyn Field,
+    field: &dyn Walls,
     inside: DVec3,
     reach: f64,
     clearance: f64,
@@ -197,18 +199,18 @@ pub(super) fn reflect(velocity: DVec3, normal: DVec3, restitution: f64) -> DVec3
 }
 
 /// ω at a part of a path, when it is passed.
-fn on_path(field: &dyn Field, path: &Path, t: f64) -> Result<f64, Undefined> {
+fn on_path(field: &dyn Walls, path: &Path, t: f64) -> Result<f64, Undefined> {
     let w = field.on_path(path, t);
     if w.is_nan() { Err(Undefined { at: path.at(t) }) } else { Ok(w) }
 }
 
-fn omega(field: &dyn Field, at: DVec3) -> Result<f64, Undefined> {
+fn omega(field: &dyn Walls, at: DVec3) -> Result<f64, Undefined> {
     let w = field.omega(at);
     if w.is_nan() { Err(Undefined { at }) } else { Ok(w) }
 }
 
 /// −∇ω/|∇ω|, or the direction the particle came from where the gradient vanishes.
-fn normal(field: &dyn Field, at: DVec3, backward: DVec3) -> Result<DVec3, Undefined> {
+fn normal(field: &dyn Walls, at: DVec3, backward: DVec3) -> Result<DVec3, Undefined> {
     let (_, gradient) = field.omega_grad(at);
     if !gradient.is_finite() {
         return Err(Undefined { at });
@@ -221,7 +223,8 @@ fn normal(field: &dyn Field, at: DVec3, backward: DVec3) -> Result<DVec3, Undefi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{field::Closures, sph::scenes};
+    use crate::field::{Closures, Field};
+    use crate::sph::scenes;
 
     #[test]
     fn reflection_law() {

@@ -1,16 +1,10 @@
-//! The first meeting of a straight path with an obstacle, for fields that know their range and for those that do not.
-//!
-//! Invariant: where a field knows its range, nothing of the path before an [`Entry`] touches the obstacle, and a path
-//! without one does not touch it at all; of an obstacle that moves, each place at the time at which it is passed. A field that knows nothing is sampled, and what lies between two samples is
-//! not seen.
+//! Straight paths, and where they enter an obstacle.
 
 use glam::DVec3;
 
-use super::Field;
 use crate::geom::Aabb;
-use crate::interval::Interval;
 
-/// A straight path, passed from t = 0 to t = 1, and how closely it is to be looked at.
+/// A straight path, passed from t = 0 to t = 1, and how closely it is to be sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Path {
     /// The place at t = 0.
@@ -19,8 +13,8 @@ pub struct Path {
     pub to: DVec3,
     /// Where the search begins, 0 to 1; what lies before is not looked at.
     pub start: f64,
-    /// Distance of samples, in the scene's unit of length, for fields that know nothing of their range: the thinnest
-    /// part that they surely show. Others do not need it.
+    /// Distance between samples, in the scene's unit of length, for fields that know nothing of their range: the
+    /// thickness of the thinnest part that sampling surely finds. Other fields do not use it.
     pub resolution: f64,
 }
 
@@ -50,12 +44,6 @@ pub struct Normals {
 /// Samples of one path at most; only a runaway needs more.
 const MOST_SAMPLES: f64 = 4096.0;
 
-/// Parts of a path shorter than this are not divided further.
-const SHORTEST: f64 = 1e-9;
-
-/// Ranges asked for on one path at most; what is then undecided is said to be so.
-const MOST_RANGES: usize = 2_000;
-
 /// A bracket shorter than this part of the coordinates' size is a point.
 const POINT: f64 = 4.0 * f64::EPSILON;
 
@@ -81,8 +69,8 @@ impl Path {
         whole.grown(POINT * a.abs().max(b.abs()).max_element())
     }
 
-    /// Places after t0 up to t1 at which to look when nothing is known.
-    fn samples(&self, t0: f64, t1: f64) -> impl Iterator<Item = f64> + use<> {
+    /// Parts of the path, after t0 and up to t1, at which a field without ranges is sampled.
+    pub(super) fn samples(&self, t0: f64, t1: f64) -> impl Iterator<Item = f64> + use<> {
         let parts = (self.from.distance(self.to) * (t1 - t0) / self.resolution).ceil();
         // NaN becomes 0, and then 1
         let count = (parts.clamp(1.0, MOST_SAMPLES) as usize).max(1);
@@ -96,12 +84,12 @@ impl Entry {
         Self { t, until, certain, point: path.at(t), normals }
     }
 
-    /// Looks at ω itself where the entry is uncertain: the first sample between `t` and `until` that is not in the
-    /// fluid, NaN included.
-    pub fn first_sample_met<F: Field + ?Sized>(&self, field: &F, path: &Path) -> Option<(f64, f64)> {
+    /// Looks at ω itself where the entry is uncertain: the first sample (t, ω) between `t` and `until` that is not in the
+    /// fluid, NaN included. `omega` gives ω at a part t of the path, see [`Walls::on_path`](super::Walls::on_path).
+    pub fn first_sample_met(&self, path: &Path, omega: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
         let middle = 0.5 * (self.t + self.until);
         let look = |t: f64| {
-            let w = field.on_path(path, t);
+            let w = omega(t);
             (w >= 0.0 || w.is_nan()).then_some((t, w))
         };
         look(self.t)
@@ -146,79 +134,8 @@ impl Normals {
     }
 }
 
-/// The first entry found by a field's ranges, or by samples if it has none: what [`Field::first_entry`] does unless a
-/// field knows better.
-pub fn search_path<F: Field + ?Sized>(field: &F, path: &Path) -> Option<Entry> {
-    let knows = |t0, t1| field.range(&path.hull(t0, t1)) != Interval::ALL;
-    let found = if knows(path.start, 1.0) || knows(path.start, path.start) {
-        by_ranges(field, path)
-    } else {
-        by_samples(field, path)
-    };
-    found.map(|(stretch, certain)| {
-        let mut normals = Normals::default();
-        normals.add(-field.omega_grad(path.at(stretch.0)).1);
-        Entry::new(path, stretch, certain, normals)
-    })
-}
-
-/// Halves the path, the earlier half first, until a range proves a part to be in the fluid or it is too short to be
-/// divided; parts that cannot be decided and follow one another are one.
-fn by_ranges<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), bool)> {
-    let mut stack = vec![(path.start, 1.0)];
-    let mut left = MOST_RANGES;
-    let mut open: Option<(f64, f64)> = None;
-    while let Some((t0, t1)) = stack.pop() {
-        let range = field.range(&path.hull(t0, t1));
-        if range.hi < 0.0 {
-            if open.is_some() {
-                break;
-            }
-            continue;
-        }
-        left = left.saturating_sub(1);
-        if left == 0 {
-            return Some(((open.map_or(t0, |o| o.0), 1.0), false));
-        }
-        if range.lo >= 0.0 && range != Interval::ALL {
-            return Some(((open.map_or(t0, |o| o.0), t1), true));
-        }
-        if t1 - t0 > SHORTEST {
-            let middle = 0.5 * (t0 + t1);
-            stack.extend([(middle, t1), (t0, middle)]);
-        } else {
-            let begin = open.map_or(t0, |o| o.0);
-            if field.on_path(path, t1) >= 0.0 {
-                return Some(((begin, t1), true));
-            }
-            open = Some((begin, t1));
-        }
-    }
-    open.map(|stretch| (stretch, false))
-}
-
-/// The first sample that is not in the fluid, and the last place before it that is.
-fn by_samples<F: Field + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), bool)> {
-    let start = field.on_path(path, path.start);
-    if start >= 0.0 || start.is_nan() {
-        return Some(((path.start, path.start), start >= 0.0));
-    }
-    let mut before = (path.start, start);
-    for t in path.samples(path.start, 1.0) {
-        let after = (t, field.on_path(path, t));
-        if after.1.is_nan() {
-            return Some(((before.0, t), false));
-        }
-        if after.1 >= 0.0 {
-            return Some(((last_outside(|t| field.on_path(path, t), path, before, after), t), true));
-        }
-        before = after;
-    }
-    None
-}
-
 /// Largest known t with `omega`(t) < 0 on a path, between one (t, ω) in the fluid and a later one that is not: secant
-/// steps, every third a bisection. Who asks decides at which time a field that moves is meant.
+/// steps, every third a bisection. The caller's `omega` decides at which time a moving field is evaluated.
 pub fn last_outside(
     omega: impl Fn(f64) -> f64,
     path: &Path,
@@ -250,40 +167,6 @@ pub fn last_outside(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::Closures;
-
-    /// A ball of radius 1 whose range is known from the distance of the box's centre.
-    struct Ball;
-
-    impl Field for Ball {
-        fn omega(&self, p: DVec3) -> f64 {
-            1.0 - p.length()
-        }
-
-        fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-            (self.omega(p), -p.normalize_or_zero())
-        }
-
-        fn range(&self, over: &Aabb) -> Interval {
-            let (middle, reach) = (self.omega(over.centre()), 0.5 * over.size().length() + 1e-15);
-            Interval::new(middle - reach, middle + reach)
-        }
-    }
-
-    #[test]
-    fn ranges_find_what_samples_miss() {
-        let path = |y: f64| Path::new(DVec3::new(-2.0, y, 0.0), DVec3::new(2.0, y, 0.0), 10.0);
-        let hit = Ball.first_entry(&path(0.6)).unwrap();
-        assert!(hit.certain && (hit.t - 0.3).abs() < 1e-8, "{hit:?}");
-        assert!((hit.normals.mean().unwrap() - DVec3::new(-0.8, 0.6, 0.0)).length() < 1e-7);
-        assert_eq!(Ball.first_entry(&path(1.001)), None);
-        let closures =
-            Closures { omega: |p: DVec3| Ball.omega(p), gradient: |p: DVec3| Ball.omega_grad(p).1 };
-        assert_eq!(closures.first_entry(&path(0.6)), None);
-        let closely = Path { resolution: 0.1, ..path(0.6) };
-        let hit = closures.first_entry(&closely).unwrap();
-        assert!((hit.t - 0.3).abs() < 1e-14 && hit.certain && Ball.omega(hit.point) < 0.0, "{hit:?}");
-    }
 
     #[test]
     fn normals_are_different_and_few() {
