@@ -12,7 +12,7 @@ use super::{Failure, choose, input, note, output};
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
 use crate::field::Field;
 use crate::geom::Aabb;
-use crate::ir::Growth;
+use crate::ir::Magnitudes;
 use crate::lower::NamedSolid;
 use crate::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
 use crate::slice::{self, Plane, Window};
@@ -269,8 +269,8 @@ fn solids(
 fn overflow(program: &Program, named: &NamedSolid, solid: &Solid) -> Option<Diagnostic> {
     let (graph, _) = program.module().graph.extract_cone(named.node);
     let growth = match program.domain(solid) {
-        Some(over) => Growth::over(&graph, &over),
-        None => Growth::within_reach(&graph),
+        Some(over) => Magnitudes::over(&graph, &over),
+        None => Magnitudes::within_reach(&graph),
     };
     let node = growth.overflow(&graph, Precision::F64)?;
     let message = format!(

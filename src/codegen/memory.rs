@@ -5,7 +5,8 @@ use std::sync::Mutex;
 
 use cranelift_jit::JITModule;
 
-use super::{Precision, Shape};
+use super::request::Shape;
+use crate::precision::Precision;
 
 /// Machine code of one program, freed when this is dropped.
 pub struct Code {

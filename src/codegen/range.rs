@@ -3,7 +3,7 @@
 //! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets the
 //! processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above the exact one
 //! after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added after each operation.
-//! The rules are those of `ir::range`; bounds may be wider by a few ulp, of R₀ by a few ulp of its larger operand.
+//! The rules are those of `ir::bounds::range`; bounds may be wider by a few ulp, of R₀ by a few ulp of its larger operand.
 //!
 //! Only graphs are taken whose every node is finite over [`REACH`], and small enough that no square overflows: then
 //! neither infinity nor NaN can arise for a box within it, and min and max need not look for them. Elsewhere the
@@ -16,23 +16,14 @@ use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
 use cranelift_frontend::FunctionBuilder;
 use glam::DVec3;
 
-use super::emit::{Emitter, Hosts};
-use super::translate::pointers;
-use super::{Precision, Request};
+use super::emitter::{Emitter, Hosts};
+use super::request::{Request, Rounding, pointers};
 use crate::geom::Aabb;
-use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeStep, Region, Unary};
+use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeRule, Region, Unary};
+use crate::precision::Precision;
 
 /// Boxes within this distance of the origin are answered by machine code.
 pub const REACH: f64 = 1e9;
-
-/// How the processor rounds while a range program runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Rounding {
-    /// Towards +∞: the caller sees to it.
-    Upward,
-    /// To nearest, as everywhere else.
-    Nearest,
-}
 
 /// Values beyond this might overflow in a product or in the bound of one.
 const LARGEST: f64 = 1e300;
@@ -118,21 +109,21 @@ impl Instructions {
 
 impl Instruction {
     fn of(graph: &Graph, expr: Expr) -> Option<Self> {
-        Some(match RangeStep::of(graph, expr) {
-            RangeStep::Square(a) => Self::Square(a),
-            RangeStep::Slab { of, first, second } => Self::Slab { of, first, second },
-            RangeStep::Plain(Expr::Constant(bits)) => Self::Constant(f64::from_bits(bits)),
-            RangeStep::Plain(Expr::Coordinate(axis)) => {
+        Some(match RangeRule::of(graph, expr) {
+            RangeRule::Square(a) => Self::Square(a),
+            RangeRule::Slab { of, first, second } => Self::Slab { of, first, second },
+            RangeRule::Plain(Expr::Constant(bits)) => Self::Constant(f64::from_bits(bits)),
+            RangeRule::Plain(Expr::Coordinate(axis)) => {
                 Self::Coordinate(Axis::SPACE.into_iter().position(|place| place == axis)?)
             }
-            RangeStep::Plain(Expr::Parameter(i)) => Self::Parameter(i),
-            RangeStep::Plain(Expr::Uniform(i)) => Self::Uniform(i),
-            RangeStep::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
-            RangeStep::Plain(Expr::Binary(Binary::Div, a, b)) => {
+            RangeRule::Plain(Expr::Parameter(i)) => Self::Parameter(i),
+            RangeRule::Plain(Expr::Uniform(i)) => Self::Uniform(i),
+            RangeRule::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
+            RangeRule::Plain(Expr::Binary(Binary::Div, a, b)) => {
                 let by_number = matches!(graph.expr(b), Expr::Constant(_) | Expr::Parameter(_));
                 by_number.then_some(Self::Divide(a, b))?
             }
-            RangeStep::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
+            RangeRule::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
         })
     }
 }
@@ -521,10 +512,10 @@ impl Ranges<'_, '_> {
 
     /// A number in both lanes.
     fn splat(&mut self, node: Node) -> Value {
-        match self.numbers.get(&node).copied() {
-            Some(Number::Constant(c)) => self.emitter.constant(c),
-            Some(Number::Parameter(splat)) => splat,
-            None => self.emitter.constant(f64::NAN), // offsets are numbers: see `ir::range`
+        // offsets are numbers: see `ir::bounds::range`
+        match self.numbers[&node] {
+            Number::Constant(c) => self.emitter.constant(c),
+            Number::Parameter(splat) => splat,
         }
     }
 

@@ -9,10 +9,14 @@ use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{Linkage, Module, default_libcall_names};
 
-use super::emit::{Emitter, Hosts};
-use super::math_calls::HostFunction;
-use super::{Code, CodegenError, Precision, Request, Shape, range, target};
+use super::emitter::{Emitter, Hosts};
+use super::host_functions::HostFunction;
+use super::machine::{CodegenError, target};
+use super::memory::Code;
+use super::range;
+use super::request::{Request, Shape, pointers};
 use crate::ir::{Axis, Expr, Node};
+use crate::precision::Precision;
 
 /// The code generator's own texts of a program.
 #[derive(Debug, Clone)]
@@ -139,7 +143,7 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node
         std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
     let [given_parameters, uniforms] = pointers(request, &parameters[4..]);
     let inputs = FxHashMap::default();
-    let given = Given { coordinates, inputs, parameters: given_parameters, uniforms };
+    let given = Arguments { coordinates, inputs, parameters: given_parameters, uniforms };
     let values = nodes(&mut emitter, request, needed, given);
     let bytes = emitter.lane_type().bytes() as i32;
     for (i, output) in request.outputs.iter().enumerate() {
@@ -186,7 +190,7 @@ fn batch(
     let coordinates = axes.map(&mut load);
     let inputs = request.inputs.iter().copied().zip(inputs.into_iter().map(load)).collect();
     let [parameters, uniforms] = pointers(request, &arguments[2..]);
-    let given = Given { coordinates, inputs, parameters, uniforms };
+    let given = Arguments { coordinates, inputs, parameters, uniforms };
     let values = nodes(&mut emitter, request, needed, given);
     for (output, base) in request.outputs.iter().zip(outputs) {
         let address = builder.ins().iadd(base, offset);
@@ -201,7 +205,7 @@ fn batch(
 }
 
 /// What a program is given.
-struct Given {
+struct Arguments {
     coordinates: [Value; 3],
     inputs: FxHashMap<Node, Value>,
     /// A pointer, as the next.
@@ -209,21 +213,14 @@ struct Given {
     uniforms: Option<Value>,
 }
 
-/// The pointers to parameters and uniforms, as far as a program has them, from its last arguments.
-pub(super) fn pointers(request: Request<'_>, last: &[Value]) -> [Option<Value>; 2] {
-    let parameters = if request.parameters { last.first() } else { None };
-    let uniforms = if request.uniforms { last.last() } else { None };
-    [parameters.copied(), uniforms.copied()]
-}
-
 /// The values of all needed nodes, in the graph's order, beside those that were given.
 fn nodes(
     emitter: &mut Emitter<'_, '_>,
     request: Request<'_>,
     needed: &[Node],
-    given: Given,
+    given: Arguments,
 ) -> FxHashMap<Node, Value> {
-    let Given { coordinates, inputs: mut values, parameters, uniforms } = given;
+    let Arguments { coordinates, inputs: mut values, parameters, uniforms } = given;
     for &node in needed {
         let expr = request.graph.expr(node);
         let value = match expr {

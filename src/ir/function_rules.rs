@@ -3,12 +3,12 @@
 //! For f(a): the derivative as nodes of a graph, the range over an interval, f′ and ½f″ over an interval, the error
 //! that f hands on from its operand, and its true value.
 
-use super::big::{Big, one};
-use super::function::{BinaryFunction, UnaryFunction};
-use super::graph::{Graph, Node};
-use super::op::{Binary, Unary};
-use super::upper::{add, div, magnitude, mul, smallest_magnitude};
+use super::bounds::upper::{add, div, magnitude, mul, smallest_magnitude};
 use crate::interval::Interval;
+use crate::ir::exact::big::{Big, one};
+use crate::ir::function::{BinaryFunction, UnaryFunction};
+use crate::ir::graph::{Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// What is multiplied by the derivative of f(a): the factor, the operand a, and the node f(a).
 #[derive(Debug, Clone, Copy)]

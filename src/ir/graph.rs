@@ -2,8 +2,8 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::op::{Binary, Unary};
 use crate::diagnostic::Span;
+use crate::ir::op::{Binary, Unary};
 
 /// An operation of one graph; only that graph makes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -3,49 +3,48 @@
 //! A [`Graph`] is a list of operations in which operands come before their uses, so every pass is one loop over
 //! it. R-functions are operations of their own (not spelt out in square roots): each consumer chooses its form.
 //!
+//! | file or folder | what it holds |
+//! |---|---|
+//! | `graph`, `op`, `function`, `r0`, `form` | the graph, its operations, and the forms in which R₀ is computed |
+//! | `interpreter` | the meaning of a graph |
+//! | `derived` | other graphs made of a graph: gradient, contact, sign twin, parts that depend on time alone |
+//! | `bounds` | ranges, magnitudes and rounding errors over boxes |
+//! | `on_path` | what is known of a leaf along a straight path |
+//! | `exact` | true values, to 120 digits |
+//! | `function_rules` | what all of these need to know of a function of the mathematical library |
+//!
 //! Invariant: nothing here knows the syntax or the code generator; equal expressions have equal [`Node`]s.
 
-mod adjoint;
-mod along;
-mod big;
-mod contact;
+mod bounds;
+mod derived;
 mod dump;
-mod error;
-mod eval;
 pub mod exact;
-mod float;
-mod forms;
+mod form;
 mod function;
 mod function_rules;
 mod graph;
-mod growth;
-mod local;
+mod interpreter;
+mod on_path;
 mod op;
 pub mod r0;
-mod range;
 mod real;
-mod sign;
-mod taylor;
-mod time;
-mod twin;
-mod upper;
 
-pub use adjoint::{gradient, gradient_and_rate};
-pub use along::along;
-pub use contact::{contact, wall_velocity};
+pub use bounds::error::{Arithmetic, Error, ErrorAnalysis, Inputs};
+pub use bounds::float::FloatType;
+pub use bounds::magnitude::Magnitudes;
+pub use bounds::range::{Affine, RangeEvaluator, RangeRule, Region};
+pub use derived::contact::{contact, wall_velocity};
+pub use derived::gradient::{gradient, gradient_and_rate};
+pub use derived::hoisted::{Hoisted, Uniforms, hoisted};
+pub use derived::localised::localised;
+pub use derived::sign::SignRule;
+pub use derived::twin::twin;
 pub use dump::dump;
-pub use error::{Arithmetic, Error, ErrorAnalysis, Inputs};
-pub use eval::{Given, Interpreter};
-pub use float::FloatType;
-pub use forms::{Form, Forms};
+pub use form::{Form, Forms};
 pub use function::{BinaryFunction, UnaryFunction};
 pub use graph::{Axis, Expr, Graph, Node};
-pub use growth::Growth;
-pub use local::localised;
+pub use interpreter::{Given, Interpreter};
+pub use on_path::enclosure::{Enclosure, EnclosureEvaluator};
+pub use on_path::polynomial::polynomial_on_path;
 pub use op::{Binary, R0, Unary};
-pub use range::{Affine, RangeEvaluator, Region, Step as RangeStep};
 pub use real::Real;
-pub use sign::SignRule;
-pub use taylor::{Enclosure, TaylorEvaluator};
-pub use time::{Hoisted, Uniforms, hoisted};
-pub use twin::twin;

@@ -4,9 +4,9 @@
 //! analysis (derivative, range, rounding error, truth) and an instruction. A function of the mathematical library needs
 //! less, see `function`.
 
-use super::function::{BinaryFunction, UnaryFunction};
-use super::r0;
-use super::real::Real;
+use crate::ir::function::{BinaryFunction, UnaryFunction};
+use crate::ir::r0;
+use crate::ir::real::Real;
 
 /// An operation on one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -15,7 +15,7 @@
 //!
 //! These functions are the specification of the code generator: same operations, same order, same bits.
 
-use super::real::Real;
+use crate::ir::real::Real;
 
 /// τ at the singular point u = v = 0.
 pub const SINGULAR_TAU: f64 = std::f64::consts::SQRT_2 - 1.0;

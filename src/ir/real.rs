@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::function::{BinaryFunction, UnaryFunction};
+use crate::ir::function::{BinaryFunction, UnaryFunction};
 
 /// `f64` or `f32`. The functions that are not correctly rounded everywhere come from one portable library, so
 /// that results do not depend on the system.

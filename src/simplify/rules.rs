@@ -1,15 +1,8 @@
 //! The rules: an equation read from left to right, the condition under which it holds, and the rewrite.
 
-use super::Simplifier;
+use super::simplifier::{Rule, Simplifier};
 use crate::diagnostic::Span;
 use crate::ir::{Binary, Expr, Node, Unary};
-
-pub(super) struct Rule {
-    /// As `rfm explain` prints it.
-    pub equation: &'static str,
-    /// The simplified node, if the left side and the condition fit.
-    pub apply: fn(&mut Simplifier, Expr, Option<Span>) -> Option<Node>,
-}
 
 pub(super) const ALL: &[Rule] = &[
     Rule { equation: "op(constants) = constant", apply: fold },

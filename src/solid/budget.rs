@@ -11,7 +11,7 @@ use crate::codegen::{Form, Forms, Precision};
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Growth, Inputs, Node};
+use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Magnitudes, Node};
 
 /// One way to compute ω.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -137,7 +137,7 @@ impl Candidate {
             let [double, _] = super::programs::forms(&graph, Form::Stable);
             double
         } else {
-            Growth::over(&graph, &over).forms(&graph, plan.form, plan.precision)
+            Magnitudes::over(&graph, &over).forms(&graph, plan.form, plan.precision)
         };
         let inputs = match (plan.precision, plan.local) {
             (Precision::F64, _) => Inputs::Exact,

@@ -16,8 +16,8 @@ use crate::field::Path;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
-    self, Enclosure, Expr, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region, TaylorEvaluator,
-    Uniforms,
+    self, Enclosure, EnclosureEvaluator, Expr, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator,
+    Region, Uniforms,
 };
 
 /// From so many leaves of one shape on, their ranges come from machine code: making it costs as much time as some
@@ -41,7 +41,7 @@ struct Shape {
     contact: OnceLock<Evaluator>,
     /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
     along: OnceLock<Option<Evaluator>>,
-    taylor: OnceLock<TaylorEvaluator>,
+    taylor: OnceLock<EnclosureEvaluator>,
 }
 
 /// What is peculiar to leaves that move.
@@ -335,7 +335,7 @@ impl Leaves {
     pub fn enclose(&self, leaf: u32, negated: bool, path: &Path, stretch: (f64, f64)) -> Enclosure {
         let (shape, constants, _) = self.of(leaf);
         let (graph, root) = shape.formula();
-        let taylor = shape.taylor.get_or_init(|| TaylorEvaluator::new(graph, root));
+        let taylor = shape.taylor.get_or_init(|| EnclosureEvaluator::new(graph, root));
         let (from, to) = (path.from.extend(self.from).to_array(), path.to.extend(self.to).to_array());
         let found = taylor.enclose(from, to, stretch, constants);
         if negated {
@@ -429,7 +429,7 @@ impl Shape {
         let make = || {
             let (graph, root) = self.formula();
             let mut graph = graph.clone();
-            let outputs = ir::along(&mut graph, root, self.parameters as u32)?;
+            let outputs = ir::polynomial_on_path(&mut graph, root, self.parameters as u32)?;
             let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
             Some(Evaluator::new(engine, &graph, &outputs, self.parameters + 5))
         };

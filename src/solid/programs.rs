@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use super::blocks::BlockProgram;
 use super::compiled::{BatchProgram, Lane, PointProgram};
 use crate::codegen::{CodegenError, Form, Forms, Precision};
-use crate::ir::{self, Axis, Binary, Expr, Graph, Growth, Hoisted, Interpreter, Node, Unary, Uniforms};
+use crate::ir::{self, Axis, Binary, Expr, Graph, Hoisted, Interpreter, Magnitudes, Node, Unary, Uniforms};
 
 /// What evaluates a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -66,7 +66,7 @@ pub fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
     if form != Form::Stable {
         return [Forms::all(form), Forms::all(form)];
     }
-    let growth = Growth::within_reach(graph);
+    let growth = Magnitudes::within_reach(graph);
     [Precision::F64, Precision::F32].map(|precision| growth.forms(graph, form, precision))
 }
 

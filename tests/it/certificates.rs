@@ -5,8 +5,8 @@ use proptest::test_runner::RngSeed;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::{
-    Arithmetic, Axis, Binary, ErrorAnalysis, Form, Forms, Graph, Growth, Inputs, Interpreter, Node, Unary,
-    UnaryFunction, exact, localised,
+    Arithmetic, Axis, Binary, ErrorAnalysis, Form, Forms, Graph, Inputs, Interpreter, Magnitudes, Node,
+    Unary, UnaryFunction, exact, localised,
 };
 use rfm::{Engine, Precision, Program, Solid};
 
@@ -124,7 +124,7 @@ proptest! {
         let (program, start) =
             if inputs == Inputs::Shifted { localised(&graph, root, origin) } else { (graph.clone(), root) };
         let local = Aabb::new(over.min - origin, over.max - origin).grown(1e-12 * scale);
-        let forms = Growth::over(&program, &local).forms(&program, form, precision);
+        let forms = Magnitudes::over(&program, &local).forms(&program, form, precision);
         let analysis = ErrorAnalysis::new(&program, start, Arithmetic { precision, forms: &forms, inputs });
         let (whole, divided) = (analysis.bound(&local), analysis.certify(&local, 0.0));
         // up to the rounding of the bounds themselves, each of which sums outwards on its own (1.3e-8 was seen)

@@ -1,4 +1,4 @@
-//! One operation of the graph → Cranelift instructions on a 128-bit vector of lanes.
+//! Cranelift instructions on a 128-bit vector of lanes, one function at a time.
 //!
 //! Traps that shape this file: `fmin`/`fmax` cost seven instructions, a comparison with `bitselect` is recognised
 //! as the single `min`/`max` instruction; a scalar float `select` becomes a jump, so single points use vectors too;
@@ -10,12 +10,11 @@ use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, types};
 use cranelift_frontend::FunctionBuilder;
 
-use super::math_calls::HostFunction;
-use super::r0::{Junction, Parts};
-use super::{Forms, Precision};
-use crate::ir::{Binary, Expr, Graph, Node, Unary};
+use super::host_functions::HostFunction;
+use crate::ir::{Binary, Expr, Forms, Graph, Node};
+use crate::precision::Precision;
 
-/// Emits operations into one function.
+/// Emits instructions into one function.
 pub(super) struct Emitter<'a, 'f> {
     pub builder: &'a mut FunctionBuilder<'f>,
     pub precision: Precision,
@@ -23,9 +22,9 @@ pub(super) struct Emitter<'a, 'f> {
     /// The functions that the program calls.
     hosts: &'a Hosts,
     /// Intermediate results of R₀ for a pair of operands: value and weights share them.
-    pub(super) parts: HashMap<(Node, Node, Junction), Parts>,
+    pub parts: HashMap<(Node, Node, Junction), R0Parts>,
     /// Pairs whose weights will be asked for: their value uses the same quotient.
-    pub(super) weighted: HashSet<(Node, Node, Junction)>,
+    pub weighted: HashSet<(Node, Node, Junction)>,
 }
 
 /// The functions of the mathematical library that were declared in a program.
@@ -33,6 +32,35 @@ pub(super) type Hosts = HashMap<HostFunction, FuncRef>;
 
 /// A node, and the value that holds it.
 pub(super) type Operand = (Node, Value);
+
+/// ∧ or ∨
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Junction {
+    And,
+    Or,
+}
+
+/// What value and weights of u ∧ v or u ∨ v share.
+#[derive(Clone, Copy)]
+pub(super) struct R0Parts {
+    /// The operand that the result is near to on the small branch: the minimum for ∧, the maximum for ∨.
+    pub near: Value,
+    /// The other one.
+    pub far: Value,
+    /// u + v
+    pub sum: Value,
+    /// √(u² + v²), not less than max(|u|, |v|)
+    pub h: Value,
+    /// Mask of the small branch.
+    pub small: Value,
+    /// max(|u|, |v|) + h
+    pub denominator: Value,
+    /// Masks u < v and v < u: at a tie neither, and both operands get the same weight.
+    pub less: Value,
+    pub greater: Value,
+    /// |τ| with the sign of m/M on the branch taken; only where weights are asked for.
+    pub tau: Option<Value>,
+}
 
 impl<'a, 'f> Emitter<'a, 'f> {
     pub fn new(
@@ -82,58 +110,19 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.builder.ins().splat(vector, scalar)
     }
 
-    pub fn unary(&mut self, op: Unary, a: Value) -> Value {
-        match op {
-            Unary::Neg => self.negate(a),
-            Unary::Abs => self.abs(a),
-            Unary::Sqrt => self.builder.ins().sqrt(a),
-            Unary::Sign => self.sign(a),
-            Unary::Call(function) => self.call(HostFunction::Unary(function), &[a]),
-        }
-    }
-
-    pub fn binary(&mut self, op: Binary, (u, a): Operand, (v, b): Operand) -> Value {
-        match op {
-            Binary::Add => self.builder.ins().fadd(a, b),
-            Binary::Sub => self.builder.ins().fsub(a, b),
-            Binary::Mul => self.builder.ins().fmul(a, b),
-            Binary::Div => self.builder.ins().fdiv(a, b),
-            Binary::DivOrZero => {
-                let zero = self.constant(0.0);
-                let is_zero = self.compare(FloatCC::Equal, b, zero);
-                let quotient = self.builder.ins().fdiv(a, b);
-                self.select(is_zero, zero, quotient)
-            }
-            Binary::Min => self.ordered(FloatCC::LessThan, a, b),
-            Binary::Max => self.ordered(FloatCC::GreaterThan, a, b),
-            Binary::PlainMin => {
-                let less = self.compare(FloatCC::LessThan, a, b);
-                self.select(less, a, b)
-            }
-            Binary::PlainMax => self.max(a, b),
-            Binary::MinWeight => self.tie_weight(FloatCC::LessThan, a, b),
-            Binary::MaxWeight => self.tie_weight(FloatCC::GreaterThan, a, b),
-            Binary::And => self.r0_value((u, a), (v, b), Junction::And),
-            Binary::Or => self.r0_value((u, a), (v, b), Junction::Or),
-            Binary::AndWeight => self.r0_weight((u, a), (v, b), Junction::And),
-            Binary::OrWeight => self.r0_weight((u, a), (v, b), Junction::Or),
-            Binary::Call(function) => self.call(HostFunction::Binary(function), &[a, b]),
-        }
-    }
-
     /// A mask of all ones in the lanes where the comparison holds, as a vector of floats.
-    pub(super) fn compare(&mut self, condition: FloatCC, a: Value, b: Value) -> Value {
+    pub fn compare(&mut self, condition: FloatCC, a: Value, b: Value) -> Value {
         let mask = self.builder.ins().fcmp(condition, a, b);
         let vector = self.vector_type();
         self.builder.ins().bitcast(vector, MemFlagsData::new().with_endianness(ENDIANNESS), mask)
     }
 
-    pub(super) fn select(&mut self, mask: Value, yes: Value, no: Value) -> Value {
+    pub fn select(&mut self, mask: Value, yes: Value, no: Value) -> Value {
         self.builder.ins().bitselect(mask, yes, no)
     }
 
     /// b < a ? a : b, one instruction; the pattern is not recognised with the comparison turned round.
-    pub(super) fn max(&mut self, a: Value, b: Value) -> Value {
+    pub fn max(&mut self, a: Value, b: Value) -> Value {
         let less = self.compare(FloatCC::LessThan, b, a);
         self.select(less, a, b)
     }
@@ -144,45 +133,21 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.constant(-0.0)
     }
 
-    pub(super) fn negate(&mut self, a: Value) -> Value {
+    pub fn negate(&mut self, a: Value) -> Value {
         let sign = self.sign_bits();
         self.builder.ins().bxor(a, sign)
     }
 
-    pub(super) fn abs(&mut self, a: Value) -> Value {
+    pub fn abs(&mut self, a: Value) -> Value {
         let sign = self.sign_bits();
         self.builder.ins().band_not(a, sign)
-    }
-
-    /// As `ir` defines min and max: never a number for a NaN.
-    fn ordered(&mut self, condition: FloatCC, a: Value, b: Value) -> Value {
-        let first = self.compare(condition, a, b);
-        let is_number = self.compare(FloatCC::Equal, a, a);
-        let other = self.select(is_number, b, a);
-        self.select(first, a, other)
-    }
-
-    fn tie_weight(&mut self, condition: FloatCC, a: Value, b: Value) -> Value {
-        let (zero, half, one) = (self.constant(0.0), self.constant(0.5), self.constant(1.0));
-        let tie = self.compare(FloatCC::Equal, a, b);
-        let other = self.select(tie, half, zero);
-        let first = self.compare(condition, a, b);
-        self.select(first, one, other)
-    }
-
-    fn sign(&mut self, a: Value) -> Value {
-        let (zero, one, minus_one) = (self.constant(0.0), self.constant(1.0), self.constant(-1.0));
-        let negative = self.compare(FloatCC::LessThan, a, zero);
-        let other = self.select(negative, minus_one, a);
-        let positive = self.compare(FloatCC::GreaterThan, a, zero);
-        self.select(positive, one, other)
     }
 
     /// A host function, lane by lane.
     ///
     /// # Panics
     /// If it was not declared: a bug of the caller.
-    fn call(&mut self, function: HostFunction, operands: &[Value]) -> Value {
+    pub fn call(&mut self, function: HostFunction, operands: &[Value]) -> Value {
         let function = self.hosts[&function];
         let vector = self.vector_type();
         let first = self.call_in_lane(function, operands, 0);

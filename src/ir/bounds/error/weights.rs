@@ -1,7 +1,7 @@
 //! How R₀ hands errors of its operands on: the largest weights over two ranges.
 
-use super::super::upper::{add, mul, root};
 use crate::interval::Interval;
+use crate::ir::bounds::upper::{add, mul, root};
 
 /// The largest w_u·e + w_v·f over two ranges of the operands of ∧.
 ///

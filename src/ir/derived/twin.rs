@@ -4,12 +4,12 @@
 //! zero set of ω; in floating point too, because min and max do not round. It needs no roots, and its gradient is
 //! that of one leaf. Its value away from the surface is another one.
 
-use super::graph::{Expr, Graph, Node};
-use super::op::Binary;
-use super::range::{RangeEvaluator, Region};
-use super::sign::SignRule;
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::ir::bounds::range::{RangeEvaluator, Region};
+use crate::ir::derived::sign::SignRule;
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::Binary;
 use glam::DVec3;
 
 /// Within these distances of the origin a leaf must be shown to be a number for the plain minimum to be used;

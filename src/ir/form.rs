@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::graph::{Graph, Node};
-use super::op::{Binary, R0};
-use super::r0;
-use super::real::Real;
+use crate::ir::graph::{Graph, Node};
+use crate::ir::op::{Binary, R0};
+use crate::ir::r0;
+use crate::ir::real::Real;
 
 /// How R₀ is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

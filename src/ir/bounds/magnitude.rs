@@ -6,13 +6,13 @@
 
 use glam::DVec3;
 
-use super::float::FloatType;
-use super::forms::{Form, Forms};
-use super::graph::{Expr, Graph, Node};
-use super::op::{Binary, Unary};
-use super::range::{RangeEvaluator, Region};
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::ir::bounds::float::FloatType;
+use crate::ir::bounds::range::{RangeEvaluator, Region};
+use crate::ir::form::{Form, Forms};
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 use crate::precision::Precision;
 
 /// Where forms are chosen for a solid of which nothing else is known: within this distance of the origin, and within
@@ -24,11 +24,11 @@ const TRUSTED: f64 = 1e290;
 
 /// Upper bounds of log₂ of the magnitudes of a graph's nodes in a box; ∞ where nothing is known.
 #[derive(Debug, Clone)]
-pub struct Growth {
+pub struct Magnitudes {
     exponents: Vec<f64>,
 }
 
-impl Growth {
+impl Magnitudes {
     pub fn within_reach(graph: &Graph) -> Self {
         Self::over(graph, &Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH)))
     }
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn only_the_members_that_need_it_are_scaled() {
         let (graph, nodes) = left_fold(1000);
-        let growth = Growth::over(&graph, &unit_box());
+        let growth = Magnitudes::over(&graph, &unit_box());
         let x = nodes[0];
         for (float, first) in [(Precision::F64, 512.0), (Precision::F32, 64.0)] {
             let forms = growth.forms(&graph, Form::Stable, float);
@@ -157,7 +157,7 @@ mod tests {
         let first = growth.overflow(&graph, Precision::F32).unwrap();
         assert!((first.index() as f64 - 128.0).abs() < 4.0, "{first:?}");
         let (graph, _) = left_fold(1100);
-        let first = Growth::over(&graph, &unit_box()).overflow(&graph, Precision::F64).unwrap();
+        let first = Magnitudes::over(&graph, &unit_box()).overflow(&graph, Precision::F64).unwrap();
         assert!((first.index() as f64 - 1024.0).abs() < 4.0, "{first:?}");
     }
 
@@ -170,9 +170,9 @@ mod tests {
         graph.binary(Binary::Or, x, y);
         let plain = Forms::all(Form::Stable);
         for float in [Precision::F64, Precision::F32] {
-            assert_eq!(Growth::within_reach(&graph).forms(&graph, Form::Stable, float), plain);
+            assert_eq!(Magnitudes::within_reach(&graph).forms(&graph, Form::Stable, float), plain);
         }
-        let tiny = Growth::over(&graph, &Aabb::new(DVec3::splat(-1e-24), DVec3::splat(1e-24)));
+        let tiny = Magnitudes::over(&graph, &Aabb::new(DVec3::splat(-1e-24), DVec3::splat(1e-24)));
         assert_eq!(tiny.forms(&graph, Form::Stable, Precision::F64), plain);
         assert_eq!(tiny.forms(&graph, Form::Stable, Precision::F32).of(x, y), Form::Scaled);
     }

@@ -8,10 +8,10 @@
 
 use std::cell::RefCell;
 
-use super::graph::{Axis, Expr, Graph, Node};
-use super::op::{Binary, Unary};
-use super::range::{self, Step};
 use crate::interval::Interval;
+use crate::ir::bounds::range::{self, RangeRule};
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// What is known of a leaf along a stretch of a path.
 #[derive(Debug, Clone, Copy)]
@@ -24,8 +24,8 @@ pub struct Enclosure {
 
 /// A graph prepared for enclosures along paths.
 #[derive(Debug, Clone)]
-pub struct TaylorEvaluator {
-    steps: Vec<(Expr, Step)>,
+pub struct EnclosureEvaluator {
+    steps: Vec<(Expr, RangeRule)>,
     root: Node,
 }
 
@@ -42,9 +42,9 @@ thread_local! {
     static SCRATCH: RefCell<Vec<Jet>> = const { RefCell::new(Vec::new()) };
 }
 
-impl TaylorEvaluator {
+impl EnclosureEvaluator {
     pub fn new(graph: &Graph, root: Node) -> Self {
-        Self { steps: graph.nodes().map(|(_, expr)| (expr, Step::of(graph, expr))).collect(), root }
+        Self { steps: graph.nodes().map(|(_, expr)| (expr, RangeRule::of(graph, expr))).collect(), root }
     }
 
     /// The enclosure over the part [t₀, t₁] of the path between two points (x, y, z and time), for a graph with
@@ -67,7 +67,7 @@ impl TaylorEvaluator {
             jets.clear();
             for &(expr, step) in &self.steps {
                 let mut jet = jet(expr, jets, axes, parameters);
-                if let Step::Square(_) | Step::Slab { .. } = step {
+                if let RangeRule::Square(_) | RangeRule::Slab { .. } = step {
                     jet.over[0] = step.over(|node| jets[node.index()].over[0]).unwrap_or(jet.over[0]);
                 }
                 jets.push(jet.tightened(stretch));
@@ -257,14 +257,15 @@ mod tests {
         };
         for (name, root) in roots {
             let (small, root) = graph.extract_cone(root);
-            let (taylor, interpreter) =
-                (TaylorEvaluator::new(&small, root), Interpreter::new(&small, &[root]));
+            let (enclosures, interpreter) =
+                (EnclosureEvaluator::new(&small, root), Interpreter::new(&small, &[root]));
             for _ in 0..2_000 {
                 let from: [f64; 4] = std::array::from_fn(|_| random());
                 let to: [f64; 4] = std::array::from_fn(|_| random());
                 let t0 = random();
                 let t1 = t0 + (1.0 - t0) * random().powi(4);
-                let Enclosure { coefficients: [c0, c1, c2], range } = taylor.enclose(from, to, (t0, t1), &[]);
+                let Enclosure { coefficients: [c0, c1, c2], range } =
+                    enclosures.enclose(from, to, (t0, t1), &[]);
                 for k in 0..=4 {
                     let s = (t1 - t0) * f64::from(k) / 4.0;
                     let [x, y, z, time] = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * (t0 + s));
@@ -293,9 +294,9 @@ mod tests {
         let (x2, y2) = (g.binary(Binary::Mul, x, x), g.binary(Binary::Mul, y, y));
         let sum = g.binary(Binary::Add, x2, y2);
         let root = g.unary(Unary::Sqrt, sum);
-        let taylor = TaylorEvaluator::new(&g, root);
+        let enclosures = EnclosureEvaluator::new(&g, root);
         let width = |w: f64| {
-            let found = taylor.enclose([-1.0, 0.5, 0.0, 0.0], [1.0, 0.5, 0.0, 0.0], (0.4, 0.4 + w), &[]);
+            let found = enclosures.enclose([-1.0, 0.5, 0.0, 0.0], [1.0, 0.5, 0.0, 0.0], (0.4, 0.4 + w), &[]);
             found.coefficients[2].width() * w * w
         };
         let ratio = width(1e-2) / width(1e-3);

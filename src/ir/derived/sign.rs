@@ -1,7 +1,7 @@
 //! How the sign of ω follows from the signs of its leaves.
 
-use super::graph::{Expr, Graph, Node};
-use super::op::{Binary, Unary};
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// How the sign of a node follows from its operands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,67 +1,14 @@
-//! Certified rounding errors: a bound of |computed ω − exact ω| for every point of a box.
-//!
-//! Forward analysis, one operation after the other. Each node has a range of its exact values (`ir::range`) and an
-//! [`Error`]: an absolute bound, and beside it a relative one with a tiny remainder for underflow,
-//! |computed − exact| ≤ ρ·|exact| + α, which alone survives products, sums of squares and their roots near zero. An
-//! operation hands on the errors of its operands through its derivatives over the box and adds its own rounding:
-//!
-//! - R₀ hands them on through its weights, 1 ∓ u/√(u² + v²), which lie in [0, 2] and depend on the direction of
-//!   (u, v) only, so the worst over two ranges is known from the directions of their corners; and because R₀ is homogeneous of degree 1 with
-//!   Σ wᵢ|uᵢ| ≤ √2·|ω|, relative errors grow by √2 at most.
-//! - R₀'s own rounding, with u the unit roundoff: stable form 4u·|ω|, scaled form 7u·|ω| (from the error bounds of
-//!   the factors of m·(1 − τ), of s + H and of M·(1 + k + q), Higham 2002, chapter 3), textbook form
-//!   u·|s| + 2u·h + u·|ω|; where squares underflow, √(2η) more.
-//! - Functions of the mathematical library err by at most one unit in the last place (the tests of the `libm`
-//!   crate hold them to that); two are charged.
-//!
-//! What is not known — a root that may meet a negative number, a divisor that may vanish, an overflow — is ∞.
-//! All bounds are computed with every operation rounded upwards. Ranges of a whole box add up worst cases of
-//! different places, so a box is divided where its bound is largest, until no point would do much better.
-
-mod step;
-mod weights;
+//! Bounds of the error of a whole graph over a box, which is divided until they are tight.
 
 use std::collections::BinaryHeap;
 
-use super::forms::Forms;
-use super::graph::{Expr, Graph, Node};
-use super::op::Binary;
-use super::range::{RangeEvaluator, Region};
+use super::arithmetic::{Arithmetic, Error};
+use super::rules::{ErrorRules, Operand};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::precision::Precision;
-use step::{Operand, Step};
-
-/// How the coordinates of a point reach the program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Inputs {
-    /// They are numbers of the program's type.
-    Exact,
-    /// They are rounded to it once.
-    Rounded,
-    /// An origin is subtracted in `f64` before; the constants of the graph were folded with it, see
-    /// [`localised`](super::localised).
-    Shifted,
-}
-
-/// One way to compute a node.
-#[derive(Debug, Clone, Copy)]
-pub struct Arithmetic<'a> {
-    pub precision: Precision,
-    pub forms: &'a Forms,
-    pub inputs: Inputs,
-}
-
-/// |computed − exact| ≤ `absolute`, and ≤ `relative`·|exact| + `remainder`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Error {
-    pub absolute: f64,
-    pub relative: f64,
-    pub remainder: f64,
-}
-
-/// Relative error of a constant that was folded with an origin, see [`localised`](super::localised).
-pub const FOLDING: f64 = 1.0 / (1u64 << 50) as f64;
+use crate::ir::bounds::range::{RangeEvaluator, Region};
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::Binary;
 
 /// Boxes that are looked at for one certificate, and operations in them.
 const MOST_BOXES: usize = 4000;
@@ -95,7 +42,7 @@ impl<'a> ErrorAnalysis<'a> {
     ///
     /// With [`Inputs::Shifted`] the box is one of shifted coordinates.
     pub fn certify(&self, over: &Aabb, enough: f64) -> f64 {
-        let whole = Part { bound: self.bound(over), over: *over };
+        let whole = Piece { bound: self.bound(over), over: *over };
         let mut parts = BinaryHeap::from([whole]);
         let most = MOST_BOXES.min(MOST_OPERATIONS / self.graph.len().max(1)).max(16);
         // no division of the box gives less than this
@@ -109,7 +56,7 @@ impl<'a> ErrorAnalysis<'a> {
                 break;
             }
             let Some(worst) = parts.pop() else { break };
-            parts.extend(worst.over.halves().map(|over| Part { bound: self.bound(&over), over }));
+            parts.extend(worst.over.halves().map(|over| Piece { bound: self.bound(&over), over }));
         }
         parts.peek().map_or(f64::INFINITY, |worst| worst.bound)
     }
@@ -127,8 +74,8 @@ impl<'a> ErrorAnalysis<'a> {
             // the ends of R₀'s ranges are R₀ of the operands' ends, rounded
             let rounded = matches!(expr, Expr::Binary(Binary::And | Binary::Or, ..));
             let range = if rounded { range.widened(4) } else { range };
-            let step = Step { arithmetic: self.arithmetic, known: &known, range };
-            let (error, not_negative) = step.of(expr);
+            let rules = ErrorRules { arithmetic: self.arithmetic, known: &known, range };
+            let (error, not_negative) = rules.of(expr);
             known.push(Operand { error, range, not_negative });
         }
         known.into_iter().map(|operand| operand.error).collect()
@@ -136,35 +83,37 @@ impl<'a> ErrorAnalysis<'a> {
 }
 
 /// A part of the box, the one with the largest bound first.
-struct Part {
+struct Piece {
     bound: f64,
     over: Aabb,
 }
 
-impl Ord for Part {
+impl Ord for Piece {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         self.bound.total_cmp(&other.bound)
     }
 }
 
-impl PartialOrd for Part {
+impl PartialOrd for Piece {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Part {
+impl PartialEq for Piece {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Part {}
+impl Eq for Piece {}
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ir::{Axis, Form, Unary};
+    use crate::ir::bounds::error::arithmetic::Inputs;
+    use crate::ir::{Axis, Form, Forms, Unary};
+    use crate::precision::Precision;
     use glam::DVec3;
 
     const UNIT: f64 = 0.5 * f64::EPSILON;

@@ -1,13 +1,13 @@
 //! One operation: the errors of its operands and its own rounding.
 
-use super::super::float::FloatType;
-use super::super::forms::Form;
-use super::super::graph::{Expr, Node};
-use super::super::op::{Binary, Unary};
-use super::super::upper::{add, compound, div, magnitude, mul, root, smallest_magnitude};
+use super::arithmetic::{Arithmetic, Error, FOLDING, Inputs};
 use super::weights::through_weights;
-use super::{Arithmetic, Error, FOLDING, Inputs};
 use crate::interval::Interval;
+use crate::ir::bounds::float::FloatType;
+use crate::ir::bounds::upper::{add, compound, div, magnitude, mul, root, smallest_magnitude};
+use crate::ir::form::Form;
+use crate::ir::graph::{Expr, Node};
+use crate::ir::op::{Binary, Unary};
 use crate::precision::Precision;
 
 /// Relative error of a host function, in units of the roundoff.
@@ -62,14 +62,14 @@ impl Error {
 }
 
 /// An operation among those that came before it.
-pub struct Step<'a> {
+pub struct ErrorRules<'a> {
     pub arithmetic: Arithmetic<'a>,
     pub known: &'a [Operand],
     /// Of the result.
     pub range: Interval,
 }
 
-impl Step<'_> {
+impl ErrorRules<'_> {
     /// The error of an operation, and whether it is never negative.
     pub fn of(&self, expr: Expr) -> (Error, bool) {
         let operand = |node: Node| self.known[node.index()];
@@ -139,7 +139,7 @@ impl Step<'_> {
         Error { absolute: add(absolute, tiny), relative, remainder: add(remainder, tiny) }
     }
 
-    /// As [`Step::rounded`] for sums and roots, which are exact where they are tiny.
+    /// As [`ErrorRules::rounded`] for sums and roots, which are exact where they are tiny.
     fn rounded_sum(&self, error: Error) -> Error {
         let unit = self.unit();
         let computed = add(magnitude(self.range), mul(2.0, error.absolute));

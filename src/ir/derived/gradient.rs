@@ -7,9 +7,9 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::function_rules::{Chain, ChainOfTwo};
-use super::graph::{Expr, Graph, Node};
-use super::op::{Binary, Unary};
+use crate::ir::function_rules::{Chain, ChainOfTwo};
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// (∂root/∂x, ∂root/∂y, ∂root/∂z). The work grows with what the root uses, not with the graph.
 pub fn gradient(graph: &mut Graph, root: Node) -> [Node; 3] {

@@ -8,8 +8,8 @@
 
 use std::collections::HashMap;
 
-use super::graph::{Axis, Expr, Graph, Node};
-use super::op::{Binary, Unary};
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// A coefficient that is known not to vanish everywhere, and the bound of its error; both are nodes.
 #[derive(Debug, Clone, Copy)]
@@ -29,7 +29,7 @@ type Polynomial = [Option<Term>; 3];
 /// are the parameters `direction`, `direction` + 1 and `direction` + 2, while time goes on by the parameter
 /// `direction` + 3 from the parameter `direction` + 4; nothing unless the root is made of sums,
 /// products and quotients by constants, and of degree two at most.
-pub fn along(graph: &mut Graph, root: Node, direction: u32) -> Option<[Node; 6]> {
+pub fn polynomial_on_path(graph: &mut Graph, root: Node, direction: u32) -> Option<[Node; 6]> {
     let mut builder = Builder { graph, direction };
     let mut known: HashMap<Node, Polynomial> = HashMap::new();
     for node in builder.graph.cone(root) {
@@ -207,7 +207,7 @@ mod tests {
             t in 0..=64u32,
         ) {
             let (mut graph, root) = sample();
-            let outputs = along(&mut graph, root, 0).unwrap();
+            let outputs = polynomial_on_path(&mut graph, root, 0).unwrap();
             // t, the point and its coordinates are exact when the path is made of multiples of 2⁻²⁰
             let round = |v: f64| (v * f64::from(1 << 20)).round() / f64::from(1 << 20);
             let (from, step) = (from.map(round), step.map(round));
@@ -234,9 +234,9 @@ mod tests {
         let cube = g.binary(Binary::Mul, square, x);
         let root = g.unary(Unary::Sqrt, square);
         let inverse = g.binary(Binary::Div, square, x);
-        assert!(along(&mut g, square, 0).is_some());
+        assert!(polynomial_on_path(&mut g, square, 0).is_some());
         for other in [cube, root, inverse] {
-            assert!(along(&mut g, other, 0).is_none());
+            assert!(polynomial_on_path(&mut g, other, 0).is_none());
         }
     }
 }

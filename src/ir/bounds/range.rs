@@ -12,15 +12,15 @@
 
 use std::cell::RefCell;
 
-use super::graph::{Axis, Expr, Graph, Node};
-use super::op::{Binary, Unary};
-use super::r0;
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
+use crate::ir::r0;
 
 /// How the range of one node is found; `codegen::range` does the same in machine code.
 #[derive(Debug, Clone, Copy)]
-pub enum Step {
+pub enum RangeRule {
     Plain(Expr),
     Square(Node),
     /// (p·e + q)·(r·e + s) of one node e.
@@ -40,14 +40,23 @@ pub struct Affine {
     pub minus: bool,
 }
 
-impl Step {
+impl RangeRule {
     /// The way for a node of a graph.
     pub fn of(graph: &Graph, expr: Expr) -> Self {
-        step(graph, expr)
+        if let Expr::Binary(Binary::Mul, a, b) = expr {
+            if a == b {
+                return Self::Square(a);
+            }
+            let ((of, first), (other, second)) = (affine(graph, a), affine(graph, b));
+            if of == other && !is_number(graph, of) {
+                return Self::Slab { of, first, second };
+            }
+        }
+        Self::Plain(expr)
     }
 
-    /// The range of a square or a slab from that of the node it is made of; nothing for other steps.
-    pub(super) fn over(&self, range: impl Fn(Node) -> Interval) -> Option<Interval> {
+    /// The range of a square or a slab from that of the node it is made of; nothing for other rules.
+    pub(in crate::ir) fn over(&self, range: impl Fn(Node) -> Interval) -> Option<Interval> {
         match *self {
             Self::Square(a) => Some(range(a).square()),
             Self::Slab { of, first, second } => {
@@ -80,7 +89,7 @@ impl<'a> Region<'a> {
 /// A graph prepared for the evaluation of ranges.
 #[derive(Debug, Clone)]
 pub struct RangeEvaluator {
-    steps: Vec<Step>,
+    rules: Vec<RangeRule>,
     root: Node,
 }
 
@@ -90,8 +99,8 @@ thread_local! {
 
 impl RangeEvaluator {
     pub fn new(graph: &Graph, root: Node) -> Self {
-        let steps = graph.nodes().map(|(_, expr)| step(graph, expr)).collect();
-        Self { steps, root }
+        let rules = graph.nodes().map(|(_, expr)| RangeRule::of(graph, expr)).collect();
+        Self { rules, root }
     }
 
     /// The range of ω over a box at any time; bounds of the box may be infinite.
@@ -121,38 +130,25 @@ impl RangeEvaluator {
 
     fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>) {
         values.clear();
-        for &step in &self.steps {
+        for &rule in &self.rules {
             // a coordinate is always a number, even if nothing else is known of it
             let unknown = |node: Node| {
-                let is_coordinate = matches!(self.steps[node.index()], Step::Plain(Expr::Coordinate(_)));
+                let is_coordinate = matches!(self.rules[node.index()], RangeRule::Plain(Expr::Coordinate(_)));
                 values[node.index()] == Interval::ALL && !is_coordinate
             };
-            let value = match step {
-                Step::Square(a) | Step::Slab { of: a, .. } if unknown(a) => Interval::ALL,
-                Step::Square(a) => values[a.index()].square(),
-                Step::Slab { of, first, second } => {
+            let value = match rule {
+                RangeRule::Square(a) | RangeRule::Slab { of: a, .. } if unknown(a) => Interval::ALL,
+                RangeRule::Square(a) => values[a.index()].square(),
+                RangeRule::Slab { of, first, second } => {
                     let number = |affine: Affine| offset(affine, |node| values[node.index()]);
                     slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
                 }
-                Step::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
-                Step::Plain(expr) => plain(expr, values, region),
+                RangeRule::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
+                RangeRule::Plain(expr) => plain(expr, values, region),
             };
             values.push(value);
         }
     }
-}
-
-fn step(graph: &Graph, expr: Expr) -> Step {
-    if let Expr::Binary(Binary::Mul, a, b) = expr {
-        if a == b {
-            return Step::Square(a);
-        }
-        let ((of, first), (other, second)) = (affine(graph, a), affine(graph, b));
-        if of == other && !is_number(graph, of) {
-            return Step::Slab { of, first, second };
-        }
-    }
-    Step::Plain(expr)
 }
 
 /// Whether a node has one value: a constant or a parameter.
@@ -224,7 +220,7 @@ fn plain(expr: Expr, values: &[Interval], region: &Region<'_>) -> Interval {
     }
 }
 
-pub(super) fn unary(op: Unary, a: Interval) -> Interval {
+pub(in crate::ir) fn unary(op: Unary, a: Interval) -> Interval {
     match op {
         Unary::Neg => -a,
         Unary::Abs => a.abs(),
@@ -234,7 +230,7 @@ pub(super) fn unary(op: Unary, a: Interval) -> Interval {
     }
 }
 
-pub(super) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
+pub(in crate::ir) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
     match op {
         Binary::Add => a + b,
         Binary::Sub => a - b,

@@ -4,11 +4,11 @@
 //! such nodes are taken out of a graph, and what is left reads them as [`Expr::Uniform`]s. A program of the rest costs
 //! what that of a solid at rest costs, and needs no compilation for another instant.
 
-use super::eval::{Given, Interpreter};
-use super::graph::{Axis, Expr, Graph, Node};
-use super::range::{RangeEvaluator, Region};
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::ir::bounds::range::{RangeEvaluator, Region};
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::interpreter::{Given, Interpreter};
 
 /// The numbers of a graph that depend on time alone.
 #[derive(Debug, Clone)]

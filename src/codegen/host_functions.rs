@@ -3,8 +3,8 @@
 use cranelift_codegen::ir::{AbiParam, Signature, types};
 use cranelift_codegen::isa::CallConv;
 
-use super::Precision;
 use crate::ir::{Binary, BinaryFunction, Expr, Unary, UnaryFunction};
+use crate::precision::Precision;
 
 /// A function of the mathematical library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,12 +1,12 @@
-//! The graph in 120-digit arithmetic: independent truth for the errors of every program.
+//! The true values of a graph.
 //!
 //! R₀ is computed as the textbook prints it, u + v ∓ √(u² + v²): with 400 bits its cancellation costs nothing, and
 //! it shares no formula with the programs that it judges. A point where an operation has no value, or where a
 //! derivative has no limit, has no truth.
 
 use super::big::{Big, PRECISION, big, one};
-use super::graph::{Axis, Expr, Graph, Node};
-use super::op::{Binary, Unary};
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// A real number to 120 digits.
 #[derive(Debug, Clone)]

@@ -7,9 +7,9 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::error::FOLDING;
-use super::graph::{Axis, Expr, Graph, Node};
-use super::op::{Binary, Unary};
+use crate::ir::bounds::error::FOLDING;
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// ± a coordinate + an offset, not yet written into the graph.
 #[derive(Clone, Copy)]

@@ -16,10 +16,10 @@
 
 use rustc_hash::FxHashMap;
 
-use super::adjoint::{gradient, gradient_and_rate};
-use super::graph::{Expr, Graph, Node};
-use super::op::{Binary, Unary};
-use super::sign::SignRule;
+use crate::ir::derived::gradient::{gradient, gradient_and_rate};
+use crate::ir::derived::sign::SignRule;
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
 
 /// What is known of the surface nearest to a point, as nodes.
 #[derive(Debug, Clone, Copy)]

@@ -2,9 +2,9 @@
 
 use std::cell::RefCell;
 
-use super::forms::{Form, Forms};
-use super::graph::{Axis, Expr, Graph, Node};
-use super::real::Real;
+use crate::ir::form::{Form, Forms};
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::real::Real;
 
 /// A graph with its outputs, evaluated operation by operation in `f64` or `f32`.
 #[derive(Debug, Clone)]

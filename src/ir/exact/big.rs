@@ -2,19 +2,19 @@
 
 use dashu_float::{FBig, round::mode::HalfEven};
 
-pub(super) type Big = FBig<HalfEven, 2>;
+pub(in crate::ir) type Big = FBig<HalfEven, 2>;
 
 /// Bits of every intermediate result.
-pub(super) const PRECISION: usize = 400;
+pub(in crate::ir) const PRECISION: usize = 400;
 
 /// The same number with all its digits; `None` if it is not finite.
-pub(super) fn big(x: f64) -> Option<Big> {
+pub(in crate::ir) fn big(x: f64) -> Option<Big> {
     if !x.is_finite() {
         return None;
     }
     Some(Big::try_from(x).ok()?.with_precision(PRECISION).value())
 }
 
-pub(super) fn one() -> Big {
+pub(in crate::ir) fn one() -> Big {
     Big::ONE.with_precision(PRECISION).value()
 }
