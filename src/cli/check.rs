@@ -227,7 +227,7 @@ fn solids(
         found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
         match program.within_tolerance(&solid) {
             Some(Ok(chosen)) => {
-                found.program = Some(chosen.plan().name());
+                found.program = Some(chosen.variant().name());
                 found.error_bound = Some(chosen.bound());
             }
             Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),

@@ -57,7 +57,7 @@ impl Drop for Code {
             Err(poisoned) => poisoned.into_inner().take(),
         };
         if let Some(module) = module {
-            // SAFETY: `entry` is private and callers borrow `self` while they run it (`solid::compiled`), so no
+            // SAFETY: `entry` is private and callers borrow `self` while they run it (`solid::programs::compiled`), so no
             // code of this module is running or can be called again.
             unsafe { module.free_memory() };
         }

@@ -6,7 +6,7 @@
 //!
 //! Invariants: code memory is owned by the [`Code`] that refers to it and freed with it, never writable and
 //! executable at once; the operations are those of `ir`, in its order, so results agree with the interpreter bit
-//! for bit. Unsafe code of the crate lives here and in `solid::compiled` only.
+//! for bit. Unsafe code of the crate lives here and in `solid::programs::compiled` only.
 
 mod emitter;
 mod host_functions;

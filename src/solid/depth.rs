@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Solid;
+use super::construction::Solid;
 use crate::field::{Field, GradientsMut, Points};
 
 /// The depth below a solid's surface, m, as a [`Field`]: minus the distance of [`Solid::contact`], so positive inside,

@@ -3,7 +3,7 @@
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::exact;
-use rfm::solid::{Chosen, Plan};
+use rfm::solid::{Chosen, ProgramVariant};
 use rfm::{Engine, Field, Program, field::Points};
 
 use crate::tool::{rfm, rfm_reading, root, snapshot};
@@ -50,7 +50,7 @@ fn the_cheapest_program_that_keeps_the_tolerance_is_chosen_and_keeps_it() {
     {
         for engine in [Engine::Jit, Engine::Interpreter] {
             let chosen = chosen(THREE, name, engine);
-            assert_eq!(chosen.plan().name(), plan, "{chosen:?}");
+            assert_eq!(chosen.variant().name(), plan, "{chosen:?}");
             let (graph, omega) = chosen.solid().formula();
             for p in random_points(chosen.over(), 300) {
                 let truth = exact::evaluate(graph, &[omega], p.to_array()).unwrap();
@@ -95,7 +95,7 @@ fn tiny_solids_are_scaled_in_single_precision() {
     for engine in [Engine::Jit, Engine::Interpreter] {
         let solid = program.solid_with("s", engine).unwrap();
         let chosen = solid.within(1e-30, over).unwrap();
-        assert_eq!(chosen.plan(), Plan::BY_COST[0], "{chosen:?}");
+        assert_eq!(chosen.variant(), ProgramVariant::BY_COST[0], "{chosen:?}");
         let found = chosen.omega(DVec3::splat(1e-24));
         // of single precision, whose squares of 1e-24 would be zero
         assert!((found / 5.857_864_376_269_049_5e-25 - 1.0).abs() < 1e-6, "{found:e}");

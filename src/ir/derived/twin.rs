@@ -13,7 +13,7 @@ use crate::ir::op::Binary;
 use glam::DVec3;
 
 /// Within these distances of the origin a leaf must be shown to be a number for the plain minimum to be used;
-/// [`Graph`] users make results beyond them NaN (see `solid::programs`). One pair for each precision: the box, and
+/// [`Graph`] users make results beyond them NaN (see `solid::programs::on_demand`). One pair for each precision: the box, and
 /// the largest value that cannot overflow.
 const PROOFS: [(f64, f64); 2] = [(5e9, 1e38), (2e77, 1e308)];
 

@@ -5,8 +5,9 @@
 
 use glam::DVec3;
 
-use super::Solid;
-use super::programs::{Guard, Programs, UniformValues};
+use super::construction::Solid;
+use super::programs::number::UniformValues;
+use super::programs::on_demand::{Guard, Programs, forms};
 use crate::codegen::{Form, Forms, Precision};
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
@@ -15,7 +16,7 @@ use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Magni
 
 /// One way to compute ω.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Plan {
+pub struct ProgramVariant {
     /// Width of the arithmetic.
     pub precision: Precision,
     /// Of R₀; scaled where the squares of its operands leave the range.
@@ -24,7 +25,7 @@ pub struct Plan {
     pub local: bool,
 }
 
-impl Plan {
+impl ProgramVariant {
     /// What solids are compiled to when nothing is asked for.
     pub const STANDARD: Self = Self::new(Precision::F64, Form::Stable, false);
 
@@ -57,18 +58,18 @@ impl Plan {
 
 /// No program keeps the tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OutOfBudget {
+pub struct OutOfTolerance {
     /// The smallest bound that can be had; infinite if there is none.
     pub bound: f64,
     /// The program that has it.
-    pub plan: Plan,
+    pub variant: ProgramVariant,
 }
 
 /// A solid whose ω is computed by the cheapest program that keeps a tolerance in a box.
 #[derive(Clone)]
 pub struct Chosen {
     solid: Solid,
-    plan: Plan,
+    variant: ProgramVariant,
     over: Aabb,
     bound: f64,
     candidate: std::sync::Arc<Candidate>,
@@ -101,45 +102,45 @@ impl Solid {
     ///
     /// # Errors
     /// If no program is certified to keep it.
-    pub fn within(&self, tolerance: f64, over: Aabb) -> Result<Chosen, OutOfBudget> {
-        for plan in Plan::BY_COST {
-            let candidate = Candidate::new(self, plan, &over);
+    pub fn within(&self, tolerance: f64, over: Aabb) -> Result<Chosen, OutOfTolerance> {
+        for variant in ProgramVariant::BY_COST {
+            let candidate = Candidate::new(self, variant, &over);
             let enough = candidate.certify(tolerance);
             if enough <= tolerance {
                 let bound = enough.min(candidate.certify(0.0));
-                let candidate = candidate.with_programs(self, plan).into();
-                return Ok(Chosen { solid: self.clone(), plan, over, bound, candidate });
+                let candidate = candidate.with_programs(self, variant).into();
+                return Ok(Chosen { solid: self.clone(), variant, over, bound, candidate });
             }
         }
-        let [.., dearest] = Plan::BY_COST;
-        let [standard, scaled] =
-            [Plan::STANDARD, dearest].map(|plan| OutOfBudget { bound: self.error_bound(plan, &over), plan });
+        let [.., dearest] = ProgramVariant::BY_COST;
+        let [standard, scaled] = [ProgramVariant::STANDARD, dearest]
+            .map(|variant| OutOfTolerance { bound: self.error_bound(variant, &over), variant });
         Err(if scaled.bound < standard.bound { scaled } else { standard })
     }
 
     /// A certified bound of |computed ω − exact ω| of one program over a box; infinite where there is none.
-    pub fn error_bound(&self, plan: Plan, over: &Aabb) -> f64 {
-        Candidate::new(self, plan, over).certify(0.0)
+    pub fn error_bound(&self, variant: ProgramVariant, over: &Aabb) -> f64 {
+        Candidate::new(self, variant, over).certify(0.0)
     }
 }
 
 impl Candidate {
-    fn new(solid: &Solid, plan: Plan, over: &Aabb) -> Self {
+    fn new(solid: &Solid, variant: ProgramVariant, over: &Aabb) -> Self {
         let (graph, root) = solid.formula();
         // few digits, so that constants fold without error
-        let origin = if plan.local { over.centre().as_vec3().as_dvec3() } else { DVec3::ZERO };
+        let origin = if variant.local { over.centre().as_vec3().as_dvec3() } else { DVec3::ZERO };
         let (graph, root) =
-            if plan.local { ir::localised(graph, root, origin) } else { (graph.clone(), root) };
-        let over = if plan.local { shifted(over, origin) } else { *over };
+            if variant.local { ir::localised(graph, root, origin) } else { (graph.clone(), root) };
+        let over = if variant.local { shifted(over, origin) } else { *over };
         // the solid's own program, unless it was compiled in another form for comparison
-        let forms = if plan == Plan::STANDARD && solid.inner.omega.form == Form::Stable {
+        let forms = if variant == ProgramVariant::STANDARD && solid.inner.omega.form == Form::Stable {
             // of this graph: that of the program has its guard, and other nodes
-            let [double, _] = super::programs::forms(&graph, Form::Stable);
+            let [double, _] = forms(&graph, Form::Stable);
             double
         } else {
-            Magnitudes::over(&graph, &over).forms(&graph, plan.form, plan.precision)
+            Magnitudes::over(&graph, &over).forms(&graph, variant.form, variant.precision)
         };
-        let inputs = match (plan.precision, plan.local) {
+        let inputs = match (variant.precision, variant.local) {
             (Precision::F64, _) => Inputs::Exact,
             (Precision::F32, false) => Inputs::Rounded,
             (Precision::F32, true) => Inputs::Shifted,
@@ -153,7 +154,7 @@ impl Candidate {
             forms,
             inputs,
             over,
-            precision: plan.precision,
+            precision: variant.precision,
             time,
             uniforms,
         }
@@ -170,8 +171,8 @@ impl Candidate {
         ErrorAnalysis::new(&self.graph, self.root, arithmetic).during(self.time).certify(&self.over, enough)
     }
 
-    fn with_programs(mut self, solid: &Solid, plan: Plan) -> Self {
-        if plan != Plan::STANDARD || solid.inner.omega.form != Form::Stable {
+    fn with_programs(mut self, solid: &Solid, variant: ProgramVariant) -> Self {
+        if variant != ProgramVariant::STANDARD || solid.inner.omega.form != Form::Stable {
             let forms = [self.forms.clone(), self.forms.clone()];
             let programs = Programs::with_forms(self.graph.clone(), vec![self.root], Guard::Infinite, forms);
             self.uniforms = programs.uniforms_at(solid.time());
@@ -191,8 +192,8 @@ fn shifted(over: &Aabb, origin: DVec3) -> Aabb {
 
 impl Chosen {
     /// Which program it is.
-    pub fn plan(&self) -> Plan {
-        self.plan
+    pub fn variant(&self) -> ProgramVariant {
+        self.variant
     }
 
     /// Certified: |computed ω − exact ω| is nowhere larger in the box.
@@ -213,7 +214,7 @@ impl Chosen {
     /// The program's value at a point of the box.
     fn value(&self, programs: &Programs, p: DVec3) -> f64 {
         let engine = self.solid.inner.engine;
-        match self.plan.precision {
+        match self.variant.precision {
             Precision::F64 => {
                 let mut out = [0.0];
                 programs.point(engine, &self.candidate.uniforms, p.to_array(), &mut out);
@@ -273,7 +274,7 @@ impl Field for Chosen {
         let Some(programs) = &self.candidate.programs else {
             return Field::omega_many(&self.solid, points, omega);
         };
-        match self.plan.precision {
+        match self.variant.precision {
             Precision::F32 => self.values_f32(programs, points, omega),
             Precision::F64 => {
                 let (engine, uniforms) = (self.solid.inner.engine, &self.candidate.uniforms);
@@ -299,6 +300,6 @@ impl Field for Chosen {
 
 impl std::fmt::Debug for Chosen {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Chosen({:?}, {}, ± {:e})", self.solid.name(), self.plan.name(), self.bound)
+        write!(f, "Chosen({:?}, {}, ± {:e})", self.solid.name(), self.variant.name(), self.bound)
     }
 }

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::leaf::Leaves;
-use super::prefix::Word;
+use super::leaf_set::Leaves;
+use super::words::Word;
 use crate::field::{Face, Faces, Part};
 
 impl Leaves {

@@ -2,55 +2,12 @@
 
 use std::sync::OnceLock;
 
-use super::blocks::BlockProgram;
-use super::compiled::{BatchProgram, Lane, PointProgram};
+use super::block_program::BlockProgram;
+use super::compiled::{BatchProgram, PointProgram};
+use super::number::{Number, UniformValues};
 use crate::codegen::{CodegenError, Form, Forms, Precision};
 use crate::ir::{self, Axis, Binary, Expr, Graph, Hoisted, Interpreter, Magnitudes, Node, Unary, Uniforms};
-
-/// What evaluates a solid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Engine {
-    /// Machine code, or the interpreter where there can be none.
-    #[default]
-    Auto,
-    /// Machine code, or an error.
-    Jit,
-    /// The interpreter: the same bits, some 12 to 13 times slower over columns of points.
-    Interpreter,
-}
-
-/// Which question a program answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ProgramKind {
-    /// ω
-    Value,
-    /// ω, ∂ω/∂x, ∂ω/∂y, ∂ω/∂z
-    Gradient,
-    /// The min/max twin, which has the sign of ω
-    Sign,
-    /// The twin and its gradient, which is that of the active leaf
-    SignGradient,
-    /// Distance from the surface (positive in the fluid), outward unit normal, mean curvature
-    Contact,
-    /// The surface's velocity along its normal: three numbers, zero for a solid at rest
-    Velocity,
-}
-
-impl ProgramKind {
-    pub(super) const COUNT: usize = 6;
-}
-
-/// Values of what depends on time alone, for programs of either precision: found in `f64` in any case.
-#[derive(Debug, Clone, Default)]
-pub struct UniformValues {
-    pub double: Vec<f64>,
-    pub single: Vec<f32>,
-}
-
-impl UniformValues {
-    /// Of a program that has none.
-    pub const NONE: Self = Self { double: Vec::new(), single: Vec::new() };
-}
+use crate::solid::engine::Engine;
 
 /// Where a program gives NaN although its formula might not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,6 +47,27 @@ enum Many<T> {
     Blocks(BlockProgram<T>),
 }
 
+/// A type that solids have programs for: `f32` or `f64`.
+pub trait Lane: Number {
+    /// The programs that compute with it.
+    #[doc(hidden)]
+    fn compiled(programs: &Programs) -> &Compiled<Self>;
+}
+
+impl Lane for f32 {
+    #[inline]
+    fn compiled(programs: &Programs) -> &Compiled<Self> {
+        &programs.single
+    }
+}
+
+impl Lane for f64 {
+    #[inline]
+    fn compiled(programs: &Programs) -> &Compiled<Self> {
+        &programs.double
+    }
+}
+
 impl<T> Compiled<T> {
     fn new() -> Self {
         Self { point: OnceLock::new(), batch: OnceLock::new() }
@@ -105,8 +83,8 @@ pub struct Programs {
     pub interpreter: Interpreter,
     /// What depends on time alone; nothing if the solid is at rest.
     pub uniforms: Option<Uniforms>,
-    pub double: Compiled<f64>,
-    pub single: Compiled<f32>,
+    double: Compiled<f64>,
+    single: Compiled<f32>,
 }
 
 impl Programs {

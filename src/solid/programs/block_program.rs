@@ -1,23 +1,20 @@
 //! Many points at a time, step by step over blocks of columns that stay in the first-level cache.
 //!
-//! A program is a list of steps (see [`plan`]): pieces of arithmetic as machine code, R₀ as loops over columns in the
-//! widest vectors there are (see [`junctions`]). Against one loop with everything in it this has twice to three times
+//! A program is a list of steps (see `block_plan`): pieces of arithmetic as machine code, R₀ as loops over columns in the
+//! widest vectors there are (see `kernels`). Against one loop with everything in it this has twice to three times
 //! the throughput of roots and divisions on processors with wide vectors, no chain of dependent operations in deep
 //! folds, no spilled registers, and code whose size is that of the different shapes, not of the leaves.
 //!
 //! Invariant: the same bits as the interpreter and the programs for one point, whatever the number of points; except in
 //! the guarded form, whose choice depends on the points that are looked at together.
 
-mod junctions;
-mod plan;
-
-use super::compiled::{Lane, SegmentProgram};
+use super::block_plan::{BlockPlan, BlockStep, Operation, Piece};
+use super::columns::{ColumnPlace, Frame, Scratch};
+use super::compiled::SegmentProgram;
+use super::kernels::{Kernel, WeightedKernel};
+use super::number::Number;
 use crate::codegen::{CodegenError, Forms};
 use crate::ir::{Graph, Node};
-pub use junctions::Wide;
-use junctions::{Kernel, WeightedKernel};
-pub use plan::Place;
-use plan::{Operation, Plan, Step};
 
 /// Columns of a block take this many bytes together, as long as a block has [`SHORTEST`] points: most of a first-level
 /// data cache of 32 KiB.
@@ -35,7 +32,7 @@ const MAX_OUTPUTS: usize = 5;
 
 /// A program over blocks.
 pub struct BlockProgram<T> {
-    steps: Vec<Run<T>>,
+    steps: Vec<CompiledStep<T>>,
     pieces: Vec<SegmentProgram<T>>,
     parameters: Vec<T>,
     columns: usize,
@@ -44,47 +41,42 @@ pub struct BlockProgram<T> {
 }
 
 /// A step with its code.
-enum Run<T> {
-    Arithmetic { piece: usize, parameters: std::ops::Range<usize>, reads: Vec<Place>, writes: Vec<Place> },
-    Junction { kernel: Kernel<T>, operands: [Place; 2], value: Place },
-    Weighted { kernel: WeightedKernel<T>, operands: [Place; 2], results: [Place; 3] },
-    Copy { from: Place, to: Place },
+enum CompiledStep<T> {
+    Arithmetic {
+        piece: usize,
+        parameters: std::ops::Range<usize>,
+        reads: Vec<ColumnPlace>,
+        writes: Vec<ColumnPlace>,
+    },
+    Junction {
+        kernel: Kernel<T>,
+        operands: [ColumnPlace; 2],
+        value: ColumnPlace,
+    },
+    Weighted {
+        kernel: WeightedKernel<T>,
+        operands: [ColumnPlace; 2],
+        results: [ColumnPlace; 3],
+    },
+    Copy {
+        from: ColumnPlace,
+        to: ColumnPlace,
+    },
 }
 
-/// Working memory of a thread, kept between calls so that none of them allocates.
-#[derive(Debug, Default)]
-pub struct Scratch<T> {
-    pub columns: Vec<T>,
-    pub pointers: Vec<*mut T>,
-}
-
-/// The columns of one block: the caller's, and those that steps hand on.
-pub struct Frame<'a, 'o, T> {
-    /// x, y, z of the block's points.
-    pub points: [&'a [T]; 3],
-    pub outputs: &'a mut [&'o mut [T]],
-    /// Numbers that depend on time alone.
-    pub uniforms: &'a [T],
-    /// Columns of [`Frame::stride`] numbers each.
-    pub columns: &'a mut [T],
-    pub stride: usize,
-    /// For the call of a piece.
-    pub pointers: &'a mut Vec<*mut T>,
-}
-
-impl<T: Lane> BlockProgram<T> {
+impl<T: Number> BlockProgram<T> {
     /// Nothing for graphs that one plain loop answers as well.
     ///
     /// # Errors
     /// As for [`crate::codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Option<Self>, CodegenError> {
-        let Some(plan) = Plan::new(graph, outputs, forms) else { return Ok(None) };
+        let Some(plan) = BlockPlan::new(graph, outputs, forms) else { return Ok(None) };
         let mut steps = Vec::with_capacity(plan.steps.len());
         for step in plan.steps {
-            let Some(run) = Run::of(step) else { return Ok(None) };
+            let Some(run) = CompiledStep::of(step) else { return Ok(None) };
             steps.push(run);
         }
-        let piece = |piece: &plan::Piece| {
+        let piece = |piece: &Piece| {
             let graph = piece.shape.as_ref().unwrap_or(graph);
             SegmentProgram::compile(graph, &piece.inputs, &piece.outputs, piece.parameters)
         };
@@ -161,104 +153,42 @@ impl<T: Lane> BlockProgram<T> {
         let mut frame = Frame { points, outputs, uniforms, columns, stride: self.block, pointers };
         for step in &self.steps {
             match step {
-                Run::Arithmetic { piece, parameters, reads, writes } => {
+                CompiledStep::Arithmetic { piece, parameters, reads, writes } => {
                     let parameters = &self.parameters[parameters.clone()];
                     self.pieces[*piece].call(&mut frame, reads, writes, parameters);
                 }
-                Run::Junction { kernel, operands, value } => frame.junction(*kernel, *operands, *value),
-                Run::Weighted { kernel, operands, results } => frame.weighted(*kernel, *operands, *results),
-                Run::Copy { from, to } => frame.copy(*from, *to),
+                CompiledStep::Junction { kernel, operands, value } => {
+                    frame.junction(*kernel, *operands, *value)
+                }
+                CompiledStep::Weighted { kernel, operands, results } => {
+                    frame.weighted(*kernel, *operands, *results)
+                }
+                CompiledStep::Copy { from, to } => frame.copy(*from, *to),
             }
         }
     }
 }
 
-impl<T: Lane> Run<T> {
+impl<T: Number> CompiledStep<T> {
     /// Nothing for a junction that there is no loop for.
-    fn of(step: Step) -> Option<Self> {
+    fn of(step: BlockStep) -> Option<Self> {
         Some(match step {
-            Step::Arithmetic { program: piece, parameters, reads, writes } => {
+            BlockStep::Arithmetic { program: piece, parameters, reads, writes } => {
                 Self::Arithmetic { piece, parameters, reads, writes }
             }
-            Step::Junction { op, form, operands, value, weights: None } => {
+            BlockStep::Junction { op, form, operands, value, weights: None } => {
                 let kernel = match op {
                     Operation::Binary(op) => T::kernel(op, form)?,
                     Operation::Negate => T::negation(),
                 };
                 Self::Junction { kernel, operands, value }
             }
-            Step::Junction { op, form, operands, value, weights: Some([by_u, by_v]) } => {
+            BlockStep::Junction { op, form, operands, value, weights: Some([by_u, by_v]) } => {
                 let Operation::Binary(op) = op else { return None };
                 let kernel = T::weighted_kernel(op, form)?;
                 Self::Weighted { kernel, operands, results: [value, by_u, by_v] }
             }
-            Step::Copy { from, to } => Self::Copy { from, to },
+            BlockStep::Copy { from, to } => Self::Copy { from, to },
         })
-    }
-}
-
-impl<T: Lane> Frame<'_, '_, T> {
-    /// Points of the block.
-    pub fn len(&self) -> usize {
-        self.points[0].len()
-    }
-
-    /// Where a column lies in `columns`. Only results are written to the caller's columns, and nothing is read back
-    /// from them.
-    fn range(&self, place: Place) -> std::ops::Range<usize> {
-        match place {
-            Place::Column(column) => {
-                let start = column as usize * self.stride;
-                start..start + self.len()
-            }
-            Place::Output(_) => unreachable!("the planner reads no output"),
-        }
-    }
-
-    fn junction(&mut self, kernel: Kernel<T>, operands: [Place; 2], value: Place) {
-        let [u, v] = operands.map(|place| self.range(place));
-        match value {
-            Place::Output(i) => kernel(&self.columns[u], &self.columns[v], self.outputs[i as usize]),
-            Place::Column(_) => {
-                let out = self.range(value);
-                if u == v {
-                    let [u, out] = self.disjoint([u, out]);
-                    kernel(u, u, out);
-                } else {
-                    let [u, v, out] = self.disjoint([u, v, out]);
-                    kernel(u, v, out);
-                }
-            }
-        }
-    }
-
-    fn weighted(&mut self, kernel: WeightedKernel<T>, operands: [Place; 2], results: [Place; 3]) {
-        let ([u, v], [value, by_u, by_v]) =
-            (operands.map(|place| self.range(place)), results.map(|place| self.range(place)));
-        if u == v {
-            let [u, value, by_u, by_v] = self.disjoint([u, value, by_u, by_v]);
-            kernel(u, u, [value, by_u, by_v]);
-        } else {
-            let [u, v, value, by_u, by_v] = self.disjoint([u, v, value, by_u, by_v]);
-            kernel(u, v, [value, by_u, by_v]);
-        }
-    }
-
-    fn copy(&mut self, from: Place, to: Place) {
-        let from = self.range(from);
-        match to {
-            Place::Output(i) => self.outputs[i as usize].copy_from_slice(&self.columns[from]),
-            Place::Column(_) => {
-                let to = self.range(to);
-                self.columns.copy_within(from, to.start);
-            }
-        }
-    }
-
-    fn disjoint<const N: usize>(&mut self, ranges: [std::ops::Range<usize>; N]) -> [&mut [T]; N] {
-        match self.columns.get_disjoint_mut(ranges) {
-            Ok(columns) => columns,
-            Err(_) => unreachable!("the planner gives results columns of their own"),
-        }
     }
 }

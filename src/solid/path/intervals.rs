@@ -10,11 +10,11 @@ use crate::ir::Enclosure;
 
 /// Disjoint closed intervals in ascending order.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Stretches(SmallVec<[(f64, f64); 4]>);
+pub struct PathIntervals(SmallVec<[(f64, f64); 4]>);
 
 /// To which side of the truth an answer may err.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
+pub enum Side {
     /// More than holds.
     More,
     /// Less than holds.
@@ -23,12 +23,12 @@ pub(super) enum Side {
 
 /// Where a leaf, or a tree of them, may be at least zero, and where it surely is.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Met {
-    pub possible: Stretches,
-    pub certain: Stretches,
+pub struct NotNegative {
+    pub possible: PathIntervals,
+    pub certain: PathIntervals,
 }
 
-impl Stretches {
+impl PathIntervals {
     pub fn one(stretch: (f64, f64)) -> Self {
         Self(SmallVec::from_slice(&[stretch]))
     }
@@ -106,12 +106,12 @@ impl Stretches {
     }
 }
 
-impl Met {
+impl NotNegative {
     /// Where what is enclosed over [t₀, t₁] may be at least zero, and where it is.
     pub fn of(enclosure: &Enclosure, (t0, t1): (f64, f64)) -> Self {
         let [a, b, c] = enclosure.coefficients;
-        let placed = |stretches: Stretches, side: Side| {
-            let mut out = Stretches::default();
+        let placed = |stretches: PathIntervals, side: Side| {
+            let mut out = PathIntervals::default();
             for (begin, end) in stretches.iter() {
                 let (begin, end) = match side {
                     Side::More => ((t0 + begin).next_down().max(t0), (t0 + end).next_up().min(t1)),
@@ -125,12 +125,12 @@ impl Met {
         };
         let width = t1 - t0;
         let possible = if enclosure.range.hi < 0.0 {
-            Stretches::default()
+            PathIntervals::default()
         } else {
             placed(not_negative([a.hi, b.hi, c.hi], width, Side::More), Side::More)
         };
         let certain = if enclosure.range.lo >= 0.0 {
-            Stretches::one((t0, t1))
+            PathIntervals::one((t0, t1))
         } else {
             placed(not_negative([a.lo, b.lo, c.lo], width, Side::Less), Side::Less)
         };
@@ -148,10 +148,10 @@ impl Met {
 /// q/c₂ with q = −½(c₁ ± √D), the other c₀/q: no cancellation, so a few ε cover their own roundings. (c₀/q belongs to a
 /// quadratic whose discriminant has moved a little; where c₀ and c₂ have one sign it moves to the same side, where they
 /// have not nothing cancels in D, and it moves by a few ε.)
-fn not_negative([c0, c1, c2]: [f64; 3], width: f64, side: Side) -> Stretches {
+fn not_negative([c0, c1, c2]: [f64; 3], width: f64, side: Side) -> PathIntervals {
     const ROUNDINGS: f64 = 16.0 * f64::EPSILON;
     let more = side == Side::More;
-    let (everything, nothing) = (Stretches::one((0.0, width)), Stretches::default());
+    let (everything, nothing) = (PathIntervals::one((0.0, width)), PathIntervals::default());
     let change = (c1.abs() + c2.abs() * width) * width;
     if c0.abs() > change * (1.0 + ROUNDINGS) {
         return if c0 > 0.0 { everything } else { nothing };
@@ -173,7 +173,7 @@ fn not_negative([c0, c1, c2]: [f64; 3], width: f64, side: Side) -> Stretches {
     };
     let clipped = |begin: f64, end: f64| {
         let (begin, end) = (begin.max(0.0), end.min(width));
-        if begin <= end { Stretches::one((begin, end)) } else { Stretches::default() }
+        if begin <= end { PathIntervals::one((begin, end)) } else { PathIntervals::default() }
     };
     if c2 == 0.0 {
         if c1 == 0.0 {
@@ -209,8 +209,8 @@ mod tests {
     use crate::interval::Interval;
     use proptest::prelude::*;
 
-    fn set(list: &[(f64, f64)]) -> Stretches {
-        Stretches(SmallVec::from_slice(list))
+    fn set(list: &[(f64, f64)]) -> PathIntervals {
+        PathIntervals(SmallVec::from_slice(list))
     }
 
     #[test]
@@ -222,7 +222,7 @@ mod tests {
         assert_eq!(a.without(&b), set(&[(0.0, 0.1), (0.55, 0.6), (0.8, 0.9), (0.95, 1.0)]));
         assert_eq!(a.within((0.55, 0.85)), set(&[(0.55, 0.6), (0.8, 0.85)]));
         assert_eq!(a.hull(), Some((0.0, 1.0)));
-        assert_eq!(Stretches::default().union(&b), b);
+        assert_eq!(PathIntervals::default().union(&b), b);
     }
 
     /// The sign of c₀ + c₁s + c₂s² in integers: all numbers are multiples of 2⁻²⁰ below 2⁴.
@@ -254,8 +254,8 @@ mod tests {
             let unit = 1.0 / f64::from(1 << 20);
             let coefficients = c.map(|c| c as f64 * unit);
             let enclosure = Enclosure { coefficients: coefficients.map(Interval::point), range: Interval::ALL };
-            let met = Met::of(&enclosure, (0.0, 1.0));
-            let holds = |stretches: &Stretches, s: f64| stretches.iter().any(|(a, b)| a <= s && s <= b);
+            let met = NotNegative::of(&enclosure, (0.0, 1.0));
+            let holds = |stretches: &PathIntervals, s: f64| stretches.iter().any(|(a, b)| a <= s && s <= b);
             let mut places = vec![at];
             places.extend(double.map(|root| root << 10));
             for s in places {

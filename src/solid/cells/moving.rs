@@ -9,11 +9,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::Solid;
-use super::cell_map::{CellMap, CellStats, margin};
-use super::cells::{Cells, Pending};
+use super::grid::{Cells, Pending};
+use super::map::{CellMap, CellStats, margin};
 use crate::field::{Moving, Walls};
 use crate::geom::Aabb;
+use crate::solid::construction::Solid;
 
 /// A solid that moves, prepared for a box and a run.
 pub struct MovingMap {

@@ -14,10 +14,10 @@ use std::cell::Cell;
 use glam::DVec3;
 use smallvec::SmallVec;
 
-use super::leaf::Leaves;
-use super::prefix::{Word, is_negative, skip};
-use super::stretches::Met;
+use super::intervals::NotNegative;
 use crate::field::{Entry, Normals, Path};
+use crate::solid::leaves::leaf_set::Leaves;
+use crate::solid::leaves::words::{Word, is_negative, skip};
 
 /// Undecided stretches shorter than this part of the path are not narrowed further.
 const SHORTEST: f64 = 1e-12;
@@ -30,7 +30,7 @@ const MOST_ENCLOSURES: u32 = 1_000;
 const TOGETHER: f64 = 1e-9;
 
 /// A path through the leaves of a solid.
-pub(super) struct Sweep<'a> {
+pub struct Sweep<'a> {
     leaves: &'a Leaves,
     path: &'a Path,
     enclosures: Cell<u32>,
@@ -47,7 +47,7 @@ impl<'a> Sweep<'a> {
         // NaN is not less than anything
         let rise = |c: f64| if c < 0.0 { 0.0 } else { c };
         let negative = is_negative(words, &mut 0, &mut |leaf, negated| {
-            let leaf = self.leaves.along(leaf, negated, self.path.from, self.path.to)?;
+            let leaf = self.leaves.on_path(leaf, negated, self.path.from, self.path.to)?;
             let [a, b, c] = leaf.coefficients.map(|coefficient| coefficient.hi);
             Some(-a > (rise(b) + rise(c)) * (1.0 + 4.0 * f64::EPSILON))
         });
@@ -66,7 +66,7 @@ impl<'a> Sweep<'a> {
     }
 
     /// Where a tree may be at least zero on a part of the path.
-    fn stretches(&self, words: &[u32], at: &mut usize, within: (f64, f64)) -> Met {
+    fn stretches(&self, words: &[u32], at: &mut usize, within: (f64, f64)) -> NotNegative {
         let word = Word::read(words[*at]);
         *at += 1;
         match word {
@@ -99,19 +99,19 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    fn leaf(&self, leaf: u32, negated: bool, within: (f64, f64)) -> Met {
-        if let Some(enclosure) = self.leaves.along(leaf, negated, self.path.from, self.path.to) {
-            let met = Met::of(&enclosure, (0.0, 1.0));
+    fn leaf(&self, leaf: u32, negated: bool, within: (f64, f64)) -> NotNegative {
+        if let Some(enclosure) = self.leaves.on_path(leaf, negated, self.path.from, self.path.to) {
+            let met = NotNegative::of(&enclosure, (0.0, 1.0));
             return if within == (0.0, 1.0) { met } else { met.within(within) };
         }
-        let mut met = Met::default();
+        let mut met = NotNegative::default();
         self.narrow(leaf, negated, within, &mut met);
         met
     }
 
     /// Adds what a leaf says of a stretch, from left to right: what remains undecided is looked at again by itself,
     /// or in halves if it has not become much shorter.
-    fn narrow(&self, leaf: u32, negated: bool, (t0, t1): (f64, f64), out: &mut Met) {
+    fn narrow(&self, leaf: u32, negated: bool, (t0, t1): (f64, f64), out: &mut NotNegative) {
         let left = self.enclosures.get();
         if left == 0 {
             return out.possible.push((t0, t1));
@@ -128,7 +128,7 @@ impl<'a> Sweep<'a> {
             }
             return;
         }
-        let met = Met::of(&enclosure, (t0, t1));
+        let met = NotNegative::of(&enclosure, (t0, t1));
         let [a, b, c] = enclosure.coefficients.map(|c| c.width());
         let width = t1 - t0;
         // the enclosure is as wide as the rounding of one value: shorter stretches teach nothing

@@ -77,24 +77,24 @@ const CANCELLED: f64 = 1.0 / 8.0;
 /// Whether the textbook's result is near enough: nothing cancelled, and no square that counts has left the range.
 /// NaN is not near enough: the stable form then gives NaN too.
 #[inline(always)]
-fn is_near<T: Reach>(result: T, h: T) -> bool {
+fn is_near<T: SafeSquares>(result: T, h: T) -> bool {
     let part = result.abs() >= h * T::from_f64(CANCELLED);
     let fits = h > T::from_f64(T::LEAST) && h < T::from_f64(T::LARGEST);
     part & fits
 }
 
 /// Between which magnitudes √(u² + v²) is good to 2 ulp without scaling.
-trait Reach: crate::ir::Real {
+trait SafeSquares: crate::ir::Real {
     const LEAST: f64;
     const LARGEST: f64;
 }
 
-impl Reach for f64 {
+impl SafeSquares for f64 {
     const LEAST: f64 = 1e-140;
     const LARGEST: f64 = 1e150;
 }
 
-impl Reach for f32 {
+impl SafeSquares for f32 {
     const LEAST: f64 = 1e-15;
     const LARGEST: f64 = 1e18;
 }
@@ -231,7 +231,7 @@ mod tests {
     }
 
     /// Every kernel at every place of a run, against the specification.
-    fn agree<T: Wide + Reach>(least: f64, largest: f64) {
+    fn agree<T: Wide + SafeSquares>(least: f64, largest: f64) {
         let (u, v) = operands::<T>(least, largest);
         let mut out = vec![T::from_f64(0.0); u.len()];
         let joins = [Binary::And, Binary::Or, Binary::Min, Binary::Max, Binary::PlainMin, Binary::PlainMax];

@@ -10,15 +10,17 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::cells::{Cell, Cells, Found, SIDE};
-use super::leaf::Leaves;
-use super::prefix::Word;
-use super::sweep::Sweep;
-use super::{Contact, Parts, Solid, Twin};
+use super::grid::{Cell, Cells, Found, SIDE};
 use crate::field::{Entry, Faces, Field, Normals, Path, Points, Walls, clearance_by_ranges};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
+use crate::solid::construction::Solid;
+use crate::solid::evaluation::Contact;
+use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
+use crate::solid::leaves::words::Word;
+use crate::solid::path::sweep::Sweep;
+use crate::solid::twin::Twin;
 
 /// Points that are looked up together.
 const RUN: usize = 64;
@@ -44,7 +46,7 @@ pub enum Place {
 pub struct CellMap {
     solid: Solid,
     twin: Twin,
-    parts: Arc<Parts>,
+    parts: Arc<LeafTree>,
     cells: Arc<Cells>,
     reach: f64,
     /// By how much cells were grown, reach included: points that rounding puts into the next cell are still right.

@@ -11,6 +11,7 @@
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
+use super::columns::ColumnPlace;
 use crate::ir::{Binary, Expr, Form, Forms, Graph, Node, R0, Unary};
 
 /// Up to this many pieces one program computes them all: it shares what they have in common, such as x² + y².
@@ -19,16 +20,8 @@ const FEW_PIECES: usize = 16;
 /// So many pieces of one shape make a shared program worth its call.
 const SAME_SHAPE: usize = 4;
 
-/// Where a result is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    Column(u32),
-    /// A column of the caller.
-    Output(u32),
-}
-
 #[derive(Debug, Clone, PartialEq)]
-pub enum Step<P = Place> {
+pub enum BlockStep<P = ColumnPlace> {
     Arithmetic {
         program: usize,
         /// In the plan's constants.
@@ -71,15 +64,15 @@ pub struct Piece {
 
 /// How a graph is evaluated.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct BlockPlan {
     pub pieces: Vec<Piece>,
-    pub steps: Vec<Step>,
+    pub steps: Vec<BlockStep>,
     /// Columns that must be kept at a time.
     pub columns: usize,
     pub constants: Vec<f64>,
 }
 
-impl Plan {
+impl BlockPlan {
     /// A plan; nothing where it would not pay: no R₀, and not many junctions of another kind.
     pub fn new(graph: &Graph, outputs: &[Node], forms: &Forms) -> Option<Self> {
         let used = graph.reachable(outputs);
@@ -94,9 +87,9 @@ impl Plan {
         if !many && count(is_r0) == 0 {
             return None;
         }
-        let parts = Parts::new(graph, outputs, &used, many);
+        let planned = PlannedGraph::new(graph, outputs, &used, many);
         let mut planner =
-            Planner { parts, forms, pieces: Vec::new(), constants: Vec::new(), steps: Vec::new() };
+            Planner { planned, forms, pieces: Vec::new(), constants: Vec::new(), steps: Vec::new() };
         planner.schedule(outputs);
         let Planner { pieces, constants, steps, .. } = planner;
         let (steps, columns) = allocate(steps, outputs);
@@ -134,7 +127,7 @@ fn is_choice(op: Binary) -> bool {
 type Member = (Node, Vec<f64>);
 
 /// The graph taken apart.
-struct Parts<'g> {
+struct PlannedGraph<'g> {
     graph: &'g Graph,
     used: Vec<bool>,
     junction: Vec<bool>,
@@ -148,7 +141,7 @@ struct Parts<'g> {
     shapes: Vec<Graph>,
 }
 
-impl<'g> Parts<'g> {
+impl<'g> PlannedGraph<'g> {
     fn new(graph: &'g Graph, outputs: &[Node], used: &[bool], many: bool) -> Self {
         let nodes = graph.len();
         let (mut junction, mut stage, mut cut) = (vec![false; nodes], vec![0; nodes], vec![false; nodes]);
@@ -171,11 +164,11 @@ impl<'g> Parts<'g> {
         }
         let (shapes, shared) = (Vec::new(), FxHashMap::default());
         let used = used.to_vec();
-        let mut parts = Self { graph, used, junction, stage, cut, together, shared, shapes };
-        if parts.together[0].len() > FEW_PIECES {
-            parts.share();
+        let mut planned = Self { graph, used, junction, stage, cut, together, shared, shapes };
+        if planned.together[0].len() > FEW_PIECES {
+            planned.share();
         }
-        parts
+        planned
     }
 
     /// Gives the cut nodes at the bottom that have one shape a common program.
@@ -228,11 +221,11 @@ impl<'g> Parts<'g> {
 }
 
 struct Planner<'g> {
-    parts: Parts<'g>,
+    planned: PlannedGraph<'g>,
     forms: &'g Forms,
     pieces: Vec<Piece>,
     constants: Vec<f64>,
-    steps: Vec<Step<Slot>>,
+    steps: Vec<BlockStep<Slot>>,
 }
 
 /// A result while columns are not yet given: the node that it is, or one that nobody reads.
@@ -241,7 +234,7 @@ type Slot = Option<Node>;
 impl Planner<'_> {
     /// Every part after what it needs, leaves as late as possible: few columns are then in use at a time.
     fn schedule(&mut self, outputs: &[Node]) {
-        for (number, shape) in self.parts.shapes.clone().into_iter().enumerate() {
+        for (number, shape) in self.planned.shapes.clone().into_iter().enumerate() {
             // the root of a cone is its last node
             let root = shape.node(shape.len() - 1);
             let parameters = shape.nodes().filter(|(_, expr)| matches!(expr, Expr::Parameter(_))).count();
@@ -249,7 +242,7 @@ impl Planner<'_> {
             let (inputs, outputs) = (Vec::new(), vec![root]);
             self.pieces.push(Piece { shape: Some(shape), parameters, inputs, outputs });
         }
-        let mut done = vec![false; self.parts.graph.len()];
+        let mut done = vec![false; self.planned.graph.len()];
         let mut stack: Vec<Node> = outputs.iter().rev().copied().collect();
         while let Some(&node) = stack.last() {
             if done[node.index()] {
@@ -268,38 +261,38 @@ impl Planner<'_> {
     }
 
     fn needs(&self, node: Node) -> Vec<Node> {
-        if self.parts.junction[node.index()] {
-            return self.parts.graph.expr(node).operands().collect();
+        if self.planned.junction[node.index()] {
+            return self.planned.graph.expr(node).operands().collect();
         }
-        if self.parts.shared.contains_key(&node) {
+        if self.planned.shared.contains_key(&node) {
             return Vec::new();
         }
-        self.parts.inputs(self.parts.stage[node.index()] as usize)
+        self.planned.inputs(self.planned.stage[node.index()] as usize)
     }
 
     /// The step that computes a node, and all that it computes.
     fn emit(&mut self, node: Node) -> Vec<Node> {
-        if self.parts.junction[node.index()] {
-            return match self.parts.graph.expr(node) {
+        if self.planned.junction[node.index()] {
+            return match self.planned.graph.expr(node) {
                 Expr::Binary(op, u, v) => self.junction(node, op, u, v),
                 Expr::Unary(Unary::Neg, a) => self.push_junction(Operation::Negate, [Some(a); 2], node),
                 expr => unreachable!("{expr:?} is no step of its own"),
             };
         }
-        if let Some((program, constants)) = self.parts.shared.get(&node) {
+        if let Some((program, constants)) = self.planned.shared.get(&node) {
             let first = self.constants.len();
             self.constants.extend(constants);
             let parameters = first..self.constants.len();
             let (reads, writes) = (Vec::new(), vec![Some(node)]);
-            self.steps.push(Step::Arithmetic { program: *program, parameters, reads, writes });
+            self.steps.push(BlockStep::Arithmetic { program: *program, parameters, reads, writes });
             return vec![node];
         }
-        let stage = self.parts.stage[node.index()] as usize;
-        let (inputs, outputs) = (self.parts.inputs(stage), self.parts.together[stage].clone());
+        let stage = self.planned.stage[node.index()] as usize;
+        let (inputs, outputs) = (self.planned.inputs(stage), self.planned.together[stage].clone());
         let program = self.pieces.len();
         let slots = |nodes: &[Node]| nodes.iter().copied().map(Some).collect();
         let (reads, writes) = (slots(&inputs), slots(&outputs));
-        self.steps.push(Step::Arithmetic { program, parameters: 0..0, reads, writes });
+        self.steps.push(BlockStep::Arithmetic { program, parameters: 0..0, reads, writes });
         self.pieces.push(Piece { shape: None, parameters: 0, inputs, outputs: outputs.clone() });
         outputs
     }
@@ -312,8 +305,8 @@ impl Planner<'_> {
             None => (op, op),
         };
         let operands = [Some(u), Some(v)];
-        let graph = self.parts.graph;
-        let find = |op, a, b| graph.find(Expr::Binary(op, a, b)).filter(|n| self.parts.used[n.index()]);
+        let graph = self.planned.graph;
+        let find = |op, a, b| graph.find(Expr::Binary(op, a, b)).filter(|n| self.planned.used[n.index()]);
         let value = find(value_op, u, v);
         let (by_u, by_v) = (find(weight_op, u, v), find(weight_op, v, u));
         if value_op == weight_op || (by_u.is_none() && by_v.is_none()) {
@@ -323,7 +316,7 @@ impl Planner<'_> {
         let weights = Some([by_u, if u == v { None } else { by_v }]);
         let op = Operation::Binary(value_op);
         let form = self.forms.of(u, v);
-        self.steps.push(Step::Junction { op, form, operands, value, weights });
+        self.steps.push(BlockStep::Junction { op, form, operands, value, weights });
         made
     }
 
@@ -332,18 +325,18 @@ impl Planner<'_> {
             [Some(u), Some(v)] => self.forms.of(u, v),
             _ => Form::Stable,
         };
-        self.steps.push(Step::Junction { op, form, operands, value: Some(node), weights: None });
+        self.steps.push(BlockStep::Junction { op, form, operands, value: Some(node), weights: None });
         vec![node]
     }
 }
 
 /// Gives each result a column for as long as it is needed, or a column of the caller.
-fn allocate(steps: Vec<Step<Slot>>, outputs: &[Node]) -> (Vec<Step>, usize) {
+fn allocate(steps: Vec<BlockStep<Slot>>, outputs: &[Node]) -> (Vec<BlockStep>, usize) {
     let mut last_use: FxHashMap<Node, usize> = FxHashMap::default();
     let mut in_three: Vec<Node> = Vec::new();
     for (i, step) in steps.iter().enumerate() {
         step.reads().into_iter().for_each(|node| _ = last_use.insert(node, i));
-        if matches!(step, Step::Junction { weights: Some(_), .. }) {
+        if matches!(step, BlockStep::Junction { weights: Some(_), .. }) {
             in_three.extend(step.writes());
         }
     }
@@ -363,9 +356,9 @@ fn allocate(steps: Vec<Step<Slot>>, outputs: &[Node]) -> (Vec<Step>, usize) {
         let step = step.map(|node| {
             let Some(node) = node else {
                 unused.push(columns.take());
-                return Place::Column(unused[unused.len() - 1]);
+                return ColumnPlace::Own(unused[unused.len() - 1]);
             };
-            direct.get(&node).map_or_else(|| Place::Column(columns.of(node)), |&o| Place::Output(o))
+            direct.get(&node).map_or_else(|| ColumnPlace::Own(columns.of(node)), |&o| ColumnPlace::Output(o))
         });
         placed.push(step);
         columns.free.extend(unused);
@@ -377,7 +370,8 @@ fn allocate(steps: Vec<Step<Slot>>, outputs: &[Node]) -> (Vec<Step>, usize) {
         }
     }
     for (i, node) in (0u32..).zip(outputs).filter(|(_, node)| !direct.contains_key(node)) {
-        placed.push(Step::Copy { from: Place::Column(columns.of(*node)), to: Place::Output(i) });
+        placed
+            .push(BlockStep::Copy { from: ColumnPlace::Own(columns.of(*node)), to: ColumnPlace::Output(i) });
     }
     (placed, columns.count as usize)
 }
@@ -413,7 +407,7 @@ impl Columns {
     }
 }
 
-impl Step<Slot> {
+impl BlockStep<Slot> {
     fn reads(&self) -> Vec<Node> {
         match self {
             Self::Arithmetic { reads, .. } => reads.iter().copied().flatten().collect(),
@@ -433,22 +427,22 @@ impl Step<Slot> {
     }
 
     /// Reads before writes: a column is not taken for a result while an operand is still in it.
-    fn map(self, mut place: impl FnMut(Slot) -> Place) -> Step {
+    fn map(self, mut place: impl FnMut(Slot) -> ColumnPlace) -> BlockStep {
         match self {
-            Self::Arithmetic { program, parameters, reads, writes } => Step::Arithmetic {
+            Self::Arithmetic { program, parameters, reads, writes } => BlockStep::Arithmetic {
                 program,
                 parameters,
                 reads: reads.into_iter().map(&mut place).collect(),
                 writes: writes.into_iter().map(&mut place).collect(),
             },
-            Self::Junction { op, form, operands, value, weights } => Step::Junction {
+            Self::Junction { op, form, operands, value, weights } => BlockStep::Junction {
                 op,
                 form,
                 operands: operands.map(&mut place),
                 value: place(value),
                 weights: weights.map(|both| both.map(&mut place)),
             },
-            Self::Copy { from, to } => Step::Copy { from: place(from), to: place(to) },
+            Self::Copy { from, to } => BlockStep::Copy { from: place(from), to: place(to) },
         }
     }
 }
@@ -480,13 +474,13 @@ mod tests {
         }
     }
 
-    fn places(plan: &Plan) -> Vec<Place> {
-        let of = |step: &Step| match step {
-            Step::Arithmetic { reads, writes, .. } => [&reads[..], writes].concat(),
-            Step::Junction { operands, value, weights, .. } => {
+    fn places(plan: &BlockPlan) -> Vec<ColumnPlace> {
+        let of = |step: &BlockStep| match step {
+            BlockStep::Arithmetic { reads, writes, .. } => [&reads[..], writes].concat(),
+            BlockStep::Junction { operands, value, weights, .. } => {
                 [&operands[..], &[*value], &weights.map_or_else(Vec::new, |w| w.to_vec())].concat()
             }
-            Step::Copy { from, to } => vec![*from, *to],
+            BlockStep::Copy { from, to } => vec![*from, *to],
         };
         plan.steps.iter().flat_map(of).collect()
     }
@@ -496,13 +490,13 @@ mod tests {
         let mut graph = Graph::default();
         let balls: Vec<Node> = (0..1000).map(|i| ball(&mut graph, i)).collect();
         let root = union(&mut graph, &balls);
-        let plan = Plan::new(&graph, &[root], &Forms::default()).unwrap();
+        let plan = BlockPlan::new(&graph, &[root], &Forms::default()).unwrap();
         assert_eq!(plan.pieces.len(), 1);
         assert_eq!(plan.constants.len(), 1000 * plan.pieces[0].parameters);
         assert_eq!(plan.steps.len(), 1000 + 999);
         // a balanced tree of n leaves has log₂ n partial results
         assert!(plan.columns <= 12, "{}", plan.columns);
-        assert_eq!(places(&plan).iter().filter(|p| matches!(p, Place::Output(0))).count(), 1);
+        assert_eq!(places(&plan).iter().filter(|p| matches!(p, ColumnPlace::Output(0))).count(), 1);
     }
 
     #[test]
@@ -512,10 +506,10 @@ mod tests {
         let root = union(&mut graph, &balls);
         let mut outputs = vec![root];
         outputs.extend(crate::ir::gradient(&mut graph, root));
-        let plan = Plan::new(&graph, &outputs, &Forms::default()).unwrap();
+        let plan = BlockPlan::new(&graph, &outputs, &Forms::default()).unwrap();
         for step in &plan.steps {
-            if let Step::Junction { operands, value, weights, .. } = step {
-                let results: Vec<Place> =
+            if let BlockStep::Junction { operands, value, weights, .. } = step {
+                let results: Vec<ColumnPlace> =
                     std::iter::once(*value).chain(weights.iter().flatten().copied()).collect();
                 assert!(results.iter().all(|place| !operands.contains(place)), "{step:?}");
                 assert!((1..results.len()).all(|i| !results[..i].contains(&results[i])), "{step:?}");
@@ -528,9 +522,12 @@ mod tests {
         let mut graph = Graph::default();
         let (a, b) = (ball(&mut graph, 0), ball(&mut graph, 1));
         let (least, forms) = (graph.binary(Binary::PlainMin, a, b), Forms::default());
-        assert!(Plan::new(&graph, &[least], &forms).is_none() && Plan::new(&graph, &[a], &forms).is_none());
+        assert!(
+            BlockPlan::new(&graph, &[least], &forms).is_none()
+                && BlockPlan::new(&graph, &[a], &forms).is_none()
+        );
         let both = graph.binary(Binary::And, a, b);
-        assert!(Plan::new(&graph, &[both], &forms).is_some());
+        assert!(BlockPlan::new(&graph, &[both], &forms).is_some());
     }
 
     #[test]
@@ -538,8 +535,8 @@ mod tests {
         let mut graph = Graph::default();
         let (a, b) = (ball(&mut graph, 0), ball(&mut graph, 1));
         let both = graph.binary(Binary::And, a, b);
-        let plan = Plan::new(&graph, &[both, a, both], &Forms::default()).unwrap();
-        let written = |i| places(&plan).iter().filter(|p| **p == Place::Output(i)).count();
+        let plan = BlockPlan::new(&graph, &[both, a, both], &Forms::default()).unwrap();
+        let written = |i| places(&plan).iter().filter(|p| **p == ColumnPlace::Output(i)).count();
         assert_eq!([written(0), written(1), written(2)], [1, 1, 1]);
     }
 }

@@ -1,8 +1,9 @@
 //! A solid as a person may look at it: its leaves, and what is left of it in a box.
 
-use super::Solid;
-use super::logic::Logic;
-use super::prefix::{Verdict, Word, prune};
+use super::construction::Solid;
+use super::leaves::pruning::{Verdict, prune};
+use super::leaves::tree::Logic;
+use super::leaves::words::Word;
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -20,7 +21,7 @@ pub struct LeafInfo {
 
 /// What is left of a solid in a box.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Left {
+pub enum Remainder {
     /// No point of the box is in the solid: proven.
     Outside,
     /// Every point is: proven.
@@ -30,6 +31,11 @@ pub enum Left {
 }
 
 impl Solid {
+    /// How many leaves decide the sign of the solid; nothing if it cannot be taken apart.
+    pub fn leaf_count(&self) -> Option<usize> {
+        self.parts().map(|parts| parts.leaves.len())
+    }
+
     /// The leaves of the solid; nothing if it is too large to be taken apart.
     pub fn leaves(&self) -> Option<Vec<LeafInfo>> {
         let omega = &self.inner.omega;
@@ -44,13 +50,13 @@ impl Solid {
     }
 
     /// What a cell map would keep of the solid in this box.
-    pub fn left_in(&self, over: &Aabb) -> Option<Left> {
+    pub fn remainder_in(&self, over: &Aabb) -> Option<Remainder> {
         let parts = self.parts()?;
         let mut words = Vec::new();
         let verdict = prune(&parts.words, &mut |leaf| parts.leaves.range(leaf, over), &mut words);
         Some(match verdict {
-            Verdict::Outside => Left::Outside,
-            Verdict::Inside => Left::Inside,
+            Verdict::Outside => Remainder::Outside,
+            Verdict::Inside => Remainder::Inside,
             Verdict::Near => {
                 let mut kept = vec![false; parts.leaves.len()];
                 for word in words {
@@ -58,7 +64,7 @@ impl Solid {
                         kept[leaf as usize] = true;
                     }
                 }
-                Left::Leaves(kept)
+                Remainder::Leaves(kept)
             }
         })
     }

@@ -2,86 +2,14 @@
 //!
 //! Everything unsafe about a call is checked here first: the number of outputs, the lengths of the columns.
 
-use std::cell::RefCell;
-
-use crate::codegen::{self, Code, CodegenError, Form, Forms, Precision, Request, Rounding, Shape};
-use crate::ir::{Expr, Given, Graph, Interpreter, Node, Real};
-
 use glam::DVec3;
 
-use super::blocks::{Frame, Place, Scratch, Wide};
-use super::programs::{Compiled, Programs, UniformValues};
+use super::columns::{ColumnPlace, Frame};
+use super::number::Number;
+use crate::codegen::{self, Code, CodegenError, Form, Forms, Precision, Request, Rounding, Shape};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-
-/// A type that programs exist for: `f32` or `f64`.
-pub trait Lane: Real + Default + Wide {
-    /// Which of the two it is.
-    const PRECISION: Precision;
-
-    #[doc(hidden)]
-    fn compiled(programs: &Programs) -> &Compiled<Self>;
-
-    #[doc(hidden)]
-    fn interpret(interpreter: &Interpreter, point: [Self; 3], uniforms: &[Self], out: &mut [Self]);
-
-    /// Numbers that depend on time alone, in this precision.
-    #[doc(hidden)]
-    fn uniforms(values: &UniformValues) -> &[Self];
-
-    /// Working memory of this thread.
-    #[doc(hidden)]
-    fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R;
-}
-
-thread_local! {
-    static SCRATCH_64: RefCell<Scratch<f64>> = RefCell::default();
-    static SCRATCH_32: RefCell<Scratch<f32>> = RefCell::default();
-}
-
-impl Lane for f32 {
-    const PRECISION: Precision = Precision::F32;
-
-    #[inline]
-    fn compiled(programs: &Programs) -> &Compiled<Self> {
-        &programs.single
-    }
-
-    fn interpret(interpreter: &Interpreter, point: [Self; 3], uniforms: &[Self], out: &mut [Self]) {
-        interpreter.eval_given_f32(Given { uniforms, ..Given::point(point) }, out);
-    }
-
-    #[inline]
-    fn uniforms(values: &UniformValues) -> &[Self] {
-        &values.single
-    }
-
-    fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R {
-        SCRATCH_32.with_borrow_mut(use_it)
-    }
-}
-
-impl Lane for f64 {
-    const PRECISION: Precision = Precision::F64;
-
-    #[inline]
-    fn compiled(programs: &Programs) -> &Compiled<Self> {
-        &programs.double
-    }
-
-    fn interpret(interpreter: &Interpreter, point: [Self; 3], uniforms: &[Self], out: &mut [Self]) {
-        interpreter.eval_given(Given { uniforms, ..Given::point(point) }, out);
-    }
-
-    #[inline]
-    fn uniforms(values: &UniformValues) -> &[Self] {
-        &values.double
-    }
-
-    fn with_scratch<R>(use_it: impl FnOnce(&mut Scratch<Self>) -> R) -> R {
-        SCRATCH_64.with_borrow_mut(use_it)
-    }
-}
+use crate::ir::{Expr, Graph, Node};
 
 /// The largest number of outputs of a program: distance, normal and curvature.
 const MAX_OUTPUTS: usize = 5;
@@ -90,7 +18,7 @@ const MAX_OUTPUTS: usize = 5;
 const MAX_LANES: usize = 4;
 
 /// How many uniforms a graph has.
-pub(super) fn uniforms_of(graph: &Graph) -> usize {
+fn uniforms_of(graph: &Graph) -> usize {
     let number = |expr| if let Expr::Uniform(i) = expr { i as usize + 1 } else { 0 };
     graph.exprs().iter().map(|&expr| number(expr)).max().unwrap_or(0)
 }
@@ -103,7 +31,7 @@ pub struct PointProgram<T> {
     lane: std::marker::PhantomData<T>,
 }
 
-impl<T: Lane> PointProgram<T> {
+impl<T: Number> PointProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
@@ -151,7 +79,7 @@ pub struct BatchProgram<T> {
     lane: std::marker::PhantomData<T>,
 }
 
-impl<T: Lane> BatchProgram<T> {
+impl<T: Number> BatchProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
@@ -234,7 +162,7 @@ pub struct SegmentProgram<T> {
     lane: std::marker::PhantomData<T>,
 }
 
-impl<T: Lane> SegmentProgram<T> {
+impl<T: Number> SegmentProgram<T> {
     /// # Errors
     /// As for [`codegen::compile`].
     pub fn compile(
@@ -256,9 +184,15 @@ impl<T: Lane> SegmentProgram<T> {
     /// # Panics
     /// If the block is no multiple of a vector, or places or parameters are not those of the program.
     #[inline]
-    pub fn call(&self, frame: &mut Frame<'_, '_, T>, reads: &[Place], writes: &[Place], parameters: &[T]) {
+    pub fn call(
+        &self,
+        frame: &mut Frame<'_, '_, T>,
+        reads: &[ColumnPlace],
+        writes: &[ColumnPlace],
+        parameters: &[T],
+    ) {
         let (length, lanes) = (frame.len(), T::PRECISION.lanes());
-        let [inputs, outputs] = [reads, writes].map(<[Place]>::len);
+        let [inputs, outputs] = [reads, writes].map(<[ColumnPlace]>::len);
         assert!(length.is_multiple_of(lanes) && frame.points.iter().all(|c| c.len() == length), "length");
         assert_eq!((inputs, outputs, parameters.len()), (self.inputs, self.code.outputs, self.parameters));
         assert!(frame.uniforms.len() >= self.uniforms, "uniforms of the program");
@@ -268,13 +202,13 @@ impl<T: Lane> SegmentProgram<T> {
         let base = frame.columns.as_mut_ptr();
         for &place in reads.iter().chain(writes) {
             let pointer = match place {
-                Place::Column(column) => {
+                ColumnPlace::Own(column) => {
                     let start = column as usize * frame.stride;
                     assert!(start + length <= frame.columns.len(), "no such column");
                     // SAFETY: within the columns, as was just checked.
                     unsafe { base.add(start) }
                 }
-                Place::Output(i) => {
+                ColumnPlace::Output(i) => {
                     let output = &mut frame.outputs[i as usize];
                     assert_eq!(output.len(), length, "length of an output");
                     output.as_mut_ptr()

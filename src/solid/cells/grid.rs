@@ -13,13 +13,14 @@ use std::collections::HashMap;
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
-use super::Parts;
-use super::prefix::{Verdict, Word, leaf_count, prune};
 use crate::geom::Aabb;
+use crate::solid::leaves::leaf_set::LeafTree;
+use crate::solid::leaves::pruning::{Verdict, prune};
+use crate::solid::leaves::words::{Word, leaf_count};
 
 /// Levels of the flat grid: 2⁶ cells along a side.
 const DEPTH: u32 = 6;
-pub(super) const SIDE: u32 = 1 << DEPTH;
+pub const SIDE: u32 = 1 << DEPTH;
 
 /// Deeper, up to [`MAX_DEPTH`], only where more leaves than this are left.
 const FEW_LEAVES: usize = 4;
@@ -39,7 +40,7 @@ const RESTLESS_DEPTH: u32 = 4;
 
 /// What is known of a cell; its last two bits say which, the others where to go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Cell {
+pub enum Cell {
     Fluid,
     Inside,
     /// Where its program begins.
@@ -50,7 +51,7 @@ pub(super) enum Cell {
 
 /// The cells of a box.
 #[derive(Debug, Clone)]
-pub(super) struct Cells {
+pub struct Cells {
     pub domain: Aabb,
     /// Cells of the flat grid for each unit of length.
     per_length: DVec3,
@@ -66,7 +67,7 @@ pub(super) struct Cells {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Counts {
+pub struct Counts {
     pub fluid: usize,
     pub inside: usize,
     pub near: usize,
@@ -76,7 +77,7 @@ pub(super) struct Counts {
 
 /// An undivided cell and its place: equal places, equal cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Found {
+pub struct Found {
     pub cell: Cell,
     pub depth: u32,
     pub place: u32,
@@ -84,7 +85,7 @@ pub(super) struct Found {
 
 /// A cell that may hold a surface, while the map is built.
 #[derive(Debug, Clone)]
-pub(super) struct Pending {
+pub struct Pending {
     depth: u32,
     /// Number of the cell along each axis at its depth.
     at: UVec3,
@@ -116,7 +117,7 @@ impl Cell {
 }
 
 /// What is known of a box, and what is left of the solid in it.
-fn judged(parts: &Parts, over: &Aabb, words: &[u32]) -> (Verdict, Vec<u32>) {
+fn judged(parts: &LeafTree, over: &Aabb, words: &[u32]) -> (Verdict, Vec<u32>) {
     let mut left = Vec::new();
     let verdict = prune(words, &mut |leaf| parts.leaves.range(leaf, over), &mut left);
     (verdict, left)
@@ -131,7 +132,7 @@ fn bounds(domain: &Aabb, depth: u32, at: UVec3) -> Aabb {
 
 impl Pending {
     /// Whether a leaf that moves is left in it.
-    fn is_restless(&self, parts: &Parts) -> bool {
+    fn is_restless(&self, parts: &LeafTree) -> bool {
         let moves =
             |&word: &u32| matches!(Word::read(word), Word::Leaf { leaf, .. } if parts.leaves.moves(leaf));
         self.words.iter().any(moves)
@@ -140,7 +141,7 @@ impl Pending {
 
 impl Cells {
     /// Divides a box; `margin` is positive.
-    pub fn new(parts: &Parts, domain: Aabb, margin: f64) -> Self {
+    pub fn new(parts: &LeafTree, domain: Aabb, margin: f64) -> Self {
         let (mut cells, level) = Self::begin(parts, domain, margin);
         cells.refine(level, parts, margin, |_| false);
         cells
@@ -148,7 +149,7 @@ impl Cells {
 
     /// Divides a box as far as it is the same during all of the parts' stretch of time. The cells that are left may
     /// change: those in which a leaf that moves matters at some time.
-    pub fn lasting(parts: &Parts, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
+    pub fn lasting(parts: &LeafTree, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
         let (mut cells, level) = Self::begin(parts, domain, margin);
         let left = cells
             .refine(level, parts, margin, |cell| cell.depth == RESTLESS_DEPTH && cell.is_restless(parts));
@@ -156,14 +157,14 @@ impl Cells {
     }
 
     /// What [`Cells::lasting`] has found, with the cells that it has left divided for a shorter stretch of time.
-    pub fn completed(&self, left: &[Pending], parts: &Parts, margin: f64) -> Self {
+    pub fn completed(&self, left: &[Pending], parts: &LeafTree, margin: f64) -> Self {
         let mut cells = self.clone();
         cells.refine(left.to_vec(), parts, margin, |_| false);
         cells
     }
 
     /// The box as one cell, unless it is settled at once.
-    fn begin(parts: &Parts, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
+    fn begin(parts: &LeafTree, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
         let mut cells = Self {
             domain,
             per_length: f64::from(SIDE) / domain.size(),
@@ -189,7 +190,7 @@ impl Cells {
     fn refine(
         &mut self,
         mut level: Vec<Pending>,
-        parts: &Parts,
+        parts: &LeafTree,
         margin: f64,
         leave: impl Fn(&Pending) -> bool,
     ) -> Vec<Pending> {

@@ -3,13 +3,13 @@
 use std::sync::OnceLock;
 
 use super::compiled::RangeProgram;
-use super::programs::Engine;
 use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{self, Graph, Hoisted, Node, RangeEvaluator, Region};
+use crate::solid::engine::Engine;
 
-pub(super) struct Ranges {
+pub struct Ranges {
     /// Without what depends on time alone; nothing for a function of space only.
     moving: Option<Hoisted>,
     evaluator: RangeEvaluator,
@@ -17,7 +17,7 @@ pub(super) struct Ranges {
 }
 
 /// What depends on time alone, during a stretch of time.
-pub(super) struct UniformRanges {
+pub struct UniformRanges {
     intervals: Vec<Interval>,
     /// The same numbers, for machine code.
     pairs: Vec<[f64; 2]>,

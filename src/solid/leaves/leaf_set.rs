@@ -8,57 +8,13 @@ use glam::DVec3;
 
 use smallvec::SmallVec;
 
-use super::compiled::{LeafProgram, RangeProgram};
-use super::prefix::{self, Word};
-use super::programs::Engine;
-use crate::codegen;
+use super::shape::{Motion, Shape};
+use super::words::{self, Word};
 use crate::field::Path;
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{
-    self, Enclosure, EnclosureEvaluator, Expr, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator,
-    Region, Uniforms,
-};
-
-/// From so many leaves of one shape on, their ranges come from machine code: making it costs as much time as some
-/// thousand ranges by the interpreter. Their number decides, not that of the calls, so that the bounds of one leaf
-/// never depend on what was asked before.
-const MANY_LEAVES: usize = 8;
-
-/// A shape of leaves.
-struct Shape {
-    /// What depends on time alone was taken out of it.
-    graph: Graph,
-    root: Node,
-    parameters: usize,
-    leaves: usize,
-    /// Nothing for a leaf at rest.
-    motion: Option<Motion>,
-    range: RangeEvaluator,
-    range_code: OnceLock<Option<RangeProgram>>,
-    value: OnceLock<Evaluator>,
-    gradient: OnceLock<Evaluator>,
-    contact: OnceLock<Evaluator>,
-    /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
-    along: OnceLock<Option<Evaluator>>,
-    taylor: OnceLock<EnclosureEvaluator>,
-}
-
-/// What is peculiar to leaves that move.
-struct Motion {
-    /// The leaf as a formula of time.
-    graph: Graph,
-    root: Node,
-    uniforms: Uniforms,
-    /// With these uniforms, as the graph of the shape.
-    velocity: (Graph, Vec<Node>),
-    velocity_code: OnceLock<Evaluator>,
-}
-
-struct Evaluator {
-    code: Option<LeafProgram>,
-    interpreter: Interpreter,
-}
+use crate::ir::{Enclosure, Expr, Graph, Node, Region};
+use crate::solid::engine::Engine;
 
 struct Leaf {
     shape: u32,
@@ -71,7 +27,7 @@ struct Leaf {
 }
 
 /// The leaves of a solid at all times.
-pub(super) struct Store {
+pub struct LeafStore {
     engine: Engine,
     shapes: Vec<Shape>,
     leaves: Vec<Leaf>,
@@ -80,13 +36,20 @@ pub(super) struct Store {
 }
 
 /// The leaves during a stretch of time: values are those at its end, ranges hold all of it.
-pub(super) struct Leaves {
-    store: Arc<Store>,
+pub struct Leaves {
+    store: Arc<LeafStore>,
     from: f64,
     to: f64,
     /// What depends on time alone, at the end.
     uniforms: Vec<f64>,
     ranges: OnceLock<Ranges>,
+}
+
+/// A solid taken apart, during a stretch of time: its leaves, and how they are joined.
+pub struct LeafTree {
+    pub leaves: Leaves,
+    /// In prefix form, see `words`.
+    pub words: Arc<[u32]>,
 }
 
 /// What depends on time alone, during the stretch.
@@ -101,7 +64,7 @@ struct Ranges {
 /// Numbers of one leaf that depend on time alone.
 type Uniform = SmallVec<[f64; 16]>;
 
-impl Store {
+impl LeafStore {
     pub fn new(engine: Engine, graph: &Graph, nodes: &[Node]) -> Self {
         let mut known: HashMap<Vec<Expr>, u32> = HashMap::new();
         let (shapes, leaves, constants) = (Vec::new(), Vec::new(), Vec::new());
@@ -278,8 +241,8 @@ impl Leaves {
     }
 
     /// Whether a tree in prefix form is surely negative all over a box, at all times of the stretch.
-    pub fn is_negative(&self, words: &[u32], over: &Aabb) -> bool {
-        let negative = prefix::is_negative(words, &mut 0, &mut |leaf, negated| {
+    pub fn is_negative(&self, tree: &[u32], over: &Aabb) -> bool {
+        let negative = words::is_negative(tree, &mut 0, &mut |leaf, negated| {
             let range = self.range(leaf, over);
             (range != Interval::ALL).then_some(if negated { range.lo > 0.0 } else { range.hi < 0.0 })
         });
@@ -310,9 +273,9 @@ impl Leaves {
     }
 
     /// What a leaf is along the whole path, passed during the stretch of time, if it is a polynomial of degree two at most.
-    pub fn along(&self, leaf: u32, negated: bool, from: DVec3, to: DVec3) -> Option<Enclosure> {
+    pub fn on_path(&self, leaf: u32, negated: bool, from: DVec3, to: DVec3) -> Option<Enclosure> {
         let (shape, constants, _) = self.of(leaf);
-        let program = shape.along(self.store.engine)?;
+        let program = shape.polynomial(self.store.engine)?;
         let mut parameters: SmallVec<[f64; 16]> = SmallVec::from_slice(constants);
         parameters.extend_from_slice(&(to - from).to_array());
         parameters.extend_from_slice(&[self.to - self.from, self.from]);
@@ -334,151 +297,12 @@ impl Leaves {
     /// An enclosure of a leaf over a part of a path.
     pub fn enclose(&self, leaf: u32, negated: bool, path: &Path, stretch: (f64, f64)) -> Enclosure {
         let (shape, constants, _) = self.of(leaf);
-        let (graph, root) = shape.formula();
-        let taylor = shape.taylor.get_or_init(|| EnclosureEvaluator::new(graph, root));
         let (from, to) = (path.from.extend(self.from).to_array(), path.to.extend(self.to).to_array());
-        let found = taylor.enclose(from, to, stretch, constants);
+        let found = shape.enclosures().enclose(from, to, stretch, constants);
         if negated {
             Enclosure { coefficients: found.coefficients.map(|c| -c), range: -found.range }
         } else {
             found
         }
-    }
-}
-
-impl Motion {
-    #[inline]
-    fn velocity(&self, shape: &Shape, engine: Engine) -> &Evaluator {
-        let (graph, outputs) = &self.velocity;
-        let make = || Evaluator::new(engine, graph, outputs, shape.parameters);
-        self.velocity_code.get_or_init(make)
-    }
-}
-
-impl Shape {
-    fn new(graph: Graph, root: Node, parameters: usize) -> Self {
-        let (graph, root, motion) = if graph.uses_time(root) {
-            let mut all = graph.clone();
-            let [x, y, z] = ir::wall_velocity(&mut all, root);
-            let (all, outputs, _) = crate::simplify::simplify(&all, &[root, x, y, z]);
-            let Hoisted { graph: rest, outputs, uniforms, .. } = ir::hoisted(&all, &outputs);
-            let velocity = rest.extract(&outputs[1..]);
-            let motion = Motion { graph, root, uniforms, velocity, velocity_code: OnceLock::new() };
-            let (rest, root) = rest.extract_cone(outputs[0]);
-            (rest, root, Some(motion))
-        } else {
-            (graph, root, None)
-        };
-        let range = RangeEvaluator::new(&graph, root);
-        let (range_code, value, gradient) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
-        let (contact, along, taylor) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
-        Self {
-            graph,
-            root,
-            parameters,
-            leaves: 0,
-            motion,
-            range,
-            range_code,
-            value,
-            gradient,
-            contact,
-            along,
-            taylor,
-        }
-    }
-
-    /// How many numbers of it depend on time alone.
-    #[inline]
-    fn uniforms(&self) -> usize {
-        self.motion.as_ref().map_or(0, |motion| motion.uniforms.len())
-    }
-
-    /// Whether machine code may answer for the range of a leaf with these numbers.
-    fn range_stays_finite(&self, parameters: &[f64], uniforms: &[Interval]) -> bool {
-        let numbers = Region { parameters, uniforms, ..Region::of(&Aabb::EMPTY) };
-        codegen::range_stays_finite(&self.graph, &self.range, numbers)
-    }
-
-    /// The leaf as a formula of place and time.
-    fn formula(&self) -> (&Graph, Node) {
-        self.motion.as_ref().map_or((&self.graph, self.root), |motion| (&motion.graph, motion.root))
-    }
-
-    #[inline]
-    fn range_code(&self) -> Option<&RangeProgram> {
-        // those of a leaf that moves are asked for again and again
-        if self.leaves < MANY_LEAVES && self.motion.is_none() {
-            return None;
-        }
-        let compile = || RangeProgram::with_parameters(&self.graph, self.root, self.parameters).ok();
-        self.range_code.get_or_init(compile).as_ref()
-    }
-
-    #[inline]
-    fn contact(&self, engine: Engine) -> &Evaluator {
-        self.contact.get_or_init(|| {
-            let mut graph = self.graph.clone();
-            let outputs = ir::contact(&mut graph, self.root);
-            let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
-            Evaluator::new(engine, &graph, &outputs, self.parameters)
-        })
-    }
-
-    fn along(&self, engine: Engine) -> Option<&Evaluator> {
-        let make = || {
-            let (graph, root) = self.formula();
-            let mut graph = graph.clone();
-            let outputs = ir::polynomial_on_path(&mut graph, root, self.parameters as u32)?;
-            let (graph, outputs, _) = crate::simplify::simplify(&graph, &outputs);
-            Some(Evaluator::new(engine, &graph, &outputs, self.parameters + 5))
-        };
-        self.along.get_or_init(make).as_ref()
-    }
-
-    #[inline]
-    fn value(&self, engine: Engine) -> &Evaluator {
-        self.value.get_or_init(|| Evaluator::new(engine, &self.graph, &[self.root], self.parameters))
-    }
-
-    fn gradient(&self, engine: Engine) -> &Evaluator {
-        self.gradient.get_or_init(|| {
-            let mut graph = self.graph.clone();
-            let [x, y, z] = ir::gradient(&mut graph, self.root);
-            let (graph, outputs, _) = crate::simplify::simplify(&graph, &[self.root, x, y, z]);
-            Evaluator::new(engine, &graph, &outputs, self.parameters)
-        })
-    }
-}
-
-impl Evaluator {
-    fn new(engine: Engine, graph: &Graph, outputs: &[Node], parameters: usize) -> Self {
-        let code = match engine {
-            Engine::Interpreter => None,
-            Engine::Auto | Engine::Jit => LeafProgram::compile(graph, outputs, parameters).ok(),
-        };
-        Self { code, interpreter: Interpreter::new(graph, outputs) }
-    }
-
-    #[inline]
-    fn point(&self, p: DVec3, constants: &[f64], uniforms: &[f64], out: &mut [f64]) {
-        match &self.code {
-            Some(code) => code.call(p, constants, uniforms, out),
-            None => self.interpret(p.to_array(), constants, uniforms, out),
-        }
-    }
-
-    fn many(&self, points: [&[f64]; 3], constants: &[f64], uniforms: &[f64], out: &mut [f64]) {
-        if let Some(code) = &self.code {
-            return code.call_many(points, constants, uniforms, out);
-        }
-        for (i, out) in out.iter_mut().enumerate() {
-            let p = points.map(|column| column[i]);
-            self.interpret(p, constants, uniforms, std::slice::from_mut(out));
-        }
-    }
-
-    fn interpret(&self, p: [f64; 3], parameters: &[f64], uniforms: &[f64], out: &mut [f64]) {
-        self.interpreter.eval_given(Given { parameters, uniforms, ..Given::point(p) }, out);
     }
 }

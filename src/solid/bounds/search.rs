@@ -4,21 +4,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::prefix::{Verdict, prune};
-use super::{Parts, Solid};
+use super::extent::Bounds;
 use crate::geom::Aabb;
-
-/// What is known about the extent of a solid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bounds {
-    /// ω > 0 nowhere in the cube of half-side 2²⁰ around the origin: proven.
-    Empty,
-    /// The solid lies in this box: proven. Each face is within a millionth of the longest side of the solid itself
-    /// where the budget of the proof allowed it.
-    Within(Aabb),
-    /// No such box was found within that cube.
-    Unbounded,
-}
+use crate::solid::construction::Solid;
+use crate::solid::leaves::leaf_set::LeafTree;
+use crate::solid::leaves::pruning::{Verdict, prune};
 
 /// Half the side of the cube around the origin in which solids are looked for.
 pub const SEARCH_RADIUS: f64 = 1_048_576.0;
@@ -34,16 +24,6 @@ const PROOF_BUDGET: usize = 3_000;
 
 /// Attempts for each face: each halves the uncertainty.
 const FACE_STEPS: usize = 24;
-
-impl Bounds {
-    /// The box, if the solid has one.
-    pub fn aabb(&self) -> Option<Aabb> {
-        match self {
-            Self::Within(aabb) => Some(*aabb),
-            Self::Empty | Self::Unbounded => None,
-        }
-    }
-}
 
 /// What tells whether a box may hold a part of the solid, the better the smaller the box.
 trait Probe {
@@ -75,7 +55,7 @@ impl Probe for Whole<'_> {
 
 /// Asks only for the ranges of the leaves that still matter in a box.
 struct ByLeaves<'a> {
-    parts: &'a Parts,
+    parts: &'a LeafTree,
 }
 
 impl Probe for ByLeaves<'_> {
@@ -101,8 +81,15 @@ impl Probe for ByLeaves<'_> {
     }
 }
 
+impl Solid {
+    /// Where the solid is; found on first use by subdivision, then kept.
+    pub fn bounds(&self) -> &Bounds {
+        self.moment.bounds(|| find(self))
+    }
+}
+
 /// Looks for the solid in the whole search cube.
-pub(super) fn find(solid: &Solid) -> Bounds {
+fn find(solid: &Solid) -> Bounds {
     match solid.parts() {
         Some(parts) => search(&ByLeaves { parts: &parts }),
         None => search(&Whole(solid)),

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use crate::ir::{Graph, Node, SignRule};
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Logic {
+pub enum Logic {
     Leaf { leaf: u32, negated: bool },
     All(Vec<Logic>),
     Any(Vec<Logic>),
