@@ -1,8 +1,8 @@
 //! Cranelift instructions on a 128-bit vector of lanes, one function at a time.
 //!
-//! Traps that shape this file: `fmin`/`fmax` cost seven instructions, a comparison with `bitselect` is recognised
-//! as the single `min`/`max` instruction; a scalar float `select` becomes a jump, so single points use vectors too;
-//! `fma` is never emitted, because results must not depend on the processor.
+//! Traps that shape this file: `fmin`/`fmax` cost seven instructions, a comparison with `bitselect` is
+//! recognised as the single `min`/`max` instruction; a scalar float `select` becomes a jump, so single points
+//! use vectors too; `fma` is never emitted, because results must not depend on the processor.
 
 use std::collections::{HashMap, HashSet};
 
@@ -127,8 +127,8 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.select(less, a, b)
     }
 
-    /// A vector whose lanes have only their sign bit set. A constant, which is loaded once before a loop: `fneg`
-    /// and `fabs` would build it anew at every use.
+    /// A vector whose lanes have only their sign bit set. A constant, which is loaded once before a loop:
+    /// `fneg` and `fabs` would build it anew at every use.
     fn sign_bits(&mut self) -> Value {
         self.constant(-0.0)
     }

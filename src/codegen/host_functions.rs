@@ -1,4 +1,5 @@
-//! Functions that have no machine instruction: called lane by lane, the same functions that the interpreter uses.
+//! Functions that have no machine instruction: called lane by lane, the same functions that the interpreter
+//! uses.
 
 use cranelift_codegen::ir::{AbiParam, Signature, types};
 use cranelift_codegen::isa::CallConv;

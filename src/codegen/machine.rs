@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 use cranelift_codegen::isa::OwnedTargetIsa;
 use cranelift_codegen::settings::{self, Configurable};
 
+/// Why there is no program.
 #[derive(Debug, Clone)]
 pub enum CodegenError {
     /// This processor or system cannot run compiled code; the interpreter can.

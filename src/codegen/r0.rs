@@ -24,8 +24,8 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// The parts for a pair of operands: see `ir::r0`, whose operations these are. A disjunction is the dual of a
-    /// conjunction there; here its signs are worked into the formulas, which changes no bit.
+    /// The parts for a pair of operands: see `ir::r0`, whose operations these are. A disjunction is the dual
+    /// of a conjunction there; here its signs are worked into the formulas, which changes no bit.
     fn r0_parts(&mut self, (u, a): Operand, (v, b): Operand, junction: Junction) -> R0Parts {
         let key = (u, v, junction);
         if let Some(parts) = self.parts.get(&key) {
@@ -130,7 +130,8 @@ impl Emitter<'_, '_> {
         (lesser, greater)
     }
 
-    /// u + v ∓ √(u² + v²) as printed in every textbook: loses all digits of a small result between large operands.
+    /// u + v ∓ √(u² + v²) as printed in every textbook: loses all digits of a small result between large
+    /// operands.
     fn textbook_value(&mut self, a: Value, b: Value, junction: Junction) -> Value {
         let sum = self.builder.ins().fadd(a, b);
         let h = self.hypotenuse(a, b);
@@ -159,7 +160,8 @@ impl Emitter<'_, '_> {
         self.builder.ins().sqrt(squares)
     }
 
-    /// As `ir::r0::and_scaled`: squares only of the ratio q = m/M, so nothing overflows that need not.
+    /// The operations of `ir::r0::and_scaled`. Only the ratio q = m/M is squared, so nothing overflows that
+    /// need not.
     fn scaled(&mut self, a: Value, b: Value, junction: Junction) -> Scaled {
         let less = self.compare(FloatCC::LessThan, a, b);
         let greater = self.compare(FloatCC::LessThan, b, a);

@@ -1,13 +1,14 @@
 //! Ranges in machine code: the interval of every node in one register, as [−lo, hi].
 //!
-//! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets the
-//! processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above the exact one
-//! after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added after each operation.
-//! The rules are those of `ir::bounds::range`; bounds may be wider by a few ulp, of R₀ by a few ulp of its larger operand.
+//! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets
+//! the processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above
+//! the exact one after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added
+//! after each operation. The rules are those of `ir::bounds::range`; bounds may be wider by a few ulp, of R₀
+//! by a few ulp of its larger operand.
 //!
-//! Only graphs are taken whose every node is finite over [`REACH`], and small enough that no square overflows: then
-//! neither infinity nor NaN can arise for a box within it, and min and max need not look for them. Elsewhere the
-//! interpreter answers.
+//! Only graphs are taken whose every node is finite over [`REACH`], and small enough that no square
+//! overflows: then neither infinity nor NaN can arise for a box within it, and min and max need not look for
+//! them. Elsewhere the interpreter answers.
 
 use std::collections::HashMap;
 
@@ -34,16 +35,17 @@ const LARGEST_OPERAND: f64 = 1e150;
 /// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
 const ULP: f64 = f64::EPSILON;
 
-/// What a product of two sums is widened by, relative: three roundings of the bound itself, and one and a half of the
-/// program whose values it must hold.
+/// What a product of two sums is widened by, relative: three roundings of the bound itself, and one and a
+/// half of the program whose values it must hold.
 const MARGIN: f64 = 8.0 * ULP;
 
-/// What R₀ is widened by, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the program (see
-/// `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of the sums.
+/// What R₀ is widened by, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the
+/// program (see `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of
+/// the sums.
 const R0_MARGIN: f64 = 16.0 * ULP;
 
-/// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the root of
-/// what is lost.
+/// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the
+/// root of what is lost.
 const R0_UNDERFLOW: f64 = 1e-147;
 
 /// Whether machine code can answer for this graph.
@@ -160,8 +162,8 @@ impl RangeBinary {
     }
 }
 
-/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by zero is
-/// not finite.
+/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by
+/// zero is not finite.
 pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
     let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
     let ranges = evaluator.all_with(&Region { space: &space, ..numbers });
@@ -181,8 +183,9 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
     })
 }
 
-/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the root out;
-/// pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as there are any.
+/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the
+/// root out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
+/// there are any.
 pub(super) fn emit(
     builder: &mut FunctionBuilder<'_>,
     request: Request<'_>,
@@ -199,7 +202,8 @@ pub(super) fn emit(
     let hosts = Hosts::default(); // no instruction calls a function
     let emitter = Emitter::new(builder, Precision::F64, (request.graph, request.forms), &hosts);
     let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
-    // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
+    // bound by bound: two numbers that were just written cannot be read as one vector before they reach the
+    // cache
     let axes: [Value; 3] = std::array::from_fn(|i| {
         let mut bound = |place: usize| {
             let flags = MemFlagsData::new();
@@ -468,13 +472,13 @@ impl Ranges<'_, '_> {
         self.not_negative(wide)
     }
 
-    /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1: from the values at the ends of e, and at the point t of
-    /// e nearest to the vertex.
+    /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1: from the values at the ends of e, and at the
+    /// point t of e nearest to the vertex.
     fn slab(&mut self, e: Value, first: Affine, second: Affine) -> Value {
         let plain = self.flip(e, Lane::Low);
         let turned = self.swap(plain);
-        // a concave product has its largest value at t and its least at an end: [lo, t] and [hi, t] are looked at; a
-        // convex one is looked at at [t, lo] and [t, hi]
+        // a concave product has its largest value at t and its least at an end: [lo, t] and [hi, t] are
+        // looked at; a convex one is looked at at [t, lo] and [t, hi]
         let concave = first.slope != second.slope;
         let (at_vertex, near, far) =
             if concave { (Lane::High, turned, plain) } else { (Lane::Low, plain, turned) };
@@ -519,8 +523,8 @@ impl Ranges<'_, '_> {
         }
     }
 
-    /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d, also d² in
-    /// the lane of the value there, which misses the extreme value by so much.
+    /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d,
+    /// also d² in the lane of the value there, which misses the extreme value by so much.
     fn vertex(&mut self, first: Affine, second: Affine, at_vertex: Lane) -> (Value, Option<Value>) {
         // the root of slope·e ± offset is ∓slope·offset
         let sign = |affine: Affine| if affine.minus { affine.slope } else { -affine.slope };
@@ -554,13 +558,13 @@ impl Ranges<'_, '_> {
         (self.fmul(sum, half), Some(self.fmul(d, d)))
     }
 
-    /// The range of a ∧ b or a ∨ b: in the lane `and` the upper bound of a conjunction, in the other that of a
-    /// disjunction, because −(u ∧ v) = −u ∨ −v.
+    /// The range of a ∧ b or a ∨ b: in the lane `and` the upper bound of a conjunction, in the other that of
+    /// a disjunction, because −(u ∧ v) = −u ∨ −v.
     ///
-    /// The bounds are u + v ∓ √(u² + v²) as written, widened by what cancels; where hardly anything else is left the
-    /// operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m = max(u, v)
-    /// u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the program). So nothing waits
-    /// for a division after the root.
+    /// The bounds are u + v ∓ √(u² + v²) as written, widened by what cancels; where hardly anything else is
+    /// left the operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m
+    /// = max(u, v) u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the
+    /// program). So nothing waits for a division after the root.
     fn r0(&mut self, a: Value, b: Value, and: Lane) -> Value {
         let lost = self.emitter.constant(R0_UNDERFLOW);
         let sum = self.fadd(a, b);

@@ -40,7 +40,7 @@ impl Listing {
     /// The texts of a program.
     ///
     /// # Errors
-    /// As for [`compile`].
+    /// Those of [`compile`].
     pub fn of(request: Request<'_>) -> Result<Self, CodegenError> {
         Ok(build(request, true)?.1)
     }
@@ -208,7 +208,7 @@ fn batch(
 struct Arguments {
     coordinates: [Value; 3],
     inputs: FxHashMap<Node, Value>,
-    /// A pointer, as the next.
+    /// Pointers.
     parameters: Option<Value>,
     uniforms: Option<Value>,
 }

@@ -13,9 +13,9 @@ pub enum Form {
     /// Half-angle form: ≤ 2 ulp, exact sign for all finite operands, finite gradient at corners.
     #[default]
     Stable,
-    /// The textbook's formula where it loses at most four bits, the stable form for the run of 16 points in which it
-    /// loses more: ≤ 14 ulp. Over blocks only; a single point gets the
-    /// stable form, unless its graph is so large that blocks answer for single points too.
+    /// The textbook's formula where it loses at most four bits, the stable form for the run of 16 points in
+    /// which it loses more: ≤ 14 ulp. Over blocks only; a single point gets the stable form, unless its graph
+    /// is so large that blocks answer for single points too.
     Guarded,
     /// u + v ∓ √(u² + v²) as written: cheapest, loses digits and at worst the sign where operands cancel.
     Textbook,
@@ -84,6 +84,7 @@ fn pair(u: Node, v: Node) -> (Node, Node) {
 }
 
 impl Form {
+    /// Its name in options and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Stable => "stable",

@@ -1,18 +1,19 @@
 //! The functions of the mathematical library that graphs may use: their names and their values.
 //!
-//! A function that is added here is known to the language, to the interpreter and to the code generator. All that
-//! remains to be said of it is in `function_rules`: its derivative, its range, its enclosure along a path, how it
-//! hands errors on, and its true value.
+//! A function that is added here is known to the language, to the interpreter and to the code generator. All
+//! that remains to be said of it is in `function_rules`: its derivative, its range, its enclosure along a
+//! path, how it hands errors on, and its true value.
 //!
 //! Values come from one portable library, so that results do not depend on the system.
 
-/// Declares functions of the mathematical library, one on each line: their variant, their name in files and dumps,
-/// and the functions that compute them in `f64` and in `f32`. Before them stand the operands in the ways in which Rust
-/// wants them written.
+/// Declares functions of the mathematical library, one on each line: their variant, their name in files and
+/// dumps, and the functions that compute them in `f64` and in `f32`. Before them stand the operands in the
+/// ways in which Rust wants them written.
 macro_rules! functions {
     (
         $(#[$meta:meta])*
-        pub enum $type:ident of [$($operand:ident)+] $operands:tt in $double_operands:tt or $single_operands:tt {
+        pub enum $type:ident of [$($operand:ident)+] $operands:tt
+            in $double_operands:tt or $single_operands:tt {
             $($(#[$variant_meta:meta])* $variant:ident $name:literal $double:ident $single:ident;)+
         }
     ) => {
@@ -77,8 +78,8 @@ macro_rules! functions {
 }
 
 functions! {
-    /// A function of one number that no processor has an instruction for: programs call it. Its derivative, its range
-    /// and its other rules are in `function_rules`.
+    /// A function of one number that no processor has an instruction for: programs call it. Its derivative,
+    /// its range and its other rules are in `function_rules`.
     pub enum UnaryFunction of [a] (a) in (a: f64) or (a: f32) {
         Sin "sin" sin sinf;
         Cos "cos" cos cosf;

@@ -1,7 +1,7 @@
 //! What every analysis needs to know of a function of the mathematical library, all in one place.
 //!
-//! For f(a): the derivative as nodes of a graph, the range over an interval, f′ and ½f″ over an interval, the error
-//! that f hands on from its operand, and its true value.
+//! For f(a): the derivative as nodes of a graph, the range over an interval, f′ and ½f″ over an interval, the
+//! error that f hands on from its operand, and its true value.
 
 use super::bounds::upper::{add, div, magnitude, mul, smallest_magnitude};
 use crate::interval::Interval;
@@ -63,7 +63,7 @@ impl UnaryFunction {
     /// The range over an interval; all reals where the function may be undefined.
     pub(super) fn range(self, a: Interval) -> Interval {
         match self {
-            // of what may have overflowed, sine and cosine are not numbers
+            // an operand that has overflowed has no sine and no cosine
             Self::Sin | Self::Cos if a.lo == f64::NEG_INFINITY || a.hi == f64::INFINITY => Interval::ALL,
             Self::Sin => a.sin(),
             Self::Cos => a.cos(),
@@ -77,8 +77,8 @@ impl UnaryFunction {
         }
     }
 
-    /// [f′, ½f″] over an interval, from the operand's range and that of f. `None` for functions without such a rule: along
-    /// a path only their range is known.
+    /// [f′, ½f″] over an interval, from the operand's range and that of f. `None` for functions without such
+    /// a rule: along a path only their range is known.
     pub(super) fn slope_and_bend(self, a: Interval, value: Interval) -> Option<[Interval; 2]> {
         let one = Interval::point(1.0);
         let half = |a: Interval| a * Interval::point(0.5);
@@ -102,8 +102,8 @@ impl UnaryFunction {
         }
     }
 
-    /// A bound of |f(â) − f(a)| for |â − a| ≤ `error`, both in the interval `a`; `None` where f may be undefined or is
-    /// too steep.
+    /// A bound of |f(â) − f(a)| for |â − a| ≤ `error`, both in the interval `a`; `None` where f may be
+    /// undefined or is too steep.
     pub(super) fn propagated(self, a: Interval, error: f64) -> Option<f64> {
         match self {
             Self::Sin | Self::Cos | Self::Atan => Some(error),
@@ -192,8 +192,8 @@ impl BinaryFunction {
         }
     }
 
-    /// A bound of |f(â, b̂) − f(a, b)| for operands in two intervals that are off by `errors` at most, and values of f in
-    /// `range`; `None` where f may be undefined or jumps.
+    /// A bound of |f(â, b̂) − f(a, b)| for operands in two intervals that are off by `errors` at most, and
+    /// values of f in `range`; `None` where f may be undefined or jumps.
     pub(super) fn propagated(self, [a, b]: [Interval; 2], errors: [f64; 2], range: Interval) -> Option<f64> {
         match self {
             // a^b = exp(b·ln a)

@@ -1,4 +1,5 @@
-//! The interpreter: the meaning of a graph, the oracle of the tests, and the engine where no machine code may run.
+//! The interpreter: the meaning of a graph, the oracle of the tests, and the engine where no machine code may
+//! run.
 
 use std::cell::RefCell;
 
@@ -14,12 +15,14 @@ pub struct Interpreter {
     outputs: Vec<Node>,
 }
 
-/// What a graph is evaluated for.
+/// The numbers that a graph is evaluated for.
 #[derive(Debug, Clone, Copy)]
 pub struct Given<'a, T> {
+    /// x, y and z.
     pub point: [T; 3],
     /// Seconds.
     pub time: T,
+    /// See [`Expr::Parameter`].
     pub parameters: &'a [T],
     /// See [`Expr::Uniform`].
     pub uniforms: &'a [T],

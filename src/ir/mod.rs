@@ -1,13 +1,14 @@
 //! The expression graph of ω: typed, interned, each node stored once; its meaning is the interpreter's.
 //!
-//! A [`Graph`] is a list of operations in which operands come before their uses, so every pass is one loop over
-//! it. R-functions are operations of their own (not spelt out in square roots): each consumer chooses its form.
+//! A [`Graph`] is a list of operations in which operands come before their uses, so every pass is one loop
+//! over it. R-functions are operations of their own (not spelt out in square roots): each consumer chooses
+//! its form.
 //!
 //! | file or folder | what it holds |
 //! |---|---|
-//! | `graph`, `op`, `function`, `r0`, `form` | the graph, its operations, and the forms in which R₀ is computed |
+//! | `graph`, `op`, `function`, `r0`, `form` | the graph, its operations, the forms in which R₀ is computed |
 //! | `interpreter` | the meaning of a graph |
-//! | `derived` | other graphs made of a graph: gradient, contact, sign twin, parts that depend on time alone |
+//! | `derived` | graphs made of a graph: gradient, contact, sign twin, what depends on time alone |
 //! | `bounds` | ranges, magnitudes and rounding errors over boxes |
 //! | `on_path` | what is known of a leaf along a straight path |
 //! | `exact` | true values, to 120 digits |

@@ -1,8 +1,8 @@
 //! The operations: each is defined once, here, by its name and its value.
 //!
-//! The code generator is tested against these values bit for bit. An operation that is added needs a rule in every
-//! analysis (derivative, range, rounding error, truth) and an instruction. A function of the mathematical library needs
-//! less, see `function`.
+//! The code generator is tested against these values bit for bit. An operation that is added needs a rule in
+//! every analysis (derivative, range, rounding error, truth) and an instruction. A function of the
+//! mathematical library needs less, see `function`.
 
 use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::r0;
@@ -11,20 +11,28 @@ use crate::ir::real::Real;
 /// An operation on one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Unary {
+    /// −a
     Neg,
+    /// |a|
     Abs,
+    /// √a
     Sqrt,
     /// −1, 0 or 1; the derivative of |a|, 0 at 0 by convention.
     Sign,
+    /// A function of the mathematical library.
     Call(UnaryFunction),
 }
 
 /// An operation on two numbers, a and b.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Binary {
+    /// a + b
     Add,
+    /// a − b
     Sub,
+    /// a·b
     Mul,
+    /// a/b
     Div,
     /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains 0.
     DivOrZero,
@@ -40,6 +48,7 @@ pub enum Binary {
     MinWeight,
     /// ∂max(a, b)/∂a: 1, ½ or 0 where a is larger, equal or smaller.
     MaxWeight,
+    /// A function of the mathematical library.
     Call(BinaryFunction),
     /// R₀-conjunction a ∧ b, see [`r0::and`].
     And,
@@ -54,9 +63,13 @@ pub enum Binary {
 /// An operation of the R₀ system. It is computed in one of several forms, see [`Form`](super::Form).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum R0 {
+    /// [`Binary::And`]
     And,
+    /// [`Binary::Or`]
     Or,
+    /// [`Binary::AndWeight`]
     AndWeight,
+    /// [`Binary::OrWeight`]
     OrWeight,
 }
 

@@ -22,7 +22,7 @@ pub trait Real:
 {
     /// The nearest number of the type.
     fn from_f64(x: f64) -> Self;
-    /// The same number in `f64`.
+    /// Its value in `f64`, exactly.
     fn to_f64(self) -> f64;
     /// √a, correctly rounded; NaN for negative numbers.
     fn sqrt(self) -> Self;

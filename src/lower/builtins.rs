@@ -30,7 +30,7 @@ enum Meaning {
     Unevaluated(fn(&mut Lowering<'_>, &[Argument], Span) -> Value),
 }
 
-/// Those that are more than one operation on one number.
+/// The builtins that are more than one operation on one number.
 const COMPOSED: [Builtin; 11] = {
     use Meaning::{Number, NumberOfVectors, Vector};
     const MANY: usize = usize::MAX;
@@ -180,8 +180,8 @@ impl Lowering<'_> {
         })
     }
 
-    /// ω/√(ω² + |∇ω|²): gradient of length 1 on the surface, no division by zero unless ω and ∇ω vanish together
-    /// (Rvachev's normalisation of first order).
+    /// ω/√(ω² + |∇ω|²): gradient of length 1 on the surface, no division by zero unless ω and ∇ω vanish
+    /// together (Rvachev's normalisation of first order).
     fn normalise(&mut self, omega: Node, span: Span) -> Node {
         let gradient = ir::gradient(&mut self.module.graph, omega);
         let square = self.binary(Binary::Mul, omega, omega, span);

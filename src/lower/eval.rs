@@ -16,10 +16,12 @@ const DEEPEST_CALL: usize = 64;
 /// Members of a fold, at most: the node budget is checked after each member, this only bounds the empty ones.
 const LONGEST_FOLD: f64 = 1e7;
 
-/// Expressions evaluated inside one another, at most; with the limits of the parser this takes a chain of calls.
+/// Expressions evaluated inside one another, at most; with the limits of the parser this takes a chain of
+/// calls.
 const DEEPEST_EVALUATION: usize = 2000;
 
-/// Expressions evaluated for each operation of the budget: shared operations cost time though they add no node.
+/// Expressions evaluated for each operation of the budget: shared operations cost time though they add no
+/// node.
 const EVALUATIONS_PER_NODE: usize = 4;
 
 /// Messages that come with a suggestion: in a file with more of them something else is wrong.
@@ -54,7 +56,7 @@ pub(super) struct Scope {
 pub(super) struct Local {
     pub name: String,
     pub value: Value,
-    /// Of the argument that it was bound to.
+    /// The place of the argument that it was bound to.
     pub span: Span,
 }
 
@@ -95,8 +97,8 @@ impl<'a> Lowering<'a> {
         Value::Failed
     }
 
-    /// The span in the user's file that an expression belongs to: its own, or that of the call that led into the
-    /// standard solids.
+    /// The span in the user's file that an expression belongs to: its own, or that of the call that led into
+    /// the standard solids.
     pub fn user_span(&self, span: Span) -> Span {
         if span.source == SourceId::File {
             return span;

@@ -25,7 +25,8 @@ pub(super) struct Global<'a> {
     used: bool,
 }
 
-/// The items of the prelude and of the file; the file's shadow the prelude's, but not inside the prelude itself.
+/// The items of the prelude and of the file; the file's shadow the prelude's, but not inside the prelude
+/// itself.
 #[derive(Debug, Default)]
 pub(super) struct Names<'a> {
     prelude: HashMap<String, Global<'a>>,

@@ -1,7 +1,7 @@
 //! Methods of shapes: the shape is evaluated in moved, turned or scaled coordinates.
 //!
-//! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point before
-//! the transformation. Displacements and angles may depend on time: the shape then moves.
+//! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point
+//! before the transformation. Displacements and angles may depend on time: the shape then moves.
 
 use super::eval::Lowering;
 use super::value::Value;
@@ -13,7 +13,7 @@ use crate::syntax::ast::{Argument, Expr, Name};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Transform {
     Move,
-    /// About a coordinate axis.
+    /// A turn about a coordinate axis.
     RotateAbout(Axis3),
     Rotate,
     Scale,
@@ -158,8 +158,8 @@ impl Lowering<'_> {
         }
     }
 
-    /// Scales about the origin. ω is scaled too (by the smallest factor), so that its gradient keeps its length
-    /// on the surface.
+    /// Scales about the origin. ω is scaled too (by the smallest factor), so that its gradient keeps its
+    /// length on the surface.
     fn scale(&mut self, shape: Node, p: [Node; 3], factor: &Value, at: Span, span: Span) -> Option<Node> {
         let factors = match factor {
             Value::Vector(_) => self.constant_vector(factor, at, "a scale factor")?,
@@ -213,7 +213,7 @@ impl Lowering<'_> {
     fn rotated_back(&mut self, p: [Node; 3], n: [f64; 3], angle: Turn, span: Span) -> [Node; 3] {
         std::array::from_fn(|i| {
             let row: [(Factor, Node); 3] = std::array::from_fn(|j| {
-                // of the vector product with the axis
+                // the matrix of the vector product with the axis
                 let cross = match (3 + j - i) % 3 {
                     0 => 0.0,
                     1 => -n[(i + 2) % 3],
@@ -232,7 +232,8 @@ impl Lowering<'_> {
         })
     }
 
-    /// cos·identity + (1 − cos)·along − sin·cross of a moving angle, written as along + (identity − along)·cos − cross·sin.
+    /// cos·identity + (1 − cos)·along − sin·cross of a moving angle, written as along + (identity −
+    /// along)·cos − cross·sin.
     fn turning(
         &mut self,
         (sin, cos): (Node, Node),

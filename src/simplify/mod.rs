@@ -1,9 +1,9 @@
 //! Graph → cheaper graph with the same values.
 //!
-//! Each rule is an equation with a direction and a label. All rules here are *value-exact*: the result has the
-//! same value for every input, infinities and NaN included, except that a zero may change its sign (no consumer
-//! can tell: ω = ±0 is the surface). Nothing is reassociated or expanded: (x − a)² − … keeps its factored
-//! differences, whose digits an expansion would lose.
+//! Each rule is an equation with a direction and a label. All rules here are *value-exact*: the result has
+//! the same value for every input, infinities and NaN included, except that a zero may change its sign (no
+//! consumer can tell: ω = ±0 is the surface). Nothing is reassociated or expanded: (x − a)² − … keeps its
+//! factored differences, whose digits an expansion would lose.
 //!
 //! Common subexpressions need no rule: interning finds them.
 

@@ -12,8 +12,10 @@ pub struct Applied(pub BTreeMap<&'static str, Uses>);
 /// The uses of one rule.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Uses {
+    /// How often it was applied.
     pub count: usize,
-    /// Where what was rewritten stands: the first [`MOST_PLACES`] different places, in the order of the graph.
+    /// Where what was rewritten stands: the first [`MOST_PLACES`] different places, in the order of the
+    /// graph.
     pub places: Vec<Span>,
 }
 
@@ -32,7 +34,7 @@ impl Uses {
 
 /// An equation read from left to right, with the condition under which it holds.
 pub(super) struct Rule {
-    /// As `rfm explain` prints it.
+    /// The equation as `rfm explain` prints it.
     pub equation: &'static str,
     /// The simplified node, if the left side and the condition fit.
     pub apply: fn(&mut Simplifier, Expr, Option<Span>) -> Option<Node>,

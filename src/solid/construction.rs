@@ -19,7 +19,8 @@ use crate::simplify::{Applied, simplify};
 
 /// An obstacle, compiled.
 ///
-/// A solid that moves is looked at one time, or during a stretch of time: see [`Solid::at`] and [`Solid::between`].
+/// Lengths are in the units of the file, times in seconds, ω in the units of its formula. A solid that moves
+/// is seen at one time, or during a stretch of time: see [`Solid::at`] and [`Solid::between`].
 #[derive(Clone)]
 pub struct Solid {
     pub(super) inner: Arc<Inner>,
@@ -84,7 +85,7 @@ impl Function {
 }
 
 impl Inner {
-    /// The solid taken apart into leaves, once; nothing if that would be too large.
+    /// The solid taken apart into leaves, once; `None` if that would be too large.
     fn parts(&self) -> Option<LeavesAtAllTimes> {
         let take_apart = || {
             let (logic, nodes) = Logic::of(&self.omega.graph, self.omega.root)?;
@@ -115,7 +116,7 @@ impl Solid {
     /// A solid whose machine code evaluates R₀ in another form; for comparing their speed and error.
     ///
     /// # Errors
-    /// As for [`Solid::new`].
+    /// Those of [`Solid::new`].
     pub fn with_form(
         name: impl Into<String>,
         graph: &Graph,
@@ -146,8 +147,8 @@ impl Solid {
         self.inner.omega.range.moves()
     }
 
-    /// How many numbers of a program depend on time alone: they are found once for each time, the rest at each point.
-    /// Nothing for a solid at rest.
+    /// How many numbers of a program depend on time alone: they are found once for each time, the rest at
+    /// each point. `None` for a solid at rest.
     pub fn time_dependent(&self, kind: ProgramKind) -> Option<usize> {
         self.programs(kind).uniforms.as_ref().map(Uniforms::len)
     }
@@ -157,15 +158,15 @@ impl Solid {
         self.moment.to
     }
 
-    /// The solid at a time, s. Nothing is compiled again; a solid at rest is the same at all times. Where the time is
-    /// not a number, nothing is.
+    /// The solid at a time, s. Nothing is compiled again; a solid at rest is the same at all times. If the
+    /// time is NaN, so are all values.
     #[must_use]
     pub fn at(&self, time: f64) -> Self {
         self.between(time, time)
     }
 
-    /// The solid during a stretch of time: values, gradients, signs and contacts are those at its end, ranges and bounds
-    /// hold all of it, and a path is passed from its beginning to its end.
+    /// The solid during a stretch of time: values, gradients, signs and contacts are those at its end, ranges
+    /// and bounds hold all of it, and a path is passed from its beginning to its end.
     #[must_use]
     pub fn between(&self, from: f64, to: f64) -> Self {
         if !self.moves() {
@@ -174,7 +175,7 @@ impl Solid {
         Self { inner: self.inner.clone(), moment: Moment::new(from, to) }
     }
 
-    /// As in `solid NAME = …`.
+    /// The name that the file gives it: `solid NAME = …`.
     pub fn name(&self) -> &str {
         &self.inner.name
     }
@@ -264,7 +265,7 @@ impl Solid {
         if part == 1.0 || from == to { self.clone() } else { self.at(from + part * (to - from)) }
     }
 
-    /// The solid taken apart into leaves, once; nothing if that would be too large.
+    /// The solid taken apart into leaves, once; `None` if that would be too large.
     pub(super) fn parts(&self) -> Option<Arc<LeafTree>> {
         self.moment.parts(|from, to| {
             let (store, words) = self.inner.parts()?;

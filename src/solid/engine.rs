@@ -8,11 +8,11 @@ pub enum Engine {
     Auto,
     /// Machine code, or an error.
     Jit,
-    /// The interpreter: the same bits, some 12 to 13 times slower over columns of points.
+    /// The interpreter: it gives the same bits, some 12 to 13 times slower over columns of points.
     Interpreter,
 }
 
-/// Which question a program answers.
+/// The question that a program answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ProgramKind {
     /// ω

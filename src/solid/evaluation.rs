@@ -10,14 +10,16 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
 
-/// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far away.
+/// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far
+/// away.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// Positive in the fluid, negative inside the solid.
+    /// Length, positive in the fluid, negative inside the solid.
     pub distance: f64,
     /// Outward unit normal of the face that is nearest; the mean of two at an edge; zero where there is none.
     pub normal: DVec3,
-    /// Of that face, positive where the solid is convex: 1/R for a ball, 1/2R for a cylinder.
+    /// Mean curvature of that face in 1/length, positive where the solid is convex: 1/R for a ball, 1/2R for
+    /// a cylinder.
     pub mean_curvature: f64,
 }
 
@@ -70,8 +72,8 @@ impl Solid {
         self.evaluate_many(ProgramKind::Gradient, points, out);
     }
 
-    /// Inside (1), on the surface (0) or outside (−1), exactly the logic of the leaves' signs; NaN where a leaf is
-    /// not a number, or farther than 1e77 from the origin.
+    /// Inside (1), on the surface (0) or outside (−1), exactly the logic of the leaves' signs; NaN where a
+    /// leaf is not a number, or farther than 1e77 from the origin.
     #[inline]
     pub fn sign(&self, p: DVec3) -> f64 {
         let mut out = [0.0];
@@ -79,7 +81,8 @@ impl Solid {
         Unary::Sign.eval(out[0])
     }
 
-    /// What a particle at this place needs to know of the surface.
+    /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
+    /// estimate far away.
     pub fn contact(&self, p: DVec3) -> Contact {
         let mut out = [0.0; 5];
         self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
@@ -87,8 +90,9 @@ impl Solid {
         Contact { distance, normal: DVec3::new(nx, ny, nz), mean_curvature }
     }
 
-    /// The velocity of the surface near a point, in the direction of its normal: of the face that [`Solid::contact`]
-    /// finds. Zero for a solid at rest. A motion within the surface itself, as of a turning cylinder, is not in ω.
+    /// The velocity of the surface near a point, along its normal, in lengths per second: that of the face
+    /// which [`Solid::contact`] finds. Zero for a solid at rest. A motion within the surface itself, as of a
+    /// turning cylinder, is not in ω.
     pub fn wall_velocity(&self, p: DVec3) -> DVec3 {
         if !self.moves() {
             return DVec3::ZERO;
@@ -121,9 +125,9 @@ impl Solid {
         self.evaluate_many(ProgramKind::Sign, points, [twin]);
     }
 
-    /// An interval that contains ω of every point of a box: the exact value and the one that [`Solid::omega`] gives,
-    /// also where that overflows. [`Interval::ALL`] where ω may not be a number; points at which it is none because
-    /// of their coordinates (not finite, or so large that their sum is not) are not spoken of.
+    /// An interval that contains ω of every point of a box: the exact value and the one that [`Solid::omega`]
+    /// gives, also where that overflows. [`Interval::ALL`] where ω may not be a number. It says nothing of
+    /// points at which ω is NaN because of their coordinates: not finite, or so large that their sum is not.
     pub fn range(&self, over: &Aabb) -> Interval {
         self.inner.omega.range(self.inner.engine, over, &self.moment, false)
     }

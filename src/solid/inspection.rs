@@ -11,32 +11,33 @@ use crate::interval::Interval;
 /// One of the inequalities that a solid consists of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeafInfo {
-    /// Where it was written first.
+    /// The place in the file where it was written first.
     pub span: Option<Span>,
     /// Leaves of one shape, numbered from 0, differ in their constants alone and share one program.
     pub shape: usize,
-    /// Of its formula.
+    /// Operations of its formula, constants and coordinates not counted.
     pub operations: usize,
 }
 
 /// What is left of a solid in a box.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Remainder {
-    /// No point of the box is in the solid: proven.
+    /// It is proven that no point of the box is in the solid.
     Outside,
-    /// Every point is: proven.
+    /// It is proven that every point of the box is.
     Inside,
-    /// These leaves still matter, in the order of [`Solid::leaves`]; the sign is that of the rest of the tree.
+    /// For each leaf, in the order of [`Solid::leaves`], whether it still matters. The sign of the solid is
+    /// that of the tree without the others.
     Leaves(Vec<bool>),
 }
 
 impl Solid {
-    /// How many leaves decide the sign of the solid; nothing if it cannot be taken apart.
+    /// How many leaves decide the sign of the solid; `None` if it cannot be taken apart.
     pub fn leaf_count(&self) -> Option<usize> {
         self.parts().map(|parts| parts.leaves.len())
     }
 
-    /// The leaves of the solid; nothing if it is too large to be taken apart.
+    /// The leaves of the solid; `None` if it is too large to be taken apart.
     pub fn leaves(&self) -> Option<Vec<LeafInfo>> {
         let omega = &self.inner.omega;
         let parts = self.parts()?;
@@ -49,7 +50,7 @@ impl Solid {
         Some(nodes.iter().enumerate().map(info).collect())
     }
 
-    /// What a cell map would keep of the solid in this box.
+    /// What a cell map would keep of the solid in this box; `None` if it cannot be taken apart.
     pub fn remainder_in(&self, over: &Aabb) -> Option<Remainder> {
         let parts = self.parts()?;
         let mut words = Vec::new();
@@ -69,7 +70,8 @@ impl Solid {
         })
     }
 
-    /// The range of each leaf over a box.
+    /// The range of each leaf over a box, in the order of [`Solid::leaves`]; `None` if it cannot be taken
+    /// apart.
     pub fn leaf_ranges(&self, over: &Aabb) -> Option<Vec<Interval>> {
         let parts = self.parts()?;
         Some((0..parts.leaves.len() as u32).map(|leaf| parts.leaves.range(leaf, over)).collect())

@@ -2,8 +2,18 @@
 //!
 //! Cheap to clone, usable from any thread; owns its machine code and frees it with the last clone.
 //!
-//! Invariant: a [`Solid`] answers for every point, every engine gives the same bits, and a program is compiled
-//! only when it is first asked for.
+//! | file or folder | what it holds |
+//! |---|---|
+//! | `construction`, `evaluation` | [`Solid`], its programs and its values |
+//! | `twin`, `walls`, `surface`, `depth` | its views: sign twin, what a fluid asks, the cheapest field, its depth |
+//! | `programs` | compiled code, the programs made on demand, programs over blocks of points |
+//! | `leaves` | a solid taken apart into leaves, and what is left of it in a box |
+//! | `path` | where a straight path meets a solid |
+//! | `cells` | boxes divided into cells, for solids at rest and for solids that move |
+//! | `bounds`, `tolerance`, `inspection` | its extent, its certified errors, its leaves for people |
+//!
+//! Invariant: a [`Solid`] answers for every point, every engine gives the same bits, and a program is
+//! compiled only when it is first asked for.
 
 mod bounds;
 mod cells;

@@ -9,7 +9,8 @@ use super::programs::number::UniformValues;
 use super::programs::ranges::UniformRanges;
 use crate::interval::Interval;
 
-/// A stretch of time. Values are those at its end, ranges hold all of it; a solid at rest has one for ever.
+/// A stretch of time. Values are those at its end, ranges hold for all of it; a solid at rest has one for
+/// ever.
 pub(super) struct Moment {
     pub from: f64,
     pub to: f64,

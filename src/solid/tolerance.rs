@@ -1,7 +1,8 @@
 //! The cheapest program whose certified error keeps a tolerance, see `ir::ErrorAnalysis`.
 //!
-//! The tolerance bounds |computed ω − exact ω| over a box. Only values are computed the cheap way, and only in the box:
-//! gradients, ranges and points beyond it get the solid's own program, signs and surfaces the exact twin.
+//! The tolerance bounds |computed ω − exact ω| over a box. Only values are computed the cheap way, and only
+//! in the box: gradients, ranges and points beyond it get the solid's own program, signs and surfaces the
+//! exact twin.
 
 use glam::DVec3;
 
@@ -17,9 +18,9 @@ use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Magni
 /// One way to compute ω.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProgramVariant {
-    /// Width of the arithmetic.
+    /// The type that it computes in.
     pub precision: Precision,
-    /// Of R₀; scaled where the squares of its operands leave the range.
+    /// How R₀ is evaluated. Pairs of operands whose squares leave the range get the scaled form in any case.
     pub form: Form,
     /// Whether the centre of the box is subtracted in `f64` first.
     pub local: bool,
@@ -29,9 +30,10 @@ impl ProgramVariant {
     /// What solids are compiled to when nothing is asked for.
     pub const STANDARD: Self = Self::new(Precision::F64, Form::Stable, false);
 
-    /// From the cheapest to the dearest: the order in which they are tried. The pawn's ω in columns of `f64`, conversion
-    /// included: 4.7, 7.5, 7.5, 7.3, 10.9 ns, and scaled another fifth. With more operations to a point the conversion
-    /// weighs less, and the `f32` programs move away from the `f64` ones.
+    /// All variants from the cheapest to the dearest, in the order in which they are tried. The pawn's ω in
+    /// columns of `f64` costs 4.7, 7.5, 7.5, 7.3 and 10.9 ns, conversion included; the scaled form a fifth
+    /// more. With more operations to a point the conversion weighs less, and the `f32` programs move away
+    /// from the `f64` ones.
     pub const BY_COST: [Self; 6] = [
         Self::new(Precision::F32, Form::Textbook, false),
         Self::new(Precision::F32, Form::Stable, false),
@@ -45,7 +47,7 @@ impl ProgramVariant {
         Self { precision, form, local }
     }
 
-    /// `f32 stable in local coordinates`
+    /// For messages: `f32 stable in local coordinates`.
     pub fn name(self) -> String {
         let precision = match self.precision {
             Precision::F32 => "f32",
@@ -59,7 +61,7 @@ impl ProgramVariant {
 /// No program keeps the tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutOfTolerance {
-    /// The smallest bound that can be had; infinite if there is none.
+    /// The smallest certified |computed ω − exact ω| that can be had; infinite if there is none.
     pub bound: f64,
     /// The program that has it.
     pub variant: ProgramVariant,
@@ -87,7 +89,7 @@ struct Candidate {
     /// In the coordinates of the program.
     over: Aabb,
     precision: Precision,
-    /// Of the solid.
+    /// The solid's stretch of time.
     time: Interval,
     /// What the programs need to know of it.
     uniforms: UniformValues,
@@ -97,8 +99,9 @@ struct Candidate {
 const BLOCK: usize = 256;
 
 impl Solid {
-    /// The cheapest program whose certified |computed ω − exact ω| is at most `tolerance` everywhere in a box. Exact is
-    /// the value of the simplified formula, whose constants are doubles, at the given point, whose coordinates are.
+    /// The cheapest program whose certified |computed ω − exact ω| is at most `tolerance` everywhere in a
+    /// box. Exact is the value of the simplified formula, whose constants are doubles, at the given point,
+    /// whose coordinates are.
     ///
     /// # Errors
     /// If no program is certified to keep it.
@@ -134,7 +137,7 @@ impl Candidate {
         let over = if variant.local { shifted(over, origin) } else { *over };
         // the solid's own program, unless it was compiled in another form for comparison
         let forms = if variant == ProgramVariant::STANDARD && solid.inner.omega.form == Form::Stable {
-            // of this graph: that of the program has its guard, and other nodes
+            // the graph of the program has a guard, and therefore other nodes
             let [double, _] = forms(&graph, Form::Stable);
             double
         } else {
@@ -191,12 +194,12 @@ fn shifted(over: &Aabb, origin: DVec3) -> Aabb {
 }
 
 impl Chosen {
-    /// Which program it is.
+    /// The program that was chosen.
     pub fn variant(&self) -> ProgramVariant {
         self.variant
     }
 
-    /// Certified: |computed ω − exact ω| is nowhere larger in the box.
+    /// The certified bound: |computed ω − exact ω| is nowhere larger in the box.
     pub fn bound(&self) -> f64 {
         self.bound
     }
@@ -265,7 +268,7 @@ impl Field for Chosen {
         }
     }
 
-    /// By the solid's own program: certificates are about values.
+    /// The solid's own program answers, because certificates are about values.
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         self.solid.omega_grad(p)
     }

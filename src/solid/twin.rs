@@ -16,8 +16,8 @@ pub struct Twin {
 }
 
 impl Solid {
-    /// The min/max twin as a field of its own: the sign and zero set of ω at a fraction of the cost, and on the
-    /// surface the gradient of the one leaf that it lies on.
+    /// The min/max twin as a field of its own: the sign and zero set of ω at a fraction of the cost, and on
+    /// the surface the gradient of the one leaf that it lies on.
     pub fn twin(&self) -> Twin {
         Twin { solid: self.clone() }
     }

@@ -9,9 +9,9 @@ use crate::field::{Entry, Face, Faces, Moving, Part, Path, Walls};
 impl Solid {
     /// Where the straight path between two points first meets the solid; ω = 0 counts as met.
     ///
-    /// During a stretch of time, see [`Solid::between`], time passes evenly along the path.
-    /// Nothing of the path before the entry is in the solid, and a path without one does not touch it: proven, however
-    /// thin the solid and long the path.
+    /// During a stretch of time, see [`Solid::between`], time passes evenly along the path. It is proven that
+    /// nothing of the path before the entry is in the solid, and that a path without an entry does not touch
+    /// it, however thin the solid and long the path.
     pub fn first_entry(&self, from: DVec3, to: DVec3) -> Option<Entry> {
         Walls::first_entry(self, &Path::new(from, to, f64::INFINITY))
     }

@@ -1,8 +1,8 @@
 //! How large the nodes of a graph can become in a box, and which form of R₀ that asks for.
 //!
-//! u ∧ v and u ∨ v can be 2 + √2 times as large as their operands, so a fold written out by hand grows as 2ⁿ: its
-//! squares overflow after 512 equal members in `f64`, after 64 in `f32`, long before its value does. Sizes are kept
-//! as logarithms here, because they leave the range that they are to be compared with.
+//! u ∧ v and u ∨ v can be 2 + √2 times as large as their operands, so a fold written out by hand grows as 2ⁿ:
+//! its squares overflow after 512 equal members in `f64`, after 64 in `f32`, long before its value does.
+//! Sizes are kept here as logarithms, because they leave the range that they are to be compared with.
 
 use glam::DVec3;
 
@@ -15,8 +15,8 @@ use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 use crate::precision::Precision;
 
-/// Where forms are chosen for a solid of which nothing else is known: within this distance of the origin, and within
-/// as many seconds of the beginning.
+/// Where forms are chosen for a solid of which nothing else is known: within this distance of the origin, and
+/// within as many seconds of the beginning.
 const REACH: f64 = 1e4;
 
 /// Ranges up to this size say themselves how large a node is; larger ones may have overflowed.
@@ -29,10 +29,12 @@ pub struct Magnitudes {
 }
 
 impl Magnitudes {
+    /// Within 10⁴ of the origin, and of the beginning of time: for a solid of which nothing else is known.
     pub fn within_reach(graph: &Graph) -> Self {
         Self::over(graph, &Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH)))
     }
 
+    /// In a box.
     pub fn over(graph: &Graph, over: &Aabb) -> Self {
         let time = Interval::new(-REACH, REACH);
         let Some((last, _)) = graph.nodes().last() else { return Self { exponents: Vec::new() } };
@@ -49,8 +51,8 @@ impl Magnitudes {
         self.exponents[node.index()]
     }
 
-    /// The default form, but the scaled one where squares of operands leave the range of the type: where they may
-    /// overflow, or are bound to underflow. Where nothing is known the default stays.
+    /// The default form, but the scaled one where squares of operands leave the range of the type: where they
+    /// may overflow, or are bound to underflow. Where nothing is known the default stays.
     pub fn forms(&self, graph: &Graph, default: Form, precision: Precision) -> Forms {
         let float = FloatType::of(precision);
         let mut forms = Forms::all(default);

@@ -1,14 +1,15 @@
 //! Guaranteed ranges: an interval that contains ω of every point of a box.
 //!
 //! R₀ grows with each operand, so its exact range is reached at the ends of the operands' ranges: two scalar
-//! evaluations, widened by four ulp for their rounding (which cannot change their signs). Squares and products of
-//! two linear functions of one node (slabs) get their exact range too; elsewhere a node that occurs twice is
-//! taken as two independent ones, which is safe but wider.
+//! evaluations, widened by four ulp for their rounding (which cannot change their signs). Squares and
+//! products of two linear functions of one node (slabs) get their exact range too; elsewhere a node that
+//! occurs twice is taken as two independent ones, which is safe but wider.
 //!
-//! A range holds the exact values of the formula over the reals and, of every node, also the values that programs in
-//! `f64` find: rounding never leaves bounds that were rounded outwards, and where squares overflow or underflow R₀ is
-//! widened to what its floating-point form then gives. A node that may not be a number has [`Interval::ALL`], and so
-//! has every node that uses it. Points whose coordinates are not finite belong to no box.
+//! A range holds the exact values of the formula over the reals and, of every node, also the values that
+//! programs in `f64` find: rounding never leaves bounds that were rounded outwards, and where squares
+//! overflow or underflow R₀ is widened to what its floating-point form then gives. A node that may not be a
+//! number has [`Interval::ALL`], and so has every node that uses it. Points whose coordinates are not finite
+//! belong to no box.
 
 use std::cell::RefCell;
 
@@ -18,23 +19,23 @@ use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 use crate::ir::r0;
 
-/// How the range of one node is found; `codegen::range` does the same in machine code.
+/// How the range of one node is found, here and in machine code.
 #[derive(Debug, Clone, Copy)]
 pub enum RangeRule {
+    /// By the operation, from the ranges of its operands.
     Plain(Expr),
+    /// The product of a node with itself.
     Square(Node),
     /// (p·e + q)·(r·e + s) of one node e.
-    Slab {
-        of: Node,
-        first: Affine,
-        second: Affine,
-    },
+    Slab { of: Node, first: Affine, second: Affine },
 }
 
 /// slope · node ± offset, with slope 1 or −1; the offset is a constant or a parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct Affine {
+    /// 1 or −1.
     pub slope: f64,
+    /// `None` for zero.
     pub offset: Option<Node>,
     /// Whether the offset is subtracted.
     pub minus: bool,
@@ -55,7 +56,7 @@ impl RangeRule {
         Self::Plain(expr)
     }
 
-    /// The range of a square or a slab from that of the node it is made of; nothing for other rules.
+    /// The range of a square or a slab from that of the node it is made of; `None` for other rules.
     pub(in crate::ir) fn over(&self, range: impl Fn(Node) -> Interval) -> Option<Interval> {
         match *self {
             Self::Square(a) => Some(range(a).square()),
@@ -68,14 +69,16 @@ impl RangeRule {
     }
 }
 
-/// For what a range is to hold.
+/// The points, times and numbers for which a range is to hold.
 #[derive(Debug, Clone, Copy)]
 pub struct Region<'a> {
+    /// The box.
     pub space: &'a Aabb,
     /// Seconds.
     pub time: Interval,
+    /// The values of the graph's parameters.
     pub parameters: &'a [f64],
-    /// Of the numbers that depend on time alone, see [`Expr::Uniform`]: one for each.
+    /// One range for each number that depends on time alone, see [`Expr::Uniform`].
     pub uniforms: &'a [Interval],
 }
 
@@ -98,6 +101,7 @@ thread_local! {
 }
 
 impl RangeEvaluator {
+    /// Prepares a root of a graph.
     pub fn new(graph: &Graph, root: Node) -> Self {
         let rules = graph.nodes().map(|(_, expr)| RangeRule::of(graph, expr)).collect();
         Self { rules, root }
@@ -156,8 +160,8 @@ fn is_number(graph: &Graph, node: Node) -> bool {
     matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_))
 }
 
-/// Reads a node as slope · (another node) + offset; only slopes ±1, for which the rounding of the written sum is
-/// that of the written sum. Anything else is 1 · itself.
+/// Reads a node as slope · (another node) + offset; only slopes ±1, for which the rounding of the written sum
+/// is that of the written sum. Anything else is 1 · itself.
 fn affine(graph: &Graph, node: Node) -> (Node, Affine) {
     let with = |slope, offset, minus| Affine { slope, offset, minus };
     let number = |node| is_number(graph, node);

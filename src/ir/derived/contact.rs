@@ -1,15 +1,16 @@
 //! Distance, normal and mean curvature at the surface, from the leaves.
 //!
-//! ω/|∇ω| is a poor distance: R₀ mixes leaves of unlike scale. A leaf u by itself knows better: along its normal it
-//! is nearly quadratic, so with g = |∇u| and b = nᵀ·Hess u·n the surface lies at
+//! ω/|∇ω| is a poor distance: R₀ mixes leaves of unlike scale. A leaf u by itself knows better: along its
+//! normal it is nearly quadratic, so with g = |∇u| and b = nᵀ·Hess u·n the surface lies at
 //!
 //! ```text
 //! t = 2u / (g + √(g² − 2ub))          (u/g where the root is not real)
 //! ```
 //!
-//! which is exact along the normal for every quadric. The leaves' distances are combined by the min/max twin, and
-//! normal and curvature are those of the leaf that decides; at a tie, the mean of the two. Products of two factors
-//! are split into their faces, sign(pq) = (p∧q)∨(¬p∧¬q): the product of a slab is half the distance far away.
+//! which is exact along the normal for every quadric. The leaves' distances are combined by the min/max twin,
+//! and normal and curvature are those of the leaf that decides; at a tie, the mean of the two. Products of
+//! two factors are split into their faces, sign(pq) = (p∧q)∨(¬p∧¬q): the product of a slab is half the
+//! distance far away.
 //!
 //! The surface of a leaf that depends on time moves along its outward normal n with the speed u_t/|∇u|: on
 //! u(x(t), t) = 0 the derivative ∇u·x′ + u_t vanishes, and n = −∇u/|∇u|.
@@ -34,7 +35,8 @@ struct Surface {
     velocity: Option<[Node; 3]>,
 }
 
-/// [distance (positive in the fluid), outward unit normal x, y, z, mean curvature (1/length, convex positive)]
+/// [distance (positive in the fluid), outward unit normal x, y, z, mean curvature (1/length, convex
+/// positive)]
 pub fn contact(graph: &mut Graph, root: Node) -> [Node; 5] {
     let mut builder = Builder { graph, known: FxHashMap::default(), moving: false };
     let surface = builder.surface(root);
@@ -43,8 +45,8 @@ pub fn contact(graph: &mut Graph, root: Node) -> [Node; 5] {
     [distance, nx, ny, nz, surface.curvature]
 }
 
-/// The velocity along its normal of the surface that [`contact`] finds: of the leaf that decides, or the mean of two.
-/// A motion within the surface itself, as of a turning cylinder, is not in ω.
+/// The velocity along its normal of the surface that [`contact`] finds: of the leaf that decides, or the mean
+/// of two. A motion within the surface itself, as of a turning cylinder, is not in ω.
 pub fn wall_velocity(graph: &mut Graph, root: Node) -> [Node; 3] {
     let mut builder = Builder { graph, known: FxHashMap::default(), moving: true };
     let surface = builder.surface(root);
@@ -230,7 +232,7 @@ impl Builder<'_> {
         self.graph.binary(Binary::Add, sum, z)
     }
 
-    /// Of length 1, or zero where opposite normals meet.
+    /// A vector made one of length 1; zero where opposite normals meet.
     fn unit(&mut self, v: [Node; 3]) -> [Node; 3] {
         let square = self.dot(v, v);
         let length = self.graph.unary(Unary::Sqrt, square);

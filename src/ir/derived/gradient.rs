@@ -1,9 +1,9 @@
 //! Reverse mode: the gradient of a node as further nodes of the same graph.
 //!
 //! Each operation hands its adjoint on to its operands, multiplied by its derivative; one sweep from the root
-//! down gives all three partial derivatives, whose code is then generated like any other. At singular points the
-//! derivative is one member of the limit set: 0 for √a at a = 0 and |a| at 0, ½ and ½ for min and max at a tie,
-//! equal weights for R₀ at a corner.
+//! down gives all three partial derivatives, whose code is then generated like any other. At singular points
+//! the derivative is one member of the limit set: 0 for √a at a = 0 and |a| at 0, ½ and ½ for min and max at
+//! a tie, equal weights for R₀ at a corner.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -53,7 +53,7 @@ fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> FxHashSet<Node> {
     depends
 }
 
-/// What a node's adjoint adds to the adjoints of its operands.
+/// For each operand, what a node's adjoint adds to that of the operand.
 fn contributions(
     graph: &mut Graph,
     node: Node,
@@ -109,7 +109,7 @@ enum Side {
     Second,
 }
 
-/// adjoint · ∂op(a, b)/∂(the operand of one side); nothing where the derivative is zero.
+/// adjoint · ∂op(a, b)/∂(the operand of one side); `None` where the derivative is zero.
 fn binary(
     graph: &mut Graph,
     op: Binary,

@@ -1,8 +1,9 @@
 //! What depends on time alone, found once for each instant rather than at each point.
 //!
-//! A solid that turns by the angle 2πt has sin 2πt and cos 2πt in its formula. They are the same at every point: here
-//! such nodes are taken out of a graph, and what is left reads them as [`Expr::Uniform`]s. A program of the rest costs
-//! what that of a solid at rest costs, and needs no compilation for another instant.
+//! A solid that turns by the angle 2πt has sin 2πt and cos 2πt in its formula. They are the same at every
+//! point: here such nodes are taken out of a graph, and what is left reads them as [`Expr::Uniform`]s. A
+//! program of the rest costs what that of a solid at rest costs, and needs no compilation for another
+//! instant.
 
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -21,18 +22,23 @@ pub struct Uniforms {
 /// A graph without time.
 #[derive(Debug, Clone)]
 pub struct Hoisted {
+    /// The graph, with uniforms in place of what was taken out.
     pub graph: Graph,
+    /// The outputs in it.
     pub outputs: Vec<Node>,
+    /// What was taken out.
     pub uniforms: Uniforms,
-    /// What has become of each node; nothing for those that were taken out or are not used.
+    /// What has become of each node; `None` for those that were taken out or are not used.
     pub image: Vec<Option<Node>>,
 }
 
 impl Uniforms {
+    /// How many they are.
     pub fn len(&self) -> usize {
         self.roots.len()
     }
 
+    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.roots.is_empty()
     }

@@ -1,7 +1,8 @@
-//! A graph in coordinates relative to an origin: x − c becomes x′ + (o − c) with the constants folded in `f64`.
+//! A graph in coordinates relative to an origin: x − c becomes x′ + (o − c) with the constants folded in
+//! `f64`.
 //!
-//! In single precision a coordinate far from zero has lost the digits that matter before the program starts. Here the
-//! origin is subtracted in double precision, and the large constants of the formula with it.
+//! In single precision a coordinate far from zero has lost the digits that matter before the program starts.
+//! Here the origin is subtracted in double precision, and the large constants of the formula with it.
 
 use std::collections::HashMap;
 
@@ -27,8 +28,8 @@ enum Image {
     Shifted(Shifted),
 }
 
-/// The root as a function of x − origin. Each constant of the new graph that was folded with the origin is off by
-/// at most 2⁻⁵⁰ of itself; no other constant is changed.
+/// The root as a function of x − origin. Each constant of the new graph that was folded with the origin is
+/// off by at most 2⁻⁵⁰ of itself; no other constant is changed.
 pub fn localised(graph: &Graph, root: Node, origin: DVec3) -> (Graph, Node) {
     let mut out = Graph::default();
     let mut images: HashMap<Node, Image> = HashMap::new();
@@ -53,8 +54,8 @@ pub fn localised(graph: &Graph, root: Node, origin: DVec3) -> (Graph, Node) {
     out.extract_cone(root) // without the constants that were folded
 }
 
-/// A coordinate with a constant added, taken from one, or negated; nothing if the constant cannot be folded to the
-/// digits that are promised.
+/// A coordinate with a constant added, taken from one, or negated; `None` if the constant cannot be folded to
+/// the digits that are promised.
 fn fold(graph: &Graph, expr: Expr, images: &HashMap<Node, Image>) -> Option<Shifted> {
     let shifted = |node: Node| match images.get(&node) {
         Some(Image::Shifted(shifted)) => Some(*shifted),

@@ -1,8 +1,8 @@
 //! The min/max twin of a graph: ∧ becomes min, ∨ becomes max.
 //!
-//! R₀ and min/max have the same sign for every sign of their operands, so the twin has exactly the sign and the
-//! zero set of ω; in floating point too, because min and max do not round. It needs no roots, and its gradient is
-//! that of one leaf. Its value away from the surface is another one.
+//! R₀ and min/max have the same sign for every sign of their operands, so the twin has exactly the sign and
+//! the zero set of ω; in floating point too, because min and max do not round. It needs no roots, and its
+//! gradient is that of one leaf. Its value away from the surface is another one.
 
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -13,15 +13,15 @@ use crate::ir::op::Binary;
 use glam::DVec3;
 
 /// Within these distances of the origin a leaf must be shown to be a number for the plain minimum to be used;
-/// [`Graph`] users make results beyond them NaN (see `solid::programs::on_demand`). One pair for each precision: the box, and
-/// the largest value that cannot overflow.
+/// [`Graph`] users make results beyond them NaN (see `solid::programs::on_demand`). One pair for each
+/// precision: the box, and the largest value that cannot overflow.
 const PROOFS: [(f64, f64); 2] = [(5e9, 1e38), (2e77, 1e308)];
 
 /// The twin of a root, in the same graph.
 ///
-/// Only the junctions that decide the sign of the root are replaced: those reached from it through ∧, ∨, ¬, min,
-/// max and multiplication by a positive constant. In `(a and b) - 0.1` the value of a ∧ b matters, not its sign, so
-/// the difference is a leaf.
+/// Only the junctions that decide the sign of the root are replaced: those reached from it through ∧, ∨, ¬,
+/// min, max and multiplication by a positive constant. In `(a and b) - 0.1` the value of a ∧ b matters, not
+/// its sign, so the difference is a leaf.
 pub fn twin(graph: &mut Graph, root: Node) -> Node {
     let logic = logic_nodes(graph, root);
     let finite = finite_nodes(graph, root);
@@ -68,7 +68,7 @@ fn logic_nodes(graph: &Graph, root: Node) -> Vec<bool> {
     logic
 }
 
-/// Which nodes are proven to be finite wherever the twin gives an answer.
+/// For each node, whether it is proven to be finite wherever the twin gives an answer.
 fn finite_nodes(graph: &Graph, root: Node) -> Vec<bool> {
     let mut finite = vec![true; root.index() + 1];
     let ranges = RangeEvaluator::new(graph, root);

@@ -7,7 +7,7 @@ pub(in crate::ir) type Big = FBig<HalfEven, 2>;
 /// Bits of every intermediate result.
 pub(in crate::ir) const PRECISION: usize = 400;
 
-/// The same number with all its digits; `None` if it is not finite.
+/// A double with all its digits; `None` if it is not finite.
 pub(in crate::ir) fn big(x: f64) -> Option<Big> {
     if !x.is_finite() {
         return None;

@@ -1,8 +1,8 @@
 //! The true values of a graph.
 //!
-//! R₀ is computed as the textbook prints it, u + v ∓ √(u² + v²): with 400 bits its cancellation costs nothing, and
-//! it shares no formula with the programs that it judges. A point where an operation has no value, or where a
-//! derivative has no limit, has no truth.
+//! R₀ is computed as the textbook prints it, u + v ∓ √(u² + v²): with 400 bits its cancellation costs
+//! nothing, and it shares no formula with the programs that it judges. A point where an operation has no
+//! value, or where a derivative has no limit, has no truth.
 
 use super::big::{Big, PRECISION, big, one};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
@@ -38,8 +38,8 @@ impl Exact {
     }
 }
 
-/// The exact values of some nodes at a point; nothing if one of the operations they need is undefined there, and for
-/// formulas of time.
+/// The exact values of some nodes at a point; `None` if one of the operations they need is undefined there,
+/// and for formulas of time.
 pub fn evaluate(graph: &Graph, outputs: &[Node], point: [f64; 3]) -> Option<Vec<Exact>> {
     evaluate_at(graph, outputs, point, f64::NAN)
 }

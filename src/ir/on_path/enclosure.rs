@@ -1,10 +1,10 @@
 //! A leaf along a straight path, enclosed: u(t₀ + s) ∈ C₀ + C₁s + C₂s² for 0 ≤ s ≤ t₁ − t₀, with intervals as
 //! coefficients.
 //!
-//! C₀ and C₁ are the value and the derivative at t₀, C₂ encloses half the second derivative over the whole stretch:
-//! Taylor's theorem with its remainder. The enclosure narrows with the cube of the stretch. Where a derivative does
-//! not exist (min and max at a tie, |a| at 0) its generalised gradient takes the place of C₁, and C₂ is zero; where
-//! nothing is known of the derivative, [`Enclosure::range`] still holds.
+//! C₀ and C₁ are the value and the derivative at t₀, C₂ encloses half the second derivative over the whole
+//! stretch: Taylor's theorem with its remainder. The enclosure narrows with the cube of the stretch. Where a
+//! derivative does not exist (min and max at a tie, |a| at 0) its generalised gradient takes the place of C₁,
+//! and C₂ is zero. Where the derivative is unknown, [`Enclosure::range`] still holds.
 
 use std::cell::RefCell;
 
@@ -43,12 +43,13 @@ thread_local! {
 }
 
 impl EnclosureEvaluator {
+    /// Prepares a root of a graph.
     pub fn new(graph: &Graph, root: Node) -> Self {
         Self { steps: graph.nodes().map(|(_, expr)| (expr, RangeRule::of(graph, expr))).collect(), root }
     }
 
-    /// The enclosure over the part [t₀, t₁] of the path between two points (x, y, z and time), for a graph with
-    /// parameters.
+    /// The enclosure over the part [t₀, t₁] of the path between two points (x, y, z and time), for a graph
+    /// with parameters.
     pub fn enclose(
         &self,
         from: [f64; 4],
@@ -200,7 +201,8 @@ fn binary(op: Binary, a: Jet, b: Jet) -> Jet {
         Max | PlainMax if b.over[0].lo > a.over[0].hi => b,
         Min | Max | PlainMin | PlainMax => either(at, over, a, b),
         And | Or => {
-            // u + v ∓ √(u² + v²) for the derivatives; where the root vanishes, both weights lie between 0 and 2
+            // u + v ∓ √(u² + v²) for the derivatives; where the root vanishes, both weights lie between 0 and
+            // 2
             let sum = binary(Add, a, b);
             let hypotenuse = unary(Unary::Sqrt, binary(Add, binary(Mul, a, a), binary(Mul, b, b)));
             let smooth = binary(if op == And { Sub } else { Add }, sum, hypotenuse);

@@ -1,10 +1,10 @@
-//! A polynomial leaf along a straight path, as further nodes of its graph: u(a + t·b) = c₀ + c₁t + c₂t², with a bound
-//! of the rounding errors of each coefficient.
+//! A polynomial leaf along a straight path, as further nodes of its graph: u(a + t·b) = c₀ + c₁t + c₂t², with
+//! a bound of the rounding errors of each coefficient.
 //!
-//! Truncated polynomials are carried through the operations, and with them the running error: what the operands bring
-//! along, and ε times every product and sum that is formed. ε is 2⁻⁵³, the unit of rounding, and a little more, which
-//! covers the roundings of the bounds themselves. Constants count as exact: the shape is that of the numbers in
-//! the graph, not of those in somebody's text.
+//! Truncated polynomials are carried through the operations, and with them the running error: what the
+//! operands bring along, and ε times every product and sum that is formed. ε is 2⁻⁵³, the unit of rounding,
+//! and a little more, which covers the roundings of the bounds themselves. Constants count as exact: the
+//! shape is that of the numbers in the graph, not of those in somebody's text.
 
 use std::collections::HashMap;
 
@@ -15,20 +15,21 @@ use crate::ir::op::{Binary, Unary};
 #[derive(Debug, Clone, Copy)]
 struct Term {
     value: Node,
-    /// Nothing where the value is exact.
+    /// `None` where the value is exact.
     error: Option<Node>,
 }
 
 /// 2⁻⁵³(1 + 2⁻³⁰)
 const ROUNDING: f64 = 0.5 * f64::EPSILON * (1.0 + 1.0 / (1u64 << 30) as f64);
 
-/// Coefficients of 1, t and t²; nothing stands for zero.
+/// Coefficients of 1, t and t²; `None` stands for zero.
 type Polynomial = [Option<Term>; 3];
 
-/// [c₀, c₁, c₂, their error bounds] of a root along the path from the point (x, y, z) in the direction whose components
-/// are the parameters `direction`, `direction` + 1 and `direction` + 2, while time goes on by the parameter
-/// `direction` + 3 from the parameter `direction` + 4; nothing unless the root is made of sums,
-/// products and quotients by constants, and of degree two at most.
+/// [c₀, c₁, c₂, their error bounds] of a root along a path from the point (x, y, z).
+///
+/// The components of the path's direction are the parameters `direction`, `direction` + 1 and `direction` +
+/// 2. Time goes on by the parameter `direction` + 3 from the parameter `direction` + 4. `None` unless the
+/// root is made of sums, products and quotients by constants, and of degree two at most.
 pub fn polynomial_on_path(graph: &mut Graph, root: Node, direction: u32) -> Option<[Node; 6]> {
     let mut builder = Builder { graph, direction };
     let mut known: HashMap<Node, Polynomial> = HashMap::new();
@@ -84,7 +85,8 @@ impl Builder<'_> {
                 }
                 _ => return None,
             },
-            _ => return None,
+            // no other operation keeps a polynomial one
+            Expr::Unary(..) | Expr::Binary(..) => return None,
         })
     }
 
@@ -152,8 +154,8 @@ impl Builder<'_> {
         self.scaled(epsilon, value)
     }
 
-    /// ε|v| of a product or quotient, and the digits that it loses below the range of normal numbers: what multiplies
-    /// it later makes them count.
+    /// ε|v| of a product or quotient, and the digits that it loses below the range of normal numbers: what
+    /// multiplies it later makes them count.
     fn rounding_or_underflow(&mut self, value: Node) -> Node {
         let own = self.rounding(value);
         let least = self.graph.constant(f64::MIN_POSITIVE);

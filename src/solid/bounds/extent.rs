@@ -5,10 +5,10 @@ use crate::geom::Aabb;
 /// What is known about the extent of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bounds {
-    /// ω > 0 nowhere in the cube of half-side 2²⁰ around the origin: proven.
+    /// It is proven that ω > 0 nowhere in the cube of half-side 2²⁰ around the origin.
     Empty,
-    /// The solid lies in this box: proven. Each face is within a millionth of the longest side of the solid itself
-    /// where the budget of the proof allowed it.
+    /// It is proven that the solid lies in this box. Each face is within a millionth of the longest side of
+    /// the solid itself, where the budget of the proof allowed it.
     Within(Aabb),
     /// No such box was found within that cube.
     Unbounded,

@@ -13,7 +13,7 @@ use crate::solid::leaves::pruning::{Verdict, prune};
 /// Half the side of the cube around the origin in which solids are looked for.
 pub const SEARCH_RADIUS: f64 = 1_048_576.0;
 
-/// Cells kept undecided on one level: beyond it the box found so far has to do.
+/// Cells kept undecided on one level. Beyond it the search ends with the box that it has found.
 const MOST_CELLS: usize = 50_000;
 
 /// Cells along the longest side at which the first search ends.
@@ -30,7 +30,7 @@ trait Probe {
     /// What is known of a box, handed on to the boxes within it.
     type Known: Clone;
     fn everything(&self) -> Self::Known;
-    /// Nothing if the box is proven to be outside.
+    /// What is known of a box within one of which `known` is; `None` if it is proven to be outside.
     fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known>;
     fn is_inside(&self, known: &Self::Known, p: DVec3) -> bool;
 }
@@ -59,7 +59,7 @@ struct ByLeaves<'a> {
 }
 
 impl Probe for ByLeaves<'_> {
-    /// What is left of the solid; nothing if the box is inside it.
+    /// What is left of the solid; `None` if the box is inside it.
     type Known = Option<Arc<[u32]>>;
 
     fn everything(&self) -> Self::Known {
@@ -106,8 +106,8 @@ fn search<P: Probe>(probe: &P) -> Bounds {
     Bounds::Within(tighten(probe, &known, hull))
 }
 
-/// Level by level: cells that may hold a part of the solid are divided, the others dropped. Also what is known of
-/// the hull.
+/// A box around the solid, and what is known of it. Cells that may hold a part of the solid are divided level
+/// by level, the others are dropped. `None` if no cell is left.
 fn coarse_hull<P: Probe>(probe: &P, everything: Aabb) -> Option<(Aabb, P::Known)> {
     let mut cells = vec![(everything, probe.everything())];
     loop {
@@ -116,7 +116,8 @@ fn coarse_hull<P: Probe>(probe: &P, everything: Aabb) -> Option<(Aabb, P::Known)
         let hull = kept.iter().fold(Aabb::EMPTY, |hull, (cell, _)| hull.union(cell));
         let (first, _) = kept.first()?;
         let fine = hull.size().max_element() >= ENOUGH_CELLS * first.size().max_element();
-        // below this a cell is a point in double precision: a solid of no extent, or a range that never decides
+        // below this a cell is a point in double precision: a solid of no extent, or a range that never
+        // decides
         let exhausted = first.size().max_element() < 1e-12 || kept.len() > MOST_CELLS;
         if fine || exhausted {
             let known = probe.look(&probe.everything(), &hull)?;
@@ -130,7 +131,7 @@ fn coarse_hull<P: Probe>(probe: &P, everything: Aabb) -> Option<(Aabb, P::Known)
     }
 }
 
-/// Whether no point of the box is inside, as far as a budget of looks can prove it.
+/// Whether it can be proven within a budget of looks that no point of the box is inside.
 fn prove_empty<P: Probe>(probe: &P, known: &P::Known, over: Aabb) -> bool {
     let mut stack = vec![(over, known.clone())];
     let mut left = PROOF_BUDGET;

@@ -1,12 +1,14 @@
-//! The cells of a box, found level by level: a flat grid of 64³, and below it eight children for each cell that is
-//! divided further.
+//! The cells of a box, found level by level: a flat grid of 64³, and below it eight children for each cell
+//! that is divided further.
 //!
-//! Each cell is judged with a margin: by the ranges of the leaves over the cell *grown* by it. A cell without a surface
-//! is then farther than the margin from every surface, and one near a surface keeps every leaf that decides within the
-//! margin of any of its points. Why no other leaf matters for the distance, either: let u and v be the distances (up to
-//! the margin r) that a tree combines by min and max, and v that of a dropped leaf, which has no zero within r and
-//! |v| ≥ r therefore. Cutting off distances at ±r commutes with min and max, and min(u, r) = u for a u that is cut off:
-//! without v the tree has the same distance wherever that is less than r, found by the same leaf.
+//! Each cell is judged with a margin: by the ranges of the leaves over the cell *grown* by it. A cell without
+//! a surface is then farther than the margin from every surface, and one near a surface keeps every leaf that
+//! decides within the margin of any of its points.
+//!
+//! No other leaf matters for the distance either. Let a tree combine the distances u and v, up to the margin
+//! r, by min and max, and let v be that of a dropped leaf. It has no zero within r, so |v| ≥ r. Cutting off
+//! distances at ±r commutes with min and max, and min(u, r) = u for a u that is cut off. So without v the
+//! tree has the same distance wherever that is less than r, found by the same leaf.
 
 use std::collections::HashMap;
 
@@ -22,20 +24,23 @@ use crate::solid::leaves::words::{Word, leaf_count};
 const DEPTH: u32 = 6;
 pub const SIDE: u32 = 1 << DEPTH;
 
-/// Deeper, up to [`MAX_DEPTH`], only where more leaves than this are left.
+/// Cells of the flat grid are divided further only where more leaves than this are left.
 const FEW_LEAVES: usize = 4;
+
+/// The deepest level.
 const MAX_DEPTH: u32 = 10;
 
-/// Below [`DEPTH`] a cell whose leaves have stayed the same for so many levels is left as it is: surfaces that lie on
-/// one another never part.
+/// Below [`DEPTH`] a cell whose leaves have stayed the same for so many levels is left as it is: surfaces
+/// that lie on one another never part.
 const LEVELS_IN_VAIN: u32 = 2;
 
-/// Ranges of leaves asked for while a map is built, and with that the words that its cells hold, 4 bytes each. A level
-/// that would exceed it is not begun: the cells above it stay as they are. 10 000 balls need a third of it.
+/// Ranges of leaves asked for while a map is built, and with that the words that its cells hold, 4 bytes
+/// each. A level that would exceed it is not begun: the cells above it stay as they are. 10 000 balls need a
+/// third of it.
 const MOST_RANGES: usize = 1 << 24;
 
-/// Cells that a moving leaf may pass are left at this depth and divided anew for each window of time: eight or so of
-/// them lie side by side in what a paddle of a tenth of the box sweeps.
+/// Cells that a moving leaf may pass are left at this depth and divided anew for each window of time: eight
+/// or so of them lie side by side in what a paddle of a tenth of the box sweeps.
 const RESTLESS_DEPTH: u32 = 4;
 
 /// What is known of a cell; its last two bits say which, the others where to go on.
@@ -57,7 +62,8 @@ pub struct Cells {
     per_length: DVec3,
     /// x fastest, then y.
     grid: Vec<u32>,
-    /// First and last of the flat grid's cells that are not fluid, along each axis: most places need look no further.
+    /// First and last of the flat grid's cells that are not fluid, along each axis: most places need look no
+    /// further.
     occupied: [UVec3; 2],
     /// Eight in a row for each divided cell.
     children: Vec<u32>,
@@ -147,8 +153,8 @@ impl Cells {
         cells
     }
 
-    /// Divides a box as far as it is the same during all of the parts' stretch of time. The cells that are left may
-    /// change: those in which a leaf that moves matters at some time.
+    /// Divides a box as far as it is the same during all of the parts' stretch of time. The cells that are
+    /// left may change: those in which a leaf that moves matters at some time.
     pub fn lasting(parts: &LeafTree, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
         let (mut cells, level) = Self::begin(parts, domain, margin);
         let left = cells
@@ -156,7 +162,8 @@ impl Cells {
         (cells, left)
     }
 
-    /// What [`Cells::lasting`] has found, with the cells that it has left divided for a shorter stretch of time.
+    /// What [`Cells::lasting`] has found, with the cells that it has left divided for a shorter stretch of
+    /// time.
     pub fn completed(&self, left: &[Pending], parts: &LeafTree, margin: f64) -> Self {
         let mut cells = self.clone();
         cells.refine(left.to_vec(), parts, margin, |_| false);
@@ -292,7 +299,7 @@ impl Cells {
         }
     }
 
-    /// The undivided cell of a point; nothing outside the box, and for NaN.
+    /// The undivided cell of a point; `None` outside the box, and for NaN.
     #[inline]
     pub fn find(&self, p: DVec3) -> Option<Found> {
         let q = (p - self.domain.min) * self.per_length;
@@ -333,7 +340,7 @@ impl Cells {
         bounds(&self.domain, depth, q.clamp(DVec3::ZERO, DVec3::splat(side - 1.0)).as_uvec3())
     }
 
-    /// The cells of the flat grid that a box within the domain touches; nothing if they are more than `most`.
+    /// The cells of the flat grid that a box within the domain touches; `None` if they are more than `most`.
     pub fn touched(&self, over: &Aabb, most: usize) -> Option<impl Iterator<Item = Cell> + '_> {
         let number = |p: DVec3| {
             let q = (p - self.domain.min) * self.per_length;

@@ -1,10 +1,12 @@
-//! A box divided into cells that know what matters in them: fluid, inside, or the few leaves of a surface nearby.
+//! A box divided into cells that know what matters in them: fluid, inside, or the few leaves of a surface
+//! nearby.
 //!
-//! Where a part is proven to be outside or inside it is dropped from the cell and from all cells within it. A point far
-//! from every surface then costs one look-up, and one near a surface the evaluation of the leaves that are left there,
-//! however many the solid has. Sign, zero set and the gradient on the surface are exactly those of the twin; the value
-//! off the surface is that of the leaf that decides in the cell, and jumps between cells. A map with a reach also
-//! answers for distance, normal and curvature up to that distance from the surface.
+//! Where a part is proven to be outside or inside it is dropped from the cell and from all cells within it. A
+//! point far from every surface then costs one look-up, and one near a surface the evaluation of the leaves
+//! that are left there, however many the solid has. Sign, zero set and the gradient on the surface are
+//! exactly those of the twin; the value off the surface is that of the leaf that decides in the cell, and
+//! jumps between cells. A map with a reach also answers for distance, normal and curvature up to that
+//! distance from the surface.
 
 use std::sync::Arc;
 
@@ -25,13 +27,13 @@ use crate::solid::twin::Twin;
 /// Points that are looked up together.
 const RUN: usize = 64;
 
-/// Neighbouring points in one cell from which their joint evaluation pays.
+/// So many neighbouring points of one cell are evaluated together.
 const SHORTEST_RUN: usize = 4;
 
 /// Cells that are looked at one by one for a range; for larger boxes the twin answers.
 const MOST_TOUCHED: usize = 4096;
 
-/// What a place is.
+/// What a map knows of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// Proven to be outside, farther than the reach from every surface.
@@ -49,20 +51,25 @@ pub struct CellMap {
     parts: Arc<LeafTree>,
     cells: Arc<Cells>,
     reach: f64,
-    /// By how much cells were grown, reach included: points that rounding puts into the next cell are still right.
+    /// By how much cells were grown, reach included: points that rounding puts into the next cell are still
+    /// right.
     margin: f64,
 }
 
 /// Counts of a cell map.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CellStats {
+    /// Leaves of the solid.
     pub leaves: usize,
-    /// Programs that had to be compiled for them.
+    /// Shapes of leaves, each with programs of its own.
     pub shapes: usize,
+    /// Cells proven to be outside.
     pub fluid: usize,
+    /// Cells proven to be inside.
     pub inside: usize,
+    /// Cells that may hold a surface.
     pub near: usize,
-    /// Different specialised programs of near cells.
+    /// Different trees of leaves that are left in near cells.
     pub programs: usize,
     /// Leaves in near cells, all together.
     pub leaves_in_cells: usize,
@@ -88,15 +95,15 @@ pub(super) fn margin(domain: &Aabb, reach: f64) -> f64 {
 }
 
 impl CellMap {
-    /// Divides a box. Nothing if the solid cannot be taken apart, or the box is not finite.
+    /// Divides a box. `None` if the solid cannot be taken apart, or the box is not finite.
     pub fn new(solid: &Solid, domain: Aabb) -> Option<Self> {
         Self::with_reach(solid, domain, 0.0)
     }
 
-    /// A map that also knows the surface from up to `reach` away, see [`CellMap::contact`]. Cells within reach of
-    /// several parts keep them all: a large reach costs time and memory.
+    /// A map that also knows the surface from up to `reach` away, see [`CellMap::contact`]. Cells within
+    /// reach of several parts keep them all: a large reach costs time and memory.
     ///
-    /// Nothing if the solid cannot be taken apart, or the box or the reach is not finite.
+    /// `None` if the solid cannot be taken apart, or if the box or the reach is not finite.
     pub fn with_reach(solid: &Solid, domain: Aabb, reach: f64) -> Option<Self> {
         if domain.is_empty() || !domain.is_finite() || !(reach >= 0.0 && reach.is_finite()) {
             return None;
@@ -113,6 +120,7 @@ impl CellMap {
         Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin })
     }
 
+    /// How the box was divided.
     pub fn stats(&self) -> CellStats {
         let (leaves, counts) = (&self.parts.leaves, self.cells.counts);
         CellStats {
@@ -126,7 +134,7 @@ impl CellMap {
         }
     }
 
-    /// What is known of a place; near for points outside the box.
+    /// What is known of a place; [`Place::Near`] for points outside the box.
     pub fn place_of(&self, p: DVec3) -> Place {
         match self.cells.find(p).map(|found| found.cell) {
             Some(Cell::Fluid) => Place::Fluid,
@@ -135,7 +143,8 @@ impl CellMap {
         }
     }
 
-    /// As [`Solid::sign`]: inside (1), on the surface (0) or outside (−1); NaN where a leaf is not a number.
+    /// Inside (1), on the surface (0) or outside (−1), as [`Solid::sign`] says; NaN where a leaf is not a
+    /// number.
     #[inline]
     pub fn sign(&self, p: DVec3) -> f64 {
         match self.cells.find(p).map(|found| found.cell) {
@@ -155,11 +164,11 @@ impl CellMap {
         sign.iter_mut().for_each(|s| *s = Unary::Sign.eval(*s));
     }
 
-    /// What a particle needs to know of the surface, if that is nearer than the reach; otherwise an infinite distance,
-    /// positive in the fluid and negative inside, without normal and curvature.
+    /// What a particle needs to know of the surface, if that is nearer than the reach; otherwise an infinite
+    /// distance, positive in the fluid and negative inside, without normal and curvature.
     ///
-    /// As [`Solid::contact`], except that leaves without a zero within reach are left out, which estimates of their
-    /// distance may not show.
+    /// It differs from [`Solid::contact`] in that leaves without a zero within reach are left out: estimates
+    /// of their distance may be too small.
     #[inline]
     pub fn contact(&self, p: DVec3) -> Contact {
         let beyond =
@@ -217,8 +226,8 @@ impl CellMap {
         }
     }
 
-    /// The surface nearest to a point, as a program says: the distance to "all of" is the largest, to "any of" the
-    /// smallest.
+    /// The surface nearest to a point, as a program says: the distance to "all of" is the largest, to "any
+    /// of" the smallest.
     fn nearest(&self, at: &mut usize, p: DVec3) -> Nearest {
         let word = Word::read(self.cells.programs[*at]);
         *at += 1;
@@ -433,8 +442,8 @@ impl Walls for CellMap {
             Some(Cell::Fluid) if most <= self.reach => most,
             Some(Cell::Fluid) => clearance_by_ranges(self, p, most).max(self.reach),
             Some(Cell::Near(program)) => {
-                // a cube around the point, with its corners at the surface's distance, or with less than half of that;
-                // what the cell has kept is right within the reach
+                // a cube around the point, with its corners at the surface's distance, or with less than half
+                // of that; what the cell has kept is right within the reach
                 let distance = self.nearest(&mut (program as usize), p).distance.min(self.reach);
                 let is_proven = |radius: f64| {
                     let cube = Aabb::new(p, p).grown(radius);

@@ -1,4 +1,5 @@
-//! A box divided into cells that know what of a solid matters in them; for a solid at rest and for one that moves.
+//! A box divided into cells that know what of a solid matters in them; for a solid at rest and for one that
+//! moves.
 
 pub mod grid;
 pub mod map;

@@ -1,9 +1,9 @@
 //! A cell map of a solid that moves: rebuilt only where it can have changed, and only now and then.
 //!
-//! Ranges over a cell *and a stretch of time* judge a cell for all of that time. For the whole run this settles the
-//! cells that the solid never comes near, those that it never leaves, and those in which nothing but parts at rest
-//! matters. The others are divided anew for each *window* of time, a stretch of some steps; in between a step costs
-//! what it costs with a solid at rest.
+//! Ranges over a cell *and a stretch of time* judge a cell for all of that time. For the whole run this
+//! settles the cells that the solid never comes near, those that it never leaves, and those in which nothing
+//! but parts at rest matters. The others are divided anew for each *window* of time, a stretch of some steps;
+//! in between a step costs what it costs with a solid at rest.
 //!
 //! Windows begin at whole multiples of their length, so that an answer does not depend on the steps before.
 
@@ -18,7 +18,7 @@ use crate::solid::construction::Solid;
 /// A solid that moves, prepared for a box and a run.
 pub struct MovingMap {
     solid: Solid,
-    /// The same during the whole run, except in the cells that are `restless`.
+    /// Right for the whole run, except in the cells that are `restless`.
     lasting: Cells,
     restless: Vec<Pending>,
     reach: f64,
@@ -34,13 +34,14 @@ const OVERLAP: f64 = 0.5;
 const MOST_WINDOWS: f64 = 1e9;
 
 impl MovingMap {
-    /// Prepares a solid in a box, as [`CellMap::with_reach`], for a run from one time to another, in windows of time of
-    /// the length `window`, all in seconds.
+    /// Prepares a solid in a box for a run from one time to another, in windows of time of the length
+    /// `window`, all in seconds. For `reach` see [`CellMap::with_reach`].
     ///
-    /// The right window is some 16 steps long: a shorter one is left too often, and in a longer one more cells are near
-    /// a surface. Steps longer than half of it are answered without a map.
+    /// The right window is some 16 steps long: a shorter one is left too often, and in a longer one more
+    /// cells are near a surface. Steps longer than half of it are answered without a map.
     ///
-    /// Nothing if the solid cannot be taken apart, or if one of the numbers is not finite or the window not positive.
+    /// `None` if the solid cannot be taken apart, if one of the numbers is not finite, or if the window is
+    /// not positive.
     pub fn new(solid: &Solid, domain: Aabb, reach: f64, run: (f64, f64), window: f64) -> Option<Self> {
         let ordered = run.0.is_finite() && run.1.is_finite() && run.0 <= run.1;
         let sensible = window > 0.0 && window.is_finite() && reach >= 0.0 && reach.is_finite();
@@ -53,7 +54,7 @@ impl MovingMap {
         Some(Self { solid: solid.clone(), lasting, restless, reach, run, window, current })
     }
 
-    /// The map during a step; nothing if the step is too long, or outside the run.
+    /// The map during a step; `None` if the step is too long, or outside the run.
     pub fn between(&self, from: f64, to: f64) -> Option<CellMap> {
         let number = ((from - self.run.0) / self.window).floor();
         // a little earlier, because it is rounded
@@ -88,7 +89,7 @@ impl MovingMap {
         self.restless.len()
     }
 
-    /// Counts of the map during a step.
+    /// How the box is divided during a step; `None` if [`MovingMap::between`] has no map.
     pub fn stats(&self, from: f64, to: f64) -> Option<CellStats> {
         Some(self.between(from, to)?.stats())
     }

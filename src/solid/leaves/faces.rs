@@ -7,7 +7,8 @@ use super::words::Word;
 use crate::field::{Face, Faces, Part};
 
 impl Leaves {
-    /// Adds the faces of the tree that begins at `first`, unless all that it describes is farther away than `reach`.
+    /// Adds the faces of the tree that begins at `first`, unless all that it describes is farther away than
+    /// `reach`.
     pub fn add_faces(&self, words: &[u32], first: usize, p: DVec3, reach: f64, faces: &mut Faces) {
         let begin = faces.len();
         if !self.add_tree(words, &mut { first }, p, reach, faces) {

@@ -1,5 +1,6 @@
-//! The leaves of a solid: many, of few shapes. Leaves that differ in their constants alone share one program, so
-//! that ten thousand balls are compiled as one.
+//! The leaves of a solid: many, of few shapes.
+//!
+//! Leaves that differ in their constants alone share their programs: ten thousand balls are compiled as one.
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
@@ -22,7 +23,7 @@ struct Leaf {
     first: u32,
     /// Where the numbers begin that depend on time alone.
     first_uniform: u32,
-    /// Whether machine code may answer for its range; of leaves that move [`Ranges`] says it.
+    /// Whether machine code may answer for its range. For leaves that move [`Ranges`] says it.
     tame: bool,
 }
 
@@ -57,7 +58,7 @@ struct Ranges {
     uniforms: Vec<Interval>,
     /// The same numbers, for machine code.
     pairs: Vec<[f64; 2]>,
-    /// Of leaves that move: whether machine code may answer for their range.
+    /// For each leaf, whether machine code may answer for its range.
     tame: Vec<bool>,
 }
 
@@ -151,7 +152,7 @@ impl Leaves {
         self.store.shapes.len()
     }
 
-    /// Which shape a leaf has.
+    /// The number of a leaf's shape.
     pub fn shape_of(&self, leaf: u32) -> usize {
         self.store.leaves[leaf as usize].shape as usize
     }
@@ -216,8 +217,8 @@ impl Leaves {
         (out[0], DVec3::new(out[1], out[2], out[3]))
     }
 
-    /// The smallest or largest leaf of a tree in prefix form, as it says, and which it is, with whether it is negated;
-    /// NaN if any leaf is.
+    /// The value of the leaf that decides in a tree in prefix form, that leaf, and whether it is negated. The
+    /// smallest decides in "all of", the largest in "any of"; the value is NaN if any leaf is.
     pub fn decide(&self, words: &[u32], at: &mut usize, p: DVec3) -> (f64, (u32, bool)) {
         let word = Word::read(words[*at]);
         *at += 1;
@@ -272,7 +273,8 @@ impl Leaves {
         shape.value(self.store.engine).many(points, constants, uniforms, out);
     }
 
-    /// What a leaf is along the whole path, passed during the stretch of time, if it is a polynomial of degree two at most.
+    /// What a leaf is along a whole path that is passed during the stretch of time; `None` unless it is a
+    /// polynomial of degree two at most.
     pub fn on_path(&self, leaf: u32, negated: bool, from: DVec3, to: DVec3) -> Option<Enclosure> {
         let (shape, constants, _) = self.of(leaf);
         let program = shape.polynomial(self.store.engine)?;

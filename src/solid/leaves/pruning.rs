@@ -14,10 +14,10 @@ pub enum Verdict {
 
 /// A tree in a region where each leaf has a known range; `left` receives the part that still matters there.
 ///
-/// A leaf that may vanish in the region stays. One that is positive throughout drops out of "all of" and decides "any
-/// of"; one that is negative throughout the other way round: the tree that is left has the sign of the whole at every
-/// point of the region, and so the same surface. A leaf of which nothing is known may be NaN: it stays, and nothing is
-/// concluded past it.
+/// A leaf that may vanish in the region stays. One that is positive throughout drops out of "all of" and
+/// decides "any of"; one that is negative throughout drops out of "any of" and decides "all of". So the tree
+/// that is left has the sign of the whole at every point of the region, and the same surface. A leaf with an
+/// unknown range may be NaN: it stays, and no conclusion is drawn past it.
 pub fn prune(words: &[u32], range: &mut impl FnMut(u32) -> Interval, left: &mut Vec<u32>) -> Verdict {
     Pruning { words, range, left }.tree(&mut 0).0
 }
@@ -29,7 +29,7 @@ struct Pruning<'a, F> {
 }
 
 impl<F: FnMut(u32) -> Interval> Pruning<'_, F> {
-    /// Also whether a leaf that is left may be NaN.
+    /// The verdict on the tree at `at`, and whether a leaf that is left may be NaN.
     fn tree(&mut self, at: &mut usize) -> (Verdict, bool) {
         let begin = *at;
         let code = self.words[begin];
@@ -130,7 +130,7 @@ mod tests {
         check(&tree, &[outside, near, near], (Near, Some(leaf(2, true))));
         // a surface through the end of a range stays
         check(&tree, &[(0.0, 1.0), inside, inside], (Near, Some(leaf(0, false))));
-        // nothing is concluded past a leaf that may be NaN
+        // no conclusion is drawn past a leaf that may be NaN
         check(&tree, &[unknown, outside, near], (Near, Some(tree.clone())));
         check(&tree, &[unknown, inside, outside], (Near, Some(tree.clone())));
     }

@@ -14,9 +14,9 @@ use crate::simplify::simplify;
 use crate::solid::engine::Engine;
 use crate::solid::programs::compiled::{LeafProgram, RangeProgram};
 
-/// From so many leaves of one shape on, their ranges come from machine code: making it costs as much time as some
-/// thousand ranges by the interpreter. Their number decides, not that of the calls, so that the bounds of one leaf
-/// never depend on what was asked before.
+/// Ranges of so many leaves of one shape come from machine code, which costs as much time to make as some
+/// thousand ranges by the interpreter. The number of leaves decides, not that of the calls, so that the
+/// bounds of a leaf never depend on what was asked before.
 const MANY_LEAVES: usize = 8;
 
 /// A shape of leaves.
@@ -26,7 +26,7 @@ pub struct Shape {
     root: Node,
     pub parameters: usize,
     pub leaves: usize,
-    /// Nothing for a leaf at rest.
+    /// `None` for a leaf at rest.
     pub motion: Option<Motion>,
     pub range: RangeEvaluator,
     range_code: OnceLock<Option<RangeProgram>>,
@@ -115,7 +115,7 @@ impl Shape {
 
     #[inline]
     pub fn range_code(&self) -> Option<&RangeProgram> {
-        // those of a leaf that moves are asked for again and again
+        // the ranges of a leaf that moves are asked for again and again
         if self.leaves < MANY_LEAVES && self.motion.is_none() {
             return None;
         }
@@ -133,7 +133,8 @@ impl Shape {
         })
     }
 
-    /// Coefficients along a path and their errors; `None` unless the leaf is a polynomial of degree two at most.
+    /// Coefficients along a path and their errors; `None` unless the leaf is a polynomial of degree two at
+    /// most.
     pub fn polynomial(&self, engine: Engine) -> Option<&Evaluator> {
         let make = || {
             let (graph, root) = self.formula();

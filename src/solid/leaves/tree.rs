@@ -1,6 +1,7 @@
 //! A solid as leaves joined by "all of" and "any of".
 //!
-//! Negations are pushed down to the leaves, positive factors dropped: the tree has the sign of ω, not its value.
+//! Negations are pushed down to the leaves and positive factors dropped. The tree has the sign of ω, not its
+//! value.
 
 use std::collections::HashMap;
 
@@ -20,7 +21,7 @@ const MOST_LEAVES: usize = 1 << 20;
 const DEEPEST: usize = 1000;
 
 impl Logic {
-    /// The tree of a root with the nodes of its leaves; nothing if it is too large to be written out.
+    /// The tree of a root with the nodes of its leaves; `None` if it is too large to be written out.
     pub fn of(graph: &Graph, root: Node) -> Option<(Self, Vec<Node>)> {
         let mut reader = Reader { graph, leaves: Vec::new(), numbers: Default::default(), written: 0 };
         let tree = reader.read(root, false, 0)?;
@@ -43,7 +44,7 @@ impl Reader<'_> {
         match SignRule::of(self.graph, node) {
             SignRule::Not(a) => self.read(a, !negated, depth + 1),
             SignRule::Same(a) => self.read(a, negated, depth + 1),
-            // min(a, a) = a: the value of a ∧ a is another, its sign is not
+            // min(a, a) = a: the value of a ∧ a differs from a, its sign does not
             SignRule::All(a, b) | SignRule::Any(a, b) if a == b => self.read(a, negated, depth + 1),
             rule @ (SignRule::All(a, b) | SignRule::Any(a, b)) => {
                 let (a, b) = (self.read(a, negated, depth + 1)?, self.read(b, negated, depth + 1)?);
@@ -65,7 +66,7 @@ impl Reader<'_> {
     }
 }
 
-/// Joins two trees; the same operation inside becomes part of one long list.
+/// Joins two trees. Parts that are joined by the same operation become members of one list.
 fn flat(a: Logic, b: Logic, all: bool) -> Logic {
     let mut parts = Vec::new();
     for part in [a, b] {

@@ -1,7 +1,7 @@
 //! A tree of leaves as a list of words in prefix form: cheap to keep many of, and to walk.
 //!
-//! A word for each node: its kind above, below it the number of parts, or the number of the leaf and whether it is
-//! negated.
+//! There is a word for each node. Its upper bits are the kind; the lower ones are the number of parts, or the
+//! number of the leaf and whether it is negated.
 
 use super::tree::Logic;
 
@@ -20,7 +20,7 @@ pub enum Word {
     },
     /// So many trees follow, of which the smallest decides.
     All(u32),
-    /// … of which the largest decides.
+    /// So many trees follow, of which the largest decides.
     Any(u32),
 }
 
@@ -59,9 +59,8 @@ pub fn skip(words: &[u32], at: &mut usize) {
     }
 }
 
-/// Whether a tree is surely negative, of whose leaves a function knows it, given their number and whether they are negated;
-/// nothing as soon
-/// as nothing is known of a leaf, which may be NaN then.
+/// Whether a tree is surely negative. `leaf` says it of a leaf, given its number and whether it is negated;
+/// `None` as soon as it knows nothing of one, which may then be NaN.
 pub fn is_negative(
     words: &[u32],
     at: &mut usize,

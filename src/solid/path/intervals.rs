@@ -1,8 +1,8 @@
-//! Stretches of a path on which something may hold, or surely does: sorted intervals of t, and the roots of quadratics
-//! that bound them.
+//! Where on a path something may hold, or surely does: sorted intervals of the path's parameter t, and the
+//! roots of quadratics that bound them.
 //!
-//! Invariant: a root is rounded to the side that is asked for, so "may hold" never loses a point and "surely holds"
-//! never gains one.
+//! Invariant: a root is rounded to the side that is asked for, so "may hold" never loses a point and "surely
+//! holds" never gains one.
 
 use smallvec::SmallVec;
 
@@ -15,9 +15,9 @@ pub struct PathIntervals(SmallVec<[(f64, f64); 4]>);
 /// To which side of the truth an answer may err.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// More than holds.
+    /// The answer may hold more than the truth.
     More,
-    /// Less than holds.
+    /// The answer may hold less than the truth.
     Less,
 }
 
@@ -145,9 +145,9 @@ impl NotNegative {
 /// Where c₀ + c₁s + c₂s² ≥ 0 for 0 ≤ s ≤ width.
 ///
 /// The discriminant is moved by its rounding error to the side asked for, the root of larger magnitude is
-/// q/c₂ with q = −½(c₁ ± √D), the other c₀/q: no cancellation, so a few ε cover their own roundings. (c₀/q belongs to a
-/// quadratic whose discriminant has moved a little; where c₀ and c₂ have one sign it moves to the same side, where they
-/// have not nothing cancels in D, and it moves by a few ε.)
+/// q/c₂ with q = −½(c₁ ± √D), the other c₀/q: no cancellation, so a few ε cover their own roundings. (c₀/q
+/// belongs to a quadratic whose discriminant has moved a little; where c₀ and c₂ have one sign it moves to
+/// the same side, where they have not nothing cancels in D, and it moves by a few ε.)
 fn not_negative([c0, c1, c2]: [f64; 3], width: f64, side: Side) -> PathIntervals {
     const ROUNDINGS: f64 = 16.0 * f64::EPSILON;
     let more = side == Side::More;

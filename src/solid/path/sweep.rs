@@ -1,13 +1,13 @@
 //! Where a path enters a tree of leaves: swept contact, also called continuous collision detection.
 //!
-//! Each leaf says on which stretches of the path it may be at least zero, and on which it surely is: leaves that are
-//! polynomials of degree two or less along the path in closed form, with bounds of all rounding errors; others by
-//! Taylor enclosures that are narrowed around their roots. "All of" then intersects stretches, "any of" unites them,
-//! and the earliest that is left is the entry. While a particle passes its path, time passes too: leaves that move are
-//! functions of the path's parameter just as those at rest.
+//! Each leaf says on which stretches of the path it may be at least zero, and on which it surely is: leaves
+//! that are polynomials of degree two or less along the path in closed form, with bounds of all rounding
+//! errors; others by Taylor enclosures that are narrowed around their roots. "All of" then intersects
+//! stretches, "any of" unites them, and the earliest that is left is the entry. While a particle passes its
+//! path, time passes too: leaves that move are functions of the path's parameter just as those at rest.
 //!
-//! Invariant: before an [`Entry`] no point of the path is in the solid, and a path without one does not touch it: in
-//! exact arithmetic, for the numbers that the graph holds.
+//! Invariant: before an [`Entry`] no point of the path is in the solid, and a path without one does not touch
+//! it: in exact arithmetic, for the numbers that the graph holds.
 
 use std::cell::Cell;
 
@@ -22,8 +22,8 @@ use crate::solid::leaves::words::{Word, is_negative, skip};
 /// Undecided stretches shorter than this part of the path are not narrowed further.
 const SHORTEST: f64 = 1e-12;
 
-/// Enclosures for one path at most. A path needs a handful, or some forty where a leaf has no slope at a root; what
-/// is undecided then stays possible.
+/// Enclosures for one path at most. A path needs a handful, or some forty where a leaf has no slope at a
+/// root; what is undecided then stays possible.
 const MOST_ENCLOSURES: u32 = 1_000;
 
 /// Leaves whose distances from the entry differ by less than this part of the path decide together.
@@ -41,8 +41,8 @@ impl<'a> Sweep<'a> {
         Self { leaves, path, enclosures: Cell::new(MOST_ENCLOSURES) }
     }
 
-    /// Whether the whole path surely stays out of a tree, by bounds alone: cheaper than its stretches, and enough for
-    /// paths that are short beside their distance from the surface.
+    /// Whether the whole path surely stays out of a tree, by bounds alone: cheaper than its stretches, and
+    /// enough for paths that are short beside their distance from the surface.
     pub fn stays_out(&self, words: &[u32]) -> bool {
         // NaN is not less than anything
         let rise = |c: f64| if c < 0.0 { 0.0 } else { c };
@@ -109,8 +109,8 @@ impl<'a> Sweep<'a> {
         met
     }
 
-    /// Adds what a leaf says of a stretch, from left to right: what remains undecided is looked at again by itself,
-    /// or in halves if it has not become much shorter.
+    /// Adds what a leaf says of a stretch, from left to right: what remains undecided is looked at again by
+    /// itself, or in halves if it has not become much shorter.
     fn narrow(&self, leaf: u32, negated: bool, (t0, t1): (f64, f64), out: &mut NotNegative) {
         let left = self.enclosures.get();
         if left == 0 {
@@ -165,7 +165,8 @@ impl<'a> Sweep<'a> {
         normals
     }
 
-    /// The smallest or largest u/|∇u| of a tree, as the tree says, and the outward directions of the leaves there.
+    /// The smallest or largest u/|∇u| of a tree, as the tree says, and the outward directions of the leaves
+    /// there.
     fn deciding(&self, words: &[u32], at: &mut usize, t: f64, together: f64) -> (f64, SmallVec<[DVec3; 4]>) {
         let word = Word::read(words[*at]);
         *at += 1;

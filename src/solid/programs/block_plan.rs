@@ -1,12 +1,12 @@
-//! Which steps evaluate a graph over a block of points, in which order, and in which columns their results are kept.
+//! How a graph is evaluated over a block of points: the steps, their order, and the columns of their results.
 //!
-//! R₀ is a step of its own, a *junction*; in solids of many leaves so are min and max, and sums and products of what
-//! junctions give. What is left falls apart into pieces of plain arithmetic, each of which is compiled into one
-//! program. Where many pieces have one shape and differ in their constants alone, they share a program: ten thousand
-//! balls are compiled as one.
+//! R₀ is a step of its own, a *junction*; in solids of many leaves so are min and max, and sums and products
+//! of what junctions give. What is left falls apart into pieces of plain arithmetic, each of which is
+//! compiled into one program. Where many pieces have one shape and differ in their constants alone, they
+//! share a program: ten thousand balls are compiled as one.
 //!
-//! The *stage* of a node is how many junctions lie below it, counted along the path with the most changes from
-//! junction to arithmetic; all arithmetic of one stage is one program.
+//! The *stage* of a node is how many junctions lie below it, counted along the path with the most changes
+//! from junction to arithmetic; all arithmetic of one stage is one program.
 
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -24,16 +24,16 @@ const SAME_SHAPE: usize = 4;
 pub enum BlockStep<P = ColumnPlace> {
     Arithmetic {
         program: usize,
-        /// In the plan's constants.
+        /// Their place among the plan's constants.
         parameters: Range<usize>,
         reads: Vec<P>,
         writes: Vec<P>,
     },
     Junction {
         op: Operation,
-        /// Of R₀.
+        /// How R₀ is evaluated.
         form: Form,
-        /// Twice the same for an operation of one operand.
+        /// The same one twice for an operation on one number.
         operands: [P; 2],
         value: P,
         /// Derivatives by the operands, where they are asked for.
@@ -55,7 +55,7 @@ pub enum Operation {
 /// A piece of arithmetic that is to be compiled.
 #[derive(Debug, Clone)]
 pub struct Piece {
-    /// A graph of its own with parameters; nothing for a part of the planned graph.
+    /// A graph of its own with parameters; `None` for a part of the planned graph.
     pub shape: Option<Graph>,
     pub parameters: usize,
     pub inputs: Vec<Node>,
@@ -73,7 +73,8 @@ pub struct BlockPlan {
 }
 
 impl BlockPlan {
-    /// A plan; nothing where it would not pay: no R₀, and not many junctions of another kind.
+    /// A plan; `None` where it would not pay, because there is no R₀ and there are few junctions of another
+    /// kind.
     pub fn new(graph: &Graph, outputs: &[Node], forms: &Forms) -> Option<Self> {
         let used = graph.reachable(outputs);
         let count = |is: fn(Binary) -> bool| {

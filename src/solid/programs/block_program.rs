@@ -1,12 +1,13 @@
 //! Many points at a time, step by step over blocks of columns that stay in the first-level cache.
 //!
-//! A program is a list of steps (see `block_plan`): pieces of arithmetic as machine code, R₀ as loops over columns in the
-//! widest vectors there are (see `kernels`). Against one loop with everything in it this has twice to three times
-//! the throughput of roots and divisions on processors with wide vectors, no chain of dependent operations in deep
-//! folds, no spilled registers, and code whose size is that of the different shapes, not of the leaves.
+//! A program is a list of steps (see `block_plan`): pieces of arithmetic as machine code, R₀ as loops over
+//! columns in the widest vectors there are (see `kernels`). Against one loop with everything in it this has
+//! twice to three times the throughput of roots and divisions on processors with wide vectors, no chain of
+//! dependent operations in deep folds, no spilled registers, and code whose size is that of the different
+//! shapes, not of the leaves.
 //!
-//! Invariant: the same bits as the interpreter and the programs for one point, whatever the number of points; except in
-//! the guarded form, whose choice depends on the points that are looked at together.
+//! Invariant: the same bits as the interpreter and the programs for one point, whatever the number of points;
+//! except in the guarded form, whose choice depends on the points that are looked at together.
 
 use super::block_plan::{BlockPlan, BlockStep, Operation, Piece};
 use super::columns::{ColumnPlace, Frame, Scratch};
@@ -16,8 +17,8 @@ use super::number::Number;
 use crate::codegen::{CodegenError, Forms};
 use crate::ir::{Graph, Node};
 
-/// Columns of a block take this many bytes together, as long as a block has [`SHORTEST`] points: most of a first-level
-/// data cache of 32 KiB.
+/// Columns of a block take this many bytes together, as long as a block has [`SHORTEST`] points: most of a
+/// first-level data cache of 32 KiB.
 const CACHED_BYTES: usize = 24 << 10;
 
 /// Points of a block, at least and at most; a multiple of every vector's lanes.
@@ -65,10 +66,10 @@ enum CompiledStep<T> {
 }
 
 impl<T: Number> BlockProgram<T> {
-    /// Nothing for graphs that one plain loop answers as well.
+    /// `None` for graphs that one plain loop answers as well.
     ///
     /// # Errors
-    /// As for [`crate::codegen::compile`].
+    /// Those of [`crate::codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Option<Self>, CodegenError> {
         let Some(plan) = BlockPlan::new(graph, outputs, forms) else { return Ok(None) };
         let mut steps = Vec::with_capacity(plan.steps.len());
@@ -124,7 +125,8 @@ impl<T: Number> BlockProgram<T> {
         });
     }
 
-    /// All outputs at one point: for graphs so large that a program for single points would take too long to make.
+    /// All outputs at one point: for graphs so large that a program for single points would take too long to
+    /// make.
     pub fn call_one(&self, point: [T; 3], uniforms: &[T], out: &mut [T]) {
         assert_eq!(out.len(), self.outputs, "outputs of the program");
         let inputs = point.map(|coordinate| [coordinate; PADDING]);
@@ -140,7 +142,7 @@ impl<T: Number> BlockProgram<T> {
         }
     }
 
-    /// Never less than was there: programs of different sizes take turns.
+    /// Enlarges the columns if need be. They never shrink, because programs of different sizes take turns.
     fn make_room(&self, scratch: &mut Scratch<T>) {
         let needed = self.columns * self.block;
         if scratch.columns.len() < needed {
@@ -170,7 +172,7 @@ impl<T: Number> BlockProgram<T> {
 }
 
 impl<T: Number> CompiledStep<T> {
-    /// Nothing for a junction that there is no loop for.
+    /// `None` for a junction that there is no loop for.
     fn of(step: BlockStep) -> Option<Self> {
         Some(match step {
             BlockStep::Arithmetic { program: piece, parameters, reads, writes } => {

@@ -40,8 +40,8 @@ impl<T: Copy> Frame<'_, '_, T> {
         self.points[0].len()
     }
 
-    /// Where a column lies in `columns`. Only results are written to the caller's columns, and nothing is read back
-    /// from them.
+    /// Where a column lies in `columns`. Only results are written to the caller's columns, and nothing is
+    /// read back from them.
     fn range(&self, place: ColumnPlace) -> Range<usize> {
         match place {
             ColumnPlace::Own(column) => {

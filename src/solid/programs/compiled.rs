@@ -23,7 +23,7 @@ fn uniforms_of(graph: &Graph) -> usize {
     graph.exprs().iter().map(|&expr| number(expr)).max().unwrap_or(0)
 }
 
-/// A compiled program for one point.
+/// A compiled program for one point, in the numbers `T`.
 #[derive(Debug)]
 pub struct PointProgram<T> {
     code: Code,
@@ -32,8 +32,10 @@ pub struct PointProgram<T> {
 }
 
 impl<T: Number> PointProgram<T> {
+    /// Compiles the outputs of a graph.
+    ///
     /// # Errors
-    /// As for [`codegen::compile`].
+    /// Those of [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
         let uniforms = uniforms_of(graph);
         let request = Request {
@@ -61,7 +63,8 @@ impl<T: Number> PointProgram<T> {
         // SAFETY: `compile` asked for a point program of this precision, whose entry has this signature (the
         // last argument is unused without uniforms), and `self.code` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
-        // SAFETY: the program writes `outputs` numbers to `out` and reads its uniforms; both lengths were checked.
+        // SAFETY: the program writes `outputs` numbers to `out` and reads its uniforms; both lengths were
+        // checked.
         unsafe { entry(x, y, z, out.as_mut_ptr(), uniforms.as_ptr()) }
     }
 
@@ -71,7 +74,7 @@ impl<T: Number> PointProgram<T> {
     }
 }
 
-/// A compiled program for many points.
+/// A compiled program for many points given by columns, in the numbers `T`.
 #[derive(Debug)]
 pub struct BatchProgram<T> {
     code: Code,
@@ -80,8 +83,10 @@ pub struct BatchProgram<T> {
 }
 
 impl<T: Number> BatchProgram<T> {
+    /// Compiles the outputs of a graph.
+    ///
     /// # Errors
-    /// As for [`codegen::compile`].
+    /// Those of [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
         let uniforms = uniforms_of(graph);
         let request = Request {
@@ -97,11 +102,12 @@ impl<T: Number> BatchProgram<T> {
         Ok(Self { code: codegen::compile(request)?, uniforms, lane: std::marker::PhantomData })
     }
 
-    /// All outputs at many points: whole blocks straight from and to the caller's columns, the rest through one
-    /// padded block on the stack.
+    /// All outputs at many points: whole blocks straight from and to the caller's columns, the rest through
+    /// one padded block on the stack.
     ///
     /// # Panics
-    /// If the columns differ in length or there are not as many output columns as outputs, or uniforms as it has.
+    /// If the columns differ in length or there are not as many output columns as outputs, or uniforms as it
+    /// has.
     pub fn call<const N: usize>(&self, points: [&[T]; 3], uniforms: &[T], mut out: [&mut [T]; N]) {
         let count = points[0].len();
         assert_eq!(uniforms.len(), self.uniforms, "uniforms of the program");
@@ -130,7 +136,8 @@ impl<T: Number> BatchProgram<T> {
         }
     }
 
-    /// The columns hold at least `blocks` whole blocks and there are all uniforms: both callers above have seen to it.
+    /// The columns hold at least `blocks` whole blocks and there are all uniforms: both callers above have
+    /// seen to it.
     fn blocks<const N: usize>(&self, points: [*const T; 3], uniforms: &[T], out: [*mut T; N], blocks: usize) {
         let mut columns = [std::ptr::null_mut::<T>(); 3 + MAX_OUTPUTS];
         for (column, point) in columns.iter_mut().zip(points) {
@@ -138,11 +145,12 @@ impl<T: Number> BatchProgram<T> {
         }
         columns[3..3 + N].copy_from_slice(&out);
         type Entry<T> = unsafe extern "C" fn(*const *mut T, usize, *const T);
-        // SAFETY: `compile` asked for a batch program of this precision, whose entry has this signature (the last
-        // argument is unused without uniforms), and `self.code` keeps it mapped while it runs.
+        // SAFETY: `compile` asked for a batch program of this precision, whose entry has this signature (the
+        // last argument is unused without uniforms), and `self.code` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
-        // SAFETY: the program reads `blocks` blocks of the first three columns and writes as many of the next N,
-        // all of them long enough; it needs no alignment; outputs are exclusive borrows, so nothing overlaps.
+        // SAFETY: the program reads `blocks` blocks of the first three columns and writes as many of the next
+        // N, all of them long enough; it needs no alignment; outputs are exclusive borrows, so nothing
+        // overlaps.
         unsafe { entry(columns.as_ptr(), blocks, uniforms.as_ptr()) }
     }
 
@@ -163,8 +171,10 @@ pub struct SegmentProgram<T> {
 }
 
 impl<T: Number> SegmentProgram<T> {
+    /// Compiles a piece that reads the columns of `inputs` and writes those of `outputs`.
+    ///
     /// # Errors
-    /// As for [`codegen::compile`].
+    /// Those of [`codegen::compile`].
     pub fn compile(
         graph: &Graph,
         inputs: &[Node],
@@ -220,9 +230,10 @@ impl<T: Number> SegmentProgram<T> {
         // SAFETY: `compile` asked for a batch program of this precision that takes parameters and
         // uniforms, whose entry has this signature, and `self.code` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<T>>(self.code.entry()) };
-        // SAFETY: the program reads and writes `length` numbers of each column, which were checked to be there, and
-        // its parameters and uniforms, whose numbers were checked. Columns that were one would give wrong numbers, nothing worse:
-        // all pointers into `columns` come from one exclusive borrow.
+        // SAFETY: the program reads and writes `length` numbers of each column, which were checked to be
+        // there, and its parameters and uniforms, whose numbers were checked. Two columns in one place would
+        // give wrong numbers and do no other harm: all pointers into `columns` come from one exclusive
+        // borrow.
         unsafe {
             entry(frame.pointers.as_ptr(), length / lanes, parameters.as_ptr(), frame.uniforms.as_ptr())
         }
@@ -238,22 +249,26 @@ const ROUNDING: Rounding =
 pub struct RangeProgram {
     code: Code,
     rounding: Rounding,
-    /// Nothing if it takes no pointer to any.
+    /// How many it takes; `None` if it takes no pointer to any.
     parameters: Option<usize>,
     uniforms: usize,
 }
 
 impl RangeProgram {
+    /// Compiles the range of a node for boxes, rounding upwards where this processor can be asked to.
+    ///
     /// # Errors
-    /// As for [`codegen::compile`]; [`CodegenError::Unsupported`] for graphs that only the interpreter knows.
+    /// Those of [`codegen::compile`], and [`CodegenError::Unsupported`] for graphs that only the interpreter
+    /// knows.
     pub fn compile(graph: &Graph, root: Node) -> Result<Self, CodegenError> {
         Self::with_rounding(graph, root, ROUNDING)
     }
 
-    /// For a processor that rounds in this way; rounding upwards is asked for where [`RangeProgram::compile`] does.
+    /// For a processor that rounds in this way; rounding upwards is asked for where [`RangeProgram::compile`]
+    /// does.
     ///
     /// # Errors
-    /// As for [`RangeProgram::compile`].
+    /// Those of [`RangeProgram::compile`].
     pub fn with_rounding(graph: &Graph, root: Node, rounding: Rounding) -> Result<Self, CodegenError> {
         if !codegen::range_is_supported(graph, root) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
@@ -261,10 +276,11 @@ impl RangeProgram {
         Self::new(graph, root, rounding, None)
     }
 
-    /// A program of a graph with uniforms. It may be called with those for which [`codegen::range_stays_finite`].
+    /// A program of a graph with uniforms. It may be called with those for which
+    /// [`codegen::range_stays_finite`].
     ///
     /// # Errors
-    /// As for [`RangeProgram::compile`].
+    /// Those of [`RangeProgram::compile`].
     pub fn with_uniforms(graph: &Graph, root: Node) -> Result<Self, CodegenError> {
         if !codegen::range_is_known(graph) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
@@ -276,7 +292,7 @@ impl RangeProgram {
     /// [`codegen::range_stays_finite`].
     ///
     /// # Errors
-    /// As for [`RangeProgram::compile`].
+    /// Those of [`RangeProgram::compile`].
     pub fn with_parameters(graph: &Graph, root: Node, parameters: usize) -> Result<Self, CodegenError> {
         if !codegen::range_is_known(graph) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
@@ -314,7 +330,7 @@ impl RangeProgram {
         Ok(Self { code: codegen::compile(request)?, rounding, parameters, uniforms })
     }
 
-    /// The range over a box, for uniforms within these bounds; nothing if the box reaches too far out.
+    /// The range over a box, for uniforms within these bounds; `None` if the box reaches too far out.
     ///
     /// # Panics
     /// If there are not as many parameters or uniforms as the program has.
@@ -340,8 +356,8 @@ impl RangeProgram {
         match self.rounding {
             Rounding::Nearest => {
                 type Entry = unsafe extern "C" fn(*const f64, *mut f64, *const f64, *const f64);
-                // SAFETY: `new` asked for a range program, whose entry has this signature (the last arguments are
-                // unused without parameters and uniforms), and `self.code` keeps it mapped while it runs.
+                // SAFETY: `new` asked for a range program, whose entry has this signature (the last arguments
+                // are unused without parameters and uniforms), and `self.code` keeps it mapped while it runs.
                 let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.code.entry()) };
                 // SAFETY: the program reads six numbers its parameters and uniforms, checked above, and
                 // writes two.
@@ -352,16 +368,19 @@ impl RangeProgram {
         Some(Interval::new(out[0], out[1]))
     }
 
-    /// The call as one block of assembly, so that no code of Rust runs in a rounding mode that it does not expect.
+    /// The call as one block of assembly, so that no code of Rust runs in a rounding mode that it does not
+    /// expect.
     #[cfg(all(target_arch = "x86_64", unix))]
     #[inline]
     fn call_rounding_upwards(&self, input: &[f64; 6], out: &mut [f64; 2], numbers: [*const f64; 2]) {
-        /// The state at the start of every program (all exceptions masked), but rounding towards +∞ (bits 13, 14).
+        /// The state at the start of every program (all exceptions masked), but rounding towards +∞ (bits 13,
+        /// 14).
         static UPWARDS: u32 = 0x1f80 | 0x4000;
-        // SAFETY: `new` asked for a range program, whose entry follows the C convention of this system with these
-        // four pointers (the last are unused without parameters and uniforms); `self.code` keeps it mapped while it runs; it reads
-        // six numbers, its parameters and its uniforms, checked by the caller, writes two, and calls nothing. The stack is aligned
-        // at the start of the block, stays so, and is put back, as is the control register, before its end.
+        // SAFETY: `new` asked for a range program, whose entry follows the C convention of this system with
+        // these four pointers (the last are unused without parameters and uniforms); `self.code` keeps it
+        // mapped while it runs; it reads six numbers, its parameters and its uniforms, checked by the caller,
+        // writes two, and calls nothing. The stack is aligned at the start of the block, stays so, and is put
+        // back, as is the control register, before its end.
         unsafe {
             std::arch::asm!(
                 "sub rsp, 16",
@@ -398,8 +417,10 @@ pub struct LeafProgram {
 }
 
 impl LeafProgram {
+    /// Compiles the outputs of a leaf, for one point and for many.
+    ///
     /// # Errors
-    /// As for [`codegen::compile`].
+    /// Those of [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], parameters: usize) -> Result<Self, CodegenError> {
         let compile = |shape| {
             let (precision, forms) = (Precision::F64, &Forms::all(Form::Stable));
@@ -427,17 +448,19 @@ impl LeafProgram {
         assert_eq!((out.len(), parameters.len()), (self.point.outputs, self.parameters), "leaf program");
         assert!(uniforms.len() >= self.uniforms, "leaf program");
         type Entry = unsafe extern "C" fn(f64, f64, f64, *mut f64, *const f64, *const f64);
-        // SAFETY: `compile` asked for a point program with parameters and uniforms in `f64`, whose entry has this
-        // signature, and `self.point` keeps it mapped while it runs.
+        // SAFETY: `compile` asked for a point program with parameters and uniforms in `f64`, whose entry has
+        // this signature, and `self.point` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.point.entry()) };
-        // SAFETY: the program writes the outputs and reads parameters and uniforms; all lengths were checked above.
+        // SAFETY: the program writes the outputs and reads parameters and uniforms; all lengths were checked
+        // above.
         unsafe { entry(p.x, p.y, p.z, out.as_mut_ptr(), parameters.as_ptr(), uniforms.as_ptr()) }
     }
 
     /// The one output at many points: whole blocks, then the rest through one padded block.
     ///
     /// # Panics
-    /// If the columns differ in length, or the program has several outputs, other parameters or other uniforms.
+    /// If the columns differ in length, or the program has several outputs, other parameters or other
+    /// uniforms.
     pub fn call_many(&self, points: [&[f64]; 3], parameters: &[f64], uniforms: &[f64], out: &mut [f64]) {
         let count = out.len();
         assert!(uniforms.len() >= self.uniforms, "leaf program");
@@ -464,19 +487,18 @@ impl LeafProgram {
         }
     }
 
-    /// The columns hold at least `blocks` whole blocks, and there are all parameters and uniforms: both callers above
-    /// have seen to it.
+    /// The columns hold at least `blocks` whole blocks, and there are all parameters and uniforms: both
+    /// callers above have seen to it.
     fn blocks(&self, [x, y, z]: [*const f64; 3], out: *mut f64, blocks: usize, numbers: [&[f64]; 2]) {
         let [parameters, uniforms] = numbers.map(<[f64]>::as_ptr);
         // the program only reads the first three
         let columns = [x.cast_mut(), y.cast_mut(), z.cast_mut(), out];
         type Entry = unsafe extern "C" fn(*const *mut f64, usize, *const f64, *const f64);
-        // SAFETY: `compile` asked for a batch program with parameters and uniforms in `f64`, whose entry has this
-        // signature, and `self.batch` keeps it mapped while it runs.
+        // SAFETY: `compile` asked for a batch program with parameters and uniforms in `f64`, whose entry has
+        // this signature, and `self.batch` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.batch.entry()) };
-        // SAFETY: the program reads `blocks` blocks of three columns, its parameters and its uniforms, whose numbers were
-        // checked,
-        // and writes as many blocks to `out`, which is borrowed exclusively.
+        // SAFETY: the program reads `blocks` blocks of three columns, its parameters and its uniforms, whose
+        // numbers were checked, and writes as many blocks to `out`, which is borrowed exclusively.
         unsafe { entry(columns.as_ptr(), blocks, parameters, uniforms) }
     }
 }

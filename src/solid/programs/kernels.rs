@@ -1,9 +1,9 @@
 //! R₀ and what joins leaves beside it, over columns, in the widest vectors of this processor.
 //!
-//! The code generator stops at 128 bits, and roots and divisions are what R₀ costs: on processors that take as long
-//! for 128 as for 256 or 512 bits, these loops are two to three times as fast. They are the specification itself,
-//! `ir::r0`, compiled for several instruction sets, of which one is chosen when the program runs; none of them
-//! contracts a product and a sum, so all give the same bits.
+//! The code generator stops at 128 bits, and roots and divisions are what R₀ costs: on processors that take
+//! as long for 128 as for 256 or 512 bits, these loops are two to three times as fast. They are the
+//! specification itself, `ir::r0`, compiled for several instruction sets, of which one is chosen when the
+//! program runs; none of them contracts a product and a sum, so all give the same bits.
 
 use multiversion::multiversion;
 
@@ -18,13 +18,13 @@ pub type WeightedKernel<T> = fn(&[T], &[T], [&mut [T]; 3]);
 
 /// A type that there are kernels for.
 pub trait Wide: Sized {
-    /// Nothing for what is no junction, or for a form that there is no kernel of.
+    /// The loop for an operation; `None` if there is none.
     fn kernel(op: Binary, form: Form) -> Option<Kernel<Self>>;
 
-    /// The first operand, negated.
+    /// The loop that negates its first operand.
     fn negation() -> Kernel<Self>;
 
-    /// Likewise; only R₀ has weights.
+    /// The loop for R₀ with both weights; `None` for other operations.
     fn weighted_kernel(op: Binary, form: Form) -> Option<WeightedKernel<Self>>;
 }
 
@@ -74,8 +74,8 @@ const RUN: usize = 16;
 /// A result smaller than this part of √(u² + v²) has lost more than four bits by cancellation.
 const CANCELLED: f64 = 1.0 / 8.0;
 
-/// Whether the textbook's result is near enough: nothing cancelled, and no square that counts has left the range.
-/// NaN is not near enough: the stable form then gives NaN too.
+/// Whether the textbook's result is near enough: nothing cancelled, and no square that counts has left the
+/// range. NaN is not near enough: the stable form then gives NaN too.
 #[inline(always)]
 fn is_near<T: SafeSquares>(result: T, h: T) -> bool {
     let part = result.abs() >= h * T::from_f64(CANCELLED);
@@ -83,7 +83,7 @@ fn is_near<T: SafeSquares>(result: T, h: T) -> bool {
     part & fits
 }
 
-/// Between which magnitudes √(u² + v²) is good to 2 ulp without scaling.
+/// The magnitudes between which √(u² + v²) is good to 2 ulp without scaling.
 trait SafeSquares: crate::ir::Real {
     const LEAST: f64;
     const LARGEST: f64;

@@ -9,7 +9,7 @@ use crate::precision::Precision;
 
 /// A type that programs compute with: `f32` or `f64`.
 pub trait Number: Real + Default + Wide {
-    /// Which of the two it is.
+    /// The name of the type.
     const PRECISION: Precision;
 
     /// All outputs at a point, by the interpreter.
@@ -33,7 +33,7 @@ pub struct UniformValues {
 }
 
 impl UniformValues {
-    /// Of a program that has none.
+    /// The values for a program that has none.
     pub const NONE: Self = Self { double: Vec::new(), single: Vec::new() };
 }
 

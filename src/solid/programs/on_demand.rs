@@ -1,4 +1,5 @@
-//! The programs of one graph: made on first use, for each precision and shape, with the interpreter behind them.
+//! The programs of one graph: made on first use, for each precision and shape, with the interpreter behind
+//! them.
 
 use std::sync::OnceLock;
 
@@ -14,11 +15,13 @@ use crate::solid::engine::Engine;
 pub enum Guard {
     /// Where a coordinate is not finite: such a point is neither inside nor outside.
     Infinite,
-    /// Also beyond the distances for which `ir::twin` has proven that leaves are numbers (f32: 4e9, f64: 1e77).
+    /// Where a coordinate is not finite, and beyond the distances for which `ir::twin` has proven that leaves
+    /// are numbers (f32: 4e9, f64: 1e77).
     FarAway,
 }
 
-/// The forms of `f64` and of `f32`: the stable one gives way to the scaled one where squares may leave the range.
+/// The forms of `f64` and of `f32`: the stable one gives way to the scaled one where squares may leave the
+/// range.
 pub fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
     if form != Form::Stable {
         return [Forms::all(form), Forms::all(form)];
@@ -29,8 +32,9 @@ pub fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
 
 type Slot<P> = OnceLock<Result<P, CodegenError>>;
 
-/// Graphs with more nodes than this are answered by their program over blocks for single points too: one program of
-/// 500 balls (4 500 nodes) takes some 30 ms to be made, which pays only for very many single points.
+/// Graphs with more nodes than this are answered by their program over blocks for single points too: one
+/// program of 500 balls (4 500 nodes) takes some 30 ms to be made, which pays only for very many single
+/// points.
 const LARGE: usize = 1500;
 
 /// The compiled programs of one precision.
@@ -78,10 +82,10 @@ impl<T> Compiled<T> {
 pub struct Programs {
     pub graph: Graph,
     pub outputs: Vec<Node>,
-    /// Of R₀ in `f64` and in `f32`.
+    /// How R₀ is evaluated in `f64` and in `f32`.
     forms: [Forms; 2],
     pub interpreter: Interpreter,
-    /// What depends on time alone; nothing if the solid is at rest.
+    /// What depends on time alone; `None` if the solid is at rest.
     pub uniforms: Option<Uniforms>,
     double: Compiled<f64>,
     single: Compiled<f32>,
@@ -179,6 +183,8 @@ impl Programs {
         }
     }
 
+    /// Makes the program for single points now, rather than when it is first asked for.
+    ///
     /// # Errors
     /// If no machine code can be made here.
     pub fn require_machine_code(&self) -> Result<(), CodegenError> {
@@ -192,8 +198,8 @@ impl Programs {
         engine != Engine::Interpreter && self.require_machine_code().is_ok()
     }
 
-    /// All outputs at a point. Inlined, so that a point made of three loose numbers is not written to memory and
-    /// read back as a vector: that stalls for longer than the whole program takes.
+    /// All outputs at a point. Inlined, so that a point made of three loose numbers is not written to memory
+    /// and read back as a vector: that stalls for longer than the whole program takes.
     #[inline]
     pub fn point<T: Lane>(&self, engine: Engine, uniforms: &UniformValues, p: [T; 3], out: &mut [T]) {
         let uniforms = T::uniforms(uniforms);
@@ -236,8 +242,8 @@ impl Programs {
     }
 }
 
-/// The root with a guard, 0 or NaN, in it. Below R₀, which hands a NaN on from either operand, adding it to one leaf
-/// costs less than adding it to the result. Pairs of operands that become others keep their forms.
+/// The root with a guard, 0 or NaN, in it. Below R₀, which hands a NaN on from either operand, adding it to
+/// one leaf costs less than adding it to the result. Pairs of operands that become others keep their forms.
 fn guarded(graph: &mut Graph, root: Node, guard: Node, forms: &mut [Forms; 2]) -> Node {
     let mut above = Vec::new();
     let mut node = root;

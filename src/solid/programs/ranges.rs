@@ -10,13 +10,13 @@ use crate::ir::{self, Graph, Hoisted, Node, RangeEvaluator, Region};
 use crate::solid::engine::Engine;
 
 pub struct Ranges {
-    /// Without what depends on time alone; nothing for a function of space only.
+    /// The function without what depends on time alone; `None` for a function of space only.
     moving: Option<Hoisted>,
     evaluator: RangeEvaluator,
     code: OnceLock<Option<RangeProgram>>,
 }
 
-/// What depends on time alone, during a stretch of time.
+/// Ranges of what depends on time alone, during a stretch of time.
 pub struct UniformRanges {
     intervals: Vec<Interval>,
     /// The same numbers, for machine code.
@@ -40,7 +40,8 @@ impl Ranges {
         self.moving.is_some()
     }
 
-    /// The range of the function over a box. One of time says what it needs to know of that, and is given it.
+    /// The range of the function over a box. A function of time asks `during` for the ranges of what depends
+    /// on time alone, and hands it the way to find them.
     #[inline]
     pub fn over<'a>(
         &'a self,

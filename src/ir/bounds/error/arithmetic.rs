@@ -18,16 +18,22 @@ pub enum Inputs {
 /// One way to compute a node.
 #[derive(Debug, Clone, Copy)]
 pub struct Arithmetic<'a> {
+    /// The type of every intermediate result.
     pub precision: Precision,
+    /// How R₀ is evaluated.
     pub forms: &'a Forms,
+    /// How coordinates reach the program.
     pub inputs: Inputs,
 }
 
 /// |computed − exact| ≤ `absolute`, and ≤ `relative`·|exact| + `remainder`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Error {
+    /// Bound of |computed − exact|.
     pub absolute: f64,
+    /// The part of the other bound that is proportional to |exact|.
     pub relative: f64,
+    /// The rest of it, for underflow.
     pub remainder: f64,
 }
 

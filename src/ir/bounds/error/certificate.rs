@@ -27,6 +27,7 @@ pub struct ErrorAnalysis<'a> {
 }
 
 impl<'a> ErrorAnalysis<'a> {
+    /// Prepares a root for one arithmetic, at all times.
     pub fn new(graph: &'a Graph, root: Node, arithmetic: Arithmetic<'a>) -> Self {
         Self { graph, root, arithmetic, ranges: RangeEvaluator::new(graph, root), time: Interval::ALL }
     }
@@ -37,8 +38,8 @@ impl<'a> ErrorAnalysis<'a> {
         Self { time, ..self }
     }
 
-    /// A bound of |computed − exact| of the root at every point of a box; ∞ where there is none. The box is divided
-    /// until the bound is at most `enough`, cannot become so, or would not become much smaller.
+    /// A bound of |computed − exact| of the root at every point of a box; ∞ where there is none. The box is
+    /// divided until the bound is at most `enough`, cannot become so, or would not become much smaller.
     ///
     /// With [`Inputs::Shifted`] the box is one of shifted coordinates.
     pub fn certify(&self, over: &Aabb, enough: f64) -> f64 {
@@ -144,7 +145,7 @@ mod tests {
         // (1 + u)²(1 + u) − 1 of at most 16, and the underflow
         let square = graph.binary(Binary::Mul, sum, sum);
         near(bound(&graph, square, Form::Stable, over), 48.0 * UNIT);
-        // of x² + y²: squares u, sum u, halved by the root, root u
+        // for x² + y²: squares u, sum u, halved by the root, root u
         let (x2, y2) = (graph.binary(Binary::Mul, x, x), graph.binary(Binary::Mul, y, y));
         let squares = graph.binary(Binary::Add, x2, y2);
         let rho = graph.unary(Unary::Sqrt, squares);

@@ -17,7 +17,7 @@ const HOST_ROUNDINGS: f64 = 4.0;
 #[derive(Clone, Copy)]
 pub struct Operand {
     pub error: Error,
-    /// Of the exact values.
+    /// The range of the exact values.
     pub range: Interval,
     /// By its form: neither the exact nor the computed value is ever negative.
     pub not_negative: bool,
@@ -65,7 +65,7 @@ impl Error {
 pub struct ErrorRules<'a> {
     pub arithmetic: Arithmetic<'a>,
     pub known: &'a [Operand],
-    /// Of the result.
+    /// The range of the result.
     pub range: Interval,
 }
 
@@ -105,10 +105,11 @@ impl ErrorRules<'_> {
         (self.settled(error), by_form)
     }
 
-    /// The smaller of both bounds; nothing where the range or the type is left.
+    /// The smaller of both bounds; unknown where the range of the type is left.
     fn settled(&self, error: Error) -> Error {
         let largest = magnitude(self.range);
-        // after a shift the relative bound is one of the written formula's value, itself within it of the graph's
+        // after a shift the relative bound is one of the written formula's value, itself within it of the
+        // graph's
         let scale = match self.arithmetic.inputs {
             Inputs::Shifted if error.relative <= 0.5 => {
                 div(add(largest, error.remainder), (1.0 - error.relative).next_down())
@@ -139,7 +140,7 @@ impl ErrorRules<'_> {
         Error { absolute: add(absolute, tiny), relative, remainder: add(remainder, tiny) }
     }
 
-    /// As [`ErrorRules::rounded`] for sums and roots, which are exact where they are tiny.
+    /// [`ErrorRules::rounded`] for sums and roots, which are exact where they are tiny.
     fn rounded_sum(&self, error: Error) -> Error {
         let unit = self.unit();
         let computed = add(magnitude(self.range), mul(2.0, error.absolute));
@@ -190,7 +191,8 @@ impl ErrorRules<'_> {
         }
     }
 
-    /// A function of the mathematical library that hands on this error of its operands, if a bound of it is known.
+    /// A function of the mathematical library that hands on this error of its operands, if a bound of it is
+    /// known.
     fn host(&self, propagated: Option<f64>) -> Error {
         let Some(propagated) = propagated else { return Error::UNKNOWN };
         let computed = add(magnitude(self.range), mul(2.0, propagated));

@@ -5,8 +5,9 @@ use crate::ir::bounds::upper::{add, mul, root};
 
 /// The largest w_u·e + w_v·f over two ranges of the operands of ∧.
 ///
-/// With θ the direction of (u, v) it is e + f − (e·cos θ + f·sin θ): along the directions that the ranges cover it is
-/// largest at one of their ends, which are directions of corners, or at (−e, −f) if that is one of them.
+/// With θ the direction of (u, v) it is e + f − (e·cos θ + f·sin θ): along the directions that the ranges
+/// cover it is largest at one of their ends, which are directions of corners, or at (−e, −f) if that is one
+/// of them.
 pub fn through_weights(u: Interval, v: Interval, e: f64, f: f64) -> f64 {
     let apart = add(mul(largest_weight(u, v), e), mul(largest_weight(v, u), f));
     let anywhere = add(add(e, f), root(add(mul(e, e), mul(f, f))));
@@ -31,8 +32,8 @@ fn holds_ray(u: Interval, v: Interval, e: f64, f: f64) -> bool {
     !(last < 0.0 || first > last + 1e-14 * (first.abs() + last.abs()))
 }
 
-/// The largest weight 1 − u/√(u² + v²) of u in u ∧ v over two ranges: u/h falls with u, and with |v| it comes nearer
-/// to zero.
+/// The largest weight 1 − u/√(u² + v²) of u in u ∧ v over two ranges: u/h falls with u, and with |v| it comes
+/// nearer to zero.
 fn largest_weight(u: Interval, v: Interval) -> f64 {
     let across = v.abs();
     let v = if u.lo >= 0.0 { across.hi } else { across.lo };
