@@ -19,13 +19,14 @@ mod request;
 mod translate;
 
 pub use machine::{CodegenError, target_description};
-pub use memory::Code;
-pub use range::{
+pub(crate) use memory::Code;
+pub(crate) use range::{
     REACH as RANGE_REACH, knows as range_is_known, stays_finite as range_stays_finite,
     supports as range_is_supported,
 };
 pub use request::{Request, Rounding, Shape};
-pub use translate::{Listing, compile};
+pub use translate::Listing;
+pub(crate) use translate::compile;
 
 pub use crate::ir::{Form, Forms};
 pub use crate::precision::Precision;

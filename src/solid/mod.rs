@@ -39,7 +39,7 @@ pub use depth::Depth;
 pub use engine::{Engine, ProgramKind};
 pub use evaluation::Contact;
 pub use inspection::{LeafInfo, Remainder};
-pub use programs::compiled::{BatchProgram, PointProgram, RangeProgram};
+pub use programs::compiled::RangeProgram;
 pub use programs::on_demand::Lane;
 pub use tolerance::{Chosen, OutOfTolerance, ProgramVariant};
 pub use twin::Twin;

@@ -67,11 +67,6 @@ impl<T: Number> PointProgram<T> {
         // checked.
         unsafe { entry(x, y, z, out.as_mut_ptr(), uniforms.as_ptr()) }
     }
-
-    /// Bytes of machine code.
-    pub fn size(&self) -> usize {
-        self.code.size
-    }
 }
 
 /// A compiled program for many points given by columns, in the numbers `T`.
@@ -152,11 +147,6 @@ impl<T: Number> BatchProgram<T> {
         // N, all of them long enough; it needs no alignment; outputs are exclusive borrows, so nothing
         // overlaps.
         unsafe { entry(columns.as_ptr(), blocks, uniforms.as_ptr()) }
-    }
-
-    /// Bytes of machine code.
-    pub fn size(&self) -> usize {
-        self.code.size
     }
 }
 
