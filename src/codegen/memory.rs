@@ -26,7 +26,7 @@ pub struct Code {
 // SAFETY: `entry` points to finished code that nobody writes to again; it stays mapped until the drop of
 // `self`, and any number of threads may execute the same code. The module is behind a mutex.
 unsafe impl Send for Code {}
-// SAFETY: shared use is what the sentence above speaks of.
+// SAFETY: threads that share a `Code` only execute it, which is safe for the reasons above.
 unsafe impl Sync for Code {}
 
 impl Code {

@@ -3,12 +3,12 @@
 //! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets
 //! the processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above
 //! the exact one after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added
-//! after each operation. The rules are those of `ir::bounds::range`; bounds may be wider by a few ulp, of R₀
-//! by a few ulp of its larger operand.
+//! after each operation. The rules are those of `ir::bounds::range`. Bounds may be wider by a few ulp, those
+//! of R₀ by a few ulp of its larger operand.
 //!
-//! Only graphs are taken whose every node is finite over [`REACH`], and small enough that no square
-//! overflows: then neither infinity nor NaN can arise for a box within it, and min and max need not look for
-//! them. Elsewhere the interpreter answers.
+//! Only graphs are taken whose every node is finite over [`REACH`], and so small that no square overflows.
+//! Then neither infinity nor NaN can arise for a box within it, and min and max need not look for them.
+//! For other graphs and boxes the interpreter answers.
 
 use std::collections::HashMap;
 

@@ -33,7 +33,7 @@ pub(super) struct Lowering<'a> {
     pub diagnostics: Vec<Diagnostic>,
     pub names: Names<'a>,
     pub scope: Scope,
-    /// Of all scenes, whatever they state.
+    /// The method that all scenes get, whatever they state.
     pub method: Option<Method>,
     max_nodes: usize,
     budget_reported: bool,

@@ -15,7 +15,7 @@ use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 use crate::precision::Precision;
 
-/// Where forms are chosen for a solid of which nothing else is known: within this distance of the origin, and
+/// Forms are chosen within this distance of the origin if nothing else is known of a solid, and
 /// within as many seconds of the beginning.
 const REACH: f64 = 1e4;
 

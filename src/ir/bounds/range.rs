@@ -5,8 +5,8 @@
 //! products of two linear functions of one node (slabs) get their exact range too; elsewhere a node that
 //! occurs twice is taken as two independent ones, which is safe but wider.
 //!
-//! A range holds the exact values of the formula over the reals and, of every node, also the values that
-//! programs in `f64` find: rounding never leaves bounds that were rounded outwards, and where squares
+//! A range holds the exact values of the formula over the reals, and for every node also the values that
+//! programs in `f64` find. Rounding never leaves bounds that were rounded outwards, and where squares
 //! overflow or underflow R₀ is widened to what its floating-point form then gives. A node that may not be a
 //! number has [`Interval::ALL`], and so has every node that uses it. Points whose coordinates are not finite
 //! belong to no box.
@@ -42,7 +42,7 @@ pub struct Affine {
 }
 
 impl RangeRule {
-    /// The way for a node of a graph.
+    /// The rule for a node of a graph.
     pub fn of(graph: &Graph, expr: Expr) -> Self {
         if let Expr::Binary(Binary::Mul, a, b) = expr {
             if a == b {

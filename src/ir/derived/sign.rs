@@ -14,7 +14,7 @@ pub enum SignRule {
     Not(Node),
     /// A product or quotient with a positive constant: the sign of the other operand.
     Same(Node),
-    /// The sign is that of the value, which is not made of signs.
+    /// The value itself has to be computed.
     Leaf,
 }
 

@@ -54,7 +54,7 @@ pub fn twin(graph: &mut Graph, root: Node) -> Node {
     image[root.index()].map_or(root, |(node, _)| node)
 }
 
-/// Nodes of which only the sign matters for the sign of the root, the leaves included.
+/// For each node, whether only its sign matters for the sign of the root; leaves included.
 fn logic_nodes(graph: &Graph, root: Node) -> Vec<bool> {
     let mut logic = vec![false; root.index() + 1];
     logic[root.index()] = true;

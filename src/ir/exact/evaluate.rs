@@ -64,7 +64,7 @@ pub fn evaluate_at(graph: &Graph, outputs: &[Node], point: [f64; 3], time: f64) 
             Expr::Unary(op, a) => unary(op, of(a)?)?,
             Expr::Binary(op, a, b) => binary(op, of(a)?, of(b)?)?,
         };
-        // a zero may have come out with unlimited digits, of which no sine can be taken
+        // a zero may have come out with unlimited digits, and such a number has no sine
         values.push(Some(value.with_precision(PRECISION).value()));
     }
     outputs.iter().map(|output| values[output.index()].clone().map(Exact)).collect()

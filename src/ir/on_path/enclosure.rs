@@ -87,7 +87,7 @@ impl Jet {
         Self { at: [value, ZERO], over: [value, ZERO, ZERO] }
     }
 
-    /// A node of which the value alone is known.
+    /// A node whose range is known, but not its derivatives.
     fn rough(at: Interval, over: Interval) -> Self {
         Self { at: [at, Interval::ALL], over: [over, Interval::ALL, Interval::ALL] }
     }

@@ -30,7 +30,8 @@ trait Probe {
     /// What is known of a box, handed on to the boxes within it.
     type Known: Clone;
     fn everything(&self) -> Self::Known;
-    /// What is known of a box within one of which `known` is; `None` if it is proven to be outside.
+    /// What is known of a box that lies within another one, of which `known` holds; `None` if it is proven to
+    /// be outside.
     fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known>;
     fn is_inside(&self, known: &Self::Known, p: DVec3) -> bool;
 }

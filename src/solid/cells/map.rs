@@ -410,7 +410,7 @@ impl Field for CellMap {
 }
 
 impl Walls for CellMap {
-    /// For a `reach` up to that of the map; farther away it knows of no face.
+    /// The map knows no face that is farther away than its own reach.
     fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
         match self.cells.find(p).map(|found| found.cell) {
             Some(Cell::Near(program)) => {

@@ -84,7 +84,7 @@ impl MovingMap {
         Some(cells)
     }
 
-    /// Cells of the whole run that are divided anew for each window, of 4096 that the box has on their level.
+    /// How many cells are divided anew for each window. The box has 4096 on their level.
     pub fn restless(&self) -> usize {
         self.restless.len()
     }

@@ -56,7 +56,7 @@ pub struct LeafTree {
 /// What depends on time alone, during the stretch.
 struct Ranges {
     uniforms: Vec<Interval>,
-    /// The same numbers, for machine code.
+    /// The ranges as machine code reads them.
     pairs: Vec<[f64; 2]>,
     /// For each leaf, whether machine code may answer for its range.
     tame: Vec<bool>,

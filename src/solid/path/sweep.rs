@@ -1,13 +1,13 @@
 //! Where a path enters a tree of leaves: swept contact, also called continuous collision detection.
 //!
-//! Each leaf says on which stretches of the path it may be at least zero, and on which it surely is: leaves
-//! that are polynomials of degree two or less along the path in closed form, with bounds of all rounding
-//! errors; others by Taylor enclosures that are narrowed around their roots. "All of" then intersects
+//! Each leaf says on which stretches of the path it may be at least zero, and on which it surely is. Leaves
+//! that are polynomials of degree two or less along the path do so in closed form, with bounds of all
+//! rounding errors; others by enclosures that are narrowed around their roots. "All of" then intersects
 //! stretches, "any of" unites them, and the earliest that is left is the entry. While a particle passes its
-//! path, time passes too: leaves that move are functions of the path's parameter just as those at rest.
+//! path, time passes too: leaves that move are functions of the path's parameter, as are leaves at rest.
 //!
 //! Invariant: before an [`Entry`] no point of the path is in the solid, and a path without one does not touch
-//! it: in exact arithmetic, for the numbers that the graph holds.
+//! it. This holds in exact arithmetic, for the numbers that the graph holds.
 
 use std::cell::Cell;
 

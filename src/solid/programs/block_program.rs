@@ -1,13 +1,14 @@
 //! Many points at a time, step by step over blocks of columns that stay in the first-level cache.
 //!
 //! A program is a list of steps (see `block_plan`): pieces of arithmetic as machine code, R₀ as loops over
-//! columns in the widest vectors there are (see `kernels`). Against one loop with everything in it this has
-//! twice to three times the throughput of roots and divisions on processors with wide vectors, no chain of
-//! dependent operations in deep folds, no spilled registers, and code whose size is that of the different
-//! shapes, not of the leaves.
+//! columns in the widest vectors there are (see `kernels`). Compared with one loop with everything in it,
+//! roots and divisions have two to three times the throughput on processors with wide vectors. There is no
+//! chain of dependent operations in deep folds and no spilled register, and the size of the code grows with
+//! the number of shapes, not of leaves.
 //!
-//! Invariant: the same bits as the interpreter and the programs for one point, whatever the number of points;
-//! except in the guarded form, whose choice depends on the points that are looked at together.
+//! Invariant: results have the bits of the interpreter and of the programs for one point, whatever the number
+//! of points. The guarded form is the exception, because its choice depends on the points that are looked at
+//! together.
 
 use super::block_plan::{BlockPlan, BlockStep, Operation, Piece};
 use super::columns::{ColumnPlace, Frame, Scratch};

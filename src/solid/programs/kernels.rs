@@ -1,4 +1,5 @@
-//! R₀ and what joins leaves beside it, over columns, in the widest vectors of this processor.
+//! R₀ and the other operations that join leaves, as loops over columns in the widest vectors of this
+//! processor.
 //!
 //! The code generator stops at 128 bits, and roots and divisions are what R₀ costs: on processors that take
 //! as long for 128 as for 256 or 512 bits, these loops are two to three times as fast. They are the

@@ -19,7 +19,7 @@ pub struct Ranges {
 /// Ranges of what depends on time alone, during a stretch of time.
 pub struct UniformRanges {
     intervals: Vec<Interval>,
-    /// The same numbers, for machine code.
+    /// The intervals as machine code reads them.
     pairs: Vec<[f64; 2]>,
     /// Whether machine code may answer.
     tame: bool,
