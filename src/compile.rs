@@ -20,8 +20,9 @@ use crate::codegen::CodegenError;
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source, nearest};
 use crate::geom::Aabb;
 use crate::ir::Node;
-use crate::lower::{self, Method, Module, Options, Scene, Tolerance};
+use crate::lower::{self, Module, Options, Scene, Tolerance};
 use crate::solid::{Bounds, Chosen, Engine, Solid};
+use crate::sph::Method;
 use crate::syntax::{self, Ast};
 
 /// Why a file gives no solid.
@@ -192,6 +193,18 @@ impl Program {
             return Err(Error::UnknownName { kind: "solid", name: name.into(), known });
         };
         self.compile(&solid.name, solid.node, engine)
+    }
+
+    /// A scene by name.
+    ///
+    /// # Errors
+    /// If there is no such scene.
+    pub fn scene(&self, name: &str) -> Result<&Scene, Error> {
+        let found = self.module.scenes.iter().find(|scene| scene.name == name);
+        found.ok_or_else(|| {
+            let known = self.module.scenes.iter().map(|scene| scene.name.clone()).collect();
+            Error::UnknownName { kind: "scene", name: name.into(), known }
+        })
     }
 
     /// Compiles any shape of the file's graph, such as the shape of a scene's fluid.

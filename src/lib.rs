@@ -8,13 +8,25 @@
 //! ```
 //!
 //! Each stage is a function from data to data, and what it makes can be printed (`rfm explain --show …`). The
-//! consumers know only the [`field::Field`] trait, never the compiler.
+//! consumers know only the traits [`Field`] and [`field::Walls`], never the compiler.
 //!
 //! Sign convention, everywhere: **ω > 0 inside the obstacle, 0 on its surface, < 0 in the fluid**; the outward
 //! unit normal is −∇ω/|∇ω|.
+//!
+//! What a program that embeds obstacles uses:
+//!
+//! | module | what it has |
+//! |---|---|
+//! | [`Program`], [`Solid`], [`solid`] | a file, compiled; ω, ∇ω, signs, contacts, ranges, paths, cell maps |
+//! | [`field`] | the traits [`Field`] and [`field::Walls`], which closures may implement as well |
+//! | [`mesh`], [`slice`], [`render`], [`fluid_surface`] | meshes, plots, pictures, surfaces of fluids |
+//! | [`Experiment`], [`experiment`], [`sph`] | scenes, and the fluid solver without them |
+//! | [`diagnostic`] | messages with their places in a file |
+//! | [`geom`], [`interval`], [`precision`], [`quantity`] | boxes, guaranteed ranges, number types, units |
+//!
+//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) and the commands (`cli`) are not part of
+//! the interface: they are reachable for this package's own tests and benches, and change without notice.
 
-pub mod cli;
-pub mod codegen;
 pub mod compile;
 pub mod diagnostic;
 pub mod experiment;
@@ -22,15 +34,25 @@ pub mod field;
 pub mod fluid_surface;
 pub mod geom;
 pub mod interval;
-pub mod ir;
-pub mod lower;
 pub mod mesh;
 pub mod precision;
+pub mod quantity;
 pub mod render;
-pub mod simplify;
 pub mod slice;
 pub mod solid;
 pub mod sph;
+
+#[doc(hidden)]
+pub mod cli;
+#[doc(hidden)]
+pub mod codegen;
+#[doc(hidden)]
+pub mod ir;
+#[doc(hidden)]
+pub mod lower;
+#[doc(hidden)]
+pub mod simplify;
+#[doc(hidden)]
 pub mod syntax;
 
 pub use compile::{Error, Program};

@@ -3,14 +3,15 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::mesh::Format;
 use crate::geom::Aabb;
 use crate::precision::Precision;
+use crate::quantity::{Dimension, parse_unit};
 use crate::slice::{Axis, Plane};
-use crate::syntax::{Dimension, parse_unit};
+use crate::sph::Method;
 use glam::DVec3;
 
 /// Obstacles written as R-functions, compiled to machine code: check, mesh, simulate.
@@ -329,35 +330,28 @@ pub(super) struct Flow {
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = count, conflicts_with_all = ["solid", "mesh_plot"])]
     pub particles: Vec<usize>,
     /// Run the scene by these methods [default: its own]
-    #[arg(long, value_enum, value_delimiter = ',', conflicts_with_all = ["solid", "mesh_plot"])]
-    pub methods: Vec<FlowMethod>,
+    #[arg(long, value_parser = flow_method(), value_delimiter = ',', conflicts_with_all = ["solid", "mesh_plot"])]
+    pub methods: Vec<Method>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum FlowMethod {
-    /// Equations 8–14 of the paper, corrected
-    Paper,
-    /// Weakly compressible
-    Wcsph,
-    /// Divergence-free
-    Dfsph,
-}
-
-impl From<FlowMethod> for crate::lower::Method {
-    fn from(method: FlowMethod) -> Self {
-        match method {
-            FlowMethod::Paper => Self::Paper,
-            FlowMethod::Wcsph => Self::Wcsph,
-            FlowMethod::Dfsph => Self::Dfsph,
-        }
-    }
+/// A method of the solver by its name.
+fn flow_method() -> impl TypedValueParser<Value = Method> {
+    let names = Method::all().into_iter().map(|method| {
+        let info = method.info();
+        PossibleValue::new(info.name).help(info.title)
+    });
+    let unknown = "clap lets only the names of methods through";
+    PossibleValuesParser::new(names).try_map(move |name| Method::named(&name).ok_or(unknown))
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Explain {
     /// The code of a message (E0201), or a file, FILE:SOLID or FILE:SCENE
-    #[arg(value_name = "CODE|FILE[:NAME]")]
-    pub subject: String,
+    #[arg(value_name = "CODE|FILE[:NAME]", required_unless_present = "methods")]
+    pub subject: Option<String>,
+    /// List the methods of the fluid solver, with the keys, units, defaults and passes of each, as Markdown
+    #[arg(long, conflicts_with = "subject")]
+    pub methods: bool,
     /// Stages to print
     #[arg(long, value_enum, value_delimiter = ',')]
     pub show: Vec<Stage>,

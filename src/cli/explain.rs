@@ -5,15 +5,17 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::args::{Explain, Shared, Stage};
+use super::run::{experiment, start};
 use super::{Failure, choose, input};
 use crate::codegen::{CodegenError, Listing, Precision, Request, Shape, target_description};
 use crate::diagnostic::{Span, explain};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{Node, dump};
-use crate::lower::NamedSolid;
+use crate::lower::{NamedSolid, Scene};
 use crate::simplify::{Exactness, MOST_PLACES, simplify};
 use crate::solid::{Bounds, ProgramKind, Remainder};
+use crate::sph::methods_reference;
 use crate::syntax;
 use crate::{Program, Solid};
 
@@ -21,7 +23,10 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if shared.json {
         return Err(Failure::usage("explanations are for people: `rfm explain` has no --json"));
     }
-    let subject = options.subject.as_str();
+    let Some(subject) = options.subject.as_deref() else {
+        say!("{}", methods_reference().trim_end());
+        return Ok(());
+    };
     if let Some(text) = explain(subject) {
         say!("{}\n\n{text}", subject.to_uppercase());
         return Ok(());
@@ -37,7 +42,7 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     }
     match name {
         Some(name) if program.module().scenes.iter().any(|s| s.name == name) => {
-            super::run::explain(shared, &program, choose::scene(&program, Some(name))?)
+            scene_passes(shared, &program, choose::scene(&program, Some(name))?)
         }
         Some(name) => {
             let module = program.module();
@@ -323,4 +328,29 @@ fn instructions(assembly: &str) -> usize {
         !(line.is_empty() || line.ends_with(':') || line.starts_with([';', '.']))
     };
     assembly.lines().filter(is_instruction).count()
+}
+
+/// `rfm explain FILE:SCENE`: which passes run, which do not, and why.
+fn scene_passes(shared: &Shared, program: &Program, scene: &Scene) -> Result<(), Failure> {
+    let experiment = experiment(shared, program, &scene.name)?;
+    let (simulation, _) = start(&experiment)?;
+    let (parameters, step) = (experiment.parameters(), experiment.time_step());
+    say!(
+        "scene {}: method {}, sums over neighbours in {}, time step {}",
+        scene.name,
+        parameters.method.name(),
+        parameters.precision.name(),
+        if parameters.adaptive {
+            step.reason.to_string()
+        } else {
+            format!("{:.3e} s ({})", step.seconds, step.reason)
+        }
+    );
+    for (pass, absence) in simulation.plan() {
+        match absence {
+            None => say!("  runs      {pass}"),
+            Some(reason) => say!("  left out  {pass}: {reason}"),
+        }
+    }
+    Ok(())
 }

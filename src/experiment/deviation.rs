@@ -4,7 +4,7 @@
 //! √(Σ (a − a*)² / Σ a*²). An instant at which what is known vanishes (a wave that turns) weighs nothing in the denominator
 //! and as much as any other in the numerator.
 
-use crate::Program;
+use super::Experiment;
 use crate::ir::{Given, Interpreter, Node};
 use crate::lower::Scene;
 use crate::sph::Simulation;
@@ -43,7 +43,8 @@ pub struct Deviations {
 
 impl Deviations {
     /// Takes the present state, if the scene knows anything of this instant.
-    pub fn look(&mut self, program: &Program, scene: &Scene, simulation: &Simulation<'_>) {
+    pub fn look(&mut self, experiment: &Experiment, simulation: &Simulation) {
+        let (program, scene) = (experiment.program(), experiment.scene());
         let now = simulation.time();
         let Some(truth) = scene.truth.filter(|truth| now >= truth.from * (1.0 - 1e-12)) else { return };
         let particles = simulation.particles();
@@ -100,7 +101,7 @@ impl Deviations {
 }
 
 /// How far along x the fluid has come on the floor of the box, m.
-fn front(scene: &Scene, simulation: &Simulation<'_>) -> f64 {
+fn front(scene: &Scene, simulation: &Simulation) -> f64 {
     let (floor, spacing) = (scene.domain.min, simulation.parameters().spacing());
     let low = simulation.particles().position.iter().filter(|p| p.z < floor.z + 1.5 * spacing);
     low.map(|p| p.x + 0.5 * spacing).fold(floor.x, f64::max)

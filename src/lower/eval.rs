@@ -2,13 +2,14 @@
 
 use std::collections::HashSet;
 
+use super::Module;
 use super::names::{Kind, Names};
 use super::value::Value;
-use super::{Method, Module};
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Axis, Binary, BinaryFunction, Expr as Operation, Node, Unary};
+use crate::quantity::{Dimension, parse_unit};
+use crate::sph::Method;
 use crate::syntax::ast::{AddOp, Comparison, Expr, ExprKind, Logic, MulOp, Name};
-use crate::syntax::{Dimension, parse_unit};
 
 /// Calls nested deeper than this are refused: functions cannot recurse, so only a chain of them gets here.
 const DEEPEST_CALL: usize = 64;

@@ -5,10 +5,10 @@
 use glam::DVec3;
 
 use super::eval::Lowering;
-use super::scene::{Block, Bound};
+use super::scene::Block;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
-use crate::syntax::Dimension;
+use crate::quantity::{Bound, Dimension};
 use crate::syntax::ast::{Entry, Expr, ExprKind};
 
 /// A measurement that goes on while a scene runs.

@@ -102,7 +102,7 @@ impl Checkpoint {
     }
 
     /// All that belongs to every method.
-    pub(super) fn of(core: &Core<'_>) -> Self {
+    pub(super) fn of(core: &Core) -> Self {
         let Core { particles, acceleration, steps, time, .. } = core;
         let mut checkpoint =
             Self { steps: *steps, time: *time, ids: particles.id.clone(), ..Self::default() };
@@ -119,7 +119,7 @@ impl Checkpoint {
     }
 
     /// The same, the other way; the core has as many particles.
-    pub(super) fn restore(&self, core: &mut Core<'_>) -> Result<(), CheckpointError> {
+    pub(super) fn restore(&self, core: &mut Core) -> Result<(), CheckpointError> {
         core.particles = self.particles()?;
         let components = core.acceleration.components_mut();
         for (name, column) in VECTORS[6..].iter().zip(components) {
@@ -247,9 +247,7 @@ impl<'a> Reader<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sph::{
-        Dfsph, Gradients, Method, Parameters, Precision, SetupError, Simulation, Slip, Wcsph, scenes,
-    };
+    use crate::sph::{Dfsph, Method, Parameters, Precision, SetupError, Simulation, Slip, Wcsph, scenes};
 
     fn methods() -> [Parameters; 3] {
         let water = Parameters {
@@ -261,13 +259,7 @@ mod tests {
             precision: Precision::F32,
             ..Parameters::default()
         };
-        let wcsph = Wcsph {
-            sound_speed: 30.0,
-            density_diffusion: 0.1,
-            artificial_viscosity: 0.02,
-            gradients: Gradients::Pairs,
-            shifting: 0.0,
-        };
+        let wcsph = Wcsph { sound_speed: Some(30.0), ..Wcsph::default() };
         [
             Parameters::default(),
             Parameters { method: Method::Wcsph(wcsph), ..water.clone() },
@@ -300,6 +292,22 @@ mod tests {
                 second.step().unwrap();
             }
             assert!(second.checkpoint() == straight.checkpoint(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_method_saves_what_it_declares() {
+        let pawn = scenes::pawn();
+        let names = |parameters: &Parameters| {
+            let checkpoint = scenes::drop_on(&pawn, parameters.clone(), 50).checkpoint();
+            checkpoint.columns.into_iter().map(|(name, _)| name).collect::<Vec<_>>()
+        };
+        let [paper, ..] = &methods();
+        let of_all_methods = names(paper);
+        for parameters in methods() {
+            let own: Vec<String> =
+                names(&parameters).into_iter().filter(|name| !of_all_methods.contains(name)).collect();
+            assert_eq!(own, parameters.method.info().saves, "{}", parameters.method.name());
         }
     }
 

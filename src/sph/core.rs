@@ -1,6 +1,8 @@
 //! What all methods share: the particles, where they are, what bounds them, and the stages that do not depend on how
 //! pressure is found.
 
+use std::sync::Arc;
+
 use fearless_simd::{Level, Simd, SimdFloat};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -8,13 +10,13 @@ use rayon::prelude::*;
 use crate::precision::Precision;
 
 use super::{
-    VectorField,
+    VectorField, VectorOfTime,
     pairs::{Cloud, Columns, Near, PairPass, Real},
-    params::{Method, Parameters},
+    params::Parameters,
     particles::{Particles, Vectors},
     probes::Contacts,
     simulation::{Cause, Quantity, StepError},
-    walls::{Boundary, Coverage, Friction, MARKED, UNKNOWN, Wall, WallKernel},
+    walls::{Boundary, Coverage, Friction, MARKED, UNKNOWN, Wall},
 };
 
 /// Particles that a loop over all of them leaves to one thread together.
@@ -24,11 +26,13 @@ pub(super) const CHUNK: usize = 2048;
 /// million million.
 const SHORTEST: f64 = 1e-6;
 
-pub(super) struct Core<'a> {
+pub(super) struct Core {
     pub parameters: Parameters,
     /// Gravity besides that of the parameters, m/s².
-    pub gravity_field: Option<&'a VectorField>,
-    pub boundary: Boundary<'a>,
+    pub gravity_field: Option<Arc<VectorField>>,
+    /// Gravity at a time, s, where that of the parameters turns.
+    pub turning_gravity: Option<Arc<VectorOfTime>>,
+    pub boundary: Boundary,
     pub particles: Particles,
     /// m/s²
     pub acceleration: Vectors,
@@ -56,16 +60,17 @@ pub(super) struct Core<'a> {
     sorted_id: Vec<u32>,
 }
 
-impl<'a> Core<'a> {
-    pub fn new(parameters: Parameters, boundary: Boundary<'a>, particles: Particles) -> Self {
+impl Core {
+    pub fn new(parameters: Parameters, boundary: Boundary, particles: Particles) -> Self {
         let mut acceleration = Vectors::default();
         acceleration.resize(particles.len());
         let speed = longest(&particles.velocity);
-        let wall = wall_of(&parameters);
+        let wall = parameters.method.numerics().wall(&parameters);
         let clear = if boundary.obstacles.is_empty() { Vec::new() } else { vec![UNKNOWN; particles.len()] };
         Self {
             parameters,
             gravity_field: None,
+            turning_gravity: None,
             boundary,
             particles,
             acceleration,
@@ -140,7 +145,7 @@ impl<'a> Core<'a> {
             permute(order, column, &mut self.spare.x);
         }
         permute(order, id, &mut self.sorted_id);
-        if self.parameters.method != Method::Paper {
+        if self.parameters.walls_have_density() {
             let Self { boundary, particles, near_walls, .. } = self;
             boundary.mark(&particles.position, self.parameters.support_radius, near_walls);
         }
@@ -159,13 +164,16 @@ impl<'a> Core<'a> {
 
     /// What acts on a particle from afar, m/s², at the end of the present step.
     pub fn gravity(&self, i: usize) -> DVec3 {
-        let field = self.gravity_field.map(|field| field(self.particles.position.get(i), self.boundary.time));
+        let field = self
+            .gravity_field
+            .as_ref()
+            .map(|field| field(self.particles.position.get(i), self.boundary.time));
         self.parameters.gravity + field.unwrap_or(DVec3::ZERO)
     }
 
     /// Adds to the accelerations what of gravity depends on the place, if any does.
     pub fn pull(&mut self) {
-        let Some(field) = self.gravity_field else { return };
+        let Some(field) = &self.gravity_field else { return };
         let (position, time) = (&self.particles.position, self.boundary.time);
         let [x, y, z] = self.acceleration.components_mut();
         x.par_iter_mut().zip(y).zip(z).enumerate().for_each(|(i, ((x, y), z))| {
@@ -290,17 +298,6 @@ impl<'a> Core<'a> {
         let stable = self.stable_dt();
         let cause = if dt > stable { Cause::StepTooLong { dt, stable } } else { Cause::Overflow };
         StepError::NonFinite { step: self.steps, id: self.particles.id[index], quantity, cause }
-    }
-}
-
-/// Divergence-free fluids stand right at a wall in layers only; differences of pressure are steady only at one that is
-/// continuous (with layers a standing wave grows noise at the walls).
-fn wall_of(parameters: &Parameters) -> Wall {
-    let h = parameters.support_radius;
-    match parameters.method {
-        Method::Paper => Wall { kernel: WallKernel::Poly6, h, layer: None },
-        Method::Wcsph(_) => Wall { kernel: WallKernel::WendlandC2, h, layer: None },
-        Method::Dfsph(_) => Wall { kernel: WallKernel::WendlandC2, h, layer: Some(parameters.spacing() / h) },
     }
 }
 

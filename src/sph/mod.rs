@@ -11,14 +11,15 @@
 //! ```
 //!
 //! ```
+//! use std::sync::Arc;
 //! use rfm::{field::Closures, geom::Aabb, glam::DVec3, sph::*};
 //!
-//! let ball = Closures {
+//! let ball = Arc::new(Closures {
 //!     omega: |p: DVec3| 0.25 - p.length_squared(),
 //!     gradient: |p: DVec3| -2.0 * p,
-//! };
+//! });
 //! let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
-//! let obstacles = vec![Obstacle::at_rest(&ball, 0.005)];
+//! let obstacles = vec![Obstacle::at_rest(ball, 0.005)];
 //! let parameters = Parameters::default();
 //! let mut fluid = FluidBlock::drop(DVec3::Z * 0.8, 200).seed(&parameters, domain)?;
 //! carve(&mut fluid, &domain, &obstacles, 0.01)?;
@@ -47,6 +48,7 @@ mod methods;
 mod pairs;
 mod params;
 mod particles;
+mod passes;
 mod probes;
 mod seed;
 mod simulation;
@@ -63,13 +65,22 @@ mod tests;
 pub type VectorField = dyn Fn(glam::DVec3, f64) -> glam::DVec3 + Send + Sync;
 
 pub use crate::precision::Precision;
+/// A vector at a time, s.
+pub type VectorOfTime = dyn Fn(f64) -> glam::DVec3 + Send + Sync;
+
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use kernel::Kernels;
-pub use params::{Dfsph, Gradients, Method, NegativePressure, ParameterError, Parameters, Slip, Wcsph};
+pub use methods::{
+    Dfsph, FluidDefaults, Gradients, KeyBlock, KeyInfo, KeyReader, Method, MethodInfo, NegativePressure,
+    Paper, Support, Wcsph,
+};
+pub use methods::{overview as methods_overview, reference as methods_reference};
+pub use params::{ParameterError, Parameters, Slip};
 pub use particles::{Particles, Vectors};
+pub use passes::Pass;
 pub use probes::{Gauge, Probe};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
-pub use stats::{Pass, Stats};
+pub use stats::Stats;
 pub use vtp::{short_time, write_pvd, write_vtp};
 pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};

@@ -1,5 +1,7 @@
 //! Scenes that the tests of this module share.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rand_pcg::{
     Pcg64,
@@ -29,7 +31,7 @@ pub fn random_cloud(count: usize, side: f64) -> Vectors {
     cloud
 }
 
-pub fn free(parameters: Parameters, particles: &[(DVec3, DVec3)]) -> Simulation<'static> {
+pub fn free(parameters: Parameters, particles: &[(DVec3, DVec3)]) -> Simulation {
     let mut fluid = Particles::default();
     for &(position, velocity) in particles {
         fluid.push(position, velocity);
@@ -37,28 +39,28 @@ pub fn free(parameters: Parameters, particles: &[(DVec3, DVec3)]) -> Simulation<
     Simulation::new(parameters, fluid, SPACE, Vec::new()).unwrap()
 }
 
-pub fn free_cloud(parameters: Parameters, count: usize, side: f64) -> Simulation<'static> {
+pub fn free_cloud(parameters: Parameters, count: usize, side: f64) -> Simulation {
     let velocity = random_cloud(count + 1, 2.0);
     let cloud: Vec<_> = random_cloud(count, side).iter().zip(velocity.iter()).collect();
     free(parameters, &cloud)
 }
 
-pub fn free_drop(parameters: Parameters, count: usize) -> Simulation<'static> {
+pub fn free_drop(parameters: Parameters, count: usize) -> Simulation {
     let drop = FluidBlock::drop(DVec3::ZERO, count).seed(&parameters, SPACE).unwrap();
     Simulation::new(parameters, drop, SPACE, Vec::new()).unwrap()
 }
 
 /// (R² − r²)/2R: gradient of length one on the surface, none at the centre.
-pub fn sphere(centre: DVec3, radius: f64) -> impl Walls {
-    Closures {
+pub fn sphere(centre: DVec3, radius: f64) -> Arc<dyn Walls> {
+    Arc::new(Closures {
         omega: move |p: DVec3| (radius * radius - p.distance_squared(centre)) / (2.0 * radius),
         gradient: move |p: DVec3| (centre - p) / radius,
-    }
+    })
 }
 
 /// The half-space below the plane through the origin with this unit normal.
-pub fn half_space(origin: DVec3, normal: DVec3) -> impl Walls {
-    Closures { omega: move |p: DVec3| (origin - p).dot(normal), gradient: move |_: DVec3| -normal }
+pub fn half_space(origin: DVec3, normal: DVec3) -> Arc<dyn Walls> {
+    Arc::new(Closures { omega: move |p: DVec3| (origin - p).dot(normal), gradient: move |_: DVec3| -normal })
 }
 
 /// R₀ node with its gradient; one symmetric member of the limits at 0.
@@ -69,7 +71,7 @@ fn r0(sign: f64, (u, du): (f64, DVec3), (v, dv): (f64, DVec3)) -> (f64, DVec3) {
 }
 
 /// The paper's pawn, equation (5).
-pub fn pawn() -> impl Walls {
+pub fn pawn() -> Arc<dyn Walls> {
     let both = |p: DVec3| {
         let (x, y, z) = (p.x - 1.5, p.y - 1.5, p.z);
         let r2 = x * x + y * y;
@@ -82,15 +84,15 @@ pub fn pawn() -> impl Walls {
         let (and, or) = (-1.0, 1.0);
         r0(or, r0(and, r0(and, w1, w2), w3), r0(or, w4, w5))
     };
-    Closures { omega: move |p: DVec3| both(p).0, gradient: move |p: DVec3| both(p).1 }
+    Arc::new(Closures { omega: move |p: DVec3| both(p).0, gradient: move |p: DVec3| both(p).1 })
 }
 
-pub fn obstacle(field: &dyn Walls) -> Obstacle<'_> {
-    Obstacle::at_rest(field, 0.005)
+pub fn obstacle(field: &Arc<dyn Walls>) -> Obstacle {
+    Obstacle::at_rest(field.clone(), 0.005)
 }
 
 /// A drop of the paper's fluid above the pawn, the drop's lowest point near the pawn's head.
-pub fn drop_on<'a>(pawn: &'a dyn Walls, parameters: Parameters, count: usize) -> Simulation<'a> {
+pub fn drop_on(pawn: &Arc<dyn Walls>, parameters: Parameters, count: usize) -> Simulation {
     let mut drop = FluidBlock::drop(DVec3::new(1.5, 1.5, 2.2), count).seed(&parameters, BOX).unwrap();
     carve(&mut drop, &BOX, &[obstacle(pawn)], 0.0).unwrap();
     Simulation::new(parameters, drop, BOX, vec![obstacle(pawn)]).unwrap()

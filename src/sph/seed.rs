@@ -241,7 +241,7 @@ pub struct Carved {
 pub fn carve(
     particles: &mut Particles,
     domain: &Aabb,
-    obstacles: &[Obstacle<'_>],
+    obstacles: &[Obstacle],
     clearance: f64,
 ) -> Result<Carved, SeedError> {
     let mut carved = Carved::default();
@@ -279,7 +279,7 @@ pub fn carve(
 
 /// Moves particles of the fluid that are nearer to an obstacle than `clearance`, m, to that distance: a lattice that a
 /// surface cuts keeps its volume, where without those particles a gap would remain along the wall.
-pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle<'_>], clearance: f64) {
+pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], clearance: f64) {
     for i in 0..particles.len() {
         let mut p = particles.position.get(i);
         for obstacle in obstacles {
@@ -364,7 +364,7 @@ mod tests {
     fn a_field_bounds_its_fluid() {
         let parameters = Parameters::default();
         let sphere = scenes::sphere(DVec3::splat(1.5), 0.2);
-        let shape = FluidShape::Field { field: &sphere, bounds: scenes::BOX, fill: Fill::Below };
+        let shape = FluidShape::Field { field: &*sphere, bounds: scenes::BOX, fill: Fill::Below };
         let fluid = FluidBlock::filling(shape).seed(&parameters, scenes::BOX).unwrap();
         let volume = fluid.len() as f64 * parameters.spacing().powi(3);
         assert!((volume / (4.0 / 3.0 * std::f64::consts::PI * 0.008) - 1.0).abs() < 0.02);
@@ -385,12 +385,12 @@ mod tests {
     #[test]
     fn carving_counts_what_it_removes() {
         let sphere = scenes::sphere(DVec3::ONE, 0.5);
-        let obstacle = Obstacle::at_rest(&sphere, 0.005);
+        let obstacle = Obstacle::at_rest(sphere, 0.005);
         let mut particles = Particles::default();
         for x in [1.0, 1.5, 1.51, 1.7, 9.0] {
             particles.push(DVec3::new(x, 1.0, 1.0), DVec3::ZERO);
         }
-        let carved = carve(&mut particles, &scenes::BOX, &[obstacle], 0.05).unwrap();
+        let carved = carve(&mut particles, &scenes::BOX, &[obstacle.clone()], 0.05).unwrap();
         assert_eq!(carved, Carved { inside: 2, too_close: 1, outside_box: 1, kept: 1 });
         assert_eq!((particles.position.get(0).x, particles.id[0]), (1.7, 0));
         let nothing = carve(&mut particles, &scenes::BOX, &[obstacle], 0.5);

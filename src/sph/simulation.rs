@@ -3,6 +3,9 @@
 //! Invariant: between steps positions, velocities, densities, pressures and accelerations belong to one
 //! instant, and particles lie in the order of the columns.
 
+use std::borrow::Cow;
+use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::{error, fmt};
 
 use glam::DVec3;
@@ -10,14 +13,15 @@ use glam::DVec3;
 use crate::geom::Aabb;
 
 use super::{
-    VectorField,
+    VectorField, VectorOfTime,
     checkpoint::{Checkpoint, CheckpointError},
     core::{Core, first_non_finite},
     methods::Scheme,
     params::{ParameterError, Parameters},
     particles::{Particles, Vectors},
+    passes::Pass,
     probes::{Contacts, Gauge, Probe},
-    stats::{Pass, Stats},
+    stats::Stats,
     walls::{Boundary, Obstacle},
 };
 
@@ -141,12 +145,12 @@ impl fmt::Display for StepError {
 impl error::Error for StepError {}
 
 /// A fluid in a box with obstacles.
-pub struct Simulation<'a> {
-    core: Core<'a>,
-    scheme: Scheme,
+pub struct Simulation {
+    core: Core,
+    scheme: Box<dyn Scheme>,
 }
 
-impl<'a> Simulation<'a> {
+impl Simulation {
     /// Checks the input and finds densities and forces of the first instant.
     ///
     /// # Errors
@@ -155,7 +159,7 @@ impl<'a> Simulation<'a> {
         parameters: Parameters,
         particles: Particles,
         domain: Aabb,
-        obstacles: Vec<Obstacle<'a>>,
+        obstacles: Vec<Obstacle>,
     ) -> Result<Self, SetupError> {
         Self::at(parameters, particles, domain, obstacles, None)
     }
@@ -165,7 +169,7 @@ impl<'a> Simulation<'a> {
         parameters: Parameters,
         particles: Particles,
         domain: Aabb,
-        obstacles: Vec<Obstacle<'a>>,
+        obstacles: Vec<Obstacle>,
         instant: Option<(u64, f64)>,
     ) -> Result<Self, SetupError> {
         let (steps, time) = instant.unwrap_or((0, 0.0));
@@ -185,7 +189,8 @@ impl<'a> Simulation<'a> {
         check_setup(&boundary, &particles)?;
         let mut core = Core::new(parameters, boundary, particles);
         (core.steps, core.time) = (steps, time);
-        let scheme = Scheme::start(&mut core, instant.is_none());
+        let method = core.parameters.method;
+        let scheme = method.numerics().start(&mut core, instant.is_none());
         Ok(Self { core, scheme })
     }
 
@@ -198,7 +203,7 @@ impl<'a> Simulation<'a> {
         parameters: Parameters,
         checkpoint: &Checkpoint,
         domain: Aabb,
-        obstacles: Vec<Obstacle<'a>>,
+        obstacles: Vec<Obstacle>,
     ) -> Result<Self, SetupError> {
         let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
         // sorting leaves in their places what was sorted before
@@ -231,6 +236,9 @@ impl<'a> Simulation<'a> {
     pub fn step_at_most(&mut self, longest: f64) -> Result<(), StepError> {
         let before = self.core.steps;
         self.core.steps += 1;
+        if let Some(gravity) = &self.core.turning_gravity {
+            self.core.parameters.gravity = gravity(self.core.time);
+        }
         let dt = self.scheme.step(&mut self.core, longest)?;
         // equal steps are counted, so that their rounding errors do not add up
         let counted = |steps: u64| steps as f64 * dt;
@@ -263,13 +271,37 @@ impl<'a> Simulation<'a> {
         self.core.time
     }
 
-    /// Turns gravity, m/s², from the next step on (a container that rotates).
+    /// Steps until a time, s, at which the last step ends; `after_step` sees each state on the way, and may end it.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn advance(
+        &mut self,
+        end: f64,
+        mut after_step: impl FnMut(&Self) -> ControlFlow<()>,
+    ) -> Result<(), StepError> {
+        while self.core.time < end * (1.0 - 1e-12) {
+            self.step_at_most(end - self.core.time)?;
+            if after_step(self).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets gravity, m/s², from the next step on.
     pub fn set_gravity(&mut self, gravity: DVec3) {
         self.core.parameters.gravity = gravity;
+        self.core.turning_gravity = None;
+    }
+
+    /// Makes gravity a function of the time, s: each step takes that of its beginning, m/s² (a container that rotates).
+    pub fn set_turning_gravity(&mut self, gravity: Arc<VectorOfTime>) {
+        self.core.turning_gravity = Some(gravity);
     }
 
     /// Adds to gravity what depends on the place, m/s².
-    pub fn set_gravity_field(&mut self, field: &'a VectorField) {
+    pub fn set_gravity_field(&mut self, field: Arc<VectorField>) {
         self.core.gravity_field = Some(field);
         if self.core.steps == 0 {
             self.core.pull();
@@ -353,17 +385,17 @@ impl<'a> Simulation<'a> {
     }
 
     /// All passes in the order in which a step would run them, each with the reason if it does not run.
-    pub fn plan(&self) -> Vec<(Pass, Option<&'static str>)> {
-        Pass::plan(&self.core.parameters, &self.core.boundary)
+    pub fn plan(&self) -> Vec<(Pass, Option<Cow<'static, str>>)> {
+        Pass::plan(&self.core.parameters, self.core.boundary.obstacles.len())
     }
 }
 
-fn check_setup(boundary: &Boundary<'_>, particles: &Particles) -> Result<(), SetupError> {
+fn check_setup(boundary: &Boundary, particles: &Particles) -> Result<(), SetupError> {
     let domain = boundary.domain;
     if !(domain.is_finite() && domain.volume() > 0.0 && domain.volume() < f64::INFINITY) {
         return Err(SetupError::Domain(domain));
     }
-    let wrong = |o: &Obstacle<'_>| {
+    let wrong = |o: &Obstacle| {
         !((0.0..=1.0).contains(&o.restitution)
             && (0.0..f64::INFINITY).contains(&o.friction)
             && o.resolution > 0.0)

@@ -1,122 +1,10 @@
-//! Figures that tell whether a state is sound, and which passes a simulation runs.
+//! Figures that tell whether a state is sound.
 //!
 //! Invariant: computed afresh from the state; nothing here is remembered by the solver.
 
-use std::fmt;
-
 use glam::DVec3;
 
-use super::{
-    core::Core,
-    methods::Terms,
-    params::{Dfsph, Method, Parameters, Slip, Wcsph},
-    walls::Boundary,
-};
-
-/// A stage of a step. Those a scene does not need do not run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pass {
-    Integrate,
-    Walls,
-    Obstacles,
-    Neighbours,
-    Coverage,
-    Density,
-    DensityDiffusion,
-    Pressure,
-    PressureSolver,
-    Viscosity,
-    ArtificialViscosity,
-    Shifting,
-    NoSlip,
-    SurfaceTension,
-    Gravity,
-}
-
-impl Pass {
-    /// All passes, about in the order of a step, each with the reason if it does not run.
-    pub(super) fn plan(
-        parameters: &Parameters,
-        boundary: &Boundary<'_>,
-    ) -> Vec<(Self, Option<&'static str>)> {
-        const STATE: &str = "the method has an equation of state";
-        let unless = |needed: bool, reason: &'static str| (!needed).then_some(reason);
-        let terms = Terms::of(parameters);
-        let (paper, wcsph, dfsph) = match parameters.method {
-            Method::Paper => (true, None, false),
-            Method::Wcsph(wcsph) => (false, Some(wcsph), false),
-            Method::Dfsph(_) => (false, None, true),
-        };
-        let of_wcsph = |needed: &dyn Fn(Wcsph) -> bool, zero| match wcsph {
-            None => Some("it belongs to the method wcsph"),
-            Some(numbers) => unless(needed(numbers), zero),
-        };
-        let no_slip = match () {
-            () if paper => Some("in this method walls act on positions and velocities only"),
-            () if parameters.slip == Slip::Free => Some("the fluid slips along walls"),
-            () => unless(terms.viscosity, "the viscosity is zero"),
-        };
-        let pressure = match () {
-            () if dfsph => Some("the method solves for the pressure"),
-            () => unless(!paper || terms.pressure, "the stiffness is zero"),
-        };
-        let shifting = match parameters.method {
-            Method::Paper => Some("it belongs to the methods wcsph and dfsph"),
-            Method::Wcsph(Wcsph { shifting, .. }) | Method::Dfsph(Dfsph { shifting, .. }) => {
-                unless(shifting > 0.0, "the shifting is zero")
-            }
-        };
-        vec![
-            (Self::Integrate, None),
-            (Self::Walls, None),
-            (Self::Obstacles, unless(!boundary.obstacles.is_empty(), "the scene has no obstacle")),
-            (Self::Neighbours, None),
-            (Self::Coverage, unless(!paper, "in this method walls act on positions and velocities only")),
-            (Self::Density, None),
-            (
-                Self::DensityDiffusion,
-                of_wcsph(&|numbers| numbers.density_diffusion > 0.0, "the density diffusion is zero"),
-            ),
-            (Self::Pressure, pressure),
-            (Self::PressureSolver, unless(dfsph, STATE)),
-            (Self::Viscosity, unless(terms.viscosity, "the viscosity is zero")),
-            (
-                Self::ArtificialViscosity,
-                of_wcsph(&|numbers| numbers.artificial_viscosity > 0.0, "the artificial viscosity is zero"),
-            ),
-            (Self::Shifting, shifting),
-            (Self::NoSlip, no_slip),
-            (Self::SurfaceTension, unless(terms.tension, "the surface tension is zero")),
-            (Self::Gravity, unless(parameters.gravity != DVec3::ZERO, "gravity is zero")),
-        ]
-    }
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Integrate => "integrate",
-            Self::Walls => "walls",
-            Self::Obstacles => "obstacles",
-            Self::Neighbours => "neighbours",
-            Self::Coverage => "wall coverage",
-            Self::Density => "density",
-            Self::DensityDiffusion => "density diffusion",
-            Self::Pressure => "pressure",
-            Self::PressureSolver => "pressure solver",
-            Self::Viscosity => "viscosity",
-            Self::ArtificialViscosity => "artificial viscosity",
-            Self::Shifting => "particle shifting",
-            Self::NoSlip => "no slip",
-            Self::SurfaceTension => "surface tension",
-            Self::Gravity => "gravity",
-        }
-    }
-}
-
-impl fmt::Display for Pass {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
+use super::{core::Core, walls::Boundary};
 
 /// Figures of one instant.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,7 +33,7 @@ pub struct Stats {
 }
 
 impl Stats {
-    pub(super) fn of(core: &Core<'_>) -> Self {
+    pub(super) fn of(core: &Core) -> Self {
         let Core { parameters, boundary, particles, .. } = core;
         let mass = parameters.particle_mass;
         let [kinetic_energy, potential_energy] = energies(core);
@@ -178,7 +66,7 @@ impl Stats {
 }
 
 /// Kinetic and potential energy, J, the latter from the box's lowest corner along gravity.
-pub(super) fn energies(core: &Core<'_>) -> [f64; 2] {
+pub(super) fn energies(core: &Core) -> [f64; 2] {
     let Core { parameters, boundary, particles, .. } = core;
     let (mass, g) = (parameters.particle_mass, parameters.gravity);
     let floor = boundary.domain.corners().map(|c| -g.dot(c)).into_iter().fold(f64::INFINITY, f64::min);
@@ -187,7 +75,7 @@ pub(super) fn energies(core: &Core<'_>) -> [f64; 2] {
     [kinetic, potential]
 }
 
-impl Boundary<'_> {
+impl Boundary {
     /// Largest ω/|∇ω| of the obstacles that hold the point, m; zero in the fluid.
     fn penetration(&self, p: DVec3) -> f64 {
         let depth = |field: &dyn crate::field::Walls| {

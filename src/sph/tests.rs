@@ -1,14 +1,16 @@
 //! The whole method against physics: falls, bounces, slides, drops.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::{
-    field::{Closures, Field},
+    field::{Closures, Walls},
     geom::Aabb,
 };
 
 use super::{
-    Cause, Dfsph, Gradients, Method, NegativePressure, Obstacle, Parameters, Particles, Pass, Quantity,
+    Cause, Dfsph, Method, NegativePressure, Obstacle, Paper, Parameters, Particles, Pass, Quantity,
     SetupError, Simulation, StepError, Wcsph, scenes,
 };
 
@@ -23,7 +25,7 @@ fn one(position: DVec3, velocity: DVec3) -> Particles {
 /// A particle that feels gravity and nothing else.
 fn lone(time_step: f64, wall_restitution: f64) -> Parameters {
     Parameters {
-        stiffness: 0.0,
+        method: Paper { stiffness: 0.0, ..Paper::default() }.into(),
         viscosity: 0.0,
         surface_tension: 0.0,
         time_step,
@@ -56,7 +58,7 @@ fn momentum_is_conserved_in_free_space() {
 }
 
 /// Heights of the first tops of a ball's bounces.
-fn tops(parameters: Parameters, obstacles: Vec<Obstacle<'_>>, floor: f64, count: usize) -> Vec<f64> {
+fn tops(parameters: Parameters, obstacles: Vec<Obstacle>, floor: f64, count: usize) -> Vec<f64> {
     let start = one(DVec3::new(1.5, 1.5, floor + 1.0), DVec3::ZERO);
     let mut simulation = Simulation::new(parameters, start, scenes::BOX, obstacles).unwrap();
     let (mut tops, mut before) = (Vec::new(), 0.0);
@@ -109,10 +111,10 @@ fn a_particle_slides_down_a_slope() {
 #[test]
 fn a_particle_swings_through_a_bowl() {
     // the hollow of a sphere, started at the height of its centre: it must come up on the other side
-    let bowl = Closures {
+    let bowl: Arc<dyn Walls> = Arc::new(Closures {
         omega: |p: DVec3| p.distance_squared(DVec3::splat(1.5)) - 1.0,
         gradient: |p: DVec3| 2.0 * (p - DVec3::splat(1.5)),
-    };
+    });
     let body = Obstacle { restitution: 0.0, ..scenes::obstacle(&bowl) };
     let start = one(DVec3::new(2.4999, 1.5, 1.5), DVec3::ZERO);
     let mut simulation = Simulation::new(lone(0.001, 0.0), start, scenes::BOX, vec![body]).unwrap();
@@ -128,10 +130,10 @@ fn a_particle_swings_through_a_bowl() {
 
 #[test]
 fn a_fast_particle_does_not_pass_a_thin_plate() {
-    let plate = Closures {
+    let plate: Arc<dyn Walls> = Arc::new(Closures {
         omega: |p: DVec3| 0.005 - (p.x - 1.5).abs(),
         gradient: |p: DVec3| DVec3::new(-(p.x - 1.5).signum(), 0.0, 0.0),
-    };
+    });
     for speed in [10.0, 100.0, 1000.0] {
         let start = one(DVec3::new(1.3, 1.5, 1.5), DVec3::X * speed);
         let mut simulation =
@@ -211,8 +213,10 @@ fn the_same_bits_for_any_number_of_threads() {
 
 #[test]
 fn an_undefined_field_is_an_error() {
-    let hole =
-        Closures { omega: |p: DVec3| if p.z < 1.0 { f64::NAN } else { -1.0 }, gradient: |_: DVec3| DVec3::Z };
+    let hole: Arc<dyn Walls> = Arc::new(Closures {
+        omega: |p: DVec3| if p.z < 1.0 { f64::NAN } else { -1.0 },
+        gradient: |_: DVec3| DVec3::Z,
+    });
     let start = one(DVec3::new(1.5, 1.5, 1.2), DVec3::ZERO);
     let mut simulation =
         Simulation::new(lone(0.01, 0.5), start, scenes::BOX, vec![scenes::obstacle(&hole)]).unwrap();
@@ -242,13 +246,7 @@ fn a_run_that_would_never_end_is_an_error() {
 
 #[test]
 fn wcsph_pairs_conserve_momentum_in_free_space() {
-    let wcsph = Wcsph {
-        sound_speed: 10.0,
-        density_diffusion: 0.1,
-        artificial_viscosity: 0.1,
-        gradients: Gradients::Pairs,
-        shifting: 0.0,
-    };
+    let wcsph = Wcsph { sound_speed: Some(10.0), artificial_viscosity: 0.1, ..Wcsph::default() };
     let parameters = Parameters {
         gravity: DVec3::ZERO,
         surface_tension: 0.0,
@@ -267,7 +265,12 @@ fn wcsph_pairs_conserve_momentum_in_free_space() {
 
 #[test]
 fn a_diverging_run_names_the_step_as_the_cause() {
-    let wild = Parameters { stiffness: 1e300, time_step: 1e10, rest_density: 1.0, ..Parameters::default() };
+    let wild = Parameters {
+        method: Paper { stiffness: 1e300, ..Paper::default() }.into(),
+        time_step: 1e10,
+        rest_density: 1.0,
+        ..Parameters::default()
+    };
     let mut simulation = scenes::free_drop(wild, 50);
     let error = (0..100).find_map(|_| simulation.step().err()).unwrap();
     let StepError::NonFinite { cause, .. } = error else { panic!("{error}") };
@@ -306,7 +309,7 @@ fn kept_tension_makes_a_pair_coincide_and_clamping_does_not() {
         let parameters = Parameters {
             gravity: DVec3::ZERO,
             surface_tension: 0.0,
-            negative_pressure,
+            method: Paper { negative_pressure, ..Paper::default() }.into(),
             ..Parameters::default()
         };
         let mut simulation =

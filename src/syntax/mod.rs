@@ -7,9 +7,7 @@ pub mod ast;
 mod build;
 mod parse;
 mod print;
-mod unit;
 
 pub use ast::Ast;
 pub use parse::{EDITION, parse};
 pub use print::print;
-pub use unit::{Dimension, Unit, parse_unit};

@@ -12,6 +12,7 @@
 //! much, something else used the machine. Frames are not written.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rfm::lower::{Gravity, Scene};
@@ -163,7 +164,7 @@ fn medians(
 }
 
 /// Milliseconds per step of the next steps; one before them wakes the pool's threads.
-fn window(simulation: &mut Simulation<'_>) -> f64 {
+fn window(simulation: &mut Simulation) -> f64 {
     step(simulation);
     let started = Instant::now();
     (0..STEPS).for_each(|_| step(simulation));
@@ -172,16 +173,15 @@ fn window(simulation: &mut Simulation<'_>) -> f64 {
 
 /// The drop of the scene with as many particles as wanted, around the scene's centre; what touches the pawn is
 /// carved off.
-fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a> {
+fn simulation(scene: &Scene, pawn: &Solid, count: usize) -> Simulation {
     let Gravity::Still(gravity) = scene.gravity else { panic!("the scene has gravity that stays") };
     let mut parameters = Parameters {
         rest_density: scene.fluid.density,
         particle_mass: scene.fluid.mass,
         support_radius: scene.fluid.support_radius,
-        stiffness: scene.fluid.stiffness,
         viscosity: scene.fluid.viscosity,
         surface_tension: scene.fluid.surface_tension,
-        surface_threshold: scene.fluid.threshold,
+        method: scene.method,
         gravity,
         wall_restitution: scene.walls.restitution,
         time_step: 1.0,
@@ -197,14 +197,14 @@ fn simulation<'a>(scene: &Scene, pawn: &'a Solid, count: usize) -> Simulation<'a
     let resolution = 0.05 * parameters.support_radius;
     let obstacles = vec![Obstacle {
         restitution: scene.obstacles[0].skin.bounce.restitution,
-        ..Obstacle::at_rest(pawn, resolution)
+        ..Obstacle::at_rest(Arc::new(pawn.clone()), resolution)
     }];
     carve(&mut particles, &scene.domain, &obstacles, 0.5 * parameters.spacing())
         .unwrap_or_else(|e| panic!("{e}"));
     Simulation::new(parameters, particles, scene.domain, obstacles).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn step(simulation: &mut Simulation<'_>) {
+fn step(simulation: &mut Simulation) {
     simulation.step().unwrap_or_else(|e| panic!("{e}"));
 }
 

@@ -8,6 +8,7 @@
 //! Times are of the processor, all threads of the process together, where the system tells (Unix), else of the clock. A
 //! repetition takes as many steps as last a quarter of a second; the median of the repetitions is told, and the least.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use rfm::field::{Faces, Part, Walls};
@@ -32,11 +33,9 @@ fn support(method: Method) -> f64 {
 
 fn wcsph(gradients: Gradients) -> Method {
     Method::Wcsph(Wcsph {
-        sound_speed: 10.0 * (9.81f64 * 2.0 * 1.5).sqrt(),
-        density_diffusion: 0.1,
-        artificial_viscosity: 0.02,
+        sound_speed: Some(10.0 * (9.81f64 * 2.0 * 1.5).sqrt()),
         gradients,
-        shifting: if gradients == Gradients::Differences { 1.0 } else { 0.0 },
+        ..Wcsph::default()
     })
 }
 
@@ -62,7 +61,7 @@ fn parameters(particles: usize, method: Method, precision: Precision) -> Paramet
     }
 }
 
-fn dam_break(particles: usize, method: Method, precision: Precision) -> Simulation<'static> {
+fn dam_break(particles: usize, method: Method, precision: Precision) -> Simulation {
     let parameters = parameters(particles, method, precision);
     let fluid = FluidBlock::filling(FluidShape::Box(COLUMN)).seed(&parameters, BOX).unwrap();
     Simulation::new(parameters, fluid, BOX, Vec::new()).unwrap()
@@ -83,7 +82,7 @@ fn processor() -> f64 {
 }
 
 /// Steps that last about a repetition, after a few that fill the buffers.
-fn steps_per_repetition(simulation: &mut Simulation<'_>) -> u32 {
+fn steps_per_repetition(simulation: &mut Simulation) -> u32 {
     let started = processor();
     for _ in 0..4 {
         simulation.step().unwrap();
@@ -92,7 +91,7 @@ fn steps_per_repetition(simulation: &mut Simulation<'_>) -> u32 {
 }
 
 /// Processor time of one step, s.
-fn seconds_per_step(simulation: &mut Simulation<'_>, steps: u32) -> f64 {
+fn seconds_per_step(simulation: &mut Simulation, steps: u32) -> f64 {
     let started = processor();
     for _ in 0..steps {
         simulation.step().unwrap();
@@ -151,7 +150,7 @@ fn methods(sizes: &[usize]) {
             ("wcsph, differences", wcsph(Gradients::Differences)),
             ("dfsph, 0.1 %", dfsph(1e-3)),
             ("dfsph, 0.01 %", dfsph(1e-4)),
-            ("paper", Method::Paper),
+            ("paper", Method::default()),
         ] {
             for precision in [Precision::F32, Precision::F64] {
                 row(name, particles, method, precision);
@@ -209,7 +208,7 @@ fn walls(particles: usize) {
     for (name, text, solid) in [("pawn", PAWN, "pawn"), ("500 posts", POSTS, "posts")] {
         let parameters = parameters(particles, wcsph(Gradients::Pairs), Precision::F32);
         let field = obstacle(text, solid, parameters.support_radius);
-        let obstacle = || Obstacle::at_rest(&*field, 0.05 * parameters.support_radius);
+        let obstacle = || Obstacle::at_rest(field.clone(), 0.05 * parameters.support_radius);
         let mut fluid = FluidBlock::filling(FluidShape::Box(POOL)).seed(&parameters, BOX).unwrap();
         carve(&mut fluid, &BOX, &[obstacle()], 0.25 * parameters.spacing()).unwrap();
         let new = |fluid: &Particles, domain, obstacles| {
@@ -256,9 +255,9 @@ fn is_near(field: &dyn Walls, p: DVec3, reach: f64) -> bool {
 /// Steps before walls are measured.
 const SETTLED: usize = 150;
 
-fn obstacle(text: &str, solid: &str, reach: f64) -> Box<dyn Walls> {
+fn obstacle(text: &str, solid: &str, reach: f64) -> Arc<dyn Walls> {
     let program = Program::from_source("obstacle.rfm", text).unwrap();
-    program.solid_with(solid, Engine::Auto).unwrap().walls(BOX, reach)
+    program.solid_with(solid, Engine::Auto).unwrap().walls(BOX, reach).into()
 }
 
 /// From the text of a pawn to the first contact with it.

@@ -123,10 +123,10 @@ fn a_box_turns_about_its_fluid() {
     let program = Program::from_path(root().join("examples/rotating_box.rfm")).unwrap();
     let program = program.with("particles", 300.0).and_then(|p| p.with("turn", 12.0)).unwrap();
     let scene = &program.module().scenes[0];
-    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap();
-    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap();
+    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap();
+    let mut simulation = experiment.start().unwrap().simulation;
     // a second at rest and a quarter of a turn: the wall x = 3 is the floor
-    experiment.advance(&program, scene, &mut simulation, 4.0, |_| ControlFlow::Continue(())).unwrap();
+    simulation.advance(4.0, |_| ControlFlow::Continue(())).unwrap();
     let gravity = simulation.parameters().gravity;
     assert!(gravity.x > 9.8 && gravity.z.abs() < 0.1, "{gravity}");
     let x = &simulation.particles().position.x;

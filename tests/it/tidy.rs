@@ -8,26 +8,26 @@ use crate::tool::root;
 ///
 /// Departures from the plan, with their reasons: `field` uses `interval`, the type of a guaranteed range;
 /// `simplify`, `codegen` and `solid` use `diagnostic` for the spans that nodes carry; `codegen` uses `geom` for the
-/// reach of range programs; `lower` uses `geom` for the boxes of
-/// scenes; `solid` uses `simplify`, because a gradient is derived and simplified when it is first asked for;
+/// reach of range programs; `lower` uses `geom` for the boxes of scenes, and `sph` for the keys that its methods declare; `solid` uses `simplify`, because a gradient is derived and simplified when it is first asked for;
 /// `compile` opens the file that `Program::from_path` names, and uses `geom` for the box of a tolerance.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("diagnostic", &[]),
     ("geom", &[]),
     ("interval", &[]),
     ("precision", &[]),
+    ("quantity", &[]),
     ("field", &["geom", "interval"]),
     ("syntax", &["diagnostic"]),
     ("ir", &["diagnostic", "geom", "interval", "precision"]),
-    ("lower", &["syntax", "ir", "diagnostic", "geom", "precision"]),
+    ("lower", &["syntax", "ir", "diagnostic", "geom", "precision", "quantity", "sph"]),
     ("simplify", &["ir", "diagnostic"]),
     ("codegen", &["ir", "diagnostic", "geom", "precision"]),
     ("solid", &["diagnostic", "ir", "simplify", "codegen", "field", "geom", "interval", "precision"]),
-    ("compile", &["diagnostic", "geom", "syntax", "ir", "lower", "simplify", "codegen", "solid"]),
+    ("compile", &["diagnostic", "geom", "syntax", "ir", "lower", "simplify", "codegen", "solid", "sph"]),
     ("slice", &["field", "geom", "interval"]),
     ("mesh", &["field", "geom", "interval"]),
     ("fluid_surface", &["geom", "mesh"]),
-    ("sph", &["field", "geom", "interval", "precision"]),
+    ("sph", &["field", "geom", "interval", "precision", "quantity"]),
     ("experiment", &["compile", "diagnostic", "field", "geom", "ir", "lower", "solid", "sph", "precision"]),
     ("render", &["field", "geom"]),
     ("cli", &["*"]),

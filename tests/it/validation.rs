@@ -23,26 +23,21 @@ fn program(name: &str, params: &[(&str, f64)]) -> Program {
 
 /// Runs a scene to its end and looks at it whenever it would be saved; afterwards how far it was from
 /// what is known.
-fn watch(
-    name: &str,
-    params: &[(&str, f64)],
-    mut look: impl FnMut(&Scene, &Simulation<'_>),
-) -> [Option<f64>; 2] {
+fn watch(name: &str, params: &[(&str, f64)], mut look: impl FnMut(&Scene, &Simulation)) -> [Option<f64>; 2] {
     let program = program(name, params);
     let scene = &program.module().scenes[0];
-    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
     let started = std::time::Instant::now();
     let frames = (scene.run.until / scene.run.save_every).round() as u32;
     let mut deviations = Deviations::default();
     look(scene, &simulation);
     for frame in 1..=frames {
         let end = f64::from(frame) * scene.run.save_every;
-        let reached =
-            experiment.advance(&program, scene, &mut simulation, end, |_| ControlFlow::Continue(()));
+        let reached = simulation.advance(end, |_| ControlFlow::Continue(()));
         reached.unwrap_or_else(|e| panic!("{name}: {e}"));
         look(scene, &simulation);
-        deviations.look(&program, scene, &simulation);
+        deviations.look(&experiment, &simulation);
     }
     let Deviation { pressure, velocity, .. } = deviations.total();
     let found = [pressure, velocity];
@@ -125,8 +120,8 @@ scene deep {
 fn a_deep_column_does_not_burst() {
     let program = Program::from_source("deep.rfm", DEEP).unwrap_or_else(|e| panic!("{e}"));
     let scene = &program.module().scenes[0];
-    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
     while simulation.time() < scene.run.until {
         simulation.step().unwrap_or_else(|e| panic!("{e}"));
     }
@@ -206,9 +201,9 @@ fn a_stone_bounces_to_the_square_of_the_restitution() {
     let e: f64 = 0.8;
     let program = program("bouncing", &[("e", e)]);
     let scene = &program.module().scenes[0];
-    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    let (mut simulation, _) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
-    let height = |s: &Simulation<'_>| s.particles().position.get(0).z;
+    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
+    let height = |s: &Simulation| s.particles().position.get(0).z;
     let start = height(&simulation);
     let (mut rising, mut last, mut tops) = (false, start, Vec::new());
     while simulation.time() < scene.run.until {

@@ -1,11 +1,14 @@
 //! Walls a thousandth of a millimetre thick, corners and cusps hold particles at 100 m/s: judged after every step, by
 //! where the particles are and not by what the solver says of itself.
 
+use std::sync::Arc;
+
+use rfm::experiment::Start;
 use rfm::field::Walls;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::lower::Scene;
-use rfm::sph::{Obstacle, Parameters, Particles, Simulation};
+use rfm::sph::{Obstacle, Paper, Parameters, Particles, Simulation};
 use rfm::{Engine, Experiment, Program, Solid};
 
 use crate::sweep::Random;
@@ -33,14 +36,14 @@ fn solid(name: &str) -> Solid {
 }
 
 /// Free particles at 100 m/s among obstacles; `check` is asked for every particle after every step.
-fn fly(field: &dyn Walls, starts: &[DVec3], steps: usize, check: &dyn Fn(DVec3, DVec3) -> bool) {
+fn fly(field: Arc<dyn Walls>, starts: &[DVec3], steps: usize, check: &dyn Fn(DVec3, DVec3) -> bool) {
     let mut random = Random(17);
     let mut fluid = Particles::default();
     for &start in starts {
         fluid.push(start, 100.0 * random.vector().normalize());
     }
     let parameters = Parameters {
-        stiffness: 0.0,
+        method: Paper { stiffness: 0.0, ..Paper::default() }.into(),
         viscosity: 0.0,
         surface_tension: 0.0,
         support_radius: 0.01,
@@ -50,7 +53,7 @@ fn fly(field: &dyn Walls, starts: &[DVec3], steps: usize, check: &dyn Fn(DVec3, 
     };
     let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
     // an infinite resolution: nothing may depend on it
-    let obstacle = Obstacle { restitution: 1.0, ..Obstacle::at_rest(field, f64::INFINITY) };
+    let obstacle = Obstacle { restitution: 1.0, ..Obstacle::at_rest(field.clone(), f64::INFINITY) };
     let mut simulation = Simulation::new(parameters, fluid, domain, vec![obstacle]).unwrap();
     for step in 0..steps {
         simulation.step().unwrap();
@@ -77,7 +80,7 @@ fn nothing_leaves_a_hollow() {
     for name in ["room", "bubble", "hat", "tyre", "cave"] {
         let (shell, hollow) = (solid(name), solid(&format!("{name}_in")));
         let starts = starts(500, |p| hollow.omega(p) > 0.01);
-        fly(&shell, &starts, 200, &|_, p| hollow.omega(p) >= 0.0);
+        fly(Arc::new(shell.clone()), &starts, 200, &|_, p| hollow.omega(p) >= 0.0);
     }
 }
 
@@ -85,11 +88,11 @@ fn nothing_leaves_a_hollow() {
 fn nothing_enters_or_passes() {
     let plate = solid("plate");
     let above = |p: DVec3| p.z > 0.1 * p.x;
-    fly(&plate, &starts(1_000, |p| (p.z - 0.1 * p.x).abs() > 0.01), 200, &|start, p| {
+    fly(Arc::new(plate.clone()), &starts(1_000, |p| (p.z - 0.1 * p.x).abs() > 0.01), 200, &|start, p| {
         above(start) == above(p)
     });
     let spikes = solid("spikes");
-    fly(&spikes, &starts(1_000, |p| spikes.omega(p) < -0.01), 200, &|_, _| true);
+    fly(Arc::new(spikes.clone()), &starts(1_000, |p| spikes.omega(p) < -0.01), 200, &|_, _| true);
 }
 
 /// A blade turns through a tray of water, closed by lids of the box.
@@ -133,11 +136,11 @@ fn what_is_far_from_many_balls_is_not_too_close_to_them() {
 }
 
 /// Hands over a file's scene at its start, with the number of particles that were carved off.
-fn with_scene(text: &str, look: impl FnOnce(&Program, &Scene, &mut Simulation<'_>, usize)) {
+fn with_scene(text: &str, look: impl FnOnce(&Program, &Scene, &mut Simulation, usize)) {
     let program = Program::from_source("scene.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     let scene = &program.module().scenes[0];
-    let experiment = Experiment::of(&program, scene, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
-    let (mut simulation, carved) = experiment.simulation(&program, scene).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let Start { mut simulation, carved, .. } = experiment.start().unwrap_or_else(|e| panic!("{e}"));
     look(&program, scene, &mut simulation, carved);
 }
 

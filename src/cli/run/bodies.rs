@@ -15,9 +15,9 @@ pub(super) struct Bodies {
 }
 
 impl Bodies {
-    pub fn new(options: &Run, setup: &Experiment) -> Self {
-        let solids = setup.obstacles.iter().map(|body| body.solid.clone()).collect();
-        Self { solids, domain: setup.domain, cells: options.mesh_cells }
+    pub fn new(options: &Run, experiment: &Experiment) -> Self {
+        let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
+        Self { solids, domain: experiment.domain(), cells: options.mesh_cells }
     }
 
     pub fn is_empty(&self) -> bool {

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use super::super::{Failure, note, output};
 use super::pace::Every;
 use crate::Experiment;
-use crate::Program;
 use crate::ir;
 use crate::lower::Scene;
 use crate::sph::{Checkpoint, CheckpointError, Parameters, Simulation};
@@ -49,7 +48,7 @@ impl Checkpoints {
     /// Writes the present instant with whatever `more` adds to it.
     pub fn save(
         &mut self,
-        simulation: &Simulation<'_>,
+        simulation: &Simulation,
         more: impl FnOnce(&mut Checkpoint),
     ) -> Result<(), Failure> {
         std::fs::create_dir_all(&self.folder).map_err(|e| {
@@ -116,7 +115,8 @@ pub(super) fn remove_all(run_folder: &Path) -> std::io::Result<()> {
 
 /// Of whatever decides the bits of a state: the fluid, the box, obstacles and the method's numbers. Not the step, how
 /// long the run is and what is saved of it: a run may go on with others.
-pub(super) fn fingerprint(program: &Program, scene: &Scene, setup: &Experiment) -> [u8; 32] {
+pub(super) fn fingerprint(experiment: &Experiment) -> [u8; 32] {
+    let (program, scene) = (experiment.program(), experiment.scene());
     let fluid = &scene.fluid;
     let container = scene.container.iter().map(|c| ("container", c.outside));
     let obstacles = scene.obstacles.iter().map(|o| ("obstacle", o.shape));
@@ -125,9 +125,9 @@ pub(super) fn fingerprint(program: &Program, scene: &Scene, setup: &Experiment) 
     let fluid_shape = [("fluid", fluid.shape)].into_iter();
     let roots: Vec<_> =
         fluid_shape.chain(container).chain(obstacles).chain(velocity).chain(gravity).collect();
-    let skins: Vec<_> = setup.obstacles.iter().map(|body| &body.skin).collect();
+    let skins: Vec<_> = experiment.bodies().iter().map(|body| &body.skin).collect();
     // gravity that turns is in the formulas, and in the parameters as it was last
-    let parameters = Parameters { time_step: 0.0, adaptive: false, ..setup.parameters.clone() };
+    let parameters = Parameters { time_step: 0.0, adaptive: false, ..experiment.parameters().clone() };
     // numbers print with all their digits
     let text = format!(
         "{}\n{:?}\n{skins:?}\n{parameters:?}\n{:?} {:?} {:?} {}",

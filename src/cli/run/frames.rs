@@ -13,7 +13,6 @@ use super::bodies::Bodies;
 use super::{checkpoints, probes};
 use crate::Experiment;
 use crate::geom::Aabb;
-use crate::lower::Scene;
 use crate::mesh::{self, Mesh};
 use crate::render;
 use crate::sph::{self, Checkpoint, Simulation};
@@ -48,17 +47,16 @@ impl Frames {
     /// The files of a run that begins, or goes on from a checkpoint.
     pub fn new(
         options: &Run,
-        scene: &Scene,
-        setup: &Experiment,
+        experiment: &Experiment,
         resumed: Option<&Checkpoint>,
     ) -> Result<Self, Failure> {
         let folder = folder(options);
         let write_frames = !options.no_frames;
         // whatever can be refused comes before the first change to the folder
-        let bodies = Bodies::new(options, setup);
+        let bodies = Bodies::new(options, experiment);
         let obstacle = if write_frames { bodies.mesh_at_start()? } else { Mesh::default() };
         let pictures = if write_frames && !options.no_pictures {
-            Some(Pictures::new(scene, setup, &obstacle)?)
+            Some(Pictures::new(experiment, &obstacle)?)
         } else {
             None
         };
@@ -142,7 +140,7 @@ impl Frames {
     }
 
     /// Saves the present instant.
-    pub fn save(&mut self, simulation: &Simulation<'_>) -> Result<(), Failure> {
+    pub fn save(&mut self, simulation: &Simulation) -> Result<(), Failure> {
         self.last_time = simulation.time();
         if !self.write_frames {
             return Ok(());
@@ -189,14 +187,15 @@ impl Pictures {
     /// long before.
     const FASTEST: f64 = 0.6;
 
-    fn new(scene: &Scene, setup: &Experiment, obstacle: &Mesh) -> Result<Self, Failure> {
-        let fastest = (Self::FASTEST * setup.typical_speed).max(f64::MIN_POSITIVE);
+    fn new(experiment: &Experiment, obstacle: &Mesh) -> Result<Self, Failure> {
+        let (domain, title) = (experiment.domain(), experiment.scene().name.clone());
+        let fastest = (Self::FASTEST * experiment.typical_speed()).max(f64::MIN_POSITIVE);
         Ok(Self {
-            scene: drawn(&setup.domain, &scene.name, fastest, obstacle)?,
-            title: scene.name.clone(),
-            domain: setup.domain,
+            scene: drawn(&domain, &title, fastest, obstacle)?,
+            title,
+            domain,
             fastest,
-            radius: 0.5 * setup.parameters.spacing(),
+            radius: 0.5 * experiment.parameters().spacing(),
             count: 0,
         })
     }
@@ -207,7 +206,7 @@ impl Pictures {
         Ok(())
     }
 
-    fn save(&mut self, path: &Path, simulation: &Simulation<'_>) -> Result<(), Failure> {
+    fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
         let particles = simulation.particles();
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
         let image = self.scene.frame(

@@ -40,7 +40,7 @@ impl Probes {
     pub fn start(
         run_folder: &Path,
         scene: &Scene,
-        simulation: &mut Simulation<'_>,
+        simulation: &mut Simulation,
         resumed: Option<&Checkpoint>,
     ) -> Result<Self, Failure> {
         let folder = run_folder.join(FOLDER);
@@ -74,7 +74,7 @@ impl Probes {
     }
 
     /// Reads those that are due.
-    pub fn sample(&mut self, simulation: &Simulation<'_>) -> Result<(), Failure> {
+    pub fn sample(&mut self, simulation: &Simulation) -> Result<(), Failure> {
         for recorder in &mut self.0 {
             if !recorder.clock.is_due(simulation.time()) {
                 continue;

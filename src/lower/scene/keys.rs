@@ -6,8 +6,8 @@ use super::super::eval::Lowering;
 use super::super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::Node;
+use crate::quantity::{Bound, Dimension, parse_unit};
 use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
-use crate::syntax::{Dimension, parse_unit};
 
 /// Keys that open a block; all others have a value.
 const BLOCKS: [&str; 9] =
@@ -16,16 +16,10 @@ const BLOCKS: [&str; 9] =
 /// The entries of a block whose keys are known, each at most once unless it may be repeated.
 pub(in crate::lower) struct Block<'a> {
     pub entries: &'a [Entry],
+    /// The name that follows the key, as in `fluid water { … }`.
+    pub label: Option<&'a Name>,
     what: &'static str,
     pub span: Span,
-}
-
-/// What a number may be.
-#[derive(Clone, Copy)]
-pub(in crate::lower) enum Bound {
-    Positive,
-    NotNegative,
-    Fraction,
 }
 
 impl<'a> Lowering<'a> {
@@ -77,7 +71,7 @@ impl<'a> Lowering<'a> {
                 );
             }
         }
-        Block { entries, what, span }
+        Block { entries, label: None, what, span }
     }
 
     /// The components of a vector, formulas or quantities.
@@ -142,15 +136,10 @@ impl<'a> Lowering<'a> {
     ) -> Option<f64> {
         let Some((_, value)) = block.setting(key) else { return default };
         let number = self.quantity_expr(value, dimension, key)?;
-        let (fits, expected) = match bound {
-            Bound::Positive => (number > 0.0, "must be positive"),
-            Bound::NotNegative => (number >= 0.0, "must not be negative"),
-            Bound::Fraction => ((0.0..=1.0).contains(&number), "must lie between 0 and 1"),
-        };
-        if fits && number.is_finite() {
+        if bound.admits(number) {
             return Some(number);
         }
-        let message = format!("`{key}` {expected}, found {number}");
+        let message = format!("`{key}` {}, found {number}", bound.demand());
         self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message));
         None
     }
@@ -205,10 +194,9 @@ impl<'a> Lowering<'a> {
                 let parsed = parse_unit(&unit.text)?; // the grammar admits known units only
                 if parsed.dimension != expected {
                     let message = format!("`{}` is not a unit of `{key}`", unit.text);
-                    let help = if expected == Dimension::NONE {
-                        format!("`{key}` has no unit")
-                    } else {
-                        format!("write for example `1 {}`", example_unit(expected))
+                    let help = match expected.unit() {
+                        Some(unit) => format!("write for example `1 {unit}`"),
+                        None => format!("`{key}` has no unit"),
                     };
                     self.report(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
                     return None;
@@ -226,21 +214,6 @@ impl<'a> Lowering<'a> {
                 self.as_constant(node, expr.span, &format!("`{key}`"))
             }
         }
-    }
-}
-
-fn example_unit(dimension: Dimension) -> &'static str {
-    match dimension {
-        Dimension::LENGTH => "m",
-        Dimension::MASS => "kg",
-        Dimension::TIME => "s",
-        Dimension::SPEED => "m/s",
-        Dimension::ACCELERATION => "m/s^2",
-        Dimension::DENSITY => "kg/m^3",
-        Dimension::VISCOSITY => "Pa·s",
-        Dimension::TENSION => "N/m",
-        Dimension::ENERGY => "J",
-        _ => "deg",
     }
 }
 

@@ -2,14 +2,15 @@
 //!
 //! Invariant: after this stage every number is finite and in SI units, and every size is positive.
 //!
-//! This file has the data, [`read`] the blocks of a scene, [`keys`] what a key may hold.
+//! This file has the data, [`read`] the blocks of a scene, [`fluid`] its fluid and method, [`keys`] what a key may hold.
 
+mod fluid;
 mod keys;
 mod read;
 
 use glam::DVec3;
 
-pub(super) use keys::{Block, Bound};
+pub(super) use keys::Block;
 
 use super::Tolerance;
 use super::probes::Probe;
@@ -17,6 +18,7 @@ use crate::diagnostic::Span;
 use crate::geom::Aabb;
 use crate::ir::Node;
 use crate::precision::Precision;
+use crate::sph::{Fill, Method, Slip};
 
 /// Acceleration of all of the fluid, m/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,13 +76,6 @@ pub struct Bounce {
     pub friction: f64,
 }
 
-/// Whether a fluid sticks to walls.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Slip {
-    Free,
-    No,
-}
-
 /// What a solid does to the fluid at its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Skin {
@@ -116,10 +111,6 @@ pub struct Truth {
 /// How a method is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solver {
-    /// Mean compression that `dfsph` accepts.
-    pub compression: f64,
-    /// Of its iterations, at most.
-    pub iterations: usize,
     /// Of sums over neighbours; the method decides if it is not given.
     pub precision: Option<Precision>,
 }
@@ -144,26 +135,8 @@ pub struct Fluid {
     pub viscosity: f64,
     /// N/m
     pub surface_tension: f64,
-    /// |∇c| above which a particle belongs to the surface, the paper's l.
-    pub threshold: f64,
-    /// Gas stiffness k of p = k(ρ − ρ₀), J.
-    pub stiffness: f64,
     /// h, m
     pub support_radius: f64,
-    /// Speed of sound of `wcsph`, m/s; ten times the speed of a fall through the box if it is not given.
-    pub sound_speed: Option<f64>,
-    /// δ of the density diffusion of `wcsph`.
-    pub density_diffusion: f64,
-    /// α of the artificial viscosity of `wcsph`.
-    pub artificial_viscosity: f64,
-    /// Whether pressures act by their differences.
-    pub differences: bool,
-    /// Strength of the particle shifting.
-    pub shifting: f64,
-    /// Whether pressure may pull.
-    pub negative_pressure: bool,
-    /// Whether the fluid starts under the pressure of its own weight, `wcsph` only: otherwise it starts without, and rings.
-    pub hydrostatic: bool,
     /// At the start, m/s.
     pub velocity: [Node; 3],
     /// Random displacement of the start positions, as a part of the particle spacing.
@@ -178,24 +151,6 @@ pub struct Obstacle {
     pub shape: Node,
     pub span: Span,
     pub skin: Skin,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fill {
-    /// From below, as a vessel is filled.
-    Below,
-    /// Where ω of the shape is largest: a drop of an exact number of particles.
-    Middle,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// Equations (8)–(14) of the paper, corrected.
-    Paper,
-    /// Weakly compressible.
-    Wcsph,
-    /// Divergence-free (Bender & Koschier 2017).
-    Dfsph,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,15 +5,13 @@ use glam::DVec3;
 use super::super::Tolerance;
 use super::super::eval::Lowering;
 use super::super::probes::Surroundings;
-use super::{
-    Block, Bounce, Bound, Container, Fill, Fluid, Gravity, Method, Obstacle, Run, Scene, Skin, Slip, Solver,
-    Truth,
-};
+use super::fluid::FluidAndMethod;
+use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Truth};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
-use crate::ir::{Node, Unary};
-use crate::precision::Precision;
-use crate::syntax::Dimension;
+use crate::ir::Unary;
+use crate::quantity::{Bound, Dimension};
+use crate::sph::Slip;
 use crate::syntax::ast::{self, Entry, Expr, ExprKind};
 
 const SCENE_KEYS: [&str; 13] = [
@@ -33,30 +31,6 @@ const SCENE_KEYS: [&str; 13] = [
 ];
 const TRUTH_KEYS: [&str; 4] = ["pressure", "velocity", "front", "from"];
 const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
-const SOLVER_KEYS: [&str; 3] = ["compression", "iterations", "precision"];
-const FLUID_KEYS: [&str; 21] = [
-    "shape",
-    "fill",
-    "particles",
-    "density",
-    "mass",
-    "spacing",
-    "viscosity",
-    "surface_tension",
-    "threshold",
-    "stiffness",
-    "support_radius",
-    "sound_speed",
-    "density_diffusion",
-    "artificial_viscosity",
-    "gradients",
-    "shifting",
-    "negative_pressure",
-    "start",
-    "velocity",
-    "jitter",
-    "seed",
-];
 const OBSTACLE_KEYS: [&str; 5] = ["solid", "restitution", "friction", "walls", "surface_velocity"];
 const FREE_SLIP: (&str, Slip) = ("free_slip", Slip::Free);
 const NO_SLIP: (&str, Slip) = ("no_slip", Slip::No);
@@ -74,13 +48,10 @@ impl<'a> Lowering<'a> {
         );
         self.units(&block);
         let domain = self.domain(&block);
-        let words = [("paper", Method::Paper), ("wcsph", Method::Wcsph), ("dfsph", Method::Dfsph)];
-        let method = self.word_key(&block, "method", &words).map(|stated| self.method.unwrap_or(stated));
-        let fluid = self.fluid(&block, method.unwrap_or(Method::Paper));
+        let fluid = self.fluid_and_method(&block);
         let slip = self.word_key(&block, "walls", &[FREE_SLIP, NO_SLIP]);
         let walls = slip.unwrap_or(Slip::Free);
         let container = self.container(&block, walls);
-        let solver = self.solver(&block);
         let obstacles: Vec<Obstacle> = block
             .blocks("obstacle")
             .filter_map(|(_, entries, span)| self.obstacle(entries, span, "an obstacle", walls))
@@ -89,7 +60,7 @@ impl<'a> Lowering<'a> {
         let truth = self.truth(&block);
         let run = self.run(&block);
         let probes = match (&domain, &fluid) {
-            (Some((domain, ..)), Some(fluid)) => {
+            (Some((domain, ..)), Some(FluidAndMethod { fluid, .. })) => {
                 let container = container.iter().map(|c| &c.name[..]);
                 let bodies = container.chain(obstacles.iter().map(|o| &o.name[..])).collect();
                 self.probes(&block, &Surroundings { domain: *domain, bodies, fluid: &fluid.name })
@@ -101,6 +72,7 @@ impl<'a> Lowering<'a> {
             return None;
         }
         let (domain, walls, domain_span) = domain?;
+        let FluidAndMethod { fluid, method, solver } = fluid?;
         Some(Scene {
             name: scene.name.text.clone(),
             span: scene.name.span,
@@ -109,11 +81,11 @@ impl<'a> Lowering<'a> {
             walls,
             slip: slip?,
             container,
-            fluid: fluid?,
+            fluid,
             obstacles,
             gravity: gravity?,
-            method: method?,
-            solver: solver?,
+            method,
+            solver,
             run: run?,
             truth: truth?,
             probes,
@@ -202,127 +174,6 @@ impl<'a> Lowering<'a> {
         Some(Skin { bounce: bounce?, slip, velocity })
     }
 
-    fn solver(&mut self, block: &Block<'_>) -> Option<Solver> {
-        let (entries, span) =
-            block.blocks("solver").next().map_or((&[][..], block.span), |(_, entries, span)| (entries, span));
-        let block = self.block(entries, "a solver", span, &SOLVER_KEYS, &[]);
-        let compression =
-            self.number_key(&block, "compression", Dimension::NONE, Some(1e-4), Bound::Positive);
-        let iterations = self.count_key(&block, "iterations", 1);
-        let precision = self.word_key(
-            &block,
-            "precision",
-            &[("auto", None), ("f32", Some(Precision::F32)), ("f64", Some(Precision::F64))],
-        );
-        Some(Solver {
-            compression: compression?,
-            iterations: iterations?.unwrap_or(100),
-            precision: precision?,
-        })
-    }
-
-    fn fluid(&mut self, block: &Block<'_>, method: Method) -> Option<Fluid> {
-        let mut fluids = block.blocks("fluid");
-        let Some((label, entries, span)) = fluids.next() else {
-            self.missing(
-                block,
-                "fluid",
-                "write `fluid water { shape: ball([1.5, 1.5, 2], 0.4), particles: 10000 }`",
-            );
-            return None;
-        };
-        if let Some((_, _, second)) = fluids.next() {
-            let message = "a second fluid: this version simulates one fluid";
-            self.report(
-                Diagnostic::error(Code::SCENE_REPEATED, second, message).label(span, "the first fluid"),
-            );
-        }
-        let block = self.block(entries, "a fluid", span, &FLUID_KEYS, &[]);
-        let shape = match block.setting("shape") {
-            Some((_, value)) => self.field(value).map(|node| (node, value.span)),
-            None => {
-                self.missing(&block, "shape", "write `shape: ball([1.5, 1.5, 2], 0.4)` or any other solid");
-                None
-            }
-        };
-        let fill = self.word_key(&block, "fill", &[("below", Fill::Below), ("middle", Fill::Middle)]);
-        let mut number =
-            |key, dimension, default, bound| self.number_key(&block, key, dimension, Some(default), bound);
-        use Bound::{Fraction, NotNegative, Positive};
-        let density = number("density", Dimension::DENSITY, 998.29, Positive);
-        let paper = method == Method::Paper;
-        let mass = number("mass", Dimension::MASS, 0.02, Positive);
-        let spacing = number("spacing", Dimension::LENGTH, 0.02, Positive);
-        let viscosity =
-            number("viscosity", Dimension::VISCOSITY, if paper { 3.5 } else { 1e-3 }, NotNegative);
-        let surface_tension =
-            number("surface_tension", Dimension::TENSION, if paper { 0.0728 } else { 0.0 }, NotNegative);
-        let threshold = number("threshold", Dimension::NONE, 7.065, Positive);
-        let stiffness = number("stiffness", Dimension::ENERGY, 3.0, Positive);
-        let sound_speed = number("sound_speed", Dimension::SPEED, 1.0, Positive);
-        let density_diffusion = number("density_diffusion", Dimension::NONE, 0.1, NotNegative);
-        let artificial_viscosity = number("artificial_viscosity", Dimension::NONE, 0.02, NotNegative);
-        let (mass, density) = (mass?, density?);
-        // a spacing says as much as a mass
-        let mass = if block.setting("spacing").is_some() { density * spacing?.powi(3) } else { mass };
-        // many neighbours make pressures smooth, and the incompressible solver slow
-        let own_support = match method {
-            Method::Paper => 0.1,
-            Method::Wcsph => 2.6 * (mass / density).cbrt(),
-            Method::Dfsph => 2.2 * (mass / density).cbrt(),
-        };
-        let support_radius =
-            self.number_key(&block, "support_radius", Dimension::LENGTH, Some(own_support), Positive);
-        let mut number =
-            |key, dimension, default, bound| self.number_key(&block, key, dimension, Some(default), bound);
-        let jitter = number("jitter", Dimension::NONE, 0.0, Fraction);
-        if let (Some((first, _)), Some((second, _))) = (block.setting("mass"), block.setting("spacing")) {
-            let message = "`mass` and `spacing` say the same: the mass of a particle is density·spacing³";
-            self.report(
-                Diagnostic::error(Code::SCENE_REPEATED, second.span, message)
-                    .label(first.span, "the mass is stated here"),
-            );
-        }
-        let differences = self.word_key(&block, "gradients", &[("pairs", false), ("differences", true)]);
-        let own_shifting = if method == Method::Wcsph && differences == Some(true) { 1.0 } else { 0.0 };
-        let shifting =
-            self.number_key(&block, "shifting", Dimension::NONE, Some(own_shifting), Bound::NotNegative);
-        let negative_pressure =
-            self.word_key(&block, "negative_pressure", &[("clamp", false), ("keep", true)]);
-        let hydrostatic = self.word_key(&block, "start", &[("free", false), ("hydrostatic", true)]);
-        let sound_speed = block.setting("sound_speed").is_some().then_some(sound_speed?);
-        let velocity = self.velocity(&block);
-        let particles = self.count_key(&block, "particles", 1);
-        let seed = self.count_key(&block, "seed", 0);
-        let particles_span = block.setting("particles").map(|(_, value)| value.span);
-        let (shape, shape_span) = shape?;
-        Some(Fluid {
-            name: label.map_or_else(|| "fluid".into(), |label| label.text.clone()),
-            shape,
-            shape_span,
-            fill: fill?,
-            particles: particles?,
-            particles_span,
-            density,
-            mass,
-            viscosity: viscosity?,
-            surface_tension: surface_tension?,
-            threshold: threshold?,
-            stiffness: stiffness?,
-            support_radius: support_radius?,
-            sound_speed,
-            density_diffusion: density_diffusion?,
-            artificial_viscosity: artificial_viscosity?,
-            differences: differences?,
-            shifting: shifting?,
-            negative_pressure: negative_pressure?,
-            hydrostatic: hydrostatic?,
-            velocity: velocity?,
-            jitter: jitter?,
-            seed: seed?.unwrap_or(1) as u64,
-        })
-    }
-
     fn gravity(&mut self, block: &Block<'_>) -> Option<Gravity> {
         let Some((_, value)) = block.setting("gravity") else {
             return Some(Gravity::Still(DVec3::new(0.0, 0.0, -9.81)));
@@ -368,14 +219,6 @@ impl<'a> Lowering<'a> {
         }
         let from = self.number_key(&block, "from", Dimension::TIME, Some(0.0), Bound::NotNegative)?;
         Some(Some(Truth { pressure, velocity, front, from }))
-    }
-
-    /// Three speeds, which may depend on the place.
-    fn velocity(&mut self, block: &Block<'_>) -> Option<[Node; 3]> {
-        match block.setting("velocity") {
-            Some((_, value)) => self.components(value, Dimension::SPEED, "velocity"),
-            None => Some([self.module.graph.constant(0.0); 3]),
-        }
     }
 
     fn obstacle(

@@ -24,7 +24,7 @@ const SURFACE: [f64; 2] = [0.85, 0.95];
 const RETURN: f64 = 0.3;
 
 /// The rate of return for the present speeds, 1/s.
-pub(super) fn return_rate(strength: f64, core: &Core<'_>) -> f64 {
+pub(super) fn return_rate(strength: f64, core: &Core) -> f64 {
     if strength > 0.0 { RETURN * core.speed / core.parameters.support_radius } else { 0.0 }
 }
 
@@ -35,7 +35,7 @@ pub(super) fn depth(spread: f64) -> f64 {
 }
 
 /// The drift as a field and its factor: Σ V ∇W + ∇λ, 1/m, times a diffusivity, m²/s. None without shifting.
-pub(super) fn shift<'a>(strength: f64, crowding: &'a Vectors, core: &Core<'_>) -> Option<(&'a Vectors, f64)> {
+pub(super) fn shift<'a>(strength: f64, crowding: &'a Vectors, core: &Core) -> Option<(&'a Vectors, f64)> {
     let strength = strength * 2.0 * core.parameters.support_radius;
     (strength > 0.0).then(|| (crowding, -strength * core.speed))
 }

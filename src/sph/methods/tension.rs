@@ -44,7 +44,7 @@ pub(super) struct Tension {
 
 impl Tension {
     /// Adds the tension's accelerations, if the fluid has any.
-    pub fn act(&mut self, core: &mut Core<'_>) {
+    pub fn act(&mut self, core: &mut Core) {
         let parameters = &core.parameters;
         if parameters.surface_tension == 0.0 {
             return;
@@ -81,7 +81,7 @@ struct Normals<'a> {
     kernel: Wendland,
     /// V·c
     steepness: f64,
-    core: &'a Core<'a>,
+    core: &'a Core,
 }
 
 impl PairPass<0, 3, 7> for Normals<'_> {

@@ -9,7 +9,7 @@ use crate::{
     field::Faces,
     sph::{
         core::{CHUNK, Core},
-        params::{Method, Slip},
+        params::Slip,
         walls::{Coverage, Wall, WallDrag},
     },
 };
@@ -86,9 +86,9 @@ pub fn about([x, y, z, u, v, w]: [f64; 6], point: DVec3) -> [f64; 6] {
 /// over the particles, with the pressure taken on to the surface by the balance ∇p = ρ(g − a). (What the method's wall
 /// terms give to the particles, summed, is less in a narrow vessel: its completed sums let the side walls carry 7 % of a
 /// column ten spacings wide.)
-pub fn pressure_on(core: &Core<'_>, obstacle: usize, point: DVec3) -> [f64; 6] {
+pub fn pressure_on(core: &Core, obstacle: usize, point: DVec3) -> [f64; 6] {
     let Core { parameters, particles, .. } = core;
-    if matches!(parameters.method, Method::Paper) {
+    if !parameters.walls_have_density() {
         return [0.0; 6];
     }
     let field = core.boundary.field(obstacle);

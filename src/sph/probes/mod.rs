@@ -16,7 +16,6 @@ use crate::geom::Aabb;
 use super::{
     core::Core,
     kernel::{Kernels, Wendland},
-    params::{Method, NegativePressure},
     stats::energies,
     walls::{Wall, WallKernel},
 };
@@ -98,7 +97,7 @@ impl Gauge {
         Self { probe, last: memory.try_into().unwrap_or([0.0; 7]) }
     }
 
-    pub(super) fn sample(&mut self, core: &Core<'_>) -> Vec<f64> {
+    pub(super) fn sample(&mut self, core: &Core) -> Vec<f64> {
         match self.probe {
             Probe::Height { x, y } => vec![height(core, x, y)],
             Probe::Pressure { at } => vec![Neighbourhood::around(core, at).pressure()],
@@ -136,7 +135,7 @@ struct Weight {
 }
 
 impl Weight {
-    fn of(core: &Core<'_>) -> Self {
+    fn of(core: &Core) -> Self {
         let Wall { kernel, h, .. } = *core.wall();
         Self { poly6: Kernels::new(h), wendland: Wendland::new(h), kernel, h }
     }
@@ -148,14 +147,14 @@ impl Weight {
 }
 
 /// How much of the kernel at a place is filled with fluid, of what walls leave of it: one in the fluid's depth.
-fn filling(core: &Core<'_>, weight: &Weight, at: DVec3, particles: impl Iterator<Item = DVec3>) -> f64 {
+fn filling(core: &Core, weight: &Weight, at: DVec3, particles: impl Iterator<Item = DVec3>) -> f64 {
     let volume = core.parameters.particle_mass / core.parameters.rest_density;
     let filled: f64 = particles.map(|p| volume * weight.at(p.distance_squared(at))).sum();
     let covered = core.boundary.coverage::<()>(core.wall(), at).map_or(0.0, |walls| walls.part);
     filled / (1.0 - covered.min(MOST_COVERED))
 }
 
-fn height(core: &Core<'_>, x: f64, y: f64) -> f64 {
+fn height(core: &Core, x: f64, y: f64) -> f64 {
     let h = core.parameters.support_radius;
     let weight = Weight::of(core);
     let beside = |p: &DVec3| (p.x - x).hypot(p.y - y) < h;
@@ -182,7 +181,7 @@ fn height(core: &Core<'_>, x: f64, y: f64) -> f64 {
 
 /// The particles around a place.
 struct Neighbourhood<'a> {
-    core: &'a Core<'a>,
+    core: &'a Core,
     at: DVec3,
     /// Particle and weight V·W.
     near: Vec<(usize, f64)>,
@@ -190,7 +189,7 @@ struct Neighbourhood<'a> {
 }
 
 impl<'a> Neighbourhood<'a> {
-    fn around(core: &'a Core<'a>, at: DVec3) -> Self {
+    fn around(core: &'a Core, at: DVec3) -> Self {
         let weight = Weight::of(core);
         let h2 = core.parameters.support_radius.powi(2);
         let position = &core.particles.position;
@@ -238,31 +237,18 @@ impl<'a> Neighbourhood<'a> {
 }
 
 /// ∫ W over the plane is the slope of what a wall there would take of the kernel.
-fn flux(core: &Core<'_>, point: DVec3, normal: DVec3) -> f64 {
+fn flux(core: &Core, point: DVec3, normal: DVec3) -> f64 {
     let Weight { kernel, h, .. } = Weight::of(core);
     let particles = core.particles.position.iter().zip(core.particles.velocity.iter());
     let passing = particles.map(|(x, v)| v.dot(normal) * kernel.slope((x - point).dot(normal) / h));
     core.parameters.particle_mass / h * passing.sum::<f64>()
 }
 
-fn elastic_energy(core: &Core<'_>) -> f64 {
+fn elastic_energy(core: &Core) -> f64 {
     let parameters = &core.parameters;
-    let specific = |density: f64| {
-        let x = density / parameters.rest_density;
-        if x < 1.0 && parameters.negative_pressure == NegativePressure::Clamp {
-            return 0.0;
-        }
-        match parameters.method {
-            // p = k(ρ − ρ₀)
-            Method::Paper => parameters.stiffness * (x.ln() + 1.0 / x - 1.0),
-            // p = c²ρ₀/7·(x⁷ − 1)
-            Method::Wcsph(wcsph) => {
-                wcsph.sound_speed.powi(2) / 7.0 * ((x.powi(6) - 1.0) / 6.0 + 1.0 / x - 1.0)
-            }
-            Method::Dfsph(_) => 0.0,
-        }
-    };
-    parameters.particle_mass * core.particles.density.iter().map(|&rho| specific(rho)).sum::<f64>()
+    let method = parameters.method.numerics();
+    let energies = core.particles.density.iter().map(|&rho| method.elastic_energy(parameters, rho));
+    parameters.particle_mass * energies.sum::<f64>()
 }
 
 #[cfg(test)]

@@ -14,9 +14,10 @@
 //! Invariant: every particle leaves this stage finite, in the box, and with ω < 0 for every obstacle; where the
 //! wedge between a wall and an obstacle leaves no such place near the target, it stays where it last had one.
 
-use rayon::prelude::*;
+use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::{
     field::{Face, Faces, Moving, Part, Path, Walls},
@@ -52,12 +53,12 @@ pub(in crate::sph) const UNKNOWN: f64 = -1.0;
 const SURELY: f64 = 1.0 - 1e-9;
 
 /// A body in the fluid's way.
-#[derive(Clone, Copy)]
-pub struct Obstacle<'a> {
+#[derive(Clone)]
+pub struct Obstacle {
     /// ω > 0 inside the body; of one that moves, as it is at the start.
-    pub field: &'a dyn Walls,
+    pub field: Arc<dyn Walls>,
     /// The body as it moves, if it does.
-    pub moving: Option<&'a dyn Moving>,
+    pub moving: Option<Arc<dyn Moving>>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
     /// Coefficient of friction μ: of the speed along the face, μ times what the face takes of the speed into it is lost.
@@ -70,12 +71,12 @@ pub struct Obstacle<'a> {
     pub slip: Slip,
     /// How its surface moves within itself, m/s, as that of a belt or of a cylinder that turns; a fluid that sticks is taken
     /// along.
-    pub surface_velocity: Option<&'a VectorField>,
+    pub surface_velocity: Option<Arc<VectorField>>,
 }
 
-impl<'a> Obstacle<'a> {
+impl Obstacle {
     /// A body at rest: the fluid slips along it, and half of a speed into it is given back.
-    pub fn at_rest(field: &'a dyn Walls, resolution: f64) -> Self {
+    pub fn at_rest(field: Arc<dyn Walls>, resolution: f64) -> Self {
         Self {
             field,
             moving: None,
@@ -89,13 +90,13 @@ impl<'a> Obstacle<'a> {
 }
 
 /// The box and the bodies in it.
-pub(in crate::sph) struct Boundary<'a> {
+pub(in crate::sph) struct Boundary {
     pub domain: Aabb,
     pub wall_restitution: f64,
     pub wall_friction: f64,
     /// Whether the fluid sticks to the box.
     pub slip: Slip,
-    pub obstacles: Vec<Obstacle<'a>>,
+    pub obstacles: Vec<Obstacle>,
     /// The obstacles that move, during the present step.
     pub during: Vec<Option<Box<dyn Walls>>>,
     /// The end of the present step, s.
@@ -111,19 +112,20 @@ pub(in crate::sph) struct Fault {
     pub at: DVec3,
 }
 
-impl<'a> Boundary<'a> {
+impl Boundary {
     /// Sets the obstacles that move to a step from one time to another, s.
     pub fn move_to(&mut self, from: f64, to: f64) {
         self.time = to;
         self.during.clear();
-        self.during.extend(self.obstacles.iter().map(|o| o.moving.map(|moving| moving.during(from, to))));
+        self.during
+            .extend(self.obstacles.iter().map(|o| o.moving.as_ref().map(|moving| moving.during(from, to))));
     }
 
     /// An obstacle during the present step.
     pub fn field(&self, k: usize) -> &dyn Walls {
         match self.during.get(k) {
             Some(Some(moving)) => &**moving,
-            _ => self.obstacles[k].field,
+            _ => &*self.obstacles[k].field,
         }
     }
 
@@ -233,7 +235,7 @@ impl<'a> Boundary<'a> {
             if obstacle.moving.is_some() {
                 coverage.set_in_motion(field.wall_velocity(p));
             }
-            if let Some(velocity) = obstacle.surface_velocity {
+            if let Some(velocity) = &obstacle.surface_velocity {
                 coverage.friction.take_along(velocity(nearest_place(p, &faces), self.time));
             }
             whole = whole.or(&coverage);

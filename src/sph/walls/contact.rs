@@ -223,7 +223,7 @@ fn normal(field: &dyn Walls, at: DVec3, backward: DVec3) -> Result<DVec3, Undefi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{Closures, Field};
+    use crate::field::Closures;
     use crate::sph::scenes;
 
     #[test]
@@ -239,7 +239,7 @@ mod tests {
     fn contact_with_a_sphere_is_exact_and_outside() {
         let sphere = scenes::sphere(DVec3::ZERO, 1.0);
         let path = Path::new(DVec3::X * 2.0, DVec3::X * 0.2, 0.1);
-        let hit = first_contact(&sphere, &path, 0.0).unwrap().unwrap();
+        let hit = first_contact(&*sphere, &path, 0.0).unwrap().unwrap();
         assert!((hit.point.x - 1.0).abs() < 1e-14 && sphere.omega(hit.point) < 0.0);
         assert!((hit.fraction - 1.0 / 1.8).abs() < 1e-14);
         assert!((hit.normal - DVec3::X).length() < 1e-14);
@@ -260,7 +260,7 @@ mod tests {
     fn push_out_finds_the_surface_even_from_the_centre() {
         let sphere = scenes::sphere(DVec3::ONE, 0.5);
         for start in [DVec3::ONE, DVec3::new(1.0, 1.1, 1.0), DVec3::new(1.0, 1.0, 1.499)] {
-            let out = push_out(&sphere, start, 2.0, 0.0).unwrap().unwrap();
+            let out = push_out(&*sphere, start, 2.0, 0.0).unwrap().unwrap();
             assert!((out.point.distance(DVec3::ONE) - 0.5).abs() < 1e-12, "{out:?}");
             assert!(sphere.omega(out.point) < 0.0 && out.normal.is_normalized());
         }

@@ -72,12 +72,9 @@ fn dfsph() -> Method {
 fn wcsph() -> Method {
     let sound_speed = 10.0 * (2.0 * 9.81 * COLUMN.size().z).sqrt();
     Method::Wcsph(Wcsph {
-        sound_speed,
-        density_diffusion: 0.1,
-        artificial_viscosity: 0.02,
-        gradients: Gradients::Pairs,
-        shifting: 0.0,
-    })
+sound_speed: Some(sound_speed),
+..Wcsph::default()
+})
 }
 
 /// With steps of one length, or those that sound allows if it is infinite.

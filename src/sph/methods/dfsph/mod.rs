@@ -1,361 +1,140 @@
-//! Divergence-free fluid, after Bender & Koschier (2017): pressure is what keeps the density, found by iteration.
-//!
-//! ```text
-//! v ← v + dt·(g + viscosity)
-//! v ← v + dt·a(s)      s ≥ 0 so that dρ/dt ≤ (ρ₀ − ρ)/τ
-//! x ← x + dt·v
-//! ```
-//!
-//! with s = p/ρ², a(s)_i = −M_i[Σ m (s_i + s_j) ∇W + 2ρ₀ s_i ∇λ] and dρ_i/dt = Σ m (M_i v_i − M_j v_j)·∇W +
-//! 2ρ₀ (M_i v_i)·∇λ.
-//!
-//! One solve does the work of their two. A velocity free of divergence is asked for, and besides that a density that is
-//! off comes back within some time τ (Baumgarte 1972). Where a density is to be right after a single step, as in their
-//! second solver, each small error of it becomes a speed: a fluid at rest simmers, and its pressure with it.
-//!
-//! Walls enter by λ, ∇λ and M = (1 − K)⁻¹: a pressure that is linear in space goes on behind the wall. The rate of density
-//! is the adjoint of that: a velocity that is linear in space goes on behind the wall and is mirrored at it. So the system
-//! to be solved is symmetric and has no negative eigenvalue, whatever the vessel, and its solution adds no energy.
-//! (Measured on a still column: with λ and ∇λ alone the pressure of the first layer comes out 2.2 times too high; with the
-//! mirrored pressure but not the mirrored velocity the column boils.)
-//!
-//! The particles' pressure is what follows from that: G·ρ²s, because the sums make G·∇p of a pressure that is linear in
-//! space (G = 0.98 in the depth of a fluid that has left the lattice), and its mean over the time τ, because what is left of a velocity's
-//! divergence in one step is a pressure in the next: of a fluid at rest single steps differ by a tenth, their sum is its
-//! weight.
-//!
-//! Invariant: the density belongs to the positions.
+//! The divergence-free method: its numbers, keys and limits. The scheme is in [`scheme`].
 
 mod passes;
+mod scheme;
 mod walls;
 
-use rayon::prelude::*;
-use smallvec::{SmallVec, smallvec};
+use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
+use super::numerics::{Numerics, Scheme};
+use crate::precision::Precision;
+use crate::quantity::{Bound, Dimension};
+use crate::sph::core::Core;
+use crate::sph::params::Parameters;
+use crate::sph::passes::Pass;
+use crate::sph::walls::{Wall, WallKernel};
 
-use super::{
-    shifting::{depth, restore_crowding, save_crowding, shift},
-    tension::Tension,
-};
-use crate::sph::{
-    checkpoint::{Checkpoint, CheckpointError},
-    core::{CHUNK, Core, add_scaled},
-    params::{Dfsph, Method},
-    particles::{Particles, Vectors},
-    simulation::StepError,
-};
+/// Part of the spacing that a particle may cross in one step where there is no sound: the customary 0.4.
+const ADVECTION: f64 = 0.4;
 
-use passes::{Constants, Densities, Drag, Push, Squeeze};
-use walls::Walls;
+/// Factor of √(h/a) at the beginning of a run, when the acceleration that pressure takes away counts too.
+const IMPLICIT_FORCE_FACTOR: f64 = 0.1;
 
-/// Walls and disorder make the system stiffer than the even fluid that [`stiffness`] speaks of.
-const STIFFNESS: f64 = 1.5;
+/// Factor of √(h/a) once the pressure is known: its acceleration is part of what is limited. With 0.25 a column of forty
+/// layers bursts at its start.
+const SOLVED_FORCE_FACTOR: f64 = 0.15;
 
-/// A particle without neighbours has no pressure to find: a factor below this part of that in a full neighbourhood.
-const LONELY: f64 = 1e-3;
-
-/// What is kept between steps: the solver's answer; the rest is working memory.
-pub struct DivergenceFree {
-    numbers: Dfsph,
-    /// s = p/ρ²
-    specific: Vec<f64>,
-    /// How much a unit of p/ρ² lowers the own dρ/dt in a second: (1 − K)⁻¹(…)·(…) + Σ m²|∇W|².
-    factor: Vec<f64>,
-    /// G = −⅓ Σ V r·∇W + ⅓ tr K
-    spread: Vec<f64>,
-    /// dρ/dt
-    rate: Vec<f64>,
-    /// The same without pressure.
-    free: Vec<f64>,
-    /// a(s)
-    push: Vectors,
-    /// Σ V ∇W + ∇λ, 1/m: where the particles crowd; zero at the surface.
-    crowding: Vectors,
-    tension: Tension,
-    /// M·v
-    completed: Vectors,
-    walls: Walls,
-    /// The guess before momentum carried it on.
-    last: Vec<f64>,
-    /// Greatest eigenvalue of the system over its diagonal: the inverse of a step that cannot overshoot.
-    stiffness: f64,
-    /// Σ of errors and of the momentum's work, chunk by chunk.
-    errors: Vec<[f64; 2]>,
-    /// Of the last step's solver.
-    pub iterations: u32,
+/// Numbers of the divergence-free method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dfsph {
+    /// Mean compression by one step that is accepted, as a part of the rest density. 1e-4: a tenth of that hardly changes
+    /// the pressure of a fluid at rest, ten times that makes it 5 % too high.
+    pub tolerance: f64,
+    /// Iterations of the solver, at most. 100.
+    pub most_iterations: u32,
+    /// How strongly particles drift to where there are fewer of them; zero: they do not. 1 halves the deviation of a fluid at
+    /// rest, and makes that of a shear flow two to three times as large.
+    pub shifting: f64,
 }
 
-impl DivergenceFree {
-    /// A scheme for a fluid that is new, or that goes on from a state which will be restored.
-    pub fn start(core: &mut Core<'_>, is_new: bool) -> Self {
-        let Method::Dfsph(numbers) = core.parameters.method else {
-            unreachable!("the method decides which scheme is made")
-        };
-        let n = core.particles.len();
-        core.particles.density.resize(n, 0.0);
-        core.particles.pressure.resize(n, 0.0);
-        let mut scheme = Self {
-            numbers,
-            specific: vec![0.0; n],
-            factor: vec![0.0; n],
-            spread: vec![0.0; n],
-            rate: vec![0.0; n],
-            free: vec![0.0; n],
-            push: Vectors::default(),
-            crowding: Vectors::default(),
-            tension: Tension::default(),
-            completed: Vectors::default(),
-            walls: Walls::default(),
-            last: Vec::new(),
-            stiffness: STIFFNESS * stiffness(core.parameters.support_radius / core.parameters.spacing()),
-            errors: Vec::new(),
-            iterations: 0,
-        };
-        scheme.push.resize(n);
-        scheme.settle(core, &mut []);
-        if is_new {
-            scheme.relax(core);
-        }
-        scheme
-    }
-
-    /// Moves the particles of the start apart where they are too dense, at walls above all, for which no lattice is made:
-    /// a first step would give them speeds for it. Their velocities stay.
-    fn relax(&mut self, core: &mut Core<'_>) {
-        /// So often at most; what is left is small.
-        const ROUNDS: usize = 40;
-        let dt = core.parameters.force_dt(core.parameters.gravity.length().max(1e-3));
-        let gravity = std::mem::take(&mut core.parameters.gravity);
-        let mut velocity = core.particles.velocity.clone();
-        let speed = std::mem::take(&mut core.speed);
-        for _ in 0..ROUNDS {
-            let rest = core.parameters.rest_density;
-            let worst =
-                core.particles.density.iter().fold(0.0, |worst: f64, rho| worst.max(rho / rest - 1.0));
-            if worst < 2.0 * self.numbers.tolerance {
-                break;
-            }
-            core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
-            self.keep_density(core, dt);
-            // a place that cannot be left is found by the first step
-            if core.drift(dt, None).is_err() {
-                break;
-            }
-            let [x, y, z] = velocity.components_mut();
-            self.settle(core, &mut [x, y, z]);
-            self.specific.fill(0.0);
-        }
-        (core.particles.velocity, core.speed) = (velocity, speed);
-        core.parameters.gravity = gravity;
-        core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
-        core.particles.pressure.fill(0.0);
-    }
-
-    pub fn step(&mut self, core: &mut Core<'_>, most: f64) -> Result<f64, StepError> {
-        let dt = core.next_dt(most)?;
-        self.find_other_accelerations(core);
-        add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
-        self.keep_density(core, dt);
-        core.move_obstacles(dt);
-        core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
-        self.settle(core, &mut []);
-        core.check_finite(dt)?;
-        Ok(dt)
-    }
-
-    /// The answers of the last step; all else follows from the positions.
-    pub fn save(&self, checkpoint: &mut Checkpoint) {
-        checkpoint.set("specific pressure", self.specific.clone());
-        checkpoint.set("stiffness", vec![self.stiffness]);
-        save_crowding(&self.crowding, checkpoint);
-    }
-
-    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.specific = checkpoint.of_particles("specific pressure")?;
-        if let [stiffness] = checkpoint.get("stiffness")? {
-            self.stiffness = *stiffness;
-        }
-        self.crowding = restore_crowding(checkpoint)?;
-        Ok(())
-    }
-
-    pub fn bytes(&self) -> usize {
-        let columns = [&self.specific, &self.factor, &self.spread, &self.rate, &self.free, &self.last];
-        columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
-            + self.push.bytes()
-            + self.crowding.bytes()
-            + self.tension.bytes()
-            + self.completed.bytes()
-            + self.walls.bytes()
-    }
-
-    /// Order, walls, densities and factors of the present positions.
-    fn settle(&mut self, core: &mut Core<'_>, kept: &mut [&mut Vec<f64>]) {
-        let mut columns: SmallVec<[&mut Vec<f64>; 4]> = smallvec![&mut self.specific];
-        columns.extend(kept.iter_mut().map(|column| &mut **column));
-        core.sort(&mut columns);
-        core.find_near();
-        self.walls.find(core);
-        let mut density = std::mem::take(&mut core.particles.density);
-        let pass = Densities { constants: Constants::of(&core.parameters), walls: &self.walls };
-        self.crowding.resize(density.len());
-        let Vectors { x, y, z } = &mut self.crowding;
-        self.spread.resize(density.len(), 0.0);
-        core.sum(&pass, [], [&mut density, &mut self.factor, x, y, z, &mut self.spread]);
-        core.particles.density = density;
-    }
-
-    /// Gravity, viscosity and tension.
-    fn find_other_accelerations(&mut self, core: &mut Core<'_>) {
-        let mut acceleration = std::mem::take(&mut core.acceleration);
-        let g = core.parameters.gravity;
-        let Vectors { x, y, z } = &mut acceleration;
-        if core.parameters.viscosity > 0.0 {
-            let Vectors { x: vx, y: vy, z: vz } = &core.particles.velocity;
-            let pass = Drag {
-                constants: Constants::of(&core.parameters),
-                walls: &self.walls,
-                velocity: &core.particles.velocity,
-                kinematic: core.parameters.viscosity / core.parameters.rest_density,
-                gravity: g,
-            };
-            core.sum(&pass, [&vx[..], vy, vz], [&mut x[..], y, z]);
-        } else {
-            x.fill(g.x);
-            y.fill(g.y);
-            z.fill(g.z);
-        }
-        core.acceleration = acceleration;
-        core.pull();
-        self.tension.act(core);
-    }
-
-    /// Changes velocities so that nothing is compressed, and what is too dense expands.
-    fn keep_density(&mut self, core: &mut Core<'_>, dt: f64) {
-        let rest = core.parameters.rest_density;
-        let mut pressure = std::mem::take(&mut self.specific);
-        let relaxation = core.parameters.relaxation_time(core.speed, dt);
-        // the compression to come without pressure; that which s takes away is found in each iteration
-        self.find_rate_of(core, &core.particles.velocity, true);
-        let mut free = std::mem::take(&mut self.free);
-        for ((free, rate), rho) in free.iter_mut().zip(&self.rate).zip(&core.particles.density) {
-            *free = (rho - rest) / relaxation + rate;
-        }
-        self.iterations = self.solve(core, &mut pressure, &free, dt, self.numbers.tolerance * rest / dt);
-        self.free = free;
-        add_scaled(&mut core.particles.velocity, &self.push, dt);
-        add_scaled(&mut core.acceleration, &self.push, 1.0);
-        let Particles { pressure: p, density, .. } = &mut core.particles;
-        // at first a mean since the start
-        let share = (dt / relaxation.min(core.time + dt)).min(1.0);
-        for (((p, s), rho), g) in p.iter_mut().zip(&pressure).zip(density).zip(&self.spread) {
-            *p += share * ((1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho - *p);
-        }
-        self.specific = pressure;
-    }
-
-    /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0, and is not positive
-    /// elsewhere, to a mean of `tolerance`; leaves a(s) in `push`. Returns the iterations.
-    ///
-    /// Projected gradients with momentum (Nesterov 1983), scaled by the diagonal, and begun anew when the momentum leads
-    /// uphill (O'Donoghue & Candès 2015): some √κ iterations where Jacobi's method needs κ.
-    fn solve(&mut self, core: &Core<'_>, pressure: &mut [f64], free: &[f64], dt: f64, tolerance: f64) -> u32 {
-        let least = LONELY * Constants::of(&core.parameters).full_factor;
-        let n = pressure.len() as f64;
-        let mut last = std::mem::take(&mut self.last);
-        last.clear();
-        last.extend_from_slice(pressure);
-        let (mut iteration, mut momentum, mut best) = (0, 0.0, f64::INFINITY);
-        loop {
-            self.find_push(core, pressure);
-            let push = std::mem::take(&mut self.push);
-            self.find_rate_of(core, &push, false);
-            self.push = push;
-            let guess = |scale: f64, s: f64, error: f64, factor: f64| (s + scale * error / factor).max(0.0);
-            let scale = 1.0 / (dt * self.stiffness);
-            // the errors at this guess, and whether momentum leads from it uphill
-            self.rate
-                .par_chunks(CHUNK)
-                .zip(free.par_chunks(CHUNK))
-                .zip(self.factor.par_chunks(CHUNK))
-                .zip(pressure.par_chunks(CHUNK))
-                .zip(last.par_chunks(CHUNK))
-                .map(|((((rate, free), factor), s), last)| {
-                    let mut sums = [0.0; 2];
-                    for k in 0..rate.len() {
-                        if factor[k] > least {
-                            let error = free[k] + dt * rate[k];
-                            let next = guess(scale, s[k], error, factor[k]);
-                            // an expansion that no pressure can end is no error
-                            sums[0] += if s[k] > 0.0 { error.abs() } else { error.max(0.0) };
-                            sums[1] += factor[k] * (s[k] - next) * (next - last[k]);
-                        }
-                    }
-                    sums
-                })
-                .collect_into_vec(&mut self.errors);
-            let [error, uphill] = self.errors.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
-            let mean = error / n;
-            let done = (mean <= tolerance && iteration > 0) || iteration >= self.numbers.most_iterations;
-            if done || !mean.is_finite() {
-                break;
-            }
-            let too_long = mean > 2.0 * best;
-            if too_long {
-                // steps are too long for this neighbourhood
-                self.stiffness *= 1.3;
-            }
-            best = if too_long { mean } else { best.min(mean) };
-            let begin_anew = too_long || uphill > 0.0;
-            let beta = if begin_anew { 0.0 } else { momentum / (momentum + 3.0) };
-            momentum = if begin_anew { 0.0 } else { momentum + 1.0 };
-            let scale = 1.0 / (dt * self.stiffness);
-            pressure
-                .par_chunks_mut(CHUNK)
-                .zip(last.par_chunks_mut(CHUNK))
-                .zip(self.rate.par_chunks(CHUNK))
-                .zip(free.par_chunks(CHUNK))
-                .zip(self.factor.par_chunks(CHUNK))
-                .for_each(|((((s, last), rate), free), factor)| {
-                    for k in 0..s.len() {
-                        if factor[k] > least {
-                            let error = free[k] + dt * rate[k];
-                            let next = guess(scale, s[k], error, factor[k]);
-                            s[k] = (next + beta * (next - last[k])).max(0.0);
-                            last[k] = next;
-                        } else {
-                            (s[k], last[k]) = (0.0, 0.0);
-                        }
-                    }
-                });
-            iteration += 1;
-        }
-        self.last = last;
-        iteration
-    }
-
-    /// a(s)
-    fn find_push(&mut self, core: &Core<'_>, pressure: &[f64]) {
-        let pass = Push { constants: Constants::of(&core.parameters), walls: &self.walls, pressure };
-        let Vectors { x, y, z } = &mut self.push;
-        core.sum(&pass, [pressure], [&mut x[..], y, z]);
-    }
-
-    /// dρ/dt of a velocity among walls that move, or of an acceleration per second.
-    fn find_rate_of(&mut self, core: &Core<'_>, velocity: &Vectors, with_walls: bool) {
-        self.walls.complete(velocity, &mut self.completed);
-        let pass = Squeeze {
-            constants: Constants::of(&core.parameters),
-            walls: &self.walls,
-            completed: &self.completed,
-            with_walls,
-        };
-        let Vectors { x, y, z } = &self.completed;
-        core.sum(&pass, [&x[..], y, z], [&mut self.rate]);
+impl Default for Dfsph {
+    fn default() -> Self {
+        Self { tolerance: 1e-4, most_iterations: 100, shifting: 0.0 }
     }
 }
 
-/// Greatest eigenvalue over diagonal in an even fluid with so many spacings per support radius: waves of pressure of the
-/// length 1.65 h, by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
-fn stiffness(ratio: f64) -> f64 {
-    1.775 * (0.5 * ratio).powi(3)
+impl Declaration for Dfsph {
+    const NAME: &'static str = "dfsph";
+    const TITLE: &'static str = "Divergence-free";
+    const PRESSURE: &'static str = "solved for, so that nothing is compressed";
+    const KERNEL: &'static str = "Wendland C2; 45";
+    const STEP: &'static str = "adaptive";
+    const FLUID: FluidDefaults = FluidDefaults {
+        viscosity: 1e-3,
+        surface_tension: 0.0,
+        // many neighbours make the solver slow
+        support: Support::Spacings(2.2),
+        precision: Precision::F32,
+        adaptive: true,
+    };
+    const KEYS: &'static [Key<Self>] = &[
+        Key {
+            name: "compression",
+            block: KeyBlock::Solver,
+            about: "mean compression by one step that is accepted, as a part of the density",
+            value: Value::Number {
+                dimension: Dimension::NONE,
+                bound: Bound::From(1e-9, 1.0),
+                get: |dfsph| Some(dfsph.tolerance),
+                set: |dfsph, tolerance| dfsph.tolerance = tolerance,
+                derived: "",
+            },
+        },
+        Key {
+            name: "iterations",
+            block: KeyBlock::Solver,
+            about: "iterations of a step's solver, at most",
+            value: Value::Count {
+                least: 1,
+                get: |dfsph| dfsph.most_iterations,
+                set: |dfsph, iterations| dfsph.most_iterations = iterations,
+            },
+        },
+        Key {
+            name: "shifting",
+            block: KeyBlock::Fluid,
+            about: "how strongly particles drift to where there are fewer of them",
+            value: Value::Number {
+                dimension: Dimension::NONE,
+                bound: Bound::NotNegative,
+                get: |dfsph| Some(dfsph.shifting),
+                set: |dfsph, strength| dfsph.shifting = strength,
+                derived: "",
+            },
+        },
+    ];
+    const PASSES: &'static [(Pass, Absence<Self>)] = &[
+        (Pass::Coverage, |_, _| None),
+        (Pass::Density, |_, _| None),
+        (Pass::Pressure, |_, _| Some("the method solves for the pressure")),
+        (Pass::PressureSolver, |_, _| None),
+        (Pass::Viscosity, |_, parameters| Pass::without_viscosity(parameters)),
+        (Pass::Shifting, |dfsph, _| (dfsph.shifting == 0.0).then_some("the shifting is zero")),
+        (Pass::NoSlip, |_, parameters| Pass::without_friction(parameters)),
+        (Pass::SurfaceTension, |_, parameters| Pass::without_tension(parameters)),
+    ];
+    const SAVES: &'static [&'static str] =
+        &["specific pressure", "stiffness", "crowding x", "crowding y", "crowding z"];
+}
+
+impl Numerics for Dfsph {
+    fn start(&self, core: &mut Core, is_new: bool) -> Box<dyn Scheme> {
+        Box::new(scheme::DivergenceFree::start(*self, core, is_new))
+    }
+
+    fn sound_speed(&self, _parameters: &Parameters) -> f64 {
+        0.0
+    }
+
+    fn courant_dt(&self, parameters: &Parameters, max_speed: f64) -> f64 {
+        ADVECTION * parameters.spacing() / max_speed
+    }
+
+    fn force_factor(&self) -> f64 {
+        IMPLICIT_FORCE_FACTOR
+    }
+
+    fn present_force_gain(&self) -> f64 {
+        SOLVED_FORCE_FACTOR / IMPLICIT_FORCE_FACTOR
+    }
+
+    /// In layers: only then a divergence-free fluid stands right at a wall. (Differences of pressure are steady only at a
+    /// wall that is continuous; with layers a standing wave of `wcsph` grows noise at the walls.)
+    fn wall(&self, parameters: &Parameters) -> Wall {
+        let h = parameters.support_radius;
+        Wall { kernel: WallKernel::WendlandC2, h, layer: Some(parameters.spacing() / h) }
+    }
+
+    fn elastic_energy(&self, _parameters: &Parameters, _density: f64) -> f64 {
+        0.0
+    }
 }

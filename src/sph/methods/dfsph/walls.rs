@@ -23,7 +23,7 @@ pub(super) type WallsNear = Coverage<WallDrag>;
 const NONE: u32 = u32::MAX;
 
 impl Walls {
-    pub fn find(&mut self, core: &Core<'_>) {
+    pub fn find(&mut self, core: &Core) {
         let n = core.particles.len();
         self.found.clear();
         self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {

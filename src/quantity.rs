@@ -1,31 +1,65 @@
-//! Units of literals: a factor to SI and the exponents of metre, kilogram, second and radian.
+//! Quantities: dimensions, units (a factor to SI and the exponents of metre, kilogram, second and radian), and the bounds
+//! that a number may have to keep.
+
+use std::fmt;
 
 /// Exponents of m, kg, s and rad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dimension {
+    /// Exponent of the metre.
     pub length: i8,
+    /// Exponent of the kilogram.
     pub mass: i8,
+    /// Exponent of the second.
     pub time: i8,
+    /// Exponent of the radian.
     pub angle: i8,
 }
 
 impl Dimension {
+    /// A number without a unit.
     pub const NONE: Self = Self::new(0, 0, 0, 0);
+    /// m
     pub const LENGTH: Self = Self::new(1, 0, 0, 0);
+    /// kg
     pub const MASS: Self = Self::new(0, 1, 0, 0);
+    /// s
     pub const TIME: Self = Self::new(0, 0, 1, 0);
+    /// rad
     pub const ANGLE: Self = Self::new(0, 0, 0, 1);
+    /// m/s
     pub const SPEED: Self = Self::new(1, 0, -1, 0);
+    /// m/s²
     pub const ACCELERATION: Self = Self::new(1, 0, -2, 0);
+    /// kg/m³
     pub const DENSITY: Self = Self::new(-3, 1, 0, 0);
     /// Dynamic viscosity, Pa·s.
     pub const VISCOSITY: Self = Self::new(-1, 1, -1, 0);
     /// Surface tension, N/m.
     pub const TENSION: Self = Self::new(0, 1, -2, 0);
+    /// J
     pub const ENERGY: Self = Self::new(2, 1, -2, 0);
 
+    /// The dimension m^length · kg^mass · s^time · rad^angle.
     pub const fn new(length: i8, mass: i8, time: i8, angle: i8) -> Self {
         Self { length, mass, time, angle }
+    }
+
+    /// The SI unit as a scene writes it; `None` for a plain number.
+    pub fn unit(self) -> Option<&'static str> {
+        const UNITS: [(Dimension, &str); 10] = [
+            (Dimension::LENGTH, "m"),
+            (Dimension::MASS, "kg"),
+            (Dimension::TIME, "s"),
+            (Dimension::ANGLE, "rad"),
+            (Dimension::SPEED, "m/s"),
+            (Dimension::ACCELERATION, "m/s^2"),
+            (Dimension::DENSITY, "kg/m^3"),
+            (Dimension::VISCOSITY, "Pa·s"),
+            (Dimension::TENSION, "N/m"),
+            (Dimension::ENERGY, "J"),
+        ];
+        UNITS.into_iter().find(|(dimension, _)| *dimension == self).map(|(_, unit)| unit)
     }
 
     fn plus(self, other: Self, times: i8) -> Self {
@@ -39,10 +73,60 @@ impl Dimension {
     }
 }
 
+/// What a number may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// Finite and above zero.
+    Positive,
+    /// Finite and at least zero.
+    NotNegative,
+    /// From 0 to 1.
+    Fraction,
+    /// At least the first number and below the second.
+    From(f64, f64),
+}
+
+impl Bound {
+    /// Whether the bound admits a number; it admits no infinity and no NaN.
+    pub fn admits(self, number: f64) -> bool {
+        number.is_finite()
+            && match self {
+                Self::Positive => number > 0.0,
+                Self::NotNegative => number >= 0.0,
+                Self::Fraction => (0.0..=1.0).contains(&number),
+                Self::From(least, limit) => (least..limit).contains(&number),
+            }
+    }
+
+    /// What the bound demands, to follow the name of a number: "must be positive".
+    pub fn demand(self) -> String {
+        match self {
+            Self::Positive => "must be positive".into(),
+            Self::NotNegative => "must not be negative".into(),
+            Self::Fraction => "must lie between 0 and 1".into(),
+            Self::From(least, limit) => format!("must be at least {least:?} and below {limit:?}"),
+        }
+    }
+}
+
+impl fmt::Display for Bound {
+    /// The numbers that the bound admits: "a finite number above 0".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Positive => write!(f, "a finite number above 0"),
+            Self::NotNegative => write!(f, "a finite number of at least 0"),
+            Self::Fraction => write!(f, "a number from 0 to 1"),
+            Self::From(least, limit) => write!(f, "a number of at least {least:?} and below {limit:?}"),
+        }
+    }
+}
+
+/// A unit as it is written at a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     /// How many SI units one of these is.
     pub factor: f64,
+    /// What it measures.
     pub dimension: Dimension,
 }
 

@@ -15,6 +15,8 @@
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
+use super::super::numerics::Scheme;
+use super::Paper;
 use crate::sph::{
     core::{Core, add_scaled, set_sum},
     kernel::Kernels,
@@ -25,22 +27,14 @@ use crate::sph::{
 };
 
 /// What is kept between steps: working memory only.
-pub struct Paper {
+pub struct PaperScheme {
+    numbers: Paper,
     kernels: Kernels,
     volume: Vec<f64>,
 }
 
-impl Paper {
-    pub fn start(core: &mut Core<'_>) -> Self {
-        let kernels = Kernels::new(core.parameters.support_radius);
-        let mut scheme = Self { kernels, volume: Vec::new() };
-        core.sort(&mut []);
-        scheme.find_density_and_pressure(core);
-        scheme.find_accelerations(core, 0.0);
-        scheme
-    }
-
-    pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
+impl Scheme for PaperScheme {
+    fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError> {
         let dt = core.next_dt(longest)?;
         add_scaled(&mut core.particles.velocity, &core.acceleration, 0.5 * dt);
         core.move_obstacles(dt);
@@ -53,11 +47,22 @@ impl Paper {
         Ok(dt)
     }
 
-    pub fn bytes(&self) -> usize {
+    fn bytes(&self) -> usize {
         8 * self.volume.capacity()
     }
+}
 
-    fn find_density_and_pressure(&self, core: &mut Core<'_>) {
+impl PaperScheme {
+    pub fn start(numbers: Paper, core: &mut Core) -> Self {
+        let kernels = Kernels::new(core.parameters.support_radius);
+        let mut scheme = Self { numbers, kernels, volume: Vec::new() };
+        core.sort(&mut []);
+        scheme.find_density_and_pressure(core);
+        scheme.find_accelerations(core, 0.0);
+        scheme
+    }
+
+    fn find_density_and_pressure(&self, core: &mut Core) {
         let mut density = std::mem::take(&mut core.particles.density);
         density.resize(core.particles.len(), 0.0);
         let pass = Density { kernels: self.kernels, mass: core.parameters.particle_mass };
@@ -65,13 +70,13 @@ impl Paper {
         core.particles.density = density;
         core.particles.pressure.resize(core.particles.len(), 0.0);
         for (p, &rho) in core.particles.pressure.iter_mut().zip(&core.particles.density) {
-            *p = core.parameters.pressure(rho);
+            *p = self.numbers.pressure(rho, core.parameters.rest_density);
         }
     }
 
     /// Accelerations for the velocities predicted `ahead` seconds from those stored.
-    fn find_accelerations(&mut self, core: &mut Core<'_>, ahead: f64) {
-        let terms = Terms::of(&core.parameters);
+    fn find_accelerations(&mut self, core: &mut Core, ahead: f64) {
+        let terms = Terms::of(&self.numbers, &core.parameters);
         let mut acceleration = std::mem::take(&mut core.acceleration);
         if !terms.any() {
             let g = core.parameters.gravity;
@@ -93,11 +98,20 @@ impl Paper {
         let Vectors { x, y, z } = &mut acceleration;
         let out = [&mut x[..], y, z];
         let (kernels, parameters, volume) = (self.kernels, &core.parameters, &self.volume[..]);
+        let threshold = self.numbers.surface_threshold;
         match (terms.viscosity, terms.tension) {
-            (true, true) => core.sum(&Forces::<true, true> { kernels, parameters, volume }, fields, out),
-            (true, false) => core.sum(&Forces::<true, false> { kernels, parameters, volume }, fields, out),
-            (false, true) => core.sum(&Forces::<false, true> { kernels, parameters, volume }, fields, out),
-            (false, false) => core.sum(&Forces::<false, false> { kernels, parameters, volume }, fields, out),
+            (true, true) => {
+                core.sum(&Forces::<true, true> { kernels, parameters, threshold, volume }, fields, out)
+            }
+            (true, false) => {
+                core.sum(&Forces::<true, false> { kernels, parameters, threshold, volume }, fields, out)
+            }
+            (false, true) => {
+                core.sum(&Forces::<false, true> { kernels, parameters, threshold, volume }, fields, out)
+            }
+            (false, false) => {
+                core.sum(&Forces::<false, false> { kernels, parameters, threshold, volume }, fields, out)
+            }
         }
         core.acceleration = acceleration;
         core.spare = predicted;
@@ -107,16 +121,16 @@ impl Paper {
 
 /// Which terms a fluid has; a term that it lacks is not compiled into its loop.
 #[derive(Debug, Clone, Copy)]
-pub struct Terms {
-    pub pressure: bool,
-    pub viscosity: bool,
-    pub tension: bool,
+struct Terms {
+    pressure: bool,
+    viscosity: bool,
+    tension: bool,
 }
 
 impl Terms {
-    pub fn of(parameters: &Parameters) -> Self {
+    fn of(numbers: &Paper, parameters: &Parameters) -> Self {
         Self {
-            pressure: parameters.stiffness > 0.0,
+            pressure: numbers.stiffness > 0.0,
             viscosity: parameters.viscosity > 0.0,
             tension: parameters.surface_tension > 0.0,
         }
@@ -160,6 +174,8 @@ impl PairPass<0, 1, 1> for Density {
 struct Forces<'a, const VISCOSITY: bool, const TENSION: bool> {
     kernels: Kernels,
     parameters: &'a Parameters,
+    /// Of the surface, 1/m.
+    threshold: f64,
     /// m/ρ, m³
     volume: &'a [f64],
 }
@@ -213,7 +229,7 @@ impl<const VISCOSITY: bool, const TENSION: bool> PairPass<5, 10, 3> for Forces<'
             // a particle is part of its own colour field: ∇W(0) = 0, but ∇²W(0) is not
             let normal = kernels.poly6_gradient(0.0) * vector(6);
             let length = normal.length();
-            if length >= parameters.surface_threshold {
+            if length >= self.threshold {
                 let curvature = kernels.poly6_laplacian(0.0) / 3.0 * sums[9];
                 force -= parameters.surface_tension * curvature / length * normal;
             }

@@ -27,27 +27,52 @@ use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{
+use super::super::{
+    negative_pressure::NegativePressure,
+    numerics::Scheme,
     shifting::{depth, restore_crowding, return_rate, save_crowding, shift},
     tension::Tension,
 };
+use super::{EXPONENT, Gradients, Wcsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
     kernel::Wendland,
     pairs::{PairPass, Real},
-    params::{Gradients, Method, NegativePressure, Parameters, Wcsph},
+    params::Parameters,
     particles::Vectors,
     simulation::StepError,
     walls::{Friction, WallDrag},
 };
 
-/// The exponent of Tait's equation for water.
-const EXPONENT: i32 = 7;
+/// The method's numbers as they act: what was left open is derived.
+#[derive(Debug, Clone, Copy)]
+struct Numbers {
+    /// m/s
+    sound_speed: f64,
+    density_diffusion: f64,
+    artificial_viscosity: f64,
+    gradients: Gradients,
+    shifting: f64,
+    negative_pressure: NegativePressure,
+}
+
+impl Numbers {
+    fn of(wcsph: &Wcsph, parameters: &Parameters) -> Self {
+        Self {
+            sound_speed: parameters.sound_speed(),
+            density_diffusion: wcsph.density_diffusion,
+            artificial_viscosity: wcsph.artificial_viscosity,
+            gradients: wcsph.gradients,
+            shifting: wcsph.shifting(),
+            negative_pressure: wcsph.negative_pressure,
+        }
+    }
+}
 
 /// What is kept between steps: the rates of change; the rest is working memory.
 pub struct Weakly {
-    numbers: Wcsph,
+    numbers: Numbers,
     /// dρ/dt, kg/m³/s
     density_rate: Vec<f64>,
     /// Σ V ∇W + ∇λ, 1/m: where the particles crowd; zero at the surface.
@@ -57,11 +82,42 @@ pub struct Weakly {
     tension: Tension,
 }
 
+impl Scheme for Weakly {
+    fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError> {
+        let dt = core.next_dt(longest)?;
+        self.kick(core, 0.5 * dt);
+        core.move_obstacles(dt);
+        core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
+        core.sort(&mut [&mut self.density_rate]);
+        self.find_rates(core, 0.5 * dt);
+        self.kick(core, 0.5 * dt);
+        self.find_pressure(core);
+        core.check_finite(dt)?;
+        Ok(dt)
+    }
+
+    fn save(&self, checkpoint: &mut Checkpoint) {
+        checkpoint.set("density rate", self.density_rate.clone());
+        save_crowding(&self.crowding, checkpoint);
+    }
+
+    fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.density_rate = checkpoint.of_particles("density rate")?;
+        self.crowding = restore_crowding(checkpoint)?;
+        Ok(())
+    }
+
+    fn bytes(&self) -> usize {
+        let columns = [&self.density_rate, &self.excess];
+        columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
+            + self.crowding.bytes()
+            + self.tension.bytes()
+    }
+}
+
 impl Weakly {
-    pub fn start(core: &mut Core<'_>) -> Self {
-        let Method::Wcsph(numbers) = core.parameters.method else {
-            unreachable!("the method decides which scheme is made")
-        };
+    pub fn start(wcsph: &Wcsph, core: &mut Core) -> Self {
+        let numbers = Numbers::of(wcsph, &core.parameters);
         let n = core.particles.len();
         // a density that was not stated is that at rest
         core.particles.density.resize(n, 0.0);
@@ -82,44 +138,13 @@ impl Weakly {
         scheme
     }
 
-    pub fn step(&mut self, core: &mut Core<'_>, longest: f64) -> Result<f64, StepError> {
-        let dt = core.next_dt(longest)?;
-        self.kick(core, 0.5 * dt);
-        core.move_obstacles(dt);
-        core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
-        core.sort(&mut [&mut self.density_rate]);
-        self.find_rates(core, 0.5 * dt);
-        self.kick(core, 0.5 * dt);
-        self.find_pressure(core);
-        core.check_finite(dt)?;
-        Ok(dt)
-    }
-
-    pub fn save(&self, checkpoint: &mut Checkpoint) {
-        checkpoint.set("density rate", self.density_rate.clone());
-        save_crowding(&self.crowding, checkpoint);
-    }
-
-    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.density_rate = checkpoint.of_particles("density rate")?;
-        self.crowding = restore_crowding(checkpoint)?;
-        Ok(())
-    }
-
-    pub fn bytes(&self) -> usize {
-        let columns = [&self.density_rate, &self.excess];
-        columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
-            + self.crowding.bytes()
-            + self.tension.bytes()
-    }
-
     /// v += a·t, ρ += dρ/dt·t
-    fn kick(&self, core: &mut Core<'_>, t: f64) {
+    fn kick(&self, core: &mut Core, t: f64) {
         add_scaled(&mut core.particles.velocity, &core.acceleration, t);
         add_scaled_column(&mut core.particles.density, &self.density_rate, t);
     }
 
-    fn find_pressure(&self, core: &mut Core<'_>) {
+    fn find_pressure(&self, core: &mut Core) {
         let (numbers, parameters, particles) = (&self.numbers, &core.parameters, &mut core.particles);
         particles.pressure.par_chunks_mut(CHUNK).zip(particles.density.par_chunks(CHUNK)).for_each(
             |(pressure, density)| {
@@ -132,7 +157,7 @@ impl Weakly {
 
     /// Accelerations and rates of density for velocities and densities predicted `ahead` seconds from those stored. The
     /// pressures that belong to them take the place of the particles'.
-    fn find_rates(&mut self, core: &mut Core<'_>, ahead: f64) {
+    fn find_rates(&mut self, core: &mut Core, ahead: f64) {
         let n = core.particles.len();
         let mut predicted = std::mem::take(&mut core.spare);
         set_sum(&mut predicted, &core.particles.velocity, &core.acceleration, ahead);
@@ -184,31 +209,28 @@ impl Weakly {
 }
 
 /// Whether particles are kept even: for differences, and for shifting itself.
-fn is_kept_even(numbers: &Wcsph) -> bool {
+fn is_kept_even(numbers: &Numbers) -> bool {
     numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences
 }
 
 /// ρ₀/c²·g: how the density of a fluid at rest grows with the depth, kg/m⁴.
-fn at_rest(numbers: &Wcsph, parameters: &Parameters) -> DVec3 {
+fn at_rest(numbers: &Numbers, parameters: &Parameters) -> DVec3 {
     parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity
 }
 
 /// p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1), not below zero unless that is kept.
 #[inline]
-fn tait(numbers: &Wcsph, parameters: &Parameters, density: f64) -> f64 {
+fn tait(numbers: &Numbers, parameters: &Parameters, density: f64) -> f64 {
     let stiffness = numbers.sound_speed.powi(2) * parameters.rest_density / f64::from(EXPONENT);
     let p = stiffness * ((density / parameters.rest_density).powi(EXPONENT) - 1.0);
-    match parameters.negative_pressure {
-        NegativePressure::Clamp => p.max(0.0),
-        NegativePressure::Keep => p,
-    }
+    numbers.negative_pressure.of(p)
 }
 
 /// The sums over neighbours and what is made of them.
 #[derive(Clone, Copy)]
 struct Rates<'a> {
     parameters: &'a Parameters,
-    core: &'a Core<'a>,
+    core: &'a Core,
     velocity: &'a Vectors,
     pressure: &'a [f64],
     /// ρ − ρ₀; of particles that are not kept even, less what a fluid at rest would have
@@ -235,8 +257,8 @@ struct Rates<'a> {
 
 impl<'a> Rates<'a> {
     fn new(
-        core: &'a Core<'a>,
-        numbers: &Wcsph,
+        core: &'a Core,
+        numbers: &Numbers,
         velocity: &'a Vectors,
         pressure: &'a [f64],
         excess: &'a [f64],

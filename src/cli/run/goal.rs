@@ -1,0 +1,109 @@
+//! Where a run ends, and when its frames are saved.
+
+use super::super::Failure;
+use super::super::args::Run;
+use crate::Experiment;
+use crate::sph::Simulation;
+
+/// Where a run ends.
+#[derive(Clone, Copy)]
+pub(super) enum Goal {
+    /// After so many steps.
+    Steps(u64),
+    /// At an instant, s, which steps of any length arrive at.
+    Time(f64),
+}
+
+impl Goal {
+    pub fn of(options: &Run, experiment: &Experiment) -> Result<Self, Failure> {
+        match (options.steps, options.until) {
+            (Some(steps), _) => Ok(Self::Steps(steps)),
+            (None, Some(until)) if !(until.is_finite() && until >= 0.0) => {
+                Err(Failure::usage(format!("--until {until}: expected a time in seconds")))
+            }
+            (None, until) => {
+                let until = until.unwrap_or(experiment.scene().run.until);
+                Ok(if experiment.parameters().adaptive {
+                    Self::Time(until)
+                } else {
+                    Self::Steps((until / experiment.parameters().time_step).round() as u64)
+                })
+            }
+        }
+    }
+
+    pub fn is_reached(self, simulation: &Simulation) -> bool {
+        match self {
+            Self::Steps(steps) => simulation.steps() >= steps,
+            Self::Time(end) => simulation.time() >= end * (1.0 - 1e-12),
+        }
+    }
+
+    /// Time to the end, s, if it is known.
+    pub fn left(self, simulation: &Simulation) -> f64 {
+        match self {
+            Self::Steps(_) => f64::INFINITY,
+            Self::Time(end) => end - simulation.time(),
+        }
+    }
+
+    /// For the bar: steps, or microseconds.
+    pub fn total(self) -> u64 {
+        match self {
+            Self::Steps(steps) => steps,
+            Self::Time(end) => (1e6 * end) as u64,
+        }
+    }
+
+    pub fn done(self, simulation: &Simulation) -> u64 {
+        match self {
+            Self::Steps(_) => simulation.steps(),
+            Self::Time(_) => (1e6 * simulation.time()) as u64,
+        }
+    }
+
+    /// Steps to come if each were as long as this, s.
+    pub fn steps(self, dt: f64) -> u64 {
+        match self {
+            Self::Steps(steps) => steps,
+            Self::Time(end) => (end / dt).ceil() as u64,
+        }
+    }
+}
+
+/// When frames are saved: after a number of equal steps, or at instants that steps are fitted to.
+pub(super) enum Pace {
+    Steps(u64),
+    Times { every: f64, next: u64 },
+}
+
+impl Pace {
+    /// From a time on, s.
+    pub fn new(experiment: &Experiment, time: f64) -> Self {
+        let every = experiment.scene().run.save_every;
+        if experiment.parameters().adaptive {
+            Self::Times { every, next: 1 + (time / every * (1.0 + 1e-12)) as u64 }
+        } else {
+            Self::Steps(((every / experiment.parameters().time_step).round() as u64).max(1))
+        }
+    }
+
+    /// Time to the next frame, s, if steps are to be fitted to it.
+    pub fn left(&self, simulation: &Simulation) -> f64 {
+        match self {
+            Self::Steps(_) => f64::INFINITY,
+            Self::Times { every, next } => every * *next as f64 - simulation.time(),
+        }
+    }
+
+    pub fn frame_is_due(&mut self, simulation: &Simulation) -> bool {
+        match self {
+            Self::Steps(steps) => simulation.steps().is_multiple_of(*steps),
+            Self::Times { every, next } => {
+                let due = simulation.time() >= *every * *next as f64 * (1.0 - 1e-12);
+                *next += u64::from(due);
+                due
+            }
+        }
+    }
+}

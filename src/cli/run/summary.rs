@@ -1,0 +1,138 @@
+//! What a run says of itself at its end.
+
+use serde::Serialize;
+
+use super::frames::Frames;
+use super::probes::Probes;
+use super::watch::Watch;
+use crate::experiment::Deviation;
+use crate::sph::{Pass, Simulation};
+
+/// What `summary.json` and `--json` say; figures that judge the run are the worst of all saved instants.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    schema: u32,
+    scene: String,
+    steps: u64,
+    simulated_seconds: f64,
+    time_step: f64,
+    particles: usize,
+    particles_carved: usize,
+    /// Of one particle, kg.
+    particle_mass: f64,
+    /// kg/m³
+    rest_density: f64,
+    milliseconds_per_step: f64,
+    neighbours_per_particle: f64,
+    max_penetration: f64,
+    inside: usize,
+    lost: usize,
+    non_finite: usize,
+    max_density_error: f64,
+    kinetic_energy: f64,
+    potential_energy: f64,
+    energy_at_start: f64,
+    /// Largest energy of a saved instant above the one at the start, as a part of that; 0 if it only fell, null if
+    /// a fluid that had none at the start has some.
+    energy_growth: Option<f64>,
+    max_speed: f64,
+    /// Relative L2 deviation of the pressure from the scene's `truth`, over all saved instants.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pressure_error: Option<f64>,
+    /// The same of the velocity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_error: Option<f64>,
+    /// The same of the front on the floor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    front_error: Option<f64>,
+    passes: Vec<&'static str>,
+    threads: usize,
+    frames: usize,
+    finished: bool,
+}
+
+impl Summary {
+    /// The figures of a run that has ended.
+    pub fn of(watch: &Watch, scene: &str, simulation: &Simulation, frames: usize, finished: bool) -> Self {
+        let steps = simulation.steps();
+        let deviation = watch.deviations.total();
+        Self {
+            schema: 1,
+            scene: scene.to_string(),
+            steps,
+            simulated_seconds: simulation.time(),
+            time_step: simulation.time() / steps.max(1) as f64,
+            particles: watch.now.particles,
+            particles_carved: watch.carved,
+            particle_mass: simulation.parameters().particle_mass,
+            rest_density: simulation.parameters().rest_density,
+            milliseconds_per_step: watch.spent.as_secs_f64() * 1e3 / steps.max(1) as f64,
+            neighbours_per_particle: watch.neighbours.0 / watch.neighbours.1 as f64,
+            max_penetration: watch.worst.max_penetration,
+            inside: watch.worst.inside,
+            lost: watch.worst.lost,
+            non_finite: watch.worst.non_finite,
+            max_density_error: watch.worst.max_density_error,
+            kinetic_energy: watch.now.kinetic_energy,
+            potential_energy: watch.now.potential_energy,
+            energy_at_start: watch.energy_at_start,
+            energy_growth: growth(watch.energy_at_start, watch.most_energy),
+            max_speed: watch.worst.max_speed,
+            pressure_error: deviation.pressure,
+            velocity_error: deviation.velocity,
+            front_error: deviation.front,
+            passes: pass_names(simulation),
+            threads: rayon::current_num_threads(),
+            frames,
+            finished,
+        }
+    }
+}
+
+/// The figures as text.
+pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
+    say!(
+        "{} particles, {} steps of {:.3e} s = {:.3} s simulated",
+        summary.particles,
+        summary.steps,
+        summary.time_step,
+        summary.simulated_seconds
+    );
+    say!(
+        "{:.2} ms per step on {} thread(s), {:.1} neighbours per particle",
+        summary.milliseconds_per_step,
+        summary.threads,
+        summary.neighbours_per_particle
+    );
+    say!(
+        "inside the obstacle: {} (deepest {:.1e} m), outside the box: {}, not finite: {}",
+        summary.inside,
+        summary.max_penetration,
+        summary.lost,
+        summary.non_finite
+    );
+    say!(
+        "energy: {:.2} J at the start, {:.2} J at the end; largest compression {:.1} %",
+        summary.energy_at_start,
+        summary.kinetic_energy + summary.potential_energy,
+        100.0 * summary.max_density_error
+    );
+    let errors = [summary.pressure_error, summary.velocity_error, summary.front_error];
+    for (what, error) in Deviation::NAMES.into_iter().zip(errors) {
+        if let Some(error) = error {
+            say!("{what}: {:.2} % from what is known (relative L2 over the saved instants)", 100.0 * error);
+        }
+    }
+    let probes = if probes.count() > 0 { format!(", {} probes", probes.count()) } else { String::new() };
+    say!("written to {}: {}{probes}", frames.folder().display(), frames.describe());
+}
+
+/// Names of the passes that a simulation runs.
+pub(super) fn pass_names(simulation: &Simulation) -> Vec<&'static str> {
+    simulation.passes().into_iter().map(Pass::name).collect()
+}
+
+/// How far `most` exceeds `start`, as a part of `start`.
+fn growth(start: f64, most: f64) -> Option<f64> {
+    if most <= start { Some(0.0) } else { Some(most / start - 1.0).filter(|part| part.is_finite()) }
+}

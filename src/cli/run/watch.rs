@@ -1,0 +1,123 @@
+//! The figures of a run while it goes on: the last ones and the worst ones of all saved instants.
+
+use std::time::Duration;
+
+use crate::Experiment;
+use crate::experiment::Deviations;
+use crate::sph::{Checkpoint, Simulation, Stats};
+
+/// Name in a checkpoint of what [`Watch`] remembers.
+pub(super) const WATCH: &str = "watch";
+
+/// The figures of a run while it goes on.
+pub(super) struct Watch {
+    /// Spent in steps.
+    pub spent: Duration,
+    pub carved: usize,
+    pub energy_at_start: f64,
+    pub most_energy: f64,
+    /// Of the last saved instant.
+    pub now: Stats,
+    /// The worst of each figure over all saved instants.
+    pub worst: Stats,
+    /// Sum of the neighbours per particle, and the instants that were summed.
+    pub neighbours: (f64, usize),
+    /// From what is known of the flow.
+    pub deviations: Deviations,
+}
+
+impl Watch {
+    pub fn new(simulation: &Simulation, carved: usize, resumed: Option<&Checkpoint>) -> Self {
+        let stats = simulation.stats();
+        let energy = stats.kinetic_energy + stats.potential_energy;
+        let mut watch = Self {
+            spent: Duration::ZERO,
+            carved,
+            energy_at_start: energy,
+            most_energy: energy,
+            neighbours: (stats.neighbours_per_particle, 1),
+            deviations: Deviations::default(),
+            now: stats.clone(),
+            worst: stats,
+        };
+        if let Some(memory) = resumed.and_then(|checkpoint| checkpoint.get(WATCH).ok()) {
+            watch.take_up(memory);
+        }
+        watch
+    }
+
+    /// What a run that goes on must know of its beginning.
+    pub fn memory(&self) -> Vec<f64> {
+        let Self { spent, carved, energy_at_start, most_energy, neighbours, worst, .. } = self;
+        let mut memory = vec![
+            spent.as_secs_f64(),
+            *carved as f64,
+            *energy_at_start,
+            *most_energy,
+            neighbours.0,
+            neighbours.1 as f64,
+            worst.max_penetration,
+            worst.inside as f64,
+            worst.lost as f64,
+            worst.non_finite as f64,
+            worst.max_density_error,
+            worst.max_speed,
+        ];
+        memory.extend(self.deviations.memory());
+        memory
+    }
+
+    /// The other way; a memory of another length is none.
+    fn take_up(&mut self, memory: &[f64]) {
+        let Ok(
+            [
+                spent,
+                carved,
+                start,
+                most,
+                sum,
+                looks,
+                depth,
+                inside,
+                lost,
+                non_finite,
+                density,
+                speed,
+                deviations @ ..,
+            ],
+        ) = <[f64; 19]>::try_from(memory)
+        else {
+            return;
+        };
+        self.spent = Duration::try_from_secs_f64(spent).unwrap_or_default();
+        self.carved = carved as usize;
+        (self.energy_at_start, self.most_energy) = (start, most);
+        self.neighbours = (sum, looks as usize);
+        self.deviations = Deviations::remembered(deviations);
+        self.worst = Stats {
+            max_penetration: depth,
+            inside: inside as usize,
+            lost: lost as usize,
+            non_finite: non_finite as usize,
+            max_density_error: density,
+            max_speed: speed,
+            ..self.worst.clone()
+        };
+    }
+
+    pub fn look(&mut self, experiment: &Experiment, simulation: &Simulation) {
+        self.deviations.look(experiment, simulation);
+        let now = simulation.stats();
+        self.most_energy = self.most_energy.max(now.kinetic_energy + now.potential_energy);
+        self.neighbours.0 += now.neighbours_per_particle;
+        self.neighbours.1 += 1;
+        let worst = &mut self.worst;
+        worst.max_penetration = worst.max_penetration.max(now.max_penetration);
+        worst.inside = worst.inside.max(now.inside);
+        worst.lost = worst.lost.max(now.lost);
+        worst.non_finite = worst.non_finite.max(now.non_finite);
+        worst.max_density_error = worst.max_density_error.max(now.max_density_error);
+        worst.max_speed = worst.max_speed.max(now.max_speed);
+        self.now = now;
+    }
+}

@@ -1,0 +1,288 @@
+//! A scene of the language → a simulation: obstacles compiled, parameters checked, particles put and carved.
+//!
+//! ```no_run
+//! let program = rfm::Program::from_path("examples/pawn.rfm")?;
+//! let experiment = rfm::Experiment::new(&program, "drop", rfm::Engine::Auto)?;
+//! let mut simulation = experiment.start()?.simulation;
+//! simulation.step().unwrap();
+//! # Ok::<(), rfm::Error>(())
+//! ```
+//!
+//! An [`Experiment`] owns all that it needs, and so does a [`Simulation`]: both may be sent to another thread. What is
+//! known of the flow is compared by [`Deviations`].
+
+mod bodies;
+mod deviation;
+mod parameters;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::compile::Error;
+use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
+use crate::geom::Aabb;
+use crate::ir::{Given, Interpreter, Node};
+use crate::lower::{Fluid, Gravity, Scene};
+use crate::solid::Bounds;
+use crate::sph::{
+    Checkpoint, FluidBlock, FluidShape, Obstacle, Parameters, Particles, SeedError, SetupError, Simulation,
+    VectorField, carve, make_room,
+};
+use crate::{Engine, Program, Solid};
+
+pub use bodies::Body;
+pub use deviation::{Deviation, Deviations};
+pub use parameters::TimeStep;
+
+/// Particles start at least this part of the spacing away from an obstacle.
+const CLEARANCE: f64 = 0.5;
+
+/// A scene, compiled and checked: what a simulation needs besides its particles.
+pub struct Experiment {
+    program: Program,
+    scene: Scene,
+    parameters: Parameters,
+    time_step: TimeStep,
+    typical_speed: f64,
+    bodies: Vec<Body>,
+    fluid: Solid,
+    warnings: Vec<Diagnostic>,
+}
+
+/// A simulation at its start.
+pub struct Start {
+    /// It has taken no step.
+    pub simulation: Simulation,
+    /// Particles of the fluid that were carved off, because they lay in an obstacle, too close to one, or outside the box.
+    pub carved: usize,
+    /// What a person should know of the start, and does not keep it from being run.
+    pub warnings: Diagnostics,
+}
+
+impl Experiment {
+    /// Compiles the solids of a scene and derives the numbers of its method.
+    ///
+    /// # Errors
+    /// If the file has no scene of this name, the engine is not to be had, or the fluid's figures do not fit together.
+    pub fn new(program: &Program, scene: &str, engine: Engine) -> Result<Self, Error> {
+        let (program, scene) = (program.clone(), program.scene(scene)?.clone());
+        let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
+        let typical_speed = parameters::typical_speed(&program, &scene);
+        let mut parameters = parameters::of_scene(&program, &scene, typical_speed);
+        let (time_step, too_long) = parameters::time_step(&scene, &parameters);
+        parameters.time_step = time_step.seconds;
+        parameters.validate().map_err(|error| {
+            let message = format!("the fluid's figures do not fit together: {error}");
+            refuse(&program, Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message))
+        })?;
+        let bodies = bodies::compile(&program, &scene, &parameters, engine)?;
+        let warnings = too_long.into_iter().collect();
+        Ok(Self { program, scene, parameters, time_step, typical_speed, bodies, fluid, warnings })
+    }
+
+    /// The program that the scene belongs to.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The box.
+    pub fn domain(&self) -> Aabb {
+        self.scene.domain
+    }
+
+    /// Numbers of the fluid and the method.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// The length of steps, and why they are as long as they are.
+    pub fn time_step(&self) -> TimeStep {
+        self.time_step
+    }
+
+    /// A speed that the scene can reach by gravity, m/s.
+    pub fn typical_speed(&self) -> f64 {
+        self.typical_speed
+    }
+
+    /// The outside of the container, if the scene has one, and the obstacles.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// What a person should know of the scene, and does not keep it from being run.
+    pub fn warnings(&self) -> Diagnostics {
+        self.diagnostics(self.warnings.clone())
+    }
+
+    /// The simulation at its start.
+    ///
+    /// # Errors
+    /// If the fluid has no room.
+    pub fn start(&self) -> Result<Start, Error> {
+        let fluid = &self.scene.fluid;
+        let mut particles = self.seed()?;
+        self.set_in_motion(&mut particles);
+        let obstacles = self.obstacles();
+        let (carved, warning) = self.carve(&mut particles, &obstacles)?;
+        self.put_under_pressure(&mut particles);
+        let simulation = Simulation::new(self.parameters.clone(), particles, self.scene.domain, obstacles);
+        let mut simulation = simulation.map_err(|e| {
+            let no_room = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string());
+            refuse(&self.program, no_room)
+        })?;
+        self.set_gravity(&mut simulation);
+        Ok(Start { simulation, carved, warnings: self.diagnostics(warning.into_iter().collect()) })
+    }
+
+    /// The simulation at a checkpoint.
+    ///
+    /// # Errors
+    /// If the checkpoint does not fit the scene.
+    pub fn resume(&self, checkpoint: &Checkpoint) -> Result<Simulation, SetupError> {
+        let obstacles = self.obstacles();
+        let mut simulation =
+            Simulation::resume(self.parameters.clone(), checkpoint, self.scene.domain, obstacles)?;
+        self.set_gravity(&mut simulation);
+        Ok(simulation)
+    }
+
+    fn obstacles(&self) -> Vec<Obstacle> {
+        self.bodies.iter().map(|body| body.obstacle.clone()).collect()
+    }
+
+    /// Gravity that depends on the time or on the place; what stays is a parameter.
+    fn set_gravity(&self, simulation: &mut Simulation) {
+        match &self.scene.gravity {
+            Gravity::Still(_) => {}
+            Gravity::Turning(nodes) => {
+                let formulas = vector_field(&self.program, nodes);
+                simulation.set_turning_gravity(Arc::new(move |time| formulas(DVec3::ZERO, time)));
+            }
+            Gravity::Field(nodes) => simulation.set_gravity_field(vector_field(&self.program, nodes)),
+        }
+    }
+
+    /// Particles that fill the shape of the fluid, at rest.
+    fn seed(&self) -> Result<Particles, Error> {
+        let fluid = &self.scene.fluid;
+        let bounds = match self.fluid.bounds() {
+            Bounds::Within(bounds) => *bounds,
+            Bounds::Unbounded => self.scene.domain,
+            Bounds::Empty => {
+                let message = "the shape of the fluid is empty";
+                let empty = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message);
+                return Err(refuse(&self.program, empty));
+            }
+        };
+        let block = FluidBlock {
+            shape: FluidShape::Field { field: &self.fluid, bounds, fill: fluid.fill },
+            count: fluid.particles,
+            allow_fewer: false,
+            velocity: DVec3::ZERO,
+            jitter: fluid.jitter,
+            seed: fluid.seed,
+        };
+        let span = fluid.particles_span.unwrap_or(fluid.shape_span);
+        block.seed(&self.parameters, self.scene.domain).map_err(|e| no_fluid(&self.program, &e, span))
+    }
+
+    /// Velocities at the start: each particle's own, where the scene gives them as formulas.
+    fn set_in_motion(&self, particles: &mut Particles) {
+        let velocities = velocities(&self.program, &self.scene.fluid);
+        for i in 0..particles.len() {
+            particles.velocity.set(i, velocities(particles.position.get(i), 0.0));
+        }
+    }
+
+    /// Removes particles that obstacles leave no room for; how many, and a warning that says so.
+    fn carve(
+        &self,
+        particles: &mut Particles,
+        obstacles: &[Obstacle],
+    ) -> Result<(usize, Option<Diagnostic>), Error> {
+        let (span, domain) = (self.scene.fluid.shape_span, &self.scene.domain);
+        let mut clearance = CLEARANCE * self.parameters.spacing();
+        if self.parameters.makes_room_at_start() {
+            // those too near may move, and only what finds no place goes
+            make_room(particles, domain, obstacles, clearance);
+            clearance *= 0.5;
+        }
+        let carved =
+            carve(particles, domain, obstacles, clearance).map_err(|e| no_fluid(&self.program, &e, span))?;
+        let lost = carved.inside + carved.too_close + carved.outside_box;
+        let message = || {
+            format!(
+                "{lost} of the fluid's particles were carved off: {} in an obstacle, {} too close to one, {} \
+                 outside the box; {} are left",
+                carved.inside, carved.too_close, carved.outside_box, carved.kept
+            )
+        };
+        Ok((lost, (lost > 0).then(|| Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message()))))
+    }
+
+    /// The densities of a fluid at rest under its own weight, its surface half a spacing above the highest particle, for
+    /// methods that start so.
+    fn put_under_pressure(&self, particles: &mut Particles) {
+        let p = &self.parameters;
+        let up = -p.gravity.normalize_or_zero();
+        let height = |at: DVec3| up.dot(at);
+        let top = particles.position.iter().map(height).fold(f64::NEG_INFINITY, f64::max) + 0.5 * p.spacing();
+        let pressure = |at: DVec3| p.rest_density * p.gravity.length() * (top - height(at));
+        let densities: Option<Vec<f64>> =
+            particles.position.iter().map(|at| p.density_at_start(pressure(at))).collect();
+        if let Some(densities) = densities {
+            particles.density = densities;
+        }
+    }
+
+    fn diagnostics(&self, list: Vec<Diagnostic>) -> Diagnostics {
+        Diagnostics { list, sources: self.program.sources().clone() }
+    }
+}
+
+/// The velocity of the fluid at the start, m/s, at a place.
+fn velocities(program: &Program, fluid: &Fluid) -> Arc<VectorField> {
+    vector_field(program, &fluid.velocity)
+}
+
+/// Formulas of the place and of t.
+fn vector_field(program: &Program, nodes: &[Node; 3]) -> Arc<VectorField> {
+    let formulas = Interpreter::new(&program.module().graph, nodes);
+    Arc::new(move |p, time| {
+        let mut vector = [0.0; 3];
+        formulas.eval_given(Given { time, ..Given::point(p.to_array()) }, &mut vector);
+        DVec3::from_array(vector)
+    })
+}
+
+fn no_fluid(program: &Program, error: &SeedError, span: Span) -> Error {
+    let code = match error {
+        SeedError::NothingLeft(_) => Code::OBSTACLE_FILLS_BOX,
+        _ => Code::SCENE_NO_ROOM,
+    };
+    refuse(program, Diagnostic::error(code, span, error.to_string()))
+}
+
+fn refuse(program: &Program, diagnostic: Diagnostic) -> Error {
+    Error::Diagnostics(Diagnostics { list: vec![diagnostic], sources: program.sources().clone() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_experiment_and_what_it_starts_may_be_sent_to_a_thread() {
+        fn is_owned<T: Send + Sync + 'static>() {}
+        is_owned::<Experiment>();
+        is_owned::<Simulation>();
+        is_owned::<Deviations>();
+    }
+}

@@ -1,0 +1,97 @@
+//! The numbers of a scene as parameters of a simulation, and the length of its steps.
+
+use glam::DVec3;
+
+use super::{vector_field, velocities};
+use crate::Program;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::lower::{Gravity, Scene};
+use crate::sph::Parameters;
+
+/// The length of a simulation's steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimeStep {
+    /// The length, or the longest if steps follow the state, s.
+    pub seconds: f64,
+    /// Where it comes from.
+    pub reason: &'static str,
+}
+
+/// A speed that the scene can reach: by its velocity at the start, and by a fall through the box, m/s.
+pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
+    let gravity = at_start(program, &scene.gravity);
+    let height = gravity.normalize_or_zero().abs().dot(scene.domain.size());
+    let start = fastest(program, scene);
+    (start * start + 2.0 * gravity.length() * height).sqrt()
+}
+
+/// All parameters but the time step.
+pub(super) fn of_scene(program: &Program, scene: &Scene, typical_speed: f64) -> Parameters {
+    let (fluid, method) = (&scene.fluid, scene.method.fluid());
+    Parameters {
+        rest_density: fluid.density,
+        particle_mass: fluid.mass,
+        support_radius: fluid.support_radius,
+        viscosity: fluid.viscosity,
+        surface_tension: fluid.surface_tension,
+        gravity: at_start(program, &scene.gravity),
+        wall_restitution: scene.walls.restitution,
+        wall_friction: scene.walls.friction,
+        time_step: 1.0,
+        adaptive: method.adaptive && scene.run.dt.is_none(),
+        expected_speed: typical_speed,
+        method: scene.method,
+        slip: scene.slip,
+        precision: scene.solver.precision.unwrap_or(method.precision),
+    }
+}
+
+/// The length of steps, and a warning if the scene states a longer one than is stable.
+pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Option<Diagnostic>) {
+    let (speed, save_every) = (parameters.expected_speed, scene.run.save_every);
+    let stable = parameters.stable_dt(speed);
+    match scene.run.dt {
+        Some(dt) => {
+            let too_long = (dt > stable).then(|| {
+                let message = format!(
+                    "the time step of {dt} s is longer than the {stable:.2e} s that are stable up to {speed:.1} m/s, \
+                     the speed of a fall through the box"
+                );
+                Diagnostic::warning(Code::LONG_STEP, scene.span, message)
+            });
+            (TimeStep { seconds: dt, reason: "stated by the scene" }, too_long)
+        }
+        None if parameters.adaptive => {
+            let reason = "adaptive: what sound, motion, forces and viscosity allow";
+            (TimeStep { seconds: save_every, reason }, None)
+        }
+        None => {
+            // a whole number of steps between frames
+            let steps = (save_every / stable).ceil().max(1.0);
+            let reason = "derived: stable for a fall through the box";
+            (TimeStep { seconds: save_every / steps, reason }, None)
+        }
+    }
+}
+
+/// Gravity of the first instant that is the same at all places, m/s².
+fn at_start(program: &Program, gravity: &Gravity) -> DVec3 {
+    match gravity {
+        Gravity::Still(gravity) => *gravity,
+        Gravity::Turning(nodes) => vector_field(program, nodes)(DVec3::ZERO, 0.0),
+        Gravity::Field(_) => DVec3::ZERO,
+    }
+}
+
+/// The greatest speed at the start, m/s, sought on a grid over the box.
+fn fastest(program: &Program, scene: &Scene) -> f64 {
+    const SIDE: usize = 16;
+    let velocities = velocities(program, &scene.fluid);
+    let mut most: f64 = 0.0;
+    for k in 0..SIDE.pow(3) {
+        let part = DVec3::new((k % SIDE) as f64, (k / SIDE % SIDE) as f64, (k / SIDE / SIDE) as f64);
+        let p = scene.domain.min + scene.domain.size() * part / (SIDE - 1) as f64;
+        most = most.max(velocities(p, 0.0).length());
+    }
+    most
+}

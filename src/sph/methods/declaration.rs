@@ -1,0 +1,273 @@
+//! What a method of the solver says of itself, once: its keys, defaults, passes, and what it saves.
+//!
+//! The reader of scenes, `rfm explain`, the checks of parameters and the tables of the manual all read these
+//! declarations; nothing about a single method is written anywhere else.
+
+use crate::precision::Precision;
+use crate::quantity::{Bound, Dimension};
+use crate::sph::params::{ParameterError, Parameters};
+use crate::sph::passes::Pass;
+
+/// The block of a scene that a key stands in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeyBlock {
+    /// `fluid { … }`
+    Fluid,
+    /// `solver { … }`
+    Solver,
+}
+
+impl KeyBlock {
+    /// The word that opens the block.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fluid => "fluid",
+            Self::Solver => "solver",
+        }
+    }
+}
+
+/// A key of a scene that belongs to a method with the numbers `M`.
+pub struct Key<M: 'static> {
+    /// As scenes write it.
+    pub name: &'static str,
+    /// Where it stands.
+    pub block: KeyBlock,
+    /// What it is, in one line.
+    pub about: &'static str,
+    /// What it may hold, and where that goes.
+    pub value: Value<M>,
+}
+
+/// What a key may hold.
+pub enum Value<M: 'static> {
+    /// A number.
+    Number {
+        /// Its dimension; [`Dimension::NONE`] for a plain number.
+        dimension: Dimension,
+        /// What it may be.
+        bound: Bound,
+        /// The number, or `None` while it is derived from others.
+        get: fn(&M) -> Option<f64>,
+        /// States the number.
+        set: fn(&mut M, f64),
+        /// What the number is where it is derived, in words; empty if it never is.
+        derived: &'static str,
+    },
+    /// A whole number of at least `least`.
+    Count {
+        /// The smallest that is accepted.
+        least: u32,
+        /// The number.
+        get: fn(&M) -> u32,
+        /// States the number.
+        set: fn(&mut M, u32),
+    },
+    /// One of a few words, each with what it sets; the first is the default.
+    Word(&'static [(&'static str, fn(&mut M))]),
+}
+
+/// What a fluid is like when its scene does not say, in a method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FluidDefaults {
+    /// Dynamic viscosity, Pa·s.
+    pub viscosity: f64,
+    /// Surface tension, N/m.
+    pub surface_tension: f64,
+    /// Support radius of the kernel.
+    pub support: Support,
+    /// Of the sums over neighbours.
+    pub precision: Precision,
+    /// Whether steps follow the state unless the scene states their length.
+    pub adaptive: bool,
+}
+
+/// How large a support radius is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Support {
+    /// A length, m.
+    Metres(f64),
+    /// So many particle spacings.
+    Spacings(f64),
+}
+
+impl Support {
+    /// The support radius of particles with this spacing, m.
+    pub fn radius(self, spacing: f64) -> f64 {
+        match self {
+            Self::Metres(length) => length,
+            Self::Spacings(count) => count * spacing,
+        }
+    }
+}
+
+/// Why a pass of a method does not run with these numbers; `None` if it runs.
+pub type Absence<M> = fn(&M, &Parameters) -> Option<&'static str>;
+
+/// A method's description of itself. Its numbers are the type that implements this.
+pub(in crate::sph) trait Declaration: Default + 'static {
+    /// As scenes write it.
+    const NAME: &'static str;
+    /// What it is, in a few words.
+    const TITLE: &'static str;
+    /// How pressure is found, in a few words.
+    const PRESSURE: &'static str;
+    /// Kernels, and neighbours within their support.
+    const KERNEL: &'static str;
+    /// How long steps are.
+    const STEP: &'static str;
+    /// What a fluid is like unless its scene says otherwise.
+    const FLUID: FluidDefaults;
+    /// Keys of the method's own.
+    const KEYS: &'static [Key<Self>];
+    /// Passes besides those that every method has, each with the reason if it does not run.
+    const PASSES: &'static [(Pass, Absence<Self>)];
+    /// Columns of a checkpoint besides those that every method has.
+    const SAVES: &'static [&'static str];
+}
+
+/// What asks for the values of keys: the reader of a scene.
+pub trait KeyReader {
+    /// A number in SI units; `None` if the key is absent, or was reported.
+    fn number(
+        &mut self,
+        block: KeyBlock,
+        key: &'static str,
+        dimension: Dimension,
+        bound: Bound,
+    ) -> Option<f64>;
+
+    /// A whole number of at least `least`; `None` if the key is absent, or was reported.
+    fn count(&mut self, block: KeyBlock, key: &'static str, least: u32) -> Option<u32>;
+
+    /// The index of one of the words; `None` if the key is absent, or was reported.
+    fn word(&mut self, block: KeyBlock, key: &'static str, words: &[&'static str]) -> Option<usize>;
+}
+
+/// Reads all keys of a method into its numbers.
+pub(super) fn read<M: Declaration>(numbers: &mut M, reader: &mut dyn KeyReader) {
+    for Key { name, block, value, .. } in M::KEYS {
+        match value {
+            Value::Number { dimension, bound, set, .. } => {
+                if let Some(number) = reader.number(*block, name, *dimension, *bound) {
+                    set(numbers, number);
+                }
+            }
+            Value::Count { least, set, .. } => {
+                if let Some(count) = reader.count(*block, name, *least) {
+                    set(numbers, count);
+                }
+            }
+            Value::Word(words) => {
+                let known: Vec<&'static str> = words.iter().map(|(word, _)| *word).collect();
+                if let Some((_, set)) = reader.word(*block, name, &known).and_then(|index| words.get(index)) {
+                    set(numbers);
+                }
+            }
+        }
+    }
+}
+
+/// # Errors
+/// The first number that its key's bound does not admit.
+pub(super) fn check<M: Declaration>(numbers: &M) -> Result<(), ParameterError> {
+    for Key { name, value, .. } in M::KEYS {
+        match value {
+            Value::Number { bound, get, .. } => {
+                if let Some(found) = get(numbers).filter(|found| !bound.admits(*found)) {
+                    return Err(ParameterError { name, found, expected: bound.to_string() });
+                }
+            }
+            Value::Count { least, get, .. } => {
+                let found = get(numbers);
+                if found < *least {
+                    let expected = format!("a whole number of at least {least}");
+                    return Err(ParameterError { name, found: f64::from(found), expected });
+                }
+            }
+            Value::Word(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// A method in words, for messages and tables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodInfo {
+    /// As scenes write it.
+    pub name: &'static str,
+    /// What it is, in a few words.
+    pub title: &'static str,
+    /// How pressure is found, in a few words.
+    pub pressure: &'static str,
+    /// Kernels, and neighbours within their support.
+    pub kernel: &'static str,
+    /// How long steps are.
+    pub step: &'static str,
+    /// What a fluid is like unless its scene says otherwise.
+    pub fluid: FluidDefaults,
+    /// Its own keys, in the order in which they are read.
+    pub keys: Vec<KeyInfo>,
+    /// Its own passes.
+    pub passes: Vec<Pass>,
+    /// Columns that it adds to a checkpoint.
+    pub saves: &'static [&'static str],
+}
+
+/// A key in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeyInfo {
+    /// As scenes write it.
+    pub name: &'static str,
+    /// Where it stands.
+    pub block: KeyBlock,
+    /// What it is, in one line.
+    pub about: &'static str,
+    /// Its unit; `None` for plain numbers and words.
+    pub unit: Option<&'static str>,
+    /// What it accepts: a bound, or the words.
+    pub accepts: String,
+    /// What it is unless it is stated.
+    pub default: String,
+}
+
+impl MethodInfo {
+    pub(super) fn of<M: Declaration>() -> Self {
+        Self {
+            name: M::NAME,
+            title: M::TITLE,
+            pressure: M::PRESSURE,
+            kernel: M::KERNEL,
+            step: M::STEP,
+            fluid: M::FLUID,
+            keys: M::KEYS.iter().map(KeyInfo::of).collect(),
+            passes: M::PASSES.iter().map(|(pass, _)| *pass).collect(),
+            saves: M::SAVES,
+        }
+    }
+
+    /// The key of a block by its name, if the method has it.
+    pub fn key(&self, block: KeyBlock, name: &str) -> Option<&KeyInfo> {
+        self.keys.iter().find(|key| key.block == block && key.name == name)
+    }
+}
+
+impl KeyInfo {
+    fn of<M: Declaration>(key: &Key<M>) -> Self {
+        let numbers = M::default();
+        let (unit, accepts, default) = match &key.value {
+            Value::Number { dimension, bound, get, derived, .. } => {
+                let default = get(&numbers).map_or_else(|| (*derived).to_string(), |x| x.to_string());
+                (dimension.unit(), bound.to_string(), default)
+            }
+            Value::Count { least, get, .. } => {
+                (None, format!("a whole number of at least {least}"), get(&numbers).to_string())
+            }
+            Value::Word(words) => {
+                let known: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+                (None, known.join(", "), known.first().copied().unwrap_or_default().to_string())
+            }
+        };
+        Self { name: key.name, block: key.block, about: key.about, unit, accepts, default }
+    }
+}

@@ -1,0 +1,69 @@
+//! The methods and their keys as a page for people, in Markdown: what `rfm explain --methods` prints.
+
+use std::fmt::Write as _;
+
+use super::declaration::{KeyInfo, MethodInfo, Support};
+use super::{KeyBlock, Method};
+
+/// One line for each method: how it finds the pressure, and its own keys.
+pub fn overview() -> String {
+    let mut text = String::from(
+        "| `method:` | pressure | kernel; neighbours | time step | keys of its own |\n|---|---|---|---|---|\n",
+    );
+    for MethodInfo { name, pressure, kernel, step, keys, .. } in Method::all().iter().map(Method::info) {
+        let keys: Vec<String> = keys.iter().map(in_its_block).collect();
+        let _ = writeln!(text, "| `{name}` | {pressure} | {kernel} | {step} | {} |", keys.join(", "));
+    }
+    text
+}
+
+/// The overview, and a section for each method with all that it declares.
+pub fn reference() -> String {
+    let mut text = format!(
+        "# Methods of the solver\n\nThis page is what `rfm explain --methods` prints. A key that the method of a scene does \
+         not have is an error.\n\n{}",
+        overview()
+    );
+    for method in Method::all().iter().map(Method::info) {
+        // writing to a String cannot fail
+        let _ = section(&mut text, &method);
+    }
+    text
+}
+
+fn section(text: &mut String, method: &MethodInfo) -> std::fmt::Result {
+    let fluid = &method.fluid;
+    writeln!(text, "\n## `{}`: {}\n", method.name, method.title)?;
+    let support = match fluid.support {
+        Support::Metres(length) => format!("{length} m"),
+        Support::Spacings(count) => format!("{count} particle spacings"),
+    };
+    writeln!(
+        text,
+        "Unless the scene says otherwise, viscosity is {} Pa·s, surface tension {} N/m, the support radius {support}, and \
+         sums over neighbours are in {}.\n",
+        fluid.viscosity,
+        fluid.surface_tension,
+        fluid.precision.name()
+    )?;
+    writeln!(text, "| key | unit | accepts | default | meaning |\n|---|---|---|---|---|")?;
+    for key in &method.keys {
+        let KeyInfo { about, unit, accepts, default, .. } = key;
+        let (unit, key) = (unit.unwrap_or(""), in_its_block(key));
+        writeln!(text, "| {key} | {unit} | {accepts} | {default} | {about} |")?;
+    }
+    let passes: Vec<&str> = method.passes.iter().map(|pass| pass.name()).collect();
+    writeln!(text, "\nPasses: {}.", passes.join(", "))?;
+    if !method.saves.is_empty() {
+        writeln!(text, "A checkpoint also holds {}.", method.saves.join(", "))?;
+    }
+    Ok(())
+}
+
+/// A key as one writes it: those of the solver within their block.
+fn in_its_block(key: &KeyInfo) -> String {
+    match key.block {
+        KeyBlock::Fluid => format!("`{}`", key.name),
+        KeyBlock::Solver => format!("`solver {{ {} }}`", key.name),
+    }
+}

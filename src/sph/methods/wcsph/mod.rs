@@ -1,0 +1,221 @@
+//! The weakly compressible method: its numbers, keys and limits. The scheme is in [`scheme`].
+
+mod scheme;
+
+use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
+use super::negative_pressure::NegativePressure;
+use super::numerics::{Numerics, Scheme};
+use crate::precision::Precision;
+use crate::quantity::{Bound, Dimension};
+use crate::sph::core::Core;
+use crate::sph::params::{ParameterError, Parameters};
+use crate::sph::passes::Pass;
+
+/// The exponent of Tait's equation for water.
+const EXPONENT: i32 = 7;
+
+/// The speed of sound over the greatest expected speed, unless it is stated: keeps the density within 1 %.
+const SOUND_OVER_SPEED: f64 = 10.0;
+
+/// The pressures that make the acceleration of a particle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Gradients {
+    /// Sums p_i + p_j: what one particle gains another loses, momentum is conserved to rounding.
+    #[default]
+    Pairs,
+    /// Differences p_j − p_i in the fluid's depth: exact where pressure is linear in space, and five to ten times as accurate
+    /// in fluids at rest, in viscous ones and in those without a free surface. Needs shifting, and, at a free surface, an
+    /// artificial viscosity of some 0.05: without it, waves gain energy.
+    Differences,
+}
+
+/// Numbers of the weakly compressible method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wcsph {
+    /// Speed of sound c, m/s; `None`: ten times the greatest expected speed, which keeps the density within 1 %.
+    pub sound_speed: Option<f64>,
+    /// δ of the density diffusion (Molteni & Colagrossi 2009), 0.1; zero: the term is not computed.
+    pub density_diffusion: f64,
+    /// α of the artificial viscosity (Monaghan 1992), 0.02; zero: the term is not computed.
+    pub artificial_viscosity: f64,
+    /// The pressures that make accelerations.
+    pub gradients: Gradients,
+    /// How strongly particles drift to where there are fewer of them, which keeps them even; zero: they do not. `None`: 1
+    /// with differences of pressure, 0 with pairs.
+    pub shifting: Option<f64>,
+    /// What becomes of negative pressure; clamped to zero by default.
+    pub negative_pressure: NegativePressure,
+    /// Whether the fluid starts under the pressure of its own weight: otherwise it starts without, and rings.
+    pub hydrostatic_start: bool,
+}
+
+impl Default for Wcsph {
+    fn default() -> Self {
+        Self {
+            sound_speed: None,
+            density_diffusion: 0.1,
+            artificial_viscosity: 0.02,
+            gradients: Gradients::Pairs,
+            shifting: None,
+            negative_pressure: NegativePressure::Clamp,
+            hydrostatic_start: false,
+        }
+    }
+}
+
+impl Wcsph {
+    /// The strength of the shifting that acts.
+    pub fn shifting(&self) -> f64 {
+        self.shifting.unwrap_or(match self.gradients {
+            Gradients::Pairs => 0.0,
+            Gradients::Differences => 1.0,
+        })
+    }
+}
+
+impl Declaration for Wcsph {
+    const NAME: &'static str = "wcsph";
+    const TITLE: &'static str = "Weakly compressible";
+    const PRESSURE: &'static str = "Tait's equation, density from the motion";
+    const KERNEL: &'static str = "Wendland C2; 74";
+    const STEP: &'static str = "adaptive";
+    const FLUID: FluidDefaults = FluidDefaults {
+        viscosity: 1e-3,
+        surface_tension: 0.0,
+        // many neighbours make pressures smooth
+        support: Support::Spacings(2.6),
+        precision: Precision::F32,
+        adaptive: true,
+    };
+    const KEYS: &'static [Key<Self>] = &[
+        Key {
+            name: "sound_speed",
+            block: KeyBlock::Fluid,
+            about: "speed of sound: the higher, the less the fluid is compressed, and the shorter are the steps",
+            value: Value::Number {
+                dimension: Dimension::SPEED,
+                bound: Bound::Positive,
+                get: |wcsph| wcsph.sound_speed,
+                set: |wcsph, speed| wcsph.sound_speed = Some(speed),
+                derived: "ten times the greatest expected speed",
+            },
+        },
+        Key {
+            name: "density_diffusion",
+            block: KeyBlock::Fluid,
+            about: "δ of the density diffusion, which smooths pressures",
+            value: Value::Number {
+                dimension: Dimension::NONE,
+                bound: Bound::NotNegative,
+                get: |wcsph| Some(wcsph.density_diffusion),
+                set: |wcsph, delta| wcsph.density_diffusion = delta,
+                derived: "",
+            },
+        },
+        Key {
+            name: "artificial_viscosity",
+            block: KeyBlock::Fluid,
+            about: "α of the artificial viscosity, which damps noise and waves",
+            value: Value::Number {
+                dimension: Dimension::NONE,
+                bound: Bound::NotNegative,
+                get: |wcsph| Some(wcsph.artificial_viscosity),
+                set: |wcsph, alpha| wcsph.artificial_viscosity = alpha,
+                derived: "",
+            },
+        },
+        Key {
+            name: "gradients",
+            block: KeyBlock::Fluid,
+            about: "pairs conserve momentum; differences are exact for linear pressures in the fluid's depth",
+            value: Value::Word(&[
+                ("pairs", |wcsph| wcsph.gradients = Gradients::Pairs),
+                ("differences", |wcsph| wcsph.gradients = Gradients::Differences),
+            ]),
+        },
+        Key {
+            name: "shifting",
+            block: KeyBlock::Fluid,
+            about: "how strongly particles drift to where there are fewer of them",
+            value: Value::Number {
+                dimension: Dimension::NONE,
+                bound: Bound::NotNegative,
+                get: |wcsph| wcsph.shifting,
+                set: |wcsph, strength| wcsph.shifting = Some(strength),
+                derived: "1 with differences, 0 with pairs",
+            },
+        },
+        Key {
+            name: "negative_pressure",
+            block: KeyBlock::Fluid,
+            about: "whether pressure may pull (keep) or is cut off at zero (clamp)",
+            value: Value::Word(&[
+                ("clamp", |wcsph| wcsph.negative_pressure = NegativePressure::Clamp),
+                ("keep", |wcsph| wcsph.negative_pressure = NegativePressure::Keep),
+            ]),
+        },
+        Key {
+            name: "start",
+            block: KeyBlock::Fluid,
+            about: "under no pressure (free), or under that of the fluid's own weight (hydrostatic)",
+            value: Value::Word(&[
+                ("free", |wcsph| wcsph.hydrostatic_start = false),
+                ("hydrostatic", |wcsph| wcsph.hydrostatic_start = true),
+            ]),
+        },
+    ];
+    const PASSES: &'static [(Pass, Absence<Self>)] = &[
+        (Pass::Coverage, |_, _| None),
+        (Pass::Density, |_, _| None),
+        (Pass::DensityDiffusion, |wcsph, _| {
+            (wcsph.density_diffusion == 0.0).then_some("the density diffusion is zero")
+        }),
+        (Pass::Pressure, |_, _| None),
+        (Pass::PressureSolver, |_, _| Some(Pass::STATE)),
+        (Pass::Viscosity, |_, parameters| Pass::without_viscosity(parameters)),
+        (Pass::ArtificialViscosity, |wcsph, _| {
+            (wcsph.artificial_viscosity == 0.0).then_some("the artificial viscosity is zero")
+        }),
+        (Pass::Shifting, |wcsph, _| (wcsph.shifting() == 0.0).then_some("the shifting is zero")),
+        (Pass::NoSlip, |_, parameters| Pass::without_friction(parameters)),
+        (Pass::SurfaceTension, |_, parameters| Pass::without_tension(parameters)),
+    ];
+    const SAVES: &'static [&'static str] = &["density rate", "crowding x", "crowding y", "crowding z"];
+}
+
+impl Numerics for Wcsph {
+    fn start(&self, core: &mut Core, _is_new: bool) -> Box<dyn Scheme> {
+        Box::new(scheme::Weakly::start(self, core))
+    }
+
+    fn validate(&self, parameters: &Parameters) -> Result<(), ParameterError> {
+        let found = self.sound_speed(parameters);
+        if Bound::Positive.admits(found) {
+            return Ok(());
+        }
+        Err(ParameterError { name: "sound_speed", found, expected: Bound::Positive.to_string() })
+    }
+
+    fn sound_speed(&self, parameters: &Parameters) -> f64 {
+        self.sound_speed.unwrap_or(SOUND_OVER_SPEED * parameters.expected_speed)
+    }
+
+    /// ρ₀(1 + 7p/(c²ρ₀))^(1/7), the inverse of Tait's equation
+    fn density_at_start(&self, parameters: &Parameters, pressure: f64) -> Option<f64> {
+        let stiffness = self.sound_speed(parameters).powi(2) * parameters.rest_density / 7.0;
+        self.hydrostatic_start.then(|| parameters.rest_density * (1.0 + pressure / stiffness).powf(1.0 / 7.0))
+    }
+
+    fn makes_room_at_start(&self) -> bool {
+        true
+    }
+
+    /// c²/7·((x⁶ − 1)/6 + 1/x − 1) with x = ρ/ρ₀
+    fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64 {
+        let x = density / parameters.rest_density;
+        if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {
+            return 0.0;
+        }
+        self.sound_speed(parameters).powi(2) / 7.0 * ((x.powi(6) - 1.0) / 6.0 + 1.0 / x - 1.0)
+    }
+}
