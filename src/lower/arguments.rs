@@ -1,7 +1,7 @@
 //! Calls: arguments are bound to parameters, then the body is evaluated in a scope of its own.
 
 use super::builtins;
-use super::eval::{Call, Local, Lowering, Scope};
+use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};

@@ -1,6 +1,6 @@
 //! Functions that are operations of the graph rather than text of the prelude.
 
-use super::eval::Lowering;
+use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::{self, Binary, BinaryFunction, Node, Unary, UnaryFunction};

@@ -3,7 +3,7 @@
 //! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point
 //! before the transformation. Displacements and angles may depend on time: the shape then moves.
 
-use super::eval::Lowering;
+use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::{Axis, Binary, Node, Unary, UnaryFunction};
