@@ -268,11 +268,11 @@ fn solids(
 /// A warning if ω may leave the range of numbers although its leaves do not.
 fn overflow(program: &Program, named: &NamedSolid, solid: &Solid) -> Option<Diagnostic> {
     let (graph, _) = program.module().graph.extract_cone(named.node);
-    let growth = match program.domain(solid) {
+    let magnitudes = match program.domain(solid) {
         Some(over) => Magnitudes::over(&graph, &over),
         None => Magnitudes::within_reach(&graph),
     };
-    let node = growth.overflow(&graph, Precision::F64)?;
+    let node = magnitudes.overflow(&graph, Precision::F64)?;
     let message = format!(
         "ω of solid `{}` may leave the range of numbers here: it doubles with each operation inside the next",
         named.name

@@ -3,7 +3,6 @@
 mod agreement;
 mod bad_input;
 mod blocks;
-mod budget;
 mod cells;
 mod certificates;
 mod cli;
@@ -23,6 +22,7 @@ mod run;
 mod simplify;
 mod sweep;
 mod tidy;
+mod tolerance;
 mod tool;
 mod validation;
 mod walls;

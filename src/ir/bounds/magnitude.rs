@@ -147,16 +147,16 @@ mod tests {
     #[test]
     fn only_the_members_that_need_it_are_scaled() {
         let (graph, nodes) = left_fold(1000);
-        let growth = Magnitudes::over(&graph, &unit_box());
+        let magnitudes = Magnitudes::over(&graph, &unit_box());
         let x = nodes[0];
         for (float, first) in [(Precision::F64, 512.0), (Precision::F32, 64.0)] {
-            let forms = growth.forms(&graph, Form::Stable, float);
+            let forms = magnitudes.forms(&graph, Form::Stable, float);
             let scaled = nodes.windows(2).filter(|w| forms.of(w[0], x) == Form::Scaled).count() as f64;
             // value n is 2ⁿ, a few of which make up for the first, smaller steps
             assert!((scaled - (999.0 - first)).abs() < 4.0, "{scaled}");
         }
-        assert_eq!(growth.overflow(&graph, Precision::F64), None);
-        let first = growth.overflow(&graph, Precision::F32).unwrap();
+        assert_eq!(magnitudes.overflow(&graph, Precision::F64), None);
+        let first = magnitudes.overflow(&graph, Precision::F32).unwrap();
         assert!((first.index() as f64 - 128.0).abs() < 4.0, "{first:?}");
         let (graph, _) = left_fold(1100);
         let first = Magnitudes::over(&graph, &unit_box()).overflow(&graph, Precision::F64).unwrap();

@@ -26,8 +26,8 @@ pub fn forms(graph: &Graph, form: Form) -> [Forms; 2] {
     if form != Form::Stable {
         return [Forms::all(form), Forms::all(form)];
     }
-    let growth = Magnitudes::within_reach(graph);
-    [Precision::F64, Precision::F32].map(|precision| growth.forms(graph, form, precision))
+    let magnitudes = Magnitudes::within_reach(graph);
+    [Precision::F64, Precision::F32].map(|precision| magnitudes.forms(graph, form, precision))
 }
 
 type Slot<P> = OnceLock<Result<P, CodegenError>>;
