@@ -113,7 +113,7 @@ impl Solid {
         Self::with_form(name, graph, root, engine, Form::Stable)
     }
 
-    /// A solid whose machine code evaluates R₀ in another form; for comparing their speed and error.
+    /// A solid whose machine code evaluates R₀ in another form, to compare the forms' speed and error.
     ///
     /// # Errors
     /// Those of [`Solid::new`].
@@ -158,8 +158,8 @@ impl Solid {
         self.moment.to
     }
 
-    /// The solid at a time, s. Nothing is compiled again; a solid at rest is the same at all times. If the
-    /// time is NaN, so are all values.
+    /// The solid at a time, s. Nothing is compiled again, and a solid at rest is the same at all times. If
+    /// the time is NaN, so are all values of a solid that moves.
     #[must_use]
     pub fn at(&self, time: f64) -> Self {
         self.between(time, time)

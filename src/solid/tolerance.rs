@@ -82,16 +82,16 @@ struct Candidate {
     graph: Graph,
     root: Node,
     origin: DVec3,
-    /// The solid's own if there are none.
+    /// `None` if the solid's own answer.
     programs: Option<Programs>,
     forms: Forms,
     inputs: Inputs,
-    /// In the coordinates of the program.
+    /// The box in the coordinates of the program.
     over: Aabb,
     precision: Precision,
     /// The solid's stretch of time.
     time: Interval,
-    /// What the programs need to know of it.
+    /// What depends on time alone, at the time of the solid.
     uniforms: UniformValues,
 }
 
@@ -100,8 +100,8 @@ const BLOCK: usize = 256;
 
 impl Solid {
     /// The cheapest program whose certified |computed ω − exact ω| is at most `tolerance` everywhere in a
-    /// box. Exact is the value of the simplified formula, whose constants are doubles, at the given point,
-    /// whose coordinates are.
+    /// box. The exact value is that of the simplified formula at the given point; the constants of the one
+    /// and the coordinates of the other are doubles.
     ///
     /// # Errors
     /// If no program is certified to keep it.

@@ -39,8 +39,8 @@ const LEVELS_IN_VAIN: u32 = 2;
 /// third of it.
 const MOST_RANGES: usize = 1 << 24;
 
-/// Cells that a moving leaf may pass are left at this depth and divided anew for each window of time: eight
-/// or so of them lie side by side in what a paddle of a tenth of the box sweeps.
+/// Cells that a moving leaf may pass are left at this depth and divided anew for each window of time. Some
+/// eight of them lie side by side in what a paddle of a tenth of the box sweeps.
 const RESTLESS_DEPTH: u32 = 4;
 
 /// What is known of a cell; its last two bits say which, the others where to go on.
@@ -81,7 +81,7 @@ pub struct Counts {
     pub leaves_in_cells: usize,
 }
 
-/// An undivided cell and its place: equal places, equal cell.
+/// An undivided cell and its place. Two points are in one cell if their places are equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Found {
     pub cell: Cell,
@@ -246,7 +246,7 @@ impl Cells {
         }
     }
 
-    /// Makes room for the children of a cell, below the flat grid; where they begin.
+    /// Makes room for the children of a cell below the flat grid, and returns where they begin.
     fn divide(&mut self, cell: &Pending) -> usize {
         if cell.depth < DEPTH {
             return 0;

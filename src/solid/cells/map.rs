@@ -51,8 +51,8 @@ pub struct CellMap {
     parts: Arc<LeafTree>,
     cells: Arc<Cells>,
     reach: f64,
-    /// By how much cells were grown, reach included: points that rounding puts into the next cell are still
-    /// right.
+    /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
+    /// still right.
     margin: f64,
 }
 
@@ -87,7 +87,7 @@ struct Nearest {
     leaf: u32,
 }
 
-/// By how much the cells of a box are grown.
+/// The length by which the cells of a box are grown.
 pub(super) fn margin(domain: &Aabb, reach: f64) -> f64 {
     let largest = domain.min.abs().max(domain.max.abs()).max_element();
     let cell = domain.size().max_element() / f64::from(SIDE);

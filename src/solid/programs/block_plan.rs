@@ -98,7 +98,7 @@ impl BlockPlan {
     }
 }
 
-/// Whether a node is a step of its own. `is_junction` knows it of the operands.
+/// Whether a node is a step of its own; `is_junction` says it of the operands.
 fn is_step(graph: &Graph, expr: Expr, many: bool, is_junction: &[bool]) -> bool {
     match expr {
         Expr::Binary(op, ..) if is_r0(op) => true,
@@ -233,7 +233,8 @@ struct Planner<'g> {
 type Slot = Option<Node>;
 
 impl Planner<'_> {
-    /// Every part after what it needs, leaves as late as possible: few columns are then in use at a time.
+    /// Every part comes after what it needs, and leaves as late as possible: few columns are then in use at a
+    /// time.
     fn schedule(&mut self, outputs: &[Node]) {
         for (number, shape) in self.planned.shapes.clone().into_iter().enumerate() {
             // the root of a cone is its last node

@@ -30,7 +30,7 @@ pub struct Frame<'a, 'o, T> {
     /// Columns of [`Frame::stride`] numbers each.
     pub columns: &'a mut [T],
     pub stride: usize,
-    /// For the call of a piece.
+    /// Room for the pointers that a piece is called with.
     pub pointers: &'a mut Vec<*mut T>,
 }
 

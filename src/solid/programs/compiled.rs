@@ -101,7 +101,7 @@ impl<T: Number> BatchProgram<T> {
     /// one padded block on the stack.
     ///
     /// # Panics
-    /// If the columns differ in length or there are not as many output columns as outputs, or uniforms as it
+    /// If the columns differ in length, or if there are not as many output columns or uniforms as the program
     /// has.
     pub fn call<const N: usize>(&self, points: [&[T]; 3], uniforms: &[T], mut out: [&mut [T]; N]) {
         let count = points[0].len();
@@ -254,8 +254,8 @@ impl RangeProgram {
         Self::with_rounding(graph, root, ROUNDING)
     }
 
-    /// For a processor that rounds in this way; rounding upwards is asked for where [`RangeProgram::compile`]
-    /// does.
+    /// Compiles the range of a node for a processor that rounds in this way. Programs that round upwards
+    /// exist where [`RangeProgram::compile`] makes them.
     ///
     /// # Errors
     /// Those of [`RangeProgram::compile`].
