@@ -4,7 +4,7 @@
 //! 128-bit vector (two `f64` or four `f32`), the widest that the code generator has. The same translation
 //! serves both: a single point is a vector whose other lanes are zero.
 //!
-//! Invariants: code memory is owned by the [`Code`] that refers to it and freed with it, never writable and
+//! Invariants: code memory is owned by the `Code` that refers to it and freed with it, never writable and
 //! executable at once; the operations are those of `ir`, in its order, so results agree with the interpreter
 //! bit for bit. Unsafe code of the crate lives here and in `solid::programs::compiled` only.
 

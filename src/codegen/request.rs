@@ -23,7 +23,7 @@ pub enum Shape {
     /// all of them `blocks` × [`Precision::lanes`] long; no alignment asked for.
     Batch,
     /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the range of the one output over a box, called with
-    /// this rounding; `f64` only, and only for graphs that [`range_is_supported`](super::range_is_supported)
+    /// this rounding; `f64` only, and only for graphs that `range_is_supported`
     /// names.
     Range(Rounding),
 }
@@ -47,7 +47,7 @@ pub struct Request<'a> {
     pub parameters: bool,
     /// Whether it takes another one after that, a pointer to the graph's uniforms: numbers of the program's
     /// type, or for [`Shape::Range`] pairs of bounds. No program knows time itself, see
-    /// [`hoisted`](crate::ir::hoisted).
+    /// `ir::hoisted`.
     pub uniforms: bool,
 }
 

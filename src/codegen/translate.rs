@@ -40,7 +40,8 @@ impl Listing {
     /// The texts of a program.
     ///
     /// # Errors
-    /// Those of [`compile`].
+    /// [`CodegenError::Unsupported`] where the system gives no executable memory or the processor is not
+    /// known; [`CodegenError::Bug`] if the generated function is refused.
     pub fn of(request: Request<'_>) -> Result<Self, CodegenError> {
         Ok(build(request, true)?.1)
     }

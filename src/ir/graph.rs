@@ -44,7 +44,7 @@ pub enum Expr {
     /// A constant that is known only when the program runs: programs of leaves that differ in their constants
     /// alone are one program.
     Parameter(u32),
-    /// A number that depends on time alone, see [`hoisted`](super::hoisted). It is known when the instant is,
+    /// A number that depends on time alone, see `hoisted`. It is known when the instant is,
     /// and has a range over a stretch of time.
     Uniform(u32),
     /// An operation on one node.

@@ -5,7 +5,7 @@
 //! | file or folder | what it holds |
 //! |---|---|
 //! | `construction`, `evaluation` | [`Solid`], its programs and its values |
-//! | `twin`, `walls`, `surface`, `depth` | its views: sign twin, what a fluid asks, the cheapest field, its depth |
+//! | `twin`, `walls`, `surface`, `depth` | its views: sign, walls of a fluid, the cheapest field, depth |
 //! | `programs` | compiled code, the programs made on demand, programs over blocks of points |
 //! | `leaves` | a solid taken apart into leaves, and what is left of it in a box |
 //! | `path` | where a straight path meets a solid |

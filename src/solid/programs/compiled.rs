@@ -248,8 +248,8 @@ impl RangeProgram {
     /// Compiles the range of a node for boxes, rounding upwards where this processor can be asked to.
     ///
     /// # Errors
-    /// Those of [`codegen::compile`], and [`CodegenError::Unsupported`] for graphs that only the interpreter
-    /// knows.
+    /// [`CodegenError::Unsupported`] where there can be no machine code, and for graphs that only the
+    /// interpreter knows; [`CodegenError::Bug`] if the generated function is refused.
     pub fn compile(graph: &Graph, root: Node) -> Result<Self, CodegenError> {
         Self::with_rounding(graph, root, ROUNDING)
     }
@@ -267,7 +267,7 @@ impl RangeProgram {
     }
 
     /// A program of a graph with uniforms. It may be called with those for which
-    /// [`codegen::range_stays_finite`].
+    /// `codegen::range_stays_finite`.
     ///
     /// # Errors
     /// Those of [`RangeProgram::compile`].
@@ -279,7 +279,7 @@ impl RangeProgram {
     }
 
     /// A program that takes its constants as parameters. It may be called with those for which
-    /// [`codegen::range_stays_finite`].
+    /// `codegen::range_stays_finite`.
     ///
     /// # Errors
     /// Those of [`RangeProgram::compile`].
