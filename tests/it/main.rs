@@ -5,6 +5,7 @@ mod bad_input;
 mod blocks;
 mod cells;
 mod certificates;
+mod circles;
 mod cli;
 mod contact;
 mod diagnostics;
