@@ -69,7 +69,7 @@ impl Builder<'_> {
                 // the program has no time of its own
                 let begin = match axis {
                     Axis::T => self.graph.intern(Expr::Parameter(self.direction + 4), None),
-                    _ => node,
+                    Axis::X | Axis::Y | Axis::Z => node,
                 };
                 [exact(begin), Some(Term { value: step, error: Some(error) }), None]
             }

@@ -277,7 +277,7 @@ impl Planner<'_> {
         if self.planned.junction[node.index()] {
             return match self.planned.graph.expr(node) {
                 Expr::Binary(op, u, v) => self.junction(node, op, u, v),
-                Expr::Unary(Unary::Neg, a) => self.push_junction(Operation::Negate, [Some(a); 2], node),
+                Expr::Unary(Unary::Neg, a) => self.push_junction(Operation::Negate, [a; 2], node),
                 expr => unreachable!("{expr:?} is no step of its own"),
             };
         }
@@ -312,7 +312,7 @@ impl Planner<'_> {
         let value = find(value_op, u, v);
         let (by_u, by_v) = (find(weight_op, u, v), find(weight_op, v, u));
         if value_op == weight_op || (by_u.is_none() && by_v.is_none()) {
-            return self.push_junction(Operation::Binary(value_op), operands, node);
+            return self.push_junction(Operation::Binary(value_op), [u, v], node);
         }
         let made: Vec<Node> = [value, by_u, by_v].into_iter().flatten().collect();
         let weights = Some([by_u, if u == v { None } else { by_v }]);
@@ -322,11 +322,8 @@ impl Planner<'_> {
         made
     }
 
-    fn push_junction(&mut self, op: Operation, operands: [Slot; 2], node: Node) -> Vec<Node> {
-        let form = match operands {
-            [Some(u), Some(v)] => self.forms.of(u, v),
-            _ => Form::Stable,
-        };
+    fn push_junction(&mut self, op: Operation, [u, v]: [Node; 2], node: Node) -> Vec<Node> {
+        let (form, operands) = (self.forms.of(u, v), [Some(u), Some(v)]);
         self.steps.push(BlockStep::Junction { op, form, operands, value: Some(node), weights: None });
         vec![node]
     }
