@@ -264,7 +264,7 @@ impl Program {
                 over.min,
                 over.max,
                 best.bound,
-                best.plan.name()
+                best.variant.name()
             )),
             Err(_) => refused(format!("no bound of the error is known in {:.3} … {:.3}", over.min, over.max)),
         }

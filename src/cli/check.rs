@@ -13,12 +13,12 @@ use super::{choose, input, output};
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Source};
 use crate::field::Field;
 use crate::geom::Aabb;
-use crate::ir::{FloatType, Growth};
+use crate::ir::Magnitudes;
 use crate::lower::NamedSolid;
 use crate::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
 use crate::slice::{self, Plane, Window};
 use crate::solid::{Bounds, ProgramKind};
-use crate::{Program, Solid};
+use crate::{Precision, Program, Solid};
 
 /// Cells along the longest side of the meshes that volumes are measured on. The second mesh is for the
 /// volumes' error.
@@ -230,7 +230,7 @@ fn solids(
         found.tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
         match program.within_tolerance(&solid) {
             Some(Ok(chosen)) => {
-                found.program = Some(chosen.plan().name());
+                found.program = Some(chosen.variant().name());
                 found.error_bound = Some(chosen.bound());
             }
             Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),
@@ -272,11 +272,11 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
 /// A warning if ω may leave the range of numbers although its leaves do not.
 fn overflow(program: &Program, named: &NamedSolid, solid: &Solid) -> Option<Diagnostic> {
     let (graph, _) = program.module().graph.extract_cone(named.node);
-    let growth = match program.domain(solid) {
-        Some(over) => Growth::over(&graph, &over),
-        None => Growth::within_reach(&graph),
+    let magnitudes = match program.domain(solid) {
+        Some(over) => Magnitudes::over(&graph, &over),
+        None => Magnitudes::within_reach(&graph),
     };
-    let node = growth.overflow(&graph, FloatType::F64)?;
+    let node = magnitudes.overflow(&graph, Precision::F64)?;
     let message = format!(
         "ω of solid `{}` may leave the range of numbers here: it doubles with each operation inside the next",
         named.name

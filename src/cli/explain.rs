@@ -14,7 +14,7 @@ use crate::interval::Interval;
 use crate::ir::{Node, dump};
 use crate::lower::{NamedSolid, Scene};
 use crate::simplify::{Exactness, MOST_PLACES, simplify};
-use crate::solid::{Bounds, Left, ProgramKind};
+use crate::solid::{Bounds, ProgramKind, Remainder};
 use crate::sph::methods_reference;
 use crate::syntax;
 use crate::{Program, Solid};
@@ -83,7 +83,7 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
         let over = chosen.over();
         say!(
             "  values of ω: {}, to {:.1e} in {:.3} … {:.3}",
-            chosen.plan().name(),
+            chosen.variant().name(),
             chosen.bound(),
             over.min,
             over.max
@@ -255,9 +255,9 @@ impl Explanation<'_> {
 
     /// What is left in some boxes, those with the same leaves together.
     fn say_left(&self, boxes: Vec<(String, Aabb)>) {
-        let mut groups: Vec<(Left, String, Vec<Interval>)> = Vec::new();
+        let mut groups: Vec<(Remainder, String, Vec<Interval>)> = Vec::new();
         for (name, over) in boxes {
-            let (Some(left), Some(ranges)) = (self.solid.left_in(&over), self.solid.leaf_ranges(&over))
+            let (Some(left), Some(ranges)) = (self.solid.remainder_in(&over), self.solid.leaf_ranges(&over))
             else {
                 return say!("    too many leaves to tell");
             };
@@ -271,9 +271,9 @@ impl Explanation<'_> {
         }
         for (left, names, ranges) in groups {
             match left {
-                Left::Outside => say!("    {names}: all fluid"),
-                Left::Inside => say!("    {names}: all solid"),
-                Left::Leaves(kept) => self.say_dropped(&names, &kept, &ranges),
+                Remainder::Outside => say!("    {names}: all fluid"),
+                Remainder::Inside => say!("    {names}: all solid"),
+                Remainder::Leaves(kept) => self.say_dropped(&names, &kept, &ranges),
             }
         }
     }

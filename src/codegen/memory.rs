@@ -5,13 +5,17 @@ use std::sync::Mutex;
 
 use cranelift_jit::JITModule;
 
-use super::{Precision, Shape};
+use super::request::Shape;
+use crate::precision::Precision;
 
 /// Machine code of one program, freed when this is dropped.
 pub struct Code {
     entry: *const u8,
+    /// The type that it computes in.
     pub precision: Precision,
+    /// How it is called.
     pub shape: Shape,
+    /// How many numbers it writes for a point.
     pub outputs: usize,
     /// Bytes of machine code.
     pub size: usize,
@@ -19,10 +23,10 @@ pub struct Code {
     module: Mutex<Option<JITModule>>,
 }
 
-// SAFETY: `entry` points to finished code that nobody writes to again; it stays mapped until the drop of `self`,
-// and any number of threads may execute the same code. The module is behind a mutex.
+// SAFETY: `entry` points to finished code that nobody writes to again; it stays mapped until the drop of
+// `self`, and any number of threads may execute the same code. The module is behind a mutex.
 unsafe impl Send for Code {}
-// SAFETY: as above.
+// SAFETY: threads that share a `Code` only execute it, which is safe for the reasons above.
 unsafe impl Sync for Code {}
 
 impl Code {
@@ -56,8 +60,8 @@ impl Drop for Code {
             Err(poisoned) => poisoned.into_inner().take(),
         };
         if let Some(module) = module {
-            // SAFETY: `entry` is private and callers borrow `self` while they run it (`solid::compiled`), so no
-            // code of this module is running or can be called again.
+            // SAFETY: `entry` is private and callers borrow `self` while they run it
+            // (`solid::programs::compiled`), so no code of this module is running or can be called again.
             unsafe { module.free_memory() };
         }
     }

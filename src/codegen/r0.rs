@@ -3,37 +3,8 @@
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{InstBuilder, Value};
 
-use super::Form;
-use super::emit::{Emitter, Operand};
-use crate::ir::r0;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Junction {
-    And,
-    Or,
-}
-
-/// What value and weights of u ∧ v or u ∨ v share.
-#[derive(Clone, Copy)]
-pub(super) struct Parts {
-    /// The operand that the result is near to on the small branch: the minimum for ∧, the maximum for ∨.
-    near: Value,
-    /// The other one.
-    far: Value,
-    /// u + v
-    sum: Value,
-    /// √(u² + v²), not less than max(|u|, |v|)
-    h: Value,
-    /// Mask of the small branch.
-    small: Value,
-    /// max(|u|, |v|) + h
-    denominator: Value,
-    /// Masks u < v and v < u: at a tie neither, and both operands get the same weight.
-    less: Value,
-    greater: Value,
-    /// |τ| with the sign of m/M on the branch taken; only where weights are asked for.
-    tau: Option<Value>,
-}
+use super::emitter::{Emitter, Junction, Operand, R0Parts};
+use crate::ir::{Form, r0};
 
 impl Emitter<'_, '_> {
     pub fn r0_value(&mut self, u: Operand, v: Operand, junction: Junction) -> Value {
@@ -53,9 +24,9 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// The parts for a pair of operands: see `ir::r0`, whose operations these are. A disjunction is the dual of a
-    /// conjunction there; here its signs are worked into the formulas, which changes no bit.
-    fn r0_parts(&mut self, (u, a): Operand, (v, b): Operand, junction: Junction) -> Parts {
+    /// The parts for a pair of operands: see `ir::r0`, whose operations these are. A disjunction is the dual
+    /// of a conjunction there; here its signs are worked into the formulas, which changes no bit.
+    fn r0_parts(&mut self, (u, a): Operand, (v, b): Operand, junction: Junction) -> R0Parts {
         let key = (u, v, junction);
         if let Some(parts) = self.parts.get(&key) {
             return *parts;
@@ -77,7 +48,7 @@ impl Emitter<'_, '_> {
             Junction::Or => (max, min, self.compare(FloatCC::LessThan, sum, zero)),
         };
         let denominator = self.builder.ins().fadd(magnitude, h);
-        let mut parts = Parts { near, far, sum, h, small, denominator, less, greater, tau: None };
+        let mut parts = R0Parts { near, far, sum, h, small, denominator, less, greater, tau: None };
         if self.weighted.contains(&key) {
             parts.tau = Some(self.r0_tau(parts, junction));
         }
@@ -86,7 +57,7 @@ impl Emitter<'_, '_> {
     }
 
     /// The parts for operands in the order in which they were met first, and whether that is the other order.
-    fn shared_parts(&mut self, u: Operand, v: Operand, junction: Junction) -> (Parts, bool) {
+    fn shared_parts(&mut self, u: Operand, v: Operand, junction: Junction) -> (R0Parts, bool) {
         if u.0 != v.0 && self.parts.contains_key(&(v.0, u.0, junction)) {
             (self.r0_parts(v, u, junction), true)
         } else {
@@ -112,7 +83,7 @@ impl Emitter<'_, '_> {
         self.select(p.small, near, far)
     }
 
-    fn r0_tau(&mut self, p: Parts, junction: Junction) -> Value {
+    fn r0_tau(&mut self, p: R0Parts, junction: Junction) -> Value {
         let top = self.select(p.small, p.near, p.far);
         let tau = self.builder.ins().fdiv(top, p.denominator);
         let zero = self.constant(0.0);
@@ -159,7 +130,8 @@ impl Emitter<'_, '_> {
         (lesser, greater)
     }
 
-    /// u + v ∓ √(u² + v²) as printed in every textbook: loses all digits of a small result between large operands.
+    /// u + v ∓ √(u² + v²) as printed in every textbook: loses all digits of a small result between large
+    /// operands.
     fn textbook_value(&mut self, a: Value, b: Value, junction: Junction) -> Value {
         let sum = self.builder.ins().fadd(a, b);
         let h = self.hypotenuse(a, b);
@@ -188,7 +160,8 @@ impl Emitter<'_, '_> {
         self.builder.ins().sqrt(squares)
     }
 
-    /// As `ir::r0::and_scaled`: squares only of the ratio q = m/M, so nothing overflows that need not.
+    /// The operations of `ir::r0::and_scaled`. Only the ratio q = m/M is squared, so nothing overflows that
+    /// need not.
     fn scaled(&mut self, a: Value, b: Value, junction: Junction) -> Scaled {
         let less = self.compare(FloatCC::LessThan, a, b);
         let greater = self.compare(FloatCC::LessThan, b, a);

@@ -1,13 +1,14 @@
 //! Ranges in machine code: the interval of every node in one register, as [−lo, hi].
 //!
-//! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets the
-//! processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above the exact one
-//! after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added after each operation.
-//! The rules are those of `ir::range`; bounds may be wider by a few ulp, of R₀ by a few ulp of its larger operand.
+//! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets
+//! the processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above
+//! the exact one after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added
+//! after each operation. The rules are those of `ir::bounds::range`. Bounds may be wider by a few ulp, those
+//! of R₀ by a few ulp of its larger operand.
 //!
-//! Only graphs are taken whose every node is finite over [`REACH`], and small enough that no square overflows: then
-//! neither infinity nor NaN can arise for a box within it, and min and max need not look for them. Elsewhere the
-//! interpreter answers.
+//! Only graphs are taken whose every node is finite over [`REACH`], and so small that no square overflows.
+//! Then neither infinity nor NaN can arise for a box within it, and min and max need not look for them.
+//! For other graphs and boxes the interpreter answers.
 
 use std::collections::HashMap;
 
@@ -16,23 +17,14 @@ use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
 use cranelift_frontend::FunctionBuilder;
 use glam::DVec3;
 
-use super::emit::Emitter;
-use super::translate::pointers;
-use super::{Precision, Request};
+use super::emitter::{Emitter, Hosts};
+use super::request::{Request, Rounding, pointers};
 use crate::geom::Aabb;
-use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeStep, Region, Unary};
+use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeRule, Region, Unary};
+use crate::precision::Precision;
 
 /// Boxes within this distance of the origin are answered by machine code.
 pub const REACH: f64 = 1e9;
-
-/// How the processor rounds while a range program runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Rounding {
-    /// Towards +∞: the caller sees to it.
-    Upward,
-    /// To nearest, as everywhere else.
-    Nearest,
-}
 
 /// Values beyond this might overflow in a product or in the bound of one.
 const LARGEST: f64 = 1e300;
@@ -43,16 +35,17 @@ const LARGEST_OPERAND: f64 = 1e150;
 /// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
 const ULP: f64 = f64::EPSILON;
 
-/// What a product of two sums is widened by, relative: three roundings of the bound itself, and one and a half of the
-/// program whose values it must hold.
+/// What a product of two sums is widened by, relative: three roundings of the bound itself, and one and a
+/// half of the program whose values it must hold.
 const MARGIN: f64 = 8.0 * ULP;
 
-/// What R₀ is widened by, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the program (see
-/// `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of the sums.
+/// What R₀ is widened by, relative to √(u² + v²): 3 ulp of the root itself, 2.3 ulp of the result in the
+/// program (see `ir::r0`), which is at most 2.5 roots, and in [`Rounding::Nearest`] the halves of an ulp of
+/// the sums.
 const R0_MARGIN: f64 = 16.0 * ULP;
 
-/// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the root of
-/// what is lost.
+/// Operands below 2⁻⁵⁰⁰ may have squares that underflow: more than the result that they have, and than the
+/// root of what is lost.
 const R0_UNDERFLOW: f64 = 1e-147;
 
 /// Whether machine code can answer for this graph.
@@ -62,21 +55,115 @@ pub fn supports(graph: &Graph, root: Node) -> bool {
 
 /// Whether every operation of a graph is one that range programs have.
 pub fn knows(graph: &Graph) -> bool {
-    let is_number = |node| matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_));
-    graph.nodes().all(|(_, expr)| match expr {
-        Expr::Coordinate(Axis::T) => false,
-        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => true,
-        Expr::Unary(op, _) => matches!(op, Unary::Neg | Unary::Abs | Unary::Sqrt),
-        Expr::Binary(Binary::Div, _, b) => is_number(b),
-        Expr::Binary(op, ..) => {
-            use Binary::{Add, And, Max, Min, Mul, Or, PlainMax, PlainMin, Sub};
-            matches!(op, Add | Sub | Mul | Min | Max | PlainMin | PlainMax | And | Or)
-        }
-    })
+    Instructions::of(graph).is_some()
 }
 
-/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by zero is
-/// not finite.
+/// What a range program does for one node.
+#[derive(Clone, Copy)]
+enum Instruction {
+    Constant(f64),
+    /// The range of x, y or z: its number.
+    Coordinate(usize),
+    Parameter(u32),
+    Uniform(u32),
+    Square(Node),
+    Slab {
+        of: Node,
+        first: Affine,
+        second: Affine,
+    },
+    Unary(RangeUnary, Node),
+    Binary(RangeBinary, Node, Node),
+    /// By a constant or a parameter.
+    Divide(Node, Node),
+}
+
+/// The operations on one range.
+#[derive(Clone, Copy)]
+enum RangeUnary {
+    Neg,
+    Abs,
+    Sqrt,
+}
+
+/// The operations on two ranges.
+#[derive(Clone, Copy)]
+enum RangeBinary {
+    Add,
+    Sub,
+    Mul,
+    Min,
+    Max,
+    And,
+    Or,
+}
+
+/// The instructions for all nodes of a graph, in its order.
+#[derive(Default)]
+pub(super) struct Instructions(Vec<Instruction>);
+
+impl Instructions {
+    /// `None` if the graph has an operation that range programs do not have.
+    pub fn of(graph: &Graph) -> Option<Self> {
+        graph.nodes().map(|(_, expr)| Instruction::of(graph, expr)).collect::<Option<_>>().map(Self)
+    }
+}
+
+impl Instruction {
+    fn of(graph: &Graph, expr: Expr) -> Option<Self> {
+        Some(match RangeRule::of(graph, expr) {
+            RangeRule::Square(a) => Self::Square(a),
+            RangeRule::Slab { of, first, second } => Self::Slab { of, first, second },
+            RangeRule::Plain(Expr::Constant(bits)) => Self::Constant(f64::from_bits(bits)),
+            RangeRule::Plain(Expr::Coordinate(axis)) => {
+                Self::Coordinate(Axis::SPACE.into_iter().position(|place| place == axis)?)
+            }
+            RangeRule::Plain(Expr::Parameter(i)) => Self::Parameter(i),
+            RangeRule::Plain(Expr::Uniform(i)) => Self::Uniform(i),
+            RangeRule::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
+            RangeRule::Plain(Expr::Binary(Binary::Div, a, b)) => {
+                let by_number = matches!(graph.expr(b), Expr::Constant(_) | Expr::Parameter(_));
+                by_number.then_some(Self::Divide(a, b))?
+            }
+            RangeRule::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
+        })
+    }
+}
+
+impl RangeUnary {
+    fn of(op: Unary) -> Option<Self> {
+        match op {
+            Unary::Neg => Some(Self::Neg),
+            Unary::Abs => Some(Self::Abs),
+            Unary::Sqrt => Some(Self::Sqrt),
+            Unary::Sign | Unary::Call(_) => None,
+        }
+    }
+}
+
+impl RangeBinary {
+    fn of(op: Binary) -> Option<Self> {
+        match op {
+            Binary::Add => Some(Self::Add),
+            Binary::Sub => Some(Self::Sub),
+            Binary::Mul => Some(Self::Mul),
+            Binary::Min | Binary::PlainMin => Some(Self::Min),
+            Binary::Max | Binary::PlainMax => Some(Self::Max),
+            Binary::And => Some(Self::And),
+            Binary::Or => Some(Self::Or),
+            Binary::Div
+            | Binary::DivOrZero
+            | Binary::MinWeight
+            | Binary::MaxWeight
+            | Binary::AndWeight
+            | Binary::OrWeight
+            | Binary::Call(_) => None,
+        }
+    }
+}
+
+/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by
+/// zero is not finite.
 pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
     let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
     let ranges = evaluator.all_with(&Region { space: &space, ..numbers });
@@ -89,15 +176,22 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
             Expr::Binary(Binary::And | Binary::Or, a, b) => {
                 within(a, LARGEST_OPERAND) && within(b, LARGEST_OPERAND)
             }
+            // all others overflow only where their result does
             _ => true,
         };
         operands_fit && within(node, LARGEST)
     })
 }
 
-/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the root out;
-/// pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as there are any.
-pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, rounding: Rounding) {
+/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the
+/// root out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
+/// there are any.
+pub(super) fn emit(
+    builder: &mut FunctionBuilder<'_>,
+    request: Request<'_>,
+    Instructions(instructions): &Instructions,
+    rounding: Rounding,
+) {
     let block = builder.create_block();
     builder.append_block_params_for_function_params(block);
     builder.switch_to_block(block);
@@ -105,9 +199,11 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
     let arguments = builder.block_params(block).to_vec();
     let (input, output) = (arguments[0], arguments[1]);
     let [parameters, uniforms] = pointers(request, &arguments[2..]);
-    let emitter = Emitter::new(builder, Precision::F64, request.forms, request.graph);
+    let hosts = Hosts::default(); // no instruction calls a function
+    let emitter = Emitter::new(builder, Precision::F64, (request.graph, request.forms), &hosts);
     let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
-    // bound by bound: two numbers that were just written cannot be read as one vector before they reach the cache
+    // bound by bound: two numbers that were just written cannot be read as one vector before they reach the
+    // cache
     let axes: [Value; 3] = std::array::from_fn(|i| {
         let mut bound = |place: usize| {
             let flags = MemFlagsData::new();
@@ -118,24 +214,20 @@ pub(super) fn emit(builder: &mut FunctionBuilder<'_>, request: Request<'_>, roun
         let pair = ranges.emitter.builder.ins().insertlane(low, high, 1);
         ranges.flip(pair, Lane::Low)
     });
-    for (node, expr) in request.graph.nodes() {
-        let value = match RangeStep::of(request.graph, expr) {
-            RangeStep::Square(a) => ranges.square(ranges.values[&a]),
-            RangeStep::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
-            RangeStep::Plain(Expr::Coordinate(Axis::X)) => axes[0],
-            RangeStep::Plain(Expr::Coordinate(Axis::Y)) => axes[1],
-            RangeStep::Plain(Expr::Coordinate(Axis::Z)) => axes[2],
-            RangeStep::Plain(Expr::Constant(bits)) => {
-                ranges.number(node, Number::Constant(f64::from_bits(bits)))
-            }
-            RangeStep::Plain(Expr::Coordinate(Axis::T)) => ranges.pair(f64::NAN, f64::NAN), // `knows` refuses
-            RangeStep::Plain(Expr::Uniform(i)) => ranges.uniform(uniforms, i),
-            RangeStep::Plain(Expr::Parameter(i)) => {
+    for ((node, _), &instruction) in std::iter::zip(request.graph.nodes(), instructions) {
+        let value = match instruction {
+            Instruction::Constant(c) => ranges.number(node, Number::Constant(c)),
+            Instruction::Coordinate(axis) => axes[axis],
+            Instruction::Parameter(i) => {
                 let splat = ranges.emitter.parameter(parameters, i);
                 ranges.number(node, Number::Parameter(splat))
             }
-            RangeStep::Plain(Expr::Unary(op, a)) => ranges.unary(op, ranges.values[&a]),
-            RangeStep::Plain(Expr::Binary(op, a, b)) => ranges.binary(op, a, b),
+            Instruction::Uniform(i) => ranges.uniform(uniforms, i),
+            Instruction::Square(a) => ranges.square(ranges.values[&a]),
+            Instruction::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
+            Instruction::Unary(op, a) => ranges.unary(op, ranges.values[&a]),
+            Instruction::Binary(op, a, b) => ranges.binary(op, a, b),
+            Instruction::Divide(a, number) => ranges.divide(ranges.values[&a], ranges.numbers[&number]),
         };
         ranges.values.insert(node, value);
     }
@@ -168,45 +260,41 @@ struct Ranges<'a, 'f> {
 }
 
 impl Ranges<'_, '_> {
-    fn unary(&mut self, op: Unary, a: Value) -> Value {
+    fn unary(&mut self, op: RangeUnary, a: Value) -> Value {
         match op {
-            Unary::Neg => self.swap(a),
-            Unary::Abs => self.magnitudes(a),
-            _ => self.sqrt(a), // the last one that `knows` lets through
+            RangeUnary::Neg => self.swap(a),
+            RangeUnary::Abs => self.magnitudes(a),
+            RangeUnary::Sqrt => self.sqrt(a),
         }
     }
 
-    fn binary(&mut self, op: Binary, u: Node, v: Node) -> Value {
+    fn binary(&mut self, op: RangeBinary, u: Node, v: Node) -> Value {
         let (a, b) = (self.values[&u], self.values[&v]);
         match op {
-            Binary::Add => self.add(a, b),
-            Binary::Sub => {
+            RangeBinary::Add => self.add(a, b),
+            RangeBinary::Sub => {
                 let b = match self.numbers.get(&v) {
                     Some(&Number::Constant(c)) => self.pair(c, -c),
                     _ => self.swap(b),
                 };
                 self.add(a, b)
             }
-            Binary::Mul => match (self.numbers.get(&u).copied(), self.numbers.get(&v).copied()) {
+            RangeBinary::Mul => match (self.numbers.get(&u).copied(), self.numbers.get(&v).copied()) {
                 (Some(number), _) => self.times(b, number),
                 (_, Some(number)) => self.times(a, number),
                 _ => self.multiply(a, b),
             },
-            Binary::Div => match self.numbers.get(&v).copied() {
-                Some(number) => self.divide(a, number),
-                None => self.pair(f64::NAN, f64::NAN), // `knows` refuses
-            },
-            Binary::Min | Binary::PlainMin => {
+            RangeBinary::Min => {
                 // −min(lo) = max(−lo)
                 let (low, high) = (self.emitter.max(a, b), self.min(a, b));
                 self.lanes(low, high)
             }
-            Binary::Max | Binary::PlainMax => {
+            RangeBinary::Max => {
                 let (low, high) = (self.min(a, b), self.emitter.max(a, b));
                 self.lanes(low, high)
             }
-            Binary::And => self.r0(a, b, Lane::High),
-            _ => self.r0(a, b, Lane::Low),
+            RangeBinary::And => self.r0(a, b, Lane::High),
+            RangeBinary::Or => self.r0(a, b, Lane::Low),
         }
     }
 
@@ -384,13 +472,13 @@ impl Ranges<'_, '_> {
         self.not_negative(wide)
     }
 
-    /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1: from the values at the ends of e, and at the point t of
-    /// e nearest to the vertex.
+    /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1: from the values at the ends of e, and at the
+    /// point t of e nearest to the vertex.
     fn slab(&mut self, e: Value, first: Affine, second: Affine) -> Value {
         let plain = self.flip(e, Lane::Low);
         let turned = self.swap(plain);
-        // a concave product has its largest value at t and its least at an end: [lo, t] and [hi, t] are looked at; a
-        // convex one is looked at at [t, lo] and [t, hi]
+        // a concave product has its largest value at t and its least at an end: [lo, t] and [hi, t] are
+        // looked at; a convex one is looked at at [t, lo] and [t, hi]
         let concave = first.slope != second.slope;
         let (at_vertex, near, far) =
             if concave { (Lane::High, turned, plain) } else { (Lane::Low, plain, turned) };
@@ -422,21 +510,21 @@ impl Ranges<'_, '_> {
         match (affine.slope < 0.0, affine.minus) {
             (false, false) => self.fadd(e, offset),
             (false, true) => self.emitter.builder.ins().fsub(e, offset),
-            _ => self.emitter.builder.ins().fsub(offset, e),
+            (true, _) => self.emitter.builder.ins().fsub(offset, e),
         }
     }
 
     /// A number in both lanes.
     fn splat(&mut self, node: Node) -> Value {
-        match self.numbers.get(&node).copied() {
-            Some(Number::Constant(c)) => self.emitter.constant(c),
-            Some(Number::Parameter(splat)) => splat,
-            None => self.emitter.constant(f64::NAN), // offsets are numbers: see `ir::range`
+        // offsets are numbers: see `ir::bounds::range`
+        match self.numbers[&node] {
+            Number::Constant(c) => self.emitter.constant(c),
+            Number::Parameter(splat) => splat,
         }
     }
 
-    /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d, also d² in
-    /// the lane of the value there, which misses the extreme value by so much.
+    /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d,
+    /// also d² in the lane of the value there, which misses the extreme value by so much.
     fn vertex(&mut self, first: Affine, second: Affine, at_vertex: Lane) -> (Value, Option<Value>) {
         // the root of slope·e ± offset is ∓slope·offset
         let sign = |affine: Affine| if affine.minus { affine.slope } else { -affine.slope };
@@ -470,13 +558,13 @@ impl Ranges<'_, '_> {
         (self.fmul(sum, half), Some(self.fmul(d, d)))
     }
 
-    /// The range of a ∧ b or a ∨ b: in the lane `and` the upper bound of a conjunction, in the other that of a
-    /// disjunction, because −(u ∧ v) = −u ∨ −v.
+    /// The range of a ∧ b or a ∨ b: in the lane `and` the upper bound of a conjunction, in the other that of
+    /// a disjunction, because −(u ∧ v) = −u ∨ −v.
     ///
-    /// The bounds are u + v ∓ √(u² + v²) as written, widened by what cancels; where hardly anything else is left the
-    /// operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m = max(u, v)
-    /// u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the program). So nothing waits
-    /// for a division after the root.
+    /// The bounds are u + v ∓ √(u² + v²) as written, widened by what cancels; where hardly anything else is
+    /// left the operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m
+    /// = max(u, v) u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the
+    /// program). So nothing waits for a division after the root.
     fn r0(&mut self, a: Value, b: Value, and: Lane) -> Value {
         let lost = self.emitter.constant(R0_UNDERFLOW);
         let sum = self.fadd(a, b);

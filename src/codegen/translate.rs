@@ -4,17 +4,19 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use cranelift_codegen::Context;
 use cranelift_codegen::ir::condcodes::IntCC;
-use cranelift_codegen::ir::{
-    AbiParam, FuncRef, Function, InstBuilder, MemFlagsData, UserFuncName, Value, types,
-};
+use cranelift_codegen::ir::{AbiParam, Function, InstBuilder, MemFlagsData, UserFuncName, Value, types};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{Linkage, Module, default_libcall_names};
 
-use super::emit::Emitter;
-use super::math_calls::{self, HostFunction};
-use super::{Code, CodegenError, Precision, Request, Shape, range, target};
+use super::emitter::{Emitter, Hosts};
+use super::host_functions::HostFunction;
+use super::machine::{CodegenError, target};
+use super::memory::Code;
+use super::range;
+use super::request::{Request, Shape, pointers};
 use crate::ir::{Axis, Expr, Node};
+use crate::precision::Precision;
 
 /// The code generator's own texts of a program.
 #[derive(Debug, Clone)]
@@ -38,7 +40,8 @@ impl Listing {
     /// The texts of a program.
     ///
     /// # Errors
-    /// As for [`compile`].
+    /// [`CodegenError::Unsupported`] where the system gives no executable memory or the processor is not
+    /// known; [`CodegenError::Bug`] if the generated function is refused.
     pub fn of(request: Request<'_>) -> Result<Self, CodegenError> {
         Ok(build(request, true)?.1)
     }
@@ -49,11 +52,16 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     if needed.iter().any(|&node| request.graph.expr(node) == Expr::Coordinate(Axis::T)) {
         return Err(CodegenError::Bug("time is in the graph of a program".into()));
     }
+    let instructions = match request.shape {
+        Shape::Range(_) => range::Instructions::of(request.graph)
+            .ok_or_else(|| CodegenError::Bug("a range program of this formula".into()))?,
+        Shape::Point | Shape::Batch => range::Instructions::default(),
+    };
     let isa = target(needed.len())?;
     let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
     let mut linker = JITBuilder::with_isa(isa, default_libcall_names());
-    for function in math_calls::all(request.precision) {
-        linker.symbol(function.name, function.address);
+    for function in HostFunction::all() {
+        linker.symbol(function.symbol(request.precision), function.address(request.precision));
     }
     let mut module = JITModule::new(linker);
     let mut context = module.make_context();
@@ -65,7 +73,7 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
     match request.shape {
         Shape::Point => point(&mut builder, request, &needed, &hosts),
-        Shape::Range(rounding) => range::emit(&mut builder, request, rounding),
+        Shape::Range(rounding) => range::emit(&mut builder, request, &instructions, rounding),
         Shape::Batch => {
             batch(&mut builder, request, &needed, &hosts, module.target_config().pointer_type());
         }
@@ -104,8 +112,6 @@ fn declare_parameters(function: &mut Function, module: &JITModule, request: Requ
     function.signature.params = parameters;
 }
 
-type Hosts = FxHashMap<String, FuncRef>;
-
 fn declare_hosts(
     module: &mut JITModule,
     function: &mut Function,
@@ -114,24 +120,16 @@ fn declare_hosts(
 ) -> Result<Hosts, cranelift_module::ModuleError> {
     let mut hosts = Hosts::default();
     for &node in needed {
-        let Some(host) = host_of(request.graph.expr(node), request.precision) else { continue };
-        if hosts.contains_key(&host.name) {
+        let Some(host) = HostFunction::of(request.graph.expr(node)) else { continue };
+        if hosts.contains_key(&host) {
             continue;
         }
         let convention = module.target_config().default_call_conv;
-        let signature = math_calls::signature(convention, request.precision, host.arity);
-        let id = module.declare_function(&host.name, Linkage::Import, &signature)?;
-        hosts.insert(host.name, module.declare_func_in_func(id, function));
+        let signature = host.signature(convention, request.precision);
+        let id = module.declare_function(&host.symbol(request.precision), Linkage::Import, &signature)?;
+        hosts.insert(host, module.declare_func_in_func(id, function));
     }
     Ok(hosts)
-}
-
-fn host_of(expr: Expr, precision: Precision) -> Option<HostFunction> {
-    match expr {
-        Expr::Unary(op, _) => math_calls::unary(op, precision),
-        Expr::Binary(op, ..) => math_calls::binary(op, precision),
-        _ => None,
-    }
 }
 
 fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node], hosts: &Hosts) {
@@ -140,14 +138,14 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node
     builder.switch_to_block(block);
     builder.seal_block(block);
     let parameters = builder.block_params(block).to_vec();
-    let mut emitter = Emitter::new(builder, request.precision, request.forms, request.graph);
+    let mut emitter = Emitter::new(builder, request.precision, (request.graph, request.forms), hosts);
     let vector = emitter.vector_type();
     let coordinates: [Value; 3] =
         std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
     let [given_parameters, uniforms] = pointers(request, &parameters[4..]);
     let inputs = FxHashMap::default();
-    let given = Given { coordinates, inputs, parameters: given_parameters, uniforms };
-    let values = nodes(&mut emitter, request, needed, hosts, given);
+    let given = Arguments { coordinates, inputs, parameters: given_parameters, uniforms };
+    let values = nodes(&mut emitter, request, needed, given);
     let bytes = emitter.lane_type().bytes() as i32;
     for (i, output) in request.outputs.iter().enumerate() {
         let lane = emitter.builder.ins().extractlane(values[output], 0);
@@ -183,7 +181,7 @@ fn batch(
 
     let offset = builder.append_block_param(body, pointer);
     builder.switch_to_block(body);
-    let mut emitter = Emitter::new(builder, request.precision, request.forms, request.graph);
+    let mut emitter = Emitter::new(builder, request.precision, (request.graph, request.forms), hosts);
     let vector = emitter.vector_type();
     // columns may start anywhere, so no alignment is promised
     let mut load = |base: Value| {
@@ -193,8 +191,8 @@ fn batch(
     let coordinates = axes.map(&mut load);
     let inputs = request.inputs.iter().copied().zip(inputs.into_iter().map(load)).collect();
     let [parameters, uniforms] = pointers(request, &arguments[2..]);
-    let given = Given { coordinates, inputs, parameters, uniforms };
-    let values = nodes(&mut emitter, request, needed, hosts, given);
+    let given = Arguments { coordinates, inputs, parameters, uniforms };
+    let values = nodes(&mut emitter, request, needed, given);
     for (output, base) in request.outputs.iter().zip(outputs) {
         let address = builder.ins().iadd(base, offset);
         builder.ins().store(MemFlagsData::new(), values[output], address, 0);
@@ -208,19 +206,12 @@ fn batch(
 }
 
 /// What a program is given.
-struct Given {
+struct Arguments {
     coordinates: [Value; 3],
     inputs: FxHashMap<Node, Value>,
-    /// A pointer, as the next.
+    /// Pointers.
     parameters: Option<Value>,
     uniforms: Option<Value>,
-}
-
-/// The pointers to parameters and uniforms, as far as a program has them, from its last arguments.
-pub(super) fn pointers(request: Request<'_>, last: &[Value]) -> [Option<Value>; 2] {
-    let parameters = if request.parameters { last.first() } else { None };
-    let uniforms = if request.uniforms { last.last() } else { None };
-    [parameters.copied(), uniforms.copied()]
 }
 
 /// The values of all needed nodes, in the graph's order, beside those that were given.
@@ -228,23 +219,21 @@ fn nodes(
     emitter: &mut Emitter<'_, '_>,
     request: Request<'_>,
     needed: &[Node],
-    hosts: &Hosts,
-    given: Given,
+    given: Arguments,
 ) -> FxHashMap<Node, Value> {
-    let Given { coordinates, inputs: mut values, parameters, uniforms } = given;
+    let Arguments { coordinates, inputs: mut values, parameters, uniforms } = given;
     for &node in needed {
         let expr = request.graph.expr(node);
-        let host = host_of(expr, request.precision).and_then(|host| hosts.get(&host.name).copied());
         let value = match expr {
             Expr::Constant(bits) => emitter.constant(f64::from_bits(bits)),
             Expr::Coordinate(Axis::X) => coordinates[0],
             Expr::Coordinate(Axis::Y) => coordinates[1],
             Expr::Coordinate(Axis::Z) => coordinates[2],
-            Expr::Coordinate(Axis::T) => emitter.constant(f64::NAN), // `build` refuses
+            Expr::Coordinate(Axis::T) => unreachable!("`build` refuses time"),
             Expr::Parameter(i) => emitter.parameter(parameters, i),
             Expr::Uniform(i) => emitter.parameter(uniforms, i),
-            Expr::Unary(op, a) => emitter.unary(op, values[&a], host),
-            Expr::Binary(op, a, b) => emitter.binary(op, (a, values[&a]), (b, values[&b]), host),
+            Expr::Unary(op, a) => emitter.unary(op, values[&a]),
+            Expr::Binary(op, a, b) => emitter.binary(op, (a, values[&a]), (b, values[&b])),
         };
         values.insert(node, value);
     }

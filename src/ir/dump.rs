@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use super::graph::{Axis, Expr, Graph, Node};
 use crate::diagnostic::Source;
+use crate::ir::graph::{Axis, Expr, Graph, Node};
 
 /// Prints what the named roots use. `%3 = r0_and %1 %2   ; pawn.rfm:4:7`
 pub fn dump(graph: &Graph, roots: &[(&str, Node)], sources: &[Source]) -> String {

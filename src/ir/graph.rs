@@ -2,49 +2,59 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::op::{Binary, Unary};
 use crate::diagnostic::Span;
+use crate::ir::op::{Binary, Unary};
 
 /// An operation of one graph; only that graph makes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Node(u32);
 
 impl Node {
+    /// Its place in the order.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
+/// A coordinate of space, or time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axis {
+    /// Length along x.
     X,
+    /// Length along y.
     Y,
+    /// Length along z.
     Z,
-    /// Time, s: a coordinate of the formula, but one that all points of a program share.
+    /// Time, s. It is a coordinate of the formula, but all points of a program share it.
     T,
 }
 
 impl Axis {
-    /// Those of a point.
+    /// The coordinates of a point.
     pub const SPACE: [Self; 3] = [Self::X, Self::Y, Self::Z];
 }
 
+/// What a node is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Expr {
     /// The bits of an `f64`: equal bits, equal constant.
     Constant(u64),
+    /// A coordinate of the point, or time.
     Coordinate(Axis),
-    /// A constant that is known only when the program runs: programs of leaves that differ in their constants alone
-    /// are one program.
+    /// A constant that is known only when the program runs: programs of leaves that differ in their constants
+    /// alone are one program.
     Parameter(u32),
-    /// A number that depends on time alone, known when the instant is, see [`hoisted`](super::hoisted); over a stretch
-    /// of time it has a range.
+    /// A number that depends on time alone, see `hoisted`. It is known when the instant is,
+    /// and has a range over a stretch of time.
     Uniform(u32),
+    /// An operation on one node.
     Unary(Unary, Node),
+    /// An operation on two nodes.
     Binary(Binary, Node, Node),
 }
 
 impl Expr {
+    /// The nodes that it is computed from, in order.
     pub fn operands(self) -> impl Iterator<Item = Node> {
         let (a, b) = match self {
             Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) | Self::Uniform(_) => (None, None),
@@ -54,7 +64,7 @@ impl Expr {
         a.into_iter().chain(b)
     }
 
-    /// The same operation on other operands.
+    /// The operation with its operands replaced.
     pub fn map(self, mut f: impl FnMut(Node) -> Node) -> Self {
         match self {
             Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) | Self::Uniform(_) => self,
@@ -81,10 +91,12 @@ pub struct Graph {
 }
 
 impl Graph {
+    /// How many nodes there are.
     pub fn len(&self) -> usize {
         self.exprs.len()
     }
 
+    /// Whether there is no node.
     pub fn is_empty(&self) -> bool {
         self.exprs.is_empty()
     }
@@ -114,6 +126,7 @@ impl Graph {
         self.interned.get(&expr.key()).copied()
     }
 
+    /// What a node is.
     pub fn expr(&self, node: Node) -> Expr {
         self.exprs[node.index()]
     }
@@ -123,23 +136,28 @@ impl Graph {
         self.spans[node.index()]
     }
 
+    /// All nodes, operands before their uses.
     pub fn nodes(&self) -> impl Iterator<Item = (Node, Expr)> + '_ {
         self.exprs.iter().enumerate().map(|(i, &expr)| (Node(i as u32), expr))
     }
 
+    /// The node of a constant.
     pub fn constant(&mut self, value: f64) -> Node {
         self.intern(Expr::Constant(value.to_bits()), None)
     }
 
+    /// The node of a coordinate.
     pub fn coordinate(&mut self, axis: Axis) -> Node {
         self.intern(Expr::Coordinate(axis), None)
     }
 
+    /// The node of an operation on one node; a new one gets the operand's span.
     pub fn unary(&mut self, op: Unary, a: Node) -> Node {
         let span = self.span(a);
         self.intern(Expr::Unary(op, a), span)
     }
 
+    /// The node of an operation on two nodes; a new one gets the first operand's span.
     pub fn binary(&mut self, op: Binary, a: Node, b: Node) -> Node {
         let span = self.span(a);
         self.intern(Expr::Binary(op, a, b), span)
@@ -156,9 +174,10 @@ impl Graph {
         (out, image[&root])
     }
 
-    /// The graph with each use of a constant replaced by a parameter of its own; and the constants. Nodes are in the
-    /// order of a walk from the root, operands first, so that graphs of one shape give the same result here,
-    /// whatever else is in the graph they come from and whichever of their constants happen to be equal.
+    /// The graph with each use of a constant replaced by a parameter of its own; and the constants. Nodes are
+    /// in the order of a walk from the root, operands first, so that graphs of one shape give the same result
+    /// here, whatever else is in the graph they come from and whichever of their constants happen to be
+    /// equal.
     pub fn parametrised(&self, root: Node) -> (Self, Node, Vec<f64>) {
         let mut out = Self::default();
         let mut constants = Vec::new();
@@ -210,7 +229,7 @@ impl Graph {
         }
     }
 
-    /// Which nodes the roots depend on, the roots included.
+    /// For each node, whether it is a root or a root depends on it.
     pub fn reachable(&self, roots: &[Node]) -> Vec<bool> {
         let mut used = vec![false; self.len()];
         for root in roots {
@@ -347,7 +366,7 @@ mod tests {
     fn extraction_leaves_out_the_unused() {
         let mut graph = Graph::default();
         let x = graph.coordinate(Axis::X);
-        let unused = graph.unary(Unary::Sin, x);
+        let unused = graph.unary(crate::ir::UnaryFunction::Sin.into(), x);
         let root = graph.unary(Unary::Neg, x);
         let (small, roots) = graph.extract(&[root]);
         assert_eq!(small.len(), 2);

@@ -1,42 +1,54 @@
 //! The expression graph of ω: typed, interned, each node stored once; its meaning is the interpreter's.
 //!
-//! A [`Graph`] is a list of operations in which operands come before their uses, so every pass is one loop over
-//! it. R-functions are operations of their own (not spelt out in square roots): each consumer chooses its form.
+//! A [`Graph`] is a list of operations in which operands come before their uses, so every pass is one loop
+//! over it. R-functions are operations of their own (not spelt out in square roots): each consumer chooses
+//! its form.
+//!
+//! | file or folder | what it holds |
+//! |---|---|
+//! | `graph`, `op`, `function`, `r0`, `form` | the graph, its operations, the forms in which R₀ is computed |
+//! | `interpreter` | the meaning of a graph |
+//! | `derived` | graphs made of a graph: gradient, contact, sign twin, what depends on time alone |
+//! | `bounds` | ranges, magnitudes and rounding errors over boxes |
+//! | `on_path` | what is known of a leaf along a straight path |
+//! | `exact` | true values, to 120 digits |
+//! | `function_rules` | what all of these need to know of a function of the mathematical library |
 //!
 //! Invariant: nothing here knows the syntax or the code generator; equal expressions have equal [`Node`]s.
 
-mod adjoint;
-mod along;
-mod contact;
+mod bounds;
+mod derived;
 mod dump;
-mod error;
-mod eval;
 pub mod exact;
-mod forms;
+mod form;
+mod function;
+mod function_rules;
 mod graph;
-mod growth;
-mod local;
+mod interpreter;
+mod on_path;
 mod op;
 pub mod r0;
-mod range;
 mod real;
-mod taylor;
-mod time;
-mod twin;
 
-pub use adjoint::{gradient, gradient_and_rate};
-pub use along::along;
-pub use contact::{contact, wall_velocity};
+pub use bounds::error::{Arithmetic, Error, ErrorAnalysis, Inputs};
+pub use bounds::float::FloatType;
+pub use bounds::magnitude::Magnitudes;
+pub use bounds::range::RangeEvaluator;
+pub(crate) use bounds::range::{Affine, RangeRule, Region};
+pub(crate) use derived::contact::{contact, wall_velocity};
+pub(crate) use derived::gradient::gradient;
+pub use derived::gradient::gradient_and_rate;
+pub(crate) use derived::hoisted::{Hoisted, Uniforms, hoisted};
+pub use derived::localised::localised;
+pub(crate) use derived::sign::SignRule;
+pub(crate) use derived::twin::twin;
 pub use dump::dump;
-pub use error::{Arithmetic, Error, ErrorAnalysis, Inputs};
-pub use eval::{Given, Interpreter};
-pub use forms::{Form, Forms};
+pub use form::{Form, Forms};
+pub use function::{BinaryFunction, UnaryFunction};
 pub use graph::{Axis, Expr, Graph, Node};
-pub use growth::{FloatType, Growth};
-pub use local::localised;
+pub use interpreter::{Given, Interpreter};
+pub(crate) use on_path::enclosure::{Enclosure, EnclosureEvaluator};
+pub(crate) use on_path::polynomial::polynomial_on_path;
+pub(crate) use op::R0;
 pub use op::{Binary, Unary};
-pub use range::{Affine, RangeEvaluator, Region, Step as RangeStep};
 pub use real::Real;
-pub use taylor::{Enclosure, TaylorEvaluator};
-pub use time::{Hoisted, Uniforms, hoisted};
-pub use twin::{sign_operands, twin};

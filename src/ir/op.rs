@@ -1,46 +1,55 @@
-//! The operations: each is defined once, here, by its name and its value; the code generator is tested against
-//! these values bit for bit.
+//! The operations: each is defined once, here, by its name and its value.
+//!
+//! The code generator is tested against these values bit for bit. An operation that is added needs a rule in
+//! every analysis (derivative, range, rounding error, truth) and an instruction. A function of the
+//! mathematical library needs less, see `function`.
 
-use super::r0;
-use super::real::Real;
+use crate::ir::function::{BinaryFunction, UnaryFunction};
+use crate::ir::r0;
+use crate::ir::real::Real;
 
+/// An operation on one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Unary {
+    /// −a
     Neg,
+    /// |a|
     Abs,
+    /// √a
     Sqrt,
     /// −1, 0 or 1; the derivative of |a|, 0 at 0 by convention.
     Sign,
-    Sin,
-    Cos,
-    Tan,
-    Asin,
-    Acos,
-    Atan,
-    Exp,
-    Ln,
+    /// A function of the mathematical library.
+    Call(UnaryFunction),
 }
 
+/// An operation on two numbers, a and b.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Binary {
+    /// a + b
     Add,
+    /// a − b
     Sub,
+    /// a·b
     Mul,
+    /// a/b
     Div,
     /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains 0.
     DivOrZero,
     /// The smaller operand; NaN if either is NaN.
     Min,
+    /// The larger operand; NaN if either is NaN.
     Max,
     /// The smaller operand, where both are known to be numbers: one instruction.
     PlainMin,
+    /// The larger operand, where both are known to be numbers: one instruction.
     PlainMax,
     /// ∂min(a, b)/∂a: 1, ½ or 0 where a is smaller, equal or larger.
     MinWeight,
+    /// ∂max(a, b)/∂a: 1, ½ or 0 where a is larger, equal or smaller.
     MaxWeight,
-    Pow,
-    /// `atan2(a, b)`: the angle of the point (b, a).
-    Atan2,
+    /// A function of the mathematical library.
+    Call(BinaryFunction),
     /// R₀-conjunction a ∧ b, see [`r0::and`].
     And,
     /// R₀-disjunction a ∨ b, see [`r0::or`].
@@ -51,78 +60,85 @@ pub enum Binary {
     OrWeight,
 }
 
-impl Unary {
-    pub const ALL: [Self; 12] = [
-        Self::Neg,
-        Self::Abs,
-        Self::Sqrt,
-        Self::Sign,
-        Self::Sin,
-        Self::Cos,
-        Self::Tan,
-        Self::Asin,
-        Self::Acos,
-        Self::Atan,
-        Self::Exp,
-        Self::Ln,
-    ];
+/// An operation of the R₀ system. It is computed in one of several forms, see [`Form`](super::Form).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum R0 {
+    /// [`Binary::And`]
+    And,
+    /// [`Binary::Or`]
+    Or,
+    /// [`Binary::AndWeight`]
+    AndWeight,
+    /// [`Binary::OrWeight`]
+    OrWeight,
+}
 
+impl Unary {
+    /// Every operation, for tests.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let functions = UnaryFunction::ALL.iter().copied().map(Self::Call);
+        [Self::Neg, Self::Abs, Self::Sqrt, Self::Sign].into_iter().chain(functions)
+    }
+
+    /// Its name in dumps.
     pub fn name(self) -> &'static str {
         match self {
             Self::Neg => "neg",
             Self::Abs => "abs",
             Self::Sqrt => "sqrt",
             Self::Sign => "sign",
-            Self::Sin => "sin",
-            Self::Cos => "cos",
-            Self::Tan => "tan",
-            Self::Asin => "asin",
-            Self::Acos => "acos",
-            Self::Atan => "atan",
-            Self::Exp => "exp",
-            Self::Ln => "ln",
+            Self::Call(function) => function.name(),
         }
     }
 
+    /// Its value.
     pub fn eval<T: Real>(self, a: T) -> T {
         match self {
             Self::Neg => -a,
             Self::Abs => a.abs(),
             Self::Sqrt => a.sqrt(),
             Self::Sign => sign(a),
-            Self::Sin => a.sin(),
-            Self::Cos => a.cos(),
-            Self::Tan => a.tan(),
-            Self::Asin => a.asin(),
-            Self::Acos => a.acos(),
-            Self::Atan => a.atan(),
-            Self::Exp => a.exp(),
-            Self::Ln => a.ln(),
+            Self::Call(function) => a.call(function),
         }
     }
 }
 
-impl Binary {
-    pub const ALL: [Self; 17] = [
-        Self::Add,
-        Self::Sub,
-        Self::Mul,
-        Self::Div,
-        Self::DivOrZero,
-        Self::Min,
-        Self::Max,
-        Self::PlainMin,
-        Self::PlainMax,
-        Self::MinWeight,
-        Self::MaxWeight,
-        Self::Pow,
-        Self::Atan2,
-        Self::And,
-        Self::Or,
-        Self::AndWeight,
-        Self::OrWeight,
-    ];
+impl From<UnaryFunction> for Unary {
+    fn from(function: UnaryFunction) -> Self {
+        Self::Call(function)
+    }
+}
 
+impl From<BinaryFunction> for Binary {
+    fn from(function: BinaryFunction) -> Self {
+        Self::Call(function)
+    }
+}
+
+impl Binary {
+    /// Every operation, for tests.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let instructions = [
+            Self::Add,
+            Self::Sub,
+            Self::Mul,
+            Self::Div,
+            Self::DivOrZero,
+            Self::Min,
+            Self::Max,
+            Self::PlainMin,
+            Self::PlainMax,
+            Self::MinWeight,
+            Self::MaxWeight,
+            Self::And,
+            Self::Or,
+            Self::AndWeight,
+            Self::OrWeight,
+        ];
+        instructions.into_iter().chain(BinaryFunction::ALL.iter().copied().map(Self::Call))
+    }
+
+    /// Its name in dumps.
     pub fn name(self) -> &'static str {
         match self {
             Self::Add => "add",
@@ -136,8 +152,7 @@ impl Binary {
             Self::PlainMax => "plain_max",
             Self::MinWeight => "min_weight",
             Self::MaxWeight => "max_weight",
-            Self::Pow => "pow",
-            Self::Atan2 => "atan2",
+            Self::Call(function) => function.name(),
             Self::And => "r0_and",
             Self::Or => "r0_or",
             Self::AndWeight => "r0_and_weight",
@@ -151,6 +166,29 @@ impl Binary {
         matches!(self, Add | Mul | Min | Max | PlainMin | PlainMax | And | Or)
     }
 
+    /// The operation of the R₀ system that it is, if it is one.
+    pub fn r0(self) -> Option<R0> {
+        match self {
+            Self::And => Some(R0::And),
+            Self::Or => Some(R0::Or),
+            Self::AndWeight => Some(R0::AndWeight),
+            Self::OrWeight => Some(R0::OrWeight),
+            Self::Add
+            | Self::Sub
+            | Self::Mul
+            | Self::Div
+            | Self::DivOrZero
+            | Self::Min
+            | Self::Max
+            | Self::PlainMin
+            | Self::PlainMax
+            | Self::MinWeight
+            | Self::MaxWeight
+            | Self::Call(_) => None,
+        }
+    }
+
+    /// Its value, with R₀ in its stable form.
     #[inline]
     pub fn eval<T: Real>(self, a: T, b: T) -> T {
         let zero = T::from_f64(0.0);
@@ -184,8 +222,7 @@ impl Binary {
             }
             Self::MinWeight => weight(a < b, a, b),
             Self::MaxWeight => weight(a > b, a, b),
-            Self::Pow => a.pow(b),
-            Self::Atan2 => a.atan2(b),
+            Self::Call(function) => a.call_with(function, b),
             Self::And => r0::and(a, b),
             Self::Or => r0::or(a, b),
             Self::AndWeight => r0::and_weights(a, b).0,

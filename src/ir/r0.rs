@@ -7,15 +7,16 @@
 //! - small branch (∧: M > 0, ∨: M < 0): r = m·(1 − τ), weights w_M = 2τ²/(1+τ²), w_m = (1−τ)²/(1+τ²)
 //! - big branch: r = (u + v) + sign(M)·h, weights w_M = 2/(1+τ²), w_m = (1+τ)²/(1+τ²)
 //!
-//! so every result is a product of well-conditioned factors (≤ 2 ulp), and the sign of the result is exactly the
-//! logic of the operands' signs for all finite operands, denormals included: |τ| ≤ ½ because h is clamped to
-//! ≥ |M|, hence m − m·τ keeps the sign of m (do not contract it into an FMA), and s + H keeps that of M.
+//! so every result is a product of well-conditioned factors (≤ 2 ulp), and the sign of the result is exactly
+//! the logic of the operands' signs for all finite operands, denormals included: |τ| ≤ ½ because h is clamped
+//! to ≥ |M|, hence m − m·τ keeps the sign of m (do not contract it into an FMA), and s + H keeps that of M.
 //!
-//! At u = v = 0 the gradient has no limit; τ is put to √2 − 1 there, which gives both operands the same weight.
+//! At u = v = 0 the gradient has no limit; τ is put to √2 − 1 there, which gives both operands the same
+//! weight.
 //!
 //! These functions are the specification of the code generator: same operations, same order, same bits.
 
-use super::real::Real;
+use crate::ir::real::Real;
 
 /// τ at the singular point u = v = 0.
 pub const SINGULAR_TAU: f64 = std::f64::consts::SQRT_2 - 1.0;
@@ -47,7 +48,8 @@ fn parts<T: Real>(u: T, v: T) -> Parts<T> {
 }
 
 /// R₀-conjunction u ∧ v: positive exactly where both are, zero exactly where the smaller is zero.
-// Inlined always, as all that follows: loops over columns compile these formulas for several instruction sets.
+// Inlined always, as all that follows: loops over columns compile these formulas for several instruction
+// sets.
 #[inline(always)]
 pub fn and<T: Real>(u: T, v: T) -> T {
     let p = parts(u, v);
@@ -78,8 +80,8 @@ pub fn and_weighted<T: Real>(u: T, v: T) -> (T, T, T) {
     (value, by_u, by_v)
 }
 
-/// The weights from τ, which has the opposite sign on the big branch; `less`: u < v, v < u. At a tie both operands get
-/// the same one.
+/// The weights from τ, which has the opposite sign on the big branch; `less`: u < v, v < u. At a tie both
+/// operands get the same one.
 #[inline(always)]
 fn weights_of_tau<T: Real>(tau: T, small: bool, less: [bool; 2]) -> (T, T) {
     let one = T::from_f64(1.0);

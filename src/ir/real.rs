@@ -3,6 +3,8 @@
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use crate::ir::function::{BinaryFunction, UnaryFunction};
+
 /// `f64` or `f32`. The functions that are not correctly rounded everywhere come from one portable library, so
 /// that results do not depend on the system.
 pub trait Real:
@@ -18,24 +20,22 @@ pub trait Real:
     + Neg<Output = Self>
     + 'static
 {
+    /// The nearest number of the type.
     fn from_f64(x: f64) -> Self;
+    /// Its value in `f64`, exactly.
     fn to_f64(self) -> f64;
+    /// √a, correctly rounded; NaN for negative numbers.
     fn sqrt(self) -> Self;
+    /// |a|
     fn abs(self) -> Self;
-    fn sin(self) -> Self;
-    fn cos(self) -> Self;
-    fn tan(self) -> Self;
-    fn asin(self) -> Self;
-    fn acos(self) -> Self;
-    fn atan(self) -> Self;
-    fn exp(self) -> Self;
-    fn ln(self) -> Self;
-    fn pow(self, exponent: Self) -> Self;
-    fn atan2(self, x: Self) -> Self;
+    /// A function of the mathematical library.
+    fn call(self, function: UnaryFunction) -> Self;
+    /// A function of the mathematical library, of this operand and a second one.
+    fn call_with(self, function: BinaryFunction, second: Self) -> Self;
 }
 
 macro_rules! real {
-    ($t:ty, $sin:ident $cos:ident $tan:ident $asin:ident $acos:ident $atan:ident $exp:ident $log:ident $pow:ident $atan2:ident) => {
+    ($t:ty, $value:ident) => {
         impl Real for $t {
             #[inline]
             fn from_f64(x: f64) -> Self {
@@ -54,48 +54,16 @@ macro_rules! real {
                 <$t>::abs(self)
             }
             #[inline]
-            fn sin(self) -> Self {
-                libm::$sin(self)
+            fn call(self, function: UnaryFunction) -> Self {
+                function.$value(self)
             }
             #[inline]
-            fn cos(self) -> Self {
-                libm::$cos(self)
-            }
-            #[inline]
-            fn tan(self) -> Self {
-                libm::$tan(self)
-            }
-            #[inline]
-            fn asin(self) -> Self {
-                libm::$asin(self)
-            }
-            #[inline]
-            fn acos(self) -> Self {
-                libm::$acos(self)
-            }
-            #[inline]
-            fn atan(self) -> Self {
-                libm::$atan(self)
-            }
-            #[inline]
-            fn exp(self) -> Self {
-                libm::$exp(self)
-            }
-            #[inline]
-            fn ln(self) -> Self {
-                libm::$log(self)
-            }
-            #[inline]
-            fn pow(self, exponent: Self) -> Self {
-                libm::$pow(self, exponent)
-            }
-            #[inline]
-            fn atan2(self, x: Self) -> Self {
-                libm::$atan2(self, x)
+            fn call_with(self, function: BinaryFunction, second: Self) -> Self {
+                function.$value(self, second)
             }
         }
     };
 }
 
-real!(f64, sin cos tan asin acos atan exp log pow atan2);
-real!(f32, sinf cosf tanf asinf acosf atanf expf logf powf atan2f);
+real!(f64, in_f64);
+real!(f32, in_f32);

@@ -1,7 +1,7 @@
 //! Calls: arguments are bound to parameters, then the body is evaluated in a scope of its own.
 
 use super::builtins;
-use super::eval::{Call, Local, Lowering, Scope};
+use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
@@ -77,34 +77,16 @@ impl<'a> Lowering<'a> {
         let mut fits = true;
         for (position, argument) in arguments.iter().enumerate() {
             let value = self.expr(&argument.value);
-            let parameter = match &argument.name {
-                None => function.parameters.get(position).map(|p| p.name.text.clone()),
-                Some(given) => {
-                    let known = function.parameters.iter().any(|p| p.name.text == given.text);
-                    if !known {
-                        let names = function.parameters.iter().map(|p| p.name.text.as_str());
-                        let message = format!("`{name}` has no parameter `{}`", given.text);
-                        let all: Vec<&str> = names.clone().collect();
-                        let diagnostic = Diagnostic::error(Code::ARGUMENTS, given.span, message)
-                            .help(format!("its parameters are {}", all.join(", ")))
-                            .suggest(&given.text, names);
-                        self.report(diagnostic);
-                        fits = false;
-                        continue;
-                    }
-                    Some(given.text.clone())
+            let parameter = match self.parameter(function, position, argument) {
+                Parameter::Known(parameter) => parameter,
+                Parameter::Unknown => {
+                    fits = false;
+                    continue;
                 }
-            };
-            let Some(parameter) = parameter else {
-                let message = format!(
-                    "`{name}` takes at most {} argument{}, found {}",
-                    function.parameters.len(),
-                    if function.parameters.len() == 1 { "" } else { "s" },
-                    arguments.len()
-                );
-                let at = self.user_span(argument.value.span);
-                self.report(Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many"));
-                return None;
+                Parameter::TooMany => {
+                    self.report_too_many(function, arguments.len(), argument);
+                    return None;
+                }
             };
             if bound.iter().any(|local| local.name == parameter) {
                 let at = self.user_span(argument.value.span);
@@ -123,20 +105,60 @@ impl<'a> Lowering<'a> {
         for parameter in &function.parameters {
             let given = bound.iter().any(|local| local.name == parameter.name.text);
             if !given && parameter.default.is_none() && fits {
-                let at = self.user_span(span);
-                let message = format!("`{name}` needs a value for `{}`", parameter.name.text);
-                let signature: Vec<String> = function
-                    .parameters
-                    .iter()
-                    .map(|p| p.name.text.clone() + if p.default.is_some() { " = …" } else { "" })
-                    .collect();
-                self.report(
-                    Diagnostic::error(Code::ARGUMENTS, at, message)
-                        .help(format!("its parameters are {name}({})", signature.join(", "))),
-                );
+                self.report_missing(function, &parameter.name.text, span);
                 fits = false;
             }
         }
         fits.then_some(bound)
     }
+
+    /// The parameter that an argument is for; a name that the function does not know is reported.
+    fn parameter(&mut self, function: &Function, position: usize, argument: &Argument) -> Parameter {
+        let Some(given) = &argument.name else {
+            let parameter = function.parameters.get(position);
+            return parameter.map_or(Parameter::TooMany, |p| Parameter::Known(p.name.text.clone()));
+        };
+        let names = function.parameters.iter().map(|p| p.name.text.as_str());
+        if names.clone().any(|name| name == given.text) {
+            return Parameter::Known(given.text.clone());
+        }
+        let message = format!("`{}` has no parameter `{}`", function.name.text, given.text);
+        let all: Vec<&str> = names.clone().collect();
+        let diagnostic = Diagnostic::error(Code::ARGUMENTS, given.span, message)
+            .help(format!("its parameters are {}", all.join(", ")))
+            .suggest(&given.text, names);
+        self.report(diagnostic);
+        Parameter::Unknown
+    }
+
+    fn report_too_many(&mut self, function: &Function, found: usize, first: &Argument) {
+        let most = function.parameters.len();
+        let plural = if most == 1 { "" } else { "s" };
+        let message =
+            format!("`{}` takes at most {most} argument{plural}, found {found}", function.name.text);
+        let at = self.user_span(first.value.span);
+        self.report(Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many"));
+    }
+
+    fn report_missing(&mut self, function: &Function, parameter: &str, span: Span) {
+        let name = &function.name.text;
+        let message = format!("`{name}` needs a value for `{parameter}`");
+        let written = |has_default: bool| if has_default { " = …" } else { "" };
+        let signature: Vec<String> =
+            function.parameters.iter().map(|p| p.name.text.clone() + written(p.default.is_some())).collect();
+        let at = self.user_span(span);
+        self.report(
+            Diagnostic::error(Code::ARGUMENTS, at, message)
+                .help(format!("its parameters are {name}({})", signature.join(", "))),
+        );
+    }
+}
+
+/// What an argument is for.
+enum Parameter {
+    Known(String),
+    /// A name that the function does not have.
+    Unknown,
+    /// A position that it does not have.
+    TooMany,
 }

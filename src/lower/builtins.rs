@@ -1,119 +1,164 @@
 //! Functions that are operations of the graph rather than text of the prelude.
 
-use super::eval::Lowering;
+use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::ir::{self, Binary, Node, Unary};
+use crate::ir::{self, Binary, BinaryFunction, Node, Unary, UnaryFunction};
 use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 
-/// Name, fewest and most arguments.
-const TABLE: [(&str, usize, usize); 23] = [
-    ("sqrt", 1, 1),
-    ("abs", 1, 1),
-    ("sin", 1, 1),
-    ("cos", 1, 1),
-    ("tan", 1, 1),
-    ("asin", 1, 1),
-    ("acos", 1, 1),
-    ("atan", 1, 1),
-    ("exp", 1, 1),
-    ("ln", 1, 1),
-    ("sign", 1, 1),
-    ("atan2", 2, 2),
-    ("pow", 2, 2),
-    ("min", 2, usize::MAX),
-    ("max", 2, usize::MAX),
-    ("hypot", 2, 3),
-    ("clamp", 3, 3),
-    ("dot", 2, 2),
-    ("cross", 2, 2),
-    ("length", 1, 1),
-    ("normalise", 1, 1),
-    ("normalize", 1, 1),
-    ("positive", 1, 2),
-];
+/// A function of the language.
+#[derive(Clone, Copy)]
+struct Builtin {
+    name: &'static str,
+    /// Arguments, at least and at most.
+    arity: (usize, usize),
+    meaning: Meaning,
+}
+
+/// What a call makes of its arguments. Functions are given as many as the builtin takes.
+#[derive(Clone, Copy)]
+enum Meaning {
+    /// One operation on one number.
+    Unary(Unary),
+    /// Numbers become a number.
+    Number(fn(&mut Lowering<'_>, &[Node], Span) -> Node),
+    /// Vectors become a number.
+    NumberOfVectors(fn(&mut Lowering<'_>, &[[Node; 3]], Span) -> Node),
+    /// Vectors become a vector.
+    Vector(fn(&mut Lowering<'_>, &[[Node; 3]], Span) -> [Node; 3]),
+    /// The arguments are looked at before they are evaluated.
+    Unevaluated(fn(&mut Lowering<'_>, &[Argument], Span) -> Value),
+}
+
+/// The builtins that are more than one operation on one number.
+const COMPOSED: [Builtin; 11] = {
+    use Meaning::{Number, NumberOfVectors, Vector};
+    const MANY: usize = usize::MAX;
+    const fn builtin(name: &'static str, arity: (usize, usize), meaning: Meaning) -> Builtin {
+        Builtin { name, arity, meaning }
+    }
+    [
+        builtin(
+            "atan2",
+            (2, 2),
+            Number(|l, a, span| l.binary(BinaryFunction::Atan2.into(), a[0], a[1], span)),
+        ),
+        builtin("pow", (2, 2), Number(|l, a, span| l.raise(a[0], a[1], span))),
+        builtin("min", (2, MANY), Number(|l, a, span| l.chain(Binary::Min, a, span))),
+        builtin("max", (2, MANY), Number(|l, a, span| l.chain(Binary::Max, a, span))),
+        builtin("hypot", (2, 3), Number(|l, a, span| l.hypotenuse(a, span))),
+        builtin("clamp", (3, 3), Number(|l, a, span| l.clamp([a[0], a[1], a[2]], span))),
+        builtin("dot", (2, 2), NumberOfVectors(|l, v, span| l.dot(v[0], v[1], span))),
+        builtin("cross", (2, 2), Vector(|l, v, span| l.cross(v[0], v[1], span))),
+        builtin("length", (1, 1), NumberOfVectors(|l, v, span| l.length(v[0], span))),
+        builtin("normalise", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
+        builtin("normalize", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
+    ]
+};
+
+const POSITIVE: Builtin = Builtin {
+    name: "positive",
+    arity: (1, 2),
+    meaning: Meaning::Unevaluated(|l, arguments, span| {
+        l.positive(&arguments[0].value, arguments.get(1).map(|what| &what.value), span)
+    }),
+};
+
+/// All builtins.
+fn all() -> impl Iterator<Item = Builtin> {
+    let operation = |op: Unary| Builtin { name: op.name(), arity: (1, 1), meaning: Meaning::Unary(op) };
+    let functions = UnaryFunction::ALL.iter().map(move |&function| operation(function.into()));
+    let instructions = [Unary::Sqrt, Unary::Abs].into_iter().map(operation);
+    instructions.chain(functions).chain([operation(Unary::Sign)]).chain(COMPOSED).chain([POSITIVE])
+}
 
 pub(super) fn exists(name: &str) -> bool {
-    TABLE.iter().any(|(known, ..)| *known == name)
+    all().any(|builtin| builtin.name == name)
 }
 
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
-    TABLE.iter().map(|(name, ..)| *name)
+    all().map(|builtin| builtin.name)
 }
 
 impl Lowering<'_> {
+    /// A call of a builtin; [`Value::Failed`] if there is none of this name, which the caller has looked for.
     pub fn call_builtin(&mut self, name: &Name, arguments: &[Argument], span: Span) -> Value {
-        let Some(&(_, fewest, most)) = TABLE.iter().find(|(known, ..)| *known == name.text) else {
-            return Value::Failed; // the caller has looked
-        };
-        if let Some(named) = arguments.iter().find_map(|a| a.name.as_ref()) {
-            let message = format!("`{}` takes its arguments by position", name.text);
-            return self.fail(Diagnostic::error(Code::ARGUMENTS, named.span, message));
+        let Some(builtin) = all().find(|builtin| builtin.name == name.text) else { return Value::Failed };
+        if let Some(diagnostic) = self.arguments_do_not_fit(builtin, arguments, span) {
+            return self.fail(diagnostic);
         }
-        if !(fewest..=most).contains(&arguments.len()) {
-            let expected = match (fewest, most) {
-                (a, b) if a == b => format!("{a}"),
-                (a, usize::MAX) => format!("{a} or more"),
-                (a, b) => format!("{a} to {b}"),
-            };
-            let plural = if expected == "1" { "" } else { "s" };
-            let message =
-                format!("`{}` takes {expected} argument{plural}, found {}", name.text, arguments.len());
-            let span = self.user_span(span);
-            return self.fail(Diagnostic::error(Code::ARGUMENTS, span, message));
-        }
-        if name.text == "positive" {
-            return self.positive(&arguments[0].value, arguments.get(1).map(|a| &a.value), span);
-        }
-        let values: Vec<Value> = arguments.iter().map(|a| self.expr(&a.value)).collect();
-        if values.contains(&Value::Failed) {
-            return Value::Failed;
-        }
-        let typed = |lowering: &mut Self, i: usize| lowering.as_number(&values[i], arguments[i].value.span);
-        let vector = |lowering: &mut Self, i: usize| lowering.as_vector(&values[i], arguments[i].value.span);
-        let result = match name.text.as_str() {
-            "dot" => match (vector(self, 0), vector(self, 1)) {
-                (Some(a), Some(b)) => Some(self.dot(a, b, span)),
-                _ => None,
-            },
-            "length" => vector(self, 0).map(|v| {
-                let square = self.dot(v, v, span);
-                self.unary(Unary::Sqrt, square, span)
-            }),
-            "cross" => {
-                return match (vector(self, 0), vector(self, 1)) {
-                    (Some(a), Some(b)) => Value::Vector(self.cross(a, b, span)),
-                    _ => Value::Failed,
-                };
+        let number = |node: Option<Node>| node.map_or(Value::Failed, Value::Number);
+        match builtin.meaning {
+            Meaning::Unevaluated(build) => build(self, arguments, span),
+            Meaning::Unary(op) => number(self.numbers(arguments).map(|a| self.unary(op, a[0], span))),
+            Meaning::Number(build) => number(self.numbers(arguments).map(|a| build(self, &a, span))),
+            Meaning::NumberOfVectors(build) => number(self.vectors(arguments).map(|v| build(self, &v, span))),
+            Meaning::Vector(build) => {
+                self.vectors(arguments).map_or(Value::Failed, |v| Value::Vector(build(self, &v, span)))
             }
-            _ => {
-                let numbers: Option<Vec<Node>> = (0..values.len()).map(|i| typed(self, i)).collect();
-                numbers.map(|numbers| self.scalar_builtin(&name.text, &numbers, span))
-            }
-        };
-        result.map_or(Value::Failed, Value::Number)
+        }
     }
 
-    fn scalar_builtin(&mut self, name: &str, a: &[Node], span: Span) -> Node {
-        if let Some(op) = Unary::ALL.into_iter().find(|op| op.name() == name) {
-            return self.unary(op, a[0], span);
+    /// What is wrong with the number of arguments, or with names given to them.
+    fn arguments_do_not_fit(
+        &self,
+        Builtin { name, arity: (fewest, most), .. }: Builtin,
+        arguments: &[Argument],
+        span: Span,
+    ) -> Option<Diagnostic> {
+        if let Some(named) = arguments.iter().find_map(|a| a.name.as_ref()) {
+            let message = format!("`{name}` takes its arguments by position");
+            return Some(Diagnostic::error(Code::ARGUMENTS, named.span, message));
         }
-        match name {
-            "atan2" => self.binary(Binary::Atan2, a[0], a[1], span),
-            "pow" => self.raise(a[0], a[1], span),
-            "min" => self.chain(Binary::Min, a, span),
-            "max" => self.chain(Binary::Max, a, span),
-            "clamp" => {
-                let upper = self.binary(Binary::Min, a[0], a[2], span);
-                self.binary(Binary::Max, a[1], upper, span)
-            }
-            "hypot" => {
-                let squares: Vec<Node> = a.iter().map(|&a| self.binary(Binary::Mul, a, a, span)).collect();
-                let sum = self.chain(Binary::Add, &squares, span);
-                self.unary(Unary::Sqrt, sum, span)
-            }
-            _ => self.normalise(a[0], span),
+        if (fewest..=most).contains(&arguments.len()) {
+            return None;
         }
+        let expected = match (fewest, most) {
+            (a, b) if a == b => format!("{a}"),
+            (a, usize::MAX) => format!("{a} or more"),
+            (a, b) => format!("{a} to {b}"),
+        };
+        let plural = if expected == "1" { "" } else { "s" };
+        let message = format!("`{name}` takes {expected} argument{plural}, found {}", arguments.len());
+        Some(Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message))
+    }
+
+    /// The values of all arguments; `None` if one of them failed.
+    fn values(&mut self, arguments: &[Argument]) -> Option<Vec<Value>> {
+        let values: Vec<Value> = arguments.iter().map(|a| self.expr(&a.value)).collect();
+        if values.contains(&Value::Failed) { None } else { Some(values) }
+    }
+
+    /// The arguments as numbers; the first that is none is reported.
+    fn numbers(&mut self, arguments: &[Argument]) -> Option<Vec<Node>> {
+        let values = self.values(arguments)?;
+        values.iter().zip(arguments).map(|(value, a)| self.as_number(value, a.value.span)).collect()
+    }
+
+    /// The arguments as vectors; each that is none is reported.
+    fn vectors(&mut self, arguments: &[Argument]) -> Option<Vec<[Node; 3]>> {
+        let values = self.values(arguments)?;
+        let vectors: Vec<Option<[Node; 3]>> =
+            values.iter().zip(arguments).map(|(value, a)| self.as_vector(value, a.value.span)).collect();
+        vectors.into_iter().collect()
+    }
+
+    /// √(a² + b² + …)
+    fn hypotenuse(&mut self, a: &[Node], span: Span) -> Node {
+        let squares: Vec<Node> = a.iter().map(|&a| self.binary(Binary::Mul, a, a, span)).collect();
+        let sum = self.chain(Binary::Add, &squares, span);
+        self.unary(Unary::Sqrt, sum, span)
+    }
+
+    /// max(low, min(value, high))
+    fn clamp(&mut self, [value, low, high]: [Node; 3], span: Span) -> Node {
+        let upper = self.binary(Binary::Min, value, high, span);
+        self.binary(Binary::Max, low, upper, span)
+    }
+
+    fn length(&mut self, v: [Node; 3], span: Span) -> Node {
+        let square = self.dot(v, v, span);
+        self.unary(Unary::Sqrt, square, span)
     }
 
     fn chain(&mut self, op: Binary, operands: &[Node], span: Span) -> Node {
@@ -135,8 +180,8 @@ impl Lowering<'_> {
         })
     }
 
-    /// ω/√(ω² + |∇ω|²): gradient of length 1 on the surface, no division by zero unless ω and ∇ω vanish together
-    /// (Rvachev's normalisation of first order).
+    /// ω/√(ω² + |∇ω|²): gradient of length 1 on the surface, no division by zero unless ω and ∇ω vanish
+    /// together (Rvachev's normalisation of first order).
     fn normalise(&mut self, omega: Node, span: Span) -> Node {
         let gradient = ir::gradient(&mut self.module.graph, omega);
         let square = self.binary(Binary::Mul, omega, omega, span);

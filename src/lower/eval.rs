@@ -1,148 +1,26 @@
 //! Expressions → values.
 
-use std::collections::HashSet;
-
-use super::Module;
-use super::names::{Kind, Names};
+use super::builtins;
+use super::lowering::{Local, Lowering};
+use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
-use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
+use crate::ir::{Axis, Binary, BinaryFunction, Node, Unary};
 use crate::quantity::{Dimension, parse_unit};
-use crate::sph::Method;
 use crate::syntax::ast::{AddOp, Comparison, Expr, ExprKind, Logic, MulOp, Name};
 
-/// Calls nested deeper than this are refused: functions cannot recurse, so only a chain of them gets here.
-const DEEPEST_CALL: usize = 64;
-
-/// Members of a fold, at most: the node budget is checked after each member, this only bounds the empty ones.
+/// The most members of a fold. The budget of nodes is checked after each member, so this only bounds folds
+/// whose members add no node.
 const LONGEST_FOLD: f64 = 1e7;
 
-/// Expressions evaluated inside one another, at most; with the limits of the parser this takes a chain of calls.
+/// The most expressions that are evaluated inside one another. With the limits of the parser it takes a chain
+/// of calls to get there.
 const DEEPEST_EVALUATION: usize = 2000;
 
-/// Expressions evaluated for each operation of the budget: shared operations cost time though they add no node.
-const EVALUATIONS_PER_NODE: usize = 4;
-
-/// Messages that come with a suggestion: in a file with more of them something else is wrong.
+/// So many messages come with a suggestion. In a file with more of them something else is wrong.
 const MOST_SUGGESTIONS: usize = 100;
 
-/// The state of a lowering.
-pub(super) struct Lowering<'a> {
-    pub module: Module,
-    pub diagnostics: Vec<Diagnostic>,
-    pub names: Names<'a>,
-    pub scope: Scope,
-    /// Of all scenes, whatever they state.
-    pub method: Option<Method>,
-    max_nodes: usize,
-    budget_reported: bool,
-    evaluations: usize,
-    depth: usize,
-    /// Code and place of what was reported: a mistake in a function or a fold is one mistake.
-    reported: HashSet<(&'static str, Span)>,
-}
-
-/// Where an expression is evaluated: whose code it is, its local names, and the call that led there.
-#[derive(Debug, Clone)]
-pub(super) struct Scope {
-    pub source: SourceId,
-    pub locals: Vec<Local>,
-    /// The functions being called, outermost first.
-    pub calls: Vec<Call>,
-}
-
-#[derive(Debug, Clone)]
-pub(super) struct Local {
-    pub name: String,
-    pub value: Value,
-    /// Of the argument that it was bound to.
-    pub span: Span,
-}
-
-#[derive(Debug, Clone)]
-pub(super) struct Call {
-    pub function: String,
-    pub source: SourceId,
-    pub span: Span,
-}
-
-impl<'a> Lowering<'a> {
-    pub fn new(max_nodes: usize) -> Self {
-        Self {
-            module: Module::default(),
-            diagnostics: Vec::new(),
-            names: Names::default(),
-            scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
-            method: None,
-            max_nodes,
-            budget_reported: false,
-            evaluations: 0,
-            depth: 0,
-            reported: HashSet::new(),
-        }
-    }
-
-    /// Says it once for each place; messages about no place in particular all come through.
-    pub fn report(&mut self, diagnostic: Diagnostic) {
-        let span = diagnostic.primary.span;
-        if span.range().is_empty() || self.reported.insert((diagnostic.code.0, span)) {
-            self.diagnostics.push(diagnostic);
-        }
-    }
-
-    /// Reports and gives the value that silences what depends on it.
-    pub fn fail(&mut self, diagnostic: Diagnostic) -> Value {
-        self.report(diagnostic);
-        Value::Failed
-    }
-
-    /// The span in the user's file that an expression belongs to: its own, or that of the call that led into the
-    /// standard solids.
-    pub fn user_span(&self, span: Span) -> Span {
-        if span.source == SourceId::File {
-            return span;
-        }
-        self.scope.calls.iter().rev().map(|c| c.span).find(|s| s.source == SourceId::File).unwrap_or(span)
-    }
-
-    /// Whether the file has grown beyond its budget; reported once.
-    pub fn over_budget(&mut self, span: Span) -> bool {
-        let too_many = self.module.graph.len() > self.max_nodes;
-        let most_evaluations = self.max_nodes.saturating_mul(EVALUATIONS_PER_NODE);
-        let over = too_many || self.evaluations > most_evaluations;
-        if over && !self.budget_reported {
-            self.budget_reported = true;
-            let message = if too_many {
-                format!("the file unrolls to more than {} operations", self.max_nodes)
-            } else {
-                format!("the file evaluates more than {most_evaluations} expressions when it is unrolled")
-            };
-            let span = self.user_span(span);
-            self.report(
-                Diagnostic::error(Code::TOO_LARGE, span, message)
-                    .help("make a range shorter, or allow more with --max-nodes"),
-            );
-        }
-        over
-    }
-
-    pub fn node(&mut self, operation: Operation, span: Span) -> Node {
-        let span = self.user_span(span);
-        self.module.graph.intern(operation, Some(span))
-    }
-
-    pub fn unary(&mut self, op: Unary, a: Node, span: Span) -> Node {
-        self.node(Operation::Unary(op, a), span)
-    }
-
-    pub fn binary(&mut self, op: Binary, a: Node, b: Node, span: Span) -> Node {
-        self.node(Operation::Binary(op, a, b), span)
-    }
-
-    pub fn constant(&mut self, value: f64) -> Node {
-        self.module.graph.constant(value)
-    }
-
+impl Lowering<'_> {
     /// A number or field; anything else is reported.
     pub fn field(&mut self, expr: &Expr) -> Option<Node> {
         let value = self.expr(expr);
@@ -160,54 +38,13 @@ impl<'a> Lowering<'a> {
         local.map_or(expr.span, |local| local.span)
     }
 
-    pub fn as_number(&mut self, value: &Value, span: Span) -> Option<Node> {
-        match value {
-            Value::Number(node) => Some(*node),
-            Value::Failed => None,
-            other => {
-                let span = self.user_span(span);
-                let message = format!("expected a number or a field, found {}", other.describe());
-                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
-                None
-            }
-        }
-    }
-
-    pub fn as_vector(&mut self, value: &Value, span: Span) -> Option<[Node; 3]> {
-        match value {
-            Value::Vector(parts) => Some(*parts),
-            Value::Failed => None,
-            other => {
-                let span = self.user_span(span);
-                let message = format!("expected a vector `[a, b, c]`, found {}", other.describe());
-                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
-                None
-            }
-        }
-    }
-
     /// A number known when the file is compiled; anything else is reported.
     pub fn constant_expr(&mut self, expr: &Expr, what: &str) -> Option<f64> {
         let node = self.field(expr)?;
         self.as_constant(node, expr.span, what)
     }
 
-    pub fn as_constant(&mut self, node: Node, span: Span, what: &str) -> Option<f64> {
-        let value = self.module.graph.constant_value(node);
-        if value.is_none() {
-            let span = self.user_span(span);
-            let on = if self.depends_on_place(node) { "x, y or z" } else { "t" };
-            let message = format!("{what} must be a constant, but it depends on {on}");
-            self.report(Diagnostic::error(Code::NOT_CONSTANT, span, message));
-        }
-        value
-    }
-
-    /// Whether a value differs from point to point, and not only from one time to another.
-    pub fn depends_on_place(&self, node: Node) -> bool {
-        Axis::SPACE.into_iter().any(|axis| self.module.graph.uses(node, axis))
-    }
-
+    /// The value of an expression; [`Value::Failed`] if a part of it was in error, which was reported.
     pub fn expr(&mut self, expr: &Expr) -> Value {
         self.evaluations += 1;
         if self.over_budget(expr.span) {
@@ -322,7 +159,7 @@ impl<'a> Lowering<'a> {
                         .help(format!("write `{name}(…)`")),
                 )
             }
-            None if super::builtins::exists(name) => {
+            None if builtins::exists(name) => {
                 let message = format!("`{name}` is a function");
                 self.fail(
                     Diagnostic::error(Code::NOT_A_FUNCTION, span, message).help(format!("write `{name}(…)`")),
@@ -416,14 +253,14 @@ impl<'a> Lowering<'a> {
 
     pub fn raise(&mut self, a: Node, b: Node, span: Span) -> Node {
         let Some(exponent) = self.module.graph.constant_value(b) else {
-            return self.binary(Binary::Pow, a, b, span);
+            return self.binary(BinaryFunction::Pow.into(), a, b, span);
         };
         if exponent == 0.5 {
             return self.unary(Unary::Sqrt, a, span);
         }
         let whole = exponent.abs();
         if whole.fract() != 0.0 || whole > 64.0 {
-            return self.binary(Binary::Pow, a, b, span);
+            return self.binary(BinaryFunction::Pow.into(), a, b, span);
         }
         let power = self.whole_power(a, whole as u32, span);
         if exponent < 0.0 {
@@ -563,26 +400,5 @@ impl<'a> Lowering<'a> {
             index += 1.0;
         }
         Value::Number(self.balanced(op, &members, span))
-    }
-
-    /// Whether one more call may be made.
-    pub fn may_call(&mut self, function: &str, source: SourceId, span: Span) -> bool {
-        let calls = &self.scope.calls;
-        if calls.iter().any(|call| call.function == function && call.source == source) {
-            let span = self.user_span(span);
-            let message = format!("`{function}` calls itself");
-            self.report(
-                Diagnostic::error(Code::RECURSION, span, message)
-                    .help("use `any i in 0..n:` or `all i in 0..n:` for repetition"),
-            );
-            return false;
-        }
-        if calls.len() >= DEEPEST_CALL {
-            let span = self.user_span(span);
-            let message = format!("calls nested more than {DEEPEST_CALL} deep");
-            self.report(Diagnostic::error(Code::TOO_DEEP, span, message));
-            return false;
-        }
-        true
     }
 }

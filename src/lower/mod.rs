@@ -8,6 +8,7 @@
 mod arguments;
 mod builtins;
 mod eval;
+mod lowering;
 mod names;
 mod probes;
 mod scene;
@@ -25,7 +26,7 @@ use crate::ir::{Graph, Node};
 use crate::sph::Method;
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Attribute, Definition, Function, Item, Name, Param};
-use eval::Lowering;
+use lowering::Lowering;
 use names::{Kind, RESERVED};
 use value::Value;
 

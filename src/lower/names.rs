@@ -9,6 +9,7 @@ use crate::syntax::ast::{Function, Name};
 /// Names with a meaning that no item can change.
 pub(super) const RESERVED: [&str; 5] = ["x", "y", "z", "t", "pi"];
 
+/// What a name stands for.
 #[derive(Debug, Clone)]
 pub(super) enum Kind<'a> {
     Value(Value),
@@ -17,6 +18,7 @@ pub(super) enum Kind<'a> {
     Scene,
 }
 
+/// A name that an item defines.
 #[derive(Debug, Clone)]
 pub(super) struct Global<'a> {
     pub kind: Kind<'a>,
@@ -25,7 +27,8 @@ pub(super) struct Global<'a> {
     used: bool,
 }
 
-/// The items of the prelude and of the file; the file's shadow the prelude's, but not inside the prelude itself.
+/// The items of the prelude and of the file. Those of the file shadow those of the prelude, but not inside
+/// the prelude itself.
 #[derive(Debug, Default)]
 pub(super) struct Names<'a> {
     prelude: HashMap<String, Global<'a>>,
@@ -91,7 +94,8 @@ impl<'a> Names<'a> {
         names
     }
 
-    /// Items of the file that nothing uses; solids are what a file is for, so they are never unused.
+    /// Items of the file that nothing uses: name, what it is, place. Solids are what a file is for, so they
+    /// are never unused.
     pub fn unused(&self) -> Vec<(String, &'static str, Span)> {
         let mut unused: Vec<_> = self
             .file

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::eval::Lowering;
+use super::lowering::Lowering;
 use super::scene::Block;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;

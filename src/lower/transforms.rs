@@ -1,24 +1,53 @@
 //! Methods of shapes: the shape is evaluated in moved, turned or scaled coordinates.
 //!
-//! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point before
-//! the transformation. Displacements and angles may depend on time: the shape then moves.
+//! A shape S moved by a transformation T has ω(T⁻¹ p): its coordinates are replaced by those of the point
+//! before the transformation. Displacements and angles may depend on time: the shape then moves.
 
-use super::eval::Lowering;
+use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::ir::{Axis, Binary, Node, Unary};
+use crate::ir::{Axis, Binary, Node, Unary, UnaryFunction};
 use crate::syntax::ast::{Argument, Expr, Name};
 
-const METHODS: [&str; 7] = ["move", "rotate_x", "rotate_y", "rotate_z", "rotate", "scale", "mirror"];
+/// What a method does to a shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Transform {
+    Move,
+    /// A turn about a coordinate axis.
+    RotateAbout(Axis3),
+    Rotate,
+    Scale,
+    Mirror,
+}
 
-/// Parameter names of a method, in order.
-fn parameters(method: &str) -> &'static [&'static str] {
-    match method {
-        "move" => &["by"],
-        "rotate" => &["axis", "angle"],
-        "scale" => &["factor"],
-        "mirror" => &["normal"],
-        _ => &["angle"],
+/// A coordinate axis, by its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axis3 {
+    X = 0,
+    Y = 1,
+    Z = 2,
+}
+
+const METHODS: [(&str, Transform); 7] = [
+    ("move", Transform::Move),
+    ("rotate_x", Transform::RotateAbout(Axis3::X)),
+    ("rotate_y", Transform::RotateAbout(Axis3::Y)),
+    ("rotate_z", Transform::RotateAbout(Axis3::Z)),
+    ("rotate", Transform::Rotate),
+    ("scale", Transform::Scale),
+    ("mirror", Transform::Mirror),
+];
+
+impl Transform {
+    /// The names of its parameters, in order.
+    fn parameters(self) -> &'static [&'static str] {
+        match self {
+            Self::Move => &["by"],
+            Self::RotateAbout(_) => &["angle"],
+            Self::Rotate => &["axis", "angle"],
+            Self::Scale => &["factor"],
+            Self::Mirror => &["normal"],
+        }
     }
 }
 
@@ -29,17 +58,35 @@ enum Factor {
     Moving(Node),
 }
 
+/// Sine and cosine of an angle: of a fixed one, or of one that depends on time.
+#[derive(Clone, Copy)]
+enum Turn {
+    Fixed { sin: f64, cos: f64 },
+    Moving { sin: Node, cos: Node },
+}
+
+impl Turn {
+    fn factors(self) -> [Factor; 2] {
+        match self {
+            Self::Fixed { sin, cos } => [sin, cos].map(Factor::Number),
+            Self::Moving { sin, cos } => [sin, cos].map(Factor::Moving),
+        }
+    }
+}
+
 impl Lowering<'_> {
     pub fn method(&mut self, receiver: &Expr, method: &Name, arguments: &[Argument], span: Span) -> Value {
         let shape = self.field(receiver);
-        if !METHODS.contains(&method.text.as_str()) {
+        let known = METHODS.into_iter().find(|(name, _)| *name == method.text);
+        let Some((_, transform)) = known else {
+            let names = METHODS.map(|(name, _)| name);
             let message = format!("shapes have no method `{}`", method.text);
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message)
-                .help(format!("they have {}", METHODS.join(", ")))
-                .suggest(&method.text, METHODS);
+                .help(format!("they have {}", names.join(", ")))
+                .suggest(&method.text, names);
             return self.fail(diagnostic);
-        }
-        let parameters = parameters(&method.text);
+        };
+        let parameters = transform.parameters();
         let mut values: Vec<Option<(Value, Span)>> = vec![None; parameters.len()];
         for (position, argument) in arguments.iter().enumerate() {
             let slot = match &argument.name {
@@ -55,7 +102,7 @@ impl Lowering<'_> {
             return self.fail(self.wrong_arguments(method, parameters, span));
         };
         let Some(shape) = shape else { return Value::Failed };
-        self.transform(shape, &method.text, &values, span).map_or(Value::Failed, Value::Number)
+        self.transformed(shape, transform, &values, span).map_or(Value::Failed, Value::Number)
     }
 
     fn wrong_arguments(&self, method: &Name, parameters: &[&str], span: Span) -> Diagnostic {
@@ -63,18 +110,24 @@ impl Lowering<'_> {
         Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message)
     }
 
-    fn transform(&mut self, shape: Node, method: &str, values: &[(Value, Span)], span: Span) -> Option<Node> {
+    fn transformed(
+        &mut self,
+        shape: Node,
+        transform: Transform,
+        values: &[(Value, Span)],
+        span: Span,
+    ) -> Option<Node> {
         let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
         let (first, at) = &values[0];
-        match method {
-            "move" => {
+        match transform {
+            Transform::Move => {
                 let by = self.as_vector(first, *at)?;
                 let q = std::array::from_fn(|i| self.binary(Binary::Sub, p[i], by[i], span));
                 Some(self.module.graph.substitute(shape, q))
             }
-            "rotate_x" | "rotate_y" | "rotate_z" => {
-                let (sin, cos) = self.angle(first, *at)?;
-                let axis = usize::from(method.as_bytes()[7] - b'x');
+            Transform::RotateAbout(axis) => {
+                let [sin, cos] = self.angle(first, *at)?.factors();
+                let axis = axis as usize;
                 let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
                 let mut q = p;
                 let back = self.negative(sin, span);
@@ -82,15 +135,15 @@ impl Lowering<'_> {
                 q[k] = self.combination(&[(back, p[j]), (cos, p[k])], span);
                 Some(self.module.graph.substitute(shape, q))
             }
-            "rotate" => {
+            Transform::Rotate => {
                 let axis = self.constant_vector(first, *at, "an axis")?;
                 let angle = self.angle(&values[1].0, values[1].1)?;
                 let axis = self.unit_vector(axis, *at)?;
                 let q = self.rotated_back(p, axis, angle, span);
                 Some(self.module.graph.substitute(shape, q))
             }
-            "scale" => self.scale(shape, p, first, *at, span),
-            _ => {
+            Transform::Scale => self.scale(shape, p, first, *at, span),
+            Transform::Mirror => {
                 let normal = self.constant_vector(first, *at, "a normal")?;
                 let n = self.unit_vector(normal, *at)?;
                 // p − 2(p·n)n
@@ -105,8 +158,8 @@ impl Lowering<'_> {
         }
     }
 
-    /// Scales about the origin. ω is scaled too (by the smallest factor), so that its gradient keeps its length
-    /// on the surface.
+    /// Scales about the origin. ω is scaled too (by the smallest factor), so that its gradient keeps its
+    /// length on the surface.
     fn scale(&mut self, shape: Node, p: [Node; 3], factor: &Value, at: Span, span: Span) -> Option<Node> {
         let factors = match factor {
             Value::Vector(_) => self.constant_vector(factor, at, "a scale factor")?,
@@ -138,15 +191,15 @@ impl Lowering<'_> {
     }
 
     /// Sine and cosine of an angle that may depend on time, but not on the place.
-    fn angle(&mut self, value: &Value, at: Span) -> Option<(Factor, Factor)> {
+    fn angle(&mut self, value: &Value, at: Span) -> Option<Turn> {
         let angle = self.as_number(value, at)?;
         if self.module.graph.constant_value(angle).is_some() || self.depends_on_place(angle) {
             let angle = self.as_constant(angle, at, "an angle")?;
             let (sin, cos) = sin_cos(angle);
-            return Some((Factor::Number(sin), Factor::Number(cos)));
+            return Some(Turn::Fixed { sin, cos });
         }
-        let [sin, cos] = [Unary::Sin, Unary::Cos].map(|op| self.unary(op, angle, at));
-        Some((Factor::Moving(sin), Factor::Moving(cos)))
+        let [sin, cos] = [UnaryFunction::Sin, UnaryFunction::Cos].map(|op| self.unary(op.into(), angle, at));
+        Some(Turn::Moving { sin, cos })
     }
 
     fn negative(&mut self, factor: Factor, span: Span) -> Factor {
@@ -157,22 +210,21 @@ impl Lowering<'_> {
     }
 
     /// The point turned by −angle about a unit axis (Rodrigues' formula, as a matrix).
-    fn rotated_back(&mut self, p: [Node; 3], n: [f64; 3], angle: (Factor, Factor), span: Span) -> [Node; 3] {
-        let (sin, cos) = angle;
+    fn rotated_back(&mut self, p: [Node; 3], n: [f64; 3], angle: Turn, span: Span) -> [Node; 3] {
         std::array::from_fn(|i| {
             let row: [(Factor, Node); 3] = std::array::from_fn(|j| {
-                // of the vector product with the axis
+                // the matrix of the vector product with the axis
                 let cross = match (3 + j - i) % 3 {
                     0 => 0.0,
                     1 => -n[(i + 2) % 3],
                     _ => n[(i + 1) % 3],
                 };
                 let (identity, along) = (f64::from(u8::from(i == j)), n[i] * n[j]);
-                let factor = match (sin, cos) {
-                    (Factor::Number(sin), Factor::Number(cos)) => {
+                let factor = match angle {
+                    Turn::Fixed { sin, cos } => {
                         Factor::Number(cos * identity + (1.0 - cos) * along - sin * cross)
                     }
-                    _ => self.turning((sin, cos), (identity, along, cross), span),
+                    Turn::Moving { sin, cos } => self.turning((sin, cos), (identity, along, cross), span),
                 };
                 (factor, p[j])
             });
@@ -180,14 +232,14 @@ impl Lowering<'_> {
         })
     }
 
-    /// cos·identity + (1 − cos)·along − sin·cross of a moving angle, written as along + (identity − along)·cos − cross·sin.
+    /// cos·identity + (1 − cos)·along − sin·cross of a moving angle, written as along + (identity −
+    /// along)·cos − cross·sin.
     fn turning(
         &mut self,
-        (sin, cos): (Factor, Factor),
+        (sin, cos): (Node, Node),
         (identity, along, cross): (f64, f64, f64),
         span: Span,
     ) -> Factor {
-        let (Factor::Moving(sin), Factor::Moving(cos)) = (sin, cos) else { return Factor::Number(f64::NAN) };
         let number = Factor::Number;
         let swinging = self.combination(&[(number(identity - along), cos), (number(-cross), sin)], span);
         if along == 0.0 {

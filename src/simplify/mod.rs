@@ -1,19 +1,20 @@
 //! Graph → cheaper graph with the same values.
 //!
-//! Each rule is an equation with a direction and a label. All rules here are *value-exact*: the result has the
-//! same value for every input, infinities and NaN included, except that a zero may change its sign (no consumer
-//! can tell: ω = ±0 is the surface). Nothing is reassociated or expanded: (x − a)² − … keeps its factored
-//! differences, whose digits an expansion would lose.
+//! Each rule is an equation with a direction and a label. All rules here are *value-exact*: the result has
+//! the same value for every input, infinities and NaN included, except that a zero may change its sign (no
+//! consumer can tell: ω = ±0 is the surface). Nothing is reassociated or expanded: (x − a)² − … keeps its
+//! factored differences, whose digits an expansion would lose.
 //!
 //! Common subexpressions need no rule: interning finds them.
 
 mod rules;
+mod simplifier;
 
-use std::collections::BTreeMap;
 use std::fmt;
 
-use crate::diagnostic::Span;
-use crate::ir::{Expr, Graph, Node};
+use crate::ir::{Graph, Node};
+use simplifier::Simplifier;
+pub use simplifier::{Applied, MOST_PLACES, Uses};
 
 /// What a step of the compiler keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,35 +34,10 @@ impl fmt::Display for Exactness {
     }
 }
 
-/// What simplification did: the use of each rule, by its equation.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Applied(pub BTreeMap<&'static str, Uses>);
-
-/// The uses of one rule.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Uses {
-    pub count: usize,
-    /// Where what was rewritten stands: the first [`MOST_PLACES`] different places, in the order of the graph.
-    pub places: Vec<Span>,
-}
-
-/// Places that are kept of each rule.
-pub const MOST_PLACES: usize = 8;
-
-impl Uses {
-    fn note(&mut self, span: Option<Span>) {
-        self.count += 1;
-        if let Some(span) = span.filter(|span| !self.places.contains(span) && self.places.len() < MOST_PLACES)
-        {
-            self.places.push(span);
-        }
-    }
-}
-
 /// The roots and what they use, simplified.
 pub fn simplify(graph: &Graph, roots: &[Node]) -> (Graph, Vec<Node>, Applied) {
     let used = graph.reachable(roots);
-    let mut simplifier = Simplifier::default();
+    let mut simplifier = Simplifier::new(rules::ALL);
     let mut image: Vec<Option<Node>> = vec![None; graph.len()];
     for (node, expr) in graph.nodes().filter(|(node, _)| used[node.index()]) {
         let mapped = expr.map(|operand| image[operand.index()].unwrap_or(operand));
@@ -70,25 +46,6 @@ pub fn simplify(graph: &Graph, roots: &[Node]) -> (Graph, Vec<Node>, Applied) {
     let roots: Vec<Node> = roots.iter().map(|root| image[root.index()].unwrap_or(*root)).collect();
     let (graph, roots) = simplifier.graph.extract(&roots);
     (graph, roots, simplifier.applied)
-}
-
-#[derive(Default)]
-struct Simplifier {
-    graph: Graph,
-    applied: Applied,
-}
-
-impl Simplifier {
-    /// The node of an expression over simplified operands, itself simplified.
-    fn make(&mut self, expr: Expr, span: Option<Span>) -> Node {
-        for rule in rules::ALL {
-            if let Some(result) = (rule.apply)(self, expr, span) {
-                self.applied.0.entry(rule.equation).or_default().note(span);
-                return result;
-            }
-        }
-        self.graph.intern(expr, span)
-    }
 }
 
 #[cfg(test)]

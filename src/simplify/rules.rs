@@ -1,15 +1,8 @@
 //! The rules: an equation read from left to right, the condition under which it holds, and the rewrite.
 
-use super::Simplifier;
+use super::simplifier::{Rule, Simplifier};
 use crate::diagnostic::Span;
 use crate::ir::{Binary, Expr, Node, Unary};
-
-pub(super) struct Rule {
-    /// As `rfm explain` prints it.
-    pub equation: &'static str,
-    /// The simplified node, if the left side and the condition fit.
-    pub apply: fn(&mut Simplifier, Expr, Option<Span>) -> Option<Node>,
-}
 
 pub(super) const ALL: &[Rule] = &[
     Rule { equation: "op(constants) = constant", apply: fold },
@@ -81,7 +74,7 @@ fn subtract_negated(s: &mut Simplifier, expr: Expr, span: Option<Span>) -> Optio
     Some(s.make(Expr::Binary(Binary::Add, a, y), span))
 }
 
-/// Also quotients. Signs move outwards, where sums and further products absorb them.
+/// For quotients too. Signs move outwards, where sums and further products absorb them.
 fn multiply_negated(s: &mut Simplifier, expr: Expr, span: Option<Span>) -> Option<Node> {
     let Expr::Binary(op @ (Binary::Mul | Binary::Div), a, b) = expr else { return None };
     let (x, y) = match (negated(s, a), negated(s, b)) {
@@ -94,7 +87,7 @@ fn multiply_negated(s: &mut Simplifier, expr: Expr, span: Option<Span>) -> Optio
     Some(s.make(Expr::Unary(Unary::Neg, product), span))
 }
 
-/// Also x / 1.
+/// For x / 1 too.
 fn multiply_one(s: &mut Simplifier, expr: Expr, _: Option<Span>) -> Option<Node> {
     match expr {
         Expr::Binary(Binary::Mul, a, b) if is_constant(s, a, 1.0) => Some(b),
@@ -112,7 +105,7 @@ fn multiply_minus_one(s: &mut Simplifier, expr: Expr, span: Option<Span>) -> Opt
     Some(s.make(Expr::Unary(Unary::Neg, x), span))
 }
 
-/// Also x − 0. −0 + 0 is +0: the sign of a zero may change.
+/// For x − 0 too. −0 + 0 is +0: the sign of a zero may change.
 fn add_zero(s: &mut Simplifier, expr: Expr, _: Option<Span>) -> Option<Node> {
     let zero = |s: &Simplifier, node: Node| s.graph.as_constant(node) == Some(0.0);
     match expr {

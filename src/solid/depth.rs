@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
-use super::Solid;
+use super::construction::Solid;
 use crate::field::{Field, GradientsMut, Points};
 
-/// The depth below a solid's surface, m, as a [`Field`]: minus the distance of [`Solid::contact`], so positive inside,
-/// with minus the outward unit normal as its gradient.
+/// The depth below a solid's surface, m, as a [`Field`]: minus the distance of [`Solid::contact`], so
+/// positive inside, with minus the outward unit normal as its gradient.
 ///
-/// Exact near quadrics whatever the scales of the leaves, where ω only has the right sign; Newton's method on it is at
-/// the surface after a step or two.
+/// Exact near quadrics whatever the scales of the leaves, where ω only has the right sign; Newton's method on
+/// it is at the surface after a step or two.
 ///
 /// ```
 /// use rfm::{Engine, Field, Program, glam::DVec3, solid::Depth};

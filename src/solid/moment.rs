@@ -2,20 +2,22 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::bounds::Bounds;
-use super::programs::{ProgramKind, UniformValues};
-use super::ranges::UniformRanges;
-use super::{Inner, Parts};
+use super::bounds::extent::Bounds;
+use super::engine::ProgramKind;
+use super::leaves::leaf_set::LeafTree;
+use super::programs::number::UniformValues;
+use super::programs::ranges::UniformRanges;
 use crate::interval::Interval;
 
-/// A stretch of time. Values are those at its end, ranges hold all of it; a solid at rest has one for ever.
+/// A stretch of time. Values are those at its end, ranges hold for all of it; a solid at rest has one for
+/// ever.
 pub(super) struct Moment {
     pub from: f64,
     pub to: f64,
     uniforms: [OnceLock<UniformValues>; ProgramKind::COUNT],
     omega_ranges: OnceLock<UniformRanges>,
     twin_ranges: OnceLock<UniformRanges>,
-    parts: OnceLock<Option<Arc<Parts>>>,
+    parts: OnceLock<Option<Arc<LeafTree>>>,
     bounds: OnceLock<Bounds>,
 }
 
@@ -49,13 +51,9 @@ impl Moment {
         slot.get_or_init(|| find(self.interval()))
     }
 
-    /// The solid taken apart, see [`Inner::parts`].
-    pub fn parts(&self, inner: &Inner) -> Option<Arc<Parts>> {
-        let make = || {
-            let (store, words) = inner.parts()?;
-            Some(Arc::new(Parts { leaves: store.during(self.from, self.to), words }))
-        };
-        self.parts.get_or_init(make).clone()
+    /// The solid taken apart, by `find` for the two ends of the stretch.
+    pub fn parts(&self, find: impl FnOnce(f64, f64) -> Option<Arc<LeafTree>>) -> Option<Arc<LeafTree>> {
+        self.parts.get_or_init(|| find(self.from, self.to)).clone()
     }
 
     pub fn bounds(&self, find: impl FnOnce() -> Bounds) -> &Bounds {

@@ -5,10 +5,10 @@ use proptest::test_runner::RngSeed;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::{
-    Arithmetic, Axis, Binary, ErrorAnalysis, FloatType, Form, Forms, Graph, Growth, Inputs, Interpreter,
-    Node, Unary, exact, localised,
+    Arithmetic, Axis, Binary, ErrorAnalysis, Form, Forms, Graph, Inputs, Interpreter, Magnitudes, Node,
+    Unary, UnaryFunction, exact, localised,
 };
-use rfm::{Engine, Program, Solid};
+use rfm::{Engine, Precision, Program, Solid};
 
 /// One more operation of a graph, with its operands counted back from the newest node.
 type Step = (u8, usize, usize, f64);
@@ -38,8 +38,8 @@ fn build(steps: &[Step]) -> (Graph, Node) {
                 let c = graph.constant(1.5 + c.abs());
                 graph.binary(Binary::Div, a, c)
             }
-            21 => graph.unary(Unary::Sin, a),
-            22 => graph.unary(Unary::Atan, a),
+            21 => graph.unary(UnaryFunction::Sin.into(), a),
+            22 => graph.unary(UnaryFunction::Atan.into(), a),
             23 => {
                 let size = graph.unary(Unary::Abs, a);
                 let one = graph.constant(1.0);
@@ -49,7 +49,7 @@ fn build(steps: &[Step]) -> (Graph, Node) {
             _ => {
                 let c = graph.constant(c);
                 let difference = graph.binary(Binary::Sub, a, c);
-                graph.unary(Unary::Exp, difference)
+                graph.unary(UnaryFunction::Exp.into(), difference)
             }
         });
     }
@@ -69,8 +69,8 @@ fn points(over: &Aabb, inside: &[[f64; 3]]) -> Vec<DVec3> {
 }
 
 /// |computed − exact| at a point in `f64` or `f32`.
-fn error(program: &Interpreter, float: FloatType, input: DVec3, exact: &exact::Exact) -> f64 {
-    if float == FloatType::F64 {
+fn error(program: &Interpreter, precision: Precision, input: DVec3, exact: &exact::Exact) -> f64 {
+    if precision == Precision::F64 {
         let mut out = [0.0];
         program.eval_f64(input.to_array(), &mut out);
         exact.error_of(out[0])
@@ -119,13 +119,13 @@ proptest! {
         let lo = scale * DVec3::from_array(lo);
         let over = Aabb::new(lo, lo + scale * DVec3::from_array(size));
         let inputs = if double { Inputs::Exact } else { inputs };
-        let float = if double { FloatType::F64 } else { FloatType::F32 };
+        let precision = if double { Precision::F64 } else { Precision::F32 };
         let origin = if inputs == Inputs::Shifted { over.centre() } else { DVec3::ZERO };
         let (program, start) =
             if inputs == Inputs::Shifted { localised(&graph, root, origin) } else { (graph.clone(), root) };
         let local = Aabb::new(over.min - origin, over.max - origin).grown(1e-12 * scale);
-        let forms = Growth::over(&program, &local).forms(&program, form, float);
-        let analysis = ErrorAnalysis::new(&program, start, Arithmetic { float, forms: &forms, inputs });
+        let forms = Magnitudes::over(&program, &local).forms(&program, form, precision);
+        let analysis = ErrorAnalysis::new(&program, start, Arithmetic { precision, forms: &forms, inputs });
         let (whole, divided) = (analysis.bound(&local), analysis.certify(&local, 0.0));
         // up to the rounding of the bounds themselves, each of which sums outwards on its own (1.3e-8 was seen)
         prop_assert!(divided <= whole * (1.0 + 1e-6), "{divided:e} {whole:e}");
@@ -137,7 +137,7 @@ proptest! {
                 continue;
             }
             let Some(truth) = exact::evaluate(&graph, &[root], p.to_array()) else { continue };
-            let found = error(&interpreter, float, p - origin, &truth[0]);
+            let found = error(&interpreter, precision, p - origin, &truth[0]);
             prop_assert!(found <= divided, "{found:e} at {p} exceeds {divided:e} ({inputs:?}, {form:?})");
         }
     }
@@ -163,15 +163,15 @@ fn certificates_of_ordinary_solids_are_useful() {
         ("bishop", example("bishop"), box3),
         ("64 spheres", spheres(), wide),
     ] {
-        for (float, form) in [
-            (FloatType::F64, Form::Stable),
-            (FloatType::F32, Form::Stable),
-            (FloatType::F32, Form::Textbook),
-            (FloatType::F64, Form::Scaled),
+        for (precision, form) in [
+            (Precision::F64, Form::Stable),
+            (Precision::F32, Form::Stable),
+            (Precision::F32, Form::Textbook),
+            (Precision::F64, Form::Scaled),
         ] {
             let (graph, root) = solid.formula();
             let forms = Forms::all(form);
-            let arithmetic = Arithmetic { float, forms: &forms, inputs: Inputs::Exact };
+            let arithmetic = Arithmetic { precision, forms: &forms, inputs: Inputs::Exact };
             let bound = ErrorAnalysis::new(graph, root, arithmetic).certify(&over, 0.0);
             let program = Interpreter::with_forms(graph, &[root], [&forms, &forms]);
             let mut seed = 1u64;
@@ -184,7 +184,7 @@ fn certificates_of_ordinary_solids_are_useful() {
                 let at = DVec3::new(random(), random(), random());
                 let p = (over.min + over.size() * at).as_vec3().as_dvec3();
                 let Some(truth) = exact::evaluate(graph, &[root], p.to_array()) else { continue };
-                largest = largest.max(error(&program, float, p, &truth[0]));
+                largest = largest.max(error(&program, precision, p, &truth[0]));
             }
             assert!(
                 largest <= bound && bound <= 100.0 * largest,

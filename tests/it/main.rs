@@ -3,9 +3,9 @@
 mod agreement;
 mod bad_input;
 mod blocks;
-mod budget;
 mod cells;
 mod certificates;
+mod circles;
 mod cli;
 mod contact;
 mod diagnostics;
@@ -23,6 +23,7 @@ mod run;
 mod simplify;
 mod sweep;
 mod tidy;
+mod tolerance;
 mod tool;
 mod validation;
 mod walls;

@@ -479,7 +479,7 @@ fn certificates_hold_at_the_time_they_are_for() {
         for _ in 0..300 {
             let p = random.point(2.0);
             let truth = exact::evaluate_at(graph, &[root], p.to_array(), time).unwrap().remove(0);
-            assert!(truth.error_of(chosen.omega(p)) <= chosen.bound(), "{:?}", chosen.plan());
+            assert!(truth.error_of(chosen.omega(p)) <= chosen.bound(), "{:?}", chosen.variant());
         }
     }
 }

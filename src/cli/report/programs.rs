@@ -221,8 +221,8 @@ fn certified<T: Lane>(solid: &Solid, over: Aabb) -> Option<f64> {
     };
     let forms = solid.forms(ProgramKind::Value, T::PRECISION);
     let (graph, root) = solid.formula();
-    let margin = 2.0 * float.unit * over.min.abs().max(over.max.abs()).max_element();
-    let arithmetic = Arithmetic { float, forms, inputs: Inputs::Exact };
+    let margin = 2.0 * FloatType::of(T::PRECISION).unit * over.min.abs().max(over.max.abs()).max_element();
+    let arithmetic = Arithmetic { precision: T::PRECISION, forms, inputs: Inputs::Exact };
     let bound = ErrorAnalysis::new(graph, root, arithmetic).certify(&over.grown(margin), 0.0);
     bound.is_finite().then_some(bound)
 }

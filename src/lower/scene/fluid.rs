@@ -1,6 +1,6 @@
 //! The fluid of a scene and how it is solved: the keys of every method, and those that a method declares for itself.
 
-use super::super::eval::Lowering;
+use super::super::lowering::Lowering;
 use super::{Block, Fluid, Solver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;

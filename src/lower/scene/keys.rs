@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::super::eval::Lowering;
+use super::super::lowering::Lowering;
 use super::super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::Node;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::Tolerance;
-use super::super::eval::Lowering;
+use super::super::lowering::Lowering;
 use super::super::probes::Surroundings;
 use super::fluid::FluidAndMethod;
 use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Truth};

@@ -1,0 +1,171 @@
+//! Cranelift instructions on a 128-bit vector of lanes, one function at a time.
+//!
+//! Traps that shape this file: `fmin`/`fmax` cost seven instructions, a comparison with `bitselect` is
+//! recognised as the single `min`/`max` instruction; a scalar float `select` becomes a jump, so single points
+//! use vectors too; `fma` is never emitted, because results must not depend on the processor.
+
+use std::collections::{HashMap, HashSet};
+
+use cranelift_codegen::ir::condcodes::FloatCC;
+use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, types};
+use cranelift_frontend::FunctionBuilder;
+
+use super::host_functions::HostFunction;
+use crate::ir::{Binary, Expr, Forms, Graph, Node};
+use crate::precision::Precision;
+
+/// Emits instructions into one function.
+pub(super) struct Emitter<'a, 'f> {
+    pub builder: &'a mut FunctionBuilder<'f>,
+    pub precision: Precision,
+    pub forms: &'a Forms,
+    /// The functions that the program calls.
+    hosts: &'a Hosts,
+    /// Intermediate results of R₀ for a pair of operands: value and weights share them.
+    pub parts: HashMap<(Node, Node, Junction), R0Parts>,
+    /// Pairs whose weights will be asked for: their value uses the same quotient.
+    pub weighted: HashSet<(Node, Node, Junction)>,
+}
+
+/// The functions of the mathematical library that were declared in a program.
+pub(super) type Hosts = HashMap<HostFunction, FuncRef>;
+
+/// A node, and the value that holds it.
+pub(super) type Operand = (Node, Value);
+
+/// ∧ or ∨
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Junction {
+    And,
+    Or,
+}
+
+/// What value and weights of u ∧ v or u ∨ v share.
+#[derive(Clone, Copy)]
+pub(super) struct R0Parts {
+    /// The operand that the result is near to on the small branch: the minimum for ∧, the maximum for ∨.
+    pub near: Value,
+    /// The other one.
+    pub far: Value,
+    /// u + v
+    pub sum: Value,
+    /// √(u² + v²), not less than max(|u|, |v|)
+    pub h: Value,
+    /// Mask of the small branch.
+    pub small: Value,
+    /// max(|u|, |v|) + h
+    pub denominator: Value,
+    /// Masks u < v and v < u: at a tie neither, and both operands get the same weight.
+    pub less: Value,
+    pub greater: Value,
+    /// |τ| with the sign of m/M on the branch taken; only where weights are asked for.
+    pub tau: Option<Value>,
+}
+
+impl<'a, 'f> Emitter<'a, 'f> {
+    pub fn new(
+        builder: &'a mut FunctionBuilder<'f>,
+        precision: Precision,
+        (graph, forms): (&Graph, &'a Forms),
+        hosts: &'a Hosts,
+    ) -> Self {
+        let weights = graph.nodes().filter_map(|(_, expr)| match expr {
+            Expr::Binary(Binary::AndWeight, u, v) => Some((u, v, Junction::And)),
+            Expr::Binary(Binary::OrWeight, u, v) => Some((u, v, Junction::Or)),
+            _ => None,
+        });
+        let weighted = weights.flat_map(|(u, v, junction)| [(u, v, junction), (v, u, junction)]).collect();
+        Self { builder, precision, forms, hosts, parts: HashMap::new(), weighted }
+    }
+
+    pub fn lane_type(&self) -> Type {
+        match self.precision {
+            Precision::F32 => types::F32,
+            Precision::F64 => types::F64,
+        }
+    }
+
+    pub fn vector_type(&self) -> Type {
+        match self.precision {
+            Precision::F32 => types::F32X4,
+            Precision::F64 => types::F64X2,
+        }
+    }
+
+    pub fn constant(&mut self, value: f64) -> Value {
+        let scalar = match self.precision {
+            Precision::F32 => self.builder.ins().f32const(value as f32),
+            Precision::F64 => self.builder.ins().f64const(value),
+        };
+        let vector = self.vector_type();
+        self.builder.ins().splat(vector, scalar)
+    }
+
+    /// A parameter or uniform in every lane; NaN if the program was given none.
+    pub fn parameter(&mut self, parameters: Option<Value>, i: u32) -> Value {
+        let Some(base) = parameters else { return self.constant(f64::NAN) };
+        let (lane, vector) = (self.lane_type(), self.vector_type());
+        let flags = MemFlagsData::trusted().with_readonly();
+        let scalar = self.builder.ins().load(lane, flags, base, (i * lane.bytes()) as i32);
+        self.builder.ins().splat(vector, scalar)
+    }
+
+    /// A mask of all ones in the lanes where the comparison holds, as a vector of floats.
+    pub fn compare(&mut self, condition: FloatCC, a: Value, b: Value) -> Value {
+        let mask = self.builder.ins().fcmp(condition, a, b);
+        let vector = self.vector_type();
+        self.builder.ins().bitcast(vector, MemFlagsData::new().with_endianness(ENDIANNESS), mask)
+    }
+
+    pub fn select(&mut self, mask: Value, yes: Value, no: Value) -> Value {
+        self.builder.ins().bitselect(mask, yes, no)
+    }
+
+    /// b < a ? a : b, one instruction; the pattern is not recognised with the comparison turned round.
+    pub fn max(&mut self, a: Value, b: Value) -> Value {
+        let less = self.compare(FloatCC::LessThan, b, a);
+        self.select(less, a, b)
+    }
+
+    /// A vector whose lanes have only their sign bit set. A constant, which is loaded once before a loop:
+    /// `fneg` and `fabs` would build it anew at every use.
+    fn sign_bits(&mut self) -> Value {
+        self.constant(-0.0)
+    }
+
+    pub fn negate(&mut self, a: Value) -> Value {
+        let sign = self.sign_bits();
+        self.builder.ins().bxor(a, sign)
+    }
+
+    pub fn abs(&mut self, a: Value) -> Value {
+        let sign = self.sign_bits();
+        self.builder.ins().band_not(a, sign)
+    }
+
+    /// A host function, lane by lane.
+    ///
+    /// # Panics
+    /// If it was not declared: a bug of the caller.
+    pub fn call(&mut self, function: HostFunction, operands: &[Value]) -> Value {
+        let function = self.hosts[&function];
+        let vector = self.vector_type();
+        let first = self.call_in_lane(function, operands, 0);
+        let mut result = self.builder.ins().scalar_to_vector(vector, first);
+        for lane in 1..self.precision.lanes() as u8 {
+            let value = self.call_in_lane(function, operands, lane);
+            result = self.builder.ins().insertlane(result, value, lane);
+        }
+        result
+    }
+
+    fn call_in_lane(&mut self, function: FuncRef, operands: &[Value], lane: u8) -> Value {
+        let arguments: Vec<Value> =
+            operands.iter().map(|&v| self.builder.ins().extractlane(v, lane)).collect();
+        let call = self.builder.ins().call(function, &arguments);
+        self.builder.inst_results(call)[0]
+    }
+}
+
+/// Only the byte order of a bitcast between lanes of one width, where it does not matter.
+const ENDIANNESS: cranelift_codegen::ir::Endianness = cranelift_codegen::ir::Endianness::Little;

@@ -1,0 +1,71 @@
+//! The machine that code is generated for, and why there may be none.
+
+use std::fmt;
+use std::sync::{Arc, OnceLock};
+
+use cranelift_codegen::isa::OwnedTargetIsa;
+use cranelift_codegen::settings::{self, Configurable};
+
+/// Why there is no program.
+#[derive(Debug, Clone)]
+pub enum CodegenError {
+    /// This processor or system cannot run compiled code; the interpreter can.
+    Unsupported(String),
+    /// The code generator refused what it was given: always a bug of ours.
+    Bug(String),
+}
+
+impl fmt::Display for CodegenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unsupported(why) => write!(f, "machine code is not available here: {why}"),
+            Self::Bug(what) => write!(f, "internal error in the code generator: {what}"),
+        }
+    }
+}
+
+impl std::error::Error for CodegenError {}
+
+/// Above this many nodes the register allocator with linear cost is used: the other one grows superlinearly
+/// (66 000 instructions: 1.8 s against 0.1 s).
+const SINGLE_PASS_ABOVE: usize = 4_000;
+
+/// The instruction set of this machine, found out once per register allocator.
+pub(super) fn target(nodes: usize) -> Result<OwnedTargetIsa, CodegenError> {
+    static THOROUGH: OnceLock<Result<OwnedTargetIsa, CodegenError>> = OnceLock::new();
+    static FAST: OnceLock<Result<OwnedTargetIsa, CodegenError>> = OnceLock::new();
+    let (cell, allocator) =
+        if nodes > SINGLE_PASS_ABOVE { (&FAST, "single_pass") } else { (&THOROUGH, "backtracking") };
+    cell.get_or_init(|| detect(allocator)).as_ref().map(Arc::clone).map_err(Clone::clone)
+}
+
+fn detect(allocator: &str) -> Result<OwnedTargetIsa, CodegenError> {
+    let mut flags = settings::builder();
+    let verify = if cfg!(debug_assertions) { "true" } else { "false" };
+    let options = [
+        ("opt_level", "speed"),
+        ("regalloc_algorithm", allocator),
+        ("enable_verifier", verify),
+        ("is_pic", "false"),
+        ("use_colocated_libcalls", "false"),
+        ("unwind_info", "false"),
+    ];
+    for (name, value) in options {
+        flags.set(name, value).map_err(|e| CodegenError::Bug(format!("setting {name}: {e}")))?;
+    }
+    let unsupported = |e: &dyn fmt::Display| CodegenError::Unsupported(e.to_string());
+    let builder = cranelift_native::builder().map_err(|e| unsupported(&e))?;
+    builder.finish(settings::Flags::new(flags)).map_err(|e| unsupported(&e))
+}
+
+/// The instruction set extensions that generated code uses here, for reports.
+pub fn target_description() -> String {
+    match target(0) {
+        Ok(isa) => {
+            let on = isa.isa_flags().into_iter().filter(|f| f.as_bool() == Some(true));
+            let names: Vec<&str> = on.map(|f| f.name.trim_start_matches("has_")).collect();
+            format!("{} ({})", isa.triple(), names.join(" "))
+        }
+        Err(error) => error.to_string(),
+    }
+}

@@ -1,0 +1,7 @@
+//! What is certain of the values of a graph over a box: ranges, magnitudes, rounding errors.
+
+pub mod error;
+pub mod float;
+pub mod magnitude;
+pub mod range;
+pub mod upper;

@@ -1,0 +1,364 @@
+//! Guaranteed ranges: an interval that contains ω of every point of a box.
+//!
+//! R₀ grows with each operand, so its exact range is reached at the ends of the operands' ranges: two scalar
+//! evaluations, widened by four ulp for their rounding (which cannot change their signs). Squares and
+//! products of two linear functions of one node (slabs) get their exact range too; elsewhere a node that
+//! occurs twice is taken as two independent ones, which is safe but wider.
+//!
+//! A range holds the exact values of the formula over the reals, and for every node also the values that
+//! programs in `f64` find. Rounding never leaves bounds that were rounded outwards, and where squares
+//! overflow or underflow R₀ is widened to what its floating-point form then gives. A node that may not be a
+//! number has [`Interval::ALL`], and so has every node that uses it. Points whose coordinates are not finite
+//! belong to no box.
+
+use std::cell::RefCell;
+
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
+use crate::ir::r0;
+
+/// How the range of one node is found, here and in machine code.
+#[derive(Debug, Clone, Copy)]
+pub enum RangeRule {
+    /// By the operation, from the ranges of its operands.
+    Plain(Expr),
+    /// The product of a node with itself.
+    Square(Node),
+    /// (p·e + q)·(r·e + s) of one node e.
+    Slab { of: Node, first: Affine, second: Affine },
+}
+
+/// slope · node ± offset, with slope 1 or −1; the offset is a constant or a parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct Affine {
+    /// 1 or −1.
+    pub slope: f64,
+    /// `None` for zero.
+    pub offset: Option<Node>,
+    /// Whether the offset is subtracted.
+    pub minus: bool,
+}
+
+impl RangeRule {
+    /// The rule for a node of a graph.
+    pub fn of(graph: &Graph, expr: Expr) -> Self {
+        if let Expr::Binary(Binary::Mul, a, b) = expr {
+            if a == b {
+                return Self::Square(a);
+            }
+            let ((of, first), (other, second)) = (affine(graph, a), affine(graph, b));
+            if of == other && !is_number(graph, of) {
+                return Self::Slab { of, first, second };
+            }
+        }
+        Self::Plain(expr)
+    }
+
+    /// The range of a square or a slab from that of the node it is made of; `None` for other rules.
+    pub(in crate::ir) fn over(&self, range: impl Fn(Node) -> Interval) -> Option<Interval> {
+        match *self {
+            Self::Square(a) => Some(range(a).square()),
+            Self::Slab { of, first, second } => {
+                let line = |affine: Affine| (affine.slope, offset(affine, &range));
+                Some(slab(range(of), line(first), line(second)))
+            }
+            Self::Plain(_) => None,
+        }
+    }
+}
+
+/// The points, times and numbers for which a range is to hold.
+#[derive(Debug, Clone, Copy)]
+pub struct Region<'a> {
+    /// The box.
+    pub space: &'a Aabb,
+    /// Seconds.
+    pub time: Interval,
+    /// The values of the graph's parameters.
+    pub parameters: &'a [f64],
+    /// One range for each number that depends on time alone, see [`Expr::Uniform`].
+    pub uniforms: &'a [Interval],
+}
+
+impl<'a> Region<'a> {
+    /// A box, at any time.
+    pub fn of(space: &'a Aabb) -> Self {
+        Self { space, time: Interval::ALL, parameters: &[], uniforms: &[] }
+    }
+}
+
+/// A graph prepared for the evaluation of ranges.
+#[derive(Debug, Clone)]
+pub struct RangeEvaluator {
+    rules: Vec<RangeRule>,
+    root: Node,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Vec<Interval>> = const { RefCell::new(Vec::new()) };
+}
+
+impl RangeEvaluator {
+    /// Prepares a root of a graph.
+    pub fn new(graph: &Graph, root: Node) -> Self {
+        let rules = graph.nodes().map(|(_, expr)| RangeRule::of(graph, expr)).collect();
+        Self { rules, root }
+    }
+
+    /// The range of ω over a box at any time; bounds of the box may be infinite.
+    pub fn eval(&self, over: &Aabb) -> Interval {
+        self.eval_with(&Region::of(over))
+    }
+
+    /// The range over a region.
+    pub fn eval_with(&self, region: &Region<'_>) -> Interval {
+        SCRATCH.with_borrow_mut(|values| {
+            self.fill(region, values);
+            values[self.root.index()]
+        })
+    }
+
+    /// The ranges of all nodes, in the graph's order.
+    pub fn all(&self, over: &Aabb) -> Vec<Interval> {
+        self.all_with(&Region::of(over))
+    }
+
+    /// The ranges of all nodes over a region.
+    pub fn all_with(&self, region: &Region<'_>) -> Vec<Interval> {
+        let mut values = Vec::new();
+        self.fill(region, &mut values);
+        values
+    }
+
+    fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>) {
+        values.clear();
+        for &rule in &self.rules {
+            // a coordinate is always a number, even if nothing else is known of it
+            let unknown = |node: Node| {
+                let is_coordinate = matches!(self.rules[node.index()], RangeRule::Plain(Expr::Coordinate(_)));
+                values[node.index()] == Interval::ALL && !is_coordinate
+            };
+            let value = match rule {
+                RangeRule::Square(a) | RangeRule::Slab { of: a, .. } if unknown(a) => Interval::ALL,
+                RangeRule::Square(a) => values[a.index()].square(),
+                RangeRule::Slab { of, first, second } => {
+                    let number = |affine: Affine| offset(affine, |node| values[node.index()]);
+                    slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
+                }
+                RangeRule::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
+                RangeRule::Plain(expr) => plain(expr, values, region),
+            };
+            values.push(value);
+        }
+    }
+}
+
+/// Whether a node has one value: a constant or a parameter.
+fn is_number(graph: &Graph, node: Node) -> bool {
+    matches!(graph.expr(node), Expr::Constant(_) | Expr::Parameter(_))
+}
+
+/// Reads a node as slope · (another node) + offset; only slopes ±1, for which the rounding of the written sum
+/// is that of the written sum. Anything else is 1 · itself.
+fn affine(graph: &Graph, node: Node) -> (Node, Affine) {
+    let with = |slope, offset, minus| Affine { slope, offset, minus };
+    let number = |node| is_number(graph, node);
+    match graph.expr(node) {
+        Expr::Binary(Binary::Add, a, b) if !number(a) && number(b) => (a, with(1.0, Some(b), false)),
+        Expr::Binary(Binary::Add, a, b) if number(a) && !number(b) => (b, with(1.0, Some(a), false)),
+        Expr::Binary(Binary::Sub, a, b) if !number(a) && number(b) => (a, with(1.0, Some(b), true)),
+        Expr::Binary(Binary::Sub, a, b) if number(a) && !number(b) => (b, with(-1.0, Some(a), false)),
+        Expr::Unary(Unary::Neg, a) => (a, with(-1.0, None, false)),
+        _ => (node, with(1.0, None, false)),
+    }
+}
+
+/// The number that is added; NaN if it is not known.
+fn offset(affine: Affine, range: impl Fn(Node) -> Interval) -> f64 {
+    let Some(node) = affine.offset else { return 0.0 };
+    let Interval { lo, hi } = range(node);
+    let number = if lo == hi { lo } else { f64::NAN };
+    if affine.minus { -number } else { number }
+}
+
+fn at((slope, offset): (f64, f64), e: Interval) -> Interval {
+    let signed = if slope < 0.0 { -e } else { e };
+    if offset == 0.0 { signed } else { signed + Interval::point(offset) }
+}
+
+/// A product of two linear functions of e has its extremes at the ends of e and at its vertex.
+fn slab(e: Interval, first: (f64, f64), second: (f64, f64)) -> Interval {
+    if first.1.is_nan() || second.1.is_nan() {
+        return Interval::ALL;
+    }
+    let value = |e: Interval| at(first, e) * at(second, e);
+    let mut range = value(Interval::point(e.lo)).hull(value(Interval::point(e.hi)));
+    // vertex halfway between the roots −offset/slope
+    let roots = (-first.1 * first.0, -second.1 * second.0);
+    let vertex = Interval::point(0.5 * roots.0 + 0.5 * roots.1).widened(4);
+    if vertex.hi >= e.lo && vertex.lo <= e.hi {
+        range = range.hull(value(vertex));
+    }
+    range
+}
+
+fn plain(expr: Expr, values: &[Interval], region: &Region<'_>) -> Interval {
+    let Aabb { min, max } = *region.space;
+    match expr {
+        Expr::Constant(bits) => {
+            let value = f64::from_bits(bits);
+            Interval::new(value, value)
+        }
+        Expr::Coordinate(Axis::X) => Interval::new(min.x, max.x),
+        Expr::Coordinate(Axis::Y) => Interval::new(min.y, max.y),
+        Expr::Coordinate(Axis::Z) => Interval::new(min.z, max.z),
+        Expr::Parameter(i) => {
+            region.parameters.get(i as usize).map_or(Interval::ALL, |&value| Interval::new(value, value))
+        }
+        Expr::Coordinate(Axis::T) => region.time,
+        Expr::Uniform(i) => region.uniforms.get(i as usize).copied().unwrap_or(Interval::ALL),
+        Expr::Unary(op, a) => unary(op, values[a.index()]),
+        Expr::Binary(op, a, b) => binary(op, values[a.index()], values[b.index()]),
+    }
+}
+
+pub(in crate::ir) fn unary(op: Unary, a: Interval) -> Interval {
+    match op {
+        Unary::Neg => -a,
+        Unary::Abs => a.abs(),
+        Unary::Sqrt => a.sqrt(),
+        Unary::Sign => Interval { lo: Unary::Sign.eval(a.lo), hi: Unary::Sign.eval(a.hi) },
+        Unary::Call(function) => function.range(a),
+    }
+}
+
+pub(in crate::ir) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
+    match op {
+        Binary::Add => a + b,
+        Binary::Sub => a - b,
+        // 0·∞, where the one that is infinite has overflowed
+        Binary::Mul if a.contains(0.0) && is_infinite(b) || b.contains(0.0) && is_infinite(a) => {
+            Interval::ALL
+        }
+        Binary::Mul => a * b,
+        Binary::Div => a / b,
+        Binary::DivOrZero => {
+            if b.contains(0.0) {
+                Interval::ALL
+            } else {
+                a / b
+            }
+        }
+        Binary::Min | Binary::PlainMin => a.min(b),
+        Binary::Max | Binary::PlainMax => a.max(b),
+        Binary::And => conjunction(a, b),
+        Binary::Or => -conjunction(-a, -b),
+        // two infinite operands have no weights
+        Binary::AndWeight | Binary::OrWeight if is_infinite(a) && is_infinite(b) => Interval::ALL,
+        Binary::MinWeight | Binary::MaxWeight => Interval { lo: 0.0, hi: 1.0 },
+        Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() },
+        Binary::Call(function) => function.range(a, b),
+    }
+}
+
+fn is_infinite(a: Interval) -> bool {
+    a.lo == f64::NEG_INFINITY || a.hi == f64::INFINITY
+}
+
+/// Operands beyond this have squares whose sum may overflow.
+const SQUARES_OVERFLOW: f64 = 6.7e153; // 2⁵¹¹
+
+/// Results below this may have operands whose squares lose digits to underflow.
+const SQUARES_UNDERFLOW: f64 = 3.0e-151; // 2⁻⁵⁰⁰
+
+/// The range of u ∧ v: exact at the ends, and what the half-angle form of `ir::r0` makes of extreme operands.
+fn conjunction(a: Interval, b: Interval) -> Interval {
+    let exact = Interval::new(r0::and_scaled(a.lo, b.lo), r0::and_scaled(a.hi, b.hi)).widened(4);
+    let largest = [a.lo, a.hi, b.lo, b.hi].into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if largest > SQUARES_OVERFLOW {
+        // √(u² + v²) = ∞: the small branch gives the smaller operand, the other one −∞; ∞ − ∞ and ∞/∞ are NaN
+        let opposite = a.hi == f64::INFINITY && b.lo == f64::NEG_INFINITY
+            || b.hi == f64::INFINITY && a.lo == f64::NEG_INFINITY;
+        if opposite || a.hi == f64::INFINITY && b.hi == f64::INFINITY {
+            return Interval::ALL;
+        }
+        let lo = if a.lo + b.lo > 0.0 { exact.lo } else { f64::NEG_INFINITY };
+        return Interval::new(lo, exact.hi.max(a.hi.min(b.hi)));
+    }
+    // there √(u² + v²) is only known to lie between the larger operand and twice that
+    let outwards = |x: f64, away: bool| match (x.abs() < SQUARES_UNDERFLOW, away) {
+        (false, _) => x,
+        (true, true) => 2.0 * x,
+        (true, false) => 0.5 * x,
+    };
+    Interval::new(outwards(exact.lo, exact.lo < 0.0), outwards(exact.hi, exact.hi > 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::{Interpreter, UnaryFunction};
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    /// ((x(3−x)) ∧ (0.25 − y² − z²)) ∨ (sin(x) − |y|·z/(2 + cos z))
+    fn sample() -> (Graph, Node) {
+        let mut g = Graph::default();
+        let (x, y, z) = (g.coordinate(Axis::X), g.coordinate(Axis::Y), g.coordinate(Axis::Z));
+        let three = g.constant(3.0);
+        let rest = g.binary(Binary::Sub, three, x);
+        let slab = g.binary(Binary::Mul, x, rest);
+        let (y2, z2) = (g.binary(Binary::Mul, y, y), g.binary(Binary::Mul, z, z));
+        let quarter = g.constant(0.25);
+        let a = g.binary(Binary::Sub, quarter, y2);
+        let ball = g.binary(Binary::Sub, a, z2);
+        let both = g.binary(Binary::And, slab, ball);
+        let (sin, abs, cos) = (
+            g.unary(UnaryFunction::Sin.into(), x),
+            g.unary(Unary::Abs, y),
+            g.unary(UnaryFunction::Cos.into(), z),
+        );
+        let two = g.constant(2.0);
+        let below = g.binary(Binary::Add, two, cos);
+        let top = g.binary(Binary::Mul, abs, z);
+        let quotient = g.binary(Binary::Div, top, below);
+        let other = g.binary(Binary::Sub, sin, quotient);
+        let root = g.binary(Binary::Or, both, other);
+        (g, root)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #[test]
+        fn no_point_is_outside_its_range(
+            lo in prop::array::uniform3(-4.0..4.0f64),
+            size in prop::array::uniform3(0.0..2.0f64),
+            at in prop::array::uniform3(0.0..=1.0f64),
+        ) {
+            let (graph, root) = sample();
+            let min = DVec3::from_array(lo);
+            let max = min + DVec3::from_array(size);
+            let p = (min + (max - min) * DVec3::from_array(at)).clamp(min, max);
+            let mut omega = [0.0];
+            Interpreter::new(&graph, &[root]).eval_f64(p.to_array(), &mut omega);
+            let range = RangeEvaluator::new(&graph, root).eval(&Aabb::new(min, max));
+            prop_assert!(range.contains(omega[0]), "{omega:?} not in {range:?}");
+        }
+    }
+
+    #[test]
+    fn slabs_are_exact_and_infinite_boxes_are_understood() {
+        let mut g = Graph::default();
+        let x = g.coordinate(Axis::X);
+        let three = g.constant(3.0);
+        let rest = g.binary(Binary::Sub, three, x);
+        let slab = g.binary(Binary::Mul, x, rest);
+        let ranges = RangeEvaluator::new(&g, slab);
+        let over = |lo, hi| ranges.eval(&Aabb::new(DVec3::splat(lo), DVec3::splat(hi)));
+        let whole = over(0.0, 3.0);
+        assert!(whole.hi >= 2.25 && whole.hi < 2.2500001 && whole.lo > -1e-300, "{whole:?}");
+        assert!(over(4.0, f64::INFINITY).hi < 0.0);
+    }
+}

@@ -1,0 +1,241 @@
+//! Distance, normal and mean curvature at the surface, from the leaves.
+//!
+//! ω/|∇ω| is a poor distance: R₀ mixes leaves of unlike scale. A leaf u by itself knows better: along its
+//! normal it is nearly quadratic, so with g = |∇u| and b = nᵀ·Hess u·n the surface lies at
+//!
+//! ```text
+//! t = 2u / (g + √(g² − 2ub))          (u/g where the root is not real)
+//! ```
+//!
+//! which is exact along the normal for every quadric. The leaves' distances are combined by the min/max twin,
+//! and normal and curvature are those of the leaf that decides; at a tie, the mean of the two. Products of
+//! two factors are split into their faces, sign(pq) = (p∧q)∨(¬p∧¬q): the product of a slab is half the
+//! distance far away.
+//!
+//! The surface of a leaf that depends on time moves along its outward normal n with the speed u_t/|∇u|: on
+//! u(x(t), t) = 0 the derivative ∇u·x′ + u_t vanishes, and n = −∇u/|∇u|.
+
+use rustc_hash::FxHashMap;
+
+use crate::ir::derived::gradient::{gradient, gradient_and_rate};
+use crate::ir::derived::sign::SignRule;
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::{Binary, Unary};
+
+/// What is known of the surface nearest to a point, as nodes.
+#[derive(Debug, Clone, Copy)]
+struct Surface {
+    /// Distance, positive inside the solid.
+    depth: Node,
+    /// Outward unit normal.
+    normal: [Node; 3],
+    /// Mean curvature, positive where the solid is convex.
+    curvature: Node,
+    /// Velocity along the normal, where it is asked for.
+    velocity: Option<[Node; 3]>,
+}
+
+/// [distance (positive in the fluid), outward unit normal x, y, z, mean curvature (1/length, convex
+/// positive)]
+pub fn contact(graph: &mut Graph, root: Node) -> [Node; 5] {
+    let mut builder = Builder { graph, known: FxHashMap::default(), moving: false };
+    let surface = builder.surface(root);
+    let [nx, ny, nz] = builder.unit(surface.normal);
+    let distance = builder.graph.unary(Unary::Neg, surface.depth);
+    [distance, nx, ny, nz, surface.curvature]
+}
+
+/// The velocity along its normal of the surface that [`contact`] finds: of the leaf that decides, or the mean
+/// of two. A motion within the surface itself, as of a turning cylinder, is not in ω.
+pub fn wall_velocity(graph: &mut Graph, root: Node) -> [Node; 3] {
+    let mut builder = Builder { graph, known: FxHashMap::default(), moving: true };
+    let surface = builder.surface(root);
+    let zero = graph.constant(0.0);
+    surface.velocity.unwrap_or([zero; 3])
+}
+
+struct Builder<'g> {
+    graph: &'g mut Graph,
+    moving: bool,
+    known: FxHashMap<Node, Surface>,
+}
+
+/// How a shape is made of others.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// A product of two factors that vary, split into its faces.
+    Product(Node, Node),
+    Signs(SignRule),
+}
+
+impl Kind {
+    fn operands(self) -> impl Iterator<Item = Node> {
+        let (faces, rule) = match self {
+            Self::Product(p, q) => ([Some(p), Some(q)], SignRule::Leaf),
+            Self::Signs(rule) => ([None; 2], rule),
+        };
+        faces.into_iter().flatten().chain(rule.operands())
+    }
+}
+
+impl Builder<'_> {
+    /// Logic nodes below the root in an order in which operands come first: no recursion, trees may be deep.
+    fn surface(&mut self, root: Node) -> Surface {
+        let mut stack = vec![root];
+        while let Some(&node) = stack.last() {
+            if self.known.contains_key(&node) {
+                stack.pop();
+                continue;
+            }
+            let kind = self.kind(node);
+            let missing: Vec<Node> = kind.operands().filter(|o| !self.known.contains_key(o)).collect();
+            if missing.is_empty() {
+                let surface = self.combine(node, kind);
+                self.known.insert(node, surface);
+                stack.pop();
+            } else {
+                stack.extend(missing);
+            }
+        }
+        self.known[&root]
+    }
+
+    fn kind(&self, node: Node) -> Kind {
+        match self.faces(node) {
+            Some((p, q)) => Kind::Product(p, q),
+            None => Kind::Signs(SignRule::of(self.graph, node)),
+        }
+    }
+
+    /// The factors of a product, both of which vary.
+    fn faces(&self, node: Node) -> Option<(Node, Node)> {
+        let varies = |factor| {
+            !matches!(self.graph.expr(factor), Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_))
+        };
+        match self.graph.expr(node) {
+            Expr::Binary(Binary::Mul, p, q) if p != q && varies(p) && varies(q) => Some((p, q)),
+            _ => None,
+        }
+    }
+
+    fn combine(&mut self, node: Node, kind: Kind) -> Surface {
+        match kind {
+            Kind::Product(p, q) => {
+                let (p, q) = (self.known[&p], self.known[&q]);
+                let both = self.nearer(p, q, Binary::Min);
+                let (p, q) = (self.negated(p), self.negated(q));
+                let neither = self.nearer(p, q, Binary::Min);
+                self.nearer(both, neither, Binary::Max)
+            }
+            Kind::Signs(SignRule::All(u, v)) => self.nearer(self.known[&u], self.known[&v], Binary::Min),
+            Kind::Signs(SignRule::Any(u, v)) => self.nearer(self.known[&u], self.known[&v], Binary::Max),
+            Kind::Signs(SignRule::Not(u)) => self.negated(self.known[&u]),
+            // a positive factor moves nothing
+            Kind::Signs(SignRule::Same(u)) => self.known[&u],
+            Kind::Signs(SignRule::Leaf) => self.leaf(node),
+        }
+    }
+
+    fn negated(&mut self, s: Surface) -> Surface {
+        Surface {
+            depth: self.graph.unary(Unary::Neg, s.depth),
+            normal: s.normal.map(|n| self.graph.unary(Unary::Neg, n)),
+            curvature: self.graph.unary(Unary::Neg, s.curvature),
+            velocity: s.velocity, // the other side of a surface moves with it
+        }
+    }
+
+    /// The surface that decides: weights are 1 and 0, or ½ and ½ at a tie.
+    fn nearer(&mut self, u: Surface, v: Surface, op: Binary) -> Surface {
+        let depth = self.graph.binary(op, u.depth, v.depth);
+        let weight = if op == Binary::Min { Binary::MinWeight } else { Binary::MaxWeight };
+        let (wu, wv) =
+            (self.graph.binary(weight, u.depth, v.depth), self.graph.binary(weight, v.depth, u.depth));
+        let mut mixed = |a: Node, b: Node| {
+            let (a, b) = (self.graph.binary(Binary::Mul, wu, a), self.graph.binary(Binary::Mul, wv, b));
+            self.graph.binary(Binary::Add, a, b)
+        };
+        let normal = std::array::from_fn(|i| mixed(u.normal[i], v.normal[i]));
+        let velocity = match (u.velocity, v.velocity) {
+            (Some(a), Some(b)) => Some(std::array::from_fn(|i| mixed(a[i], b[i]))),
+            _ => None,
+        };
+        Surface { depth, normal, curvature: mixed(u.curvature, v.curvature), velocity }
+    }
+
+    fn leaf(&mut self, u: Node) -> Surface {
+        use Binary::{Add, DivOrZero, Mul, Sub};
+        let slopes = gradient(self.graph, u);
+        let g2 = self.dot(slopes, slopes);
+        let g = self.graph.unary(Unary::Sqrt, g2);
+        // ∇(½g²) = Hess u · ∇u
+        let half = self.graph.constant(0.5);
+        let half_g2 = self.graph.binary(Mul, half, g2);
+        let bent = gradient(self.graph, half_g2);
+        let along = self.dot(slopes, bent);
+        let trace = self.trace(slopes);
+        let b = self.graph.binary(DivOrZero, along, g2);
+        // where there is no normal every direction is as good: the mean second derivative
+        let has_normal = self.graph.unary(Unary::Sign, g2);
+        let one = self.graph.constant(1.0);
+        let third = self.graph.constant(1.0 / 3.0);
+        let has_none = self.graph.binary(Sub, one, has_normal);
+        let mean = self.graph.binary(Mul, third, trace);
+        let mean = self.graph.binary(Mul, has_none, mean);
+        let b = self.graph.binary(Add, b, mean);
+        let depth = self.depth(u, g, g2, b);
+        let normal = slopes.map(|slope| {
+            let inward = self.graph.binary(DivOrZero, slope, g);
+            self.graph.unary(Unary::Neg, inward)
+        });
+        // −(tr Hess u − nᵀ·Hess u·n)/2g
+        let across = self.graph.binary(Sub, b, trace);
+        let twice = self.graph.binary(Add, g, g);
+        let curvature = self.graph.binary(DivOrZero, across, twice);
+        let velocity = self.moving.then(|| self.velocity(u, g, normal));
+        Surface { depth, normal, curvature, velocity }
+    }
+
+    /// n·u_t/|∇u|
+    fn velocity(&mut self, u: Node, g: Node, normal: [Node; 3]) -> [Node; 3] {
+        let [.., rate] = gradient_and_rate(self.graph, u);
+        let speed = self.graph.binary(Binary::DivOrZero, rate, g);
+        normal.map(|n| self.graph.binary(Binary::Mul, speed, n))
+    }
+
+    /// 2u/(g + √(g² − 2ub)), or u/g where the root is not real.
+    fn depth(&mut self, u: Node, g: Node, g2: Node, b: Node) -> Node {
+        use Binary::{Add, DivOrZero, Max, MinWeight, Mul, Sub};
+        let twice = self.graph.binary(Add, u, u);
+        let bend = self.graph.binary(Mul, twice, b);
+        let radicand = self.graph.binary(Sub, g2, bend);
+        let zero = self.graph.constant(0.0);
+        let clipped = self.graph.binary(Max, radicand, zero);
+        let root = self.graph.unary(Unary::Sqrt, clipped);
+        let unreal = self.graph.binary(MinWeight, radicand, zero);
+        let instead = self.graph.binary(Mul, unreal, g);
+        let below = self.graph.binary(Add, g, root);
+        let below = self.graph.binary(Add, below, instead);
+        self.graph.binary(DivOrZero, twice, below)
+    }
+
+    /// ∂²u/∂x² + ∂²u/∂y² + ∂²u/∂z²
+    fn trace(&mut self, slopes: [Node; 3]) -> Node {
+        let [xx, yy, zz] = std::array::from_fn(|i| gradient(self.graph, slopes[i])[i]);
+        let sum = self.graph.binary(Binary::Add, xx, yy);
+        self.graph.binary(Binary::Add, sum, zz)
+    }
+
+    fn dot(&mut self, a: [Node; 3], b: [Node; 3]) -> Node {
+        let [x, y, z] = std::array::from_fn(|i| self.graph.binary(Binary::Mul, a[i], b[i]));
+        let sum = self.graph.binary(Binary::Add, x, y);
+        self.graph.binary(Binary::Add, sum, z)
+    }
+
+    /// A vector made one of length 1; zero where opposite normals meet.
+    fn unit(&mut self, v: [Node; 3]) -> [Node; 3] {
+        let square = self.dot(v, v);
+        let length = self.graph.unary(Unary::Sqrt, square);
+        v.map(|c| self.graph.binary(Binary::DivOrZero, c, length))
+    }
+}

@@ -1,0 +1,8 @@
+//! Graphs derived from a graph: what is computed beside ω itself.
+
+pub mod contact;
+pub mod gradient;
+pub mod hoisted;
+pub mod localised;
+pub mod sign;
+pub mod twin;

@@ -1,0 +1,234 @@
+//! What every analysis needs to know of a function of the mathematical library, all in one place.
+//!
+//! For f(a): the derivative as nodes of a graph, the range over an interval, f′ and ½f″ over an interval, the
+//! error that f hands on from its operand, and its true value.
+
+use super::bounds::upper::{add, div, magnitude, mul, smallest_magnitude};
+use crate::interval::Interval;
+use crate::ir::exact::big::{Big, one};
+use crate::ir::function::{BinaryFunction, UnaryFunction};
+use crate::ir::graph::{Graph, Node};
+use crate::ir::op::{Binary, Unary};
+
+/// What is multiplied by the derivative of f(a): the factor, the operand a, and the node f(a).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chain {
+    pub adjoint: Node,
+    pub operand: Node,
+    pub value: Node,
+}
+
+impl UnaryFunction {
+    /// adjoint · f′(a)
+    pub(super) fn derivative(self, graph: &mut Graph, chain: Chain) -> Node {
+        use Binary::{Add, Div, DivOrZero, Mul, Sub};
+        let Chain { adjoint, operand: a, value } = chain;
+        match self {
+            Self::Sin => {
+                let cos = graph.unary(Unary::Call(Self::Cos), a);
+                graph.binary(Mul, adjoint, cos)
+            }
+            Self::Cos => {
+                let sin = graph.unary(Unary::Call(Self::Sin), a);
+                let product = graph.binary(Mul, adjoint, sin);
+                graph.unary(Unary::Neg, product)
+            }
+            // 1 + tan²
+            Self::Tan => {
+                let one = graph.constant(1.0);
+                let square = graph.binary(Mul, value, value);
+                let factor = graph.binary(Add, one, square);
+                graph.binary(Mul, adjoint, factor)
+            }
+            // ±1/√(1 − a²)
+            Self::Asin | Self::Acos => {
+                let one = graph.constant(1.0);
+                let square = graph.binary(Mul, a, a);
+                let rest = graph.binary(Sub, one, square);
+                let root = graph.unary(Unary::Sqrt, rest);
+                let quotient = graph.binary(DivOrZero, adjoint, root);
+                if self == Self::Asin { quotient } else { graph.unary(Unary::Neg, quotient) }
+            }
+            Self::Atan => {
+                let one = graph.constant(1.0);
+                let square = graph.binary(Mul, a, a);
+                let sum = graph.binary(Add, one, square);
+                graph.binary(Div, adjoint, sum)
+            }
+            Self::Exp => graph.binary(Mul, adjoint, value),
+            Self::Ln => graph.binary(Div, adjoint, a),
+        }
+    }
+
+    /// The range over an interval; all reals where the function may be undefined.
+    pub(super) fn range(self, a: Interval) -> Interval {
+        match self {
+            // an operand that has overflowed has no sine and no cosine
+            Self::Sin | Self::Cos if a.lo == f64::NEG_INFINITY || a.hi == f64::INFINITY => Interval::ALL,
+            Self::Sin => a.sin(),
+            Self::Cos => a.cos(),
+            Self::Atan => a.increasing(libm::atan),
+            Self::Exp => a.increasing(libm::exp),
+            Self::Ln if a.lo > 0.0 => a.increasing(libm::log),
+            Self::Asin if a.lo >= -1.0 && a.hi <= 1.0 => a.increasing(libm::asin),
+            Self::Acos if a.lo >= -1.0 && a.hi <= 1.0 => (-a).increasing(|x| libm::acos(-x)),
+            Self::Tan if a.lo > -1.57 && a.hi < 1.57 => a.increasing(libm::tan),
+            Self::Ln | Self::Asin | Self::Acos | Self::Tan => Interval::ALL,
+        }
+    }
+
+    /// [f′, ½f″] over an interval, from the operand's range and that of f. `None` for functions without such
+    /// a rule: along a path only their range is known.
+    pub(super) fn slope_and_bend(self, a: Interval, value: Interval) -> Option<[Interval; 2]> {
+        let one = Interval::point(1.0);
+        let half = |a: Interval| a * Interval::point(0.5);
+        match self {
+            Self::Sin => Some([a.cos(), -half(value)]),
+            Self::Cos => Some([-a.sin(), -half(value)]),
+            Self::Tan => {
+                let slope = one + value.square();
+                Some([slope, value * slope])
+            }
+            Self::Atan => {
+                let slope = one / (one + a.square());
+                Some([slope, -(a * slope.square())])
+            }
+            Self::Exp => Some([value, half(value)]),
+            Self::Ln => {
+                let slope = one / a;
+                Some([slope, -half(slope.square())])
+            }
+            Self::Asin | Self::Acos => None,
+        }
+    }
+
+    /// A bound of |f(â) − f(a)| for |â − a| ≤ `error`, both in the interval `a`; `None` where f may be
+    /// undefined or is too steep.
+    pub(super) fn propagated(self, a: Interval, error: f64) -> Option<f64> {
+        match self {
+            Self::Sin | Self::Cos | Self::Atan => Some(error),
+            Self::Tan if magnitude(a) < 1.57 => {
+                let steepest = magnitude(a.increasing(libm::tan));
+                Some(mul(error, add(1.0, mul(steepest, steepest))))
+            }
+            Self::Exp => Some(mul(error, a.increasing(libm::exp).hi)),
+            Self::Ln if a.lo > 0.0 => Some(div(error, a.lo)),
+            Self::Asin | Self::Acos if magnitude(a) < 1.0 => {
+                let rest = (Interval::point(1.0) - a.square()).sqrt();
+                Some(div(error, rest.lo))
+            }
+            Self::Tan | Self::Ln | Self::Asin | Self::Acos => None,
+        }
+    }
+
+    /// The true value; `None` where there is none.
+    pub(super) fn exact(self, a: &Big) -> Option<Big> {
+        let within_one = *a >= -one() && *a <= one();
+        match self {
+            Self::Sin => Some(a.sin()),
+            Self::Cos => Some(a.cos()),
+            Self::Tan => Some(a.tan()),
+            Self::Asin if within_one => Some(a.asin()),
+            Self::Acos if within_one => Some(a.acos()),
+            Self::Atan => Some(a.atan()),
+            Self::Exp => Some(a.exp()),
+            Self::Ln if *a > Big::ZERO => Some(a.ln()),
+            Self::Asin | Self::Acos | Self::Ln => None,
+        }
+    }
+}
+
+/// What is multiplied by a derivative of f(a, b): the factor, the operands, and the node f(a, b).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ChainOfTwo {
+    pub adjoint: Node,
+    pub operands: [Node; 2],
+    pub value: Node,
+}
+
+impl BinaryFunction {
+    /// adjoint · ∂f/∂a, or with `first` unset adjoint · ∂f/∂b.
+    pub(super) fn derivative(self, graph: &mut Graph, chain: ChainOfTwo, first: bool) -> Node {
+        use Binary::{Add, DivOrZero, Mul, Sub};
+        let ChainOfTwo { adjoint, operands: [a, b], value } = chain;
+        match self {
+            // b·a^(b−1)
+            Self::Pow if first => {
+                let one = graph.constant(1.0);
+                let exponent = graph.binary(Sub, b, one);
+                let power = graph.binary(Binary::Call(Self::Pow), a, exponent);
+                let factor = graph.binary(Mul, b, power);
+                graph.binary(Mul, adjoint, factor)
+            }
+            // a^b·ln a
+            Self::Pow => {
+                let ln = graph.unary(Unary::Call(UnaryFunction::Ln), a);
+                let factor = graph.binary(Mul, value, ln);
+                graph.binary(Mul, adjoint, factor)
+            }
+            // b/(a² + b²) and −a/(a² + b²)
+            Self::Atan2 => {
+                let (a2, b2) = (graph.binary(Mul, a, a), graph.binary(Mul, b, b));
+                let sum = graph.binary(Add, a2, b2);
+                let product = graph.binary(Mul, adjoint, if first { b } else { a });
+                let quotient = graph.binary(DivOrZero, product, sum);
+                if first { quotient } else { graph.unary(Unary::Neg, quotient) }
+            }
+        }
+    }
+
+    /// The range over two intervals; all reals where the function may be undefined.
+    pub(super) fn range(self, a: Interval, b: Interval) -> Interval {
+        match self {
+            Self::Pow if a.lo > 0.0 => {
+                let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
+                let corners = corners.map(|(a, b)| libm::pow(a, b));
+                let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
+                let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                Interval::new(lo, hi).widened(4)
+            }
+            Self::Pow => Interval::ALL,
+            Self::Atan2 => Interval::new(-std::f64::consts::PI, std::f64::consts::PI).widened(1),
+        }
+    }
+
+    /// A bound of |f(â, b̂) − f(a, b)| for operands in two intervals that are off by `errors` at most, and
+    /// values of f in `range`; `None` where f may be undefined or jumps.
+    pub(super) fn propagated(self, [a, b]: [Interval; 2], errors: [f64; 2], range: Interval) -> Option<f64> {
+        match self {
+            // a^b = exp(b·ln a)
+            Self::Pow => {
+                if a.lo <= 0.0 {
+                    return None;
+                }
+                let logarithm = magnitude(a.increasing(libm::log));
+                let change = add(mul(magnitude(b), div(errors[0], a.lo)), mul(logarithm, errors[1]));
+                // eᵗ − 1 ≤ t·(1 + t) and eᵗ ≤ 1 + 2t for t ≤ 1
+                if change > 1.0 {
+                    return None;
+                }
+                let largest = mul(magnitude(range), add(1.0, mul(2.0, change)));
+                Some(mul(largest, mul(change, add(1.0, change))))
+            }
+            // the gradient is as long as 1/√(a² + b²), away from the cut
+            Self::Atan2 => {
+                if b.lo <= 0.0 && a.contains(0.0) {
+                    return None;
+                }
+                let squares = smallest_magnitude(a).powi(2) + smallest_magnitude(b).powi(2);
+                let distance = squares.sqrt() * (1.0 - 1e-15);
+                Some(div(add(errors[0], errors[1]), distance))
+            }
+        }
+    }
+
+    /// The true value; `None` where there is none.
+    pub(super) fn exact(self, a: &Big, b: &Big) -> Option<Big> {
+        match self {
+            Self::Pow if *a > Big::ZERO => Some(a.powf(b)),
+            Self::Pow => None,
+            Self::Atan2 if *a != Big::ZERO || *b != Big::ZERO => Some(a.atan2(b)),
+            Self::Atan2 => Some(Big::ZERO),
+        }
+    }
+}

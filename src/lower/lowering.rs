@@ -1,0 +1,202 @@
+//! The state of a lowering: the module so far, what was reported, and where an expression is evaluated.
+
+use std::collections::HashSet;
+
+use super::Module;
+use super::names::Names;
+use super::value::Value;
+use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
+use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
+use crate::sph::Method;
+
+/// Calls nested deeper than this are refused: functions cannot recurse, so only a chain of them gets here.
+const DEEPEST_CALL: usize = 64;
+
+/// Expressions evaluated for each operation of the budget: shared operations cost time though they add no
+/// node.
+const EVALUATIONS_PER_NODE: usize = 4;
+
+/// The state of a lowering.
+pub(super) struct Lowering<'a> {
+    pub module: Module,
+    pub diagnostics: Vec<Diagnostic>,
+    pub names: Names<'a>,
+    pub scope: Scope,
+    /// The method that all scenes get, whatever they state.
+    pub method: Option<Method>,
+    max_nodes: usize,
+    budget_reported: bool,
+    /// Expressions evaluated so far.
+    pub evaluations: usize,
+    /// Expressions that are being evaluated inside one another.
+    pub depth: usize,
+    /// Code and place of what was reported: a mistake in a function or a fold is one mistake.
+    reported: HashSet<(&'static str, Span)>,
+}
+
+/// Where an expression is evaluated: whose code it is, its local names, and the call that led there.
+#[derive(Debug, Clone)]
+pub(super) struct Scope {
+    pub source: SourceId,
+    pub locals: Vec<Local>,
+    /// The functions being called, outermost first.
+    pub calls: Vec<Call>,
+}
+
+/// A name that holds within one call or one fold.
+#[derive(Debug, Clone)]
+pub(super) struct Local {
+    pub name: String,
+    pub value: Value,
+    /// The place of the argument that it was bound to.
+    pub span: Span,
+}
+
+/// A function that is being called.
+#[derive(Debug, Clone)]
+pub(super) struct Call {
+    pub function: String,
+    pub source: SourceId,
+    pub span: Span,
+}
+
+impl Lowering<'_> {
+    pub fn new(max_nodes: usize) -> Self {
+        Self {
+            module: Module::default(),
+            diagnostics: Vec::new(),
+            names: Names::default(),
+            scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
+            method: None,
+            max_nodes,
+            budget_reported: false,
+            evaluations: 0,
+            depth: 0,
+            reported: HashSet::new(),
+        }
+    }
+
+    /// Reports once for each place; messages about no place in particular all come through.
+    pub fn report(&mut self, diagnostic: Diagnostic) {
+        let span = diagnostic.primary.span;
+        if span.range().is_empty() || self.reported.insert((diagnostic.code.0, span)) {
+            self.diagnostics.push(diagnostic);
+        }
+    }
+
+    /// Reports and gives the value that silences what depends on it.
+    pub fn fail(&mut self, diagnostic: Diagnostic) -> Value {
+        self.report(diagnostic);
+        Value::Failed
+    }
+
+    /// The span in the user's file that an expression belongs to: its own, or that of the call that led into
+    /// the standard solids.
+    pub fn user_span(&self, span: Span) -> Span {
+        if span.source == SourceId::File {
+            return span;
+        }
+        self.scope.calls.iter().rev().map(|c| c.span).find(|s| s.source == SourceId::File).unwrap_or(span)
+    }
+
+    /// Whether the file has grown beyond its budget; reported once.
+    pub fn over_budget(&mut self, span: Span) -> bool {
+        let too_many = self.module.graph.len() > self.max_nodes;
+        let most_evaluations = self.max_nodes.saturating_mul(EVALUATIONS_PER_NODE);
+        let over = too_many || self.evaluations > most_evaluations;
+        if over && !self.budget_reported {
+            self.budget_reported = true;
+            let message = if too_many {
+                format!("the file unrolls to more than {} operations", self.max_nodes)
+            } else {
+                format!("the file evaluates more than {most_evaluations} expressions when it is unrolled")
+            };
+            let span = self.user_span(span);
+            self.report(
+                Diagnostic::error(Code::TOO_LARGE, span, message)
+                    .help("make a range shorter, or allow more with --max-nodes"),
+            );
+        }
+        over
+    }
+
+    pub fn node(&mut self, operation: Operation, span: Span) -> Node {
+        let span = self.user_span(span);
+        self.module.graph.intern(operation, Some(span))
+    }
+
+    pub fn unary(&mut self, op: Unary, a: Node, span: Span) -> Node {
+        self.node(Operation::Unary(op, a), span)
+    }
+
+    pub fn binary(&mut self, op: Binary, a: Node, b: Node, span: Span) -> Node {
+        self.node(Operation::Binary(op, a, b), span)
+    }
+
+    pub fn constant(&mut self, value: f64) -> Node {
+        self.module.graph.constant(value)
+    }
+
+    pub fn as_number(&mut self, value: &Value, span: Span) -> Option<Node> {
+        match value {
+            Value::Number(node) => Some(*node),
+            Value::Failed => None,
+            other => {
+                let span = self.user_span(span);
+                let message = format!("expected a number or a field, found {}", other.describe());
+                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
+                None
+            }
+        }
+    }
+
+    pub fn as_vector(&mut self, value: &Value, span: Span) -> Option<[Node; 3]> {
+        match value {
+            Value::Vector(parts) => Some(*parts),
+            Value::Failed => None,
+            other => {
+                let span = self.user_span(span);
+                let message = format!("expected a vector `[a, b, c]`, found {}", other.describe());
+                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
+                None
+            }
+        }
+    }
+
+    pub fn as_constant(&mut self, node: Node, span: Span, what: &str) -> Option<f64> {
+        let value = self.module.graph.constant_value(node);
+        if value.is_none() {
+            let span = self.user_span(span);
+            let on = if self.depends_on_place(node) { "x, y or z" } else { "t" };
+            let message = format!("{what} must be a constant, but it depends on {on}");
+            self.report(Diagnostic::error(Code::NOT_CONSTANT, span, message));
+        }
+        value
+    }
+
+    /// Whether a value differs from point to point, and not only from one time to another.
+    pub fn depends_on_place(&self, node: Node) -> bool {
+        Axis::SPACE.into_iter().any(|axis| self.module.graph.uses(node, axis))
+    }
+
+    /// Whether one more call may be made.
+    pub fn may_call(&mut self, function: &str, source: SourceId, span: Span) -> bool {
+        let calls = &self.scope.calls;
+        if calls.iter().any(|call| call.function == function && call.source == source) {
+            let span = self.user_span(span);
+            let message = format!("`{function}` calls itself");
+            self.report(
+                Diagnostic::error(Code::RECURSION, span, message)
+                    .help("use `any i in 0..n:` or `all i in 0..n:` for repetition"),
+            );
+            return false;
+        }
+        if calls.len() >= DEEPEST_CALL {
+            let span = self.user_span(span);
+            let message = format!("calls nested more than {DEEPEST_CALL} deep");
+            self.report(Diagnostic::error(Code::TOO_DEEP, span, message));
+            return false;
+        }
+        true
+    }
+}

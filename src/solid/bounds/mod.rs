@@ -1,0 +1,4 @@
+//! Where a solid is.
+
+pub mod extent;
+mod search;

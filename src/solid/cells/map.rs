@@ -1,0 +1,483 @@
+//! A box divided into cells that know what matters in them: fluid, inside, or the few leaves of a surface
+//! nearby.
+//!
+//! Where a part is proven to be outside or inside it is dropped from the cell and from all cells within it. A
+//! point far from every surface then costs one look-up, and one near a surface the evaluation of the leaves
+//! that are left there, however many the solid has. Sign, zero set and the gradient on the surface are
+//! exactly those of the twin; the value off the surface is that of the leaf that decides in the cell, and
+//! jumps between cells. A map with a reach also answers for distance, normal and curvature up to that
+//! distance from the surface.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::grid::{Cell, Cells, Found, SIDE};
+use crate::field::{Entry, Faces, Field, Normals, Path, Points, Walls, clearance_by_ranges};
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::Unary;
+use crate::solid::construction::Solid;
+use crate::solid::evaluation::Contact;
+use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
+use crate::solid::leaves::words::Word;
+use crate::solid::path::sweep::Sweep;
+use crate::solid::twin::Twin;
+
+/// Points that are looked up together.
+const RUN: usize = 64;
+
+/// So many neighbouring points of one cell are evaluated together.
+const SHORTEST_RUN: usize = 4;
+
+/// Cells that are looked at one by one for a range; for larger boxes the twin answers.
+const MOST_TOUCHED: usize = 4096;
+
+/// What a map knows of a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Proven to be outside, farther than the reach from every surface.
+    Fluid,
+    /// Proven to be inside, farther than the reach from every surface.
+    Inside,
+    /// There may be a surface within the reach.
+    Near,
+}
+
+/// A solid specialised to the cells of a box.
+pub struct CellMap {
+    solid: Solid,
+    twin: Twin,
+    parts: Arc<LeafTree>,
+    cells: Arc<Cells>,
+    reach: f64,
+    /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
+    /// still right.
+    margin: f64,
+}
+
+/// Counts of a cell map.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CellStats {
+    /// Leaves of the solid.
+    pub leaves: usize,
+    /// Shapes of leaves, each with programs of its own.
+    pub shapes: usize,
+    /// Cells proven to be outside.
+    pub fluid: usize,
+    /// Cells proven to be inside.
+    pub inside: usize,
+    /// Cells that may hold a surface.
+    pub near: usize,
+    /// Different trees of leaves that are left in near cells.
+    pub programs: usize,
+    /// Leaves in near cells, all together.
+    pub leaves_in_cells: usize,
+}
+
+/// The surface that decides so far.
+#[derive(Clone, Copy)]
+struct Nearest {
+    distance: f64,
+    normal: DVec3,
+    mean_curvature: f64,
+    /// Whether the normal is the mean of several.
+    tied: bool,
+    /// The first of those that decide.
+    leaf: u32,
+}
+
+/// The length by which the cells of a box are grown.
+pub(super) fn margin(domain: &Aabb, reach: f64) -> f64 {
+    let largest = domain.min.abs().max(domain.max.abs()).max_element();
+    let cell = domain.size().max_element() / f64::from(SIDE);
+    reach * (1.0 + 1e-9) + 1e-9 * cell + 64.0 * f64::EPSILON * largest
+}
+
+impl CellMap {
+    /// Divides a box. `None` if the solid cannot be taken apart, or the box is not finite.
+    pub fn new(solid: &Solid, domain: Aabb) -> Option<Self> {
+        Self::with_reach(solid, domain, 0.0)
+    }
+
+    /// A map that also knows the surface from up to `reach` away, see [`CellMap::contact`]. Cells within
+    /// reach of several parts keep them all: a large reach costs time and memory.
+    ///
+    /// `None` if the solid cannot be taken apart, or if the box or the reach is not finite.
+    pub fn with_reach(solid: &Solid, domain: Aabb, reach: f64) -> Option<Self> {
+        if domain.is_empty() || !domain.is_finite() || !(reach >= 0.0 && reach.is_finite()) {
+            return None;
+        }
+        let parts = solid.parts()?;
+        let margin = margin(&domain, reach);
+        let cells = Arc::new(Cells::new(&parts, domain, margin));
+        Self::of(solid, cells, reach)
+    }
+
+    /// A map of cells that are right for the solid's stretch of time, and were grown by [`margin`].
+    pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
+        let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
+        Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin })
+    }
+
+    /// How the box was divided.
+    pub fn stats(&self) -> CellStats {
+        let (leaves, counts) = (&self.parts.leaves, self.cells.counts);
+        CellStats {
+            leaves: leaves.len(),
+            shapes: leaves.shapes(),
+            fluid: counts.fluid,
+            inside: counts.inside,
+            near: counts.near,
+            programs: counts.programs,
+            leaves_in_cells: counts.leaves_in_cells,
+        }
+    }
+
+    /// What is known of a place; [`Place::Near`] for points outside the box.
+    pub fn place_of(&self, p: DVec3) -> Place {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) => Place::Fluid,
+            Some(Cell::Inside) => Place::Inside,
+            _ => Place::Near,
+        }
+    }
+
+    /// Inside (1), on the surface (0) or outside (−1), as [`Solid::sign`] says; NaN where a leaf is not a
+    /// number.
+    #[inline]
+    pub fn sign(&self, p: DVec3) -> f64 {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) => -1.0,
+            Some(Cell::Inside) => 1.0,
+            Some(Cell::Near(program)) => Unary::Sign.eval(self.run(program, p).0),
+            _ => self.solid.sign(p),
+        }
+    }
+
+    /// [`CellMap::sign`] of many points.
+    ///
+    /// # Panics
+    /// If `sign` is not as long as the points.
+    pub fn sign_many(&self, points: Points<'_>, sign: &mut [f64]) {
+        self.evaluate(points, sign, |_| 1.0);
+        sign.iter_mut().for_each(|s| *s = Unary::Sign.eval(*s));
+    }
+
+    /// What a particle needs to know of the surface, if that is nearer than the reach; otherwise an infinite
+    /// distance, positive in the fluid and negative inside, without normal and curvature.
+    ///
+    /// It differs from [`Solid::contact`] in that leaves without a zero within reach are left out: estimates
+    /// of their distance may be too small.
+    #[inline]
+    pub fn contact(&self, p: DVec3) -> Contact {
+        let beyond =
+            |sign: f64| Contact { distance: sign * f64::INFINITY, normal: DVec3::ZERO, mean_curvature: 0.0 };
+        let found = match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) => return beyond(1.0),
+            Some(Cell::Inside) => return beyond(-1.0),
+            Some(Cell::Near(program)) => self.nearest(&mut (program as usize), p).contact(),
+            _ => self.solid.contact(p),
+        };
+        if found.distance.abs() >= self.reach { beyond(found.distance.signum()) } else { found }
+    }
+
+    /// [`CellMap::contact`] of many points: distance, normal x, y, z and mean curvature.
+    ///
+    /// # Panics
+    /// If a column is shorter than the points.
+    pub fn contact_many(&self, points: Points<'_>, [distance, x, y, z, curvature]: [&mut [f64]; 5]) {
+        for i in 0..points.len() {
+            let found = self.contact(points.get(i));
+            (distance[i], curvature[i]) = (found.distance, found.mean_curvature);
+            (x[i], y[i], z[i]) = (found.normal.x, found.normal.y, found.normal.z);
+        }
+    }
+
+    /// The value of a program at a point, and the leaf that decides.
+    #[inline]
+    fn run(&self, program: u32, p: DVec3) -> (f64, (u32, bool)) {
+        self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
+    }
+
+    /// The value of a program at up to [`RUN`] points.
+    fn run_many(&self, at: &mut usize, points: [&[f64]; 3], out: &mut [f64]) {
+        let word = Word::read(self.cells.programs[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                self.parts.leaves.values(leaf, points, out);
+                return out.iter_mut().for_each(|v| *v = signed(*v, negated));
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        self.run_many(at, points, out);
+        let mut other = [0.0; RUN];
+        let other = &mut other[..out.len()];
+        for _ in 1..parts {
+            self.run_many(at, points, other);
+            for (best, next) in out.iter_mut().zip(&*other) {
+                let wins = if all { *next < *best } else { *next > *best };
+                if wins || next.is_nan() {
+                    *best = *next;
+                }
+            }
+        }
+    }
+
+    /// The surface nearest to a point, as a program says: the distance to "all of" is the largest, to "any
+    /// of" the smallest.
+    fn nearest(&self, at: &mut usize, p: DVec3) -> Nearest {
+        let word = Word::read(self.cells.programs[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                return Nearest::of(leaf, self.parts.leaves.contact(leaf, p), negated);
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let mut best = self.nearest(at, p);
+        for _ in 1..parts {
+            let next = self.nearest(at, p);
+            let wins = if all { next.distance > best.distance } else { next.distance < best.distance };
+            if wins || next.distance.is_nan() {
+                best = next;
+            } else if next.distance == best.distance {
+                best = best.mean(&next);
+            }
+        }
+        best
+    }
+
+    /// The value at many points: `free` gives its magnitude where there is no surface, from the cell's depth.
+    fn evaluate(&self, points: Points<'_>, omega: &mut [f64], free: impl Fn(u32) -> f64) {
+        let mut found: [Option<Found>; RUN] = [None; RUN];
+        for first in (0..points.len()).step_by(RUN) {
+            let count = RUN.min(points.len() - first);
+            for (k, found) in found[..count].iter_mut().enumerate() {
+                *found = self.cells.find(points.get(first + k));
+            }
+            let mut k = 0;
+            while k < count {
+                let Some(Found { cell, depth, place }) = found[k] else {
+                    omega[first + k] = self.twin.omega(points.get(first + k));
+                    k += 1;
+                    continue;
+                };
+                let Cell::Near(program) = cell else {
+                    omega[first + k] = if cell == Cell::Inside { free(depth) } else { -free(depth) };
+                    k += 1;
+                    continue;
+                };
+                let same = |other: &&Option<Found>| other.is_some_and(|other| other.place == place);
+                let length = found[k..count].iter().take_while(same).count();
+                let run = first + k..first + k + length;
+                if length >= SHORTEST_RUN {
+                    let columns = [points.x, points.y, points.z].map(|c| &c[run.clone()]);
+                    self.run_many(&mut (program as usize), columns, &mut omega[run]);
+                } else {
+                    for i in run {
+                        omega[i] = self.run(program, points.get(i)).0;
+                    }
+                }
+                k += length;
+            }
+        }
+    }
+
+    /// Whether a path that does not leave its cell surely stays in the fluid.
+    fn stays_out(&self, path: &Path) -> bool {
+        match (self.cells.find(path.from), self.cells.find(path.to)) {
+            (Some(from), Some(to)) if from.place == to.place => match from.cell {
+                Cell::Near(program) => {
+                    Sweep::new(&self.parts.leaves, path).stays_out(&self.cells.programs[program as usize..])
+                }
+                cell => cell == Cell::Fluid,
+            },
+            _ => false,
+        }
+    }
+
+    /// The first entry on a path within the box, cell by cell.
+    fn walk(&self, path: &Path) -> Option<Entry> {
+        // half of what the cells were grown by: the next look-up is then surely in the next cell
+        let beyond = 0.5 * (self.margin - self.reach);
+        let step = path.to - path.from;
+        let mut t = path.start;
+        while let Some(Found { cell, depth, .. }) = self.cells.find(path.at(t)) {
+            let bounds = self.cells.bounds_at(path.at(t), depth).grown(beyond);
+            let side = DVec3::select(step.cmpgt(DVec3::ZERO), bounds.max, bounds.min);
+            // a component that does not move never leaves: its quotient is infinite or NaN
+            let leave = ((side - path.from) / step).to_array().into_iter().filter(|t| t.is_finite());
+            let end = leave.fold(1.0, f64::min).max(t);
+            match cell {
+                Cell::Inside => return Some(Entry::new(path, (t, end), true, Normals::default())),
+                Cell::Near(program) => {
+                    let words = &self.cells.programs[program as usize..];
+                    let entry = Sweep::new(&self.parts.leaves, path).first_entry(words, (t, end));
+                    match entry {
+                        // the border of the cell has cut off what would decide it
+                        Some(entry) if !entry.certain && entry.until >= end && end < 1.0 => {
+                            return self.twin.first_entry(&Path { start: entry.t, ..*path });
+                        }
+                        Some(_) => return entry,
+                        None => {}
+                    }
+                }
+                Cell::Fluid | Cell::Divided(_) => {}
+            }
+            if end >= 1.0 {
+                return None;
+            }
+            if end <= t {
+                break; // the path is shorter than its rounding errors
+            }
+            t = end;
+        }
+        self.twin.first_entry(&Path { start: t, ..*path })
+    }
+}
+
+impl Nearest {
+    #[inline]
+    fn of(leaf: u32, [distance, x, y, z, mean_curvature]: [f64; 5], negated: bool) -> Self {
+        let sign = if negated { -1.0 } else { 1.0 };
+        let normal = sign * DVec3::new(x, y, z);
+        let mean_curvature = sign * mean_curvature;
+        Self { distance: sign * distance, normal, mean_curvature, tied: false, leaf }
+    }
+
+    fn mean(&self, other: &Self) -> Self {
+        let normal = 0.5 * (self.normal + other.normal);
+        let mean_curvature = 0.5 * (self.mean_curvature + other.mean_curvature);
+        Self { distance: self.distance, normal, mean_curvature, tied: true, leaf: self.leaf }
+    }
+
+    fn velocity(&self, leaves: &Leaves, p: DVec3) -> DVec3 {
+        leaves.velocity(self.leaf, p)
+    }
+
+    #[inline]
+    fn contact(self) -> Contact {
+        let normal = if self.tied { self.normal.normalize_or_zero() } else { self.normal };
+        Contact { distance: self.distance, normal, mean_curvature: self.mean_curvature }
+    }
+}
+
+impl Field for CellMap {
+    fn omega(&self, p: DVec3) -> f64 {
+        match self.cells.find(p) {
+            Some(Found { cell: Cell::Fluid, depth, .. }) => -self.cells.shortest_side(depth),
+            Some(Found { cell: Cell::Inside, depth, .. }) => self.cells.shortest_side(depth),
+            Some(Found { cell: Cell::Near(program), .. }) => self.run(program, p).0,
+            _ => self.twin.omega(p),
+        }
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        let Some(Found { cell: Cell::Near(program), .. }) = self.cells.find(p) else {
+            return self.twin.omega_grad(p);
+        };
+        let (value, (leaf, negated)) = self.run(program, p);
+        let gradient = self.parts.leaves.gradient(leaf, p).1;
+        (value, if negated { -gradient } else { gradient })
+    }
+
+    fn continuous(&self, p: DVec3) -> f64 {
+        self.twin.omega(p)
+    }
+
+    fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        self.evaluate(points, omega, |depth| self.cells.shortest_side(depth));
+    }
+
+    fn range(&self, over: &Aabb) -> Interval {
+        let domain = self.cells.domain;
+        if domain.union(over) != domain || over.is_empty() {
+            return self.twin.range(over);
+        }
+        let Some(mut touched) = self.cells.touched(over, MOST_TOUCHED) else { return self.twin.range(over) };
+        // what stands for ω where only its sign is known
+        let free = self.cells.shortest_side(SIDE.ilog2());
+        match touched.next() {
+            Some(Cell::Fluid) if touched.all(|cell| cell == Cell::Fluid) => Interval::point(-free),
+            Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Interval::point(free),
+            _ => Interval::ALL,
+        }
+    }
+}
+
+impl Walls for CellMap {
+    /// The map knows no face that is farther away than its own reach.
+    fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Near(program)) => {
+                self.parts.leaves.add_faces(&self.cells.programs, program as usize, p, reach, faces);
+            }
+            Some(Cell::Fluid) => {}
+            _ => self.parts.leaves.add_faces(&self.parts.words, 0, p, reach, faces),
+        }
+    }
+
+    fn on_path(&self, path: &Path, t: f64) -> f64 {
+        if self.solid.moves() { self.twin.on_path(path, t) } else { self.omega(path.at(t)) }
+    }
+
+    fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        if !self.solid.moves() {
+            return DVec3::ZERO;
+        }
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Near(program)) => {
+                self.nearest(&mut (program as usize), p).velocity(&self.parts.leaves, p)
+            }
+            _ => self.solid.wall_velocity(p),
+        }
+    }
+
+    fn clearance(&self, p: DVec3, most: f64) -> f64 {
+        match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Fluid) if most <= self.reach => most,
+            Some(Cell::Fluid) => clearance_by_ranges(self, p, most).max(self.reach),
+            Some(Cell::Near(program)) => {
+                // a cube around the point, with its corners at the surface's distance, or with less than half
+                // of that; what the cell has kept is right within the reach
+                let distance = self.nearest(&mut (program as usize), p).distance.min(self.reach);
+                let is_proven = |radius: f64| {
+                    let cube = Aabb::new(p, p).grown(radius);
+                    self.parts.leaves.is_negative(&self.cells.programs[program as usize..], &cube)
+                };
+                let radii = [0.57, 0.25].map(|part| (part * distance).min(most));
+                radii.into_iter().find(|&radius| radius > 0.0 && is_proven(radius)).unwrap_or(0.0)
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn is_far(&self, over: &Aabb, reach: f64) -> bool {
+        let domain = self.cells.domain;
+        let within = domain.contains(over.min) && domain.contains(over.max);
+        within
+            && reach <= self.reach
+            && self
+                .cells
+                .touched(over, MOST_TOUCHED)
+                .is_some_and(|mut cells| cells.all(|cell| cell == Cell::Fluid))
+    }
+
+    fn first_entry(&self, path: &Path) -> Option<Entry> {
+        let domain = self.cells.domain;
+        if domain.contains(path.from) && domain.contains(path.to) {
+            if self.stays_out(path) { None } else { self.walk(path) }
+        } else {
+            self.twin.first_entry(path)
+        }
+    }
+}
+
+#[inline]
+fn signed(value: f64, negated: bool) -> f64 {
+    if negated { -value } else { value }
+}

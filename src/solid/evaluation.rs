@@ -1,0 +1,158 @@
+//! The values of a solid: ω and its gradient, its sign, its range, the surface near a point.
+
+use glam::{DVec3, Vec3};
+
+use super::construction::Solid;
+use super::engine::ProgramKind;
+use super::programs::on_demand::Lane;
+use crate::field::{Field, GradientsMut, Points};
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::Unary;
+
+/// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far
+/// away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Length, positive in the fluid, negative inside the solid.
+    pub distance: f64,
+    /// Outward unit normal of the face that is nearest; the mean of two at an edge; zero where there is none.
+    pub normal: DVec3,
+    /// Mean curvature of that face in 1/length, positive where the solid is convex: 1/R for a ball, 1/2R for
+    /// a cylinder.
+    pub mean_curvature: f64,
+}
+
+impl Solid {
+    /// ω at a point.
+    #[inline]
+    pub fn omega(&self, p: DVec3) -> f64 {
+        let mut out = [0.0];
+        self.evaluate(ProgramKind::Value, p.to_array(), &mut out);
+        out[0]
+    }
+
+    /// ω and ∇ω at a point; at edges and corners ∇ω is one finite member of the limits.
+    #[inline]
+    pub fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        let mut out = [0.0; 4];
+        self.evaluate(ProgramKind::Gradient, p.to_array(), &mut out);
+        (out[0], DVec3::new(out[1], out[2], out[3]))
+    }
+
+    /// ω in single precision throughout.
+    #[inline]
+    pub fn omega_f32(&self, p: Vec3) -> f32 {
+        let mut out = [0.0];
+        self.evaluate(ProgramKind::Value, p.to_array(), &mut out);
+        out[0]
+    }
+
+    /// ω and ∇ω in single precision throughout.
+    #[inline]
+    pub fn omega_grad_f32(&self, p: Vec3) -> (f32, Vec3) {
+        let mut out = [0.0; 4];
+        self.evaluate(ProgramKind::Gradient, p.to_array(), &mut out);
+        (out[0], Vec3::new(out[1], out[2], out[3]))
+    }
+
+    /// ω at many points given by columns; no allocation, on the caller's thread.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn omega_many<T: Lane>(&self, points: [&[T]; 3], omega: &mut [T]) {
+        self.evaluate_many(ProgramKind::Value, points, [omega]);
+    }
+
+    /// ω and ∇ω at many points given by columns: `out` is ω, ∂x, ∂y, ∂z.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn omega_grad_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 4]) {
+        self.evaluate_many(ProgramKind::Gradient, points, out);
+    }
+
+    /// Inside (1), on the surface (0) or outside (−1), exactly the logic of the leaves' signs; NaN where a
+    /// leaf is not a number, or farther than 1e77 from the origin.
+    #[inline]
+    pub fn sign(&self, p: DVec3) -> f64 {
+        let mut out = [0.0];
+        self.evaluate(ProgramKind::Sign, p.to_array(), &mut out);
+        Unary::Sign.eval(out[0])
+    }
+
+    /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
+    /// estimate far away.
+    pub fn contact(&self, p: DVec3) -> Contact {
+        let mut out = [0.0; 5];
+        self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
+        let [distance, nx, ny, nz, mean_curvature] = out;
+        Contact { distance, normal: DVec3::new(nx, ny, nz), mean_curvature }
+    }
+
+    /// The velocity of the surface near a point, along its normal, in lengths per second: that of the face
+    /// which [`Solid::contact`] finds. Zero for a solid at rest. A motion within the surface itself, as of a
+    /// turning cylinder, is not in ω.
+    pub fn wall_velocity(&self, p: DVec3) -> DVec3 {
+        if !self.moves() {
+            return DVec3::ZERO;
+        }
+        let mut out = [0.0; 3];
+        self.evaluate(ProgramKind::Velocity, p.to_array(), &mut out);
+        DVec3::from_array(out)
+    }
+
+    /// The distance of [`Solid::contact`] in single precision throughout.
+    pub fn distance_f32(&self, p: Vec3) -> f32 {
+        let mut out = [0.0; 5];
+        self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
+        out[0]
+    }
+
+    /// Distance, normal x, y, z and mean curvature at many points given by columns.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
+        self.evaluate_many(ProgramKind::Contact, points, out);
+    }
+
+    /// The twin at many points: positive inside, 0 on the surface, negative outside.
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn twin_many<T: Lane>(&self, points: [&[T]; 3], twin: &mut [T]) {
+        self.evaluate_many(ProgramKind::Sign, points, [twin]);
+    }
+
+    /// An interval that contains ω of every point of a box: the exact value and the one that [`Solid::omega`]
+    /// gives, also where that overflows. [`Interval::ALL`] where ω may not be a number. It says nothing of
+    /// points at which ω is NaN because of their coordinates: not finite, or so large that their sum is not.
+    pub fn range(&self, over: &Aabb) -> Interval {
+        self.inner.omega.range(self.inner.engine, over, &self.moment, false)
+    }
+}
+
+impl Field for Solid {
+    #[inline]
+    fn omega(&self, p: DVec3) -> f64 {
+        self.omega(p)
+    }
+
+    #[inline]
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        self.omega_grad(p)
+    }
+
+    fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        self.omega_many([points.x, points.y, points.z], omega);
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        self.omega_grad_many([points.x, points.y, points.z], [out.omega, out.x, out.y, out.z]);
+    }
+
+    fn range(&self, over: &Aabb) -> Interval {
+        self.range(over)
+    }
+}

@@ -1,0 +1,310 @@
+//! The leaves of a solid: many, of few shapes.
+//!
+//! Leaves that differ in their constants alone share their programs: ten thousand balls are compiled as one.
+
+use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
+
+use glam::DVec3;
+
+use smallvec::SmallVec;
+
+use super::shape::{Motion, Shape};
+use super::words::{self, Word};
+use crate::field::Path;
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::{Enclosure, Expr, Graph, Node, Region};
+use crate::solid::engine::Engine;
+
+struct Leaf {
+    shape: u32,
+    /// Where its constants begin.
+    first: u32,
+    /// Where the numbers begin that depend on time alone.
+    first_uniform: u32,
+    /// Whether machine code may answer for its range. For leaves that move [`Ranges`] says it.
+    tame: bool,
+}
+
+/// The leaves of a solid at all times.
+pub struct LeafStore {
+    engine: Engine,
+    shapes: Vec<Shape>,
+    leaves: Vec<Leaf>,
+    constants: Vec<f64>,
+    uniforms: usize,
+}
+
+/// The leaves during a stretch of time: values are those at its end, ranges hold all of it.
+pub struct Leaves {
+    store: Arc<LeafStore>,
+    from: f64,
+    to: f64,
+    /// What depends on time alone, at the end.
+    uniforms: Vec<f64>,
+    ranges: OnceLock<Ranges>,
+}
+
+/// A solid taken apart, during a stretch of time: its leaves, and how they are joined.
+pub struct LeafTree {
+    pub leaves: Leaves,
+    /// In prefix form, see `words`.
+    pub words: Arc<[u32]>,
+}
+
+/// What depends on time alone, during the stretch.
+struct Ranges {
+    uniforms: Vec<Interval>,
+    /// The ranges as machine code reads them.
+    pairs: Vec<[f64; 2]>,
+    /// For each leaf, whether machine code may answer for its range.
+    tame: Vec<bool>,
+}
+
+/// Numbers of one leaf that depend on time alone.
+type Uniform = SmallVec<[f64; 16]>;
+
+impl LeafStore {
+    pub fn new(engine: Engine, graph: &Graph, nodes: &[Node]) -> Self {
+        let mut known: HashMap<Vec<Expr>, u32> = HashMap::new();
+        let (shapes, leaves, constants) = (Vec::new(), Vec::new(), Vec::new());
+        let mut out = Self { engine, shapes, leaves, constants, uniforms: 0 };
+        for &node in nodes {
+            let (shape, root, constants) = graph.parametrised(node);
+            let next = out.shapes.len() as u32;
+            let number = *known.entry(shape.exprs().to_vec()).or_insert(next);
+            if number == next {
+                out.shapes.push(Shape::new(shape, root, constants.len()));
+            }
+            let shape = &mut out.shapes[number as usize];
+            shape.leaves += 1;
+            let still = shape.motion.is_none();
+            let tame = still && shape.range_stays_finite(&constants, &[]);
+            let (first, first_uniform) = (out.constants.len() as u32, out.uniforms as u32);
+            out.leaves.push(Leaf { shape: number, first, first_uniform, tame });
+            out.constants.extend(constants);
+            out.uniforms += shape.uniforms();
+        }
+        out
+    }
+
+    fn of(&self, leaf: u32) -> (&Shape, &[f64]) {
+        let leaf = &self.leaves[leaf as usize];
+        let shape = &self.shapes[leaf.shape as usize];
+        let first = leaf.first as usize;
+        (shape, &self.constants[first..first + shape.parameters])
+    }
+
+    /// The leaves that move, with their shapes and constants.
+    fn moving(&self) -> impl Iterator<Item = (usize, &Shape, &Motion, &[f64])> {
+        (0..self.leaves.len()).filter_map(|i| {
+            let (shape, constants) = self.of(i as u32);
+            Some((i, shape, shape.motion.as_ref()?, constants))
+        })
+    }
+
+    /// The leaves during a stretch of time.
+    pub fn during(self: &Arc<Self>, from: f64, to: f64) -> Leaves {
+        let mut uniforms = vec![0.0; self.uniforms];
+        if self.uniforms > 0 {
+            for (i, shape, motion, constants) in self.moving() {
+                let first = self.leaves[i].first_uniform as usize;
+                motion.uniforms.fill(to, constants, &mut uniforms[first..first + shape.uniforms()]);
+            }
+        }
+        Leaves { store: self.clone(), from, to, uniforms, ranges: OnceLock::new() }
+    }
+}
+
+impl Leaves {
+    /// Whether a leaf depends on time.
+    pub fn moves(&self, leaf: u32) -> bool {
+        self.store.of(leaf).0.motion.is_some()
+    }
+
+    fn of(&self, leaf: u32) -> (&Shape, &[f64], &[f64]) {
+        let (shape, constants) = self.store.of(leaf);
+        let first = self.store.leaves[leaf as usize].first_uniform as usize;
+        (shape, constants, &self.uniforms[first..first + shape.uniforms()])
+    }
+
+    fn ranges(&self) -> &Ranges {
+        self.ranges.get_or_init(|| {
+            let time = Interval::new(self.from.min(self.to), self.from.max(self.to));
+            let mut uniforms = Vec::with_capacity(self.store.uniforms);
+            let mut tame: Vec<bool> = self.store.leaves.iter().map(|leaf| leaf.tame).collect();
+            for (i, shape, motion, constants) in self.store.moving() {
+                let own = motion.uniforms.over(time, constants);
+                tame[i] = shape.range_stays_finite(constants, &own);
+                uniforms.extend(own);
+            }
+            let pairs = uniforms.iter().map(|u| [u.lo, u.hi]).collect();
+            Ranges { uniforms, pairs, tame }
+        })
+    }
+
+    pub fn len(&self) -> usize {
+        self.store.leaves.len()
+    }
+
+    pub fn shapes(&self) -> usize {
+        self.store.shapes.len()
+    }
+
+    /// The number of a leaf's shape.
+    pub fn shape_of(&self, leaf: u32) -> usize {
+        self.store.leaves[leaf as usize].shape as usize
+    }
+
+    /// Operations of a leaf's formula, constants and coordinates not counted.
+    pub fn operations(&self, leaf: u32) -> usize {
+        let (shape, ..) = self.of(leaf);
+        let graph = shape.motion.as_ref().map_or(&shape.graph, |motion| &motion.graph);
+        graph.nodes().filter(|(_, expr)| expr.operands().next().is_some()).count()
+    }
+
+    /// An interval that contains the leaf's value at every point of a box, at all times of the stretch.
+    pub fn range(&self, leaf: u32, over: &Aabb) -> Interval {
+        let (shape, constants, uniforms) = self.of(leaf);
+        if uniforms.is_empty() {
+            let by_code = self.store.engine != Engine::Interpreter && self.store.leaves[leaf as usize].tame;
+            if by_code
+                && let Some(range) = shape.range_code().and_then(|code| code.call(over, constants, &[]))
+            {
+                return range;
+            }
+            return shape.range.eval_with(&Region { parameters: constants, ..Region::of(over) });
+        }
+        let ranges = self.ranges();
+        let first = self.store.leaves[leaf as usize].first_uniform as usize;
+        let own = first..first + uniforms.len();
+        let by_code = self.store.engine != Engine::Interpreter && ranges.tame[leaf as usize];
+        if by_code
+            && let Some(code) = shape.range_code()
+            && let Some(range) = code.call(over, constants, &ranges.pairs[own.clone()])
+        {
+            return range;
+        }
+        let uniforms = &ranges.uniforms[own];
+        shape.range.eval_with(&Region { parameters: constants, uniforms, ..Region::of(over) })
+    }
+
+    #[inline]
+    pub fn value(&self, leaf: u32, p: DVec3) -> f64 {
+        let (shape, constants, uniforms) = self.of(leaf);
+        let mut out = [0.0];
+        shape.value(self.store.engine).point(p, constants, uniforms, &mut out);
+        out[0]
+    }
+
+    /// Value and gradient.
+    pub fn gradient(&self, leaf: u32, p: DVec3) -> (f64, DVec3) {
+        self.gradient_along(leaf, p, 1.0)
+    }
+
+    /// Value and gradient after a part of the stretch of time.
+    pub fn gradient_along(&self, leaf: u32, p: DVec3, part: f64) -> (f64, DVec3) {
+        let (shape, constants, at_end) = self.of(leaf);
+        let mut uniforms = Uniform::from_slice(at_end);
+        if let Some(motion) = &shape.motion
+            && part < 1.0
+        {
+            motion.uniforms.fill(self.from + part * (self.to - self.from), constants, &mut uniforms);
+        }
+        let mut out = [0.0; 4];
+        shape.gradient(self.store.engine).point(p, constants, &uniforms, &mut out);
+        (out[0], DVec3::new(out[1], out[2], out[3]))
+    }
+
+    /// The value of the leaf that decides in a tree in prefix form, that leaf, and whether it is negated. The
+    /// smallest decides in "all of", the largest in "any of"; the value is NaN if any leaf is.
+    pub fn decide(&self, words: &[u32], at: &mut usize, p: DVec3) -> (f64, (u32, bool)) {
+        let word = Word::read(words[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                let value = self.value(leaf, p);
+                return (if negated { -value } else { value }, (leaf, negated));
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let mut best = self.decide(words, at, p);
+        for _ in 1..parts {
+            let next = self.decide(words, at, p);
+            let wins = if all { next.0 < best.0 } else { next.0 > best.0 };
+            if wins || next.0.is_nan() {
+                best = next;
+            }
+        }
+        best
+    }
+
+    /// Whether a tree in prefix form is surely negative all over a box, at all times of the stretch.
+    pub fn is_negative(&self, tree: &[u32], over: &Aabb) -> bool {
+        let negative = words::is_negative(tree, &mut 0, &mut |leaf, negated| {
+            let range = self.range(leaf, over);
+            (range != Interval::ALL).then_some(if negated { range.lo > 0.0 } else { range.hi < 0.0 })
+        });
+        negative == Some(true)
+    }
+
+    /// Distance, outward normal and mean curvature, see `ir::contact`.
+    #[inline]
+    pub fn contact(&self, leaf: u32, p: DVec3) -> [f64; 5] {
+        let (shape, constants, uniforms) = self.of(leaf);
+        let mut out = [0.0; 5];
+        shape.contact(self.store.engine).point(p, constants, uniforms, &mut out);
+        out
+    }
+
+    /// Velocity of the leaf's surface along its normal, see `ir::wall_velocity`.
+    pub fn velocity(&self, leaf: u32, p: DVec3) -> DVec3 {
+        let (shape, constants, uniforms) = self.of(leaf);
+        let Some(motion) = &shape.motion else { return DVec3::ZERO };
+        let mut out = [0.0; 3];
+        motion.velocity(shape, self.store.engine).point(p, constants, uniforms, &mut out);
+        DVec3::from_array(out)
+    }
+
+    pub fn values(&self, leaf: u32, points: [&[f64]; 3], out: &mut [f64]) {
+        let (shape, constants, uniforms) = self.of(leaf);
+        shape.value(self.store.engine).many(points, constants, uniforms, out);
+    }
+
+    /// What a leaf is along a whole path that is passed during the stretch of time; `None` unless it is a
+    /// polynomial of degree two at most.
+    pub fn on_path(&self, leaf: u32, negated: bool, from: DVec3, to: DVec3) -> Option<Enclosure> {
+        let (shape, constants, _) = self.of(leaf);
+        let program = shape.polynomial(self.store.engine)?;
+        let mut parameters: SmallVec<[f64; 16]> = SmallVec::from_slice(constants);
+        parameters.extend_from_slice(&(to - from).to_array());
+        parameters.extend_from_slice(&[self.to - self.from, self.from]);
+        let mut out = [0.0; 6];
+        program.point(from, &parameters, &[], &mut out);
+        let [a, b, c, d, e, f] = out;
+        let coefficients = [(a, d), (b, e), (c, f)].map(|(value, error)| {
+            let value = if negated { -value } else { value };
+            // an error of zero says that the value is exact
+            if error == 0.0 {
+                Interval::new(value, value)
+            } else {
+                Interval::new((value - error).next_down(), (value + error).next_up())
+            }
+        });
+        Some(Enclosure { coefficients, range: Interval::ALL })
+    }
+
+    /// An enclosure of a leaf over a part of a path.
+    pub fn enclose(&self, leaf: u32, negated: bool, path: &Path, stretch: (f64, f64)) -> Enclosure {
+        let (shape, constants, _) = self.of(leaf);
+        let (from, to) = (path.from.extend(self.from).to_array(), path.to.extend(self.to).to_array());
+        let found = shape.enclosures().enclose(from, to, stretch, constants);
+        if negated {
+            Enclosure { coefficients: found.coefficients.map(|c| -c), range: -found.range }
+        } else {
+            found
+        }
+    }
+}

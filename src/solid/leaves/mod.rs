@@ -1,0 +1,8 @@
+//! A solid taken apart into leaves: how they are joined, what each of them is, what is left of them in a box.
+
+mod faces;
+pub mod leaf_set;
+pub mod pruning;
+mod shape;
+pub mod tree;
+pub mod words;

@@ -1,0 +1,202 @@
+//! A shape of leaves: those that differ in their constants alone, and so share their programs.
+
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use crate::codegen;
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::{
+    self, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region, Uniforms,
+};
+use crate::simplify::simplify;
+use crate::solid::engine::Engine;
+use crate::solid::programs::compiled::{LeafProgram, RangeProgram};
+
+/// Ranges of so many leaves of one shape come from machine code, which costs as much time to make as some
+/// thousand ranges by the interpreter. The number of leaves decides, not that of the calls, so that the
+/// bounds of a leaf never depend on what was asked before.
+const MANY_LEAVES: usize = 8;
+
+/// A shape of leaves.
+pub struct Shape {
+    /// What depends on time alone was taken out of it.
+    pub graph: Graph,
+    root: Node,
+    pub parameters: usize,
+    pub leaves: usize,
+    /// `None` for a leaf at rest.
+    pub motion: Option<Motion>,
+    pub range: RangeEvaluator,
+    range_code: OnceLock<Option<RangeProgram>>,
+    value: OnceLock<Evaluator>,
+    gradient: OnceLock<Evaluator>,
+    contact: OnceLock<Evaluator>,
+    /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
+    polynomial: OnceLock<Option<Evaluator>>,
+    enclosures: OnceLock<EnclosureEvaluator>,
+}
+
+/// What is peculiar to leaves that move.
+pub struct Motion {
+    /// The leaf as a formula of time.
+    pub graph: Graph,
+    root: Node,
+    pub uniforms: Uniforms,
+    /// With these uniforms, as the graph of the shape.
+    velocity: (Graph, Vec<Node>),
+    velocity_code: OnceLock<Evaluator>,
+}
+
+pub struct Evaluator {
+    code: Option<LeafProgram>,
+    interpreter: Interpreter,
+}
+
+impl Motion {
+    #[inline]
+    pub fn velocity(&self, shape: &Shape, engine: Engine) -> &Evaluator {
+        let (graph, outputs) = &self.velocity;
+        let make = || Evaluator::new(engine, graph, outputs, shape.parameters);
+        self.velocity_code.get_or_init(make)
+    }
+}
+
+impl Shape {
+    pub fn new(graph: Graph, root: Node, parameters: usize) -> Self {
+        let (graph, root, motion) = if graph.uses_time(root) {
+            let mut all = graph.clone();
+            let [x, y, z] = ir::wall_velocity(&mut all, root);
+            let (all, outputs, _) = simplify(&all, &[root, x, y, z]);
+            let Hoisted { graph: rest, outputs, uniforms, .. } = ir::hoisted(&all, &outputs);
+            let velocity = rest.extract(&outputs[1..]);
+            let motion = Motion { graph, root, uniforms, velocity, velocity_code: OnceLock::new() };
+            let (rest, root) = rest.extract_cone(outputs[0]);
+            (rest, root, Some(motion))
+        } else {
+            (graph, root, None)
+        };
+        let range = RangeEvaluator::new(&graph, root);
+        let (range_code, value, gradient) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        let (contact, polynomial, enclosures) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        Self {
+            graph,
+            root,
+            parameters,
+            leaves: 0,
+            motion,
+            range,
+            range_code,
+            value,
+            gradient,
+            contact,
+            polynomial,
+            enclosures,
+        }
+    }
+
+    /// How many numbers of it depend on time alone.
+    #[inline]
+    pub fn uniforms(&self) -> usize {
+        self.motion.as_ref().map_or(0, |motion| motion.uniforms.len())
+    }
+
+    /// Whether machine code may answer for the range of a leaf with these numbers.
+    pub fn range_stays_finite(&self, parameters: &[f64], uniforms: &[Interval]) -> bool {
+        let numbers = Region { parameters, uniforms, ..Region::of(&Aabb::EMPTY) };
+        codegen::range_stays_finite(&self.graph, &self.range, numbers)
+    }
+
+    /// The leaf as a formula of place and time.
+    pub fn formula(&self) -> (&Graph, Node) {
+        self.motion.as_ref().map_or((&self.graph, self.root), |motion| (&motion.graph, motion.root))
+    }
+
+    #[inline]
+    pub fn range_code(&self) -> Option<&RangeProgram> {
+        // the ranges of a leaf that moves are asked for again and again
+        if self.leaves < MANY_LEAVES && self.motion.is_none() {
+            return None;
+        }
+        let compile = || RangeProgram::with_parameters(&self.graph, self.root, self.parameters).ok();
+        self.range_code.get_or_init(compile).as_ref()
+    }
+
+    #[inline]
+    pub fn contact(&self, engine: Engine) -> &Evaluator {
+        self.contact.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let outputs = ir::contact(&mut graph, self.root);
+            let (graph, outputs, _) = simplify(&graph, &outputs);
+            Evaluator::new(engine, &graph, &outputs, self.parameters)
+        })
+    }
+
+    /// Coefficients along a path and their errors; `None` unless the leaf is a polynomial of degree two at
+    /// most.
+    pub fn polynomial(&self, engine: Engine) -> Option<&Evaluator> {
+        let make = || {
+            let (graph, root) = self.formula();
+            let mut graph = graph.clone();
+            let outputs = ir::polynomial_on_path(&mut graph, root, self.parameters as u32)?;
+            let (graph, outputs, _) = simplify(&graph, &outputs);
+            Some(Evaluator::new(engine, &graph, &outputs, self.parameters + 5))
+        };
+        self.polynomial.get_or_init(make).as_ref()
+    }
+
+    /// Enclosures along paths.
+    pub fn enclosures(&self) -> &EnclosureEvaluator {
+        self.enclosures.get_or_init(|| {
+            let (graph, root) = self.formula();
+            EnclosureEvaluator::new(graph, root)
+        })
+    }
+
+    #[inline]
+    pub fn value(&self, engine: Engine) -> &Evaluator {
+        self.value.get_or_init(|| Evaluator::new(engine, &self.graph, &[self.root], self.parameters))
+    }
+
+    pub fn gradient(&self, engine: Engine) -> &Evaluator {
+        self.gradient.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let [x, y, z] = ir::gradient(&mut graph, self.root);
+            let (graph, outputs, _) = simplify(&graph, &[self.root, x, y, z]);
+            Evaluator::new(engine, &graph, &outputs, self.parameters)
+        })
+    }
+}
+
+impl Evaluator {
+    pub fn new(engine: Engine, graph: &Graph, outputs: &[Node], parameters: usize) -> Self {
+        let code = match engine {
+            Engine::Interpreter => None,
+            Engine::Auto | Engine::Jit => LeafProgram::compile(graph, outputs, parameters).ok(),
+        };
+        Self { code, interpreter: Interpreter::new(graph, outputs) }
+    }
+
+    #[inline]
+    pub fn point(&self, p: DVec3, constants: &[f64], uniforms: &[f64], out: &mut [f64]) {
+        match &self.code {
+            Some(code) => code.call(p, constants, uniforms, out),
+            None => self.interpret(p.to_array(), constants, uniforms, out),
+        }
+    }
+
+    pub fn many(&self, points: [&[f64]; 3], constants: &[f64], uniforms: &[f64], out: &mut [f64]) {
+        if let Some(code) = &self.code {
+            return code.call_many(points, constants, uniforms, out);
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            let p = points.map(|column| column[i]);
+            self.interpret(p, constants, uniforms, std::slice::from_mut(out));
+        }
+    }
+
+    pub fn interpret(&self, p: [f64; 3], parameters: &[f64], uniforms: &[f64], out: &mut [f64]) {
+        self.interpreter.eval_given(Given { parameters, uniforms, ..Given::point(p) }, out);
+    }
+}

@@ -1,0 +1,4 @@
+//! Where a straight path meets a solid.
+
+pub mod intervals;
+pub mod sweep;
