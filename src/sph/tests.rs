@@ -1,4 +1,4 @@
-//! The whole method against physics: falls, bounces, slides, drops.
+//! All methods against physics: falls, bounces, slides, drops.
 
 use std::sync::Arc;
 

@@ -87,7 +87,8 @@ fn a_linear_pressure_is_met_exactly_at_walls_too() {
         for z in [0.0, 0.03, 0.2, 0.33] {
             let found = Neighbourhood::around(&core, DVec3::new(x, y, z)).pressure();
             let exact = RHO * G * (DEPTH - z);
-            // LEAST_SPREAD against the variance of the places: some 1e-3 of the pressure over a support radius
+            // LEAST_SPREAD against the variance of the places: some 1e-3 of the pressure over a support
+            // radius
             assert!(
                 (found - exact).abs() < 2e-3 * RHO * G * core.parameters.support_radius,
                 "{x} {y} {z}: {found} {exact}"
