@@ -182,7 +182,20 @@ impl<'a> Lowering<'a> {
             self.names.define(self.scope.source, &param.name, Kind::Value(Value::Failed));
             return;
         };
-        let mut fits = false;
+        let fits = self.param_fits(param, value, range, overridden.is_some());
+        let value_now = if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
+        self.names.define(self.scope.source, &param.name, Kind::Value(value_now));
+        self.module.params.push(ParamValue {
+            name: param.name.text.clone(),
+            value,
+            range,
+            doc: param.doc.clone(),
+            span: param.name.span,
+        });
+    }
+
+    /// Whether a param's value is a finite number within its range; what is wrong is reported.
+    fn param_fits(&mut self, param: &Param, value: f64, range: Option<(f64, f64)>, overridden: bool) -> bool {
         if let Some((low, high)) = range
             && low > high
             && let Some((first, last)) = &param.range
@@ -195,7 +208,7 @@ impl<'a> Lowering<'a> {
         } else if let Some((low, high)) = range
             && !(low <= value && value <= high)
         {
-            let diagnostic = if overridden.is_some() {
+            let diagnostic = if overridden {
                 let message =
                     format!("-D sets `{}` to {value}, outside its range {low} .. {high}", param.name.text);
                 Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here")
@@ -207,23 +220,16 @@ impl<'a> Lowering<'a> {
             self.report(diagnostic);
         } else if !value.is_finite() {
             let message = format!("`{}` is {value}, which is not a finite number", param.name.text);
-            let (code, at) = match overridden {
-                Some(_) => (Code::OVERRIDE, param.name.span),
-                None => (Code::OUT_OF_RANGE, param.value.span),
+            let (code, at) = if overridden {
+                (Code::OVERRIDE, param.name.span)
+            } else {
+                (Code::OUT_OF_RANGE, param.value.span)
             };
             self.report(Diagnostic::error(code, at, message));
         } else {
-            fits = true;
+            return true;
         }
-        let value_now = if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
-        self.names.define(self.scope.source, &param.name, Kind::Value(value_now));
-        self.module.params.push(ParamValue {
-            name: param.name.text.clone(),
-            value,
-            range,
-            doc: param.doc.clone(),
-            span: param.name.span,
-        });
+        false
     }
 
     fn definition(&mut self, definition: &'a Definition) {

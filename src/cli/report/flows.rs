@@ -120,28 +120,7 @@ pub(super) fn run(
         );
         table.head();
     }
-    let mut rows: Vec<Row> = Vec::new();
-    for method in methods {
-        let by_method = match method {
-            Some(method) => program.with_method(method).map_err(refused)?,
-            None => program.clone(),
-        };
-        for &size in &sizes {
-            let sized = match size {
-                Some(size) => by_method.with(SIZE, size as f64).map_err(refused)?,
-                None => by_method.clone(),
-            };
-            let mut row = study.measure(&sized, size)?;
-            if let Some(coarser) = rows.last() {
-                row.compare(coarser);
-            }
-            if !shared.json {
-                // each as soon as it is known: the next may take long
-                study.bar.suspend(|| table.row(&row));
-            }
-            rows.push(row);
-        }
-    }
+    let rows = study.rows(program, &methods, &sizes, &table)?;
     study.bar.finish_and_clear();
     if let Some(path) = picture {
         let picture = flow_plot::draw(&scene.name, &rows, path)?;
@@ -154,13 +133,19 @@ pub(super) fn run(
     } else if let Some(path) = picture {
         println!("plot written to {}", path.display());
     }
-    let failures: Vec<String> = rows
-        .iter()
-        .filter_map(|row| {
-            Some(format!("{}, {} particles: {}", row.method, row.particles, row.failure.as_ref()?))
-        })
-        .collect();
-    if failures.is_empty() { Ok(()) } else { Err(Failure::Numerical(failures.join("\n"))) }
+    match failures(&rows) {
+        None => Ok(()),
+        Some(failures) => Err(Failure::Numerical(failures)),
+    }
+}
+
+/// What went wrong in which run, a line each.
+fn failures(rows: &[Row]) -> Option<String> {
+    let failed = rows.iter().filter_map(|row| {
+        Some(format!("{}, {} particles: {}", row.method, row.particles, row.failure.as_ref()?))
+    });
+    let lines: Vec<String> = failed.collect();
+    (!lines.is_empty()).then(|| lines.join("\n"))
 }
 
 /// The sizes asked for, or [`PARTS`] of the file's own within its range; nothing is one run as the file has it.
@@ -194,6 +179,38 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
+    /// Runs the scene by each method in each size; a row is printed as soon as it is known, because the next may take long.
+    fn rows(
+        &mut self,
+        program: &Program,
+        methods: &[Option<Method>],
+        sizes: &[Option<usize>],
+        table: &Table,
+    ) -> Result<Vec<Row>, Failure> {
+        let mut rows: Vec<Row> = Vec::new();
+        for method in methods {
+            let by_method = match method {
+                Some(method) => program.with_method(*method).map_err(refused)?,
+                None => program.clone(),
+            };
+            for &size in sizes {
+                let sized = match size {
+                    Some(size) => by_method.with(SIZE, size as f64).map_err(refused)?,
+                    None => by_method.clone(),
+                };
+                let mut row = self.measure(&sized, size)?;
+                if let Some(coarser) = rows.last() {
+                    row.compare(coarser);
+                }
+                if !self.shared.json {
+                    self.bar.suspend(|| table.row(&row));
+                }
+                rows.push(row);
+            }
+        }
+        Ok(rows)
+    }
+
     /// Runs the scene to its end and looks at it whenever it would be saved.
     fn measure(&mut self, program: &Program, size: Option<usize>) -> Result<Row, Failure> {
         let scene = choose::scene(program, Some(self.scene))?;
@@ -242,9 +259,22 @@ impl Study<'_> {
         self.bar.set_position(before + work(size) as u64);
         self.instants = self.instants.max(deviations.instants());
         let deviation = if failure.is_none() { deviations.total() } else { Deviation::default() };
+        Ok(Row::of(&simulation, deviation, [cpu_seconds, seconds], failure))
+    }
+}
+
+impl Row {
+    /// A run that has ended, with the seconds that it took of processors and of the clock; orders of convergence are not
+    /// known yet.
+    fn of(
+        simulation: &Simulation,
+        deviation: Deviation,
+        [cpu_seconds, seconds]: [f64; 2],
+        failure: Option<String>,
+    ) -> Self {
         let parameters = simulation.parameters();
-        Ok(Row {
-            method,
+        Self {
+            method: parameters.method.name(),
             precision: parameters.precision.name(),
             particles: simulation.particles().len(),
             spacing: parameters.spacing(),
@@ -260,7 +290,7 @@ impl Study<'_> {
             cpu_seconds_per_simulated_second: cpu_seconds / simulation.time(),
             seconds,
             failure,
-        })
+        }
     }
 }
 

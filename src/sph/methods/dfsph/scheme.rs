@@ -275,39 +275,15 @@ impl DivergenceFree {
     fn solve(&mut self, core: &Core, pressure: &mut [f64], free: &[f64], dt: f64, tolerance: f64) -> u32 {
         let least = LONELY * Constants::of(&core.parameters).full_factor;
         let n = pressure.len() as f64;
-        let mut last = std::mem::take(&mut self.last);
-        last.clear();
-        last.extend_from_slice(pressure);
+        self.last.clear();
+        self.last.extend_from_slice(pressure);
         let (mut iteration, mut momentum, mut best) = (0, 0.0, f64::INFINITY);
         loop {
             self.find_push(core, pressure);
             let push = std::mem::take(&mut self.push);
             self.find_rate_of(core, &push, false);
             self.push = push;
-            let guess = |scale: f64, s: f64, error: f64, factor: f64| (s + scale * error / factor).max(0.0);
-            let scale = 1.0 / (dt * self.stiffness);
-            // the errors at this guess, and whether momentum leads from it uphill
-            self.rate
-                .par_chunks(CHUNK)
-                .zip(free.par_chunks(CHUNK))
-                .zip(self.factor.par_chunks(CHUNK))
-                .zip(pressure.par_chunks(CHUNK))
-                .zip(last.par_chunks(CHUNK))
-                .map(|((((rate, free), factor), s), last)| {
-                    let mut sums = [0.0; 2];
-                    for k in 0..rate.len() {
-                        if factor[k] > least {
-                            let error = free[k] + dt * rate[k];
-                            let next = guess(scale, s[k], error, factor[k]);
-                            // an expansion that no pressure can end is no error
-                            sums[0] += if s[k] > 0.0 { error.abs() } else { error.max(0.0) };
-                            sums[1] += factor[k] * (s[k] - next) * (next - last[k]);
-                        }
-                    }
-                    sums
-                })
-                .collect_into_vec(&mut self.errors);
-            let [error, uphill] = self.errors.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+            let [error, uphill] = self.find_errors(pressure, free, dt, least);
             let mean = error / n;
             let done = (mean <= tolerance && iteration > 0) || iteration >= self.numbers.most_iterations;
             if done || !mean.is_finite() {
@@ -322,29 +298,59 @@ impl DivergenceFree {
             let begin_anew = too_long || uphill > 0.0;
             let beta = if begin_anew { 0.0 } else { momentum / (momentum + 3.0) };
             momentum = if begin_anew { 0.0 } else { momentum + 1.0 };
-            let scale = 1.0 / (dt * self.stiffness);
-            pressure
-                .par_chunks_mut(CHUNK)
-                .zip(last.par_chunks_mut(CHUNK))
-                .zip(self.rate.par_chunks(CHUNK))
-                .zip(free.par_chunks(CHUNK))
-                .zip(self.factor.par_chunks(CHUNK))
-                .for_each(|((((s, last), rate), free), factor)| {
-                    for k in 0..s.len() {
-                        if factor[k] > least {
-                            let error = free[k] + dt * rate[k];
-                            let next = guess(scale, s[k], error, factor[k]);
-                            s[k] = (next + beta * (next - last[k])).max(0.0);
-                            last[k] = next;
-                        } else {
-                            (s[k], last[k]) = (0.0, 0.0);
-                        }
-                    }
-                });
+            self.guess_again(pressure, free, dt, least, beta);
             iteration += 1;
         }
-        self.last = last;
         iteration
+    }
+
+    /// The sum of the errors at a guess, and whether momentum leads from it uphill: a sum above zero.
+    fn find_errors(&mut self, pressure: &[f64], free: &[f64], dt: f64, least: f64) -> [f64; 2] {
+        let scale = 1.0 / (dt * self.stiffness);
+        self.rate
+            .par_chunks(CHUNK)
+            .zip(free.par_chunks(CHUNK))
+            .zip(self.factor.par_chunks(CHUNK))
+            .zip(pressure.par_chunks(CHUNK))
+            .zip(self.last.par_chunks(CHUNK))
+            .map(|((((rate, free), factor), s), last)| {
+                let mut sums = [0.0; 2];
+                for k in 0..rate.len() {
+                    if factor[k] > least {
+                        let error = free[k] + dt * rate[k];
+                        let next = projected(scale, s[k], error, factor[k]);
+                        // an expansion that no pressure can end is no error
+                        sums[0] += if s[k] > 0.0 { error.abs() } else { error.max(0.0) };
+                        sums[1] += factor[k] * (s[k] - next) * (next - last[k]);
+                    }
+                }
+                sums
+            })
+            .collect_into_vec(&mut self.errors);
+        self.errors.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
+    }
+
+    /// Takes the step along the gradient, and the part `beta` of the last step again.
+    fn guess_again(&mut self, pressure: &mut [f64], free: &[f64], dt: f64, least: f64, beta: f64) {
+        let scale = 1.0 / (dt * self.stiffness);
+        pressure
+            .par_chunks_mut(CHUNK)
+            .zip(self.last.par_chunks_mut(CHUNK))
+            .zip(self.rate.par_chunks(CHUNK))
+            .zip(free.par_chunks(CHUNK))
+            .zip(self.factor.par_chunks(CHUNK))
+            .for_each(|((((s, last), rate), free), factor)| {
+                for k in 0..s.len() {
+                    if factor[k] > least {
+                        let error = free[k] + dt * rate[k];
+                        let next = projected(scale, s[k], error, factor[k]);
+                        s[k] = (next + beta * (next - last[k])).max(0.0);
+                        last[k] = next;
+                    } else {
+                        (s[k], last[k]) = (0.0, 0.0);
+                    }
+                }
+            });
     }
 
     /// a(s)
@@ -378,6 +384,12 @@ fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
     let slow = falls.max(at_rest * dt);
     let courant = (dt * speed / (ADVECTION * parameters.spacing())).min(1.0);
     slow + (moving * dt - slow) * courant
+}
+
+/// A step along the gradient from a guess, not below zero.
+#[inline]
+fn projected(scale: f64, s: f64, error: f64, factor: f64) -> f64 {
+    (s + scale * error / factor).max(0.0)
 }
 
 /// Greatest eigenvalue over diagonal in an even fluid with so many spacings per support radius: waves of pressure of the
