@@ -149,7 +149,7 @@ pub(super) struct Eval {
     pub precision: Option<Precision>,
 }
 
-/// In the order of their columns.
+/// A column of the output of `rfm eval`. The variants stand in the order of the columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub(super) enum What {
     /// ω, positive inside
@@ -181,14 +181,15 @@ pub(super) struct Mesh {
     /// The solid [default: the only one, or the first obstacle of the scene]
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
-    /// Where the mesh goes; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf. With --fluid a folder
-    /// [default: surface/ in that of the run]
+    /// Where the mesh goes; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf. With --fluid a
+    /// folder [default: surface/ in that of the run]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Cells along the longest side
     #[arg(long, value_name = "N", default_value_t = 128, conflicts_with = "cell")]
     pub cells: usize,
-    /// Size of a cell instead of their number, in metres or with a unit; with --fluid half the radius by default
+    /// Size of a cell instead of their number, in metres or with a unit; with --fluid half the radius by
+    /// default
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = length)]
     pub cell: Option<f64>,
     /// Mesh this box instead of the solid's own bounds; the mesh is closed at its border
@@ -203,8 +204,8 @@ pub(super) struct Mesh {
     /// Contract thin triangles; all vertices stay on the surface
     #[arg(long)]
     pub no_slivers: bool,
-    /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of the mesh's
-    /// diagonal as in 0.1%. The distance is measured; vertices stay on the surface
+    /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of
+    /// the mesh's diagonal as in 0.1%. The distance is measured; vertices stay on the surface
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub simplify: Option<Tolerance>,
     /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
@@ -241,23 +242,25 @@ pub(super) struct Mesh {
 /// How far a simplified mesh may be from the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Tolerance {
-    /// Metres.
+    /// A length, m.
     Length(f64),
-    /// Part of the diagonal of the mesh's bounds.
+    /// A part of the diagonal of the mesh's bounds.
     OfDiagonal(f64),
 }
 
 /// A range of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Frames {
+    /// The first frame.
     pub first: usize,
-    /// The first that is left out.
+    /// The first frame that is left out; `None`: all frames are taken.
     pub end: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum MeshMethod {
-    /// Marching cubes with vertices on the exact surface: a third of the time at as many cells, but edges are cut off
+    /// Marching cubes with vertices on the exact surface: a third of the time at as many cells, but edges are
+    /// cut off
     Mc,
     /// Dual contouring: also edges and corners are exact, so an eighth of the cells do for the same error
     Dc,
@@ -321,12 +324,12 @@ pub(super) struct Report {
     pub flow: Flow,
 }
 
-/// What is asked of a flow.
+/// How a flow is measured.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Flows")]
 pub(super) struct Flow {
-    /// Run the scene with so many particles, by its `param particles` [default: 1/16, 1/4 and all of what the file
-    /// states]
+    /// Run the scene with so many particles, by its `param particles` [default: 1/16, 1/4 and all of what the
+    /// file states]
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = count, conflicts_with_all = ["solid", "mesh_plot"])]
     pub particles: Vec<usize>,
     /// Run the scene by these methods [default: its own]
@@ -375,7 +378,7 @@ fn definition(text: &str) -> Result<(String, f64), String> {
     Ok((name.trim().to_string(), value))
 }
 
-/// More threads than this are a slip of the keyboard, and starting them would take minutes.
+/// Most threads. A larger number is a typing error, and starting the threads would take minutes.
 const MOST_THREADS: usize = 1024;
 
 fn threads(text: &str) -> Result<NonZeroUsize, String> {
