@@ -34,7 +34,7 @@ impl<'a> Points<'a> {
     /// Borrows three slices as points.
     ///
     /// # Panics
-    /// Panics if the slices differ in length.
+    /// If the slices differ in length.
     pub fn new(x: &'a [f64], y: &'a [f64], z: &'a [f64]) -> Self {
         assert!(x.len() == y.len() && y.len() == z.len(), "coordinate slices differ in length");
         Self { x, y, z }
@@ -53,7 +53,7 @@ impl<'a> Points<'a> {
     /// Point `i`.
     ///
     /// # Panics
-    /// Panics if there are not more than `i` points.
+    /// If there are not more than `i` points.
     pub fn get(&self, i: usize) -> DVec3 {
         DVec3::new(self.x[i], self.y[i], self.z[i])
     }

@@ -112,7 +112,7 @@ pub(super) struct Check {
     /// Check again whenever a file changes
     #[arg(long)]
     pub watch: bool,
-    /// The time at which solids that move are looked at, s
+    /// Time at which moving solids are evaluated, s
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// Treat a kind of message as an error
@@ -138,7 +138,7 @@ pub(super) struct Eval {
     /// A CSV file of points with the header x,y,z; `-` is standard input
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
-    /// The time at which solids that move are looked at, s
+    /// Time at which moving solids are evaluated, s
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// Columns to print
@@ -195,7 +195,7 @@ pub(super) struct Mesh {
     /// Mesh this box instead of the solid's own bounds; the mesh is closed at its border
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = aabb, allow_hyphen_values = true)]
     pub domain: Option<Aabb>,
-    /// The time at which solids that move are looked at, s
+    /// Time at which moving solids are evaluated, s
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// How the surface is found

@@ -66,7 +66,7 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
             (TimeStep { seconds: save_every, reason }, None)
         }
         None => {
-            // a whole number of steps between frames
+            // fit a whole number of steps between frames
             let steps = (save_every / stable).ceil().max(1.0);
             let reason = "derived: stable for a fall through the box";
             (TimeStep { seconds: save_every / steps, reason }, None)

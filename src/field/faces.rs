@@ -19,9 +19,9 @@ pub struct Face {
 pub enum Part {
     /// A face: the obstacle lies behind it.
     Face(Face),
-    /// The intersection of the next so many trees: an edge that stands out of the obstacle.
+    /// The intersection of this many of the trees that follow: an edge that stands out of the obstacle.
     All(u32),
-    /// The union of the next so many trees: an edge that reaches into the obstacle.
+    /// The union of this many of the trees that follow: an edge that reaches into the obstacle.
     Any(u32),
 }
 

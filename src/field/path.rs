@@ -153,7 +153,7 @@ pub fn last_outside(
         if width <= tolerance {
             break;
         }
-        // nearer to either end than half the tolerance teaches nothing
+        // points nearer to either end than half the tolerance add no knowledge
         let margin = (0.5 * tolerance / width).min(0.5);
         let secant = w_low / (w_low - w_high);
         let part = if k % 3 == 2 || !secant.is_finite() { 0.5 } else { secant.clamp(margin, 1.0 - margin) };

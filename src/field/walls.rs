@@ -21,8 +21,8 @@ const SHORTEST: f64 = 1e-9;
 /// Most ranges that are evaluated on one path. What is still undecided then is reported as uncertain.
 const MOST_RANGES: usize = 2_000;
 
-/// An obstacle as a fluid meets it. Every method has a default that follows from [`Field`] alone, so `impl
-/// Walls for MyField {}` is enough. An implementation overrides the methods that it can answer better.
+/// An obstacle as a fluid meets it. Every method has a default that follows from [`Field`] alone, so the line
+/// `impl Walls for MyField {}` is enough. An implementation overrides the methods that it can answer better.
 pub trait Walls: Field {
     /// Where a path first meets the obstacle, from [`Path::start`] on; ω = 0 counts as met. `None` if it does
     /// not.
@@ -150,7 +150,7 @@ pub(crate) fn clearance_by_ranges<F: Walls + ?Sized>(field: &F, p: DVec3, most: 
             return radius;
         }
         if range == Interval::ALL && radius == most && field.range(&Aabb::new(p, p)) == Interval::ALL {
-            break; // it knows nothing, and will not know more
+            break; // the field knows nothing of its range
         }
         radius *= 0.5;
     }

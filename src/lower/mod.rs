@@ -147,7 +147,7 @@ fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
         lowering.item(item, options);
     }
     if !lowering.diagnostics.iter().any(|d| d.severity == Severity::Error) {
-        lowering.unused(); // what failed may have been the use
+        lowering.unused(); // an item that failed may contain the use
     }
     lowering.unknown_overrides(ast, options);
     (lowering.module, lowering.diagnostics)
@@ -318,7 +318,7 @@ impl<'a> Lowering<'a> {
             }
         }
         if !fits {
-            // calls of it would only repeat the message
+            // a definition that failed, so that calls do not repeat the message
             self.names.define(self.scope.source, &function.name, Kind::Value(Value::Failed));
         }
         fits

@@ -178,7 +178,7 @@ impl Checkpoint {
     /// [`CheckpointError`] says why the bytes are not one.
     pub fn read(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let rest = bytes.strip_prefix(&MAGIC).ok_or(CheckpointError::Foreign)?;
-        // the version first: another one may have another checksum
+        // check the version first: another one may have another checksum
         let version = rest.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
         if let Some(version) = version.filter(|version| *version != VERSION) {
             return Err(CheckpointError::Version(version));

@@ -104,7 +104,7 @@ impl Core {
         if let Some((shift, factor)) = shift {
             add_scaled(&mut self.spare, shift, factor * dt);
         }
-        // infinite positions would be clamped to the box and never seen
+        // check now: infinite positions would be clamped to the box and never noticed
         if let Some(i) = first_non_finite(&self.spare) {
             return Err(self.non_finite(i, Quantity::Position, dt));
         }
@@ -273,7 +273,7 @@ impl Core {
         if dt < SHORTEST * self.longest_dt {
             return Err(self.stalled(dt));
         }
-        // equal steps to the instant that is to be met, rather than full ones and a small rest
+        // take equal steps to the instant, rather than full ones and a small rest
         Ok(if most.is_finite() { most / (most / dt - 1e-9).ceil().max(1.0) } else { dt })
     }
 
@@ -327,7 +327,7 @@ impl PairPass<0, 1, 1> for Count {
     }
 
     fn finish(&self, _: usize, [count]: [f64; 1]) -> [f64; 1] {
-        [count - 1.0] // itself
+        [count - 1.0] // without the particle itself
     }
 }
 
@@ -341,14 +341,14 @@ fn permute<T: Copy + Default + Send + Sync>(order: &[u32], values: &mut Vec<T>, 
     std::mem::swap(values, buffer);
 }
 
-/// to = a + b·t
+/// Sets `to` = a + b·t.
 pub(super) fn set_sum(to: &mut Vectors, a: &Vectors, b: &Vectors, t: f64) {
     for (to, a, b) in [(&mut to.x, &a.x, &b.x), (&mut to.y, &a.y, &b.y), (&mut to.z, &a.z, &b.z)] {
         set_sum_column(to, a, b, t);
     }
 }
 
-/// to = a + b·t
+/// Sets `to` = a + b·t.
 pub(super) fn set_sum_column(to: &mut Vec<f64>, a: &[f64], b: &[f64], t: f64) {
     to.resize(a.len(), 0.0);
     to.par_chunks_mut(CHUNK).zip(a.par_chunks(CHUNK)).zip(b.par_chunks(CHUNK)).for_each(|((to, a), b)| {
@@ -358,14 +358,14 @@ pub(super) fn set_sum_column(to: &mut Vec<f64>, a: &[f64], b: &[f64], t: f64) {
     });
 }
 
-/// to += from·t
+/// Adds from·t to `to`.
 pub(super) fn add_scaled(to: &mut Vectors, from: &Vectors, t: f64) {
     for (to, from) in [(&mut to.x, &from.x), (&mut to.y, &from.y), (&mut to.z, &from.z)] {
         add_scaled_column(to, from, t);
     }
 }
 
-/// to += from·t
+/// Adds from·t to `to`.
 pub(super) fn add_scaled_column(to: &mut [f64], from: &[f64], t: f64) {
     to.par_chunks_mut(CHUNK).zip(from.par_chunks(CHUNK)).for_each(|(to, from)| {
         for (to, from) in to.iter_mut().zip(from) {

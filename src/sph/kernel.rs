@@ -47,7 +47,7 @@ impl Kernels {
         }
     }
 
-    /// W_poly6 = 315/(64πh⁹)·(h² − r²)³, 1/m³.
+    /// The kernel W_poly6 = 315/(64πh⁹)·(h² − r²)³, 1/m³.
     #[inline(always)]
     pub fn poly6(&self, r2: f64) -> f64 {
         let q = positive(self.h2 - r2);
@@ -61,13 +61,13 @@ impl Kernels {
         self.poly6_gradient * q * q
     }
 
-    /// ∇²W_poly6 = −945/(32πh⁹)·(h² − r²)(3h² − 7r²), 1/m⁵.
+    /// The Laplacian ∇²W_poly6 = −945/(32πh⁹)·(h² − r²)(3h² − 7r²), 1/m⁵.
     #[inline(always)]
     pub fn poly6_laplacian(&self, r2: f64) -> f64 {
         self.poly6_gradient * positive(self.h2 - r2) * (3.0 * self.h2 - 7.0 * r2)
     }
 
-    /// W_spiky = 15/(πh⁶)·(h − r)³, 1/m³.
+    /// The kernel W_spiky = 15/(πh⁶)·(h − r)³, 1/m³.
     pub fn spiky(&self, r: f64) -> f64 {
         self.spiky * positive(self.h - r).powi(3)
     }
@@ -86,7 +86,7 @@ impl Kernels {
         self.spiky_gradient * self.h2
     }
 
-    /// W_viscosity = 15/(2πh³)·(−r³/2h³ + r²/h² + h/2r − 1), 1/m³; infinite at r = 0.
+    /// The kernel W_viscosity = 15/(2πh³)·(−r³/2h³ + r²/h² + h/2r − 1), 1/m³; infinite at r = 0.
     pub fn viscosity(&self, r: f64) -> f64 {
         if r > self.h {
             return 0.0;
@@ -95,7 +95,7 @@ impl Kernels {
         self.viscosity * (-0.5 * q * q * q + q * q + 0.5 / q - 1.0)
     }
 
-    /// ∇²W_viscosity = 45/(πh⁶)·(h − r), 1/m⁵.
+    /// The Laplacian ∇²W_viscosity = 45/(πh⁶)·(h − r), 1/m⁵.
     #[inline(always)]
     pub fn viscosity_laplacian(&self, r: f64) -> f64 {
         -self.spiky_gradient * positive(self.h - r)
@@ -107,9 +107,9 @@ impl Kernels {
 pub struct Wendland {
     /// Support radius h, m.
     pub h: f64,
-    /// w = 21/(2πh³), 1/m³
+    /// The factor w = 21/(2πh³), 1/m³.
     pub weight: f64,
-    /// c = 210/(πh⁵), 1/m⁵
+    /// The factor c = 210/(πh⁵), 1/m⁵.
     pub steepness: f64,
 }
 

@@ -1,8 +1,8 @@
 //! Smoothed particle hydrodynamics around obstacles given as fields.
 //!
 //! A fluid is a set of particles. [`Method`] has three ways to find its pressure: that of the paper
-//! (equations 7–14, table 1), a weakly compressible and a divergence-free one. Walls are given by ω and ∇ω
-//! alone: there are no boundary particles and there is no mesh.
+//! (equations 7–14, table 1), a weakly compressible and a divergence-free one. Walls are fields: there are no
+//! boundary particles and there is no mesh.
 //!
 //! ```text
 //! Parameters ─┐
@@ -83,5 +83,6 @@ pub use probes::{Gauge, Probe};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::Stats;
-pub use vtp::{short_time, write_pvd, write_vtp};
+pub(crate) use vtp::short_time;
+pub use vtp::{write_pvd, write_vtp};
 pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};

@@ -55,8 +55,8 @@ pub struct Parameters {
     pub method: Method,
     /// How the walls of the box act on a fluid that moves along them. Obstacles have their own.
     pub slip: Slip,
-    /// Coefficient of friction μ of the container's walls: a particle that hits a wall loses, of its speed
-    /// along the wall, μ times the change of its speed into the wall. Zero: no friction.
+    /// Coefficient of friction μ of the container's walls: when a particle hits a wall, its speed along the
+    /// wall falls by μ times the change of its velocity normal to the wall. Zero: no friction.
     pub wall_friction: f64,
     /// Precision of the sums over neighbours. State and motion are always in `f64`. `f32` has seven digits,
     /// relative to a few support radii.

@@ -31,7 +31,7 @@ impl Vectors {
     /// Vector `i`.
     ///
     /// # Panics
-    /// Panics if there are not more than `i` vectors.
+    /// If there are not more than `i` vectors.
     pub fn get(&self, i: usize) -> DVec3 {
         DVec3::new(self.x[i], self.y[i], self.z[i])
     }
@@ -39,7 +39,7 @@ impl Vectors {
     /// Replaces vector `i`.
     ///
     /// # Panics
-    /// Panics if there are not more than `i` vectors.
+    /// If there are not more than `i` vectors.
     pub fn set(&mut self, i: usize, v: DVec3) {
         (self.x[i], self.y[i], self.z[i]) = (v.x, v.y, v.z);
     }

@@ -127,7 +127,7 @@ pub(super) fn fingerprint(experiment: &Experiment) -> [u8; 32] {
     let roots: Vec<_> =
         fluid_shape.chain(container).chain(obstacles).chain(velocity).chain(gravity).collect();
     let skins: Vec<_> = experiment.bodies().iter().map(|body| &body.skin).collect();
-    // of a gravity that turns the parameters hold only the last value; its formulas are among the roots
+    // a gravity that turns has one value in the parameters; its formulas are among the roots
     let parameters = Parameters { time_step: 0.0, adaptive: false, ..experiment.parameters().clone() };
     // numbers print with all their digits
     let text = format!(

@@ -224,7 +224,7 @@ fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     let set = Arc::clone(&flag);
     let handler = move || {
         if set.swap(true, Ordering::Relaxed) {
-            std::process::exit(130); // asked twice
+            std::process::exit(130); // the user pressed Ctrl-C twice
         }
     };
     ctrlc::set_handler(handler).map_err(|e| Failure::usage(format!("cannot listen for Ctrl-C: {e}")))?;

@@ -119,7 +119,7 @@ pub(in crate::sph) trait Declaration: Default + 'static {
     const STEP: &'static str;
     /// The defaults of a fluid.
     const FLUID: FluidDefaults;
-    /// Keys of the method's own.
+    /// Keys that the method declares, besides those that every method has.
     const KEYS: &'static [Key<Self>];
     /// Passes besides those that every method has, each with the reason if it does not run.
     const PASSES: &'static [(Pass, Absence<Self>)];

@@ -92,7 +92,7 @@ pub(in crate::sph) trait Numerics {
     fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64;
 }
 
-/// A method at work: what it keeps between steps.
+/// A method at work, with what it keeps between steps.
 pub(in crate::sph) trait Scheme: Send + Sync {
     /// Advances by one step of at most `longest` seconds, and returns how long it was.
     ///

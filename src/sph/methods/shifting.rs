@@ -1,11 +1,11 @@
 //! Shifting, which keeps particles evenly distributed where pressure does not (Lind et al. 2012, Sun et al.
 //! 2017).
 //!
-//! Forces by sums of pressures p_i + p_j push particles apart until they lie evenly, but that makes noise as
-//! large as the pressure itself. Forces by differences p_j − p_i have no such noise, and no such order. So
-//! particles also drift by −2h·U·(Σ V ∇W + ∇λ), where U is the greatest speed: from where they crowd to where
-//! there are few. The drift is not a motion of the fluid. A particle keeps what it carries (velocity,
-//! density); the error of that is of the order of the drift times the gradient.
+//! Forces by sums of pressures p_i + p_j push particles apart until they lie evenly, but that makes noise in
+//! proportion to how far the pressure is above zero. Forces by differences p_j − p_i have no such noise, and
+//! no such order. So particles also drift by −2h·U·(Σ V ∇W + ∇λ), where U is the greatest speed: from where
+//! they crowd to where there are few. The drift is not a motion of the fluid. A particle keeps what it
+//! carries (velocity, density); the error of that is of the order of the drift times the gradient.
 //!
 //! The drift does not change densities that follow the motion, and the fluid's volume would stray: by 5 %
 //! within a few periods of a wave. In the depth of the fluid densities are therefore drawn to what the

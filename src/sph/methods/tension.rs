@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! n_i = Σ V ∇W + ∇λ          into the fluid, of the length A(δ)/h at the depth δh below a flat surface
-//! κ_i = −∇·(n/|n|)           Σ over those that have a normal, over what the sum makes of the gradient of a position
+//! κ_i = −∇·(n/|n|)           Σ over neighbours with a normal, divided by the sum's own tangential moment
 //! a_i = (2σ/ρ₀)·κ_i·n_i
 //! ```
 //!
@@ -39,7 +39,7 @@ pub(super) struct Tension {
     direction: Vectors,
     /// Weight of the normal, 0 to 1.
     weight: Vec<f64>,
-    /// n, 1/m
+    /// Normals n, 1/m.
     normal: Vectors,
     force: Vectors,
 }
@@ -81,7 +81,7 @@ impl Tension {
 #[derive(Clone, Copy)]
 struct Normals<'a> {
     kernel: Wendland,
-    /// V·c
+    /// The factor V·c of the kernel's gradient.
     steepness: f64,
     core: &'a Core,
 }
@@ -120,7 +120,7 @@ impl PairPass<0, 3, 7> for Normals<'_> {
 #[derive(Clone, Copy)]
 struct Curvature<'a> {
     kernel: Wendland,
-    /// V·c
+    /// The factor V·c of the kernel's gradient.
     steepness: f64,
     parameters: &'a Parameters,
     normal: &'a Vectors,

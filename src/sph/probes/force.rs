@@ -33,7 +33,7 @@ struct Hit {
 }
 
 impl Contacts {
-    /// No impulse yet, for so many obstacles.
+    /// The state before any contact, for a number of obstacles.
     pub fn of(obstacles: usize) -> Self {
         Self { totals: vec![[0.0; 6]; obstacles], now: Mutex::default() }
     }

@@ -104,7 +104,7 @@ impl Probe {
 pub struct Gauge {
     /// What is measured.
     pub probe: Probe,
-    /// Time, impulse and moment of impulse of the obstacle's contacts at the last sample.
+    /// Time of the last sample, and impulse and moment of impulse of the obstacle's contacts up to then.
     last: [f64; 7],
 }
 

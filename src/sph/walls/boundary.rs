@@ -43,8 +43,8 @@ pub(in crate::sph) const MARKED: usize = 32;
 /// Most contacts of one particle in one step. After them it stays where it is.
 const MAX_CONTACTS: usize = 4;
 
-/// In clearances, so that it is a support radius: how far a particle that a moving wall overtakes is moved at
-/// most, and the largest ball that is tested for being free.
+/// A support radius, in clearances. A particle that a moving wall overtakes is moved at most this far, and no
+/// larger ball is tested for being free.
 const REACH: f64 = 1e6;
 
 /// Distance of a particle from all obstacles that is not known. Any negative number means the same.
@@ -62,8 +62,8 @@ pub struct Obstacle {
     pub moving: Option<Arc<dyn Moving>>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
-    /// Coefficient of friction μ: a particle that hits the body loses, of its speed along the face, μ times
-    /// the change of its speed into the face.
+    /// Coefficient of friction μ: when a particle hits the body, its speed along the face falls by μ times
+    /// the change of its velocity normal to the face.
     pub friction: f64,
     /// Thickness, m, of the thinnest part that must stop particles of any speed, for fields that do not know
     /// their range (closures): their paths are sampled this closely. A twentieth of the support radius is a

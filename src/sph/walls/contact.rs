@@ -72,7 +72,7 @@ pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<O
             return stop(field, path, &entry, clearance).map(Some);
         }
         if entry.until >= 1.0 {
-            return Ok(None); // its last sample was the end
+            return Ok(None); // the last sample was the end of the path
         }
         rest.start = entry.until.next_up();
     }
@@ -80,7 +80,7 @@ pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<O
     stop(field, path, &entry, clearance).map(Some)
 }
 
-/// The place to stop before an entry.
+/// The contact at which a path stops before an entry.
 fn stop(field: &dyn Walls, path: &Path, entry: &Entry, clearance: f64) -> Result<Contact, Undefined> {
     let step = path.to - path.from;
     let normal = match entry.normals.mean() {

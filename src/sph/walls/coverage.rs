@@ -127,7 +127,7 @@ impl<F: Friction> Coverage<F> {
         Coverage { part, gradient, spread, sweep, friction: () }
     }
 
-    /// ⅓ tr K: the walls' part of the gradient of a position.
+    /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
     pub fn share(&self) -> f64 {
         self.part + self.spread.trace() / 3.0
     }
@@ -204,7 +204,7 @@ mod tests {
             }
             let volume = step.powi(3) * 21.0 / (2.0 * std::f64::consts::PI * H.powi(3));
             part += volume * (1.0 - q).powi(4) * (1.0 + 4.0 * q);
-            // ∇W by the particle's place is against y
+            // the gradient by the particle's place points against that by y
             let slope = volume * 20.0 * (1.0 - q).powi(3) / (H * H) * y;
             gradient += slope;
             moment += DMat3::from_cols(y * slope.x, y * slope.y, y * slope.z);

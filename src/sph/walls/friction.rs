@@ -48,8 +48,8 @@ impl Friction for () {
 /// The friction of a viscous fluid with walls.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct WallDrag {
-    /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks. Its product with a velocity is
-    /// the drag.
+    /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks. Times −2ν and a velocity it is
+    /// the drag of walls at rest.
     pub tensor: Symmetric,
     /// λ of those walls along which the fluid slips.
     slippery: f64,

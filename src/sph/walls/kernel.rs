@@ -28,13 +28,13 @@
 /// A smoothing kernel whose integrals over a wall are known; h is the radius of its support.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WallKernel {
-    /// w = 315/64π·(1 − q²)³
+    /// Poly6: w = 315/64π·(1 − q²)³.
     Poly6,
-    /// w = 15/π·(1 − q)³
+    /// Spiky: w = 15/π·(1 − q)³.
     Spiky,
-    /// w = 8/π·(1 − 6q² + 6q³) up to q = ½, then 16/π·(1 − q)³ (Monaghan 1992)
+    /// Cubic spline: w = 8/π·(1 − 6q² + 6q³) up to q = ½, then 16/π·(1 − q)³ (Monaghan 1992).
     CubicSpline,
-    /// w = 21/2π·(1 − q)⁴·(1 + 4q) (Wendland 1995)
+    /// Wendland C2: w = 21/2π·(1 − q)⁴·(1 + 4q) (Wendland 1995).
     WendlandC2,
 }
 
@@ -71,7 +71,7 @@ impl WallKernel {
         }
     }
 
-    /// −dA/dδ = 2πδ·w(|δ|): how a layer of the wall at this distance repels, odd in δ.
+    /// The derivative −dA/dδ = 2πδ·w(|δ|): how a layer of the wall at this distance repels, odd in δ.
     pub fn steepness(self, delta: f64) -> f64 {
         let d = delta.abs().min(1.0);
         let s = 1.0 - d;
@@ -311,7 +311,7 @@ mod tests {
         for i in 1..=2000 {
             let delta = -1.0 + f64::from(i) * 1e-3;
             let next = wall.of_face(delta, 0.0);
-            // slopes of A and below: no step anywhere
+            // the differences stay below the greatest slopes, so nothing jumps
             assert!((next.part - last.part).abs() < 2e-3, "{delta}: {last:?} {next:?}");
             assert!((next.area - last.area).abs() < 6e-3, "{delta}: {last:?} {next:?}");
             last = next;
@@ -339,7 +339,7 @@ mod tests {
         }
     }
 
-    /// Thin layers are the continuous wall, curved ones too.
+    /// The sums over thin layers tend to the continuous wall, also for a curved one.
     #[test]
     fn many_layers_come_to_the_integral() {
         for kernel in WallKernel::ALL {
@@ -393,7 +393,7 @@ mod tests {
                         corrected = corrected.max((kernel.covered_by_curved(delta, curvature) - exact).abs());
                     }
                 }
-                // a bound of the second-order term, with a tenth for the terms behind it
+                // the bound of the second-order term, and a tenth of it for higher terms
                 assert!(corrected < 0.0286 * ratio * ratio, "{kernel:?} {ratio}: {corrected:e}");
                 assert!(plane > 0.08 * ratio, "{kernel:?} {ratio}: {plane:e}");
             }

@@ -77,7 +77,7 @@ pub struct DivergenceFree {
     /// The diagonal of the system: how much a unit of p/ρ² lowers the particle's own dρ/dt in a second, (1 −
     /// K)⁻¹(…)·(…) + Σ m²|∇W|².
     factor: Vec<f64>,
-    /// G = −⅓ Σ V r·∇W + ⅓ tr K
+    /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
     spread: Vec<f64>,
     /// Rate of density dρ/dt.
     rate: Vec<f64>,
@@ -91,7 +91,7 @@ pub struct DivergenceFree {
     /// M·v of each particle.
     completed: Vectors,
     walls: Walls,
-    /// The guess before momentum carried it on.
+    /// The last guess, without the momentum that was added to it.
     last: Vec<f64>,
     /// Greatest eigenvalue of the system over its diagonal: the inverse of a step that cannot overshoot.
     stiffness: f64,
@@ -249,7 +249,7 @@ impl DivergenceFree {
         self.tension.act(core);
     }
 
-    /// Changes velocities so that nothing is compressed, and what is too dense expands.
+    /// Changes velocities by pressure so that nothing is compressed, and what is too dense expands.
     fn keep_density(&mut self, core: &mut Core, dt: f64) {
         let rest = core.parameters.rest_density;
         let mut pressure = std::mem::take(&mut self.specific);

@@ -123,7 +123,7 @@ impl Numerics for Paper {
         lone_density.powi(2) / (2.0 * parameters.viscosity * mass * laplacian)
     }
 
-    /// The paper's method has no such limit.
+    /// No limit: the paper's method has none for surface tension.
     fn capillary_dt(&self, _parameters: &Parameters) -> f64 {
         f64::INFINITY
     }

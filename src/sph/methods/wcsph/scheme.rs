@@ -249,7 +249,7 @@ struct Rates<'a> {
     laminar: f64,
     /// The factor α·h/2·c·ρ₀ of the artificial viscosity.
     artificial: f64,
-    /// Whether pressures act by their differences.
+    /// Whether pressures act by their differences in the fluid's depth.
     differences: bool,
     /// Rate at which densities return to what the places say, 1/s.
     return_rate: f64,
