@@ -1,46 +1,47 @@
-//! Points, boxes and regular grids in the scene's coordinates (metres unless a file says otherwise).
+//! Axis-aligned boxes in the scene's coordinates, in metres.
 
 use glam::DVec3;
 
-/// An axis-aligned box, `min ≤ max` in each coordinate unless it is empty.
+/// An axis-aligned box, in metres. It has `min ≤ max` in each coordinate unless it is empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aabb {
     /// The corner with the smallest coordinates.
     pub min: DVec3,
-    /// The corner with the largest coordinates; it belongs to the box.
+    /// The corner with the largest coordinates. It belongs to the box.
     pub max: DVec3,
 }
 
 impl Aabb {
-    /// The box that holds nothing: every union with it gives the other box.
+    /// The empty box. Every union with it gives the other box.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
-    /// The box between two corners; empty if `min` exceeds `max` anywhere.
+    /// The box between two corners. It is empty if `min` exceeds `max` in a coordinate.
     pub const fn new(min: DVec3, max: DVec3) -> Self {
         Self { min, max }
     }
 
-    /// True when no point is in the box, and for corners that are NaN. A box without thickness holds its points.
+    /// Whether no point is in the box. True also for corners that are NaN, and false for a box without
+    /// thickness, which holds its points.
     pub fn is_empty(&self) -> bool {
         !(self.min.x <= self.max.x && self.min.y <= self.max.y && self.min.z <= self.max.z)
     }
 
-    /// True when no side is infinite or NaN.
+    /// Whether all coordinates of the corners are finite.
     pub fn is_finite(&self) -> bool {
         self.min.is_finite() && self.max.is_finite()
     }
 
-    /// Lengths of the sides; negative for an empty box.
+    /// The lengths of the sides. Some are negative for an empty box.
     pub fn size(&self) -> DVec3 {
         self.max - self.min
     }
 
-    /// The middle.
+    /// The middle of the box.
     pub fn centre(&self) -> DVec3 {
         0.5 * (self.min + self.max)
     }
 
-    /// Product of the sides; 0 for an empty box.
+    /// The volume in m³. It is 0 for an empty box.
     pub fn volume(&self) -> f64 {
         if self.is_empty() {
             return 0.0;
@@ -49,17 +50,17 @@ impl Aabb {
         size.x * size.y * size.z
     }
 
-    /// True for points inside and on the border.
+    /// Whether a point is inside the box or on its border.
     pub fn contains(&self, p: DVec3) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
-    /// The smallest box that holds both.
+    /// The smallest box that holds both boxes.
     pub fn union(&self, other: &Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// What both hold; empty if they do not meet.
+    /// The part that both boxes hold. It is empty if they do not meet.
     pub fn intersection(&self, other: &Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
@@ -69,12 +70,12 @@ impl Aabb {
         Self { min: self.min.min(p), max: self.max.max(p) }
     }
 
-    /// The box grown by `margin` on every side.
+    /// The box grown by `margin` metres on every side.
     pub fn grown(&self, margin: f64) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
-    /// The eight corners; bit 0 of the index chooses x, bit 1 y, bit 2 z.
+    /// The eight corners. Bit 0 of the index chooses x, bit 1 y, bit 2 z; a set bit means `max`.
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|i| {
             let pick = |bit: usize, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };
@@ -86,7 +87,7 @@ impl Aabb {
         })
     }
 
-    /// Cuts the box across its longest side.
+    /// The two halves of the box, cut across its longest side; the lower one comes first.
     pub fn halves(&self) -> [Self; 2] {
         let axis = self.size().max_position();
         let middle = self.centre()[axis];

@@ -1,47 +1,53 @@
-//! Closed intervals with outward rounding: the enclosure of a real computation, never narrower.
+//! Closed intervals with outward rounding. They enclose the results of real arithmetic and are
+//! never narrower.
 //!
-//! Every operation contains the exact image of its operands: results of the correctly rounded operations
-//! (+ − × ÷ √) are widened by one unit in the last place, those of library functions by four. An undefined
-//! point (√ of a negative number, division by an interval around zero) widens to [`Interval::ALL`], which
-//! also stands for "may be NaN".
+//! The result of every operation contains the exact image of its operands: results of the correctly rounded
+//! operations (+ − × ÷ √) are widened by one unit in the last place, those of library functions by four.
+//! Where an operation is undefined at a point (√ of a negative number, division by an interval around zero)
+//! the result is [`Interval::ALL`], which also stands for "may be NaN".
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `lo ≤ hi`; either may be infinite; never NaN.
+/// A closed interval with `lo ≤ hi`. Either end may be infinite, and neither is NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
+    /// The lower end.
     pub lo: f64,
+    /// The upper end.
     pub hi: f64,
 }
 
 impl Interval {
-    /// Knows nothing: all reals, and possibly NaN.
+    /// All reals, and possibly NaN: nothing is known.
     pub const ALL: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
+    /// The interval that holds one number only.
     pub const fn point(x: f64) -> Self {
         Self { lo: x, hi: x }
     }
 
-    /// The interval between two bounds; [`Interval::ALL`] if they are out of order or NaN.
+    /// The interval between two bounds. It is [`Interval::ALL`] if they are out of order or NaN.
     pub fn new(lo: f64, hi: f64) -> Self {
         if lo <= hi { Self { lo, hi } } else { Self::ALL }
     }
 
+    /// Whether a number is in the interval. NaN is in none.
     pub fn contains(&self, x: f64) -> bool {
         self.lo <= x && x <= self.hi
     }
 
+    /// The length of the interval.
     pub fn width(&self) -> f64 {
         self.hi - self.lo
     }
 
-    /// The smallest interval that contains both.
+    /// The smallest interval that contains both intervals.
     pub fn hull(&self, other: Self) -> Self {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    /// `ulps` floating-point neighbours further out on both sides; exact zeros stay zero, so that a widened
-    /// bound never loses a sign.
+    /// The interval with its ends `ulps` floating-point neighbours further out. Exact zeros stay zero, so
+    /// that a widened bound never loses a sign.
     #[must_use]
     pub fn widened(self, ulps: u32) -> Self {
         let (mut lo, mut hi) = (self.lo, self.hi);
@@ -56,12 +62,14 @@ impl Interval {
         Self::new(lo, hi)
     }
 
-    /// Widened by one neighbour, zeros included: a result that rounded to zero may have been non-zero.
+    /// The interval with its ends one neighbour further out. That includes zeros, because a result that was
+    /// rounded to zero may have been non-zero.
     fn rounded_out(lo: f64, hi: f64) -> Self {
         Self::new(lo.next_down(), hi.next_up())
     }
 
-    /// x², without the sign that a product of an interval with itself would lose.
+    /// The squares x² of the numbers in the interval. They are never negative, while a product of the
+    /// interval with itself could be.
     pub fn square(self) -> Self {
         let (a, b) = (self.lo * self.lo, self.hi * self.hi);
         let hi = a.max(b).next_up();
@@ -71,6 +79,7 @@ impl Interval {
         Self::new(a.min(b).next_down().max(0.0), hi)
     }
 
+    /// The square roots. [`Interval::ALL`] if the interval holds a negative number.
     pub fn sqrt(self) -> Self {
         if self.lo < 0.0 {
             return Self::ALL;
@@ -78,6 +87,7 @@ impl Interval {
         Self::new(self.lo.sqrt().next_down().max(0.0), self.hi.sqrt().next_up())
     }
 
+    /// The absolute values.
     pub fn abs(self) -> Self {
         if self.lo >= 0.0 {
             self
@@ -88,15 +98,17 @@ impl Interval {
         }
     }
 
+    /// The smaller of two numbers, one from each interval.
     pub fn min(self, other: Self) -> Self {
         Self { lo: self.lo.min(other.lo), hi: self.hi.min(other.hi) }
     }
 
+    /// The larger of two numbers, one from each interval.
     pub fn max(self, other: Self) -> Self {
         Self { lo: self.lo.max(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    /// The image under a function that never decreases.
+    /// The image under a function that never decreases and is exact to four units in the last place.
     pub fn increasing(self, f: impl Fn(f64) -> f64) -> Self {
         let (lo, hi) = (f(self.lo), f(self.hi));
         if lo.is_nan() || hi.is_nan() {
@@ -105,15 +117,18 @@ impl Interval {
         Self::rounded_out(lo, hi).widened(3)
     }
 
+    /// The sines of angles in radians.
     pub fn sin(self) -> Self {
         self.periodic(libm::sin, std::f64::consts::FRAC_PI_2)
     }
 
+    /// The cosines of angles in radians.
     pub fn cos(self) -> Self {
         self.periodic(libm::cos, 0.0)
     }
 
-    /// sin or cos: extremes at the ends, and ±1 where a crest (at `crest + 2πk`) or a trough lies between.
+    /// The image under sin or cos: the extremes lie at the ends, or are ±1 if a crest (at `crest + 2πk`) or a
+    /// trough lies between them.
     fn periodic(self, f: impl Fn(f64) -> f64, crest: f64) -> Self {
         use std::f64::consts::{PI, TAU};
         // beyond 2^20 the position of a crest is no longer known to a useful accuracy
@@ -134,7 +149,7 @@ impl Interval {
     }
 }
 
-/// 0 · ∞ is 0 here: an infinite bound is a limit that no operand reaches.
+/// The product of two bounds. 0 · ∞ is 0 here, because an infinite bound is a limit that no operand reaches.
 fn bound_product(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
 }

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::mesh::Format;
+use super::mesh::{ascii_help, output_help};
 use crate::geom::Aabb;
+use crate::mesh::Format;
 use crate::precision::Precision;
 use crate::quantity::{Dimension, parse_unit};
 use crate::slice::{Axis, Plane};
@@ -181,9 +182,8 @@ pub(super) struct Mesh {
     /// The solid [default: the only one, or the first obstacle of the scene]
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
-    /// Where the mesh goes; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf. With --fluid a
-    /// folder [default: surface/ in that of the run]
-    #[arg(short, long, value_name = "FILE")]
+    // where the mesh goes; `output_help` writes the help, which lists the formats
+    #[arg(short, long, value_name = "FILE", help = output_help())]
     pub output: Option<PathBuf>,
     /// Cells along the longest side
     #[arg(long, value_name = "N", default_value_t = 128, conflicts_with = "cell")]
@@ -211,8 +211,8 @@ pub(super) struct Mesh {
     /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
     #[arg(long)]
     pub quality: bool,
-    /// Write .stl as text
-    #[arg(long)]
+    // whether to write text; the help names the formats that can
+    #[arg(long, help = ascii_help())]
     pub ascii: bool,
     /// Mesh the fluid: a closed surface around the particles of each frame that `rfm run` wrote
     #[arg(
@@ -253,7 +253,7 @@ pub(super) enum Tolerance {
 pub(super) struct Frames {
     /// The first frame.
     pub first: usize,
-    /// The first frame that is left out; `None`: all frames are taken.
+    /// The first frame that is left out; `None`: all frames from `first` on.
     pub end: Option<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! `rfm check`: messages, the solids with their bounds and volumes, slices.
+//! `rfm check`: messages about files, the solids with their bounds and volumes, and slices.
 
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -8,8 +8,9 @@ use glam::DVec2;
 use serde::Serialize;
 
 use super::args::{Check, Deny, Shared};
-use super::{Failure, choose, input, note, output};
-use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source};
+use super::failure::{Failure, complain, note};
+use super::{choose, input, output};
+use crate::diagnostic::{Code, Diagnostic, Diagnostics, Source};
 use crate::field::Field;
 use crate::geom::Aabb;
 use crate::ir::{FloatType, Growth};
@@ -19,7 +20,8 @@ use crate::slice::{self, Plane, Window};
 use crate::solid::{Bounds, ProgramKind};
 use crate::{Program, Solid};
 
-/// Cells of the meshes that volumes are measured on; the second is for their error.
+/// Cells along the longest side of the meshes that volumes are measured on. The second mesh is for the
+/// volumes' error.
 const VOLUME_CELLS: [usize; 2] = [96, 48];
 
 #[derive(Serialize)]
@@ -43,11 +45,11 @@ struct Message {
     help: Option<String>,
 }
 
-/// Operations of a solid that is measured, at most: a larger one would keep a person waiting for minutes.
+/// The most operations of a solid that is measured. A larger one would take minutes.
 const MOST_MEASURED: usize = 120_000;
 
-/// What is known of a solid. Numbers that do not exist (an unbounded solid's volume) or that were not found (the
-/// volume of one too thin for the grid) are null.
+/// What is known about a solid. Numbers that do not exist (the volume of an unbounded solid) or that were not
+/// found (the volume of one too thin for the grid) are null.
 #[derive(Serialize)]
 struct Facts {
     name: String,
@@ -59,13 +61,14 @@ struct Facts {
     volume_error: Option<f64>,
     area: Option<f64>,
     components: Option<usize>,
-    /// What the file asks of the error of ω, the program that keeps it, and its certified bound.
+    /// The tolerance for the error of ω that the file states, the program that keeps it, and the program's
+    /// certified bound.
     tolerance: Option<f64>,
     program: Option<String>,
     error_bound: Option<f64>,
-    /// The time, s, that all this is for; null for a solid at rest.
+    /// The time in seconds for which all this holds. Null for a solid at rest.
     time: Option<f64>,
-    /// Cells of the finer measuring grid in which parts of the surface hide, see `mesh::thin_cells`.
+    /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
     thin_cells: Option<usize>,
 }
 
@@ -106,7 +109,7 @@ pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
     once(shared, options)
 }
 
-/// Checks again whenever one of the files has another time stamp; ends with the process.
+/// Checks again whenever the time stamp of a file changes. It ends with the process.
 fn watch(shared: &Shared, options: &Check) -> Result<(), Failure> {
     if options.files.iter().any(|f| f == Path::new("-")) {
         return Err(Failure::usage("standard input cannot be watched"));
@@ -121,7 +124,7 @@ fn watch(shared: &Shared, options: &Check) -> Result<(), Failure> {
         }
         match once(shared, options) {
             Ok(()) | Err(Failure::Findings) => {}
-            Err(Failure::Usage(message)) => super::complain(&message), // the file may be back in a moment
+            Err(Failure::Usage(message)) => complain(&message), // the file may be back in a moment
             Err(other) => return Err(other),
         }
         note("watching; press Ctrl-C to end");
@@ -204,7 +207,7 @@ fn message(diagnostic: &Diagnostic, all: &Diagnostics) -> Message {
     }
 }
 
-/// Bounds and size of every solid, with what is odd about them added to the messages.
+/// The facts about every solid. Adds warnings about odd ones to the messages.
 fn solids(
     shared: &Shared,
     program: &Program,
@@ -233,36 +236,37 @@ fn solids(
             Some(Err(diagnostic)) => diagnostics.list.push(*diagnostic),
             None => {}
         }
-        let warning = |code, message| Diagnostic {
-            severity: Severity::Warning,
-            ..Diagnostic::error(code, named.span, message)
-        };
-        match solid.bounds() {
-            Bounds::Empty => {
-                let message = format!("solid `{}` is empty: ω is nowhere positive", named.name);
-                diagnostics.list.push(warning(Code::EMPTY_SOLID, message));
-            }
-            Bounds::Unbounded => {
-                let message = format!("solid `{}` could not be proven to end anywhere", named.name);
-                diagnostics.list.push(
-                    warning(Code::UNBOUNDED_SOLID, message)
-                        .help("intersect it with a box, or mesh it with --box"),
-                );
-            }
-            Bounds::Within(_) => {}
-        }
-        if thin.count > 0 {
-            let message = format!(
-                "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
-                named.name, VOLUME_CELLS[0], thin.count, thin.bounds.min, thin.bounds.max
-            );
-            diagnostics.list.push(
-                warning(Code::THIN_PARTS, message).help("mesh it with more --cells, until `thin_cells` is 0"),
-            );
-        }
+        diagnostics.list.extend(remarks(named, &solid, &thin));
         facts.push(found);
     }
     Ok(facts)
+}
+
+/// Warnings about a solid that is empty, unbounded or thin.
+fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnostic> {
+    let warning = |code, message| Diagnostic::warning(code, named.span, message);
+    let mut found = Vec::new();
+    match solid.bounds() {
+        Bounds::Empty => {
+            let message = format!("solid `{}` is empty: ω is nowhere positive", named.name);
+            found.push(warning(Code::EMPTY_SOLID, message));
+        }
+        Bounds::Unbounded => {
+            let message = format!("solid `{}` could not be proven to end anywhere", named.name);
+            let help = "intersect it with a box, or mesh it with --box";
+            found.push(warning(Code::UNBOUNDED_SOLID, message).help(help));
+        }
+        Bounds::Within(_) => {}
+    }
+    if thin.count > 0 {
+        let message = format!(
+            "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
+            named.name, VOLUME_CELLS[0], thin.count, thin.bounds.min, thin.bounds.max
+        );
+        let help = "mesh it with more --cells, until `thin_cells` is 0";
+        found.push(warning(Code::THIN_PARTS, message).help(help));
+    }
+    found
 }
 
 /// A warning if ω may leave the range of numbers although its leaves do not.
@@ -318,8 +322,8 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
     if let [fine, coarse] = &reports[..]
         && fine.triangles > 0
     {
-        // vertices lie on the surface, so errors fall as h²: a third of the difference leads to the limit. Creases
-        // fall unevenly between the cells, so the whole difference is what is claimed.
+        // vertices lie on the surface, so errors fall as h², and a third of the difference leads to the
+        // limit; creases lie unevenly between the cells, so the whole difference is given as the error
         let difference = fine.volume - coarse.volume;
         facts.volume = Some(fine.volume + difference / 3.0);
         facts.volume_error = Some(difference.abs());
@@ -348,7 +352,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             say!("    empty");
         }
         if let Some(bounds) = &solid.bounds {
-            // rounded first, and without the sign of a zero
+            // rounded first, so that zero has no sign
             let round = |x: f64| (1e4 * x).round() / 1e4 + 0.0;
             let corner =
                 |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", round(c[0]), round(c[1]), round(c[2]));
@@ -391,11 +395,11 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
         Some([u0, v0, u1, v1]) => Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)),
         None => plane.window(&around(&solid)?),
     };
-    // without a program that keeps the tolerance, which was reported, the picture is still worth seeing
+    // if no program keeps the tolerance, which was reported, the solid's own ω is drawn
     let chosen = program.within_tolerance(&solid).and_then(Result::ok);
     let field: &dyn Field = chosen.as_ref().map_or(&solid as &dyn Field, |chosen| chosen);
     if options.term {
-        // drawn first, so that a reader who leaves early is no error of the drawing
+        // drawn to memory first, so that a reader who leaves early is no error of the drawing
         let mut drawing = Vec::new();
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
         slice::terminal::draw(field, solid.name(), plane, window, 78, colour, &mut drawing)

@@ -1,15 +1,16 @@
-//! Which solid or scene of a file is meant.
+//! The solid or the scene of a file that a command line means.
 
 use std::path::Path;
 
 use super::args::Shared;
-use super::{Failure, input, note};
+use super::failure::{Failure, note};
+use super::input;
 use crate::diagnostic::{Diagnostics, nearest};
 use crate::lower::{NamedSolid, Scene};
 use crate::solid::Chosen;
 use crate::{Error, Program, Solid};
 
-/// `FILE` or `FILE:NAME`; what there is as a file is one.
+/// The parts of `FILE` or `FILE:NAME`. If a file has the whole text as its name, it is that file.
 pub(super) fn subject(text: &str) -> (&Path, Option<&str>) {
     match text.rsplit_once(':') {
         Some((path, name)) if !Path::new(text).exists() => (Path::new(path), Some(name)),
@@ -17,7 +18,7 @@ pub(super) fn subject(text: &str) -> (&Path, Option<&str>) {
     }
 }
 
-/// A name that is neither a solid nor a scene of the file.
+/// The failure for a name that is neither a solid nor a scene of the file.
 pub(super) fn no_such(path: &Path, program: &Program, name: &str) -> Failure {
     let module = program.module();
     let solids = module.solids.iter().map(|s| s.name.as_str());
@@ -27,7 +28,7 @@ pub(super) fn no_such(path: &Path, program: &Program, name: &str) -> Failure {
     Failure::usage(format!("`{}` has no solid or scene `{name}`{hint}", path.display()))
 }
 
-/// The solid by name; without one, the only solid, or the first obstacle of the only scene.
+/// The solid of a name. Without a name it is the only solid, or the first obstacle of the only scene.
 pub(super) fn solid(shared: &Shared, program: &Program, name: Option<&str>) -> Result<Solid, Failure> {
     let name = match name {
         Some(name) => name.to_string(),
@@ -36,7 +37,7 @@ pub(super) fn solid(shared: &Shared, program: &Program, name: Option<&str>) -> R
     program.solid_with(&name, shared.engine.into()).map_err(usage)
 }
 
-/// The solid by name, as [`solid`], at a time; says on standard error that it moves.
+/// The solid that [`solid`] finds, at a time in seconds. If it moves, a note says so.
 pub(super) fn solid_at(
     shared: &Shared,
     program: &Program,
@@ -69,7 +70,8 @@ fn default_solid(program: &Program) -> Result<&NamedSolid, Failure> {
     }
 }
 
-/// The cheap program for values of ω, if the file states a tolerance; shows why if there is none.
+/// The cheapest program that keeps the tolerance of ω. `None` if the file states no tolerance. Prints the
+/// reason if no program keeps it.
 pub(super) fn within_tolerance(program: &Program, solid: &Solid) -> Result<Option<Chosen>, Failure> {
     program.within_tolerance(solid).transpose().map_err(|diagnostic| {
         let list = vec![*diagnostic];
@@ -78,7 +80,7 @@ pub(super) fn within_tolerance(program: &Program, solid: &Solid) -> Result<Optio
     })
 }
 
-/// The scene by name; without one, the only scene.
+/// The scene of a name. Without a name it is the only scene.
 pub(super) fn scene<'a>(program: &'a Program, name: Option<&str>) -> Result<&'a Scene, Failure> {
     let scenes = &program.module().scenes;
     let names = || scenes.iter().map(|s| s.name.clone()).collect::<Vec<_>>();

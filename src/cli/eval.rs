@@ -1,4 +1,4 @@
-//! `rfm eval`: points in, ω and what belongs to it out, as CSV with 17 significant digits.
+//! `rfm eval`: ω and related values at points, as CSV with 17 significant digits.
 
 use std::io::{self, BufRead, BufWriter, Read, Write};
 use std::path::Path;
@@ -6,12 +6,13 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::args::{Eval, Shared, What};
-use super::{Failure, choose, input, output};
+use super::failure::Failure;
+use super::{choose, input, output};
 use crate::ir::Unary;
 use crate::solid::Chosen;
 use crate::{Field, Precision, Solid};
 
-/// Points evaluated at a time: memory stays small for any number of points.
+/// Points that are evaluated at a time, so that memory stays small for any number of points.
 const CHUNK: usize = 4096;
 
 pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
@@ -26,7 +27,7 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
     let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let chosen = match options.precision {
         None => choose::within_tolerance(&program, &solid)?,
-        Some(_) => None, // asked for by hand
+        Some(_) => None, // the user chose the precision
     };
     let mut writer = Table::new(solid, chosen, options, shared.json)?;
     writer.rows(&options.at)?;
@@ -43,7 +44,7 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
     writer.finish()
 }
 
-/// Reads CSV with the columns x, y, z (others are ignored), some thousand points at a time.
+/// Reads CSV with the columns x, y and z, some thousand points at a time. Other columns are ignored.
 fn read_points(
     reader: impl BufRead,
     name: &str,
@@ -90,14 +91,14 @@ struct Document {
     points: Vec<serde_json::Value>,
 }
 
-/// The rows of the answer, written as they are known.
+/// The table of results. Rows are written as soon as they are known.
 struct Table {
     solid: Solid,
-    /// What computes ω where it is asked for alone and the file states a tolerance.
+    /// The program that keeps the file's tolerance. It computes ω where no gradient is needed.
     chosen: Option<Chosen>,
     what: Vec<What>,
     precision: Precision,
-    /// Rows are collected for JSON, which is one document.
+    /// The rows for JSON, which are collected because they are one document.
     json: Option<Vec<serde_json::Value>>,
     names: Vec<&'static str>,
     out: BufWriter<io::Stdout>,
@@ -164,14 +165,14 @@ impl Table {
             match what {
                 What::Value => row.push(omega),
                 What::Gradient => row.extend(gradient.to_array()),
-                // a tolerance is one of values: the twin knows the sign
+                // a tolerance holds for values only; the sign comes from the twin
                 What::Sign if self.chosen.is_some() => row.push(self.solid.sign(p)),
                 What::Sign => row.push(Unary::Sign.eval(omega)),
                 What::Distance => row.push(match self.precision {
                     Precision::F64 => self.solid.contact(p).distance,
                     Precision::F32 => self.solid.distance_f32(p.as_vec3()).into(),
                 }),
-                // NaN where there is no normal: tangent surfaces, centres
+                // NaN where there is no normal, as at centres and where surfaces touch
                 What::Normal => row.extend((-gradient / gradient.length()).to_array()),
             }
         }
@@ -187,7 +188,8 @@ impl Table {
     }
 }
 
-/// 17 significant digits, enough to read the same number back; NaN as `nan`, infinities as `inf` and `-inf`.
+/// The number with 17 significant digits, which read back to the same number. NaN is `nan`, infinities are
+/// `inf` and `-inf`.
 fn number(value: f64) -> String {
     if value.is_nan() {
         return "nan".into();

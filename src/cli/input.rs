@@ -1,16 +1,17 @@
-//! Reading a file: path or standard input, params from flags, messages to standard error.
+//! Reads the file of a command from a path or from standard input, with params from flags. Messages go to
+//! standard error.
 
 use std::io::{IsTerminal, Read};
 use std::path::Path;
 
-use super::Failure;
 use super::args::Shared;
+use super::failure::{Failure, note};
 use crate::Program;
 use crate::compile::text_of;
 use crate::diagnostic::{Code, Diagnostics, Source, Style, render};
 use crate::lower::Options;
 
-/// The text of a file, under the name that messages give it.
+/// The text of a file, with the name that messages give it.
 pub(super) fn read(path: &Path) -> Result<Source, Failure> {
     let name = if path == Path::new("-") { "<stdin>".to_string() } else { path.display().to_string() };
     let limit = Source::MAX_LEN as u64 + 1;
@@ -32,7 +33,7 @@ pub(super) fn check(shared: &Shared, source: Source) -> Result<Program, Diagnost
     Program::check(source, options)
 }
 
-/// Reads and checks a file; prints its messages.
+/// Reads and checks a file, and prints its messages.
 pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> {
     match check(shared, read(path)?) {
         Ok(program) => {
@@ -46,7 +47,7 @@ pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> 
     }
 }
 
-/// A file with findings, or a command line that sets what cannot be set.
+/// The failure of a file with errors, or of flags that set what the file does not allow.
 pub(super) fn failure(diagnostics: &Diagnostics) -> Failure {
     let errors = || diagnostics.list.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error);
     if errors().all(|d| d.code == Code::OVERRIDE) {
@@ -55,7 +56,7 @@ pub(super) fn failure(diagnostics: &Diagnostics) -> Failure {
     Failure::Findings
 }
 
-/// Messages that a person is shown at once; `--json` lists all.
+/// The most messages that are printed as text. `--json` lists all.
 const MOST_SHOWN: usize = 100;
 
 pub(super) fn show(diagnostics: &Diagnostics) {
@@ -65,10 +66,10 @@ pub(super) fn show(diagnostics: &Diagnostics) {
     if diagnostics.list.len() > MOST_SHOWN {
         let first = diagnostics.list[..MOST_SHOWN].to_vec();
         show(&Diagnostics { list: first, sources: diagnostics.sources.clone() });
-        super::note(format!("{} more messages are not shown", diagnostics.list.len() - MOST_SHOWN));
+        note(format!("{} more messages are not shown", diagnostics.list.len() - MOST_SHOWN));
         return;
     }
-    // anstream takes the colours out where they are not wanted; the line drawing is for terminals only
+    // anstream removes colours where they are not wanted; line drawing characters are for terminals only
     let style = if std::io::stderr().is_terminal() { Style::Terminal } else { Style::Plain };
     anstream::eprint!("{}", render(diagnostics, style));
 }

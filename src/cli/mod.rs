@@ -1,9 +1,9 @@
-//! The command line: one file per subcommand; the only part of the crate that touches files and terminals.
+//! The command line: one file for each command. Only this part of the crate touches files and terminals.
 //!
-//! Data goes to standard output, messages and progress bars to standard error. Exit codes: 0 fine; 1 the input
-//! has findings; 2 usage or file error; 3 numerical failure in a run; 130 interrupted.
+//! Data goes to standard output, messages and progress bars go to standard error. Exit codes: 0 fine; 1 the
+//! input has findings; 2 usage or file error; 3 numerical failure in a run; 130 interrupted.
 
-/// One line of data on standard output.
+/// Prints one line of data on standard output.
 macro_rules! say {
     ($($words:tt)*) => { $crate::cli::output::line(format_args!($($words)*)) };
 }
@@ -13,6 +13,7 @@ mod check;
 mod choose;
 mod eval;
 mod explain;
+mod failure;
 mod input;
 mod mesh;
 mod output;
@@ -26,59 +27,19 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-/// Why a command stopped; its message is printed once, here.
-#[derive(Debug)]
-enum Failure {
-    /// The input has findings, which were printed already.
-    Findings,
-    /// A wrong flag, a file that cannot be read or written.
-    Usage(String),
-    /// A run whose numbers became useless.
-    Numerical(String),
-    /// Stopped by the user, in order.
-    Interrupted,
-    /// Somebody closed our output: nothing is left to do, and nothing is wrong.
-    ClosedPipe,
-}
+use failure::{Failure, note};
 
-impl Failure {
-    fn usage(message: impl std::fmt::Display) -> Self {
-        Self::Usage(message.to_string())
-    }
-}
-
-impl From<std::io::Error> for Failure {
-    fn from(error: std::io::Error) -> Self {
-        match error.kind() {
-            std::io::ErrorKind::BrokenPipe => Self::ClosedPipe,
-            _ => Self::Usage(error.to_string()),
-        }
-    }
-}
-
-/// Runs the program with the arguments of a process.
+/// Runs the program with the arguments of a process, the program's name first, and gives its exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match args::Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
-            // help and version count as errors of clap; printing can only fail if nobody reads
+            // clap reports help and version as errors; printing them fails only if nobody reads
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
-    match command(arguments) {
-        Ok(()) | Err(Failure::ClosedPipe) => ExitCode::SUCCESS,
-        Err(Failure::Findings) => ExitCode::from(1),
-        Err(Failure::Usage(message)) => {
-            complain(&message);
-            ExitCode::from(2)
-        }
-        Err(Failure::Numerical(message)) => {
-            complain(&message);
-            ExitCode::from(3)
-        }
-        Err(Failure::Interrupted) => ExitCode::from(130),
-    }
+    command(arguments).map_or_else(Failure::report, |()| ExitCode::SUCCESS)
 }
 
 fn command(arguments: args::Arguments) -> Result<(), Failure> {
@@ -95,15 +56,4 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),
     }
-}
-
-fn complain(message: &str) {
-    let red = anstyle::AnsiColor::Red.on_default().bold();
-    anstream::eprintln!("{red}error{red:#}: {message}");
-}
-
-/// A remark that is no finding: on standard error, never part of the data.
-fn note(message: impl std::fmt::Display) {
-    let blue = anstyle::AnsiColor::Blue.on_default().bold();
-    anstream::eprintln!("{blue}note{blue:#}: {message}");
 }

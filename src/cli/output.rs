@@ -1,16 +1,17 @@
-//! Files that are whole or not there: written to a temporary name beside the target, then renamed.
+//! Output: files, and lines and documents on standard output. A file is written under a temporary name beside
+//! its target and then renamed, so it is whole or not there.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::Failure;
+use super::failure::{Failure, complain};
 
-/// Writes a file through a callback. If anything fails, the file that was there before is untouched.
+/// Writes a file through a callback. If anything fails, a file that was there before is unchanged.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
     let failed = |error: io::Error| {
-        // the temporary name that an error may carry means nothing to the reader
+        // an error may carry the temporary name, which means nothing to the user
         let text = error.to_string();
         let reason = text.split(" at path ").next().unwrap_or_default();
         Failure::usage(format!("cannot write `{}`: {reason}", path.display()))
@@ -36,7 +37,7 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     Ok(())
 }
 
-/// The formats that pictures are written in.
+/// The formats of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Picture {
     Svg,
@@ -58,7 +59,7 @@ impl Picture {
     }
 }
 
-/// Temporary files are private; results are not.
+/// Lets others read a file, because temporary files are private and results are not.
 #[cfg(unix)]
 fn readable_by_others(file: &std::fs::File) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
@@ -70,18 +71,18 @@ fn readable_by_others(_: &std::fs::File) -> io::Result<()> {
     Ok(())
 }
 
-/// One line on standard output. Where nobody reads any more the process ends quietly, as other tools do.
+/// Prints one line on standard output. If nobody reads any more the process ends quietly, as other tools do.
 pub(super) fn line(words: std::fmt::Arguments<'_>) {
     if let Err(error) = writeln!(anstream::stdout(), "{words}") {
         if error.kind() == io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }
-        super::complain(&format!("cannot write to standard output: {error}"));
+        complain(&format!("cannot write to standard output: {error}"));
         std::process::exit(2);
     }
 }
 
-/// One JSON document on standard output.
+/// Prints one JSON document on standard output.
 pub(super) fn json(document: &impl Serialize) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, document).map_err(io::Error::from)?;

@@ -1,9 +1,11 @@
-//! What all plots share: the ground with its title, the margins, axes, and SVG or PNG at the end.
+//! The common parts of all plots: the ground with its title, the margins, the axes, and SVG or PNG at
+//! the end.
 
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{Failure, output};
+use super::failure::Failure;
+use super::output;
 use crate::slice;
 
 pub(super) const WIDTH: f64 = 760.0;
@@ -13,7 +15,7 @@ pub(super) const RIGHT: f64 = 190.0;
 pub(super) const TOP: f64 = 50.0;
 pub(super) const BOTTOM: f64 = 60.0;
 
-/// Powers of ten between which there is room for more lines.
+/// If an axis has at most this many powers of ten there is room for lines between them.
 const FEW: i32 = 3;
 
 /// The beginning of a plot: the white ground and the title.
@@ -24,7 +26,7 @@ pub(super) fn begin(title: &str) -> String {
     )
 }
 
-/// The finished plot as SVG or PNG, as the ending of the path says.
+/// The finished plot as SVG or PNG, by the ending of the path.
 pub(super) fn end(mut svg: String, path: &Path) -> Result<Vec<u8>, Failure> {
     svg.push_str("</svg>\n");
     match output::Picture::of(path)? {
@@ -38,14 +40,14 @@ pub(super) fn end(mut svg: String, path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// A logarithmic axis over whole powers of ten.
-pub(super) struct Axis {
+pub(super) struct LogAxis {
     low: i32,
     high: i32,
     from: f64,
     to: f64,
 }
 
-impl Axis {
+impl LogAxis {
     pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (mut low, mut high) = (i32::MAX, i32::MIN);
         for value in values {
@@ -58,7 +60,8 @@ impl Axis {
         Self { low, high, from, to }
     }
 
-    /// Powers of ten, and where there are few of them also twice and five times as much, each with its text.
+    /// The values to mark, each with its text: powers of ten, and if there are few of them also their double
+    /// and fivefold.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
         let factors: &[f64] = if self.high - self.low <= FEW { &[1.0, 2.0, 5.0] } else { &[1.0] };
         (self.low..=self.high)
@@ -77,7 +80,8 @@ impl Axis {
     }
 }
 
-/// An axis on which equal differences are equally long, with whole multiples of 1, 2 or 5 times a power of ten.
+/// An axis on which equal differences are equally long. Its ticks are whole multiples of 1, 2 or 5 times a
+/// power of ten.
 pub(super) struct EvenAxis {
     low: f64,
     high: f64,
@@ -87,9 +91,9 @@ pub(super) struct EvenAxis {
 }
 
 impl EvenAxis {
-    /// Over finite values; without any, from 0 to 1.
+    /// An axis over the finite values, or from 0 to 1 without any.
     pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        /// Ticks are at least so many.
+        /// The least number of intervals between ticks.
         const TICKS: f64 = 5.0;
         let (low, high) = values
             .filter(|value| value.is_finite())
@@ -112,22 +116,22 @@ impl EvenAxis {
         self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
     }
 
-    /// Values to be marked, each with its text.
+    /// The values to mark, each with its text.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
         let count = ((self.high - self.low) / self.tick).round() as usize;
         let digits = (-self.tick.log10().floor()).clamp(0.0, 12.0) as usize;
         let large = self.low.abs().max(self.high.abs()) >= 1e6 || self.tick < 1e-6;
         (0..=count).map(move |k| {
             let value = self.low + k as f64 * self.tick;
-            // the last bits of a sum are no reason to write −0
+            // the last bits of a sum must not give −0
             let value = if value.abs() < 1e-9 * self.tick { 0.0 } else { value };
             (value, if large { format!("{value:.1e}") } else { format!("{value:.digits$}") })
         })
     }
 }
 
-/// Lines at the whole powers of ten, and what the axes are.
-pub(super) fn grid(out: &mut String, x: &Axis, y: &Axis, names: [&str; 2]) {
+/// Draws lines at the ticks, and the names of the axes.
+pub(super) fn grid(out: &mut String, x: &LogAxis, y: &LogAxis, names: [&str; 2]) {
     for (value, text) in x.ticks() {
         across(out, x.at(value), &text);
     }
@@ -143,7 +147,7 @@ pub(super) fn grid(out: &mut String, x: &Axis, y: &Axis, names: [&str; 2]) {
     axis_names(out, names);
 }
 
-/// Lines at the ticks, and what the axes are.
+/// Draws lines at the ticks, and the names of the axes.
 pub(super) fn even_grid(out: &mut String, x: &EvenAxis, y: &EvenAxis, names: [&str; 2]) {
     for (value, text) in x.ticks() {
         across(out, x.at(value), &text);
@@ -154,7 +158,7 @@ pub(super) fn even_grid(out: &mut String, x: &EvenAxis, y: &EvenAxis, names: [&s
     axis_names(out, names);
 }
 
-/// An upright line of the grid with its value below. Writing to a String cannot fail.
+/// Draws an upright line of the grid, with its value below. Writing to a String cannot fail.
 fn across(out: &mut String, at: f64, text: &str) {
     let _ = write!(
         out,
@@ -164,7 +168,7 @@ fn across(out: &mut String, at: f64, text: &str) {
     );
 }
 
-/// A level line of the grid with its value to the left.
+/// Draws a level line of the grid, with its value to the left.
 fn along(out: &mut String, at: f64, text: &str) {
     let _ = write!(
         out,
@@ -192,7 +196,7 @@ mod tests {
     #[test]
     fn few_powers_of_ten_are_divided() {
         let texts = |low: f64, high: f64| -> Vec<String> {
-            Axis::over([low, high].into_iter(), 0.0, 1.0).ticks().map(|tick| tick.1).collect()
+            LogAxis::over([low, high].into_iter(), 0.0, 1.0).ticks().map(|tick| tick.1).collect()
         };
         assert_eq!(texts(0.03, 0.4), ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"]);
         assert_eq!(texts(1e-3, 20.0), ["0.001", "0.01", "0.1", "1", "10", "100"]);

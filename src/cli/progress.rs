@@ -1,11 +1,11 @@
-//! Progress bars on standard error: on a terminal only, and never part of the output.
+//! Progress bars on standard error. They appear only on a terminal and are never part of the output.
 
 use std::io::IsTerminal;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// A bar over `length` steps with a text that the caller keeps up to date.
+/// A bar over `length` steps, with a text that the caller keeps up to date.
 pub(super) fn bar(length: u64, what: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(length);
     if !std::io::stderr().is_terminal() {
@@ -20,7 +20,7 @@ pub(super) fn bar(length: u64, what: &'static str) -> ProgressBar {
     bar
 }
 
-/// A sign of life where nobody knows how long it takes.
+/// A spinner for work of unknown length.
 pub(super) fn spinner(what: &'static str) -> ProgressBar {
     let spinner = ProgressBar::new_spinner();
     if !std::io::stderr().is_terminal() {

@@ -1,19 +1,22 @@
-//! Every code a message can carry, with the explanation that `rfm explain CODE` prints.
+//! Every code that a message can carry, with the explanation that `rfm explain CODE` prints.
 
-/// A stable name of a kind of message: `E…` errors, `W…` warnings.
+/// The stable name of a kind of message: `E…` for errors, `W…` for warnings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Code(pub &'static str);
 
 macro_rules! codes {
     ($($name:ident = $code:literal : $text:literal;)*) => {
         impl Code {
-            $(pub const $name: Self = Self($code);)*
+            $(
+                #[doc = concat!("The code `", $code, "`; [`explain`] gives its explanation.")]
+                pub const $name: Self = Self($code);
+            )*
         }
         const TABLE: &[(&str, &str)] = &[$(($code, $text)),*];
     };
 }
 
-/// The long explanation of a code, or nothing if there is no such code.
+/// The long explanation of a code, in upper or lower case. `None` if there is no such code.
 pub fn explain(code: &str) -> Option<&'static str> {
     TABLE.iter().find(|(name, _)| name.eq_ignore_ascii_case(code)).map(|&(_, text)| text)
 }

@@ -1,6 +1,7 @@
-//! What the compiler says to a person: one type for every message about a file, one renderer, one list of codes.
+//! Messages of the compiler to people: one type for every message about a file, one renderer, one list
+//! of codes.
 //!
-//! Messages are lower case without a full stop; they say what was found and what would be accepted.
+//! Messages are in lower case without a full stop. They say what was found and what would be accepted.
 
 mod codes;
 mod render;
@@ -13,9 +14,12 @@ pub use codes::{Code, explain};
 pub use render::{Style, render};
 pub use source::{Position, Source, SourceId, Span};
 
+/// How serious a message is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
+    /// The input is accepted, but something about it is odd.
     Warning,
+    /// The input is refused.
     Error,
 }
 
@@ -28,26 +32,34 @@ impl fmt::Display for Severity {
     }
 }
 
-/// A further place that a message speaks of.
+/// A place in a source, with words beside it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Label {
+    /// The place.
     pub span: Span,
+    /// The words beside it; may be empty.
     pub text: String,
 }
 
 /// One message about the input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
+    /// Whether it is an error or a warning.
     pub severity: Severity,
+    /// The code, which [`explain`] explains.
     pub code: Code,
+    /// What was found, in lower case and without a full stop.
     pub message: String,
-    /// The place that the message is about, with a few words put beside it.
+    /// The place that the message is about, with a few words beside it.
     pub primary: Label,
+    /// Other places that belong to the matter.
     pub secondary: Vec<Label>,
+    /// What would be accepted, or what to do.
     pub help: Option<String>,
 }
 
 impl Diagnostic {
+    /// An error about a place.
     pub fn error(code: Code, span: Span, message: impl Into<String>) -> Self {
         Self {
             severity: Severity::Error,
@@ -59,30 +71,33 @@ impl Diagnostic {
         }
     }
 
+    /// A warning about a place.
     pub fn warning(code: Code, span: Span, message: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, ..Self::error(code, span, message) }
     }
 
-    /// The words beside the primary span.
+    /// Puts words beside the primary place.
     #[must_use]
     pub fn at(mut self, text: impl Into<String>) -> Self {
         self.primary.text = text.into();
         self
     }
 
+    /// Adds another place that belongs to the matter.
     #[must_use]
     pub fn label(mut self, span: Span, text: impl Into<String>) -> Self {
         self.secondary.push(Label { span, text: text.into() });
         self
     }
 
+    /// Adds help: what would be accepted, or what to do.
     #[must_use]
     pub fn help(mut self, text: impl Into<String>) -> Self {
         self.help = Some(text.into());
         self
     }
 
-    /// Help of the form "did you mean `name`?" if one of the candidates is near enough to what was written.
+    /// Adds the help "did you mean `name`?" if one of the candidates is near enough to what was written.
     #[must_use]
     pub fn suggest<'a>(self, written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Self {
         match nearest(written, candidates) {
@@ -92,10 +107,11 @@ impl Diagnostic {
     }
 }
 
-/// The candidate with the fewest typing slips from `written`: at most one slip, or one in three letters.
+/// The candidate with the fewest typing slips from `written`. `None` if each has more than one slip and more
+/// than one in three letters.
 pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = written.chars().count();
-    // one letter is near to every other
+    // a single letter is near to every other
     let limit = if length == 1 { 0 } else { (length / 3).max(1) };
     let lower = written.to_lowercase();
     candidates
@@ -106,18 +122,23 @@ pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>)
         .map(|(_, name)| name)
 }
 
-/// The messages of one compilation together with the texts they point into: the error type of the library.
+/// The messages of one compilation, together with the texts that they point into. This is the error type of
+/// the compiler.
 #[derive(Debug, Clone)]
 pub struct Diagnostics {
+    /// The messages in the order in which they are shown.
     pub list: Vec<Diagnostic>,
+    /// The texts that their spans point into.
     pub sources: Arc<[Source]>,
 }
 
 impl Diagnostics {
+    /// Whether there is an error among the messages.
     pub fn has_errors(&self) -> bool {
         self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
+    /// The text with an id. `None` if it is not among the sources.
     pub fn source(&self, id: SourceId) -> Option<&Source> {
         self.sources.iter().find(|s| s.id == id)
     }

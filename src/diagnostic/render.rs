@@ -6,21 +6,22 @@ use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Renderer, Snip
 
 use super::{Diagnostic, Diagnostics, Label, Severity, Source, Span};
 
+/// How messages are decorated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
-    /// ASCII decorations, no escape codes: for logs, snapshots and error values.
+    /// ASCII decorations without escape codes, for logs, snapshots and error values.
     Plain,
     /// Escape codes and line drawing characters, for terminals.
     Terminal,
 }
 
-/// Lines longer than this are not quoted whole: a generated file may be one line of megabytes.
+/// Lines longer than this, in bytes, are not quoted whole. A generated file may be one line of megabytes.
 const LONGEST_QUOTED_LINE: usize = 400;
 
 /// Messages longer than this, in bytes, lose their middle.
 const LONGEST_MESSAGE: usize = 400;
 
-/// All messages, one after the other, each ended by a newline.
+/// All messages as text, with a blank line between them and a newline at the end.
 pub fn render(diagnostics: &Diagnostics, style: Style) -> String {
     let renderer = match style {
         Style::Plain => Renderer::plain(),
@@ -59,7 +60,7 @@ fn groups<'a>(diagnostic: &'a Diagnostic, sources: &'a [Source]) -> Vec<Group<'a
     vec![group]
 }
 
-/// A message may quote a name of any length.
+/// The message without its middle if it is too long. It may quote a name of any length.
 fn shortened(message: &str) -> Cow<'_, str> {
     if message.len() <= LONGEST_MESSAGE {
         return message.into();
@@ -69,7 +70,7 @@ fn shortened(message: &str) -> Cow<'_, str> {
     format!("{}…{}", &message[..first], &message[last..]).into()
 }
 
-/// The quoted lines that the labels touch: cut out first, so that the cost does not grow with the file.
+/// The lines that the labels touch. They are cut out first, so that the cost does not grow with the file.
 fn snippet<'a>(source: &'a Source, labels: &[(AnnotationKind, &'a Label)]) -> Snippet<'a, Annotation<'a>> {
     let text = &source.text;
     let first = labels.iter().map(|(_, l)| clamp(text, l.span).start).min().unwrap_or(0);
@@ -98,7 +99,7 @@ fn snippet<'a>(source: &'a Source, labels: &[(AnnotationKind, &'a Label)]) -> Sn
     snippet
 }
 
-/// The span's bytes, moved onto character boundaries inside the text.
+/// The bytes of a span, moved onto character boundaries inside the text.
 fn clamp(text: &str, span: Span) -> std::ops::Range<usize> {
     let start = floor_boundary(text, span.start as usize);
     let end = floor_boundary(text, span.end as usize).max(start);

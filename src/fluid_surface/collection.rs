@@ -4,22 +4,25 @@ use std::fmt;
 
 use roxmltree::Document;
 
-/// One file of a collection.
+/// One frame of a run: an entry of its collection.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
-    /// Seconds.
+pub struct FrameEntry {
+    /// The simulated time in seconds.
     pub time: f64,
-    /// Relative to the folder of the collection.
+    /// The frame's file, relative to the folder of the collection.
     pub file: String,
 }
 
 /// Why a file is no collection.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CollectionError {
-    /// Not an XML document, or one of another kind; what was found.
+    /// The file is not an XML document, or one of another kind. The text says what was found.
     NotACollection(String),
-    /// An entry without file, or with a time that is no number.
-    Entry { index: usize },
+    /// An entry has no file, or a time that is no number.
+    Entry {
+        /// The entry's index.
+        index: usize,
+    },
 }
 
 impl fmt::Display for CollectionError {
@@ -33,11 +36,11 @@ impl fmt::Display for CollectionError {
 
 impl std::error::Error for CollectionError {}
 
-/// Reads the entries of a collection, in its order.
+/// Reads the entries of a collection from the text of its file, in their order.
 ///
 /// # Errors
-/// See [`CollectionError`].
-pub fn read_collection(text: &str) -> Result<Vec<Entry>, CollectionError> {
+/// [`CollectionError`] if the text is no collection, or an entry is incomplete.
+pub fn read_collection(text: &str) -> Result<Vec<FrameEntry>, CollectionError> {
     let document =
         Document::parse(text).map_err(|error| CollectionError::NotACollection(error.to_string()))?;
     let root = document.root_element();
@@ -50,7 +53,7 @@ pub fn read_collection(text: &str) -> Result<Vec<Entry>, CollectionError> {
         .map(|(index, set)| {
             let time = set.attribute("timestep").and_then(|t| t.trim().parse::<f64>().ok());
             let file = set.attribute("file").map(str::to_string);
-            let entry = time.zip(file).map(|(time, file)| Entry { time, file });
+            let entry = time.zip(file).map(|(time, file)| FrameEntry { time, file });
             entry.ok_or(CollectionError::Entry { index })
         })
         .collect()

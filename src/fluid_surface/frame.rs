@@ -1,10 +1,10 @@
 //! The positions of the points of a VTK PolyData file (`.vtp`).
 //!
-//! Read are the ways in which such files store arrays without compression: as text, as base64 in the element, and
-//! appended behind the document, raw or as base64; either byte order, 32- or 64-bit lengths and floats. Everything
-//! but `Points` is passed over.
+//! All ways in which such files store arrays without compression can be read: as text, as base64 in the
+//! element, and appended behind the document, raw or as base64; in either byte order, with 32- or 64-bit
+//! lengths and floats. Everything except `Points` is skipped.
 //!
-//! Invariant: no length that the file claims is believed before the bytes are there.
+//! Invariant: a length that the file states is not trusted before the bytes are there.
 
 use std::fmt;
 
@@ -16,18 +16,23 @@ use roxmltree::{Document, Node};
 /// Why a file is no frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FrameError {
-    /// Not an XML document, or one of another kind; what was found.
+    /// The file is not an XML document, or one of another kind. The text says what was found.
     NotPolyData(String),
-    /// A way of storing arrays that is not read.
+    /// The file stores arrays in a way that cannot be read. The text names it.
     Unsupported(String),
-    /// Something that must be there is not.
+    /// Something is missing. The text names it.
     Missing(&'static str),
-    /// A number or block that cannot be read.
+    /// A number or a block cannot be read. The text names it.
     Malformed(&'static str),
     /// The file ends before its data.
     Truncated,
-    /// The array has another length than the piece says.
-    Count { expected: usize, found: usize },
+    /// The array has another length than the piece states.
+    Count {
+        /// The number of coordinates that the piece states.
+        expected: usize,
+        /// The number of coordinates in the array.
+        found: usize,
+    },
 }
 
 impl fmt::Display for FrameError {
@@ -47,10 +52,11 @@ impl fmt::Display for FrameError {
 
 impl std::error::Error for FrameError {}
 
-/// Reads the positions of all points, in the order of the file; numbers are as they stand, NaN included.
+/// Reads the positions of all points from the bytes of a file, in their order. NaN and infinite coordinates
+/// are kept.
 ///
 /// # Errors
-/// See [`FrameError`].
+/// [`FrameError`] if the file is no PolyData, is stored in an unknown way, or is damaged.
 pub fn read_points(file: &[u8]) -> Result<Vec<DVec3>, FrameError> {
     let (head, appended) = split(file)?;
     let document = Document::parse(&head).map_err(|error| FrameError::NotPolyData(error.to_string()))?;
@@ -88,7 +94,7 @@ pub fn read_points(file: &[u8]) -> Result<Vec<DVec3>, FrameError> {
     Ok(points)
 }
 
-/// The document without what is appended, and that.
+/// The document without the appended data, and the appended data.
 fn split(file: &[u8]) -> Result<(String, Option<&[u8]>), FrameError> {
     const TAG: &[u8] = b"<AppendedData";
     let start = file.windows(TAG.len()).position(|window| window == TAG);
@@ -113,7 +119,7 @@ fn number<T: std::str::FromStr>(node: Node<'_, '_>, name: &'static str) -> Resul
 /// How a file stores its arrays.
 struct Storage<'a> {
     big_endian: bool,
-    /// Lengths have eight bytes, else four.
+    /// Whether lengths have eight bytes, and not four.
     wide_lengths: bool,
     appended: Option<&'a [u8]>,
     appended_is_raw: bool,
@@ -161,7 +167,7 @@ impl<'a> Storage<'a> {
                 if self.appended_is_raw {
                     self.block(from)?.to_vec()
                 } else {
-                    // offsets count characters; other arrays follow, so the length comes first
+                    // offsets count characters; other arrays follow, so the length is read first
                     let head = base64_bytes(from, self.length_size())?;
                     let bytes = self.length(&head)?.saturating_add(self.length_size());
                     self.block(&base64_bytes(from, bytes)?)?.to_vec()
@@ -197,7 +203,7 @@ impl<'a> Storage<'a> {
         usize::try_from(length).map_err(|_| FrameError::Truncated)
     }
 
-    /// The bytes of an array behind their length.
+    /// The bytes of an array, which follow their length.
     fn block<'b>(&self, bytes: &'b [u8]) -> Result<&'b [u8], FrameError> {
         let length = self.length(bytes)?;
         bytes[self.length_size()..].get(..length).ok_or(FrameError::Truncated)
@@ -212,7 +218,8 @@ fn words(text: &str, wide: bool) -> Result<Vec<f64>, FrameError> {
     text.split_ascii_whitespace().map(number).collect()
 }
 
-/// Up to `most` bytes from base64, which may consist of several padded parts, until the text ends.
+/// Decodes base64, which may consist of several padded parts, until the text ends or at least `most` bytes
+/// are found.
 fn base64_bytes(text: &[u8], most: usize) -> Result<Vec<u8>, FrameError> {
     let mut bytes = Vec::new();
     let mut group = Vec::with_capacity(4);

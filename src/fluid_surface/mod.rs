@@ -1,13 +1,14 @@
-//! From the particles of a fluid to a closed triangle mesh around them, frame by frame.
+//! Closed triangle meshes around the particles of a fluid, frame by frame.
 //!
-//! [`read_collection`] lists the frames of a run → [`read_points`] reads the positions of one → [`Reconstruction::mesh`]
-//! lays a surface around them (crate `splashsurf_lib`): the density that a kernel sum gives, over the rest density, is
-//! meshed by marching cubes at a threshold, as Löschner, Böttcher, Jeske and Bender describe ("Weighted Laplacian
-//! Smoothing for Surface Reconstruction of Particle-based Fluids", 2023).
+//! [`read_collection`] lists the frames of a run, [`read_points`] reads the positions of one, and
+//! [`Reconstruction::mesh`] lays a surface around them with the crate `splashsurf_lib`. A kernel sum gives
+//! the density over the rest density, which marching cubes mesh at a threshold, as Löschner, Böttcher,
+//! Jeske and Bender describe ("Weighted Laplacian Smoothing for Surface Reconstruction of Particle-based
+//! Fluids", 2023).
 //!
-//! Invariant: the mesh is closed, its triangles are counter-clockwise seen from outside the fluid, and the same
-//! particles give the same bits on any number of threads: what the crate returns in the order in which threads finish
-//! is put in order here.
+//! Invariant: the mesh is closed, its triangles are counter-clockwise as seen from outside the fluid, and the
+//! same particles give the same bits on any number of threads. The crate returns vertices in the order in
+//! which threads finish; they are put in order here.
 
 mod collection;
 mod frame;
@@ -21,38 +22,39 @@ use splashsurf_lib::{GridDecompositionParameters, Parameters, SpatialDecompositi
 use crate::geom::Aabb;
 use crate::mesh::Mesh;
 
-pub use collection::{CollectionError, Entry, read_collection};
+pub use collection::{CollectionError, FrameEntry, read_collection};
 pub use frame::{FrameError, read_points};
 
-/// What a surface is made with; lengths in metres.
+/// The parameters of a surface. Lengths are in metres and absolute.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reconstruction {
-    /// Half of the particles' spacing: a particle stands for a cube of twice this side.
+    /// Half of the particles' spacing. A particle stands for a cube whose side is twice this.
     pub particle_radius: f64,
-    /// Beyond this distance a particle has no weight. Twice the smoothing length, which splashsurf advises to be twice
-    /// the radius: larger ones smooth the surface, and blunt it.
+    /// Beyond this distance a particle has no weight. It is twice the smoothing length, which splashsurf
+    /// advises to be twice the radius. Larger ones smooth the surface and blunt it.
     pub support_radius: f64,
-    /// Side of a marching-cubes cell. splashsurf advises half the radius; from a whole one on, single particles show
-    /// as facets.
+    /// The side of a marching-cubes cell. splashsurf advises half the radius. From a whole radius on, single
+    /// particles show as facets.
     pub cell: f64,
-    /// The part of the rest density at which the surface lies: 0.6, as splashsurf advises, which is where a half-space
-    /// full of particles keeps about its volume.
+    /// The part of the rest density at which the surface lies. splashsurf advises 0.6, with which a
+    /// half-space full of particles keeps about its volume.
     pub threshold: f64,
 }
 
 impl Reconstruction {
-    /// Support radius over particle radius.
+    /// The advised support radius over the particle radius.
     const SUPPORT: f64 = 4.0;
-    /// Cell over particle radius.
+    /// The advised cell over the particle radius.
     const CELL: f64 = 0.5;
+    /// The advised threshold.
     const THRESHOLD: f64 = 0.6;
-    /// Most cells within the support radius: at 32 one particle already touches 137 000 nodes.
+    /// The most cells within the support radius. At 32 one particle already touches 137 000 nodes.
     const MOST_IN_SUPPORT: f64 = 32.0;
-    /// Most cells along the longest side of the fluid: `f32`, in which the crate computes fast, then still resolves a
-    /// thousandth of a cell.
+    /// The most cells along the longest side of the fluid. `f32`, in which the crate computes fast, then
+    /// still resolves a thousandth of a cell.
     const MOST_CELLS: f64 = 16384.0;
 
-    /// The advised values for particles of a radius.
+    /// The advised parameters for particles of a radius, in metres.
     pub fn of_radius(particle_radius: f64) -> Self {
         Self {
             particle_radius,
@@ -62,11 +64,11 @@ impl Reconstruction {
         }
     }
 
-    /// The surface around particles. No particles give no triangles.
+    /// The surface around particles at positions in metres. Without particles it has no triangles.
     ///
     /// # Errors
-    /// Lengths that are not positive, cells too small for the radius or for the extent of the fluid, positions that are
-    /// not numbers.
+    /// [`SurfaceError`] for lengths that are not positive, for cells that are too small for the radius or for
+    /// the extent of the fluid, for positions that are not numbers, and for surfaces with too many vertices.
     pub fn mesh(&self, particles: &[DVec3]) -> Result<Mesh, SurfaceError> {
         let positive = |length: f64| length.is_finite() && length > 0.0;
         if ![self.particle_radius, self.support_radius, self.cell].into_iter().all(positive) {
@@ -116,8 +118,8 @@ impl Reconstruction {
     }
 }
 
-/// A mesh whose vertices are sorted by place and whose triangles by vertices: the crate stitches subdomains together in
-/// the order in which threads finish.
+/// A mesh whose vertices are sorted by position and whose triangles are sorted by vertices. The crate
+/// stitches subdomains together in the order in which threads finish.
 fn in_order(
     positions: Vec<[f32; 3]>,
     triangles: Vec<[usize; 3]>,
@@ -137,7 +139,7 @@ fn in_order(
         .into_iter()
         .map(|t| {
             let [a, b, c] = t.map(|v| number[v]);
-            // begin with the least corner, keep the way round
+            // begin with the least corner, and keep the winding
             if a < b && a < c {
                 [a, b, c]
             } else if b < c {
@@ -152,28 +154,36 @@ fn in_order(
     Ok(Mesh::from_triangles(order.iter().map(place).collect(), sorted))
 }
 
-/// Why particles got no surface.
+/// Why there is no surface for particles.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SurfaceError {
     /// A length is not positive and finite.
     Length,
+    /// The cell is too small for the support radius.
     CellTooSmall {
+        /// The side of the cell in metres.
         cell: f64,
+        /// The least side that would do, in metres.
         least: f64,
     },
     /// The fluid is too many cells wide.
     TooWide {
+        /// The longest side of the fluid in metres.
         extent: f64,
+        /// The side of the cell in metres.
         cell: f64,
     },
     /// A position is infinite or not a number.
     NotANumber {
+        /// The particle's index.
         index: usize,
     },
+    /// The surface would have more vertices than [`Mesh::MAX_VERTICES`].
     TooManyVertices {
+        /// The number of vertices that was found.
         found: usize,
     },
-    /// What `splashsurf_lib` says.
+    /// `splashsurf_lib` failed with this message.
     Crate(String),
 }
 

@@ -21,8 +21,8 @@ fn advised() -> Reconstruction {
     Reconstruction::of_radius(0.5 * SPACING)
 }
 
-/// The density falls from 1 to 0 about the face of the outermost cells; edges and corners are rounded off, which takes
-/// less of a larger cube.
+/// The density falls from 1 to 0 at the faces of the outermost cells. Edges and corners are rounded off,
+/// which removes less of a larger cube.
 #[test]
 fn a_cube_of_particles_keeps_its_volume() {
     let part = |n: usize| {
@@ -54,7 +54,8 @@ fn the_surface_does_not_depend_on_threads() {
 #[test]
 fn single_and_coincident_particles_have_a_surface() {
     assert_eq!(advised().mesh(&[]), Ok(Mesh::default()));
-    // one particle alone has the density of its own kernel only: splashsurf divides by it, so a ball remains
+    // a single particle has the density of its own kernel only, by which splashsurf divides, so a
+    // ball remains
     for particles in [vec![DVec3::ZERO], vec![DVec3::ONE; 2], vec![DVec3::splat(1e6); 3]] {
         let mesh = advised().mesh(&particles).unwrap();
         assert!(is_closed_manifold(&mesh) && volume(&mesh) > 0.0, "{particles:?}");
@@ -77,7 +78,7 @@ fn what_cannot_be_meshed_is_refused() {
     }
 }
 
-/// Two points, stored in each of the ways.
+/// Two points are stored in each of the ways.
 #[test]
 fn arrays_are_read_however_they_are_stored() {
     let expected = vec![DVec3::new(1.0, -2.0, 0.5), DVec3::new(1e-3_f32.into(), 4.0, 1e10)];
@@ -93,7 +94,7 @@ fn arrays_are_read_however_they_are_stored() {
         );
         let file = [head.as_bytes(), behind, b"</VTKFile>\n"].concat();
         assert_eq!(read_points(&file), Ok(expected.clone()), "{}", String::from_utf8_lossy(&file));
-        // cut off anywhere it is an error, never a panic, and never other points
+        // cut off anywhere, the file gives an error, and never a panic or other points
         for end in 0..file.len() {
             match read_points(&file[..end]) {
                 Ok(points) => assert_eq!(points, expected, "cut at {end}"),
@@ -108,7 +109,7 @@ fn arrays_are_read_however_they_are_stored() {
     let inline =
         |data: &str| format!("<DataArray type=\"Float32\" format=\"binary\">\n {data}\n</DataArray>");
     file("byte_order=\"LittleEndian\"", &inline(&joined), b"");
-    // length and data padded apart
+    // length and data are padded separately
     let apart = encode(&24_u32.to_le_bytes()) + &encode(&bytes);
     file("byte_order=\"LittleEndian\"", &inline(&apart), b"");
     let doubles = "<DataArray type=\"Float64\" format=\"appended\" offset=\"4\"/>";
@@ -158,7 +159,7 @@ fn collections_are_read_in_their_order() {
     let text = "<VTKFile type=\"Collection\"><Collection>\
                 <DataSet timestep=\"0\" part=\"0\" file=\"frames/a.vtp\"/>\
                 <DataSet timestep=\"0.04\" part=\"0\" file=\"b&amp;c.vtp\"/></Collection></VTKFile>";
-    let entry = |time: f64, file: &str| Entry { time, file: file.to_string() };
+    let entry = |time: f64, file: &str| FrameEntry { time, file: file.to_string() };
     assert_eq!(read_collection(text), Ok(vec![entry(0.0, "frames/a.vtp"), entry(0.04, "b&c.vtp")]));
     let broken = text.replace("0.04", "late");
     assert_eq!(read_collection(&broken), Err(CollectionError::Entry { index: 1 }));

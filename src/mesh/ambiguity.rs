@@ -1,37 +1,39 @@
-//! What the eight corner values say where the corners' signs leave a choice: the mesh then has the topology of the
-//! trilinear interpolant, F(x, y, z) in the cell [0, 1]³.
+//! Decisions by the values at a cell's corners where their signs leave a choice. The mesh then has the
+//! topology of the trilinear interpolant, F(x, y, z) in the cell [0, 1]³.
 //!
-//! On a face F is bilinear and F = 0 a hyperbola; which corners its branches join is told by the sign of F at its
-//! saddle (asymptotic decider, Nielson and Hamann, Visualization 1991). Within the cell each loop of segments bounds a
-//! disc, except that two of them may bound a tunnel.
+//! On a face F is bilinear and F = 0 is a hyperbola. The sign of F at its saddle says which corners its
+//! branches join (asymptotic decider, Nielson and Hamann, Visualization 1991). Within the cell each loop of
+//! segments bounds a disc, except that two of them may bound a tunnel.
 //!
-//! When is there a tunnel? In a slice x = t, F is bilinear with corner values A, B, C, D linear in t; A·C − B·D is a
-//! quadratic in t whose discriminant is Cayley's hyperdeterminant of the corner values, the same on all three axes. If
-//! it is positive, the roots u₀, u₁ on x, v₀, v₁ on y and w₀, w₁ on z span a box on which F vanishes at six corners and
-//! along the six edges between them: a closed hexagon of straight lines on the surface (compare Grosso, Computer
-//! Graphics Forum 35, 2016). The box's other two corners P and Q lie opposite to one another, and in coordinates of the
-//! box F = F(P)·(1−x)(1−y)(1−z) + F(Q)·xyz. So if F(P) and F(Q) differ in sign, the surface within the box is a disc
-//! that spans the hexagon; if they agree, the box is free of surface, and the hexagon is the waist of a tunnel from P
-//! to Q. A tunnel lies in the cell where its waist does. The lines go on beyond the hexagon's corners, those next to P
-//! towards the faces on the side of P: the loops that they meet there are the tunnel's ends.
+//! A tunnel is recognised as follows. In a slice x = t, F is bilinear with corner values A, B, C, D linear in
+//! t; A·C − B·D is a quadratic in t whose discriminant is Cayley's hyperdeterminant of the corner values, the
+//! same on all three axes. If it is positive, the roots u₀, u₁ on x, v₀, v₁ on y and w₀, w₁ on z span a box
+//! on which F vanishes at six corners and along the six edges between them: a closed hexagon of straight
+//! lines on the surface (compare Grosso, Computer Graphics Forum 35, 2016). The box's other two corners P and
+//! Q lie opposite to one another, and in coordinates of the box F = F(P)·(1−x)(1−y)(1−z) + F(Q)·xyz. So if
+//! F(P) and F(Q) differ in sign, the surface within the box is a disc that spans the hexagon; if they agree,
+//! the box is free of surface, and the hexagon is the waist of a tunnel from P to Q. A tunnel lies in the
+//! cell where its waist does. The lines go on beyond the hexagon's corners, those next to P towards the faces
+//! on the side of P: the loops that they meet there are the tunnel's ends.
 //!
-//! The values are those of [`crate::field::Field::continuous`] at the grid's nodes; for a solid these are the min/max
-//! twin's, whose sign is ω's, with a cell map or without. Ties count as outside, as ω = 0 does everywhere.
+//! The values are those of [`crate::field::Field::continuous`] at the grid's nodes. For a solid they come
+//! from the min/max twin, whose sign is that of ω, with a cell map or without. Ties count as outside, as ω =
+//! 0 does everywhere.
 //!
-//! Invariant: a decision about a face depends on its four values alone and not on their order, so both cells there come
-//! to the same.
+//! Invariant: a decision about a face depends on its four values alone and not on their order, so both cells
+//! at the face decide alike.
 
 use super::cases::{Ambiguous, FACES, Tunnel, edge_between, face_corners};
 
-/// ω at the corners of a cell; bit 0 of the index is x, bit 1 y, bit 2 z.
+/// ω at the corners of a cell. Bit 0 of the index is x, bit 1 is y, bit 2 is z.
 pub(super) type Corners = [f64; 8];
 
-/// Bit c tells whether corner c is inside.
+/// Bit c is set if corner c is inside.
 pub(super) fn inside(corners: &Corners) -> u8 {
     corners.iter().enumerate().fold(0, |mask, (c, &w)| mask | u8::from(w > 0.0) << c)
 }
 
-/// Which corners are joined on each face; of no consequence where that is not ambiguous.
+/// Which corners are joined on each face. The decision has no effect on a face that is not ambiguous.
 pub(super) fn faces(corners: &Corners) -> [Ambiguous; FACES] {
     std::array::from_fn(|face| {
         let [a, b, c, d] = face_corners(face).map(|corner| corners[corner]);
@@ -41,7 +43,7 @@ pub(super) fn faces(corners: &Corners) -> [Ambiguous; FACES] {
     })
 }
 
-/// Which two of the loops bound a tunnel, if any do, and its waist.
+/// The tunnel of a cell, with the two loops that bound it and its waist. `None` if there is none.
 pub(super) fn tunnel(corners: &Corners, loops: &[Vec<usize>]) -> Option<Tunnel> {
     if loops.len() < 2 {
         return None;
@@ -58,16 +60,16 @@ pub(super) fn tunnel(corners: &Corners, loops: &[Vec<usize>]) -> Option<Tunnel> 
     }
 }
 
-/// The hexagon's box around a tunnel.
+/// The box that is spanned by the hexagon around a tunnel.
 struct Waist {
-    /// Its low and high side on each axis.
+    /// The low and the high side on each axis.
     sides: [[f64; 2]; 3],
     /// The corner P: low (0) or high (1) on each axis.
     end: [usize; 3],
 }
 
 impl Waist {
-    /// The waist within the cell, if there is a tunnel.
+    /// The waist within the cell. `None` if there is no tunnel.
     fn of(corners: &Corners) -> Option<Self> {
         let mut sides = [[0.0; 2]; 3];
         for (axis, sides) in sides.iter_mut().enumerate() {
@@ -90,7 +92,8 @@ impl Waist {
         })
     }
 
-    /// The loop that the lines beyond the hexagon's corners next to one end of the tunnel meet.
+    /// The loop at one end of the tunnel: the one that most lines beyond the hexagon's corners next to that
+    /// end meet.
     fn loop_towards(&self, end: [usize; 3], corners: &Corners, loops: &[Vec<usize>]) -> Option<usize> {
         let mut votes = vec![0; loops.len()];
         for axis in 0..3 {
@@ -106,7 +109,8 @@ impl Waist {
     }
 }
 
-/// The two slices across an axis, within the cell, in which the bilinear F degenerates to a pair of lines.
+/// The two slices across an axis in which the bilinear F degenerates to a pair of lines. `None` if they are
+/// not both within the cell.
 fn degenerate_slices(corners: &Corners, axis: usize) -> Option<[f64; 2]> {
     let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
     let [a, b, c, d] = [0, u, u | v, v].map(|low| (corners[low], corners[low | 1 << axis] - corners[low]));
@@ -133,11 +137,11 @@ fn trilinear(corners: &Corners, at: [f64; 3]) -> f64 {
     (0..8).map(|corner| weight(corner) * corners[corner]).sum()
 }
 
-/// The loop whose segment on a face a point of F = 0 on that face lies on.
+/// The loop whose segment on a face holds a point of F = 0 on that face.
 fn loop_on_face(face: usize, at: [f64; 3], corners: &Corners, loops: &[Vec<usize>]) -> Option<usize> {
     let around = face_corners(face);
     let borders = |e: usize| (0..4).position(|i| edge_between(around[i], around[(i + 1) % 4]) == e);
-    // segments on the face: the loop and the two sides of the face
+    // segments on the face, each as its loop and two sides of the face
     let mut segments = Vec::new();
     for (number, polygon) in loops.iter().enumerate() {
         for (i, &from) in polygon.iter().enumerate() {
@@ -215,19 +219,20 @@ mod tests {
         }
     }
 
-    /// What a set of points tells of the solid that it samples.
+    /// The topology of a solid, as a set of points shows it.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     struct Topology {
-        /// Of the solid; the surface has twice that.
+        /// The Euler characteristic of the solid; that of its surface is twice as large.
         euler: i64,
         solids: usize,
-        /// Parts of the fluid, the one outside included.
+        /// The number of parts of the fluid, with the one outside.
         fluids: usize,
     }
 
-    /// The topology of the positive set by brute force: points `per_cell` to a cell side, joined along the axes where
-    /// both are positive (and filled where all around a square or cube are), the rest joined across corners as well; or
-    /// the other way round. Near a surface that the points resolve both agree. Nothing if they do not.
+    /// The topology of the positive set by brute force, with `per_cell` points to a cell side. Positive
+    /// points are joined along the axes, and squares and cubes between them are filled; the other points are
+    /// joined across corners as well. The roles are then exchanged. Where the points resolve the surface both
+    /// ways agree; `None` if they do not.
     fn sampled(values: &Values, per_cell: usize) -> Option<Topology> {
         let side = (values.n - 1) * per_cell + 3; // a layer of fluid around
         let mut positive = vec![false; side.pow(3)];
@@ -240,23 +245,25 @@ mod tests {
             }
         }
         let [solid, fluid] = [true, false].map(|kind| parts(&positive, side, kind));
-        // the complement of a solid in space has the solid's characteristic, plus one for the ball at infinity
+        // the complement of a solid in space has the solid's characteristic, plus one for the ball
+        // at infinity
         let agree =
             solid.euler == fluid.euler - 1 && [solid, fluid].iter().all(|p| p.along_axes == p.across_corners);
         agree.then_some(Topology { euler: solid.euler, solids: solid.along_axes, fluids: fluid.along_axes })
     }
 
-    /// Points of one kind.
+    /// The parts that points of one kind form.
     #[derive(Debug, Clone, Copy)]
-    struct Parts {
-        /// Of points, edges, filled squares and filled cubes.
+    struct PointSet {
+        /// The Euler characteristic of points, edges, filled squares and filled cubes.
         euler: i64,
-        /// Parts that hang together along the axes, and across corners as well.
+        /// The number of parts if points are joined along the axes, and if they are joined across corners
+        /// as well.
         along_axes: usize,
         across_corners: usize,
     }
 
-    fn parts(positive: &[bool], side: usize, kind: bool) -> Parts {
+    fn parts(positive: &[bool], side: usize, kind: bool) -> PointSet {
         let steps = [1, side, side * side];
         let is = |at: usize| positive[at] == kind;
         let mut parent: Vec<u32> = (0..positive.len() as u32).collect();
@@ -296,7 +303,7 @@ mod tests {
                 alike.for_each(|other| unite(&mut parent, first, other));
             }
         }
-        Parts { euler, along_axes, across_corners: count(&parent) }
+        PointSet { euler, along_axes, across_corners: count(&parent) }
     }
 
     fn find(parent: &mut [u32], mut at: usize) -> usize {
@@ -312,7 +319,8 @@ mod tests {
         parent[a.max(b)] = a.min(b) as u32;
     }
 
-    /// Refines until some resolutions in a row agree; nothing for fields too near to a change of topology.
+    /// Refines until `in_a_row` resolutions agree. `None` for fields that are too near to a change
+    /// of topology.
     fn true_topology(values: &Values, resolutions: &[usize], in_a_row: usize) -> Option<Topology> {
         let mut agreeing: Vec<Topology> = Vec::new();
         for &per_cell in resolutions {
@@ -326,9 +334,9 @@ mod tests {
         None
     }
 
-    /// Meshes a random grid by both methods; whether the topology of each is right, none if it could not be told. Two
-    /// resolutions may agree and still miss a tunnel between their points, so a mesh is called wrong only if three finer
-    /// ones agree against it.
+    /// Meshes a random grid by both methods and says whether the topology of each is right. `None` if the
+    /// truth could not be found. Two resolutions may agree and still miss a tunnel between their points, so a
+    /// mesh is called wrong only if three finer ones agree against it.
     fn is_right(n: usize, seed: u64) -> Option<[bool; 2]> {
         let values = Values::random(n, seed);
         let truth = true_topology(&values, &[6, 9, 14, 21], 2)?;
@@ -341,8 +349,8 @@ mod tests {
             report
         });
         assert!(reports[0].degenerate == 0, "grid {n}³ {seed}: {:?}", reports[0]);
-        // how many of the components are solids is told by the signs of their volumes, which dual contouring in a cell
-        // or two may get wrong: what the components do not tell, the characteristic and their number do
+        // the signs of volumes say which components are solids, but dual contouring may get those of a cell
+        // or two wrong; its characteristic and its number of components are compared instead
         let matches = |truth: Topology| {
             let expected = (2 * truth.euler, truth.solids + truth.fluids - 1);
             let same = reports.each_ref().map(|report| (report.euler, report.components) == expected);
@@ -376,9 +384,9 @@ mod tests {
         }
     }
 
-    /// Meshes of a random trilinear grid have the interpolant's Euler characteristic and parts, as found by brute
-    /// force on ever finer points. With `RFM_THOUSANDS_OF_GRIDS=1 cargo test --release --lib random_grids` thirty
-    /// thousand grids, which takes some minutes.
+    /// Meshes of a random trilinear grid have the interpolant's Euler characteristic and parts, as found by
+    /// brute force on ever finer points. `RFM_THOUSANDS_OF_GRIDS=1 cargo test --release --lib random_grids`
+    /// tries thirty thousand grids, which takes some minutes.
     #[test]
     fn random_grids_have_the_topology_of_the_interpolant() {
         check_random_grids(match std::env::var_os("RFM_THOUSANDS_OF_GRIDS") {

@@ -1,35 +1,38 @@
-//! Which triangles a cell gets, for each of the 256 ways its corners can lie inside or outside.
+//! The triangles of a cell, for each of the 256 ways in which its corners can lie inside or outside.
 //!
-//! Nothing is typed in: face rule → segments on each face → closed loops around the cell → triangles.
+//! The table is derived, not typed in: a rule gives the segments on each face, these form closed loops around
+//! the cell, and the loops are triangulated.
 //!
-//! Invariant 1: the two cells at a face put the same segments on it, because these depend on the four corners
-//! of that face alone. So loops close up between cells.
+//! Invariant 1: the two cells at a face put the same segments on it, because segments depend on the four
+//! corners of the face alone. So loops close up between cells.
 //!
-//! Invariant 2: no triangle has a side in a cell's face other than such a segment. Were a diagonal allowed
-//! there, the neighbour could use the same one, and four triangles would meet in it.
+//! Invariant 2: no triangle has a side in a cell's face other than such a segment. If a diagonal were allowed
+//! there, the neighbour could use it too, and four triangles would meet in it.
 //!
-//! Numbering. Corner c: bit 0 of c is x, bit 1 y, bit 2 z. Edge e = 4·axis + place, from the corner that is low
-//! on `axis` to the high one; bit 0 of `place` is the edge's position on the next axis (cyclically), bit 1 on
-//! the one after. Face f = 2·axis + side.
+//! Numbering. Corner c: bit 0 of c is x, bit 1 y, bit 2 z. Edge e = 4·axis + place, from the corner that is
+//! low on `axis` to the high one; bit 0 of `place` is the edge's position on the next axis (cyclically), bit
+//! 1 on the one after. Face f = 2·axis + side.
 
 use std::sync::LazyLock;
 
-/// Edges of a cell.
+/// The number of edges of a cell.
 pub(super) const EDGES: usize = 12;
 
-/// Faces of a cell.
+/// The number of faces of a cell.
 pub(super) const FACES: usize = 6;
 
-/// What happens on a face whose inside corners lie on one diagonal and whose outside corners on the other.
+/// The decision on a face whose inside corners lie on one diagonal and whose outside corners lie on
+/// the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ambiguous {
-    /// Solid on both sides of a strip of fluid.
+    /// There is solid on both sides of a strip of fluid.
     PartSolid,
-    /// A strip of solid between two parts of fluid.
+    /// There is a strip of solid between two parts of fluid.
     JoinSolid,
 }
 
-/// Triangles of all cells that the signs alone decide, as edges of the cell, counter-clockwise seen from the fluid.
+/// The triangles of all cells that the signs alone decide. Their corners are edges of the cell,
+/// counter-clockwise as seen from the fluid.
 pub(super) struct Cases {
     triangles: Vec<[u8; 3]>,
     first: [usize; 257],
@@ -44,7 +47,7 @@ impl Cases {
         let mut first = [0; 257];
         for inside in 0..=255_u8 {
             if !needs_values(inside) {
-                // of no consequence here
+                // no face of such a case is ambiguous
                 let polygons = loops(inside, [Ambiguous::JoinSolid; FACES]);
                 let without_face_diagonals = polygons.iter().map(|polygon| triangulate(polygon));
                 triangles
@@ -55,15 +58,16 @@ impl Cases {
         Self { triangles, first }
     }
 
-    /// Triangles of a cell; bit c of `inside` tells that corner c has ω > 0. None for those that need values.
+    /// The triangles of a cell; bit c of `inside` is set if corner c has ω > 0. Empty for cells that
+    /// need values.
     pub(super) fn triangles(&self, inside: u8) -> &[[u8; 3]] {
         let case = usize::from(inside);
         &self.triangles[self.first[case]..self.first[case + 1]]
     }
 }
 
-/// Whether the signs leave a choice: on a face, or between two corners that are alike and opposite in the cell, which a
-/// tunnel may join.
+/// Whether the signs leave a choice: on a face, or between two like corners opposite one another in the cell,
+/// which a tunnel may join.
 pub(super) fn needs_values(inside: u8) -> bool {
     let is_inside = |corner: usize| inside >> corner & 1 == 1;
     let ambiguous = |face: usize| {
@@ -78,29 +82,29 @@ pub(super) fn needs_values(inside: u8) -> bool {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tunnel {
     pub loops: [usize; 2],
-    /// Corners of the line in the cell [0, 1]³.
+    /// The corners of that line in the cell [0, 1]³.
     pub waist: [[f64; 3]; 6],
 }
 
-/// Where a vertex within the cell belongs, before it is put on the surface.
+/// The position of a vertex within the cell, before it is put on the surface.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Inner {
+pub(super) enum InnerVertex {
     /// In the middle of the vertices on these edges.
     Amidst(Vec<usize>),
     /// At a point of the cell [0, 1]³.
     At([f64; 3]),
 }
 
-/// Triangles of one cell whose corners' values had to be asked.
+/// The triangles of a cell for which the values at its corners were needed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Patch {
-    /// Edges of the cell, and from [`EDGES`] on inner vertices.
+pub(super) struct CellTriangles {
+    /// Corners are edges of the cell, and from [`EDGES`] on inner vertices.
     pub triangles: Vec<[u8; 3]>,
-    pub inner: Vec<Inner>,
+    pub inner: Vec<InnerVertex>,
 }
 
-impl Patch {
-    /// Discs for all loops but the two that bound a tunnel.
+impl CellTriangles {
+    /// A disc for each loop, except for the two that bound a tunnel.
     pub(super) fn new(loops: &[Vec<usize>], tunnel: Option<Tunnel>) -> Self {
         let mut patch = Self { triangles: Vec::new(), inner: Vec::new() };
         for (number, polygon) in loops.iter().enumerate() {
@@ -115,7 +119,7 @@ impl Patch {
         patch
     }
 
-    /// A disc without inner vertices, or else a fan around one.
+    /// Adds a disc without inner vertices, or else a fan around one.
     fn add_disc(&mut self, polygon: &[usize]) {
         match triangulate(polygon) {
             Some(triangles) => self.triangles.extend(triangles),
@@ -123,12 +127,12 @@ impl Patch {
                 let centre = (EDGES + self.inner.len()) as u8;
                 let next = polygon.iter().cycle().skip(1);
                 self.triangles.extend(polygon.iter().zip(next).map(|(&a, &b)| [a as u8, b as u8, centre]));
-                self.inner.push(Inner::Amidst(polygon.to_vec()));
+                self.inner.push(InnerVertex::Amidst(polygon.to_vec()));
             }
         }
     }
 
-    /// A tube between two loops, or else one from either loop to the waist.
+    /// Adds a tube between two loops, or else a tube from each loop to the waist.
     fn add_tunnel(&mut self, a: &[usize], b: &[usize], waist: &[[f64; 3]; 6]) {
         let first = EDGES + self.inner.len();
         let place = |v: usize| if v < EDGES { midpoint(v) } else { waist[v - first] };
@@ -136,7 +140,8 @@ impl Patch {
             self.triangles.extend(triangles);
             return;
         }
-        // no cross edge to the waist lies in a face, so both tubes exist; of its two directions the shorter tubes' one
+        // no cross edge to the waist lies in a face, so both tubes exist; the waist runs in the direction
+        // that makes them shorter
         let ring: Vec<usize> = (first..first + waist.len()).collect();
         let back: Vec<usize> = ring.iter().rev().copied().collect();
         let tubes = [(&ring, &back), (&back, &ring)].into_iter().filter_map(|(one, other)| {
@@ -144,13 +149,13 @@ impl Patch {
             Some((one.0 + other.0, [one.1, other.1]))
         });
         if let Some((_, both)) = tubes.min_by_key(|(cost, _)| *cost) {
-            self.inner.extend(waist.map(Inner::At));
+            self.inner.extend(waist.map(InnerVertex::At));
             self.triangles.extend(both.into_iter().flatten());
         }
     }
 }
 
-/// Axis of an edge, and its low corner.
+/// The axis of an edge, and its low corner.
 pub(super) const fn edge(e: usize) -> (usize, usize) {
     let axis = e / 4;
     (axis, (e & 1) << ((axis + 1) % 3) | (e >> 1 & 1) << ((axis + 2) % 3))
@@ -163,7 +168,7 @@ pub(super) fn edge_between(a: usize, b: usize) -> usize {
     4 * axis + (low >> ((axis + 1) % 3) & 1) + 2 * (low >> ((axis + 2) % 3) & 1)
 }
 
-/// Corners of a face, counter-clockwise seen from outside the cell.
+/// The corners of a face, counter-clockwise as seen from outside the cell.
 pub(super) fn face_corners(face: usize) -> [usize; 4] {
     let (axis, side) = (face / 2, face % 2);
     let corner = |u: usize, v: usize| side << axis | u << ((axis + 1) % 3) | v << ((axis + 2) % 3);
@@ -174,8 +179,8 @@ pub(super) fn face_corners(face: usize) -> [usize; 4] {
     }
 }
 
-/// Segments on one face, each from the edge where a walk around the face enters the solid to the one where it
-/// leaves it: so directed, the loops turn counter-clockwise seen from the fluid.
+/// The segments on one face. Each leads from the edge where a walk around the face enters the solid to the
+/// edge where it leaves it. The loops then turn counter-clockwise as seen from the fluid.
 fn face_segments(inside: u8, face: usize, ambiguous: Ambiguous) -> Vec<(usize, usize)> {
     let corners = face_corners(face);
     let is_inside = |i: usize| inside >> corners[i % 4] & 1 == 1;
@@ -189,7 +194,7 @@ fn face_segments(inside: u8, face: usize, ambiguous: Ambiguous) -> Vec<(usize, u
     pairs.map(|(enter, leave)| (edge_after(enter), edge_after(leave))).collect()
 }
 
-/// Closed loops of crossed edges, given the decision for each face.
+/// The closed loops of crossed edges, for given decisions about the faces.
 pub(super) fn loops(inside: u8, ambiguous: [Ambiguous; FACES]) -> Vec<Vec<usize>> {
     let mut next = [None; EDGES];
     for (face, decision) in ambiguous.into_iter().enumerate() {
@@ -212,7 +217,7 @@ pub(super) fn loops(inside: u8, ambiguous: [Ambiguous; FACES]) -> Vec<Vec<usize>
     found
 }
 
-/// True if both edges border one face of the cell.
+/// Whether both edges border one face of the cell.
 fn share_a_face(a: usize, b: usize) -> bool {
     (0..6).any(|face| {
         let corners = face_corners(face);
@@ -233,10 +238,11 @@ fn midpoint_distance(a: usize, b: usize) -> u32 {
     (0..3).map(|i| (4.0 * (p[i] - q[i]).powi(2)) as u32).sum()
 }
 
-/// The triangulation of a loop with the shortest diagonals, none of them in a face; `None` if there is none.
+/// The triangulation of a loop with the shortest diagonals, none of which lies in a face. `None` if there is
+/// no such triangulation.
 ///
-/// Dynamic programming over chains i..=j of the loop: `best[i][j]` is the least cost of the polygon which the
-/// chain and its closing diagonal bound, with the corner that makes the triangle at that diagonal.
+/// This is dynamic programming over chains i..=j of the loop. `best[i][j]` is the least cost of the polygon
+/// between the chain and its closing diagonal, with the corner of the triangle at that diagonal.
 fn triangulate(polygon: &[usize]) -> Option<Vec<[u8; 3]>> {
     let n = polygon.len();
     let diagonal_cost = |i: usize, j: usize| match (j - i == 1 || j - i == n - 1, polygon[i], polygon[j]) {
@@ -266,11 +272,12 @@ fn triangulate(polygon: &[usize]) -> Option<Vec<[u8; 3]>> {
     Some(triangles)
 }
 
-/// The tube with the shortest cross edges, none of them in a face, between two loops that run around it in opposite
-/// directions, and its cost; `None` if there is none. Vertices from [`EDGES`] on lie within the cell.
+/// The tube between two loops that run around it in opposite directions, with the shortest cross edges, none
+/// of which lies in a face; and its cost. `None` if there is no such tube. Vertices from [`EDGES`] on lie
+/// within the cell.
 ///
-/// A tube is a walk around both loops at once: from the cross edge at (i, j), corner i of `a` and corner j of the
-/// reversed `b`, a triangle leads to (i + 1, j) or to (i, j + 1).
+/// A tube is a walk around both loops at once. The cross edge at (i, j) joins corner i of `a` to corner j of
+/// the reversed `b`, and a triangle leads from there to (i + 1, j) or to (i, j + 1).
 pub(super) fn tube(
     a: &[usize],
     b: &[usize],
@@ -303,9 +310,10 @@ pub(super) fn tube(
     Some((cost, triangles))
 }
 
-/// The cheapest walk from (0, 0) once around both loops, as steps along `a` or not, with its cost. It begins with a step
-/// along `a` and ends with one along `b`, as every tube does from one of its cross edges; and it turns more than once,
-/// for all the way around one loop at a single corner of the other would meet that cross edge twice.
+/// The cheapest walk from (0, 0) once around both loops, with its cost. A step is `true` if it goes along
+/// `a`. The walk begins with a step along `a` and ends with one along `b`, as every tube does from one of its
+/// cross edges. It turns more than once: a walk that went all around one loop at a single corner of the other
+/// would meet that cross edge twice.
 fn shortest_walk(
     a: &[usize],
     b: &[usize],
@@ -313,7 +321,8 @@ fn shortest_walk(
 ) -> Option<(u32, Vec<bool>)> {
     let (m, n) = (a.len(), b.len());
     cost(a[0], b[0])?;
-    // least cost to (i, j) in the first run along a, in the first along b, and later; with the step there and from where
+    // least cost to (i, j) in the first run along a, in the first run along b, and later, with the last step
+    // and the run it came from
     let mut best = vec![vec![[None::<(u32, bool, usize)>; 3]; n + 1]; m + 1];
     best[0][0][0] = Some((0, true, 0));
     for i in 1..=m {
@@ -365,7 +374,7 @@ mod tests {
         }
     }
 
-    /// All decisions about faces that matter for a case: those on faces that are not ambiguous are left alone.
+    /// All decisions about the ambiguous faces of a case. Those about other faces do not vary.
     fn choices(inside: u8) -> impl Iterator<Item = [Ambiguous; FACES]> {
         let is_inside = move |corner: usize| inside >> corner & 1 == 1;
         let is_ambiguous = move |face: usize| {
@@ -380,9 +389,9 @@ mod tests {
         })
     }
 
-    /// The border of a cell's triangles must be the face segments, each once, in their direction: that, and
-    /// segments agreeing between neighbours, makes any mesh closed and each of its edges shared by two. Within the cell
-    /// too each side must have one partner.
+    /// The border of a cell's triangles must be the face segments, each once, in their direction. Because
+    /// neighbours agree about segments, any mesh is then closed and each of its edges is shared by two
+    /// triangles. Within the cell, too, each side must have one partner.
     #[track_caller]
     fn check_triangles(inside: u8, faces: [Ambiguous; FACES], triangles: &[[u8; 3]]) {
         let side = |t: &[u8; 3], i: usize| (usize::from(t[i]), usize::from(t[(i + 1) % 3]));
@@ -430,7 +439,7 @@ mod tests {
         for inside in 0..=255_u8 {
             for faces in choices(inside) {
                 let polygons = loops(inside, faces);
-                let patch = Patch::new(&polygons, None);
+                let patch = CellTriangles::new(&polygons, None);
                 check_triangles(inside, faces, &patch.triangles);
                 assert_eq!(euler(&patch.triangles), polygons.len() as i32);
                 assert!(
@@ -451,7 +460,7 @@ mod tests {
             [0.4, 0.4, 0.6],
             [0.6, 0.4, 0.6],
         ];
-        // one far from both loops as well
+        // the second is far from both loops
         let waists = [waist, waist.map(|p| p.map(|c| 0.01 * c))];
         let (mut direct, mut at_waist) = (0, 0);
         for inside in 0..=255_u8 {
@@ -459,10 +468,10 @@ mod tests {
                 let polygons = loops(inside, faces);
                 for (a, b) in (0..polygons.len()).flat_map(|b| (0..b).map(move |a| (a, b))) {
                     let (loops, choice) = ([a, b], usize::from(inside) % 2);
-                    let patch = Patch::new(&polygons, Some(Tunnel { loops, waist: waists[choice] }));
+                    let patch = CellTriangles::new(&polygons, Some(Tunnel { loops, waist: waists[choice] }));
                     check_triangles(inside, faces, &patch.triangles);
                     assert_eq!(euler(&patch.triangles), polygons.len() as i32 - 2);
-                    let ring = patch.inner.iter().any(|inner| matches!(inner, Inner::At(_)));
+                    let ring = patch.inner.iter().any(|inner| matches!(inner, InnerVertex::At(_)));
                     *(if ring { &mut at_waist } else { &mut direct }) += 1;
                 }
             }
@@ -474,7 +483,7 @@ mod tests {
     fn neighbours_put_the_same_segments_on_their_common_face() {
         for axis in 0..3 {
             for corners in 0..16_u8 {
-                // The same four corners as the high face of one cell and the low face of the next.
+                // the same four corners as the high face of one cell and as the low face of the next
                 let place = |side: usize| -> u8 {
                     (0..4).filter(|i| corners >> i & 1 == 1).fold(0, |mask, i| {
                         mask | 1

@@ -1,4 +1,4 @@
-//! What a mesh is worth: its topology, its size, and how far its vertices are from the field's surface.
+//! Findings about a mesh: its topology, its size, and how far its vertices are from the field's surface.
 //!
 //! Invariant: nothing here relies on how the mesh was made; any mesh over any field can be checked.
 
@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     Mesh,
-    normals::{Gradients, unit},
+    normals::{GradientColumns, unit},
     shells::{Roots, shells},
 };
 use crate::field::Field;
@@ -15,40 +15,42 @@ use crate::field::Field;
 /// The findings about a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
+    /// The number of vertices.
     pub vertices: usize,
+    /// The number of triangles.
     pub triangles: usize,
-    /// Every edge is run along equally often in both directions: the mesh has no border.
+    /// True if triangles run along every edge equally often in both directions: the mesh has no border.
     pub closed: bool,
-    /// Every edge lies in exactly two triangles, which run along it in opposite directions, and the triangles
-    /// around every vertex form one fan.
+    /// True if every edge lies in exactly two triangles, which run along it in opposite directions, and the
+    /// triangles around every vertex form one fan.
     pub manifold: bool,
-    /// Connected parts of the mesh, cavities included.
+    /// The number of connected parts of the mesh, with the walls of cavities.
     pub components: usize,
-    /// Connected solids: parts whose volume is positive. Walls of cavities are negative.
+    /// The number of connected parts with a positive volume. Walls of cavities have a negative one.
     pub solids: usize,
-    /// Signed volume of each part, in the order of their first vertices, in cubic metres.
+    /// The signed volume of each part in m³, in the order of their first vertices.
     pub component_volumes: Vec<f64>,
-    /// Vertices − edges + triangles.
+    /// The Euler characteristic: vertices that triangles use − edges + triangles.
     pub euler: i64,
-    /// Triangles of which two vertices coincide.
+    /// The number of triangles with two vertices at one point.
     pub degenerate: usize,
-    /// Cubic metres.
+    /// The volume in m³, less that of cavities.
     pub volume: f64,
-    /// Square metres.
+    /// The area in m².
     pub area: f64,
-    /// Largest distance of a vertex from ω = 0, cap vertices left out, in metres. Infinite where it cannot be
-    /// told.
+    /// The largest distance of a vertex from ω = 0 in metres, cap vertices left out. Infinite if it could not
+    /// be found for some vertex.
     pub max_distance: f64,
-    /// Root of the mean squared distance.
+    /// The root of the mean squared distance in metres, cap vertices left out.
     pub rms_distance: f64,
-    /// Evaluations of ω that making the mesh took.
+    /// The number of evaluations of ω that it took to make the mesh.
     pub evaluations: u64,
 }
 
-/// Examines a mesh of the surface of `field`.
+/// Examines a mesh of the surface of `field`. The field is used for distances only.
 pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
     let shells = shells(mesh);
-    let edges = Edges::of(mesh);
+    let edges = EdgeFindings::of(mesh);
     let used: usize = shells.iter().map(|shell| shell.vertices).sum();
     let (max_distance, rms_distance) = distances(mesh, field);
     let coincide = |t: &[u32; 3]| {
@@ -65,7 +67,7 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
         component_volumes: shells.iter().map(|shell| shell.volume).collect(),
         euler: used as i64 - edges.count as i64 + mesh.triangles.len() as i64,
         degenerate: mesh.triangles.iter().filter(|t| coincide(t)).count(),
-        volume: shells.iter().fold(0.0, |sum, shell| sum + shell.volume), // `sum` of nothing is −0
+        volume: shells.iter().fold(0.0, |sum, shell| sum + shell.volume), // `sum` of an empty iterator is −0
         area: shells.iter().fold(0.0, |sum, shell| sum + shell.area),
         max_distance,
         rms_distance,
@@ -73,32 +75,33 @@ pub fn check(mesh: &Mesh, field: &dyn Field) -> Report {
     }
 }
 
-/// Whether a mesh is closed and manifold, see [`Report`].
+/// Whether a mesh is closed and manifold, as [`Report`] defines it.
 pub fn is_closed_manifold(mesh: &Mesh) -> bool {
-    let edges = Edges::of(mesh);
+    let edges = EdgeFindings::of(mesh);
     let used: usize = shells(mesh).iter().map(|shell| shell.vertices).sum();
     edges.closed && edges.two_sided && edges.fans == used
 }
 
 /// Findings about a mesh's edges.
-struct Edges {
+struct EdgeFindings {
     count: usize,
     closed: bool,
     two_sided: bool,
-    /// Fans of triangles around vertices, joined across edges; as many as vertices on a manifold.
+    /// The number of fans of triangles around vertices, joined across edges. A manifold has as many
+    /// as vertices.
     fans: usize,
 }
 
-/// One triangle's side: its ends in ascending order, whether the triangle runs up along it, and its corner
-/// (3·triangle + place) at the lower and at the higher end.
+/// A side of a triangle: its ends in ascending order, whether the triangle runs up along it, and the corners
+/// (3·triangle + place) of the triangle at the lower and at the higher end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+struct TriangleSide {
     ends: (u32, u32),
     runs_up: bool,
     corners: [u32; 2],
 }
 
-impl Edges {
+impl EdgeFindings {
     fn of(mesh: &Mesh) -> Self {
         let side = |triangle: usize, place: usize| {
             let (from, to) = (mesh.triangles[triangle][place], mesh.triangles[triangle][(place + 1) % 3]);
@@ -106,9 +109,9 @@ impl Edges {
             let runs_up = from < to;
             let (ends, corners) =
                 if runs_up { ((from, to), corners) } else { ((to, from), [corners[1], corners[0]]) };
-            Side { ends, runs_up, corners }
+            TriangleSide { ends, runs_up, corners }
         };
-        let mut sides: Vec<Side> =
+        let mut sides: Vec<TriangleSide> =
             (0..mesh.triangles.len()).flat_map(|t| (0..3).map(move |place| side(t, place))).collect();
         sides.par_sort_unstable();
 
@@ -132,7 +135,7 @@ impl Edges {
 /// Vertices projected together.
 const BATCH: usize = 1024;
 
-/// Largest and root-mean-square distance of the vertices, caps left out.
+/// The largest and the root-mean-square distance of the vertices, caps left out.
 fn distances(mesh: &Mesh, field: &dyn Field) -> (f64, f64) {
     let mut is_cap = vec![false; mesh.positions.len()];
     mesh.caps.iter().for_each(|&v| is_cap[v as usize] = true);
@@ -149,15 +152,15 @@ fn distances(mesh: &Mesh, field: &dyn Field) -> (f64, f64) {
     (max, (sum / on_surface.len().max(1) as f64).sqrt())
 }
 
-/// Newton steps; where ω is smooth two are enough, a double root gains one bit with each.
+/// Newton steps at most. Two are enough where ω is smooth; a double root gains one bit with each.
 const NEWTON_STEPS: usize = 8;
 
-/// Distance of each point from ω = 0: the way that Newton's method along ∇ω takes to the surface, or the
-/// distance within which ω changes sign if that is shorter or Newton's method gets nowhere.
+/// The distance of each point from ω = 0: the way that Newton's method along ∇ω takes to the surface. The
+/// distance within which ω changes sign is taken if it is shorter, or if Newton's method does not converge.
 fn project(field: &dyn Field, points: &[DVec3]) -> Vec<f64> {
     let mut at = points.to_vec();
     let mut directions = vec![DVec3::ZERO; points.len()];
-    let mut gradients = Gradients::default();
+    let mut gradients = GradientColumns::default();
     for step in 0..NEWTON_STEPS {
         let mut moved = false;
         let found: Vec<(f64, DVec3)> = gradients.at(field, &at).collect();
@@ -196,9 +199,9 @@ fn rounding(p: DVec3) -> f64 {
     f64::EPSILON * p.abs().max_element()
 }
 
-/// The least radius, up to a factor of two, at which ω has both signs on the axes and the gradient's line
-/// around a point: a bound for the distance that holds for flat and kinked fields too. Infinite if there is no
-/// change of sign within the size of the point's coordinates.
+/// The least radius, up to a factor of two, at which ω has both signs on the axes and on the gradient's line
+/// through a point. This bound for the distance holds for flat and kinked fields too. It is infinite if there
+/// is no change of sign within the size of the point's coordinates.
 fn sign_change_distance(field: &dyn Field, p: DVec3, direction: DVec3) -> f64 {
     let mut radius = rounding(p);
     for _ in 0..52 {
@@ -239,7 +242,7 @@ mod tests {
         let found = report(&tetrahedron(DVec3::splat(1e6)));
         assert!(found.closed && found.manifold);
         assert_eq!((found.euler, found.components, found.solids), (2, 1, 1));
-        // Coordinates near 1e6 are rounded to 1e-10.
+        // coordinates near 1e6 are rounded to 1e-10
         assert!((found.volume - 1.0 / 6.0).abs() < 1e-9, "{}", found.volume);
         assert!((found.area - (1.5 + 0.75_f64.sqrt())).abs() < 1e-9, "{}", found.area);
     }
@@ -260,7 +263,7 @@ mod tests {
 
     #[test]
     fn edges_of_four_triangles_and_pinched_vertices_are_not_manifold() {
-        // A second tetrahedron shares vertex 0, or the edge 0–1, with the first.
+        // a second tetrahedron shares vertex 0, or the edge 0–1, with the first
         for (shared, translate) in [(1, [0, 4, 5, 6]), (2, [0, 1, 4, 5])] {
             let mut mesh = tetrahedron(DVec3::ZERO);
             mesh.positions.extend((shared..4).map(|i| DVec3::splat(-(i as f64))));
@@ -284,7 +287,8 @@ mod tests {
         };
         let plain = wall_at_one(|s| 50.0 * s, |_| 50.0);
         assert!((plain - 1e-3).abs() < 1e-12, "{plain}");
-        // A triple root: Newton's steps shrink by a third; the change of sign is found within a factor of two.
+        // triple root: Newton's steps shrink by a third, and the change of sign is found within a factor
+        // of two
         let flat = wall_at_one(|s| s.powi(3), |s| 3.0 * s * s);
         assert!((1e-3..=2e-3).contains(&flat) || (flat - 1e-3).abs() < 1e-4, "{flat}");
         let kinked = wall_at_one(|s| s.min(100.0 * s), |s| if s > 0.0 { 1.0 } else { 100.0 });

@@ -1,10 +1,12 @@
-//! Merges vertices that coincide in a node of the grid, so that no triangle has zero area where that can be had.
+//! Merges vertices that coincide in a node of the grid, so that no triangle has zero area where that can
+//! be avoided.
 //!
-//! Where ω = 0 in a node, all roots on the edges around it fall onto the node; where a solid leaves the grid
-//! across an edge of its box, two or three cap vertices do. Sheets that only touch in the node stay apart.
+//! Where ω = 0 in a node, all roots on the edges around it fall onto the node. Where a solid leaves the grid
+//! across an edge of its box, two or three cap vertices fall onto a node. Sheets that only touch in the node
+//! stay apart.
 //!
 //! Invariant: each step contracts one edge of zero length under the link condition (its ends have exactly two
-//! common neighbours), which keeps the mesh closed, manifold and of the same topology; or it removes a whole
+//! common neighbours), which keeps the mesh closed, manifold and of the same topology. Or it removes a whole
 //! component that has shrunk into the node.
 
 use std::collections::BTreeMap;
@@ -16,13 +18,13 @@ use super::Mesh;
 /// A vertex that lies exactly on a node of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct AtNode {
-    /// The node's number, see `Lattice::key`.
+    /// The number of the node, see `Lattice::key`.
     pub node: u64,
     pub vertex: u32,
 }
 
-/// Contracts the edges of zero length among the listed vertices and drops what vanishes. Tells which of the vertices
-/// were lost, if any.
+/// Contracts the edges of zero length among the listed vertices and drops what vanishes. Returns which
+/// vertices of the mesh were lost; `None` if none could be.
 pub(super) fn merge_coincident(mesh: &mut Mesh, mut at_nodes: Vec<AtNode>) -> Option<Vec<bool>> {
     at_nodes.par_sort_unstable();
     let groups: Vec<&[AtNode]> =
@@ -48,9 +50,9 @@ pub(super) fn merge_coincident(mesh: &mut Mesh, mut at_nodes: Vec<AtNode>) -> Op
 pub(super) struct Fans<'a> {
     pub mesh: &'a mut Mesh,
     fans: BTreeMap<u32, Vec<u32>>,
-    /// Triangles that are gone.
+    /// Whether a triangle is gone.
     pub is_dead: Vec<bool>,
-    /// Vertices that are gone.
+    /// Whether a vertex is gone.
     pub is_lost: Vec<bool>,
 }
 
@@ -68,13 +70,13 @@ impl<'a> Fans<'a> {
         Self { mesh, fans, is_dead, is_lost }
     }
 
-    /// Living triangles around a vertex.
+    /// The triangles around a vertex that are not gone.
     pub(super) fn fan(&self, v: u32) -> impl Iterator<Item = u32> {
         let listed = self.fans.get(&v).map_or(&[][..], Vec::as_slice);
         listed.iter().copied().filter(|&t| !self.is_dead[t as usize])
     }
 
-    /// Vertices joined to `v` by an edge, ascending.
+    /// The vertices joined to `v` by an edge, ascending.
     pub(super) fn neighbours(&self, v: u32) -> Vec<u32> {
         let mut found: Vec<u32> =
             self.fan(v).flat_map(|t| self.mesh.triangles[t as usize]).filter(|&u| u != v).collect();
@@ -83,8 +85,8 @@ impl<'a> Fans<'a> {
         found
     }
 
-    /// A pair (kept, lost) of the vertices whose edge may be contracted. A vertex on ω = 0 is kept rather than
-    /// one of a cap.
+    /// A pair (kept, lost) of the vertices whose edge may be contracted. `None` if there is none. Of a vertex
+    /// on ω = 0 and one of a cap, the first is kept.
     fn contractible(&self, vertices: &[u32]) -> Option<(u32, u32)> {
         for (i, &a) in vertices.iter().enumerate() {
             let around = self.neighbours(a);
@@ -98,7 +100,8 @@ impl<'a> Fans<'a> {
         None
     }
 
-    /// True if contracting the edge keeps the topology: two common neighbours, and not a tetrahedron.
+    /// Whether contracting the edge keeps the topology: its ends have two common neighbours, and the mesh
+    /// there is not a tetrahedron.
     pub(super) fn meets_link_condition(&self, b: u32, around_a: &[u32]) -> bool {
         let around_b = self.neighbours(b);
         let common = around_b.iter().filter(|v| around_a.binary_search(v).is_ok()).count();

@@ -1,10 +1,10 @@
-//! Where the surface crosses the grid's edges: what marching cubes and dual contouring both begin with.
+//! Where the surface crosses the grid's edges. Marching cubes and dual contouring both begin with this.
 //!
-//! Bricks that may hold the surface are found by ranges → signs at their nodes → crossed edges, which are numbered
-//! brick by brick → a point of ω = 0 on each, with its normal.
+//! Ranges find the bricks that may hold the surface. Signs at their nodes show the crossed edges, which are
+//! numbered brick by brick. A root search puts a point of ω = 0 on each.
 //!
-//! Invariant: bricks and tasks depend on the grid and the field alone, never on the number of threads, and numbers
-//! follow the order of bricks.
+//! Invariant: bricks and tasks depend on the grid and the field alone, never on the number of threads, and
+//! numbers follow the order of bricks.
 
 use std::{
     ops::Range,
@@ -18,25 +18,25 @@ use super::{
     MeshError,
     collapse::AtNode,
     prune::{Bricks, Lattice},
-    roots::{Edges, RootFinder},
-    signs::{Around, Brick, Samples, Signs},
+    roots::{AxisEdges, RootFinder},
+    signs::{Around, Brick, SignSampler, Signs},
 };
 use crate::field::Field;
 
-/// Near bricks in a task: some thousand vertices, whose coordinates stay in the nearer caches.
+/// Near bricks in a task. They have some thousand vertices, whose coordinates stay in the nearer caches.
 pub(super) const BRICKS_PER_TASK: usize = 16;
 
-/// A part of the work, for who waits for it.
-pub(super) struct Stage<'a> {
+/// A part of the work, and the progress that it reports.
+pub(super) struct ProgressPart<'a> {
     tasks: usize,
     done: AtomicUsize,
-    /// The shares done before it and after it.
+    /// The shares of all work that are done before this part and after it.
     shares: Range<f64>,
     progress: &'a (dyn Fn(f64) + Sync),
 }
 
-impl<'a> Stage<'a> {
-    /// A part in which [`Self::advance`] will be called `tasks` times.
+impl<'a> ProgressPart<'a> {
+    /// A part of the work in which [`Self::advance`] will be called `tasks` times.
     pub(super) fn new(tasks: usize, shares: Range<f64>, progress: &'a (dyn Fn(f64) + Sync)) -> Self {
         Self { tasks, done: AtomicUsize::new(0), shares, progress }
     }
@@ -48,8 +48,8 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Samples the signs at the nodes of all near bricks; adds to the number of evaluations, and calls `advance` after each
-/// task.
+/// Samples the signs at the nodes of all near bricks. Adds to the number of evaluations and calls `advance`
+/// after each task.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] at the first NaN.
@@ -63,7 +63,7 @@ pub(super) fn sample(
     let mut signs = vec![Signs::default(); bricks.near.len()];
     let tasks = signs.par_chunks_mut(BRICKS_PER_TASK).zip(bricks.near.par_chunks(BRICKS_PER_TASK));
     let counts: Vec<Result<u64, MeshError>> = tasks
-        .map_init(Samples::default, |samples, (signs, bricks)| {
+        .map_init(SignSampler::default, |samples, (signs, bricks)| {
             let mut count = 0;
             for (signs, brick) in signs.iter_mut().zip(bricks) {
                 *signs = samples.take(field, lattice, brick, &mut count)?;
@@ -78,19 +78,19 @@ pub(super) fn sample(
     Ok(signs)
 }
 
-/// The crossed bricks of a task, in order, and what a method keeps for each.
+/// The crossed bricks of a task, in order, and what a meshing method keeps for each.
 pub(super) struct Task<T> {
     pub bricks: Vec<Brick>,
     pub kept: Vec<T>,
-    /// The number of the first vertex, and how many there are.
+    /// The number of the first vertex, and the number of vertices.
     pub first: usize,
     pub vertices: usize,
 }
 
-/// All bricks with crossed cells, by the tasks in which they were found.
+/// All bricks with crossed cells, grouped by the tasks that found them.
 pub(super) struct Crossed<T> {
     pub tasks: Vec<Task<T>>,
-    /// For each near brick its place in its task, or [`Self::NONE`].
+    /// For each near brick its place among the bricks of its task, or [`Self::NONE`].
     places: Vec<u8>,
     pub vertices: usize,
 }
@@ -98,8 +98,8 @@ pub(super) struct Crossed<T> {
 impl<T: Send> Crossed<T> {
     const NONE: u8 = u8::MAX;
 
-    /// Finds the crossed edges of all near bricks and numbers their vertices. `look` is asked what to keep of each crossed
-    /// brick, and may add inner vertices to it.
+    /// Finds the crossed edges of all near bricks and numbers their vertices. `look` gives what to keep of
+    /// each crossed brick, and may add inner vertices to the brick.
     pub(super) fn number(
         near: &Bricks,
         signs: &[Signs],
@@ -128,7 +128,8 @@ impl<T: Send> Crossed<T> {
         for task in &mut tasks {
             task.first = vertices;
             for brick in &mut task.bricks {
-                brick.first = vertices as u32; // too many are refused before the numbers are used
+                // wraps only if there are too many vertices, which is an error before the numbers are used
+                brick.first = vertices as u32;
                 vertices += brick.vertices();
             }
         }
@@ -137,7 +138,7 @@ impl<T: Send> Crossed<T> {
 }
 
 impl<T> Crossed<T> {
-    /// A near brick by its number, if it is crossed.
+    /// The near brick of a number; `None` if it is not crossed.
     pub(super) fn get(&self, number: u32) -> Option<&Brick> {
         let number = number as usize;
         self.tasks[number / BRICKS_PER_TASK].bricks.get(usize::from(self.places[number]))
@@ -153,11 +154,11 @@ pub(super) fn parts<X>(mut whole: &mut [X], lengths: impl Iterator<Item = usize>
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cap {
     pub vertex: u32,
-    /// Along that edge.
+    /// The unit vector along that edge, out of the grid.
     pub outward: DVec3,
 }
 
-/// What the edges of a task tell besides the places of their vertices.
+/// What the edges of a task give besides the positions of their vertices.
 #[derive(Debug, Default)]
 pub(super) struct OnEdges {
     /// Ascending.
@@ -170,16 +171,16 @@ pub(super) struct OnEdges {
 #[derive(Default)]
 pub(super) struct EdgeScratch {
     /// Crossed edges by axis, without those that leave the grid.
-    edges: [Edges; 3],
-    /// For each of them its vertex and its low end.
+    edges: [AxisEdges; 3],
+    /// For each of these edges its vertex and its low end.
     ends: [Vec<(u32, [usize; 3])>; 3],
     roots: Vec<f64>,
     finder: RootFinder,
 }
 
 impl<T> Task<T> {
-    /// Puts a vertex on each crossed edge: at ω = 0, or at the border if the edge leaves the grid. `positions` are those
-    /// of the task's vertices; inner ones are left alone.
+    /// Puts a vertex on each crossed edge: at ω = 0, or at the border if the edge leaves the grid.
+    /// `positions` are those of the task's vertices. The positions of inner vertices are not changed.
     ///
     /// # Errors
     /// [`MeshError::NotANumber`] at the first NaN.
@@ -191,7 +192,7 @@ impl<T> Task<T> {
         scratch: &mut EdgeScratch,
     ) -> Result<OnEdges, MeshError> {
         let EdgeScratch { edges, ends, roots, finder } = scratch;
-        edges.iter_mut().for_each(Edges::clear);
+        edges.iter_mut().for_each(AxisEdges::clear);
         ends.iter_mut().for_each(Vec::clear);
         let mut found = OnEdges::default();
         let first = self.first as u32;
@@ -204,7 +205,7 @@ impl<T> Task<T> {
                 let position = lattice.position(low);
                 let leaves_below = lattice.is_ring(axis, low[axis]);
                 if leaves_below || lattice.is_ring(axis, high[axis]) {
-                    // the end in the grid
+                    // the end that lies in the grid
                     let node = lattice.key(if leaves_below { high } else { low });
                     let outward = if leaves_below { -DVec3::AXES[axis] } else { DVec3::AXES[axis] };
                     positions[(vertex - first) as usize] = position;
@@ -228,7 +229,7 @@ impl<T> Task<T> {
                 position[axis] = root;
                 position[(axis + 1) % 3] = edges.across[0][i];
                 position[(axis + 2) % 3] = edges.across[1][i];
-                // a root may have met either end
+                // a root may lie on either end
                 let mut node = low;
                 node[axis] += usize::from(root == edges.high[i]);
                 if root == edges.low[i] || root == edges.high[i] {

@@ -1,11 +1,11 @@
 //! Marching cubes: from signs at the nodes to triangles whose vertices lie on ω = 0.
 //!
-//! Bricks that may hold the surface are worked on in parallel, three times: signs at their nodes → crossed edges and the
-//! cells that need values, whose vertices and triangles are numbered → vertices, normals and triangles, written to where
-//! their numbers say.
+//! Bricks that may hold the surface are worked on in parallel, three times. First come the signs at their
+//! nodes; then the crossed edges and the cells that need values, whose vertices and triangles are numbered;
+//! then the vertices, normals and triangles, which are written to the places that their numbers say.
 //!
-//! Invariant: bricks and tasks depend on the grid and the field alone, never on the number of threads; each task writes
-//! to its own part of the mesh.
+//! Invariant: bricks and tasks depend on the grid and the field alone, never on the number of threads; each
+//! task writes to its own part of the mesh.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,8 +14,8 @@ use super::{
     Grid, Mesh, MeshError,
     cases::{CASES, EDGES},
     collapse,
-    crossings::{self, BRICKS_PER_TASK, Crossed, EdgeScratch, OnEdges, Stage, Task},
-    normals::{self, Gradients},
+    crossings::{self, BRICKS_PER_TASK, Crossed, EdgeScratch, OnEdges, ProgressPart, Task},
+    normals::{self, GradientColumns},
     patches::{self, CellPatch},
     prune::{BRICK, Bricks, Lattice},
     signs::{
@@ -25,11 +25,12 @@ use super::{
 };
 use crate::field::Field;
 
-/// The surface ω = 0 of a field as a closed mesh; empty if no node of the grid lies inside.
+/// The surface ω = 0 of a field as a closed mesh. It is empty if no node of the grid lies inside.
 ///
-/// Inside is strictly ω > 0; everything outside the grid counts as outside, so a solid cut by the border is
+/// Inside is strictly ω > 0. Everything outside the grid counts as outside, so a solid cut by the border is
 /// closed by faces on it (see [`Mesh::caps`]). `progress` is called from any thread with the share of tasks
-/// done, in (0, 1], not always in ascending order.
+/// done, in (0, 1], not always in ascending order. Source: W. Lorensen, H. Cline, Marching cubes, SIGGRAPH
+/// 1987, with the decisions about ambiguous cells of `ambiguity`.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node or on an edge that crosses the surface,
@@ -42,17 +43,15 @@ pub fn marching_cubes(
     let lattice = Lattice::new(grid);
     let near = Bricks::classify(field, &lattice);
     let mut mesh = Mesh::default();
-    let sampling = Stage::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..0.5, progress);
+    let sampling = ProgressPart::new(near.near.len().div_ceil(BRICKS_PER_TASK), 0.0..0.5, progress);
     let signs =
         crossings::sample(field, &lattice, &near, &mut mesh.work.evaluations, &|| sampling.advance())?;
     let crossed = Crossed::number(&near, &signs, |brick, around| {
-        let cells = Cells::new(field, &lattice, brick.low, around);
+        let cells = BrickTriangles::new(field, &lattice, brick.low, around);
         brick.inner = cells.patches.iter().map(|patch| patch.inner.len() as u32).sum();
         cells
     });
-    if crossed.vertices > Mesh::MAX_VERTICES {
-        return Err(MeshError::TooManyVertices { found: crossed.vertices });
-    }
+    MeshError::check_vertices(crossed.vertices)?;
     // rayon writes the zeros, so each thread touches memory of its own for the first time
     [mesh.positions, mesh.normals] =
         [(); 2].map(|()| rayon::iter::repeat_n(DVec3::ZERO, crossed.vertices).collect());
@@ -60,16 +59,16 @@ pub fn marching_cubes(
     let counts: Vec<usize> = counts.collect();
     mesh.triangles = rayon::iter::repeat_n([0; 3], counts.iter().sum()).collect();
 
-    let marching = Stage::new(crossed.tasks.len(), 0.5..1.0, progress);
+    let marching = ProgressPart::new(crossed.tasks.len(), 0.5..1.0, progress);
     let vertices = || crossed.tasks.iter().map(|task| task.vertices);
     let positions = crossings::parts(&mut mesh.positions, vertices());
     let normals = crossings::parts(&mut mesh.normals, vertices());
     let triangles = crossings::parts(&mut mesh.triangles, counts.into_iter());
-    let scene = Scene { field, lattice: &lattice, signs: &signs, crossed: &crossed };
+    let extraction = Extraction { field, lattice: &lattice, signs: &signs, crossed: &crossed };
     let jobs = crossed.tasks.par_iter().zip(positions).zip(normals).zip(triangles);
     let found: Vec<Result<OnEdges, MeshError>> = jobs
-        .map_init(Scratch::default, |scratch, (((task, positions), normals), triangles)| {
-            let found = scene.extract(Job { task, positions, normals, triangles }, scratch);
+        .map_init(ExtractionScratch::default, |scratch, (((task, positions), normals), triangles)| {
+            let found = extraction.extract(ExtractionJob { task, positions, normals, triangles }, scratch);
             marching.advance();
             found
         })
@@ -90,15 +89,15 @@ pub fn marching_cubes(
     Ok(mesh)
 }
 
-/// What is known of a brick's cells before its vertices have places.
-struct Cells {
+/// The triangles of a brick's cells, before its vertices have positions.
+struct BrickTriangles {
     patches: Vec<CellPatch>,
-    /// Number of triangles.
+    /// The number of triangles, with those of the patches.
     triangles: usize,
     evaluations: u64,
 }
 
-impl Cells {
+impl BrickTriangles {
     fn new(field: &dyn Field, lattice: &Lattice, low: [usize; 3], around: &Around) -> Self {
         let mut evaluations = 0;
         let patches = patches::find(field, lattice, low, around, &mut evaluations);
@@ -114,37 +113,41 @@ impl Cells {
 }
 
 /// A task, and where its vertices and triangles go.
-struct Job<'a> {
-    task: &'a Task<Cells>,
+struct ExtractionJob<'a> {
+    task: &'a Task<BrickTriangles>,
     positions: &'a mut [DVec3],
     normals: &'a mut [DVec3],
     triangles: &'a mut [[u32; 3]],
 }
 
-/// What all tasks read.
-struct Scene<'a> {
+/// What every task reads.
+struct Extraction<'a> {
     field: &'a dyn Field,
     lattice: &'a Lattice,
     signs: &'a [Signs],
-    crossed: &'a Crossed<Cells>,
+    crossed: &'a Crossed<BrickTriangles>,
 }
 
 /// Memory that a thread keeps from task to task.
-struct Scratch {
+struct ExtractionScratch {
     edges: EdgeScratch,
-    gradients: Gradients,
+    gradients: GradientColumns,
     vertices: Box<VertexTable>,
 }
 
-impl Default for Scratch {
+impl Default for ExtractionScratch {
     fn default() -> Self {
-        Self { edges: EdgeScratch::default(), gradients: Gradients::default(), vertices: vertex_table() }
+        Self {
+            edges: EdgeScratch::default(),
+            gradients: GradientColumns::default(),
+            vertices: vertex_table(),
+        }
     }
 }
 
-impl Scene<'_> {
-    fn extract(&self, job: Job<'_>, scratch: &mut Scratch) -> Result<OnEdges, MeshError> {
-        let Job { task, positions, normals, triangles } = job;
+impl Extraction<'_> {
+    fn extract(&self, job: ExtractionJob<'_>, scratch: &mut ExtractionScratch) -> Result<OnEdges, MeshError> {
+        let ExtractionJob { task, positions, normals, triangles } = job;
         let found = task.place_on_edges(self.field, self.lattice, positions, &mut scratch.edges)?;
         for (brick, cells) in task.bricks.iter().zip(&task.kept) {
             let inner = cells.patches.iter().flat_map(|patch| &patch.inner);
@@ -165,11 +168,11 @@ impl Scene<'_> {
         Ok(found)
     }
 
-    /// Triangles of all cells of a brick, written to their places.
+    /// Writes the triangles of all cells of a brick to their places.
     fn fill_triangles<'a>(
         &self,
         brick: &Brick,
-        cells: &Cells,
+        cells: &BrickTriangles,
         vertices: &mut VertexTable,
         mut places: impl Iterator<Item = &'a mut [u32; 3]>,
     ) {

@@ -1,4 +1,4 @@
-//! The regular grid on which a surface is sought: where its nodes lie, and how far it reaches.
+//! The regular grid on which a surface is sought: its box and its nodes.
 //!
 //! Invariant: a grid has at least one cell on each axis, its nodes strictly increase along each axis, and the
 //! first and last node of an axis are exactly the ends of its box.
@@ -14,27 +14,27 @@ use crate::geom::Aabb;
 pub enum Resolution {
     /// Number of cells along the grid's longest side.
     Cells(usize),
-    /// Length of a cell's side, in the scene's unit (metres).
+    /// Length of a cell's side, in metres.
     Spacing(f64),
 }
 
-/// Cells of equal shape that fill a box.
+/// A box filled with cells of equal shape.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     bounds: Aabb,
     cells: [usize; 3],
 }
 
-/// Why no grid can be laid.
+/// Why there is no grid for a box and a resolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GridError {
-    /// The box is empty, infinite or NaN, or it is flat where a solid box is needed.
+    /// The box is empty, infinite or NaN, or it is flat although [`Grid::filling`] needs a volume.
     BadBox(Aabb),
     /// Fewer cells than [`Grid::MIN_CELLS`] were asked for.
     TooFewCells(usize),
-    /// The cell side is not a positive finite number, or below what `f64` tells apart at these coordinates.
+    /// The cell's side is not a positive finite number, or `f64` cannot resolve it at these coordinates.
     BadSpacing(f64),
-    /// An axis would need more cells than [`Grid::MAX_CELLS`].
+    /// An axis would need so many cells, more than [`Grid::MAX_CELLS`].
     TooManyCells(f64),
 }
 
@@ -63,24 +63,27 @@ impl fmt::Display for GridError {
 
 impl std::error::Error for GridError {}
 
-/// Cells between a solid's bounds and the low side of its padded grid. Above one half, so that bounds which
-/// err by half a cell still hold the solid; irrational and different on each axis, so that neither flat faces
-/// nor planes of symmetry (x = y, the middle plane) fall onto nodes, where ω = 0 would make slivers.
+/// Cells between a solid's bounds and the low side of its padded grid. The numbers are above one half, so
+/// that bounds which err by half a cell still hold the solid. They are irrational and differ between axes, so
+/// that neither flat faces nor planes of symmetry (x = y, the middle plane) fall onto nodes, where ω = 0
+/// would make slivers.
 const LOW_MARGIN: DVec3 = DVec3::new(0.618_033_988_749_895, 0.553_241_077_386_224, 0.587_401_051_968_199);
 
-/// Cells that both margins of an axis take together.
+/// The cells that both margins of an axis take together.
 const BOTH_MARGINS: f64 = 1.370_818_339_168_115;
 
 impl Grid {
-    /// Fewer cells along the longest side leave no room for the margins.
+    /// The smallest number of cells along the longest side. Fewer leave no room for the margins.
     pub const MIN_CELLS: usize = 2;
-    /// A surface across 8192² cells has some 10⁸ vertices, a fifth of those that a mesh can have.
+    /// The largest number of cells along a side. A surface across 8192² cells has some 10⁸ vertices, a fifth
+    /// of [`Mesh::MAX_VERTICES`](super::Mesh::MAX_VERTICES).
     pub const MAX_CELLS: usize = 8192;
 
-    /// A grid of cubic cells around a solid's own bounds, padded so that its surface stays off the border.
+    /// A grid of cubic cells around a solid's own bounds, in metres. It is padded so that the surface stays
+    /// off the border.
     ///
     /// # Errors
-    /// [`GridError`] when the bounds or the resolution are unusable.
+    /// [`GridError`] if the bounds or the resolution are unusable.
     pub fn around(bounds: &Aabb, resolution: Resolution) -> Result<Self, GridError> {
         if bounds.is_empty() || !bounds.is_finite() {
             return Err(GridError::BadBox(*bounds));
@@ -94,7 +97,7 @@ impl Grid {
         check_side(side, bounds)?;
         let mut cells = [0; 3];
         for (axis, count) in cells.iter_mut().enumerate() {
-            // The longest axis gives the whole number asked for only up to rounding.
+            // on the longest axis this is the whole number that was asked for only up to rounding
             let needed = bounds.size()[axis] / side + BOTH_MARGINS;
             *count = cell_count((needed - 1e-6).ceil())?;
         }
@@ -103,12 +106,12 @@ impl Grid {
         Ok(Self { bounds: Aabb::new(min, min + side * counts), cells })
     }
 
-    /// A grid that fills an imposed box exactly. Everything outside the box counts as fluid, so a solid that
-    /// reaches the border is closed by faces that lie on it. The cells are as near to cubes as whole numbers of
-    /// them allow, and no longer than the side asked for.
+    /// A grid that fills an imposed box exactly, in metres. Everything outside the box counts as fluid, so a
+    /// solid that reaches the border is closed by faces on it. The cells are as near to cubes as whole
+    /// numbers of them allow, and no side is longer than asked for.
     ///
     /// # Errors
-    /// [`GridError`] when the box or the resolution are unusable.
+    /// [`GridError`] if the box or the resolution are unusable.
     pub fn filling(domain: &Aabb, resolution: Resolution) -> Result<Self, GridError> {
         if !domain.is_finite() || domain.size().min_element() <= 0.0 {
             return Err(GridError::BadBox(*domain));
@@ -128,22 +131,25 @@ impl Grid {
         Ok(grid)
     }
 
-    /// The box that the cells fill.
+    /// The box that the cells fill, in metres.
     pub fn bounds(&self) -> &Aabb {
         &self.bounds
     }
 
-    /// Number of cells along x, y and z.
+    /// The numbers of cells along x, y and z.
     pub fn cells(&self) -> [usize; 3] {
         self.cells
     }
 
-    /// Side lengths of a cell.
+    /// The side lengths of a cell, in metres.
     pub fn spacing(&self) -> DVec3 {
         self.bounds.size() / DVec3::from_array(self.cells.map(|n| n as f64))
     }
 
-    /// Coordinates of the nodes along one axis: one more than there are cells.
+    /// The coordinates of the nodes along an axis (0, 1 or 2), ascending: one more than there are cells.
+    ///
+    /// # Panics
+    /// If `axis` is not below 3.
     pub fn nodes(&self, axis: usize) -> Vec<f64> {
         let (count, first, last) = (self.cells[axis], self.bounds.min[axis], self.bounds.max[axis]);
         let side = self.spacing()[axis];
@@ -153,7 +159,8 @@ impl Grid {
     }
 }
 
-/// A side must move every coordinate of the box by many units in the last place, else nodes would coincide.
+/// Refuses a side that moves a coordinate of the box by only a few units in the last place: nodes
+/// would coincide.
 fn check_side(side: f64, bounds: &Aabb) -> Result<(), GridError> {
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
     if side.is_finite() && side > 1e-12 * largest { Ok(()) } else { Err(GridError::BadSpacing(side)) }

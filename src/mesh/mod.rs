@@ -1,17 +1,22 @@
 //! From a field to a closed triangle mesh of its surface ω = 0, and what can be said about that mesh.
 //!
-//! [`Grid`] lays nodes → [`marching_cubes`] samples ω in the bricks of cells that ranges do not exclude, connects
-//! crossed edges by the case table, or by the corners' values where the table leaves a choice, puts each vertex on the
-//! surface by a root search on ω itself, merges vertices that coincide in a node and adds normals −∇ω/|∇ω| →
-//! [`remove_slivers`] or [`simplify()`] if asked → [`check`] reports topology, volume and distance, [`thin_cells`] what the grid cannot
-//! see, [`measure`] the distance both ways → the [`formats`] write. [`dual_contouring`] does what [`marching_cubes`]
-//! does, with sharp creases.
+//! A [`Grid`] says where the nodes are. [`marching_cubes`] or [`dual_contouring`] makes a mesh: the first
+//! cuts creases off between nodes, the second puts vertices on them. [`remove_slivers`] and [`simplify()`]
+//! contract edges of a mesh. [`check`] reports its topology, volume and distance, [`thin_cells`] counts what
+//! the grid could not see, and [`measure`] finds the distance both ways. The [`FORMATS`] write it to files.
 //!
-//! Promises: the mesh is closed, every edge lies in exactly two triangles that run along it in opposite
-//! directions, triangles are counter-clockwise seen from the fluid, its topology is that of the trilinear interpolant
-//! of ω at the nodes, and the same field and grid give the same bits on any number of threads. Not promised: marching
-//! cubes cut creases between nodes, features thinner than a cell may be missed (but are counted), and where the field touches
-//! zero without a change of sign there is no surface.
+//! Marching cubes sample ω in the bricks of cells that ranges do not exclude. They connect crossed edges by
+//! the case table, or by the corners' values where the table leaves a choice. A root search on ω itself puts
+//! each vertex on the surface, vertices that coincide in a node are merged, and normals are −∇ω/|∇ω|.
+//!
+//! What is promised: the mesh is closed; every edge lies in exactly two triangles, which run along it in
+//! opposite directions; triangles are counter-clockwise as seen from the fluid; the topology is that of
+//! the trilinear interpolant of ω at the nodes; the same field and grid give the same bits on any number
+//! of threads.
+//!
+//! What is not promised: marching cubes cut creases between nodes; features thinner than a cell may be
+//! missed, although they are counted; there is no surface where the field touches zero without a change
+//! of sign.
 //!
 //! ```
 //! use rfm::{field::Closures, geom::Aabb, glam::DVec3, mesh};
@@ -35,7 +40,7 @@ mod collapse;
 mod crossings;
 mod dual;
 mod extract;
-pub mod formats;
+mod formats;
 mod grid;
 mod normals;
 mod patches;
@@ -58,7 +63,7 @@ use glam::DVec3;
 pub use check::{Report, check, is_closed_manifold};
 pub use dual::dual_contouring;
 pub use extract::marching_cubes;
-pub use formats::{glb, obj, ply, stl, threemf, vtp};
+pub use formats::*;
 pub use grid::{Grid, GridError, Resolution};
 pub use quality::{Distances, Quality, Reference, measure};
 pub use shells::{Shell, shells};
@@ -66,59 +71,63 @@ pub use simplify::simplify;
 pub use slivers::remove_slivers;
 pub use thin::{ThinCells, thin_cells};
 
-/// Triangles over shared vertices.
+/// A triangle mesh with shared vertices.
+///
+/// `positions` and `normals` have the same length. Meshes made here are closed manifolds, see [`check`].
+/// Functions that take a mesh panic if one of its triangles names a vertex that does not exist.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
-    /// Vertices, in the scene's unit (metres).
+    /// The vertices, in metres.
     pub positions: Vec<DVec3>,
-    /// Outward unit normals, one for each vertex, always finite.
+    /// The outward unit normals, one for each vertex; always finite.
     pub normals: Vec<DVec3>,
-    /// Indices of vertices, counter-clockwise seen from the fluid.
+    /// Three indices of vertices for each triangle, counter-clockwise as seen from the fluid.
     pub triangles: Vec<[u32; 3]>,
-    /// Ascending indices of vertices which close a solid at the grid's border: they lie on the border and
-    /// inside the solid, not on ω = 0.
+    /// Indices, ascending, of the vertices that close a solid at the grid's border. They lie on the border
+    /// and inside the solid, not on ω = 0.
     pub caps: Vec<u32>,
-    /// What it took to make the mesh.
+    /// The work that it took to make the mesh.
     pub work: Work,
 }
 
 impl Mesh {
-    /// Most vertices of a mesh: the corners of twice as many triangles then still have 32-bit numbers.
+    /// The largest number of vertices of a mesh. The corners of twice as many triangles then still have
+    /// 32-bit numbers, and indices fit the signed 32 bits of PLY and VTP files.
     pub const MAX_VERTICES: usize = 1 << 29;
-
-    /// A mesh of no field: each normal is the area-weighted mean of the triangles around.
-    pub fn from_triangles(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let normals = vec![DVec3::ZERO; positions.len()];
-        let mut mesh = Self { positions, normals, triangles, ..Self::default() };
-        normals::fill_missing(&mut mesh);
-        mesh
-    }
 }
 
-/// Counts of work, the same on any machine.
+/// Counts of work. They are the same on any machine.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Evaluations of ω: samples and root steps.
+    /// Evaluations of ω: samples at nodes and steps of root searches.
     pub evaluations: u64,
-    /// Evaluations of ∇ω, for normals.
+    /// Evaluations of ∇ω.
     pub gradients: u64,
-    /// Vertices merged because they coincided in a node of the grid, or dropped as a speck of no extent.
+    /// Vertices that were merged because they coincided in a node of the grid, or dropped as a speck
+    /// without extent.
     pub merged: u64,
 }
 
 /// Why a field could not be meshed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MeshError {
-    /// ω is not a number here, so nobody can say whether the point is inside.
+    /// ω is not a number at a point, so nobody can say whether the point is inside.
     NotANumber {
-        /// The first such point in the order of the search.
+        /// The first such point in the order of the search, in metres.
         at: DVec3,
     },
-    /// More vertices than [`Mesh::MAX_VERTICES`].
+    /// The mesh would have more vertices than [`Mesh::MAX_VERTICES`].
     TooManyVertices {
-        /// The number found.
+        /// The number of vertices that was found.
         found: usize,
     },
+}
+
+impl MeshError {
+    /// Refuses more vertices than a mesh can have.
+    pub(crate) fn check_vertices(found: usize) -> Result<(), Self> {
+        if found > Mesh::MAX_VERTICES { Err(Self::TooManyVertices { found }) } else { Ok(()) }
+    }
 }
 
 impl fmt::Display for MeshError {
@@ -128,10 +137,10 @@ impl fmt::Display for MeshError {
                 write!(f, "the field is not a number at ({}, {}, {})", at.x, at.y, at.z)
             }
             Self::TooManyVertices { found } => {
+                let most = Mesh::MAX_VERTICES;
                 write!(
                     f,
-                    "the mesh would have {found} vertices; at most {} are possible, use larger cells",
-                    i32::MAX
+                    "the mesh would have {found} vertices; at most {most} are possible, use larger cells"
                 )
             }
         }

@@ -1,4 +1,5 @@
-//! Vertex normals: n = −∇ω/|∇ω|, or the mean of the triangles around where the field gives no direction.
+//! Vertex normals: n = −∇ω/|∇ω|, or the mean of the triangles around a vertex where the field gives
+//! no direction.
 //!
 //! Invariant: every normal is a finite unit vector.
 
@@ -8,16 +9,16 @@ use rayon::prelude::*;
 use super::Mesh;
 use crate::field::{Field, GradientsMut, Points};
 
-/// Columns for gradients at many points, kept from one call to the next.
+/// Gradients at many points. The columns are kept from one call to the next.
 #[derive(Debug, Default)]
-pub(super) struct Gradients {
+pub(super) struct GradientColumns {
     points: [Vec<f64>; 3],
     /// ω and its derivatives.
     found: [Vec<f64>; 4],
 }
 
-impl Gradients {
-    /// Writes −∇ω/|∇ω| at each position, zero where the field gives no direction.
+impl GradientColumns {
+    /// Writes −∇ω/|∇ω| at each position, and zero where the field gives no direction.
     pub(super) fn normals(&mut self, field: &dyn Field, positions: &[DVec3], normals: &mut [DVec3]) {
         self.evaluate(field, positions);
         let [_, x, y, z] = &self.found;
@@ -50,9 +51,20 @@ impl Gradients {
     }
 }
 
+impl Mesh {
+    /// A mesh that stands for no field: each normal is the area-weighted mean of the triangles around
+    /// its vertex.
+    pub fn from_triangles(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let normals = vec![DVec3::ZERO; positions.len()];
+        let mut mesh = Self { positions, normals, triangles, ..Self::default() };
+        fill_missing(&mut mesh);
+        mesh
+    }
+}
+
 /// ω and ∇ω at each position.
 pub(super) fn gradients(field: &dyn Field, positions: &[DVec3]) -> Vec<(f64, DVec3)> {
-    Gradients::default().at(field, positions).collect()
+    GradientColumns::default().at(field, positions).collect()
 }
 
 /// Vertices evaluated together.
@@ -62,7 +74,7 @@ const BATCH: usize = 1024;
 pub(super) fn add(field: &dyn Field, mesh: &mut Mesh, vertices: &[u32]) {
     let parts: Vec<Vec<DVec3>> = vertices
         .par_chunks(BATCH)
-        .map_init(Gradients::default, |gradients, part| {
+        .map_init(GradientColumns::default, |gradients, part| {
             let positions: Vec<DVec3> = part.iter().map(|&v| mesh.positions[v as usize]).collect();
             let mut normals = vec![DVec3::ZERO; part.len()];
             gradients.normals(field, &positions, &mut normals);
@@ -79,10 +91,11 @@ pub(super) fn add(field: &dyn Field, mesh: &mut Mesh, vertices: &[u32]) {
     fill_missing(mesh);
 }
 
-/// Squares of lengths of which neither a part underflows nor the sum overflows.
+/// Squared lengths in this range come from vectors whose squared parts do not underflow and whose sum does
+/// not overflow.
 const SAFE: std::ops::Range<f64> = 1e-200..1e200;
 
-/// The unit vector along `v`, also where |v|² would underflow; none for zero, infinite and NaN vectors.
+/// The unit vector along `v`, also where |v|² would underflow. `None` for zero, infinite and NaN vectors.
 pub(super) fn unit(v: DVec3) -> Option<DVec3> {
     let squared = v.length_squared();
     if SAFE.contains(&squared) {
@@ -95,8 +108,8 @@ pub(super) fn unit(v: DVec3) -> Option<DVec3> {
     Some((v / largest).normalize()).filter(|n| n.is_finite())
 }
 
-/// Replaces each zero normal by the area-weighted mean of the triangles around, or by +z if these cancel. Cap vertices
-/// lie inside the solid, where ∇ω says nothing about the cap: they too are left to this.
+/// Replaces each zero normal by the area-weighted mean of the triangles around it, or by +z if these cancel.
+/// Cap vertices are treated so too: they lie inside the solid, where ∇ω says nothing about the cap.
 pub(super) fn fill_missing(mesh: &mut Mesh) {
     let is_missing: Vec<bool> = mesh.normals.par_iter().map(|n| *n == DVec3::ZERO).collect();
     if is_missing.par_iter().all(|missing| !missing) {

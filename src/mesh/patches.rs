@@ -1,29 +1,29 @@
-//! Cells that signs alone do not decide: their corners' values are asked, and their triangles made one by one. They
-//! are few on smooth surfaces.
+//! Cells that signs alone do not decide. The values at their corners are evaluated, and their triangles are
+//! made one by one. Smooth surfaces have few of them.
 
 use glam::DVec3;
 
 use super::{
     ambiguity,
-    cases::{Inner, Patch, Tunnel, edge, face_corners, loops},
+    cases::{CellTriangles, InnerVertex, Tunnel, edge, face_corners, loops},
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, set_positions},
 };
 use crate::field::Field;
 
-/// Triangles of one cell of a brick.
+/// The triangles of one cell of a brick.
 #[derive(Debug, Clone)]
 pub(super) struct CellPatch {
-    /// The cell's plane, and its bit there.
+    /// The cell's plane, and its bit in the plane.
     pub cell: (usize, usize),
-    /// Edges of the cell, and from `cases::EDGES` on inner vertices.
+    /// Corners are edges of the cell, and from `cases::EDGES` on inner vertices.
     pub triangles: Vec<[u8; 3]>,
-    /// Places of the inner vertices, on ω = 0.
+    /// The positions of the inner vertices, on ω = 0.
     pub inner: Vec<DVec3>,
 }
 
-/// Patches for the cells of a brick that need them, in the order of planes and bits; `low` are the extended indices of
-/// its first node. Adds to the number of evaluations.
+/// The patches of the cells of a brick that need one, in the order of planes and bits. `low` are the extended
+/// indices of the brick's first node. Adds to the number of evaluations.
 pub(super) fn find(
     field: &dyn Field,
     lattice: &Lattice,
@@ -33,9 +33,9 @@ pub(super) fn find(
 ) -> Vec<CellPatch> {
     let mut found = Vec::new();
     for (z, bit) in undecided(around) {
-        let cell = Cell::new(field, lattice, cell_low(low, (z, bit)));
+        let cell = CellValues::new(field, lattice, cell_low(low, (z, bit)));
         *evaluations += 8;
-        let Patch { triangles, inner } = cell.patch();
+        let CellTriangles { triangles, inner } = cell.patch();
         let inner =
             inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
         found.push(CellPatch { cell: (z, bit), triangles, inner });
@@ -43,7 +43,7 @@ pub(super) fn find(
     found
 }
 
-/// Planes and bits of a brick's cells that signs alone do not decide, ascending.
+/// The planes and bits of a brick's cells that signs alone do not decide, ascending.
 pub(super) fn undecided(around: &Around) -> impl Iterator<Item = (usize, usize)> {
     let planes = (0..BRICK).map(|z| (z, around.corners(z)));
     let crossed = planes.filter(|(_, corners)| crossed_cells(corners) != 0);
@@ -55,8 +55,8 @@ pub(super) fn cell_low(low: [usize; 3], (z, bit): (usize, usize)) -> [usize; 3] 
     [low[0] + bit % BRICK, low[1] + bit / BRICK, low[2] + z]
 }
 
-/// Cells with an ambiguous face, or with two opposite corners that differ from all others: `cases::needs_values` for
-/// 64 cells at once.
+/// The cells with an ambiguous face, or with two opposite corners that differ from all others. This is
+/// `cases::needs_values` for 64 cells at once.
 pub(super) fn undecided_cells(corners: &[u64; 8]) -> u64 {
     let mut found = 0;
     for face in 0..6 {
@@ -73,13 +73,13 @@ pub(super) fn undecided_cells(corners: &[u64; 8]) -> u64 {
 }
 
 /// A cell with the values at its corners.
-pub(super) struct Cell {
+pub(super) struct CellValues {
     low: DVec3,
     high: DVec3,
     values: ambiguity::Corners,
 }
 
-impl Cell {
+impl CellValues {
     pub(super) fn new(field: &dyn Field, lattice: &Lattice, low: [usize; 3]) -> Self {
         let ends = [low, low.map(|n| n + 1)];
         let at = |corner: usize| [0, 1, 2].map(|axis: usize| ends[corner >> axis & 1][axis]);
@@ -93,32 +93,32 @@ impl Cell {
         Self { low: positions[0], high: positions[7], values }
     }
 
-    /// Its loops of crossed edges, and which two of them bound a tunnel.
+    /// The cell's loops of crossed edges, and the two of them that bound a tunnel, if any do.
     pub(super) fn loops(&self) -> (Vec<Vec<usize>>, Option<Tunnel>) {
         let polygons = loops(ambiguity::inside(&self.values), ambiguity::faces(&self.values));
         let tunnel = ambiguity::tunnel(&self.values, &polygons);
         (polygons, tunnel)
     }
 
-    fn patch(&self) -> Patch {
+    fn patch(&self) -> CellTriangles {
         let (polygons, tunnel) = self.loops();
-        Patch::new(&polygons, tunnel)
+        CellTriangles::new(&polygons, tunnel)
     }
 
     fn corner(&self, corner: usize) -> DVec3 {
         DVec3::from_array([0, 1, 2].map(|axis: usize| [self.low, self.high][corner >> axis & 1][axis]))
     }
 
-    fn place(&self, inner: &Inner) -> DVec3 {
+    fn place(&self, inner: &InnerVertex) -> DVec3 {
         match inner {
-            Inner::At(share) => self.low + DVec3::from_array(*share) * (self.high - self.low),
-            Inner::Amidst(edges) => {
+            InnerVertex::At(share) => self.low + DVec3::from_array(*share) * (self.high - self.low),
+            InnerVertex::Amidst(edges) => {
                 edges.iter().map(|&e| self.on_edge(e)).sum::<DVec3>() / edges.len() as f64
             }
         }
     }
 
-    /// Where the straight line between the ends' values is zero.
+    /// The point of an edge at which the straight line between the values at its ends is zero.
     fn on_edge(&self, e: usize) -> DVec3 {
         let (axis, low) = edge(e);
         let (f0, f1) = (self.values[low], self.values[low | 1 << axis]);
@@ -130,7 +130,7 @@ impl Cell {
     fn on_surface(&self, field: &dyn Field, middle: DVec3, evaluations: &mut u64) -> DVec3 {
         *evaluations += 1;
         let value = field.omega(middle);
-        // along the axes to the faces, and to the corners, of which some lie on the other side
+        // along the axes to the faces, and to the corners; some of them lie on the other side
         let to_face = |i: usize| {
             let mut end = middle;
             end[i % 3] = [self.low, self.high][i / 3][i % 3];

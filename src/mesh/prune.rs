@@ -1,12 +1,13 @@
-//! Which bricks of cells may hold the surface, as proven by the field's range over them: an octree of bricks.
+//! The bricks of cells that may hold the surface, as far as the field's ranges prove it: an octree of bricks.
 //!
-//! Extended indices: a ring of virtual nodes that count as outside surrounds the grid, so node i of the grid has
-//! extended index i + 1 and a surface that leaves the grid is closed there without special cases. A brick owns
-//! [`BRICK`]³ extended nodes, from its low corner on, and the cells and edges that begin in them.
+//! A ring of virtual nodes that count as outside surrounds the grid, so a surface that leaves the grid is
+//! closed there without special cases. Extended indices count the ring: node i of the grid has extended index
+//! i + 1. A brick owns [`BRICK`]³ extended nodes, from its low corner on, and the cells and edges that begin
+//! in them.
 //!
-//! Invariant: a brick is called solid or fluid only if the range excludes every other sign and NaN in its closed
-//! box, so its nodes need no sample and none of its edges is crossed. A field that knows no ranges makes every brick
-//! near.
+//! Invariant: a brick is called solid or fluid only if the range excludes every other sign and NaN in its
+//! closed box. Its nodes then need no sample, and none of its edges is crossed. With a field that knows no
+//! ranges every brick is near.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,36 +15,37 @@ use rayon::prelude::*;
 use super::Grid;
 use crate::{field::Field, geom::Aabb};
 
-/// Cells along a brick's side: the inside bits of one plane of its nodes fill a word.
+/// Cells along a brick's side. The inside bits of one plane of its nodes fill a word.
 pub(super) const BRICK: usize = 8;
 
-/// Boxes whose ranges are asked for in one task.
+/// Boxes whose ranges are evaluated in one task.
 const BOXES_PER_TASK: usize = 64;
 
-/// What is known of a brick.
+/// What ranges prove about a brick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum BrickKind {
     /// ω > 0 throughout.
     Solid,
     /// ω ≤ 0 throughout.
     Fluid,
-    /// Samples must decide; its number among the near bricks.
+    /// Samples must decide. The number is the brick's place among the near bricks.
     Near(u32),
 }
 
 /// A brick that the surface may pass through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct NearBrick {
-    /// Its place among the bricks.
+    /// Its place in the lattice of bricks, on each axis.
     pub at: [usize; 3],
-    /// ω > 0 is proven at all of its nodes in the grid: the surface only closes the solid at the grid's border.
+    /// True if ω > 0 is proven at all of its nodes in the grid. The surface then only closes the solid at the
+    /// grid's border.
     pub solid: bool,
 }
 
 /// The grid's nodes and its division into bricks.
 #[derive(Debug)]
 pub(super) struct Lattice {
-    /// Coordinates of the grid's nodes on each axis.
+    /// The coordinates of the grid's nodes on each axis.
     nodes: [Vec<f64>; 3],
 }
 
@@ -52,42 +54,43 @@ impl Lattice {
         Self { nodes: [0, 1, 2].map(|axis| grid.nodes(axis)) }
     }
 
-    /// Bricks on each axis.
+    /// The number of bricks on each axis.
     fn counts(&self) -> [usize; 3] {
         [0, 1, 2].map(|axis| (self.nodes[axis].len() + 2).div_ceil(BRICK))
     }
 
-    /// True for the ring's nodes.
+    /// Whether a node with this extended index belongs to the ring.
     pub(super) fn is_ring(&self, axis: usize, extended: usize) -> bool {
         extended == 0 || extended > self.nodes[axis].len()
     }
 
-    /// The coordinate of an extended node; the ring's nodes have no place of their own and lie on the border.
+    /// The coordinate of an extended node. Nodes of the ring have no coordinates of their own and lie on
+    /// the border.
     pub(super) fn coordinate(&self, axis: usize, extended: usize) -> f64 {
         self.nodes[axis][extended.clamp(1, self.nodes[axis].len()) - 1]
     }
 
-    /// The place of an extended node.
+    /// The position of an extended node.
     pub(super) fn position(&self, extended: [usize; 3]) -> DVec3 {
         let [x, y, z] = extended;
         DVec3::new(self.coordinate(0, x), self.coordinate(1, y), self.coordinate(2, z))
     }
 
-    /// The part of a brick's nodes on one axis that lies in the grid, counted from the brick's first.
+    /// The part of a brick's nodes on one axis that lies in the grid, counted from the brick's first node.
     pub(super) fn own_nodes(&self, axis: usize, brick: usize) -> std::ops::Range<usize> {
         let first = brick * BRICK;
         let end = (self.nodes[axis].len() + 1).saturating_sub(first).min(BRICK);
         usize::from(first == 0).min(end)..end
     }
 
-    /// A number of an extended node of its own.
+    /// A number that belongs to one extended node alone.
     pub(super) fn key(&self, extended: [usize; 3]) -> u64 {
         let [nx, ny, _] = [0, 1, 2].map(|axis| self.nodes[axis].len() as u64 + 2);
         (extended[2] as u64 * ny + extended[1] as u64) * nx + extended[0] as u64
     }
 
-    /// The closed box of extended nodes from `low` to `high` and whether all of it lies in the grid; nothing if none
-    /// of it does.
+    /// The closed box of extended nodes from `low` to `high`, and whether all of it lies in the grid. `None`
+    /// if none of it does.
     fn bounds(&self, low: [usize; 3], high: [usize; 3]) -> Option<(Aabb, bool)> {
         let in_grid = |axis: usize| low[axis] > 0 && high[axis] <= self.nodes[axis].len();
         let beyond = (0..3).any(|axis| low[axis] > self.nodes[axis].len());
@@ -96,7 +99,7 @@ impl Lattice {
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Cell {
+enum Octant {
     Solid,
     Fluid,
     Near(u32),
@@ -107,30 +110,30 @@ enum Cell {
 /// All bricks of a grid.
 #[derive(Debug)]
 pub(super) struct Bricks {
-    /// Eight children in a row for each divided cell; the root is the first.
-    cells: Vec<Cell>,
-    /// Bricks along the root's side are two to this power.
+    /// Eight children in a row for each divided octant. The root is the first.
+    cells: Vec<Octant>,
+    /// The root's side has two to this power bricks.
     levels: u32,
-    /// Near bricks, neighbours close to one another in the list.
+    /// The near bricks. Neighbours are close to one another in the list.
     pub near: Vec<NearBrick>,
 }
 
-/// What a range says.
+/// What a range says about a box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Finding {
     Solid,
-    /// Proven to be solid as far as it lies in the grid, but it reaches beyond.
+    /// The part of the box in the grid is proven to be solid, but the box reaches beyond the grid.
     SolidAtBorder,
     Fluid,
     Undecided,
 }
 
 impl Bricks {
-    /// Divides the grid, level by level, until the sign is proven or a single brick is left.
+    /// Divides the grid, level by level, until the sign is proven or single bricks are left.
     pub(super) fn classify(field: &dyn Field, lattice: &Lattice) -> Self {
         let most = lattice.counts().into_iter().max().unwrap_or(1);
         let levels = most.next_power_of_two().trailing_zeros();
-        let mut found = Self { cells: vec![Cell::Fluid], levels, near: Vec::new() };
+        let mut found = Self { cells: vec![Octant::Fluid], levels, near: Vec::new() };
         let mut open = vec![(0_usize, [0_usize; 3])];
         for level in (0..=levels).rev() {
             let size = 1_usize << level;
@@ -151,18 +154,18 @@ impl Bricks {
             let mut next = Vec::new();
             for ((slot, at), finding) in open.into_iter().zip(findings) {
                 found.cells[slot] = match finding {
-                    Finding::Solid => Cell::Solid,
-                    Finding::Fluid => Cell::Fluid,
+                    Finding::Solid => Octant::Solid,
+                    Finding::Fluid => Octant::Fluid,
                     _ if level == 0 => {
                         found.near.push(NearBrick { at, solid: finding == Finding::SolidAtBorder });
-                        Cell::Near(found.near.len() as u32 - 1)
+                        Octant::Near(found.near.len() as u32 - 1)
                     }
                     _ => {
                         let first = found.cells.len();
-                        found.cells.resize(first + 8, Cell::Fluid);
+                        found.cells.resize(first + 8, Octant::Fluid);
                         let child = |i: usize| [0, 1, 2].map(|axis| at[axis] + (i >> axis & 1) * size / 2);
                         next.extend((0..8).map(|i| (first + i, child(i))));
-                        Cell::Divided(first as u32)
+                        Octant::Divided(first as u32)
                     }
                 };
             }
@@ -171,19 +174,19 @@ impl Bricks {
         found
     }
 
-    /// What is known of a brick; fluid beyond the grid.
-    pub(super) fn place(&self, at: [usize; 3]) -> Place {
+    /// What is known about a brick. Beyond the grid there is fluid.
+    pub(super) fn kind(&self, at: [usize; 3]) -> BrickKind {
         if at.iter().any(|b| b >> self.levels != 0) {
-            return Place::Fluid;
+            return BrickKind::Fluid;
         }
         let mut cell = self.cells[0];
         let mut level = self.levels;
         loop {
             match cell {
-                Cell::Solid => return Place::Solid,
-                Cell::Fluid => return Place::Fluid,
-                Cell::Near(number) => return Place::Near(number),
-                Cell::Divided(first) => {
+                Octant::Solid => return BrickKind::Solid,
+                Octant::Fluid => return BrickKind::Fluid,
+                Octant::Near(number) => return BrickKind::Near(number),
+                Octant::Divided(first) => {
                     level -= 1;
                     let [x, y, z] = at.map(|b| b >> level & 1);
                     cell = self.cells[first as usize + (z << 2 | y << 1 | x)];
@@ -199,7 +202,7 @@ mod tests {
     use crate::interval::Interval;
     use crate::mesh::Resolution;
 
-    /// ω = x − 1 with its exact range.
+    /// The field ω = x − 1 with its exact range.
     struct HalfSpace;
 
     impl Field for HalfSpace {
@@ -220,17 +223,17 @@ mod tests {
         let lattice = Lattice::new(&Grid::filling(&domain, Resolution::Cells(48)).unwrap());
         assert_eq!(lattice.counts(), [7; 3]);
         let bricks = Bricks::classify(&HalfSpace, &lattice);
-        // the plane lies between nodes 16 and 17 of the grid, which is extended node 17 and 18
-        let found = [0, 1, 2, 3, 5, 6, 7].map(|x| bricks.place([x, 3, 3]));
-        let near = |place| matches!(place, Place::Near(_));
+        // the plane lies between nodes 16 and 17 of the grid, whose extended indices are 17 and 18
+        let found = [0, 1, 2, 3, 5, 6, 7].map(|x| bricks.kind([x, 3, 3]));
+        let near = |place| matches!(place, BrickKind::Near(_));
         assert_eq!(found.map(near), [false, false, true, false, false, true, false]);
-        assert_eq!([found[0], found[3], found[6]], [Place::Fluid, Place::Solid, Place::Fluid]);
+        assert_eq!([found[0], found[3], found[6]], [BrickKind::Fluid, BrickKind::Solid, BrickKind::Fluid]);
         // at the border nothing is sampled, but the solid is closed there
         let solid = bricks.near.iter().filter(|brick| brick.solid).count();
         let border = 7 * 7 + 3 * (7 * 7 - 5 * 5);
         assert_eq!((solid, bricks.near.len()), (border, border + 49));
         for (i, brick) in bricks.near.iter().enumerate() {
-            assert_eq!(bricks.place(brick.at), Place::Near(i as u32));
+            assert_eq!(bricks.kind(brick.at), BrickKind::Near(i as u32));
         }
     }
 

@@ -1,9 +1,11 @@
-//! How far a mesh is from the surface it stands for, both ways, how its triangles face and how well they are shaped.
+//! How far a mesh is from the surface that it stands for, both ways; how its triangles face, and how well
+//! they are shaped.
 //!
-//! Mesh → surface: points spread over every triangle, each moved to the surface by Newton's method; the way it goes is
-//! at least its distance. Surface → mesh: points of the surface found in a grid of half the cells, those on creases and
-//! corners among them, each with its exact distance from the nearest triangle. The larger of the two maxima is the
-//! Hausdorff distance, as far as samples tell.
+//! From the mesh to the surface: points are spread over every triangle, and Newton's method moves each of
+//! them to the surface. The way that it goes is at least its distance. From the surface to the mesh: points
+//! of the surface, with those on creases and corners, come from a mesh in half the cells. Each has its exact
+//! distance from the nearest triangle. The larger of the two maxima is the Hausdorff distance, as far as
+//! samples show.
 //!
 //! Invariant: the samples depend on the mesh, the field and the grid alone; sums are taken in their order.
 
@@ -19,48 +21,53 @@ use super::{
 };
 use crate::field::Field;
 
-/// Distances of many samples.
+/// Distances of many samples in metres, or angles of many samples in degrees.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Distances {
-    /// In the scene's unit (metres).
+    /// The largest.
     pub max: f64,
-    /// Root of the mean square.
+    /// The root of the mean square.
     pub rms: f64,
+    /// The number of samples.
     pub samples: usize,
 }
 
-/// The figures of a mesh over its field.
+/// The quality of a mesh of a field's surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Quality {
-    /// From points of the mesh to the surface; caps at the grid's border left out.
+    /// From points of the mesh to the surface. Caps at the grid's border are left out.
     pub to_surface: Distances,
     /// From points of the surface to the mesh.
     pub from_surface: Distances,
-    /// Angle between a triangle and the surface below its middle, in degrees.
+    /// The angle between a triangle and the surface below its middle, in degrees.
     pub normal_error: Distances,
-    /// Volume and area less those of a mesh in half the cells, as a share: that mesh's own error is about a quarter of
-    /// what dual contouring has in these cells.
+    /// The volume over that of a mesh in half the cells, less 1. The error of that mesh is about a quarter of
+    /// the error that dual contouring has in these cells.
     pub volume_error: f64,
+    /// The area over that of a mesh in half the cells, less 1.
     pub area_error: f64,
-    /// Triangles that face the other way than the surface below their middles.
+    /// The number of triangles that face away from the surface below their middles.
     pub flipped: usize,
-    /// Smallest angle of any triangle, in degrees.
+    /// The smallest angle of any triangle, in degrees.
     pub min_angle: f64,
-    /// Smallest and mean ratio of a triangle's inner to its outer radius, twice: 1 if equilateral, 0 without area.
+    /// The smallest radius ratio. The ratio is twice a triangle's inner radius over its outer one: 1 for an
+    /// equilateral triangle, 0 for one without area.
     pub min_radius_ratio: f64,
+    /// The mean radius ratio.
     pub mean_radius_ratio: f64,
-    /// Share of the triangles whose radius ratio is below 0.1.
+    /// The share of the triangles whose radius ratio is below 0.1.
     pub slivers: f64,
 }
 
 impl Quality {
-    /// The larger of both largest distances.
+    /// The Hausdorff distance in metres, as far as samples show: the larger of the largest distances
+    /// both ways.
     pub fn hausdorff(&self) -> f64 {
         self.to_surface.max.max(self.from_surface.max)
     }
 }
 
-/// One flat object, the Hausdorff distance first.
+/// Serialises as one flat object that begins with the Hausdorff distance.
 impl Serialize for Quality {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_struct("Quality", 15)?;
@@ -83,37 +90,39 @@ impl Serialize for Quality {
     }
 }
 
-/// Points of a triangle are spread this many to a side: with sides of a cell, neighbours are a fifth of it apart.
+/// Intervals between sample points along a triangle's side. With sides of a cell, neighbours are a fifth of
+/// it apart.
 const SPREAD: usize = 5;
 
-/// Triangles, or points, treated together.
+/// Triangles or points in a batch.
 const BATCH: usize = 256;
 
-/// Below this radius ratio a triangle faces nowhere.
+/// A triangle with a smaller radius ratio has no direction.
 const NO_DIRECTION: f64 = 1e-6;
 
-/// What meshes of one surface are measured against.
+/// A surface against which meshes of it are measured.
 pub struct Reference<'a> {
     distance: &'a dyn Field,
     /// Points all over the surface.
     points: Vec<DVec3>,
-    /// Volume and area of a mesh in half the cells.
+    /// The volume and the area of a mesh in half the cells.
     extent: (f64, f64),
 }
 
 impl<'a> Reference<'a> {
-    /// Prepares to measure meshes of `field` in `grid`. `distance` has the same surface, and near it ω is the distance
-    /// from it or nearly so: Newton's method then finds the nearest face, where parts of unlike scale would mislead it.
+    /// Prepares to measure meshes of `field` in `grid`. `distance` must have the surface of `field`, and near
+    /// it ω must be the distance from it or nearly so. Newton's method then finds the nearest face, while
+    /// parts of unlike scale would mislead it.
     ///
     /// # Errors
-    /// Those of meshing the finer grid that gives points of the surface.
+    /// Those of [`dual_contouring`] in the finer grid that gives points of the surface.
     pub fn new(field: &dyn Field, distance: &'a dyn Field, grid: &Grid) -> Result<Self, MeshError> {
         let finer = Grid::filling(grid.bounds(), Resolution::Spacing(0.5 * grid.spacing().min_element()));
         let finer = dual_contouring(field, finer.as_ref().unwrap_or(grid), &|_| ())?;
         Ok(Self { distance, points: surface_points(&finer, distance, grid), extent: extent(&finer) })
     }
 
-    /// Measures a mesh.
+    /// Measures a mesh of the surface. For a mesh without triangles all distances are 0.
     pub fn measure(&self, mesh: &Mesh) -> Quality {
         let mut quality = shapes(mesh);
         if mesh.triangles.is_empty() {
@@ -128,7 +137,8 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// Measures one mesh of `field` in `grid`, see [`Reference`].
+/// Measures one mesh of `field` in `grid`. Several meshes of one surface are measured faster with
+/// a [`Reference`].
 ///
 /// # Errors
 /// Those of [`Reference::new`].
@@ -141,7 +151,7 @@ pub fn measure(
     Ok(Reference::new(field, distance, grid)?.measure(mesh))
 }
 
-/// Volume and area.
+/// The volume and the area of a mesh.
 fn extent(mesh: &Mesh) -> (f64, f64) {
     shells(mesh).iter().fold((0.0, 0.0), |sum, shell| (sum.0 + shell.volume, sum.1 + shell.area))
 }
@@ -166,7 +176,7 @@ fn shapes(mesh: &Mesh) -> Quality {
     }
 }
 
-/// 2r/R of a triangle with the sides a, b, c and the area A: 16A²/((a + b + c)·abc).
+/// The radius ratio 2r/R = 16A²/((a + b + c)·abc) of a triangle with the sides a, b, c and the area A.
 fn radius_ratio([p, q, r]: [DVec3; 3]) -> f64 {
     let (a, b, c) = (q.distance(r), r.distance(p), p.distance(q));
     let twice_area = (q - p).cross(r - p).length();
@@ -174,7 +184,7 @@ fn radius_ratio([p, q, r]: [DVec3; 3]) -> f64 {
     if below > 0.0 { 4.0 * twice_area * twice_area / below } else { 0.0 }
 }
 
-/// Degrees; 0 where two corners coincide.
+/// The smallest angle in degrees; 0 where two corners coincide.
 fn min_angle(corners: [DVec3; 3]) -> f64 {
     let angle = |i: usize| {
         let (u, v) = (corners[(i + 1) % 3] - corners[i], corners[(i + 2) % 3] - corners[i]);
@@ -212,7 +222,7 @@ impl Sums {
     }
 }
 
-/// Points of a triangle, on its border too: the middle first.
+/// Points of a triangle: the middle, then others that are spread over it and its border.
 fn spread([a, b, c]: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
     let n = SPREAD;
     let lattice = (0..=n).flat_map(move |i| {
@@ -253,18 +263,18 @@ fn mesh_to_surface(mesh: &Mesh, field: &dyn Field, quality: &mut Quality) {
     quality.flipped = parts.iter().map(|part| part.2).sum();
 }
 
-/// A point of the surface, with the outward unit normal that the distance has where the search began: that of the nearest
-/// point, while in a narrow gap the search may end on the other wall.
+/// A point of the surface, with the outward unit normal that the distance has where the search began. That is
+/// the normal of the nearest point, while in a narrow gap the search may end on the other wall.
 #[derive(Debug, Clone, Copy)]
 struct Foot {
     position: DVec3,
     normal: Option<DVec3>,
 }
 
-/// Newton steps: a point beside a crease goes to and fro between its faces, nearer each time.
+/// Newton steps at most. A point beside a crease goes to and fro between its faces, nearer each time.
 const STEPS: usize = 24;
 
-/// The point of the surface that each point is led to by Newton's method.
+/// The points of the surface to which Newton's method leads.
 fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
     let mut feet: Vec<Foot> = points.iter().map(|&position| Foot { position, normal: None }).collect();
     let mut moving: Vec<usize> = (0..points.len()).collect();
@@ -290,7 +300,7 @@ fn feet(field: &dyn Field, points: &[DVec3]) -> Vec<Foot> {
     feet
 }
 
-/// Points all over the surface, about half a cell apart, on its creases and corners too, from a mesh of it.
+/// Points all over the surface and on its creases and corners, about half a cell apart, from a mesh of it.
 fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid) -> Vec<DVec3> {
     let mut points = Vec::with_capacity(2 * mesh.positions.len());
     let caps: std::collections::HashSet<u32> = mesh.caps.iter().copied().collect();
@@ -308,10 +318,10 @@ fn surface_points(mesh: &Mesh, distance: &dyn Field, grid: &Grid) -> Vec<DVec3> 
     points
 }
 
-/// A triangle in the index.
-struct Place([DVec3; 3]);
+/// A triangle in the spatial index.
+struct IndexedTriangle([DVec3; 3]);
 
-impl RTreeObject for Place {
+impl RTreeObject for IndexedTriangle {
     type Envelope = AABB<[f64; 3]>;
 
     fn envelope(&self) -> Self::Envelope {
@@ -320,7 +330,7 @@ impl RTreeObject for Place {
     }
 }
 
-impl PointDistance for Place {
+impl PointDistance for IndexedTriangle {
     fn distance_2(&self, point: &[f64; 3]) -> f64 {
         let p = DVec3::from_array(*point);
         p.distance_squared(nearest_point(self.0, p))
@@ -328,7 +338,7 @@ impl PointDistance for Place {
 }
 
 fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
-    let index = RTree::bulk_load(mesh.triangles.iter().map(|&t| Place(corners(mesh, t))).collect());
+    let index = RTree::bulk_load(mesh.triangles.iter().map(|&t| IndexedTriangle(corners(mesh, t))).collect());
     let parts: Vec<Sums> = points
         .par_chunks(BATCH)
         .map(|points| {
@@ -343,7 +353,7 @@ fn surface_to_mesh(mesh: &Mesh, points: &[DVec3]) -> Distances {
     Sums::join(parts.into_iter())
 }
 
-/// The point of a triangle nearest to `p`: inside, on a side or in a corner.
+/// The point of a triangle nearest to `p`. It lies inside, on a side or in a corner.
 pub(super) fn nearest_point([a, b, c]: [DVec3; 3], p: DVec3) -> DVec3 {
     let normal = (b - a).cross(c - a);
     let above = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) >= 0.0;
@@ -395,7 +405,7 @@ mod tests {
         assert_eq!((radius_ratio([DVec3::X; 3]), min_angle([DVec3::X; 3])), (0.0, 0.0));
     }
 
-    /// A mesh of a ball of radius r against the field of one of radius 1: 1 − r both ways, up to the chords' error.
+    /// A mesh of a ball of radius r is 1 − r away from a ball of radius 1 both ways, up to the chords' error.
     #[test]
     fn a_ball_that_is_too_small_is_told_both_ways() {
         let ball = |radius: f64| Closures {

@@ -1,13 +1,13 @@
-//! Where ω changes sign along an edge of the grid, to the last digits, for many edges at a time.
+//! Where ω changes sign along edges of the grid, to the last digits, for many edges at a time.
 //!
-//! On most edges ω is one leaf, and most leaves are quadratic along a line: three values determine the root, a step
-//! across it confirms it. What this does not settle (creases, other leaves) is left to Chandrupatla's method (Adv. Eng.
-//! Software 28, 1997): inverse quadratic interpolation where three points show that it is safe, else bisection. R0
-//! fields bend sharply near creases and may be flat, so a bracket is always kept and bisection bounds the number of
-//! steps.
+//! On most edges ω is one leaf, and most leaves are quadratic along a line. Three values then determine the
+//! root, and a step across it confirms it. Chandrupatla's method (Adv. Eng. Software 28, 1997) does the rest,
+//! at creases and with other leaves: inverse quadratic interpolation where three points show that it is safe,
+//! and bisection elsewhere. R0 fields bend sharply near creases and may be flat, so a bracket is always kept
+//! and bisection bounds the number of steps.
 //!
-//! Invariant: the result lies in the closed edge and is one of two points at most [`BRACKET`] apart of which one
-//! has ω > 0 and the other does not: the one with the smaller |ω|.
+//! Invariant: the result lies in the closed edge. It is one of two points at most [`BRACKET`] apart, one with
+//! ω > 0 and one without: the one with the smaller |ω|.
 
 use std::ops::Range;
 
@@ -16,39 +16,40 @@ use crate::field::{Field, Points};
 
 /// Edges along one axis, with ω > 0 at exactly one end of each.
 #[derive(Debug, Default, Clone)]
-pub(super) struct Edges {
-    /// Coordinates of the ends on the axis.
+pub(super) struct AxisEdges {
+    /// The coordinates of both ends on the axis.
     pub low: Vec<f64>,
     pub high: Vec<f64>,
-    /// Coordinates on the next axis and on the one after, cyclically.
+    /// The coordinates on the next axis and on the one after it, cyclically.
     pub across: [Vec<f64>; 2],
 }
 
-/// The width of the final bracket relative to the edge's coordinates: a few times the rounding of an R0 field
-/// divided by its slope. Narrower ones make the search wander in that rounding: 13 evaluations for each edge of
-/// the pawn rather than 8. The root itself is mostly right to the last digit. Roots so near to an edge's end are
-/// put on it, so that vertices which meet in a node coincide exactly and can be merged.
+/// The width of the final bracket relative to the edge's coordinates: a few times the rounding of an R0
+/// field divided by its slope. In a narrower bracket the search wanders in that rounding and takes 13
+/// evaluations for each edge of the pawn instead of 8. The root itself is mostly right to the last digit. A
+/// root that is so near to an edge's end is put on it, so that vertices which meet in a node coincide
+/// exactly and can be merged.
 const BRACKET: f64 = 32.0 * f64::EPSILON;
 
 /// The first step across a root that interpolation seems to have found, as a share of the final bracket.
 const FIRST_STEP: f64 = 0.25;
 
-/// How much longer the next step is if that one does not change the sign: ω is flatter there than three points
-/// could show.
+/// How much longer the next step is if a step does not change the sign, because ω is flatter there than three
+/// points could show.
 const STEP_GROWTH: f64 = 4.0;
 
-/// The least distance of the third value from the edge's ends, as a share of the edge: nearer, rounding would decide
-/// about the curvature.
+/// The least distance of the third value from the edge's ends, as a share of the edge. If it were nearer,
+/// rounding would decide about the curvature.
 const LEAST_SHARE: f64 = 1.0 / 64.0;
 
-/// Interpolation halves a bracket at least every other step in practice; after this many steps only bisection
+/// In practice interpolation halves a bracket at least every other step. After this many steps only bisection
 /// is used, which ends within 60 more.
 const MAX_INTERPOLATIONS: usize = 40;
 
-/// Edges in a batch: enough to fill vector code, few enough to stay in the nearest cache.
+/// Edges in a batch: enough for vector code, and few enough to stay in the nearest cache.
 const BATCH: usize = 512;
 
-impl Edges {
+impl AxisEdges {
     pub(super) fn clear(&mut self) {
         self.low.clear();
         self.high.clear();
@@ -74,7 +75,7 @@ impl Edges {
     }
 }
 
-/// Points on edges along an axis, one on each, as columns.
+/// One point on each of some edges along an axis, as columns.
 fn on_axis<'a>(axis: usize, along: &'a [f64], across: [&'a [f64]; 2]) -> Points<'a> {
     match axis {
         0 => Points::new(along, across[0], across[1]),
@@ -86,17 +87,19 @@ fn on_axis<'a>(axis: usize, along: &'a [f64], across: [&'a [f64]; 2]) -> Points<
 /// Finds roots, keeping its memory from one call to the next.
 #[derive(Debug, Default)]
 pub(super) struct RootFinder {
-    /// ω at both ends of each edge, then where the straight line, the parabola and the step across it led.
+    /// ω at both ends of each edge, then at the points that the straight line, the parabola and the step
+    /// across its root gave.
     omega: [Vec<f64>; 5],
     tried: [Vec<f64>; 3],
-    /// dω/dt of the parabola at its root.
+    /// The slope dω/dt of each parabola at its root.
     slopes: Vec<f64>,
-    searches: Vec<Search>,
+    searches: Vec<RootSearch>,
     columns: [Vec<f64>; 3],
 }
 
 impl RootFinder {
-    /// Appends the surface's coordinate on each edge along `axis` to `roots`; returns the number of evaluations.
+    /// Appends the surface's coordinate on each edge along `axis` to `roots`; returns the number
+    /// of evaluations.
     ///
     /// # Errors
     /// [`MeshError::NotANumber`] at the first NaN found.
@@ -104,7 +107,7 @@ impl RootFinder {
         &mut self,
         field: &dyn Field,
         axis: usize,
-        edges: &Edges,
+        edges: &AxisEdges,
         roots: &mut Vec<f64>,
     ) -> Result<u64, MeshError> {
         let mut evaluations = 0;
@@ -117,12 +120,12 @@ impl RootFinder {
         Ok(evaluations)
     }
 
-    /// Fills `tried` and `omega` for a batch of edges.
+    /// Fills `tried`, `slopes` and `omega` for a batch of edges. Returns the number of evaluations.
     fn fit_parabolas(
         &mut self,
         field: &dyn Field,
         axis: usize,
-        edges: &Edges,
+        edges: &AxisEdges,
         batch: Range<usize>,
     ) -> Result<u64, MeshError> {
         let across = edges.across.each_ref().map(|column| &column[batch.clone()]);
@@ -149,20 +152,20 @@ impl RootFinder {
 
         step.clear();
         for (i, &f) in at_parabola[..count].iter().enumerate() {
-            // ω = 0 counts as outside: the step then leads to the end that is inside
+            // ω = 0 counts as outside, and then the step leads to the end that is inside
             let towards_high = (f > 0.0) == (f0[i] > 0.0);
             let least = FIRST_STEP * BRACKET * low[i].abs().max(high[i].abs());
             let way = (f / self.slopes[i]).abs() + least;
             let next = if towards_high { parabola[i] + way } else { parabola[i] - way };
-            // infinite and NaN ways lead to an end
+            // an infinite or NaN way leads to an end
             step.push(if towards_high { next.min(high[i]) } else { next.max(low[i]) });
         }
         evaluations += evaluate(field, on_axis(axis, step, across), at_step)?;
         Ok(evaluations)
     }
 
-    /// Takes the roots that lie between the parabola's and the step; lists searches for the others.
-    fn confirm(&mut self, edges: &Edges, batch: Range<usize>, roots: &mut Vec<f64>) {
+    /// Appends the roots that the step confirms, and lists searches for the others.
+    fn confirm(&mut self, edges: &AxisEdges, batch: Range<usize>, roots: &mut Vec<f64>) {
         self.searches.clear();
         for (i, edge) in batch.enumerate() {
             let at = |k: usize| (self.tried[k][i], self.omega[k + 2][i]);
@@ -181,7 +184,7 @@ impl RootFinder {
                 false => (low, parabola),
             };
             roots.push(f64::NAN);
-            self.searches.push(Search::new(
+            self.searches.push(RootSearch::new(
                 edge,
                 roots.len() - 1,
                 [step, other, previous],
@@ -190,12 +193,12 @@ impl RootFinder {
         }
     }
 
-    /// Ends the listed searches.
+    /// Finishes the listed searches. Returns the number of evaluations.
     fn search(
         &mut self,
         field: &dyn Field,
         axis: usize,
-        edges: &Edges,
+        edges: &AxisEdges,
         roots: &mut [f64],
     ) -> Result<u64, MeshError> {
         let mut evaluations = 0;
@@ -226,7 +229,7 @@ impl RootFinder {
     }
 }
 
-/// ω at many points.
+/// Evaluates ω at many points. Returns their number.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] at the first NaN.
@@ -240,31 +243,33 @@ fn evaluate(field: &dyn Field, points: Points<'_>, omega: &mut Vec<f64>) -> Resu
     Ok(points.len() as u64)
 }
 
-/// The share of an edge at which the straight line through the values at its ends is zero; kept off the ends.
+/// The share of an edge at which the straight line through the values at its ends is zero. It is kept off
+/// the ends.
 fn line_share(f0: f64, f1: f64) -> f64 {
     let share = f0 / (f0 - f1);
     // not a number when an end is infinite
     if share.is_nan() { 0.5 } else { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) }
 }
 
-/// The root in [0, 1] of the parabola through (0, f0), (1, f1) and (s, f), and the parabola's slope there; f0 and f1
-/// differ in sign, so there is exactly one.
+/// The root in [0, 1] of the parabola through (0, f0), (1, f1) and (s, f), and the parabola's slope there.
+/// There is exactly one, because f0 and f1 differ in sign.
 fn parabola_root(f0: f64, f1: f64, s: f64, f: f64) -> (f64, f64) {
     let rise = f1 - f0;
     // f0 + b·t + c·t²
     let c = (f - f0 - s * rise) / (s * (s - 1.0));
     let b = rise - c;
     let slope = (b * b - 4.0 * c * f0).max(0.0).sqrt().copysign(rise);
-    // of the two equal forms the one that adds numbers of one sign
+    // both forms are equal; this one adds numbers of one sign
     let share = if b * slope >= 0.0 { -2.0 * f0 / (b + slope) } else { (slope - b) / (2.0 * c) };
     (if share.is_nan() { 0.5 } else { share.clamp(0.0, 1.0) }, slope)
 }
 
-/// One edge's search. `newest` and `other` bracket the root, `previous` is the point last given up.
+/// The search on one edge. `newest` and `other` bracket the root, and `previous` is the point that was given
+/// up last.
 #[derive(Debug, Clone, Copy)]
-struct Search {
+struct RootSearch {
     edge: usize,
-    /// Where the root is written.
+    /// The place in `roots` for the result.
     slot: usize,
     newest: (f64, f64),
     other: (f64, f64),
@@ -277,8 +282,9 @@ struct Search {
     next: f64,
 }
 
-impl Search {
-    /// Goes on from the newest point, the one that brackets the root with it, and the one given up.
+impl RootSearch {
+    /// Goes on from the newest point, the point that brackets the root with it, and the point that was
+    /// given up.
     fn new(edge: usize, slot: usize, [newest, other, previous]: [(f64, f64); 3], tolerance: f64) -> Self {
         let least_step = FIRST_STEP * tolerance;
         let mut search = Self { edge, slot, newest, other, previous, tolerance, least_step, next: 0.0 };
@@ -286,7 +292,7 @@ impl Search {
         search
     }
 
-    /// Takes ω at `next` into account; returns the root once the bracket is down to rounding.
+    /// Takes ω at `next` into account. Returns the root once the bracket is as narrow as rounding allows.
     fn advance(&mut self, omega: f64, interpolate: bool) -> Option<f64> {
         // ω = 0 counts as outside, as everywhere: a field may be zero on a whole region.
         if (omega > 0.0) == (self.newest.1 > 0.0) {
@@ -308,8 +314,8 @@ impl Search {
         None
     }
 
-    /// The share of the bracket, from the newest point, at which inverse quadratic interpolation puts the root;
-    /// none where the three points do not promise a monotone parabola.
+    /// The share of the bracket, from the newest point, at which inverse quadratic interpolation puts the
+    /// root. `None` where the three points do not promise a monotone parabola.
     fn quadratic_share(&self) -> Option<f64> {
         let ((x1, f1), (x2, f2), (x3, f3)) = (self.newest, self.other, self.previous);
         let xi = (x1 - x2) / (x3 - x2);
@@ -345,7 +351,7 @@ mod tests {
 
     fn solve(field: &dyn Field, count: usize) -> Result<(Vec<f64>, u64), MeshError> {
         let column = |value| vec![value; count];
-        let edges = Edges { low: column(0.0), high: column(1.0), across: [column(3.0), column(2.0)] };
+        let edges = AxisEdges { low: column(0.0), high: column(1.0), across: [column(3.0), column(2.0)] };
         let mut roots = Vec::new();
         let evaluations = RootFinder::default().solve(field, 1, &edges, &mut roots)?;
         Ok((roots, evaluations))
@@ -394,7 +400,7 @@ mod tests {
         let at = DVec3::new(1.0, 2.0, 3.0);
         for axis in 0..3 {
             let across = [1, 2].map(|next| vec![at[(axis + next) % 3]]);
-            let edges = Edges { low: vec![0.0], high: vec![5.0], across };
+            let edges = AxisEdges { low: vec![0.0], high: vec![5.0], across };
             let mut roots = Vec::new();
             RootFinder::default().solve(&field, axis, &edges, &mut roots).unwrap();
             assert!((roots[0] - at[axis]).abs() < 1e-14, "axis {axis}: {}", roots[0]);

@@ -7,33 +7,36 @@ use super::Mesh;
 /// One connected part of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shell {
-    /// Its lowest vertex.
+    /// The lowest of its vertices.
     pub first_vertex: u32,
+    /// The number of vertices.
     pub vertices: usize,
+    /// The number of triangles.
     pub triangles: usize,
-    /// Signed volume in cubic metres: positive for the outside of a solid, negative for the wall of a cavity.
+    /// The signed volume in m³: positive for the outside of a solid, negative for the wall of a cavity.
     pub volume: f64,
-    /// Square metres.
+    /// The area in m².
     pub area: f64,
 }
 
 impl Shell {
-    /// A volume this small beside its area (a ball has 0.09 of area^1.5) is rounding: the shell is a folded
-    /// sheet without inside.
+    /// A volume below this share of area^1.5 is rounding, and the shell is a folded sheet without inside. A
+    /// ball has 0.09.
     const FLAT: f64 = 1e-12;
 
-    /// True for the outside of a solid.
+    /// Whether the shell is the outside of a solid.
     pub fn is_solid(&self) -> bool {
         self.volume > Self::FLAT * self.area.powf(1.5)
     }
 
-    /// True for the wall of a cavity.
+    /// Whether the shell is the wall of a cavity.
     pub fn is_cavity(&self) -> bool {
         self.volume < -Self::FLAT * self.area.powf(1.5)
     }
 }
 
-/// The connected parts of a mesh. Vertices that no triangle uses belong to none.
+/// The connected parts of a mesh, in the order of their first vertices. Vertices that no triangle uses belong
+/// to no part.
 pub fn shells(mesh: &Mesh) -> Vec<Shell> {
     let mut roots = Roots::new(mesh.positions.len());
     for &[a, b, c] in &mesh.triangles {
@@ -49,7 +52,8 @@ pub fn shells(mesh: &Mesh) -> Vec<Shell> {
             found.len() - 1
         });
         let shell = &mut found[index];
-        // Volumes about a vertex of the shell itself: a small shell far from the origin keeps its digits.
+        // volumes about a vertex of the shell itself, so that a small shell far from the origin keeps
+        // its digits
         let origin = mesh.positions[root as usize];
         let [p, q, r] = [a, b, c].map(|v| mesh.positions[v as usize] - origin);
         shell.triangles += 1;
@@ -65,7 +69,7 @@ pub fn shells(mesh: &Mesh) -> Vec<Shell> {
     found
 }
 
-/// Disjoint sets whose representative is their least member.
+/// Disjoint sets. The representative of a set is its least member.
 pub(super) struct Roots {
     parents: Vec<u32>,
 }

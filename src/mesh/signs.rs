@@ -1,36 +1,37 @@
-//! The signs at a brick's nodes, one bit each, and what follows from them: crossed edges, their numbers, cells that
-//! the surface passes through.
+//! The signs at a brick's nodes, one bit each, and what follows from them: crossed edges, their numbers, and
+//! the cells that the surface passes through.
 //!
-//! A plane of a brick's nodes is a word: bit x + 8·y tells whether node (x, y) lies inside. Edges belong to the brick
-//! of their low end, cells to that of their low corner; both may reach into the seven bricks above.
+//! A plane of a brick's nodes is a word: bit x + 8·y is set if node (x, y) lies inside. An edge belongs
+//! to the brick of its low end, a cell to the brick of its low corner. Both may reach into the seven
+//! bricks above.
 //!
 //! Invariant: a bit is set exactly where ω > 0, whether sampled or proven; the ring's bits are zero.
 
 use super::{
     MeshError,
     cases::{EDGES, edge},
-    prune::{BRICK, Bricks, Lattice, NearBrick, Place},
+    prune::{BRICK, BrickKind, Bricks, Lattice, NearBrick},
 };
 use crate::field::{Field, Points};
 
-/// Inside bits of a brick's nodes, plane by plane.
+/// The inside bits of a brick's nodes, plane by plane.
 pub(super) type Signs = [u64; BRICK];
 
-/// Bits of the nodes with x = 0, and of those with y = 0.
+/// The bits of the nodes with x = 0, and the bits of those with y = 0.
 const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 const FIRST_ROW: u64 = 0xff;
 
-/// Points of a brick, and ω there.
+/// Takes the signs of bricks. The points of a brick and ω there are kept as memory for the next one.
 #[derive(Debug, Default)]
-pub(super) struct Samples {
+pub(super) struct SignSampler {
     x: Vec<f64>,
     y: Vec<f64>,
     z: Vec<f64>,
     omega: Vec<f64>,
 }
 
-impl Samples {
-    /// Samples a brick's own nodes, or takes their proven sign; adds to the number of evaluations.
+impl SignSampler {
+    /// The signs at a brick's own nodes, sampled or proven. Adds to the number of evaluations.
     ///
     /// # Errors
     /// [`MeshError::NotANumber`] at the first NaN.
@@ -64,7 +65,7 @@ impl Samples {
         self.omega.resize(points.len(), 0.0);
         field.omega_many(points, &mut self.omega);
         *evaluations += points.len() as u64;
-        // a pass of its own without a way out in the middle becomes vector code
+        // a separate pass that never leaves early becomes vector code
         if self.omega.iter().fold(false, |any, w| any | w.is_nan()) {
             let first = self.omega.iter().position(|w| w.is_nan()).unwrap_or(0);
             return Err(MeshError::NotANumber { at: points.get(first) });
@@ -86,27 +87,29 @@ impl Samples {
 pub(super) struct Brick {
     /// Its number among the near bricks.
     pub number: usize,
-    /// Extended indices of its first node.
+    /// The extended indices of its first node.
     pub low: [usize; 3],
     /// Crossed edges by axis and plane.
     pub edges: [Signs; 3],
-    /// How many crossed edges come before each word of `edges`.
+    /// The number of crossed edges before each word of `edges`.
     before: [[u16; BRICK]; 3],
-    /// The bricks above: at i − 1 the one that is higher on the axes whose bits are set in i.
-    upper: [Place; 7],
-    /// The number of its first vertex: those on edges come first, then the inner ones.
+    /// The bricks above. Entry i − 1 is the brick that is higher on the axes whose bits are set in i.
+    upper: [BrickKind; 7],
+    /// The number of its first vertex. Vertices on edges come first, then inner ones.
     pub first: u32,
-    /// How many vertices lie within its cells.
+    /// The number of vertices within its cells.
     pub inner: u32,
 }
 
-/// Vertices on edges of a brick and on those of the bricks above that its cells use, by [`edge_slot`].
+/// The vertices on edges of a brick, and on the edges of the bricks above that its cells use,
+/// by [`edge_slot`].
 pub(super) type VertexTable = [u32; 3 * SLOTS];
 
 const SLOTS_ALONG: usize = BRICK + 1;
 const SLOTS: usize = SLOTS_ALONG.pow(3);
 
-/// Where the vertex of an edge stands in the table: the edge along `axis` from a node, counted from the brick's first.
+/// The place in the table of the vertex on an edge: the edge along `axis` from a node, which is counted from
+/// the brick's first node.
 pub(super) const fn edge_slot(axis: usize, [x, y, z]: [usize; 3]) -> usize {
     axis * SLOTS + (z * SLOTS_ALONG + y) * SLOTS_ALONG + x
 }
@@ -116,8 +119,8 @@ pub(super) fn vertex_table() -> Box<VertexTable> {
     Box::new([0; 3 * SLOTS])
 }
 
-/// Where the vertex of each edge of the first cell stands in a vertex table; that of another cell stands as much
-/// further on as the cell's x edge.
+/// The places in a vertex table for the edges of the first cell. Those of another cell are as much further on
+/// as that cell's x edge.
 pub(super) const SLOT_OF_EDGE: [usize; EDGES] = {
     let mut slots = [0; EDGES];
     let mut e = 0;
@@ -130,11 +133,11 @@ pub(super) const SLOT_OF_EDGE: [usize; EDGES] = {
 };
 
 impl Brick {
-    /// Finds a brick's neighbours and crossed edges.
+    /// A near brick with its neighbours and crossed edges.
     pub(super) fn new(bricks: &Bricks, signs: &[Signs], number: usize) -> Self {
         let at = bricks.near[number].at;
         let upper = [1, 2, 3, 4, 5, 6, 7]
-            .map(|i| bricks.place([0, 1, 2].map(|axis: usize| at[axis] + (i >> axis & 1))));
+            .map(|i| bricks.kind([0, 1, 2].map(|axis: usize| at[axis] + (i >> axis & 1))));
         let mut brick = Self {
             number,
             low: at.map(|b| b * BRICK),
@@ -161,17 +164,18 @@ impl Brick {
         brick
     }
 
-    /// Number of crossed edges.
+    /// The number of crossed edges.
     pub(super) fn crossings(&self) -> u32 {
         u32::from(self.before[2][BRICK - 1]) + self.edges[2][BRICK - 1].count_ones()
     }
 
-    /// Number of vertices, on edges and within cells.
+    /// The number of vertices, on edges and within cells.
     pub(super) fn vertices(&self) -> usize {
         (self.crossings() + self.inner) as usize
     }
 
-    /// Calls `visit(axis, node)` for each crossed edge in the order of vertices; nodes count from the brick's first.
+    /// Calls `visit(axis, node)` for each crossed edge in the order of vertices. Nodes are counted from the
+    /// brick's first node.
     pub(super) fn for_each_edge(&self, mut visit: impl FnMut(usize, [usize; 3])) {
         for (axis, planes) in self.edges.iter().enumerate() {
             for (z, &word) in planes.iter().enumerate() {
@@ -182,12 +186,12 @@ impl Brick {
         }
     }
 
-    /// Signs of the brick and of the nodes above that its cells use.
+    /// The signs of the brick, and of the nodes above that its cells use.
     pub(super) fn around(&self, signs: &[Signs]) -> Around {
         let above = |i: usize, z: usize| match self.upper[i - 1] {
-            Place::Solid => u64::MAX,
-            Place::Fluid => 0,
-            Place::Near(neighbour) => signs[neighbour as usize][z],
+            BrickKind::Solid => u64::MAX,
+            BrickKind::Fluid => 0,
+            BrickKind::Near(neighbour) => signs[neighbour as usize][z],
         };
         let mut around = Around { planes: [[0; BRICK + 1]; 4] };
         around.planes[0][..BRICK].copy_from_slice(&signs[self.number]);
@@ -198,8 +202,9 @@ impl Brick {
         around
     }
 
-    /// Writes the numbers of all vertices that the brick's cells may use. `crossed` gives a near brick by its number,
-    /// if it is crossed: one without a crossed cell holds no crossed edge either, whose other cells would be crossed too.
+    /// Writes the numbers of all vertices that the brick's cells may use. `crossed` gives a near brick by its
+    /// number if it is crossed. A brick without a crossed cell has no crossed edge either, because all cells
+    /// around such an edge are crossed.
     pub(super) fn number_vertices<'a>(
         &self,
         crossed: impl Fn(u32) -> Option<&'a Self>,
@@ -211,14 +216,14 @@ impl Brick {
             next += 1;
         });
         for (i, place) in (1..8_usize).zip(self.upper) {
-            let Place::Near(neighbour) = place else { continue };
+            let BrickKind::Near(neighbour) = place else { continue };
             let Some(neighbour) = crossed(neighbour) else { continue };
             let offset = [0, 1, 2].map(|axis: usize| (i >> axis & 1) * BRICK);
             let mut touching = u64::MAX;
             touching &= if i & 1 == 0 { u64::MAX } else { FIRST_COLUMN };
             touching &= if i & 2 == 0 { u64::MAX } else { FIRST_ROW };
             let planes = if i & 4 == 0 { BRICK } else { 1 };
-            // an edge along an axis on which the neighbour is higher leads away from the brick
+            // an edge along an axis on which the neighbour is higher leads away from this brick
             for axis in (0..3).filter(|axis| i >> axis & 1 == 0) {
                 for z in 0..planes {
                     let word = neighbour.edges[axis][z];
@@ -234,11 +239,11 @@ impl Brick {
     }
 }
 
-/// Signs of a brick's nodes, and of the nodes of the bricks above that its cells use.
+/// The signs of a brick's nodes, and of the nodes of the bricks above that its cells use.
 #[derive(Debug)]
 pub(super) struct Around {
-    /// Planes of the brick itself, of the one above on x, on y, and on both; the last plane is that of the four bricks
-    /// above on z.
+    /// The planes of the brick itself and of the bricks above it on x, on y, and on both. The last plane
+    /// belongs to the four bricks above on z.
     planes: [[u64; BRICK + 1]; 4],
 }
 
@@ -248,7 +253,8 @@ impl Around {
         (0..BRICK).any(|z| crossed_cells(&self.corners(z)) != 0)
     }
 
-    /// For each cell of plane `z`, bit x + 8·y, whether its corner c is inside; c as in `cases`.
+    /// For each corner c, numbered as in `cases`, a word whose bit x + 8·y is set if that corner of cell (x,
+    /// y) in plane `z` is inside.
     pub(super) fn corners(&self, z: usize) -> [u64; 8] {
         let [a, b, c, d] = self.corners_below(z);
         let [e, f, g, h] = self.corners_below(z + 1);
@@ -265,19 +271,19 @@ impl Around {
     }
 }
 
-/// Cells that the surface passes through: their corners have both signs.
+/// The cells that the surface passes through: those whose corners have both signs.
 pub(super) fn crossed_cells(corners: &[u64; 8]) -> u64 {
     let some = corners.iter().fold(0, |bits, c| bits | c);
     let all = corners.iter().fold(u64::MAX, |bits, c| bits & c);
     some & !all
 }
 
-/// The corners of one cell: bit c tells whether corner c is inside.
+/// The corners of one cell: bit c is set if corner c is inside.
 pub(super) fn inside_corners(corners: &[u64; 8], cell: usize) -> u8 {
     (0..8).fold(0, |inside, c| inside | ((corners[c] >> cell & 1) as u8) << c)
 }
 
-/// Positions of the set bits, ascending.
+/// The positions of the set bits, ascending.
 pub(super) fn set_positions(mut word: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = (word != 0).then(|| word.trailing_zeros() as usize)?;

@@ -1,11 +1,12 @@
-//! Takes slivers out of a mesh: edges of thin triangles are contracted to one of their ends, so that every vertex stays
-//! where the mesher put it, on the surface.
+//! Takes slivers out of a mesh. Edges of thin triangles are contracted to one of their ends, so every vertex
+//! stays on the surface, where the mesher put it.
 //!
-//! Where the surface passes close to a node of the grid, marching cubes put several vertices there, a hair's breadth
-//! from one another, and thin triangles between them and those further off.
+//! Where the surface passes close to a node of the grid, marching cubes put several vertices very close to
+//! one another, and thin triangles between them and those further off.
 //!
-//! Invariant: each step meets the link condition (see `collapse`), turns no triangle by more than [`LARGEST_TURN`], and
-//! leaves the worst triangle it touches better than it was. So the mesh stays closed, manifold and of the same topology.
+//! Invariant: each step meets the link condition (see `collapse`), so the mesh stays closed, manifold and of
+//! the same topology. It turns no triangle by more than [`LARGEST_TURN`], and the worst triangle that it
+//! touches becomes better.
 
 use glam::DVec3;
 
@@ -14,24 +15,26 @@ use super::{
     collapse::{Fans, compact},
 };
 
-/// Triangles less round than this are slivers: 1 is equilateral, 0 has no area.
+/// Triangles less round than this are slivers. An equilateral triangle has 1, one without area has 0.
 pub(super) const SLIVER: f64 = 0.1;
 
-/// The cosine of the largest angle by which a triangle may turn. Slivers themselves may turn freely: they have hardly a
-/// direction.
+/// The cosine of the largest angle by which a triangle may turn. Slivers themselves may turn freely, because
+/// they hardly have a direction.
 const LARGEST_TURN: f64 = 0.7;
 
-/// Passes over the mesh; after the third few slivers give way.
+/// Passes over the mesh at most. After the third few slivers give way.
 const PASSES: usize = 4;
 
-/// 4√3 · area / sum of the squared sides: 1 for an equilateral triangle, 0 for one without area.
+/// The roundness 4√3 · area / (sum of the squared sides): 1 for an equilateral triangle, 0 for one
+/// without area.
 pub(super) fn roundness([a, b, c]: [DVec3; 3]) -> f64 {
     let sides = a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
     let twice_area = (b - a).cross(c - a).length();
     if sides > 0.0 { 2.0 * 3.0_f64.sqrt() * twice_area / sides } else { 0.0 }
 }
 
-/// Contracts edges of slivers where that is safe; returns how many vertices it took.
+/// Contracts edges of slivers where that keeps the mesh closed, manifold and in shape. Returns the number of
+/// vertices that it removed.
 pub fn remove_slivers(mesh: &mut Mesh) -> usize {
     let before = mesh.positions.len();
     for _ in 0..PASSES {
@@ -53,7 +56,8 @@ pub fn remove_slivers(mesh: &mut Mesh) -> usize {
     before - mesh.positions.len()
 }
 
-/// Contracts the shortest edge of a sliver that can be, to the better of its ends.
+/// Contracts the shortest edge of a sliver that may be contracted, to the better of its ends. Returns whether
+/// there was one.
 fn contract_one(fans: &mut Fans<'_>, sliver: u32) -> bool {
     let corners = fans.mesh.triangles[sliver as usize];
     let position = |v: u32| fans.mesh.positions[v as usize];
@@ -79,8 +83,8 @@ fn contract_one(fans: &mut Fans<'_>, sliver: u32) -> bool {
     false
 }
 
-/// The worst quality around `lost` once it is drawn to `kept`; nothing if that is no better than before, or turns a
-/// triangle too far.
+/// The worst roundness around `lost` once it is drawn to `kept`. `None` if that is no better than before, or
+/// if a triangle turns too far.
 fn gain(fans: &Fans<'_>, kept: u32, lost: u32) -> Option<f64> {
     let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
     for t in fans.fan(lost) {

@@ -12,7 +12,7 @@ use crate::{
     interval::Interval,
 };
 
-/// A field from ω alone; ∇ω by central differences, good enough for normals and Newton steps.
+/// A field from ω alone. Central differences give ∇ω, which is good enough for normals and Newton steps.
 pub(super) struct Formula<F>(pub F);
 
 impl<F: Fn(DVec3) -> f64 + Send + Sync> Field for Formula<F> {
@@ -54,7 +54,7 @@ pub(super) fn ball(centre: DVec3, radius: f64) -> impl Fn(DVec3) -> f64 {
     move |p| radius * radius - p.distance_squared(centre)
 }
 
-/// max-norm box: ω = 0 exactly on faces that lie on nodes.
+/// A box by the max norm: ω = 0 exactly on faces that lie on nodes.
 fn cuboid(p: DVec3, half: DVec3) -> f64 {
     (half - p.abs()).min_element()
 }
@@ -73,7 +73,7 @@ fn check_around(field: &dyn Field, bounds: &Aabb, cells: usize) -> (Mesh, Report
     check_mesh(field, &Grid::around(bounds, Resolution::Cells(cells)).unwrap())
 }
 
-/// The same in an imposed box.
+/// Meshes in an imposed box and checks what must hold of every mesh.
 #[track_caller]
 fn check_filling(field: &dyn Field, bounds: &Aabb, cells: usize) -> (Mesh, Report) {
     check_mesh(field, &Grid::filling(bounds, Resolution::Cells(cells)).unwrap())
@@ -296,6 +296,20 @@ fn nan_is_an_error_that_names_the_point() {
 }
 
 #[test]
+fn the_limit_of_vertices_is_the_one_that_the_error_names() {
+    assert_eq!(MeshError::check_vertices(Mesh::MAX_VERTICES), Ok(()));
+    let error = MeshError::check_vertices(Mesh::MAX_VERTICES + 1).unwrap_err();
+    assert_eq!(error, MeshError::TooManyVertices { found: 536_870_913 });
+    assert_eq!(
+        error.to_string(),
+        "the mesh would have 536870913 vertices; at most 536870912 are possible, use larger cells"
+    );
+    // what the limit is for: `check` numbers the corners of twice as many triangles, PLY and VTP write
+    // signed indices
+    assert!(u32::try_from(3 * 2 * Mesh::MAX_VERTICES).is_ok() && i32::try_from(Mesh::MAX_VERTICES).is_ok());
+}
+
+#[test]
 fn nan_or_zero_gradients_fall_back_to_triangles() {
     for bad in [DVec3::NAN, DVec3::ZERO] {
         let field = Closures { omega: ball(DVec3::ZERO, 1.0), gradient: move |_| bad };
@@ -397,7 +411,7 @@ pub(super) fn trilinear(values: Vec<f64>, n: usize) -> impl Fn(DVec3) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
-    /// Noise: every case, every neighbourhood of cases, every way to meet the border.
+    /// Noise has every case, every neighbourhood of cases and every way to meet the border.
     #[test]
     fn random_grids_are_closed_and_manifold(values in prop::collection::vec(-1.0..1.0_f64, 125)) {
         let domain = Aabb::new(DVec3::ZERO, DVec3::splat(4.0));
@@ -406,7 +420,7 @@ proptest! {
         prop_assert_eq!(report.degenerate, 0);
     }
 
-    /// Noise with many exact zeros: vertices meet in nodes all over.
+    /// In noise with many exact zeros vertices meet in nodes all over.
     #[test]
     fn random_grids_with_zeros_stay_closed_and_manifold(values in prop::collection::vec(-1..=1_i32, 125)) {
         let values = values.into_iter().map(f64::from).collect();
@@ -421,7 +435,7 @@ pub(super) fn pawn_mesh() -> Mesh {
     check_around(&Formula(pawn), &bounds, 24).0
 }
 
-/// Prints times; asserts nothing about them. `cargo test --release --lib print_times -- --nocapture`
+/// Prints times and asserts nothing about them. `cargo test --release --lib print_times -- --nocapture`
 #[test]
 fn print_times_of_the_pawn() {
     let fastest = |work: &mut dyn FnMut()| {

@@ -1,32 +1,34 @@
 //! What marching cubes cannot see: parts of a solid, or gaps in it, that pass between the nodes of the grid.
 //!
-//! Cells that touch no triangle have corners of one sign only, as have all cells around them. Where the range over
-//! such a cell, cut to eighths, does not exclude the surface, or a point of the other sign is found, something thinner
-//! than a cell is hidden there. Cells next to triangles are not asked: every curved surface bulges a little into some.
+//! A cell that touches no triangle has corners of one sign only, and so have all cells around it. If the
+//! ranges over its parts, an eighth of a cell long, do not exclude the surface, or if a point of the other
+//! sign is found, something thinner than a cell is hidden there. Cells next to triangles are not examined,
+//! because every curved surface bulges a little into some of them.
 //!
-//! Invariant: a cell that is not counted and touches no triangle is proven to hold no surface, or the field knows no
-//! ranges there and no sampled point of it has the other sign.
+//! Invariant: a cell that is not counted and touches no triangle is proven to hold no surface; or the field
+//! knows no ranges there, and no sampled point of the cell has the other sign.
 
 use rayon::prelude::*;
 
 use super::{
     Grid, MeshError,
     crossings::sample,
-    prune::{BRICK, Bricks, Lattice, Place},
+    prune::{BRICK, BrickKind, Bricks, Lattice},
     signs::{Brick, Signs, crossed_cells},
 };
 use crate::{field::Field, geom::Aabb, interval::Interval};
 
-/// Cells away from the mesh in which a surface is hidden from the grid.
+/// The cells away from the mesh in which a surface is hidden from the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThinCells {
+    /// The number of such cells.
     pub count: usize,
-    /// The smallest box around all of them; empty if there are none.
+    /// The smallest box around all of them, in metres; empty if there are none.
     pub bounds: Aabb,
 }
 
 impl ThinCells {
-    /// What is found where the grid sees everything.
+    /// The result for a grid that sees everything.
     pub const NONE: Self = Self { count: 0, bounds: Aabb::EMPTY };
 
     fn and(self, other: Self) -> Self {
@@ -34,13 +36,14 @@ impl ThinCells {
     }
 }
 
-/// How often an undecided cell is halved on each axis.
+/// The number of times that an undecided cell is halved on each axis.
 const HALVINGS: u32 = 3;
 
-/// Rows of a brick's cells and of those next to it, bit 0 being the cell before the first.
+/// Rows of a brick's cells and of the cells next to it. Bit 0 is the cell before the brick's first.
 type Rows = [[u16; BRICK + 2]; BRICK + 2];
 
-/// Counts the cells of a grid in which [`super::marching_cubes`] misses a surface, or may.
+/// Counts the cells of a grid in which [`marching_cubes`](super::marching_cubes) misses a surface, or may
+/// miss one.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node.
@@ -65,7 +68,7 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
             }
             let rows = crossed_rows(&near, &crossed, brick.at);
             let untouched = std::array::from_fn(|z| untouched_plane(&rows, z));
-            let search = Search {
+            let search = HiddenSearch {
                 field,
                 lattice: &lattice,
                 low: brick.at.map(|b| b * BRICK),
@@ -79,7 +82,7 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
     Ok(parts.into_iter().fold(ThinCells::NONE, ThinCells::and))
 }
 
-/// Crossed cells of a brick and of the layer of cells around it.
+/// The crossed cells of a brick and of the layer of cells around it.
 fn crossed_rows(near: &Bricks, crossed: &[Signs], at: [usize; 3]) -> Rows {
     let mut rows = [[0; BRICK + 2]; BRICK + 2];
     for i in 0..27 {
@@ -87,11 +90,11 @@ fn crossed_rows(near: &Bricks, crossed: &[Signs], at: [usize; 3]) -> Rows {
         if (0..3).any(|axis| at[axis] + step[axis] == 0) {
             continue;
         }
-        let Place::Near(number) = near.place([0, 1, 2].map(|axis| at[axis] + step[axis] - 1)) else {
+        let BrickKind::Near(number) = near.kind([0, 1, 2].map(|axis| at[axis] + step[axis] - 1)) else {
             continue;
         };
         let planes = &crossed[number as usize];
-        // of a neighbour only its last or its first layer lies next to the brick
+        // only the last or the first layer of a neighbour lies next to the brick
         let layers = |axis: usize| match step[axis] {
             0 => BRICK - 1..BRICK,
             1 => 0..BRICK,
@@ -113,7 +116,7 @@ fn crossed_rows(near: &Bricks, crossed: &[Signs], at: [usize; 3]) -> Rows {
     rows
 }
 
-/// Cells of a plane of the brick that have no crossed cell around them.
+/// The cells of a plane of the brick that have no crossed cell around them.
 fn untouched_plane(rows: &Rows, z: usize) -> u64 {
     let mut touched = 0;
     for y in 0..BRICK {
@@ -125,26 +128,26 @@ fn untouched_plane(rows: &Rows, z: usize) -> u64 {
 }
 
 /// The search for hidden surfaces in one brick.
-struct Search<'a> {
+struct HiddenSearch<'a> {
     field: &'a dyn Field,
     lattice: &'a Lattice,
-    /// Extended indices of the brick's first node.
+    /// The extended indices of the brick's first node.
     low: [usize; 3],
-    /// Cells of the grid.
+    /// The numbers of cells of the grid.
     cells: [usize; 3],
-    /// Cells to be searched.
+    /// The cells to search.
     untouched: Signs,
     signs: &'a Signs,
 }
 
-impl Search<'_> {
-    /// Thin cells in a cube of cells, counted from the brick's first.
+impl HiddenSearch<'_> {
+    /// The thin cells in a cube of cells, whose first cell is counted from the brick's first.
     fn count(&self, first: [usize; 3], size: usize) -> ThinCells {
         let row = ((1_u64 << size) - 1) << first[0];
         let square = (first[1]..first[1] + size).fold(0, |bits, y| bits | row << (BRICK * y));
         let any = self.untouched[first[2]..first[2] + size].iter().any(|plane| plane & square != 0);
         let low = [0, 1, 2].map(|axis| self.low[axis] + first[axis]);
-        // the ring's cells, below the first node of the grid or from the last on, have no extent
+        // cells of the ring, below the first node of the grid or from the last node on, have no extent
         let beyond = (0..3).any(|axis| low[axis] + size <= 1 || low[axis] > self.cells[axis]);
         if !any || beyond {
             return ThinCells::NONE;
@@ -169,8 +172,8 @@ fn is_decided(range: Interval) -> bool {
     range.lo > 0.0 || range.hi <= 0.0
 }
 
-/// Whether a box has a point of the other sign in the middle of one of its parts, or one of its smallest parts cannot be
-/// excluded.
+/// Whether the middle of the box or of one of its parts has the other sign, or one of its smallest parts
+/// cannot be excluded.
 fn hides_surface(field: &dyn Field, bounds: &Aabb, inside: bool, halvings: u32) -> bool {
     let range = field.range(bounds);
     if is_decided(range) {
@@ -181,7 +184,7 @@ fn hides_surface(field: &dyn Field, bounds: &Aabb, inside: bool, halvings: u32) 
         return true;
     }
     if halvings == 0 {
-        return range != Interval::ALL; // of which nothing is known is not blamed
+        return range != Interval::ALL; // a field that knows nothing here is not blamed
     }
     let parts = bounds.corners().map(|corner| Aabb::new(corner.min(centre), corner.max(centre)));
     parts.iter().any(|part| hides_surface(field, part, inside, halvings - 1))
@@ -194,13 +197,13 @@ mod tests {
     use super::*;
     use crate::mesh::Resolution;
 
-    /// A shell between two balls, with its exact range (up to rounding).
-    struct Shell {
+    /// A shell between two balls, with its exact range up to rounding.
+    struct HollowBall {
         inner: f64,
         outer: f64,
     }
 
-    impl Field for Shell {
+    impl Field for HollowBall {
         fn omega(&self, p: DVec3) -> f64 {
             let r = p.length();
             (self.outer - r).min(r - self.inner)
@@ -224,19 +227,19 @@ mod tests {
     #[test]
     fn a_ball_and_a_thick_shell_hide_nothing() {
         for cells in [5, 16, 40, 64] {
-            assert_eq!(thin(&Shell { inner: -1.0, outer: 0.83 }, cells), ThinCells::NONE);
+            assert_eq!(thin(&HollowBall { inner: -1.0, outer: 0.83 }, cells), ThinCells::NONE);
         }
-        assert_eq!(thin(&Shell { inner: 0.6, outer: 0.83 }, 40), ThinCells::NONE);
+        assert_eq!(thin(&HollowBall { inner: 0.6, outer: 0.83 }, 40), ThinCells::NONE);
     }
 
     #[test]
     fn a_shell_thinner_than_a_cell_is_found_where_it_is() {
         // cells of 1/20, a wall of 1/1000
-        let found = thin(&Shell { inner: 0.8, outer: 0.801 }, 40);
+        let found = thin(&HollowBall { inner: 0.8, outer: 0.801 }, 40);
         // the sphere meets some 6·π·0.8²·20² cells, of which few see a node inside
         assert!(found.count > 1000, "{found:?}");
         assert!(found.bounds.max.max_element() < 0.86 && found.bounds.min.min_element() > -0.86, "{found:?}");
-        assert_eq!(thin(&Shell { inner: 0.8, outer: 0.86 }, 160), ThinCells::NONE);
+        assert_eq!(thin(&HollowBall { inner: 0.8, outer: 0.86 }, 160), ThinCells::NONE);
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! Where the picture is taken from: a mild perspective that shows the whole box, z upwards.
+//! The view: a mild perspective that shows the whole box, with z upwards.
 //!
-//! Screen coordinates are sub-pixels (two per pixel each way), x to the right, y down; nearness is the inverse
-//! of the depth along the view, so it is linear on the screen along lines and planes.
+//! Screen coordinates are sub-pixels, two per pixel each way, with x to the right and y down. Nearness is the
+//! inverse of the depth along the view, so it is linear on the screen along lines and planes.
 
 use glam::{DVec2, DVec3};
 
@@ -11,25 +11,27 @@ use crate::geom::Aabb;
 /// Sub-pixels per pixel in each direction.
 pub(super) const SUBPIXELS: usize = 2;
 
-/// Distance of the eye from the centre of the box, in diagonals of the box: far enough to keep parallels nearly so.
+/// The distance of the eye from the centre of the box, in diagonals of the box. Parallel lines stay
+/// nearly parallel.
 const DISTANCE: f64 = 3.0;
-/// What the box keeps free of a picture 960 high: left, top, right (colour bar), bottom (caption).
+/// The margins around the box in a picture 960 high: left, top, right (colour bar), bottom (caption).
 const MARGINS: [f64; 4] = [48.0, 56.0, 150.0, 72.0];
 
 /// A view of a box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// Pixels.
+    /// The picture's width in pixels.
     pub(super) width: u32,
+    /// The picture's height in pixels.
     pub(super) height: u32,
     eye: DVec3,
     right: DVec3,
     up: DVec3,
-    /// From the scene to the eye.
+    /// The direction from the scene to the eye.
     back: DVec3,
-    /// Sub-pixels for a unit length at depth one.
+    /// The sub-pixels for a unit length at depth one.
     focal: f64,
-    /// Where the axis of the view meets the screen.
+    /// The point where the axis of the view meets the screen.
     centre: DVec2,
 }
 
@@ -41,23 +43,24 @@ pub(super) struct Seen {
 }
 
 impl Camera {
-    /// The usual picture size.
+    /// The usual picture size: width and height in pixels.
     pub const SIZE: (u32, u32) = (1280, 960);
 
-    /// The three-quarter view: x to the right, y away, from a little above.
+    /// The three-quarter view of a box: x to the right, y away from the eye, from a little above. `size` is
+    /// the picture's width and height in pixels.
     ///
     /// # Errors
-    /// As [`Camera::new`].
+    /// Those of [`Camera::new`].
     pub fn three_quarter(bounds: &Aabb, size: (u32, u32)) -> Result<Self, RenderError> {
         Self::new(bounds, DVec3::new(0.48, -1.0, 0.46), size)
     }
 
-    /// A view of the whole box from the direction `towards_eye` (of any length; the three-quarter view's if it is
-    /// zero or not finite). `size` is the picture's width and height in pixels.
+    /// A view of the whole box from the direction `towards_eye`, which may have any length. If it is zero or
+    /// not finite, the view is the three-quarter one. `size` is the picture's width and height in pixels.
     ///
     /// # Errors
-    /// [`RenderError::Bounds`] for a box that is empty, infinite or a point; [`RenderError::Size`] for a picture
-    /// with a side outside 16 ..= 8192.
+    /// [`RenderError::Bounds`] for a box that is empty, infinite or a point; [`RenderError::Size`] for a
+    /// picture with a side outside 16 ..= 8192.
     pub fn new(bounds: &Aabb, towards_eye: DVec3, size: (u32, u32)) -> Result<Self, RenderError> {
         let diagonal = bounds.size().length();
         if bounds.is_empty() || !diagonal.is_finite() || diagonal <= 0.0 {
@@ -68,7 +71,7 @@ impl Camera {
             return Err(RenderError::Size(width, height));
         }
         let back = towards_eye.try_normalize().unwrap_or(DVec3::new(0.48, -1.0, 0.46).normalize());
-        // Straight from above or below, y takes the place of "up".
+        // seen straight from above or below, y points up in the picture
         let right = DVec3::Z.cross(back).try_normalize().unwrap_or(DVec3::X);
         let up = back.cross(right);
         let eye = bounds.centre() + DISTANCE * diagonal * back;
@@ -77,7 +80,7 @@ impl Camera {
         Ok(camera)
     }
 
-    /// Sets the focal length and the centre so that the box fills the picture but for the margins.
+    /// Sets the focal length and the centre so that the box fills the picture except for the margins.
     fn fit(&mut self, bounds: &Aabb) {
         let corners = bounds.corners().map(|corner| self.look(corner).map_or(DVec2::ZERO, |seen| seen.at));
         let (low, high) =
@@ -90,7 +93,8 @@ impl Camera {
         self.centre = DVec2::new(left, top) + 0.5 * room - 0.5 * self.focal * (low + high);
     }
 
-    /// A point on the screen; none for points that are not finite, or behind or very near the eye.
+    /// A point on the screen. `None` for points that are not finite, and for those behind or very near
+    /// the eye.
     pub(super) fn look(&self, p: DVec3) -> Option<Seen> {
         let d = p - self.eye;
         let nearness = 1.0 / -d.dot(self.back);
@@ -98,22 +102,22 @@ impl Camera {
         (nearness > 0.0 && at.abs().max_element() < 1e6).then_some(Seen { at, nearness })
     }
 
-    /// A direction in the camera's frame: x right, y up, z towards the eye.
+    /// A direction in the camera's frame: x to the right, y up, z towards the eye.
     pub(super) fn turn(&self, direction: DVec3) -> DVec3 {
         DVec3::new(direction.dot(self.right), direction.dot(self.up), direction.dot(self.back))
     }
 
-    /// From a point to the eye.
+    /// The vector from a point to the eye.
     pub(super) fn to_eye(&self, p: DVec3) -> DVec3 {
         self.eye - p
     }
 
-    /// Sub-pixels for a unit length at a nearness.
+    /// The sub-pixels for a unit length at a nearness.
     pub(super) fn magnification(&self, nearness: f64) -> f64 {
         self.focal * nearness
     }
 
-    /// Columns and rows of sub-pixels.
+    /// The numbers of columns and rows of sub-pixels.
     pub(super) fn subpixels(&self) -> (usize, usize) {
         (SUBPIXELS * self.width as usize, SUBPIXELS * self.height as usize)
     }

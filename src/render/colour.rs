@@ -1,10 +1,10 @@
-//! The colour of a speed: blue for slow, yellow for medium, red for fast.
+//! The colours of speeds: blue for slow, yellow for medium, red for fast.
 //!
-//! The map is fixed and linear in the speed, so pictures of different runs can be compared: 0 dark blue, ¼ light
-//! blue, ½ yellow, ¾ orange, 1 and above red. Blue and red differ in lightness from yellow between them, and the
-//! map holds no green: it reads with red–green blindness.
+//! The map is fixed and linear in the speed, so pictures of different runs can be compared: 0 is dark blue, ¼
+//! light blue, ½ yellow, ¾ orange, 1 and above red. People with red–green blindness can read it, because it
+//! has no green and the yellow between blue and red is lighter than both.
 
-/// An sRGB colour, 8 bits a channel.
+/// An sRGB colour with 8 bits per channel: red, green, blue.
 pub type Rgb = [u8; 3];
 
 /// The colour of a particle whose speed is NaN.
@@ -13,13 +13,14 @@ pub const UNKNOWN_SPEED: Rgb = [128, 128, 128];
 pub(super) const STOPS: [Rgb; 5] =
     [[44, 98, 188], [108, 176, 226], [250, 218, 88], [240, 128, 46], [190, 24, 34]];
 
-/// The colour of `speed` where `fastest` is red; both in the same unit. All is blue if `fastest` is not positive.
+/// The colour of `speed` on a map on which `fastest` is red; both in the same unit. Every speed is blue if
+/// `fastest` is not positive, and NaN is [`UNKNOWN_SPEED`].
 pub fn speed_colour(speed: f64, fastest: f64) -> Rgb {
     if speed.is_nan() {
         return UNKNOWN_SPEED;
     }
     let t = if fastest > 0.0 { (speed / fastest).clamp(0.0, 1.0) } else { 0.0 };
-    // ∞/∞ is as fast as it gets.
+    // ∞/∞ is the fastest
     let position = if t.is_nan() { 4.0 } else { 4.0 * t };
     let k = (position as usize).min(STOPS.len() - 2);
     let part = position - k as f64;

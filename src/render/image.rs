@@ -2,19 +2,23 @@
 
 use std::io::{self, Write};
 
-/// RGB pixels, row by row from the top.
+/// A picture of RGB pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
+    /// The width in pixels.
     pub width: u32,
+    /// The height in pixels.
     pub height: u32,
-    /// Three bytes a pixel, sRGB.
+    /// Three sRGB bytes per pixel, row by row from the top.
     pub pixels: Vec<u8>,
-    /// Particles that are not in the picture because their position is not finite or lies behind the eye.
+    /// The number of particles that are not in the picture because their position is not finite or lies
+    /// behind the eye.
     pub skipped: usize,
 }
 
 impl Image {
-    /// The colour of a pixel; none outside of the picture.
+    /// The colour of the pixel in column `x` and row `y`, counted from the upper left corner. `None` outside
+    /// the picture.
     pub fn pixel(&self, x: u32, y: u32) -> Option<[u8; 3]> {
         if x >= self.width || y >= self.height {
             return None;
@@ -23,10 +27,10 @@ impl Image {
         self.pixels.get(at..at + 3)?.try_into().ok()
     }
 
-    /// Writes the picture as PNG, packed for speed rather than size.
+    /// Writes the picture as PNG, compressed for speed and not for size.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Those of `out`.
     pub fn write_png(&self, out: &mut impl Write) -> io::Result<()> {
         let mut encoder = png::Encoder::new(out, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
@@ -38,7 +42,7 @@ impl Image {
         Ok(())
     }
 
-    /// Lays a picture with opacity over this one, its upper left corner at (x, y); parts outside are cut off.
+    /// Lays a layer over this picture, with its upper left corner at (x, y). Parts outside are cut off.
     pub(super) fn lay(&mut self, layer: &Layer, x: usize, y: usize) {
         let columns = layer.width.min((self.width as usize).saturating_sub(x));
         for row in 0..layer.height.min((self.height as usize).saturating_sub(y)) {
@@ -47,7 +51,7 @@ impl Image {
             for (pixel, over) in to.chunks_exact_mut(3).zip(from.chunks_exact(4)) {
                 let through = 255 - u16::from(over[3]);
                 for (channel, &colour) in pixel.iter_mut().zip(over) {
-                    // Premultiplied colours never exceed their opacity, so the sum fits a byte.
+                    // premultiplied colours never exceed their opacity, so the sum fits a byte
                     let under = (u16::from(*channel) * through + 127) / 255;
                     *channel = (u16::from(colour) + under).min(255) as u8;
                 }
@@ -56,7 +60,7 @@ impl Image {
     }
 }
 
-/// A picture with opacity: premultiplied RGBA.
+/// A picture with opacity, as premultiplied RGBA.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Layer {
     pub width: usize,

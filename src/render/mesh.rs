@@ -1,4 +1,4 @@
-//! The obstacle: a shaded triangle mesh seen by the camera.
+//! The obstacle: a shaded triangle mesh as the camera sees it.
 
 use glam::DVec3;
 
@@ -8,13 +8,14 @@ use super::{
     shade,
 };
 
-/// A triangle mesh by reference, in the scene's length unit.
+/// A triangle mesh by reference.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Mesh<'a> {
+pub struct MeshView<'a> {
+    /// The vertices in metres.
     pub vertices: &'a [DVec3],
-    /// Outward normals of any length, one a vertex; if there are fewer, the mesh is shaded flat.
+    /// The outward normals of any length, one for each vertex. If there are fewer, the mesh is shaded flat.
     pub normals: &'a [DVec3],
-    /// Indices into the vertices. Both sides are drawn.
+    /// Three indices of vertices for each triangle. Both sides are drawn.
     pub triangles: &'a [[u32; 3]],
 }
 
@@ -22,7 +23,7 @@ pub struct Mesh<'a> {
 #[derive(Debug)]
 pub struct Facets {
     facets: Vec<Facet>,
-    /// Triangles with a bad index or a corner that the camera cannot see.
+    /// The number of triangles with a bad index or a corner that the camera cannot see.
     pub skipped: usize,
 }
 
@@ -30,12 +31,12 @@ pub struct Facets {
 struct Facet {
     corners: [Corner; 3],
     rows: (i64, i64),
-    /// In the camera's frame, towards the side that is seen.
+    /// The normals in the camera's frame, towards the side that is seen.
     normals: [[f32; 3]; 3],
 }
 
 impl Facets {
-    pub fn new(mesh: &Mesh<'_>, camera: &Camera) -> Self {
+    pub fn new(mesh: &MeshView<'_>, camera: &Camera) -> Self {
         let seen: Vec<_> = mesh.vertices.iter().map(|vertex| camera.look(*vertex)).collect();
         let smooth = mesh.normals.len() >= mesh.vertices.len();
         let facet = |triangle: &[u32; 3]| {
@@ -44,7 +45,7 @@ impl Facets {
             let points = [a, b, c].map(|i| mesh.vertices[i]);
             let face = (points[1] - points[0]).cross(points[2] - points[0]);
             let given = if smooth { [a, b, c].map(|i| mesh.normals[i]) } else { [face; 3] };
-            // The winding decides where the face looks only if the normals do not say.
+            // the winding decides which side is outside only if the normals do not
             let outward = if face.dot(given[0] + given[1] + given[2]) < 0.0 { -face } else { face };
             let side = if outward.dot(camera.to_eye(points[0])) < 0.0 { -1.0 } else { 1.0 };
             let normals = given.map(|n| {

@@ -1,15 +1,17 @@
 //! Pictures of a simulation: the box, the obstacle's mesh and the particles, coloured by their speed.
 //!
 //! ```text
-//! Camera, box, mesh ──Scene::new──▶ Scene (drawn once) ──frame(particles)──▶ Image ──write_png──▶ PNG
+//! Camera, box, mesh ──Backdrop::new──▶ Backdrop ──frame(particles)──▶ Image ──write_png──▶ PNG
 //! ```
 //!
 //! Everything is drawn on the processor at twice the size and averaged down. Rows are cut into bands of fixed
-//! height, drawn in parallel; within a band the order is fixed, so ties in depth are settled alike every time.
+//! height, which are drawn in parallel. Within a band the order is fixed, so ties in depth are settled alike
+//! every time.
 //!
-//! Invariant: a band depends on its inputs alone, so a picture has the same bits on any number of threads; this
-//! module takes plain slices, opens no file and reads no clock.
+//! Invariant: a band depends on its inputs alone, so a picture has the same bits on any number of threads.
+//! This module takes plain slices, opens no file and reads no clock.
 
+mod backdrop;
 mod camera;
 mod colour;
 mod image;
@@ -17,30 +19,31 @@ mod mesh;
 mod overlay;
 mod particles;
 mod raster;
-mod scene;
 mod shade;
 
 use std::{fmt, io};
 
+use self::colour::Rgb;
 pub use self::{
+    backdrop::Backdrop,
     camera::Camera,
-    colour::{Rgb, UNKNOWN_SPEED, speed_colour},
     image::Image,
-    mesh::Mesh,
-    particles::Particles,
-    scene::{Legend, Moment, Scene},
+    mesh::MeshView,
+    overlay::{Caption, Legend},
+    particles::ParticlesView,
 };
 use crate::geom::Aabb;
 
-/// Why a scene could not be set up or a picture not be written.
+/// Why a backdrop could not be drawn, or a picture not be written.
 #[derive(Debug)]
 pub enum RenderError {
     /// The box to look at is empty, infinite or a point.
     Bounds(Aabb),
     /// Width and height of the picture, outside 16 ..= 8192.
     Size(u32, u32),
-    /// The legend that we drew is not accepted: a bug of ours.
+    /// The rasteriser refused the legend, which is a bug of ours.
     Legend(String),
+    /// The output could not be written.
     Io(io::Error),
 }
 

@@ -1,4 +1,5 @@
-//! Words and numbers over the picture: title, colour bar and caption, set in the one font that is built in.
+//! Words and numbers over the picture: the title, the colour bar and the caption, in the one font that is
+//! built in.
 
 use std::{
     fmt::Write,
@@ -10,12 +11,26 @@ use resvg::{
     usvg::{Options, Tree, fontdb},
 };
 
-use super::{
-    RenderError,
-    colour::STOPS,
-    image::Layer,
-    scene::{Legend, Moment},
-};
+use super::{RenderError, colour::STOPS, image::Layer};
+
+/// The text beside the picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Legend<'a> {
+    /// The title over the picture.
+    pub title: &'a str,
+    /// The speed that is shown in red, in m/s. Frames of a run can be compared if it is the same for all
+    /// of them.
+    pub fastest: f64,
+}
+
+/// The text under a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Caption {
+    /// Simulated time in seconds.
+    pub time: f64,
+    /// The number of the step.
+    pub step: u64,
+}
 
 const INK: &str = "#1c1c1c";
 
@@ -25,7 +40,7 @@ static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
     Arc::new(fonts)
 });
 
-/// Draws on a page of `size` units at `scale` pixels a unit.
+/// Draws an SVG body on a page of `size` units, at `scale` pixels per unit.
 fn draw(size: (f64, f64), scale: f64, body: &str) -> Result<Layer, RenderError> {
     let svg = format!(
         r#"<svg xmlns="http://www.w3.org/2000/svg" width="{}" height="{}" font-family="Ubuntu" font-weight="300" fill="{INK}">{body}</svg>"#,
@@ -54,9 +69,9 @@ pub fn title(text: &str, width: f64, scale: f64) -> Result<Layer, RenderError> {
     draw((width, 48.0), scale, &format!(r#"<text x="32" y="36" font-size="22">{escaped}</text>"#))
 }
 
-/// Width of the colour bar's layer, in units.
+/// The width of the colour bar's layer, in units.
 pub const BAR_WIDTH: f64 = 124.0;
-/// Height of the colour bar's layer, in units.
+/// The height of the colour bar's layer, in units.
 pub const BAR_HEIGHT: f64 = 420.0;
 
 /// The colour bar for speeds.
@@ -86,11 +101,11 @@ pub fn bar(legend: &Legend<'_>, scale: f64) -> Result<Layer, RenderError> {
     draw((BAR_WIDTH, BAR_HEIGHT), scale, &body)
 }
 
-/// Height of the caption's layer, in units.
+/// The height of the caption's layer, in units.
 pub const CAPTION_HEIGHT: f64 = 44.0;
 
-/// Time, step and number of particles, in columns that stay where they are while the numbers change.
-pub fn caption(moment: &Moment, particles: usize, scale: f64) -> Result<Layer, RenderError> {
+/// The time, the step and the number of particles, in columns that stay in place while the numbers change.
+pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, RenderError> {
     let body = format!(
         r#"<g font-size="18"><text x="32" y="22">t = {:.3} s</text><text x="172" y="22">step {}</text><text x="312" y="22">N = {}</text></g>"#,
         moment.time,
@@ -100,7 +115,7 @@ pub fn caption(moment: &Moment, particles: usize, scale: f64) -> Result<Layer, R
     draw((520.0, CAPTION_HEIGHT), scale, &body)
 }
 
-/// Digits in groups of three, set apart by spaces that do not break.
+/// The digits of a number in groups of three, with unbreakable spaces between them.
 fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut out = String::new();
@@ -113,7 +128,7 @@ fn grouped(number: u64) -> String {
     out
 }
 
-/// Three to seven round values from 0 to `top` with their labels; none if `top` is not a positive number.
+/// Three to seven round values from 0 to `top` with their labels. Empty if `top` is not a positive number.
 fn round_values(top: f64) -> Vec<(f64, String)> {
     if !(top > 0.0 && top.is_finite()) {
         return Vec::new();
@@ -121,7 +136,7 @@ fn round_values(top: f64) -> Vec<(f64, String)> {
     let decade = libm::log10(top).floor() as i32;
     let candidates = [(1, decade - 1), (2, decade - 1), (5, decade - 1), (1, decade), (2, decade)];
     for (mantissa, exponent) in candidates {
-        // Read back from digits: the value is the one that the label says.
+        // read back from digits, so that the value is the one of the label
         let number = |k: i64| format!("{}e{exponent}", k * mantissa).parse::<f64>().unwrap_or(f64::NAN);
         let count = (0..20).take_while(|&k| number(k) <= top * (1.0 + 1e-9)).count() as i64;
         if count <= 7 {
@@ -159,7 +174,7 @@ mod tests {
     #[test]
     fn any_title_and_moment_can_be_set() {
         assert!(title("a<b & \"c\"\u{0}", 400.0, 1.0).is_ok());
-        let layer = caption(&Moment { time: f64::NAN, step: u64::MAX }, 0, 0.1).unwrap();
+        let layer = caption(&Caption { time: f64::NAN, step: u64::MAX }, 0, 0.1).unwrap();
         assert_eq!((layer.width, layer.height), (52, 5));
     }
 }

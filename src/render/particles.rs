@@ -1,4 +1,4 @@
-//! The fluid: particles drawn as balls that cut into each other where they overlap.
+//! The fluid: particles, drawn as balls that cut into each other where they overlap.
 
 use rayon::prelude::*;
 
@@ -12,32 +12,33 @@ use crate::field::Points;
 
 /// Particles by reference.
 #[derive(Debug, Clone, Copy)]
-pub struct Particles<'a> {
-    /// In the scene's length unit.
+pub struct ParticlesView<'a> {
+    /// The positions in metres.
     pub positions: Points<'a>,
-    /// In the unit of [`Legend::fastest`](super::Legend::fastest); particles beyond the slice's end are grey.
+    /// The speeds, in the unit of [`Legend::fastest`](super::Legend::fastest). Particles without a speed
+    /// are grey.
     pub speeds: &'a [f64],
-    /// Of every ball, in the scene's length unit; half the spacing lets neighbours touch.
+    /// The radius of every ball in metres. Neighbours touch if it is half their spacing.
     pub radius: f64,
 }
 
-/// A ball on the screen: a disc in sub-pixels with the front of a ball.
+/// A ball on the screen: a disc in sub-pixels with the front side of a ball.
 #[derive(Debug, Clone, Copy)]
 pub struct Disc {
     x: f32,
     y: f32,
     radius: f32,
     nearness: f32,
-    /// How much nearer the front of the ball is than its middle.
+    /// The nearness of the front of the ball, less that of its middle.
     bulge: f32,
     colour: [f32; 3],
 }
 
-/// Smaller discs could fall between the middles of sub-pixels and flicker.
+/// The least radius in sub-pixels. Smaller discs could fall between the middles of sub-pixels and flicker.
 const MIN_RADIUS: f32 = 0.9;
 
 /// The discs of all particles that the camera sees, in the particles' order.
-pub fn discs(particles: &Particles<'_>, camera: &Camera, fastest: f64) -> Vec<Disc> {
+pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, fastest: f64) -> Vec<Disc> {
     let radius = if particles.radius.is_finite() { particles.radius.max(0.0) } else { 0.0 };
     let disc = |i: usize| {
         let seen = camera.look(particles.positions.get(i))?;
@@ -47,7 +48,7 @@ pub fn discs(particles: &Particles<'_>, camera: &Camera, fastest: f64) -> Vec<Di
             y: seen.at.y as f32,
             radius: (camera.magnification(seen.nearness) * radius).min(1e6) as f32,
             nearness: seen.nearness as f32,
-            // The derivative of 1/depth: a ball is small beside its distance.
+            // the derivative of 1/depth, because a ball is small beside its distance
             bulge: (radius * seen.nearness * seen.nearness) as f32,
             colour: speed_colour(speed, fastest).map(f32::from),
         })
@@ -56,8 +57,8 @@ pub fn discs(particles: &Particles<'_>, camera: &Camera, fastest: f64) -> Vec<Di
     seen.into_iter().flatten().collect()
 }
 
-/// Draws discs over the canvas and then whatever `finish` adds. Only `pixels` near discs change: they must already
-/// hold the picture of the canvas, finished.
+/// Draws discs over the canvas, and then what `finish` adds. Only the `pixels` near discs change, so they
+/// must already hold the finished picture of the canvas.
 pub fn draw(discs: &[Disc], canvas: &Canvas, finish: impl Fn(&mut Band<'_>) + Sync, pixels: &mut [u8]) {
     let stride = canvas.width / SUBPIXELS;
     let height = canvas.nearness.len() / canvas.width;
@@ -68,7 +69,7 @@ pub fn draw(discs: &[Disc], canvas: &Canvas, finish: impl Fn(&mut Band<'_>) + Sy
             discs.iter().filter(|d| d.y + d.reach() >= first && d.y - d.reach() <= end).collect();
         let left = here.iter().map(|d| d.x - d.reach()).fold(f32::INFINITY, f32::min);
         let right = here.iter().map(|d| d.x + d.reach()).fold(f32::NEG_INFINITY, f32::max);
-        // Whole pixels, and the rest of the row stays as it is.
+        // whole pixels; the rest of the row stays as it is
         let even = |x: f32| (x.max(0.0) as usize).min(canvas.width) / SUBPIXELS * SUBPIXELS;
         let columns = even(left)..(even(right + 1.0) + SUBPIXELS).min(canvas.width);
         if here.is_empty() || columns.is_empty() {
@@ -82,7 +83,8 @@ pub fn draw(discs: &[Disc], canvas: &Canvas, finish: impl Fn(&mut Band<'_>) + Sy
             nearness: &mut nearness,
             colour: &mut colour,
         };
-        // Near ones first: most of the others are then hidden and need no shading. Of equals the order stays.
+        // near discs first: most of the others are then hidden and need no shading; equally near ones keep
+        // their order
         here.sort_by(|a, b| b.nearness.total_cmp(&a.nearness));
         for disc in here {
             disc.draw(&mut band);
@@ -107,7 +109,7 @@ impl Disc {
             let half = f64::from(reach * (1.0 - v * v).max(0.0).sqrt());
             let columns = band.columns(f64::from(self.x) - half - 1.0, f64::from(self.x) + half);
             let start = band.index(columns.start, y);
-            // Most rows of a crowd are hidden altogether, and this loop is many pixels at a time.
+            // most rows of a crowd are hidden altogether, and this loop takes many pixels at a time
             let line = &band.nearness[start..start + columns.len()];
             if !line.iter().fold(false, |open, near| open | (*near < foremost)) {
                 continue;

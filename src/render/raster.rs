@@ -1,7 +1,7 @@
 //! Sub-pixels with depth: the canvas, its bands, triangles and lines.
 //!
-//! Invariant: what is nearer hides what is farther, and of equals the first drawn stays. Triangles are cut from
-//! the plane in integers, so neighbours share an edge without gap or overlap.
+//! Invariant: what is nearer hides what is farther, and among equals the first that was drawn stays.
+//! Triangles are cut from the plane in integers, so neighbours share an edge without gap or overlap.
 
 use std::ops::Range;
 
@@ -13,10 +13,11 @@ use super::{
     camera::{SUBPIXELS, Seen},
 };
 
-/// Rows of sub-pixels in a band: fixed, so that pictures do not depend on the number of threads.
+/// Rows of sub-pixels in a band. The number is fixed, so that pictures do not depend on the number
+/// of threads.
 pub const BAND_ROWS: usize = 32;
 
-/// All sub-pixels of a picture. Nearness 0 is infinitely far.
+/// All sub-pixels of a picture. Nearness 0 is infinitely far away.
 #[derive(Debug, Clone)]
 pub struct Canvas {
     pub width: usize,
@@ -51,7 +52,7 @@ impl Canvas {
     }
 }
 
-/// A rectangle of sub-pixels, addressed by their place in the whole picture.
+/// A rectangle of sub-pixels, which are addressed by their place in the whole picture.
 pub struct Band<'a> {
     pub left: usize,
     pub top: usize,
@@ -75,12 +76,13 @@ impl Band<'_> {
         clip(lo, hi, self.top, self.bottom())
     }
 
-    /// Where a sub-pixel of the band is stored.
+    /// The index at which a sub-pixel of the band is stored.
     pub fn index(&self, x: usize, y: usize) -> usize {
         (y - self.top) * self.width + (x - self.left)
     }
 
-    /// Pixels: each the mean of its sub-pixels. `out` holds the band's rows of pixels, `stride` pixels long.
+    /// Writes pixels, each the mean of its sub-pixels. `out` holds the band's rows of pixels, which are
+    /// `stride` pixels long.
     pub fn average(&self, out: &mut [u8], stride: usize) {
         let first = self.left / SUBPIXELS;
         for (row, lines) in self.colour.chunks_exact(SUBPIXELS * self.width).enumerate() {
@@ -97,14 +99,14 @@ impl Band<'_> {
         }
     }
 
-    /// A straight line with soft borders; colour and nearness change evenly along it.
+    /// Draws a straight line with soft borders. Colour and nearness change evenly along it.
     pub fn line(&mut self, ends: [Seen; 2], colours: [Rgb; 2], thickness: f64) {
         let [a, b] = ends.map(|end| end.at);
         let (along, length) = (b - a, a.distance(b));
         let reach = 0.5 * thickness + 0.5;
         for y in self.rows(a.y.min(b.y) - reach, a.y.max(b.y) + reach) {
             let centre = y as f64 + 0.5;
-            // Where the line passes this row; a nearly level line passes everywhere between its ends.
+            // where the line passes this row; a nearly level line passes it everywhere between its ends
             let slack = reach * (1.0 + length / along.y.abs().max(1e-9));
             let at_row = a.x + (centre - a.y) / if along.y == 0.0 { 1e-9 } else { along.y } * along.x;
             let lo = (at_row - slack).max(a.x.min(b.x) - reach);
@@ -126,7 +128,7 @@ impl Band<'_> {
         }
     }
 
-    /// A triangle; `colour` gets the weights of the corners, which sum to one.
+    /// Draws a triangle. `colour` takes the weights of the corners, whose sum is one.
     pub fn triangle(&mut self, corners: &[Corner; 3], colour: impl Fn([f32; 3]) -> Rgb) {
         let [a, b, mut c] = *corners;
         let mut b = b;
@@ -134,7 +136,7 @@ impl Band<'_> {
         if area == 0 {
             return;
         }
-        // Both sides are drawn: go round clockwise on the screen whichever way the corners are given.
+        // both sides are drawn: the corners are taken clockwise on the screen for either order
         let turned = area < 0;
         if turned {
             std::mem::swap(&mut b, &mut c);
@@ -183,7 +185,7 @@ pub struct Corner {
 
 impl Corner {
     pub fn new(seen: Seen) -> Self {
-        // The camera lets nothing beyond a million sub-pixels pass: products below stay within 62 bits.
+        // the camera shows nothing beyond a million sub-pixels, so products below stay within 62 bits
         let snap = |v: f64| (v * STEPS as f64).round() as i64;
         Self { x: snap(seen.at.x), y: snap(seen.at.y), nearness: seen.nearness as f32 }
     }
@@ -204,19 +206,20 @@ fn edge(a: Corner, b: Corner, (x, y): (i64, i64)) -> i64 {
     (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x)
 }
 
-/// Borders that own the points on them, so that of two neighbours exactly one does.
+/// Whether a border owns the points on it. It does for exactly one of two neighbours.
 fn is_top_or_left(a: Corner, b: Corner) -> bool {
     b.y < a.y || (b.y == a.y && b.x > a.x)
 }
 
-/// The whole numbers of lo..=hi within first..end; always a range inside of that, empty or not.
+/// The whole numbers of lo..=hi within first..end. The result is always a range inside that, and may
+/// be empty.
 fn clip(lo: f64, hi: f64, first: usize, end: usize) -> Range<usize> {
-    // `as` saturates, and turns NaN into 0.
+    // `as` saturates, and turns NaN into 0
     let end = ((hi.ceil() + 1.0).max(0.0) as usize).clamp(first, end);
     (lo.floor().max(0.0) as usize).clamp(first, end)..end
 }
 
-/// From `a` (t = 0) to `b` (t = 1).
+/// The colour between `a` (t = 0) and `b` (t = 1).
 pub fn mix(a: Rgb, b: Rgb, t: f64) -> Rgb {
     std::array::from_fn(|i| (f64::from(a[i]) + t * (f64::from(b[i]) - f64::from(a[i]))).round() as u8)
 }
@@ -239,7 +242,7 @@ mod tests {
 
     #[test]
     fn neighbouring_triangles_cover_a_square_once() {
-        // Twice at one nearness: the first drawn stays, so an overlap would show as a missing sub-pixel.
+        // two triangles at one nearness: the first stays, so an overlap would show as a missing sub-pixel
         let (p, q, r, s) = ((3.3, 4.1), (80.7, 9.9), (75.2, 90.5), (1.25, 70.0));
         let mut both = Canvas::new(100, 100, [0; 3]);
         let pieces = [(corners([p, q, r], 1.0), [1; 3]), (corners([r, s, p], 1.0), [2; 3])];

@@ -1,12 +1,12 @@
-//! Light: one lamp over the viewer's left shoulder, and light from everywhere.
+//! Light: one lamp over the viewer's left shoulder, and ambient light.
 //!
-//! Normals are unit vectors in the camera's frame: x right, y up, z towards the eye.
+//! Normals are unit vectors in the camera's frame: x to the right, y up, z towards the eye.
 
 use super::Rgb;
 
-/// Towards the lamp, of unit length.
+/// The unit vector towards the lamp.
 const LAMP: [f32; 3] = [-0.452_29, 0.678_434, 0.578_931];
-/// Half-way between the lamp and the eye, of unit length: where spheres gleam.
+/// The unit vector half-way between the lamp and the eye. Spheres gleam where their normal is this.
 const GLEAM: [f32; 3] = [-0.254_519, 0.381_778, 0.888_519];
 const AMBIENT: f32 = 0.52;
 const DIFFUSE: f32 = 0.58;
@@ -14,15 +14,15 @@ const DIFFUSE: f32 = 0.58;
 /// The obstacle's colour: a neutral warm grey.
 const STONE: [f32; 3] = [203.0, 195.0, 184.0];
 
-/// A point of the obstacle's surface.
+/// The colour of a point of the obstacle's surface.
 pub fn stone(normal: [f32; 3]) -> Rgb {
-    // Some light comes from below, so that undersides keep their shape.
+    // some light depends on the height of the normal, so that undersides keep their shape
     let light = AMBIENT + 0.06 * normal[1] + DIFFUSE * dot(normal, LAMP).max(0.0);
     let gleam = 14.0 * power_16(dot(normal, GLEAM));
     STONE.map(|channel| byte(channel * light + gleam))
 }
 
-/// A point of a particle; the rim is darker, so that neighbours of one colour stay apart.
+/// The colour of a point of a particle. The rim is darker, so that neighbours of one colour stay apart.
 pub fn ball(colour: [f32; 3], normal: [f32; 3]) -> Rgb {
     let rim = (0.45 + 1.1 * normal[2]).min(1.0);
     let light = (0.56 + 0.52 * dot(normal, LAMP).max(0.0)) * rim;
@@ -42,7 +42,7 @@ fn power_16(x: f32) -> f32 {
 }
 
 fn byte(x: f32) -> u8 {
-    // `as` saturates, and turns NaN into 0.
+    // `as` saturates, and turns NaN into 0
     (x + 0.5) as u8
 }
 

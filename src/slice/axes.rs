@@ -1,6 +1,6 @@
-//! The frame of a plot: where (u, v) lies on the page, and the ticks and labels around it.
+//! The frame of a plot: the place of (u, v) on the page, and the ticks and labels around it.
 //!
-//! Page units are CSS pixels, y downwards.
+//! Page units are CSS pixels, with y downwards.
 
 use std::fmt::Write;
 
@@ -18,13 +18,13 @@ const LABEL_SPACING: DVec2 = DVec2::new(46.0, 36.0);
 
 /// The plotted area on the page.
 #[derive(Debug, Clone, Copy)]
-pub struct Frame {
+pub struct PlotFrame {
     pub window: Window,
     pub origin: DVec2,
     pub size: DVec2,
 }
 
-impl Frame {
+impl PlotFrame {
     /// The largest frame with equal scales in both directions, its upper left corner at `origin`.
     pub fn new(window: Window, origin: DVec2) -> Self {
         let size = window.size();
@@ -46,10 +46,10 @@ impl Frame {
     }
 }
 
-/// Border, ticks with numbers, and the names of the axes.
-pub fn draw(out: &mut String, frame: &Frame, plane: Plane) {
+/// Draws the border, ticks with numbers, and the names of the axes.
+pub fn draw(out: &mut String, frame: &PlotFrame, plane: Plane) {
     let (right, up) = plane.axis.right_and_up();
-    let Frame { window, origin, size } = *frame;
+    let PlotFrame { window, origin, size } = *frame;
     let (left, bottom) = (origin.x, frame.bottom());
     let count = |axis: usize| ((size[axis] / LABEL_SPACING[axis]) as usize).clamp(2, 9);
 
@@ -98,7 +98,7 @@ pub fn draw(out: &mut String, frame: &Frame, plane: Plane) {
     );
 }
 
-/// Lines and text: a little softer than black.
+/// The colour of lines and text, a little softer than black.
 pub const INK: &str = "#1c1c1c";
 
 #[cfg(test)]
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn frames_keep_the_shape_of_the_window_and_the_v_axis_points_up() {
         let window = Window::new(DVec2::new(0.0, 1.0), DVec2::new(2.0, 2.0));
-        let frame = Frame::new(window, DVec2::new(50.0, 40.0));
+        let frame = PlotFrame::new(window, DVec2::new(50.0, 40.0));
         assert_eq!(frame.size, DVec2::new(560.0, 280.0));
         assert_eq!(frame.page(window.min), DVec2::new(50.0, frame.bottom()));
         assert_eq!(frame.page(window.max), DVec2::new(frame.right(), 40.0));

@@ -1,37 +1,39 @@
-//! The colours of ω: bands between levels 1, 2, 5 · 10ⁿ, oranges inside and blues outside.
+//! The colours of ω: bands between the levels 1, 2, 5 · 10ⁿ, orange inside and blue outside.
 //!
-//! Levels that shrink by decades keep detail near the surface while far values, often a hundred times larger, share
-//! the outermost bands instead of washing the picture out. Each side has its own largest level because ω is not a
-//! distance: an obstacle may reach +0.2 where its surroundings reach −20. Both ramps darken away from the surface
-//! and differ in hue and in no other respect, so the plot reads for the colour-blind too, and the pale ends stay
-//! apart on paper because the line ω = 0 lies between them.
+//! Levels that shrink by decades keep detail near the surface. Values far from it, often a hundred times
+//! larger, share the outermost bands and do not wash the picture out. Each side has its own largest level
+//! because ω is not a distance: an obstacle may reach +0.2 where its surroundings reach −20. Both ramps
+//! darken away from the surface and differ only in hue, so colour-blind people can read the plot too. The
+//! pale ends stay apart on paper because the line ω = 0 lies between them.
 
 use super::{Samples, numbers::Decimal};
 
-/// An sRGB colour, 8 bits a channel.
+/// An sRGB colour with 8 bits per channel: red, green, blue.
 pub type Rgb = [u8; 3];
 
-/// The colour of places without a value.
+/// The colour of places where ω is NaN.
 pub const UNDEFINED: Rgb = [214, 214, 214];
 
-/// Levels other than zero on a side: five span a factor of 20 to 25.
+/// Levels other than zero on each side. Five span a factor of 20 to 25.
 const LEVELS_PER_SIDE: usize = 5;
-/// The ramps from the surface outwards, spread evenly over a side's bands.
+/// The ramps from the surface outwards. They are spread evenly over the bands of a side.
 const INSIDE: [Rgb; 3] = [[255, 237, 211], [247, 176, 102], [208, 103, 30]];
 const OUTSIDE: [Rgb; 3] = [[232, 241, 249], [155, 197, 226], [77, 134, 188]];
 
-/// Which ω has which colour: bands are numbered from the lowest ω to the highest, band k below level k.
+/// The colours of values of ω. Bands are numbered from the lowest ω to the highest, and band k lies below
+/// level k.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {
-    /// Ascending, zero among them.
+    /// The levels, ascending, with zero among them.
     levels: Vec<Decimal>,
     values: Vec<f64>,
-    /// Index of the level zero: bands 0..=zero are outside, the others inside.
+    /// The index of the level zero. Bands 0..=zero are outside, the others inside.
     zero: usize,
 }
 
 impl Scale {
-    /// Levels that suit a slice: on each side the highest is just below the 98th percentile of |ω| there.
+    /// The levels that suit a slice. On each side the highest is the largest 1, 2 or 5 · 10ⁿ up to the 98th
+    /// percentile of |ω| there.
     pub fn for_samples(samples: &Samples) -> Self {
         let side = |sign: f64| {
             let magnitudes = samples.omega.iter().map(|w| w * sign).filter(|w| *w > 0.0 && w.is_finite());
@@ -54,7 +56,7 @@ impl Scale {
         Self { levels, values, zero }
     }
 
-    /// The levels in ascending order; zero is one of them.
+    /// The levels in ascending order. Zero is one of them.
     pub fn levels(&self) -> &[f64] {
         &self.values
     }
@@ -63,17 +65,18 @@ impl Scale {
         &self.levels
     }
 
-    /// One more than the levels.
+    /// The number of bands: one more than there are levels.
     pub fn bands(&self) -> usize {
         self.levels.len() + 1
     }
 
-    /// The band that holds a value; none for NaN.
+    /// The band that holds a value. `None` for NaN.
     pub fn band(&self, omega: f64) -> Option<usize> {
         (!omega.is_nan()).then(|| self.values.partition_point(|level| *level <= omega))
     }
 
-    /// How far a band is from the surface, 1 to 0 outside and 0 to 1 inside, and whether it is inside.
+    /// Whether a band is inside, and how far it is from the surface: 0 for the nearest band of its side, 1
+    /// for the farthest.
     pub fn depth(&self, band: usize) -> (bool, f64) {
         let part = |k: usize, last: usize| if last == 0 { 0.5 } else { k.min(last) as f64 / last as f64 };
         match band.checked_sub(self.zero + 1) {
@@ -82,12 +85,13 @@ impl Scale {
         }
     }
 
+    /// The colour of a band.
     pub fn band_colour(&self, band: usize) -> Rgb {
         let (inside, depth) = self.depth(band);
         ramp(if inside { &INSIDE } else { &OUTSIDE }, depth)
     }
 
-    /// The colour of a value; [`UNDEFINED`] for NaN.
+    /// The colour of a value. [`UNDEFINED`] for NaN.
     pub fn colour(&self, omega: f64) -> Rgb {
         self.band(omega).map_or(UNDEFINED, |band| self.band_colour(band))
     }

@@ -1,44 +1,48 @@
-//! Level sets of ω in a slice: marching squares with every crossing refined on ω itself.
+//! Level sets of ω in a slice, by marching squares with every crossing refined on ω itself.
 //!
-//! The grid is thought to have a rim of cells outside the window where nothing is inside, so each level gives
-//! closed loops: the outlines of {ω ≥ level}, which run along the window's border where the region is cut off.
-//! The isolines are those loops without their border parts, hence fills and lines fit each other exactly.
-//! A node without a value (NaN) counts as rim.
+//! The grid is surrounded by a rim of nodes that count as outside, so each level gives closed loops: the
+//! outlines of {ω ≥ level}, which run along the window's border where the region is cut off. The isolines are
+//! these loops without their border parts, so fills and lines fit each other exactly. A node without a value
+//! (NaN) counts as rim.
 //!
-//! Invariant: a loop has ω ≥ level on its left; the order of loops and points depends on the samples alone.
+//! Invariant: a loop has ω ≥ level on its left. The order of loops and points depends on the samples alone.
 
 use glam::DVec2;
 
 use super::Samples;
 use crate::field::Field;
 
-/// A connected piece of a level set, in (u, v).
+/// A connected piece of a level set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polyline {
+    /// The points in order, as (u, v) in metres.
     pub points: Vec<DVec2>,
-    /// The last point is joined to the first one, which is not repeated.
+    /// Whether the last point is joined to the first one, which is not repeated.
     pub closed: bool,
 }
 
-/// A closed outline of {ω ≥ level}; `rim[i]` marks points put there by the window's border or by a NaN.
+/// A closed outline of {ω ≥ level}.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
+    /// The points in order, as (u, v) in metres. The first is not repeated.
     pub points: Vec<DVec2>,
+    /// For each point whether it is not on the level, but at the window's border or beside a NaN.
     pub rim: Vec<bool>,
 }
 
-/// The lines ω = `level` of a slice. The samples must be the field's own.
+/// The lines ω = `level` of a slice. The samples must be those of the field.
 pub fn isolines(field: &dyn Field, samples: &Samples, level: f64) -> Vec<Polyline> {
     outlines(field, samples, level).iter().flat_map(Outline::isolines).collect()
 }
 
-/// The outlines of the region ω ≥ `level` in the window; fill them by the even-odd rule.
+/// The outlines of the region ω ≥ `level` in the window, to be filled by the even-odd rule. The samples must
+/// be those of the field.
 pub fn outlines(field: &dyn Field, samples: &Samples, level: f64) -> Vec<Outline> {
     Tracer { field, samples, level }.outlines()
 }
 
 impl Outline {
-    /// The parts between rim points.
+    /// The parts of the outline between rim points.
     pub fn isolines(&self) -> Vec<Polyline> {
         let n = self.points.len();
         let Some(start) = self.rim.iter().position(|&rim| rim) else {
@@ -61,7 +65,7 @@ impl Outline {
 
 const NONE: u32 = u32::MAX;
 
-/// Nodes are numbered with the rim: (0, 0) is the rim's corner, (1, 1) the first sample.
+/// Traces outlines. Nodes are numbered with the rim: (0, 0) is the rim's corner, (1, 1) the first sample.
 struct Tracer<'a> {
     field: &'a dyn Field,
     samples: &'a Samples,
@@ -115,9 +119,9 @@ impl Tracer<'_> {
                 ];
                 let saddle = count == 2 && inside[0] == inside[2];
                 let joined = saddle && self.inside(self.centre(column, row));
-                // Walking round the square, a line enters where the border turns from inside to outside and
-                // leaves where it turns back: at the turn just before, or, if two inside corners are joined
-                // through the middle, at the turn just after.
+                // on a walk around the square a line enters where the border turns from inside to outside,
+                // and leaves where it turns back: at the turn just before, or, if two inside corners are
+                // joined through the middle, at the turn just after
                 for side in (0..4).filter(|&side| inside[side] && !inside[(side + 1) % 4]) {
                     let step = if joined { 1 } else { 3 };
                     let turns_in = |s: usize| !inside[s] && inside[(s + 1) % 4];
@@ -143,7 +147,7 @@ impl Tracer<'_> {
         omega >= self.level
     }
 
-    /// ω at a node; NaN on the rim.
+    /// ω at a node. NaN on the rim.
     fn value(&self, column: usize, row: usize) -> f64 {
         let within = |i: usize, n: usize| (1..=n).contains(&i);
         if within(column, self.samples.columns) && within(row, self.samples.rows) {
@@ -164,7 +168,7 @@ impl Tracer<'_> {
         self.samples.position(clamp(column, self.samples.columns), clamp(row, self.samples.rows))
     }
 
-    /// Where the level is met on a crossed edge, and whether that is the rim.
+    /// The point of a crossed edge on the level, and whether it is on the rim instead.
     fn crossing(&self, edge: usize) -> (DVec2, bool) {
         let (node, vertical) = (edge / 2, edge % 2 == 1);
         let from = (node % self.width(), node / self.width());
@@ -180,12 +184,12 @@ impl Tracer<'_> {
     }
 }
 
-/// The bracket of a root found, relative to the edge of a cell.
+/// The final bracket of a root, relative to the edge of a cell.
 const ROOT_TOLERANCE: f64 = 1e-13;
 
-/// A root of f in [0, 1] with f(0) ≥ 0 > f(1): Illinois steps and bisections in turn, so that kinks and
+/// A root of f in [0, 1] with f(0) ≥ 0 > f(1), by Illinois steps and bisections in turn, so that kinks and
 /// jumps cannot stall it. Steps keep off the ends by the tolerance, so that the far end is drawn in when the
-/// near one has reached the root. Stops where f has no value.
+/// near one has reached the root. The search stops where f has no value.
 fn root(f: impl Fn(f64) -> f64, f0: f64, f1: f64) -> f64 {
     let (mut lo, mut hi) = ((0.0, f0), (1.0, f1));
     let mut kept = 0;
@@ -250,7 +254,7 @@ mod tests {
         let points = &trace(&disc(), 1.0, 0.0)[0].points;
         let twice_area: f64 =
             (0..points.len()).map(|i| points[i].perp_dot(points[(i + 1) % points.len()])).sum();
-        // The polygon with 40 samples is inscribed: its area is a little below π/4.
+        // the polygon with 40 samples is inscribed, so its area is a little below π/4
         assert!((0.5 * twice_area - std::f64::consts::FRAC_PI_4).abs() < 5e-3, "{twice_area}");
     }
 
@@ -268,7 +272,7 @@ mod tests {
 
     #[test]
     fn saddles_follow_the_sample_in_the_middle() {
-        // One cell: two opposite corners inside. The bump decides whether they are connected.
+        // one cell with two opposite corners inside: the bump decides whether they are connected
         for (bump, pieces) in [(0.5, 1), (-0.5, 2)] {
             let f = field(move |p| p.x * p.y + bump * (1.0 - p.x * p.x) * (1.0 - p.y * p.y));
             let window = Window::new(DVec2::splat(-1.0), DVec2::ONE);

@@ -1,28 +1,29 @@
-//! The numbers on isolines: one a level at most, where the line is straight and there is room.
+//! The numbers on isolines: at most one for each level, where the line is straight and there is room.
 //!
-//! Invariant: a label keeps away from the frame, from the lines of other levels and from the labels before it.
+//! Invariant: a label keeps away from the frame, from the lines of other levels and from the labels
+//! before it.
 
 use glam::DVec2;
 
-use super::axes::Frame;
+use super::axes::PlotFrame;
 
-/// A number on the page, turned with its line but never upside down.
+/// A number on the page. It is turned with its line, but never upside down.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Label {
+pub struct LevelLabel {
     pub at: DVec2,
-    /// Degrees, clockwise, −90 to 90.
+    /// In degrees, clockwise, −90 to 90.
     pub angle: f64,
     pub text: String,
 }
 
-/// Width of a character and height of the labels, for type of 10 units.
+/// The width of a character and the height of a label in type of 10 units.
 const CHARACTER: f64 = 5.6;
 const HEIGHT: f64 = 11.0;
 
-/// Collects labels that do not disturb each other.
+/// Finds places for labels that do not disturb each other.
 #[derive(Debug)]
 pub struct Placer<'a> {
-    frame: &'a Frame,
+    frame: &'a PlotFrame,
     /// The lines of each level, in page units, with points close together.
     lines: &'a [Vec<Vec<DVec2>>],
     /// Centres and radii of the labels so far.
@@ -30,12 +31,12 @@ pub struct Placer<'a> {
 }
 
 impl<'a> Placer<'a> {
-    pub fn new(frame: &'a Frame, lines: &'a [Vec<Vec<DVec2>>]) -> Self {
+    pub fn new(frame: &'a PlotFrame, lines: &'a [Vec<Vec<DVec2>>]) -> Self {
         Self { frame, lines, taken: Vec::new() }
     }
 
-    /// The best place for a text on the lines of a level, if there is any.
-    pub fn place(&mut self, level: usize, text: &str) -> Option<Label> {
+    /// The best label for a text on the lines of a level. `None` if there is no room.
+    pub fn place(&mut self, level: usize, text: &str) -> Option<LevelLabel> {
         let width = CHARACTER * text.chars().count() as f64;
         let candidates = self.lines[level].iter().flat_map(|line| stations(line, width));
         let best = candidates
@@ -50,7 +51,7 @@ impl<'a> Placer<'a> {
         } else {
             angle
         };
-        Some(Label { at: best.at, angle: upright, text: text.to_owned() })
+        Some(LevelLabel { at: best.at, angle: upright, text: text.to_owned() })
     }
 
     fn is_free(&self, station: &Station, level: usize, radius: f64) -> bool {
@@ -72,7 +73,8 @@ impl<'a> Placer<'a> {
         })
     }
 
-    /// Straight and level places are easy to read; the right half of the picture decides between equals.
+    /// How good a place is. Straight and level places are easy to read, and among equals those further to the
+    /// right win.
     fn merit(&self, station: &Station) -> f64 {
         let place = ((station.at - self.frame.origin) / self.frame.size).x;
         4.0 * station.straightness + station.direction.x.abs() + 0.25 * place
@@ -121,7 +123,7 @@ mod tests {
 
     #[test]
     fn labels_keep_apart_and_stay_off_other_lines() {
-        let frame = Frame::new(Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0)), DVec2::ZERO);
+        let frame = PlotFrame::new(Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0)), DVec2::ZERO);
         let dense = |y: f64| vec![(0..=560).map(|x| DVec2::new(f64::from(x), y)).collect::<Vec<_>>()];
         let lines = [
             dense(200.0),

@@ -5,11 +5,12 @@
 //!                      └──────terminal──▶ characters
 //! ```
 //!
-//! Invariant: this module sees a [`Field`] and nothing of how it was made; it opens no file
-//! and asks no terminal; the same field gives the same bytes on any number of threads.
+//! Invariant: this module sees a [`Field`] and nothing of how it was made. It opens no file and queries no
+//! terminal. The same field gives the same bytes on any number of threads.
 
 mod axes;
 mod colour;
+mod error;
 mod isolines;
 mod labels;
 mod numbers;
@@ -20,68 +21,30 @@ mod sample;
 mod svg;
 pub mod terminal;
 
-use std::{fmt, io};
+use std::io;
 
-pub use self::{
+use self::{
     colour::{Rgb, Scale, UNDEFINED},
-    isolines::{Outline, Polyline, isolines, outlines},
+    isolines::Outline,
+    svg::svg,
+};
+pub use self::{
+    error::SliceError,
+    isolines::{Polyline, isolines},
     plane::{Axis, Plane, Window},
     sample::{Samples, sample},
-    svg::{escaped, svg},
 };
+pub(crate) use self::{png::rasterise, svg::escaped};
 use crate::field::Field;
-pub use png::rasterise;
 
-/// Samples along the longer side that make a plot smooth at the printed size.
+/// The number of samples along the longer side that makes a plot smooth at the printed size.
 pub const DEFAULT_SAMPLES: usize = 320;
 
-/// Why a slice could not be drawn.
-#[derive(Debug)]
-pub enum SliceError {
-    /// The window has no area or is not finite.
-    Window(Window),
-    /// The number of samples is outside 2 ..= 8192.
-    Resolution(usize),
-    /// The picture of this many pixels per unit of the drawing cannot be made.
-    Scale(f32),
-    /// The drawing that we wrote is not accepted: a bug of ours.
-    Drawing(String),
-    Io(io::Error),
-}
-
-impl fmt::Display for SliceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Window(Window { min, max }) => {
-                write!(
-                    f,
-                    "nothing to draw in the window {min} .. {max}: expected finite sides longer than zero"
-                )
-            }
-            Self::Resolution(samples) => write!(f, "{samples} samples along a side: expected 2 to 8192"),
-            Self::Scale(scale) => write!(f, "cannot draw {scale} pixels per unit: expected 0.1 to 16"),
-            Self::Drawing(reason) => write!(f, "the drawing is not valid: {reason}"),
-            Self::Io(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for SliceError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        if let Self::Io(error) = self { Some(error) } else { None }
-    }
-}
-
-impl From<io::Error> for SliceError {
-    fn from(error: io::Error) -> Self {
-        Self::Io(error)
-    }
-}
-
-/// Writes a slice as an SVG document.
+/// Writes a slice as an SVG document, with `samples` samples along the window's longer side. `name` is part
+/// of the title.
 ///
 /// # Errors
-/// Those of [`sample`] and of the writer.
+/// Those of [`sample`] and of `out`.
 pub fn write_svg(
     field: &dyn Field,
     name: &str,
@@ -94,10 +57,10 @@ pub fn write_svg(
     Ok(())
 }
 
-/// Writes a slice as a PNG picture: the drawing of [`write_svg`] at `scale` pixels per unit (2 prints well).
+/// Writes a slice as a PNG picture: the drawing of [`write_svg`] at `scale` pixels per unit. 2 prints well.
 ///
 /// # Errors
-/// Those of [`sample`] and of the writer, and [`SliceError::Scale`].
+/// Those of [`sample`] and of `out`, and [`SliceError::Scale`].
 pub fn write_png(
     field: &dyn Field,
     name: &str,
@@ -121,7 +84,7 @@ mod tests {
         Closures { omega, gradient: |_| DVec3::ZERO }
     }
 
-    /// A ball of radius 1/2: its slices through the middle are discs.
+    /// A ball of radius 1/2. Its slices through the middle are discs.
     pub fn disc() -> impl Field {
         field(|p| 0.25 - p.length_squared())
     }

@@ -1,11 +1,11 @@
-//! Round numbers, as people write them on axes: 1, 2 or 5 times a power of ten, and their multiples.
+//! Round numbers for axes: 1, 2 or 5 times a power of ten, and their multiples.
 //!
-//! Invariant: values are read back from decimal digits, so 0.05 is the double nearest to 0.05 and its label is
-//! exactly `0.05`.
+//! Invariant: values are read back from decimal digits, so 0.05 is the double nearest to 0.05 and its label
+//! is exactly `0.05`.
 
 use std::fmt;
 
-/// mantissa · 10^exponent.
+/// The number mantissa · 10^exponent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimal {
     pub mantissa: i64,
@@ -16,7 +16,7 @@ impl Decimal {
     pub const ZERO: Self = Self { mantissa: 0, exponent: 0 };
 
     pub fn value(self) -> f64 {
-        // The digits of a number always parse.
+        // the digits of a number always parse
         format!("{}e{}", self.mantissa, self.exponent).parse().unwrap_or(f64::NAN)
     }
 
@@ -24,12 +24,12 @@ impl Decimal {
         Self { mantissa: -self.mantissa, ..self }
     }
 
-    /// The largest 1, 2 or 5 · 10ⁿ that is not above `x`; none for zero, negative and non-finite numbers.
+    /// The largest 1, 2 or 5 · 10ⁿ that is not above `x`. `None` for zero, negative and non-finite numbers.
     pub fn below(x: f64) -> Option<Self> {
         if !(x > 0.0 && x.is_finite()) {
             return None;
         }
-        // One decade lower than the logarithm says, in case that was rounded up.
+        // one decade lower than the logarithm, in case that was rounded up
         let mut best = Self { mantissa: 1, exponent: libm::log10(x).floor() as i32 - 1 };
         while best.larger().value() <= x {
             best = best.larger();
@@ -45,7 +45,7 @@ impl Decimal {
         }
     }
 
-    /// The next smaller one in the series 1, 2, 5.
+    /// The next smaller number in the series 1, 2, 5.
     pub fn smaller(self) -> Self {
         match self.mantissa {
             5 => Self { mantissa: 2, ..self },
@@ -56,7 +56,7 @@ impl Decimal {
 }
 
 impl fmt::Display for Decimal {
-    /// Plain digits where they are few, with a true minus sign; otherwise like 5e−7.
+    /// Plain digits if they are few, and otherwise like 5e−7; with a true minus sign.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sign = if self.mantissa < 0 { "−" } else { "" };
         let digits = self.mantissa.unsigned_abs();
@@ -73,14 +73,15 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// Between about `count`/2 and `count` round numbers from `min` to `max`, evenly spaced and of one precision.
+/// About `count`/2 to `count` round numbers from `min` to `max`, evenly spaced and with the same number
+/// of digits.
 pub fn ticks(min: f64, max: f64, count: usize) -> Vec<Decimal> {
     let span = max - min;
     let Some(mut step) = Decimal::below(span / count as f64) else { return Vec::new() };
     while span / step.value() > count as f64 {
         step = step.larger();
     }
-    // Rounding must not lose a tick on the border itself.
+    // rounding must not lose a tick on the border itself
     let slack = 1e-9 * span;
     let first = ((min - slack) / step.value()).ceil();
     let last = ((max + slack) / step.value()).floor();

@@ -1,17 +1,18 @@
-//! Polylines as SVG path data: as few points and digits as the eye cannot tell from all of them.
+//! Polylines as SVG path data, with so few points and digits that the eye sees no difference.
 
 use std::fmt::Write;
 
 use glam::DVec2;
 
-/// Largest distance, in page units, between a line and what is written: a twelfth of a pixel at double size.
+/// The largest distance in page units between a line and the path that is written: a twelfth of a pixel at
+/// double size.
 const TOLERANCE: f64 = 0.04;
 
 /// Appends path data for points in page units.
 pub fn append(path: &mut String, points: &[DVec2], closed: bool) {
     let kept = simplify(points, closed);
     let Some(first) = kept.first() else { return };
-    // Steps between rounded points, so that rounding does not add up along the line.
+    // steps between rounded points, so that rounding does not add up along the line
     let hundredths = |p: &DVec2| ((p.x * 100.0).round() as i64, (p.y * 100.0).round() as i64);
     let mut at = hundredths(first);
     let _ = write!(path, "M{} {}", number(at.0), number(at.1));
@@ -43,7 +44,8 @@ fn number(hundredths: i64) -> String {
     }
 }
 
-/// Douglas and Peucker's selection; a closed line is cut at its first point and the point farthest from that.
+/// The points that Douglas and Peucker's method selects. A closed line is cut at its first point and at the
+/// point farthest from it.
 fn simplify(points: &[DVec2], closed: bool) -> Vec<DVec2> {
     if points.len() < 3 {
         return points.to_vec();

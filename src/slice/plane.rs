@@ -1,34 +1,37 @@
-//! Where a slice lies: a plane across one axis, a window in it, and how densely it is sampled.
+//! Where a slice lies: a plane across one axis, and a window in it.
 //!
-//! In the plane the coordinates are (u, v), u to the right and v upwards: (x, y) for z = c, (x, z) for y = c and
-//! (y, z) for x = c, so that z points up whenever it is in the picture.
+//! Coordinates in the plane are (u, v), u to the right and v upwards: (x, y) for z = c, (x, z) for y = c and
+//! (y, z) for x = c. So z points up whenever it is in the picture.
 
 use std::fmt;
 
 use glam::{DVec2, DVec3};
 
-use super::SliceError;
 use crate::geom::Aabb;
 
 /// A coordinate axis of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axis {
+    /// The first coordinate.
     X,
+    /// The second coordinate.
     Y,
+    /// The third coordinate.
     Z,
 }
 
 impl Axis {
-    /// The axis's place in a vector: 0, 1 or 2.
+    /// The axis's index in a vector: 0, 1 or 2.
     pub const fn index(self) -> usize {
         self as usize
     }
 
+    /// The axis's name: `x`, `y` or `z`.
     pub const fn name(self) -> &'static str {
         ["x", "y", "z"][self as usize]
     }
 
-    /// The axes drawn to the right and upwards in a slice across this one.
+    /// The axes that are drawn to the right and upwards in a slice across this one.
     pub const fn right_and_up(self) -> (Self, Self) {
         match self {
             Self::X => (Self::Y, Self::Z),
@@ -38,14 +41,17 @@ impl Axis {
     }
 }
 
-/// The plane `axis = value`, in the scene's length unit.
+/// The plane `axis = value`, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
+    /// The axis that the plane lies across.
     pub axis: Axis,
+    /// The coordinate of the plane on that axis, in metres.
     pub value: f64,
 }
 
 impl Plane {
+    /// The plane across an axis at a coordinate, in metres.
     pub const fn new(axis: Axis, value: f64) -> Self {
         Self { axis, value }
     }
@@ -59,7 +65,7 @@ impl Plane {
         }
     }
 
-    /// The rectangle a box projects to along the plane's axis, whether or not the plane cuts the box.
+    /// The rectangle that a box projects to along the plane's axis, whether or not the plane cuts the box.
     pub fn window(&self, over: &Aabb) -> Window {
         let (right, up) = self.axis.right_and_up();
         let pick = |p: DVec3| DVec2::new(p[right.index()], p[up.index()]);
@@ -73,38 +79,24 @@ impl fmt::Display for Plane {
     }
 }
 
-/// The rectangle of the plane that is drawn, in (u, v).
+/// The rectangle of the plane that is drawn, in (u, v) and metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
+    /// The lower left corner.
     pub min: DVec2,
+    /// The upper right corner.
     pub max: DVec2,
 }
 
 impl Window {
+    /// The rectangle between two corners. One without area is refused when it is sampled.
     pub const fn new(min: DVec2, max: DVec2) -> Self {
         Self { min, max }
     }
 
+    /// The lengths of the sides in metres.
     pub fn size(&self) -> DVec2 {
         self.max - self.min
-    }
-
-    /// Columns and rows of samples for `samples` along the longer side and nearly square cells.
-    ///
-    /// # Errors
-    /// [`SliceError::Window`] for a window without area or with infinite sides, [`SliceError::Resolution`] for
-    /// fewer than 2 or more than 8192 samples.
-    pub fn grid(&self, samples: usize) -> Result<(usize, usize), SliceError> {
-        let size = self.size();
-        if !(size.is_finite() && self.min.is_finite() && size.x > 0.0 && size.y > 0.0) {
-            return Err(SliceError::Window(*self));
-        }
-        if !(2..=8192).contains(&samples) {
-            return Err(SliceError::Resolution(samples));
-        }
-        let cells = (samples - 1) as f64;
-        let along = |side: f64| (cells * side / size.max_element()).round().max(1.0) as usize + 1;
-        Ok((along(size.x), along(size.y)))
     }
 }
 
@@ -123,17 +115,5 @@ mod tests {
             assert_eq!(window.max, DVec2::new(1.0, 2.0));
         }
         assert_eq!(Plane::new(Axis::Z, 0.5).to_string(), "z = 0.5");
-    }
-
-    #[test]
-    fn bad_windows_and_resolutions_are_errors() {
-        let flat = Window::new(DVec2::ZERO, DVec2::new(1.0, 0.0));
-        assert!(matches!(flat.grid(10), Err(SliceError::Window(_))));
-        let endless = Window::new(DVec2::ZERO, DVec2::new(f64::INFINITY, 1.0));
-        assert!(matches!(endless.grid(10), Err(SliceError::Window(_))));
-        let unit = Window::new(DVec2::ZERO, DVec2::ONE);
-        assert!(matches!(unit.grid(1), Err(SliceError::Resolution(1))));
-        let wide = Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0));
-        assert_eq!(wide.grid(101).unwrap(), (101, 51));
     }
 }

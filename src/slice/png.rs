@@ -1,6 +1,6 @@
-//! The drawing as pixels: the same SVG, rasterised with the one font that is built in.
+//! Drawings as pixels: SVG, rasterised with the one font that is built in.
 //!
-//! Invariant: no font of the system is looked at, so the picture does not depend on the machine.
+//! Invariant: fonts of the system are not used, so the picture does not depend on the machine.
 
 use std::{
     io,
@@ -14,7 +14,7 @@ use resvg::{
 
 use super::SliceError;
 
-/// The family that [`super::svg`] asks for first and that the rasteriser has.
+/// The font family that [`super::svg`] names first, which the rasteriser has.
 pub(super) const FONT_FAMILY: &str = "Ubuntu";
 
 static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
@@ -23,10 +23,11 @@ static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
     Arc::new(fonts)
 });
 
-/// Writes any SVG drawing with an opaque ground as an RGB PNG with `scale` pixels per unit of the drawing.
+/// Writes an SVG drawing with an opaque ground as an RGB PNG, with `scale` pixels per unit of the drawing.
 ///
 /// # Errors
-/// [`SliceError::Drawing`] if it is no SVG, [`SliceError::Scale`] beyond 0.1 … 16, and those of the writer.
+/// [`SliceError::Drawing`] if the drawing is no SVG, [`SliceError::Scale`] outside 0.1 … 16, and those
+/// of `out`.
 pub fn rasterise(svg: &str, scale: f32, out: impl io::Write) -> Result<(), SliceError> {
     if !(0.1..=16.0).contains(&scale) {
         return Err(SliceError::Scale(scale));
@@ -36,7 +37,7 @@ pub fn rasterise(svg: &str, scale: f32, out: impl io::Write) -> Result<(), Slice
     let mut pixmap = Pixmap::new(width, height).ok_or(SliceError::Scale(scale))?;
     resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixmap.as_mut());
 
-    // The drawing has an opaque ground, so premultiplied colours are the colours.
+    // the ground is opaque, so premultiplied colours are the colours
     let rgb: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     let mut encoder = png::Encoder::new(out, width, height);
     encoder.set_color(png::ColorType::Rgb);

@@ -1,7 +1,7 @@
 //! ω on a regular grid of a plane.
 //!
-//! Invariant: a row is evaluated in one batch, whatever the number of threads, so the samples have the same bits
-//! on one thread and on many.
+//! Invariant: a row is evaluated in one batch on any number of threads, so the samples have the same bits on
+//! one thread and on many.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -9,18 +9,23 @@ use rayon::prelude::*;
 use super::{Plane, SliceError, Window};
 use crate::field::{Field, Points};
 
-/// ω at the nodes of a grid: row 0 at the bottom of the window, column 0 at its left border.
+/// ω at the nodes of a grid in a window. Row 0 is at the bottom of the window, column 0 at its left border.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples {
+    /// The plane that was sampled.
     pub plane: Plane,
+    /// The part of it that was sampled.
     pub window: Window,
+    /// The number of columns, two at least.
     pub columns: usize,
+    /// The number of rows, two at least.
     pub rows: usize,
-    /// `rows × columns` values, row by row.
+    /// The `rows × columns` values, row by row.
     pub omega: Vec<f64>,
 }
 
-/// Samples a field over a window of a plane, with `samples` points along the window's longer side.
+/// Samples a field over a window of a plane, with `samples` nodes along the window's longer side and nearly
+/// square cells.
 ///
 /// # Errors
 /// Those of [`Window::grid`].
@@ -34,7 +39,7 @@ pub fn sample(
     Ok(sample_grid(field, plane, window, columns, rows))
 }
 
-/// As [`sample`] with the columns and rows given (at least two each); for cells that are not square.
+/// Samples a field at given numbers of columns and rows, at least two each. Cells need not be square.
 pub(super) fn sample_grid(
     field: &dyn Field,
     plane: Plane,
@@ -53,12 +58,36 @@ pub(super) fn sample_grid(
     samples
 }
 
+impl Window {
+    /// The columns and rows of samples, for `samples` along the longer side and nearly square cells.
+    ///
+    /// # Errors
+    /// [`SliceError::Window`] for a window without area or with infinite sides, [`SliceError::Resolution`]
+    /// for fewer than 2 or more than 8192 samples.
+    pub fn grid(&self, samples: usize) -> Result<(usize, usize), SliceError> {
+        let size = self.size();
+        if !(size.is_finite() && self.min.is_finite() && size.x > 0.0 && size.y > 0.0) {
+            return Err(SliceError::Window(*self));
+        }
+        if !(2..=8192).contains(&samples) {
+            return Err(SliceError::Resolution(samples));
+        }
+        let cells = (samples - 1) as f64;
+        let along = |side: f64| (cells * side / size.max_element()).round().max(1.0) as usize + 1;
+        Ok((along(size.x), along(size.y)))
+    }
+}
+
 impl Samples {
+    /// ω at a node.
+    ///
+    /// # Panics
+    /// If there is no such node.
     pub fn get(&self, column: usize, row: usize) -> f64 {
         self.omega[row * self.columns + column]
     }
 
-    /// (u, v) of a node; the last column and row lie on the window's border exactly.
+    /// The position (u, v) of a node. The last column and row lie exactly on the window's border.
     pub fn position(&self, column: usize, row: usize) -> DVec2 {
         let along = |i: usize, n: usize, from: f64, to: f64| {
             if i + 1 == n { to } else { from + (to - from) * (i as f64 / (n - 1) as f64) }
@@ -67,12 +96,12 @@ impl Samples {
         DVec2::new(along(column, self.columns, min.x, max.x), along(row, self.rows, min.y, max.y))
     }
 
-    /// True where some corner of the cell right of and above this node has no value.
+    /// Whether a corner of the cell to the right of and above this node is NaN.
     pub fn cell_is_undefined(&self, column: usize, row: usize) -> bool {
         [(0, 0), (1, 0), (0, 1), (1, 1)].iter().any(|&(i, j)| self.get(column + i, row + j).is_nan())
     }
 
-    /// Number of nodes where ω is NaN.
+    /// The number of nodes where ω is NaN.
     pub fn undefined(&self) -> usize {
         self.omega.iter().filter(|w| w.is_nan()).count()
     }
@@ -105,5 +134,17 @@ mod tests {
             pool.install(|| sample(&disc(), plane, window, 65).unwrap())
         };
         assert_eq!(on(1), on(2));
+    }
+
+    #[test]
+    fn bad_windows_and_resolutions_are_errors() {
+        let flat = Window::new(DVec2::ZERO, DVec2::new(1.0, 0.0));
+        assert!(matches!(flat.grid(10), Err(SliceError::Window(_))));
+        let endless = Window::new(DVec2::ZERO, DVec2::new(f64::INFINITY, 1.0));
+        assert!(matches!(endless.grid(10), Err(SliceError::Window(_))));
+        let unit = Window::new(DVec2::ZERO, DVec2::ONE);
+        assert!(matches!(unit.grid(1), Err(SliceError::Resolution(1))));
+        let wide = Window::new(DVec2::ZERO, DVec2::new(2.0, 1.0));
+        assert_eq!(wide.grid(101).unwrap(), (101, 51));
     }
 }

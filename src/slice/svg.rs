@@ -1,7 +1,7 @@
-//! A slice as an SVG document: filled bands, isolines, the surface line, axes and a colour bar.
+//! A slice as an SVG document: filled bands, isolines, the line of the surface, axes and a colour bar.
 //!
-//! Bands are painted over each other from the lowest ω upwards, each as the whole region above its level, so no
-//! gap shows between neighbours at any magnification.
+//! Bands are painted over each other from the lowest ω upwards. Each is the whole region above its level, so
+//! no gap shows between neighbours at any magnification.
 
 use std::fmt::Write;
 
@@ -9,9 +9,9 @@ use glam::DVec2;
 
 use super::{
     Outline, Rgb, Samples, Scale,
-    axes::{self, Frame, INK},
+    axes::{self, INK, PlotFrame},
     isolines::outlines,
-    labels::{Label, Placer},
+    labels::{LevelLabel, Placer},
     paths,
 };
 use crate::field::Field;
@@ -19,14 +19,14 @@ use crate::field::Field;
 const LEFT: f64 = 72.0;
 const TOP: f64 = 44.0;
 const BELOW: f64 = 52.0;
-/// The colour bar: gap before it, its width, room for its numbers and its title.
+/// The colour bar: the gap before it, its width, the room for its numbers and for its title.
 const BAR: [f64; 4] = [26.0, 16.0, 52.0, 22.0];
-/// The height of a band in the colour bar, and the least for a legible number.
+/// The largest height of a band in the colour bar, and the least for a legible number.
 const BAND: [f64; 2] = [26.0, 15.0];
 
-/// The slice as an SVG document; `name` becomes part of the title. The samples must be the field's own.
+/// The slice as an SVG document. `name` becomes part of the title. The samples must be those of the field.
 pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
-    let frame = Frame::new(samples.window, DVec2::new(LEFT, TOP));
+    let frame = PlotFrame::new(samples.window, DVec2::new(LEFT, TOP));
     let scale = Scale::for_samples(samples);
     let bar = Bar::new(&frame, &scale);
     let width = frame.right() + BAR.iter().sum::<f64>() + 8.0;
@@ -50,10 +50,10 @@ pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
     out
 }
 
-fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame: &Frame, scale: &Scale) {
+fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame: &PlotFrame, scale: &Scale) {
     let levels: Vec<Vec<Outline>> =
         scale.levels().iter().map(|&level| outlines(field, samples, level)).collect();
-    let Frame { origin, size, .. } = *frame;
+    let PlotFrame { origin, size, .. } = *frame;
     let _ = writeln!(
         out,
         r#"<rect x="{}" y="{}" width="{}" height="{}" fill="{}"/>"#,
@@ -98,16 +98,22 @@ fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame
     labels(out, frame, scale, zero, &lines);
 }
 
-fn labels(out: &mut String, frame: &Frame, scale: &Scale, zero: usize, lines: &[Vec<(Vec<DVec2>, bool)>]) {
+fn labels(
+    out: &mut String,
+    frame: &PlotFrame,
+    scale: &Scale,
+    zero: usize,
+    lines: &[Vec<(Vec<DVec2>, bool)>],
+) {
     let lines: Vec<Vec<Vec<DVec2>>> =
         lines.iter().map(|level| level.iter().map(|(points, _)| points.clone()).collect()).collect();
     let mut placer = Placer::new(frame, &lines);
     let mut text = String::new();
     for (k, level) in scale.decimals().iter().enumerate().filter(|(k, _)| *k != zero) {
-        let Some(Label { at, angle, text: label }) = placer.place(k, &level.to_string()) else {
+        let Some(LevelLabel { at, angle, text: label }) = placer.place(k, &level.to_string()) else {
             continue;
         };
-        // The halo has the colour of the ground, so the line seems to be interrupted.
+        // the halo has the colour of the ground, so the line seems to be interrupted
         let _ = writeln!(
             text,
             r#"<text transform="translate({:.2} {:.2}) rotate({angle:.1})" y="3.4" stroke="{}">{label}</text>"#,
@@ -126,8 +132,9 @@ fn labels(out: &mut String, frame: &Frame, scale: &Scale, zero: usize, lines: &[
     }
 }
 
-/// Grey hatching over every cell with a corner that has no value; cells side by side make one rectangle.
-fn undefined_cells(out: &mut String, samples: &Samples, frame: &Frame) {
+/// Draws grey hatching over every cell with a corner that has no value. Cells side by side make
+/// one rectangle.
+fn undefined_cells(out: &mut String, samples: &Samples, frame: &PlotFrame) {
     if samples.undefined() == 0 {
         return;
     }
@@ -153,7 +160,7 @@ fn undefined_cells(out: &mut String, samples: &Samples, frame: &Frame) {
     );
 }
 
-/// The colour bar: bands of one height, pointed ends for what lies beyond the last levels.
+/// The colour bar: bands of one height, with pointed ends for values beyond the last levels.
 struct Bar {
     left: f64,
     band: f64,
@@ -161,10 +168,10 @@ struct Bar {
 }
 
 impl Bar {
-    fn new(frame: &Frame, scale: &Scale) -> Self {
+    fn new(frame: &PlotFrame, scale: &Scale) -> Self {
         let bands = scale.bands() as f64;
         let band = (frame.size.y / bands).clamp(BAND[1], BAND[0]).floor();
-        // Centred beside the plot; below its upper edge if the plot is lower than the bar.
+        // centred beside the plot, or from the plot's upper edge down if the plot is lower than the bar
         let top = frame.origin.y + (0.5 * (frame.size.y - bands * band)).max(0.0).round();
         Self { left: frame.right() + BAR[0], band, bottom: top + bands * band }
     }
@@ -221,7 +228,7 @@ impl Bar {
     }
 }
 
-fn on_page(frame: &Frame, points: &[DVec2]) -> Vec<DVec2> {
+fn on_page(frame: &PlotFrame, points: &[DVec2]) -> Vec<DVec2> {
     points.iter().map(|&uv| frame.page(uv)).collect()
 }
 
@@ -233,7 +240,7 @@ fn mean(a: Rgb, b: Rgb) -> Rgb {
     std::array::from_fn(|i| a[i].midpoint(b[i]))
 }
 
-/// Text for XML: markup characters escaped, control characters left out.
+/// The text with its markup characters escaped for XML, and without control characters.
 pub fn escaped(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars().filter(|c| !c.is_control()) {

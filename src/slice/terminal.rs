@@ -1,22 +1,23 @@
-//! A slice in characters: half blocks with 24-bit colours, or `.:-=+*#` where there is no colour.
+//! A slice in characters: half blocks with 24-bit colours, or `.:-=+*#` without colour.
 //!
-//! Invariant: the caller decides about width and colour; nothing here asks the terminal.
+//! Invariant: the caller decides about width and colour. Nothing here queries the terminal.
 
 use std::io::{self, Write};
 
 use super::{Plane, Samples, Scale, SliceError, UNDEFINED, Window, sample::sample_grid};
 use crate::field::Field;
 
-/// Far outside to near the surface, and near the surface to deep inside; `=` is where the sign changes.
+/// Characters from near the surface to far from it, on each side. `=` is where the sign changes.
 const OUTSIDE: [char; 3] = ['-', ':', '.'];
 const INSIDE: [char; 3] = ['+', '*', '#'];
 const SURFACE: char = '=';
 const NO_VALUE: char = '?';
 
-/// Draws a slice `columns` characters wide (1000 at most), rows chosen so that lengths look equal both ways.
+/// Draws a slice `columns` characters wide, 1000 at most. The number of rows is such that lengths look equal
+/// both ways.
 ///
 /// # Errors
-/// Those of [`super::sample`] and of the writer.
+/// Those of [`super::sample`] and of `out`.
 pub fn draw(
     field: &dyn Field,
     name: &str,
@@ -28,14 +29,14 @@ pub fn draw(
 ) -> Result<(), SliceError> {
     window.grid(columns)?;
     let columns = columns.clamp(2, 1000);
-    // A character is about twice as high as wide.
+    // a character is about twice as high as wide
     let size = window.size();
     let lines = ((columns as f64 * size.y / size.x / 2.0).round() as usize).clamp(2, 500);
     let samples = sample_grid(field, plane, window, columns, if colour { 2 * lines } else { lines });
     let scale = Scale::for_samples(&samples);
     let (right, up) = plane.axis.right_and_up();
     let Window { min, max } = window;
-    // a caption, not a measurement: four digits behind the point and no trailing zeros
+    // four digits behind the point are enough for a caption, without trailing zeros
     let short = |x: f64| (1e4 * x).round() / 1e4 + 0.0;
     writeln!(
         out,
@@ -55,13 +56,15 @@ pub fn draw(
     Ok(())
 }
 
-/// Two samples a character: the upper one in the colour of the block, the lower one in that of the ground.
+/// Draws two samples with each character: the upper one in the colour of the block, the lower one in that of
+/// the ground.
 fn blocks(samples: &Samples, scale: &Scale, out: &mut impl Write) -> io::Result<()> {
     for line in (0..samples.rows / 2).rev() {
         let mut last = None;
         for column in 0..samples.columns {
             let [upper, lower] = [2 * line + 1, 2 * line].map(|row| scale.colour(samples.get(column, row)));
-            // Most neighbours have the same colours: repeating the codes would make the output ten times longer.
+            // most neighbours have the same colours, and repeating the codes would make the output ten
+            // times longer
             if last.replace((upper, lower)) != Some((upper, lower)) {
                 let ([r, g, b], [s, h, c]) = (upper, lower);
                 write!(out, "\x1b[38;2;{r};{g};{b};48;2;{s};{h};{c}m")?;
@@ -96,7 +99,7 @@ fn characters(samples: &Samples, scale: &Scale, out: &mut impl Write) -> io::Res
 fn character(samples: &Samples, scale: &Scale, column: usize, row: usize) -> char {
     let omega = samples.get(column, row);
     let Some(band) = scale.band(omega) else { return NO_VALUE };
-    // An inside sample with an outside neighbour: the line is one character thick.
+    // an inside sample with an outside neighbour; the line is one character thick
     let neighbours =
         [(column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)];
     let outside = |(i, j): (usize, usize)| i < samples.columns && j < samples.rows && samples.get(i, j) < 0.0;

@@ -1,7 +1,10 @@
-//! Sharp meshes of random solids: closed, manifold, of the topology that marching cubes find, and not folded.
+//! Sharp meshes of random solids are closed, manifold, of the topology that marching cubes find, and
+//! not folded.
+
+use std::cell::Cell;
 
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
+use proptest::test_runner::{RngSeed, TestRunner};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{Grid, Resolution, check, dual_contouring, marching_cubes, measure, shells};
@@ -11,7 +14,7 @@ use rfm::{Engine, Program, Solid};
 const DOMAIN: Aabb = Aabb { min: DVec3::NEG_ONE, max: DVec3::ONE };
 
 fn number(range: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
-    // three digits: a failure that can be read
+    // three digits, so that a failure can be read
     range.prop_map(|x| (1000.0 * x).round() / 1000.0)
 }
 
@@ -20,7 +23,7 @@ fn vector(reach: f64) -> impl Strategy<Value = [f64; 3]> {
     [one(), one(), one()]
 }
 
-/// Balls, boxes, cylinders and half spaces at any angle, and what `and`, `or` and `not` make of up to six of them.
+/// Up to six balls, boxes, cylinders and half spaces at any angle, joined by `and`, `or` and `not`.
 fn csg() -> impl Strategy<Value = String> {
     let size = || number(0.2..0.7);
     let leaf = prop_oneof![
@@ -57,7 +60,8 @@ fn config(cases: u32) -> ProptestConfig {
 proptest! {
     #![proptest_config(config(150))]
 
-    /// Also where the grid is too coarse for a solid's edges: what is cut off or mended must not tear the mesh.
+    /// This holds also where the grid is too coarse for a solid's edges: what is cut off or mended must not
+    /// tear the mesh.
     #[test]
     fn sharp_meshes_of_random_solids_have_the_topology_of_marching_cubes(
         text in csg(), is_cut: bool, cells in 8..28_usize
@@ -70,19 +74,28 @@ proptest! {
         // closed says that triangles run along each edge in opposite directions
         prop_assert!(sharp.closed && sharp.manifold, "{:?}", sharp);
         prop_assert_eq!((sharp.components, sharp.euler), (cubes.components, cubes.euler));
-        // and a mesh that is inside out would have the other sign: both are within half a cell of the surface or so
+        // a mesh that is inside out would have the other sign; both meshes are within about half a cell of
+        // the surface
         let most = 0.5 * grid.spacing().x * sharp.area.max(cubes.area);
         prop_assert!((sharp.volume - cubes.volume).abs() <= most, "{} and {}", sharp.volume, cubes.volume);
     }
 }
 
-proptest! {
-    #![proptest_config(config(30))]
+/// Meshes of random solids that are judged below.
+const JUDGED: u32 = 60;
 
-    /// Where the mesh is near the surface everywhere, so that no tip of a wedge is cut off, and no part is a speck of a cell
-    /// or two, at most one triangle in a thousand faces away from the surface below it.
-    #[test]
-    fn sharp_meshes_of_random_solids_are_hardly_folded(text in csg(), cells in 12..28_usize) {
+/// The share of the meshes that may be too coarse to be judged.
+const MOST_COARSE: f64 = 0.5;
+
+/// Where the mesh is near the surface everywhere, so that no tip of a wedge is cut off, and no part is a
+/// speck of a cell or two, at most one triangle in a thousand faces away from the surface below it. Meshes
+/// for which that does not hold are too coarse to be judged; they are counted, so that the test cannot pass
+/// by judging none.
+#[test]
+fn sharp_meshes_of_random_solids_are_hardly_folded() {
+    let coarse = Cell::new(0);
+    let mut runner = TestRunner::new(config(JUDGED));
+    let result = runner.run(&(csg(), 12..28_usize), |(text, cells)| {
         let solid = solid(&text, false);
         let field = solid.surface(DOMAIN);
         let grid = Grid::filling(&DOMAIN, Resolution::Cells(cells)).unwrap();
@@ -90,8 +103,21 @@ proptest! {
         let quality = measure(&sharp, &*field, &Depth(&solid), &grid).unwrap();
         let h = grid.spacing().x;
         let is_large = shells(&sharp).iter().all(|shell| shell.area > 4.0 * h * h);
-        prop_assume!(quality.hausdorff() < 0.25 * h && is_large);
+        if quality.hausdorff() >= 0.25 * h || !is_large {
+            coarse.set(coarse.get() + 1);
+            return Ok(());
+        }
         let most = sharp.triangles.len().div_ceil(1000);
-        prop_assert!(quality.flipped <= most, "{} of {}: {:?}", quality.flipped, sharp.triangles.len(), quality);
-    }
+        prop_assert!(
+            quality.flipped <= most,
+            "{} of {}: {:?}",
+            quality.flipped,
+            sharp.triangles.len(),
+            quality
+        );
+        Ok(())
+    });
+    result.unwrap_or_else(|error| panic!("{error}"));
+    println!("{} of {JUDGED} meshes are too coarse to be judged", coarse.get());
+    assert!(f64::from(coarse.get()) <= MOST_COARSE * f64::from(JUDGED), "{} of {JUDGED}", coarse.get());
 }

@@ -26,7 +26,8 @@ fn around(solid: &Solid, cells: usize) -> Grid {
     Grid::around(&solid.bounds().aabb().unwrap(), Resolution::Cells(cells)).unwrap()
 }
 
-/// The contact program knows nothing of the mesher. At an edge it gives the mean of two normals, the mesher one of them.
+/// The contact program knows nothing of the mesher. At an edge it gives the mean of two normals, while the
+/// mesher gives one of them.
 #[test]
 fn vertices_lie_on_the_surface_and_normals_are_those_of_the_contact_program() {
     for name in ["pawn", "bishop"] {
@@ -75,11 +76,11 @@ fn sharp_meshes_of_pawn_and_bishop_are_within_a_small_part_of_a_cell() {
     }
 }
 
-/// The collars are 0.158 m and 0.2 m thick on the axis and thin out towards their rims, the gaps between collar and head
-/// towards their bottoms. With 32 cells and more what the nodes do not see of either is found from the edges beside it: a
-/// tenth of a cell is left where a gap is narrower than that. With fewer cells (0.19 m down to 0.125 m) whole cells of a
-/// rim lie between nodes: part of the rim is cut off, and at 16 cells a few triangles turn their backs to the faces that
-/// were missed.
+/// The collars are 0.158 m and 0.2 m thick on the axis and thin out towards their rims; the gaps between
+/// collar and head thin out towards their bottoms. With 32 cells and more, the edges beside them show what
+/// the nodes do not see, and a tenth of a cell is left where a gap is narrower than that. With fewer cells
+/// (0.19 m down to 0.125 m) whole cells of a rim lie between nodes: part of the rim is cut off, and at 16
+/// cells a few triangles turn their backs to the faces that were missed.
 #[test]
 fn sharp_meshes_keep_to_thin_collars_on_coarse_grids() {
     for name in ["pawn", "bishop"] {
@@ -113,7 +114,7 @@ fn volumes_of_pawn_and_bishop_converge_with_the_square_of_the_cell() {
         let [coarse, fine] = [64, 256].map(error);
         println!("{name}: {coarse:.2e} at 64 cells, {fine:.2e} at 256");
         assert!(fine <= 5e-4, "{name}: {fine}");
-        // sixteen times smaller, less what creases do between nodes
+        // sixteen times smaller, but for what creases do between nodes
         assert!(coarse > 10.0 * fine, "{name}: {coarse} and {fine}");
     }
 }

@@ -1,25 +1,27 @@
-//! `rfm mesh DIR --fluid`: the frames that `rfm run` wrote → surfaces of the fluid, one file for each frame.
+//! `rfm mesh DIR --fluid`: surfaces of the fluid from the frames that `rfm run` wrote, one file for
+//! each frame.
 //!
-//! Everything is read and checked before the first file is written; each file is whole or not there.
+//! The list of frames is read and checked before the first file is written. Each file is whole or not there.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::super::args::{Frames, Mesh as Options, Shared};
-use super::super::{Failure, note, output, progress};
-use super::format::Format;
-use crate::fluid_surface::{Entry, Reconstruction, read_collection, read_points};
-use crate::mesh::{is_closed_manifold, shells};
+use super::super::failure::{Failure, note};
+use super::super::{output, progress};
+use super::format;
+use crate::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
+use crate::mesh::{WriteMesh, is_closed_manifold, shells, vtp};
 use crate::sph;
 
-/// What `--json` says; lengths in metres, volumes in cubic metres.
+/// The JSON document. Lengths are in metres, volumes in cubic metres.
 #[derive(Debug, Serialize)]
-struct Summary {
+struct FluidSummary {
     schema: u32,
-    /// How many were meshed.
+    /// The number of frames that were meshed.
     frames: usize,
     triangles: usize,
     milliseconds: f64,
@@ -27,31 +29,32 @@ struct Summary {
     support_radius: f64,
     cell: f64,
     format: &'static str,
-    surfaces: Vec<Surface>,
+    surfaces: Vec<FrameSurface>,
 }
 
 /// One frame.
 #[derive(Debug, Serialize)]
-struct Surface {
+struct FrameSurface {
     frame: usize,
     time: f64,
     file: String,
     particles: usize,
-    /// Particles whose position is not a number: they are left out.
+    /// The number of particles that were left out because their position is not a number.
     left_out: usize,
     vertices: usize,
     triangles: usize,
     closed: bool,
     components: usize,
     volume: f64,
-    /// Particles times mass over rest density.
+    /// The number of particles times mass over rest density.
     particle_volume: f64,
-    /// The one over the other, null without particles: the error of the surface, and the fluid's own compression.
+    /// `volume` over `particle_volume`, null without particles. It shows the error of the surface together
+    /// with the fluid's own compression.
     volume_ratio: Option<f64>,
     milliseconds: f64,
 }
 
-/// What is needed of a run's `summary.json`.
+/// The part of a run's `summary.json` that is needed here.
 #[derive(Debug, Deserialize)]
 struct RunFigures {
     particle_mass: f64,
@@ -59,67 +62,48 @@ struct RunFigures {
 }
 
 /// How large the particles are.
-struct Scale {
+struct ParticleScale {
     surface: Reconstruction,
-    /// Mass over rest density, m³.
+    /// The mass of a particle over the rest density, in m³.
     particle_volume: f64,
 }
 
 pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
-    let format = options.format.unwrap_or(Format::Vtp).as_text(options.ascii)?;
-    let folder = &options.file;
+    let format = options.format.unwrap_or(vtp::FORMAT);
+    let write = format::writer(format, options.ascii)?;
+    let folder = options.file.as_path();
     let entries = chosen(collection(folder)?, options.frames)?;
-    let scale = Scale::of(folder, options)?;
-    for (_, entry) in &entries {
-        let file = folder.join(&entry.file);
-        if !file.is_file() {
-            let lost =
-                format!("the frame `{}` is missing; `rfm run` writes it again, or choose", file.display());
-            return Err(Failure::usage(format!("{lost} others with --frames A..B")));
-        }
-    }
+    let scale = ParticleScale::new(folder, options)?;
+    check_frames(folder, &entries)?;
     let target = options.output.clone().unwrap_or_else(|| folder.join("surface"));
+    let job = Job { folder, target, ending: format.ending, write, scale };
     let started = Instant::now();
-    let bar = progress::bar(entries.len() as u64, "surfaces");
-    let mut surfaces: Vec<Surface> = Vec::new();
-    for (frame, entry) in &entries {
-        let made = surface(*frame, entry, folder, &target, &scale, format);
-        let made = made.map_err(|failure| with_kept(failure, surfaces.len(), &target))?;
-        bar.set_message(format!("t = {:.3} s, {} triangles", made.time, made.triangles));
-        surfaces.push(made);
-        if format == Format::Vtp {
-            output::write(&target.join("surface.pvd"), |mut out| {
-                sph::write_pvd(&mut out, surfaces.iter().map(|s| (s.time, s.file.as_str())))
-            })?;
-        }
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
+    let surfaces = job.surfaces(&entries)?;
     let left_out: usize = surfaces.iter().map(|surface| surface.left_out).sum();
     if left_out > 0 {
         note(format!("{left_out} positions are not numbers and were left out"));
     }
-    let summary = Summary {
+    let summary = FluidSummary {
         schema: 1,
         frames: surfaces.len(),
         triangles: surfaces.iter().map(|surface| surface.triangles).sum(),
         milliseconds: started.elapsed().as_secs_f64() * 1e3,
-        particle_radius: scale.surface.particle_radius,
-        support_radius: scale.surface.support_radius,
-        cell: scale.surface.cell,
-        format: format.ending(),
+        particle_radius: job.scale.surface.particle_radius,
+        support_radius: job.scale.surface.support_radius,
+        cell: job.scale.surface.cell,
+        format: job.ending,
         surfaces,
     };
     if shared.json {
         return output::json(&summary);
     }
     print(&summary);
-    say!("written to {}", target.display());
+    say!("written to {}", job.target.display());
     Ok(())
 }
 
 /// The frames of a run, from its `particles.pvd`.
-fn collection(folder: &Path) -> Result<Vec<Entry>, Failure> {
+fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
     let shown = folder.display();
     if !folder.exists() {
         return Err(Failure::usage(format!(
@@ -148,8 +132,21 @@ fn collection(folder: &Path) -> Result<Vec<Entry>, Failure> {
     Ok(entries)
 }
 
+/// Refuses frames whose file is missing.
+fn check_frames(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<(), Failure> {
+    for (_, entry) in entries {
+        let file = folder.join(&entry.file);
+        if !file.is_file() {
+            let lost =
+                format!("the frame `{}` is missing; `rfm run` writes it again, or choose", file.display());
+            return Err(Failure::usage(format!("{lost} others with --frames A..B")));
+        }
+    }
+    Ok(())
+}
+
 /// The entries that are asked for, with their numbers.
-fn chosen(entries: Vec<Entry>, frames: Option<Frames>) -> Result<Vec<(usize, Entry)>, Failure> {
+fn chosen(entries: Vec<FrameEntry>, frames: Option<Frames>) -> Result<Vec<(usize, FrameEntry)>, Failure> {
     let count = entries.len();
     let Frames { first, end } = frames.unwrap_or_default();
     let end = end.unwrap_or(count);
@@ -162,9 +159,9 @@ fn chosen(entries: Vec<Entry>, frames: Option<Frames>) -> Result<Vec<(usize, Ent
     Ok(entries.into_iter().enumerate().take(end).skip(first).collect())
 }
 
-impl Scale {
-    /// From the flags, else from what the run says of its particles.
-    fn of(folder: &Path, options: &Options) -> Result<Self, Failure> {
+impl ParticleScale {
+    /// The scale that the flags give, and otherwise the one in the run's summary.
+    fn new(folder: &Path, options: &Options) -> Result<Self, Failure> {
         let path = folder.join("summary.json");
         let figures = std::fs::read_to_string(&path)
             .map_err(|error| error.to_string())
@@ -195,46 +192,73 @@ impl Scale {
     }
 }
 
-/// Reads one frame, meshes it and writes the mesh.
-fn surface(
-    frame: usize,
-    entry: &Entry,
-    folder: &Path,
-    target: &Path,
-    scale: &Scale,
-    format: Format,
-) -> Result<Surface, Failure> {
-    let started = Instant::now();
-    let path = folder.join(&entry.file);
-    let failed = |error: String| {
-        let rest = "`rfm run` writes it again, or leave it out with --frames A..B";
-        Failure::usage(format!("cannot mesh the frame `{}`: {error}\n{rest}", path.display()))
-    };
-    let bytes = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
-    let points = read_points(&bytes).map_err(|error| failed(error.to_string()))?;
-    let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
-    let mesh = scale.surface.mesh(&finite).map_err(|error| failed(error.to_string()))?;
-    create(target)?;
-    let file = format!("surface_{frame:06}.{}", format.ending());
-    output::write(&target.join(&file), |out| format.write(&mesh, out))?;
-    let parts = shells(&mesh);
-    let volume = parts.iter().fold(0.0, |sum, shell| sum + shell.volume);
-    let particle_volume = finite.len() as f64 * scale.particle_volume;
-    Ok(Surface {
-        frame,
-        time: entry.time,
-        file,
-        particles: finite.len(),
-        left_out: points.len() - finite.len(),
-        vertices: mesh.positions.len(),
-        triangles: mesh.triangles.len(),
-        closed: is_closed_manifold(&mesh),
-        components: parts.len(),
-        volume,
-        particle_volume,
-        volume_ratio: (particle_volume > 0.0).then_some(volume / particle_volume),
-        milliseconds: started.elapsed().as_secs_f64() * 1e3,
-    })
+/// What is done with every frame.
+struct Job<'a> {
+    /// The folder of the run.
+    folder: &'a Path,
+    /// The folder for the surfaces.
+    target: PathBuf,
+    /// The ending of their files.
+    ending: &'static str,
+    write: WriteMesh,
+    scale: ParticleScale,
+}
+
+impl Job<'_> {
+    /// Meshes all frames, and lists the files in a collection if ParaView reads their format.
+    fn surfaces(&self, entries: &[(usize, FrameEntry)]) -> Result<Vec<FrameSurface>, Failure> {
+        let bar = progress::bar(entries.len() as u64, "surfaces");
+        let mut surfaces: Vec<FrameSurface> = Vec::new();
+        for (frame, entry) in entries {
+            let made = self.surface(*frame, entry);
+            let made = made.map_err(|failure| with_kept(failure, surfaces.len(), &self.target))?;
+            bar.set_message(format!("t = {:.3} s, {} triangles", made.time, made.triangles));
+            surfaces.push(made);
+            if self.ending == vtp::FORMAT.ending {
+                output::write(&self.target.join("surface.pvd"), |mut out| {
+                    sph::write_pvd(&mut out, surfaces.iter().map(|s| (s.time, s.file.as_str())))
+                })?;
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(surfaces)
+    }
+
+    /// Reads one frame, meshes it and writes the mesh.
+    fn surface(&self, frame: usize, entry: &FrameEntry) -> Result<FrameSurface, Failure> {
+        let started = Instant::now();
+        let path = self.folder.join(&entry.file);
+        let failed = |error: String| {
+            let rest = "`rfm run` writes it again, or leave it out with --frames A..B";
+            Failure::usage(format!("cannot mesh the frame `{}`: {error}\n{rest}", path.display()))
+        };
+        let bytes = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
+        let points = read_points(&bytes).map_err(|error| failed(error.to_string()))?;
+        let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
+        let mesh = self.scale.surface.mesh(&finite).map_err(|error| failed(error.to_string()))?;
+        create(&self.target)?;
+        let file = format!("surface_{frame:06}.{}", self.ending);
+        output::write(&self.target.join(&file), |out| (self.write)(&mesh, out))?;
+        let parts = shells(&mesh);
+        let volume = parts.iter().fold(0.0, |sum, shell| sum + shell.volume);
+        let particle_volume = finite.len() as f64 * self.scale.particle_volume;
+        Ok(FrameSurface {
+            frame,
+            time: entry.time,
+            file,
+            particles: finite.len(),
+            left_out: points.len() - finite.len(),
+            vertices: mesh.positions.len(),
+            triangles: mesh.triangles.len(),
+            closed: is_closed_manifold(&mesh),
+            components: parts.len(),
+            volume,
+            particle_volume,
+            volume_ratio: (particle_volume > 0.0).then_some(volume / particle_volume),
+            milliseconds: started.elapsed().as_secs_f64() * 1e3,
+        })
+    }
 }
 
 fn create(folder: &Path) -> Result<(), Failure> {
@@ -242,7 +266,7 @@ fn create(folder: &Path) -> Result<(), Failure> {
         .map_err(|error| Failure::usage(format!("cannot make the folder `{}`: {error}", folder.display())))
 }
 
-/// A failure that says what is there already.
+/// The failure of a frame, which also says what is there already.
 fn with_kept(failure: Failure, kept: usize, target: &Path) -> Failure {
     match failure {
         Failure::Usage(message) if kept > 0 => {
@@ -252,7 +276,7 @@ fn with_kept(failure: Failure, kept: usize, target: &Path) -> Failure {
     }
 }
 
-fn print(summary: &Summary) {
+fn print(summary: &FluidSummary) {
     let ratios = summary.surfaces.iter().filter_map(|surface| surface.volume_ratio);
     let (least, most) =
         ratios.fold((f64::INFINITY, 0.0), |(least, most), ratio| (ratio.min(least), ratio.max(most)));

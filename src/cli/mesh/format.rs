@@ -1,79 +1,119 @@
-//! The formats of meshes, by their names and by the endings of files.
+//! The formats of meshes on the command line: choices, help and messages, all from the table of the library.
 
-use std::io::{self, Write};
 use std::path::Path;
 
 use clap::ValueEnum;
+use clap::builder::PossibleValue;
 
-use super::super::Failure;
-use crate::mesh::{self, Mesh};
+use super::super::failure::Failure;
+use crate::mesh::{FORMATS, Format, WriteMesh};
 
-/// A format and its writer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(in crate::cli) enum Format {
-    /// Triangles as records, for nearly every program
-    Stl,
-    /// Shared vertices with normals, binary
-    Ply,
-    /// Shared vertices with normals, text
-    Obj,
-    /// For ParaView
-    Vtp,
-    /// For viewers and browsers
-    Glb,
-    /// For printers
-    #[value(name = "3mf")]
-    ThreeMf,
-    #[value(skip)]
-    StlText,
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Self] {
+        FORMATS
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.ending).help(self.purpose))
+    }
 }
 
-impl Format {
-    /// The format that a path's ending names.
-    pub fn of(path: &Path) -> Result<Self, Failure> {
-        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-        Self::from_str(&ending, false).map_err(|_| {
-            Failure::usage(format!(
-                "cannot tell the mesh format of `{}`: the ending must be .stl, .ply, .obj, .vtp, .glb or .3mf",
-                path.display()
-            ))
-        })
-    }
+/// The format that a path's ending names.
+pub(super) fn of_path(path: &Path) -> Result<Format, Failure> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let found = FORMATS.iter().find(|format| format.ending == ending);
+    found.copied().ok_or_else(|| {
+        Failure::usage(format!(
+            "cannot tell the mesh format of `{}`: the ending must be {}",
+            path.display(),
+            one_of(FORMATS)
+        ))
+    })
+}
 
-    /// The format as text, if it is asked for.
-    pub fn as_text(self, text: bool) -> Result<Self, Failure> {
-        match (self, text) {
-            (Self::Stl, true) => Ok(Self::StlText),
-            (format, false) => Ok(format),
-            _ => Err(Self::no_text()),
+/// The writer of a format: that of its text form if `ascii` is set.
+pub(super) fn writer(format: Format, ascii: bool) -> Result<WriteMesh, Failure> {
+    if ascii { format.write_text.ok_or_else(no_text) } else { Ok(format.write) }
+}
+
+/// The failure of `--ascii` without a file whose format has a text form.
+pub(super) fn no_text() -> Failure {
+    let with_text = one_of(with_text());
+    Failure::usage(format!(
+        "--ascii is for {with_text} files: the other formats are text or binary by themselves"
+    ))
+}
+
+/// The failure of a command that has nowhere to put its mesh.
+pub(super) fn no_output() -> Failure {
+    let (first, others) = (FORMATS[0].ending, endings(&FORMATS[1..]).join(", "));
+    Failure::usage(format!("no output: give -o FILE.{first} (or {others}), or --json for the figures alone"))
+}
+
+/// The help of `--output`.
+pub(in crate::cli) fn output_help() -> String {
+    format!(
+        "Where the mesh goes; the ending chooses the format: {}. With --fluid a folder [default: surface/ in that of \
+         the run]",
+        endings(FORMATS).join(" ")
+    )
+}
+
+/// The help of `--ascii`.
+pub(in crate::cli) fn ascii_help() -> String {
+    format!("Write {} as text", one_of(with_text()))
+}
+
+fn with_text() -> impl Iterator<Item = &'static Format> {
+    FORMATS.iter().filter(|format| format.write_text.is_some())
+}
+
+/// The endings of formats, each with its dot.
+fn endings(formats: impl IntoIterator<Item = &'static Format>) -> Vec<String> {
+    formats.into_iter().map(|format| format!(".{}", format.ending)).collect()
+}
+
+/// Endings as a choice: `.a, .b or .c`.
+fn one_of(formats: impl IntoIterator<Item = &'static Format>) -> String {
+    let endings = endings(formats);
+    match endings.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => endings.concat(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_and_messages_name_every_format() {
+        let message = |failure: Failure| match failure {
+            Failure::Usage(message) => message,
+            other => panic!("{other:?}"),
+        };
+        let unknown = message(of_path(Path::new("pawn.3ds")).unwrap_err());
+        for text in [output_help(), unknown, message(no_output())] {
+            for format in FORMATS {
+                assert!(text.contains(&format!(".{}", format.ending)), "{text}");
+            }
         }
     }
 
-    pub fn no_text() -> Failure {
-        Failure::usage("--ascii is for .stl files: the other formats are text or binary by themselves")
-    }
-
-    /// The ending of files of this format.
-    pub fn ending(self) -> &'static str {
-        match self {
-            Self::Stl | Self::StlText => "stl",
-            Self::Ply => "ply",
-            Self::Obj => "obj",
-            Self::Vtp => "vtp",
-            Self::Glb => "glb",
-            Self::ThreeMf => "3mf",
+    #[test]
+    fn formats_are_found_by_endings_in_any_case() {
+        for format in FORMATS {
+            let path = format!("pawn.{}", format.ending.to_uppercase());
+            assert_eq!(of_path(Path::new(&path)).unwrap().ending, format.ending);
         }
+        assert!(of_path(Path::new("stl")).is_err() && of_path(Path::new("pawn.st")).is_err());
     }
 
-    pub fn write(self, mesh: &Mesh, mut out: &mut dyn Write) -> io::Result<()> {
-        match self {
-            Self::Stl => mesh::stl::write(mesh, &mut out),
-            Self::Ply => mesh::ply::write(mesh, &mut out),
-            Self::Obj => mesh::obj::write(mesh, &mut out),
-            Self::Vtp => mesh::vtp::write(mesh, &mut out),
-            Self::Glb => mesh::glb::write(mesh, &mut out),
-            Self::ThreeMf => mesh::threemf::write(mesh, &mut out),
-            Self::StlText => mesh::stl::write_ascii(mesh, &mut out),
+    #[test]
+    fn text_is_written_where_a_format_has_it() {
+        for format in FORMATS {
+            assert!(writer(*format, false).is_ok());
+            assert_eq!(writer(*format, true).is_ok(), format.write_text.is_some());
         }
     }
 }

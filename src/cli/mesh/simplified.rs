@@ -1,26 +1,26 @@
-//! `--simplify`: fewer triangles within a distance of the surface that is measured, not only aimed at.
+//! `--simplify`: fewer triangles within a stated distance of the surface. The distance is measured, not only
+//! aimed at.
 
 use std::time::Instant;
 
 use super::super::args::Tolerance;
-use super::super::note;
+use super::super::failure::note;
 use crate::field::Field;
 use crate::geom::Aabb;
 use crate::mesh::{Mesh, Quality, Reference, simplify};
 
-/// A simplified mesh and what was found about it.
+/// What was found about a simplified mesh.
 pub(super) struct Simplified {
-    pub mesh: Mesh,
     pub quality: Quality,
-    /// Triangles before.
+    /// The number of triangles before.
     pub from: usize,
-    /// Metres.
+    /// In metres.
     pub tolerance: f64,
     pub milliseconds: f64,
 }
 
 impl Tolerance {
-    /// In metres, for a mesh.
+    /// The tolerance for a mesh, in metres.
     fn of(self, mesh: &Mesh) -> f64 {
         let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p));
         match self {
@@ -31,32 +31,33 @@ impl Tolerance {
     }
 }
 
-/// Parts of the tolerance to aim at: the measure has other samples than the simplification, of which some lie a few
-/// hundredths further off.
+/// Parts of the tolerance to aim at, in turn. The measure has other samples than the simplification, and some
+/// of them lie a few hundredths further off.
 const AIMS: [f64; 3] = [0.9, 0.75, 0.5];
 
-/// Simplifies a mesh as far as the tolerance allows. If the measured distance is too large each time, the mesh stays
-/// as it was.
+/// Simplifies a mesh as far as the tolerance allows. If the measured distance is too large at every aim, the
+/// mesh stays as it was.
 pub(super) fn simplified(
-    mesh: &Mesh,
+    mesh: &mut Mesh,
     tolerance: Tolerance,
     distance: &dyn Field,
     reference: &Reference<'_>,
 ) -> Simplified {
     let tolerance = tolerance.of(mesh);
     let started = Instant::now();
-    let found = |mesh: Mesh, quality: Quality, from: usize| {
-        let milliseconds = started.elapsed().as_secs_f64() * 1e3;
-        Simplified { mesh, quality, from, tolerance, milliseconds }
-    };
     let from = mesh.triangles.len();
+    let found = |quality: Quality| {
+        let milliseconds = started.elapsed().as_secs_f64() * 1e3;
+        Simplified { quality, from, tolerance, milliseconds }
+    };
     let mut own = None;
     for aim in AIMS {
         let mut less = mesh.clone();
         simplify(&mut less, distance, aim * tolerance);
         let quality = reference.measure(&less);
         if quality.hausdorff() <= tolerance {
-            return found(less, quality, from);
+            *mesh = less;
+            return found(quality);
         }
         let own: &Quality = own.get_or_insert_with(|| reference.measure(mesh));
         if own.hausdorff() > tolerance {
@@ -65,10 +66,10 @@ pub(super) fn simplified(
                  {tolerance:.2e} m asked for; try more cells, or --method dc for sharp edges",
                 own.hausdorff()
             ));
-            return found(less, quality, from);
+            *mesh = less;
+            return found(quality);
         }
     }
     note("no simplified mesh was found to be near enough to the surface: all triangles are kept");
-    let quality = own.unwrap_or_else(|| reference.measure(mesh));
-    found(mesh.clone(), quality, from)
+    found(own.unwrap_or_else(|| reference.measure(mesh)))
 }

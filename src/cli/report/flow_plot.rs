@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::super::Failure;
-use super::super::plot::{self, Axis};
+use super::super::plot::{self, LogAxis};
 use super::flows::Row;
 use crate::experiment::Deviation;
 
@@ -26,8 +26,9 @@ pub(super) fn draw(scene: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Fa
         .flat_map(|row| known.iter().filter_map(move |&k| Some((row, k, row.errors()[k]?))))
         .filter(|&(.., error)| is_shown(error))
         .collect();
-    let x = Axis::over(marks.iter().map(|(row, ..)| row.cpu_seconds), plot::LEFT, plot::WIDTH - plot::RIGHT);
-    let y = Axis::over(marks.iter().map(|(.., error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
+    let x =
+        LogAxis::over(marks.iter().map(|(row, ..)| row.cpu_seconds), plot::LEFT, plot::WIDTH - plot::RIGHT);
+    let y = LogAxis::over(marks.iter().map(|(.., error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
     let mut out = plot::begin(&format!("{scene}: error against cost"));
     plot::grid(&mut out, &x, &y, ["processor time, s", "relative deviation"]);
     let mut legend = Vec::new();

@@ -1,4 +1,4 @@
-//! Error and time of both ways of meshing against the number of cells.
+//! The error and the time of both meshing methods against the number of cells.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -8,24 +8,25 @@ use anstream::println;
 use serde::Serialize;
 
 use super::super::args::MeshMethod;
-use super::super::plot::{self, Axis};
-use super::super::{Failure, progress};
+use super::super::failure::Failure;
+use super::super::plot::{self, LogAxis};
+use super::super::progress;
 use crate::Solid;
 use crate::mesh::{self, Grid, Quality, Resolution};
 use crate::solid::Depth;
 
-/// Resolutions of each method, each twice as fine as the one before.
+/// Resolutions for each method. Each is twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;
 
-/// Timed repetitions of which the fastest counts.
+/// Timed repetitions, of which the fastest counts.
 const REPETITIONS: usize = 3;
 
-/// One mesh.
+/// The error and the time of one mesh, a row of the report.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Row {
+pub(super) struct MeshFigures {
     method: &'static str,
     cells: usize,
-    /// Side of a cell.
+    /// The side of a cell in metres.
     spacing: f64,
     triangles: usize,
     closed: bool,
@@ -35,17 +36,17 @@ pub(super) struct Row {
     evaluations: u64,
     gradients: u64,
     milliseconds: f64,
-    /// log₂ of how much smaller the Hausdorff distance is than with half the cells.
+    /// log₂ of the Hausdorff distance with half the cells over the one with these.
     order: Option<f64>,
-    /// The same for the root mean square from the mesh to the surface.
+    /// The order of the root mean square from the mesh to the surface.
     order_rms: Option<f64>,
 }
 
-/// Meshes a solid by each method with up to `finest` cells. Nothing for a solid without bounds.
-pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<Row>, Failure> {
+/// Meshes a solid by each method with up to `finest` cells. Empty for a solid without bounds.
+pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, Failure> {
     let Some(bounds) = solid.bounds().aabb() else { return Ok(Vec::new()) };
     let bar = progress::bar(u64::from(2 * RESOLUTIONS), "meshing");
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<MeshFigures> = Vec::new();
     for method in [MeshMethod::Mc, MeshMethod::Dc] {
         for halvings in (0..RESOLUTIONS).rev() {
             let cells = (finest >> halvings).max(Grid::MIN_CELLS);
@@ -67,7 +68,7 @@ fn order(coarse: f64, fine: f64) -> Option<f64> {
     Some((coarse / fine).log2()).filter(|order| order.is_finite())
 }
 
-fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<Row, Failure> {
+fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<MeshFigures, Failure> {
     let surface = solid.surface(*grid.bounds());
     let mut fastest = f64::INFINITY;
     let mut mesh = mesh::Mesh::default();
@@ -78,7 +79,7 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<R
     }
     let report = mesh::check(&mesh, &*surface);
     let quality = mesh::measure(&mesh, &*surface, &Depth(solid), grid).map_err(Failure::usage)?;
-    Ok(Row {
+    Ok(MeshFigures {
         method: method.name(),
         cells,
         spacing: grid.spacing().min_element(),
@@ -94,7 +95,7 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<R
     })
 }
 
-pub(super) fn print(rows: &[Row]) {
+pub(super) fn print(rows: &[MeshFigures]) {
     if rows.is_empty() {
         return println!("no meshes: the solid has no bounds");
     }
@@ -137,15 +138,16 @@ pub(super) fn print(rows: &[Row]) {
     }
 }
 
-/// Hausdorff distance against cells, a line for each method, as SVG or PNG.
-pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
-    let marks: Vec<(&Row, f64)> = rows
+/// Plots the Hausdorff distance against the cells, with a line for each method, as SVG or PNG.
+pub(super) fn draw(solid: &str, rows: &[MeshFigures], path: &Path) -> Result<Vec<u8>, Failure> {
+    let marks: Vec<(&MeshFigures, f64)> = rows
         .iter()
         .map(|row| (row, row.quality.hausdorff()))
         .filter(|(_, error)| *error > 0.0 && error.is_finite())
         .collect();
-    let x = Axis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);
-    let y = Axis::over(marks.iter().map(|(_, error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
+    let x =
+        LogAxis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);
+    let y = LogAxis::over(marks.iter().map(|(_, error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
     let mut out = plot::begin(&format!("{solid}: error of its meshes"));
     plot::grid(&mut out, &x, &y, ["cells along the longest side", "Hausdorff distance"]);
     let legend = plot::WIDTH - plot::RIGHT + 22.0;

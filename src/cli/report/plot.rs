@@ -1,28 +1,28 @@
-//! Speed against error as a picture: one mark for each program.
+//! Speed against error as a picture, with a mark for each program.
 
 use std::fmt::Write;
 use std::path::Path;
 
-use super::super::Failure;
-use super::super::plot::{Axis, BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, begin, end, grid};
-use super::Row;
+use super::super::failure::Failure;
+use super::super::plot::{BOTTOM, HEIGHT, LEFT, LogAxis, RIGHT, TOP, WIDTH, begin, end, grid};
+use super::programs::ProgramFigures;
 
-/// Errors below this are drawn at it: an exact answer has no place on a logarithmic axis.
+/// Smaller errors are drawn at this one, because an exact answer has no place on a logarithmic axis.
 const LEAST_ERROR: f64 = 1e-17;
 
-/// The plot as SVG or PNG, as the ending of the path says.
-pub(super) fn draw(solid: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
+/// The plot as SVG or PNG, by the ending of the path.
+pub(super) fn draw(solid: &str, rows: &[ProgramFigures], path: &Path) -> Result<Vec<u8>, Failure> {
     end(svg(solid, rows), path)
 }
 
-fn svg(solid: &str, rows: &[Row]) -> String {
-    let marks: Vec<(&Row, f64)> = rows
+fn svg(solid: &str, rows: &[ProgramFigures]) -> String {
+    let marks: Vec<(&ProgramFigures, f64)> = rows
         .iter()
         .filter_map(|row| Some((row, row.max_rel_error?.max(LEAST_ERROR))))
         .filter(|(_, error)| error.is_finite())
         .collect();
-    let x = Axis::over(marks.iter().map(|(row, _)| row.ns_per_point), LEFT, WIDTH - RIGHT);
-    let y = Axis::over(marks.iter().map(|(_, error)| *error), HEIGHT - BOTTOM, TOP);
+    let x = LogAxis::over(marks.iter().map(|(row, _)| row.ns_per_point), LEFT, WIDTH - RIGHT);
+    let y = LogAxis::over(marks.iter().map(|(_, error)| *error), HEIGHT - BOTTOM, TOP);
     let mut out = begin(&format!("{solid}: speed against error"));
     grid(&mut out, &x, &y, ["ns per point, one thread", "largest relative error"]);
     for (row, error) in &marks {
@@ -32,8 +32,8 @@ fn svg(solid: &str, rows: &[Row]) -> String {
     out
 }
 
-/// Colour tells the program, shape the form; interpreters are hollow.
-fn mark(out: &mut String, row: &Row, x: f64, y: f64) {
+/// Draws a mark. Its colour stands for the program, its shape for the form, and interpreters are hollow.
+fn mark(out: &mut String, row: &ProgramFigures, x: f64, y: f64) {
     let colour = colour(row);
     let fill = if row.engine == "interp" { "#ffffff" } else { colour };
     let style = format!(r##"fill="{fill}" stroke="{colour}" stroke-width="1.6""##);
@@ -46,7 +46,7 @@ fn mark(out: &mut String, row: &Row, x: f64, y: f64) {
     };
 }
 
-fn colour(row: &Row) -> &'static str {
+fn colour(row: &ProgramFigures) -> &'static str {
     match (row.program, row.precision, row.shape) {
         ("value", "f64", "many") => "#1b6ca8",
         ("value", "f64", _) => "#0b3c5d",
@@ -57,7 +57,7 @@ fn colour(row: &Row) -> &'static str {
     }
 }
 
-fn legend(out: &mut String, marks: &[(&Row, f64)]) {
+fn legend(out: &mut String, marks: &[(&ProgramFigures, f64)]) {
     let x = WIDTH - RIGHT + 22.0;
     let mut y = TOP + 12.0;
     let mut seen: Vec<&'static str> = Vec::new();

@@ -1,32 +1,32 @@
-//! The points at which programs are timed and judged.
+//! The points at which programs are timed and their errors measured.
 
 use glam::DVec3;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use crate::Solid;
 use crate::geom::Aabb;
+use crate::{Precision, Solid};
 
-/// Points of a timed batch: enough to fill the pipelines, few enough to stay in the nearest cache.
+/// Points of a timed batch: enough to fill the pipelines, and few enough to stay in the nearest cache.
 const TIMED: usize = 4096;
 
-/// Random points whose errors are measured: each costs some 100 µs of 120-digit arithmetic.
+/// Random points at which errors are measured. Each costs some 100 µs of 120-digit arithmetic.
 const JUDGED: usize = 600;
 
-/// Points on the surface whose errors are measured.
+/// Points on the surface at which errors are measured.
 const ON_SURFACE: usize = 400;
 
-pub(super) struct Points {
+pub(super) struct SamplePoints {
     pub over: Aabb,
     pub random: Vec<DVec3>,
-    /// How many of the random points are judged; they come first.
+    /// The number of random points at which errors are measured. They come first.
     pub random_judged: usize,
-    /// As near to ω = 0 as doubles go.
+    /// Points as near to ω = 0 as `f64` allows.
     pub surface: Vec<DVec3>,
 }
 
-impl Points {
-    /// The same points for the same solid and box.
+impl SamplePoints {
+    /// Chooses points. Equal solids and boxes get equal points.
     pub fn choose(solid: &Solid, over: Aabb) -> Self {
         let mut generator = Pcg64::seed_from_u64(1);
         let mut unit = || (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
@@ -44,14 +44,17 @@ impl Points {
         Self { over, random, random_judged: JUDGED, surface }
     }
 
-    /// The points whose errors are measured, random ones first; rounded to `f32` if the program will see them so.
-    pub fn judged(&self, single: bool) -> impl Iterator<Item = DVec3> + '_ {
+    /// The points at which errors are measured, random ones first, rounded to a precision.
+    pub fn judged(&self, precision: Precision) -> impl Iterator<Item = DVec3> + '_ {
         let points = self.random[..self.random_judged].iter().chain(&self.surface);
-        points.map(move |p| if single { p.as_vec3().as_dvec3() } else { *p })
+        points.map(move |p| match precision {
+            Precision::F32 => p.as_vec3().as_dvec3(),
+            Precision::F64 => *p,
+        })
     }
 }
 
-/// The last outside point between an inside and an outside one.
+/// The last point outside the solid between a point inside and a point outside.
 fn bisect(solid: &Solid, mut inside: DVec3, mut outside: DVec3) -> DVec3 {
     for _ in 0..60 {
         let middle = 0.5 * (inside + outside);

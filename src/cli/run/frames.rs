@@ -35,7 +35,7 @@ pub(super) struct Frames {
 /// What all pictures share.
 struct Pictures {
     /// The scene that is drawn, with the box, the obstacles and the legend.
-    scene: render::Scene,
+    scene: render::Backdrop,
     title: String,
     domain: Aabb,
     /// The speed that is drawn red, m/s.
@@ -212,12 +212,12 @@ impl Pictures {
         let particles = simulation.particles();
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
         let image = self.scene.frame(
-            &render::Particles {
+            &render::ParticlesView {
                 positions: particles.position.points(),
                 speeds: &speeds,
                 radius: self.radius,
             },
-            &render::Moment { time: simulation.time(), step: simulation.steps() },
+            &render::Caption { time: simulation.time(), step: simulation.steps() },
         );
         output::write(path, |mut out| image.write_png(&mut out))?;
         self.count += 1;
@@ -226,15 +226,15 @@ impl Pictures {
 }
 
 /// The scene of a picture without its particles: the box, the obstacles, the legend.
-fn drawn(domain: &Aabb, title: &str, fastest: f64, obstacle: &Mesh) -> Result<render::Scene, Failure> {
+fn drawn(domain: &Aabb, title: &str, fastest: f64, obstacle: &Mesh) -> Result<render::Backdrop, Failure> {
     let camera = render::Camera::three_quarter(domain, render::Camera::SIZE).map_err(Failure::usage)?;
-    let mesh = render::Mesh {
+    let mesh = render::MeshView {
         vertices: &obstacle.positions,
         normals: &obstacle.normals,
         triangles: &obstacle.triangles,
     };
     let legend = render::Legend { title, fastest };
-    render::Scene::new(camera, domain, &mesh, &legend).map_err(Failure::usage)
+    render::Backdrop::new(camera, domain, &mesh, &legend).map_err(Failure::usage)
 }
 
 /// The folder for a run's files. The default is beside the file, `pawn.rfm` → `pawn.out`; for standard input

@@ -1,50 +1,41 @@
-//! A point on the crease where two faces of a surface meet, or in the corner of three, to the last digits.
+//! A point of the crease where two faces of a surface meet, or of the corner of three, to the last digits.
 //!
-//! The field itself bends on a crease, so Newton's method on it gets nowhere there; but a little beside the crease it
-//! is smooth and known. Points on each face at a distance δ from the crease give tangent planes; where these meet the
-//! crease is missed by κδ²/2 only, with κ the faces' curvature. Then δ shrinks.
+//! The field itself bends on a crease, so Newton's method on it does not converge there. A little beside the
+//! crease it is smooth. Points on each face at a distance δ from the crease give tangent planes, and these
+//! meet only κδ²/2 away from the crease, where κ is the faces' curvature. Then δ shrinks.
 //!
-//! Invariant: a point that is returned lies on the surface, and the faces still meet at an angle there: where a smooth
-//! surface bends sharply the normals grow together as δ shrinks, and there is no crease.
+//! Invariant: a point that is returned lies on the surface, and the faces still meet at an angle there. Where
+//! a smooth surface bends sharply the normals approach each other as δ shrinks, and no point is returned.
 
 use glam::{DMat3, DVec3};
 
 use super::super::normals::unit;
-use super::project;
+use super::project::{self, FacePoint};
 use crate::field::Field;
 
-/// A face beside a crease.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Face {
-    /// A point of the face: it tells on which side of the crease the face lies.
-    pub point: DVec3,
-    /// Unit normal.
-    pub normal: DVec3,
-}
-
-/// The distances δ of the probes from the crease, in sizes. Each is much larger than the error that the one before
-/// leaves (κ·size is below 1 where a grid resolves the surface at all), so that probes fall on their own faces; the last
-/// leaves less than rounding.
+/// The distances δ of the probes from the crease, in sizes. Each is much larger than the error that the one
+/// before leaves (κ·size is below 1 where a grid resolves the surface at all), so that probes fall on their
+/// own faces. What the last one leaves is below rounding.
 const DISTANCES: [f64; 4] = [0.2, 0.02, 1e-3, 1e-6];
 
-/// Faces whose normals differ by less than this make no crease (cosine of 2.5°).
+/// Faces whose normals differ by less than this make no crease (the cosine of 2.5°).
 const SMOOTH: f64 = 0.999;
 
-/// How far the result may be from the surface, in sizes: what the last probe leaves is far below.
+/// The largest distance of the result from the surface, in sizes. What the last probe leaves is far below it.
 const RESIDUAL: f64 = 1e-9;
 
-/// The point of the crease of two faces nearest to `start`, or the corner of three. `size` is the length over which the
-/// faces are known to be single, say a cell's side.
+/// The point of the crease of two faces nearest to `start`, or the corner of three. `None` if there is no
+/// such point. `size` is a length over which there are no other faces, for example a cell's side.
 ///
-/// `count` counts the evaluations.
+/// `count` counts the evaluations of ω and ∇ω.
 pub(super) fn find(
     field: &dyn Field,
     start: DVec3,
-    faces: &[Face],
+    faces: &[FacePoint],
     size: f64,
     count: &mut u64,
 ) -> Option<DVec3> {
-    let mut planes: [Face; 3] = [faces[0]; 3];
+    let mut planes: [FacePoint; 3] = [faces[0]; 3];
     planes[..faces.len()].copy_from_slice(faces);
     let planes = &mut planes[..faces.len()];
     let mut at = meeting_point(start, planes)?;
@@ -64,23 +55,23 @@ pub(super) fn find(
     (omega.abs() <= RESIDUAL * size * gradient.length()).then_some(at)
 }
 
-/// The tangent plane of the face near a probe, which misses the face by the square of their distance, as a plane that
-/// touches it would at δ from the crease. Where the field there is another face's, the face is sought at most δ away:
-/// farther, the point may be on another.
-fn tangent(field: &dyn Field, probe: DVec3, normal: DVec3, delta: f64, count: &mut u64) -> Option<Face> {
+/// The tangent plane of the face near a probe. It misses the face by the square of their distance, as a plane
+/// that touches the face at δ from the crease does. If the field at the probe belongs to another face, the
+/// face is sought at most δ away, because a point farther away may be on another one.
+fn tangent(field: &dyn Field, probe: DVec3, normal: DVec3, delta: f64, count: &mut u64) -> Option<FacePoint> {
     *count += 1;
     let (omega, gradient) = field.omega_grad(probe);
     let found = unit(-gradient)
-        .map(|normal| Face { point: probe - gradient * (omega / gradient.length_squared()), normal });
-    let is_same = |face: &Face| {
+        .map(|normal| FacePoint { point: probe - gradient * (omega / gradient.length_squared()), normal });
+    let is_same = |face: &FacePoint| {
         face.normal.dot(normal) > project::SAME_FACE && face.point.distance(probe) <= 0.5 * delta
     };
     found.filter(is_same).or_else(|| project::onto_face(field, probe, normal, delta, count))
 }
 
-/// The point nearest to `from` in two or three planes; none where they are nearly parallel.
-fn meeting_point(from: DVec3, planes: &[Face]) -> Option<DVec3> {
-    let height = |face: &Face| face.normal.dot(face.point - from);
+/// The point nearest to `from` that lies in two or three planes. `None` if they are nearly parallel.
+fn meeting_point(from: DVec3, planes: &[FacePoint]) -> Option<DVec3> {
+    let height = |face: &FacePoint| face.normal.dot(face.point - from);
     let (a, b) = (&planes[0], &planes[1]);
     let cosine = a.normal.dot(b.normal);
     if cosine.abs() > SMOOTH {
@@ -122,8 +113,11 @@ mod tests {
     #[test]
     fn the_rim_of_a_can_is_found_to_the_last_digits() {
         let faces = [
-            Face { point: DVec3::new(0.9, 0.0, 0.0), normal: DVec3::Z },
-            Face { point: DVec3::new(0.99, 0.14, -0.1), normal: DVec3::new(0.99, 0.14, 0.0).normalize() },
+            FacePoint { point: DVec3::new(0.9, 0.0, 0.0), normal: DVec3::Z },
+            FacePoint {
+                point: DVec3::new(0.99, 0.14, -0.1),
+                normal: DVec3::new(0.99, 0.14, 0.0).normalize(),
+            },
         ];
         let start = DVec3::new(0.97, 0.05, -0.03);
         let found = find(&can(), start, &faces, 0.1, &mut 0).unwrap();
@@ -135,7 +129,7 @@ mod tests {
     fn a_smooth_bend_is_no_crease() {
         let ball = Closures { omega: |p: DVec3| 0.01 - p.length_squared(), gradient: |p: DVec3| -2.0 * p };
         let at = |angle: f64| DVec3::new(angle.cos(), angle.sin(), 0.0);
-        let faces = [0.0, 0.9].map(|angle| Face { point: 0.1 * at(angle), normal: at(angle) });
+        let faces = [0.0, 0.9].map(|angle| FacePoint { point: 0.1 * at(angle), normal: at(angle) });
         assert_eq!(find(&ball, DVec3::new(0.095, 0.05, 0.0), &faces, 0.1, &mut 0), None);
     }
 
@@ -148,7 +142,7 @@ mod tests {
         let faces = [0, 1, 2].map(|axis| {
             let mut point = DVec3::splat(-0.3);
             point[axis] = 0.0;
-            Face { point, normal: DVec3::AXES[axis] }
+            FacePoint { point, normal: DVec3::AXES[axis] }
         });
         let found = find(&corner, DVec3::splat(-0.1), &faces, 1.0, &mut 0).unwrap();
         assert!(found.length() < 1e-15, "{found}");

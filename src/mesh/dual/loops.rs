@@ -1,8 +1,9 @@
-//! The closed loops of crossed edges of a cell: each runs around a sheet of the surface, and becomes a vertex.
+//! The closed loops of crossed edges of a cell. Each runs around a sheet of the surface and becomes a vertex.
 //!
-//! They are those of marching cubes: where the signs leave a choice, on a face or about a tunnel, the corners' values
-//! decide (see `ambiguity`). A vertex at either end of a tunnel would close it: there each loop becomes a ring of vertices,
-//! one at each passage through a face, and a tube joins the rings.
+//! The loops are those of marching cubes. Where the signs leave a choice, on a face or about a tunnel, the
+//! corners' values decide (see `ambiguity`). A single vertex at either end of a tunnel would close the
+//! tunnel. There each loop becomes a ring of vertices, one at each passage through a face, and a tube joins
+//! the rings.
 
 use std::sync::LazyLock;
 
@@ -10,7 +11,7 @@ use smallvec::SmallVec;
 
 use super::super::{
     cases::{Ambiguous, FACES, loops, needs_values},
-    patches::{self, Cell},
+    patches::{self, CellValues},
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, inside_corners, set_positions},
 };
@@ -21,16 +22,17 @@ use crate::field::Field;
 pub(super) struct Loop {
     /// Edges of the cell, numbered as in the table of cases, in the order of the loop.
     pub edges: SmallVec<[u8; 12]>,
-    /// Pairs of neighbours in the loop, by their places in it, that lie in a face which the loop passes twice. Two
-    /// cells whose loops both pass their common face twice would be joined by two edges of the mesh with the same ends.
+    /// Pairs of neighbours in the loop, by their places in it, that lie in a face which the loop passes
+    /// twice. Two cells whose loops both pass their common face twice would be joined by two edges of the
+    /// mesh with the same ends.
     pub twice: Vec<[u8; 2]>,
 }
 
-/// The loops of all cases that the signs alone decide; none for the others.
+/// The loops of all cases that the signs alone decide. The lists of other cases are empty.
 pub(super) static LOOPS: LazyLock<Vec<Vec<Loop>>> = LazyLock::new(|| {
     let of_case = |inside: u8| match needs_values(inside) {
         true => Vec::new(),
-        // of no consequence here
+        // no face of such a case is ambiguous
         false => loops(inside, [Ambiguous::JoinSolid; FACES]).iter().map(|l| Loop::of(l)).collect(),
     };
     (0..=255).map(of_case).collect()
@@ -39,28 +41,28 @@ pub(super) static LOOPS: LazyLock<Vec<Vec<Loop>>> = LazyLock::new(|| {
 /// The loops of a cell that signs alone do not decide.
 #[derive(Debug, Clone)]
 pub(super) struct CellLoops {
-    /// The cell's plane, and its bit there.
+    /// The cell's plane, and its bit in the plane.
     pub cell: (usize, usize),
     pub loops: Vec<Loop>,
-    /// Which two bound a tunnel.
+    /// The two loops that bound a tunnel.
     pub tunnel: Option<[usize; 2]>,
 }
 
-/// What the cells of a brick become.
+/// The sheets of the surface in the cells of a brick.
 #[derive(Debug, Clone)]
 pub(super) struct Sheets {
     pub undecided: Vec<CellLoops>,
-    /// Number of vertices: those of cells that signs decide come first.
+    /// The number of vertices. Those of cells that signs decide come first.
     pub vertices: usize,
     pub evaluations: u64,
 }
 
 impl Sheets {
-    /// Looks at the cells of the brick whose first node has the extended indices `low`.
+    /// The sheets of the brick whose first node has the extended indices `low`.
     pub fn find(field: &dyn Field, lattice: &Lattice, low: [usize; 3], around: &Around) -> Self {
         let mut sheets = Self { undecided: Vec::new(), vertices: 0, evaluations: 0 };
         for cell in patches::undecided(around) {
-            let (polygons, tunnel) = Cell::new(field, lattice, patches::cell_low(low, cell)).loops();
+            let (polygons, tunnel) = CellValues::new(field, lattice, patches::cell_low(low, cell)).loops();
             let found = CellLoops {
                 cell,
                 loops: polygons.iter().map(|polygon| Loop::of(polygon)).collect(),
@@ -87,7 +89,7 @@ impl CellLoops {
         self.tunnel.is_some_and(|ends| ends.contains(&number))
     }
 
-    /// How many vertices a loop becomes.
+    /// The number of vertices that a loop becomes.
     pub fn vertices(&self, number: usize) -> usize {
         if self.opens(number) { self.loops[number].edges.len() } else { 1 }
     }
@@ -106,7 +108,7 @@ impl Loop {
     }
 }
 
-/// The face that holds both edges: 2·axis + side.
+/// The face 2·axis + side that holds both edges.
 fn common_face(a: usize, b: usize) -> Option<usize> {
     let faces = |e: usize| {
         let axis = e / 4;
@@ -160,7 +162,8 @@ mod tests {
         }
     }
 
-    /// Loops that pass a face twice exist: two corners inside on a diagonal, and all of the other face.
+    /// Some loops pass a face twice: for example if two corners on a diagonal of a face are inside, and all
+    /// corners of the opposite face.
     #[test]
     fn a_face_can_be_passed_twice() {
         let (mut with, mut without) = (0, 0);

@@ -1,12 +1,13 @@
-//! Mends the places where edges stay far from the surface although nothing near their middles could cut them, and
-//! triangles that lie upside down: about collars and gaps thinner than a cell, which the grid has seen in part.
+//! Mends edges that stay far from the surface although nothing near their middles could cut them, and
+//! triangles that lie upside down. Both occur at collars and gaps thinner than a cell, of which the grid has
+//! seen a part.
 //!
-//! One edge after the other is turned, or cut at one of several points of the surface, or one of the vertices about it
-//! goes to another place, whichever brings the triangles beside it nearer to the surface without folding them. Edges that
-//! a change touches wait in the same queue.
+//! One edge after the other is turned, or cut at a point of the surface, or one of the vertices beside it
+//! moves. The change is the one that brings the triangles beside the edge nearest to the surface without
+//! folding them. Edges that a change touches wait in the same queue.
 //!
-//! Invariant: edges are treated in the order of their numbers and an edge is turned only if its new ends were not joined
-//! yet, so the mesh stays closed and manifold and is the same on any number of threads.
+//! Invariant: edges are treated in the order of their numbers, and an edge is turned only if its new ends
+//! were not joined before. So the mesh stays closed and manifold and is the same on any number of threads.
 
 use std::collections::VecDeque;
 
@@ -16,40 +17,40 @@ use rustc_hash::FxHashSet;
 
 use super::super::normals::{gradients, unit};
 use super::patch::{FACING, NEAR, Pair, Patch, STEPS};
-use super::vertices::{Kind, Vertex, Vertices};
+use super::vertices::{Vertex, VertexKind, Vertices};
 use super::{crease, project};
 use crate::field::Field;
 
-/// A change must leave at most this share of what it is to mend.
+/// A change must leave at most this share of what was wrong.
 const LEFT: f64 = 0.9;
 
-/// No edge shorter than this is cut, in cells, and no half as long made.
+/// No edge shorter than this is cut, and none shorter than half of it is made, in cells.
 const SHORTEST: f64 = 0.1;
 
-/// Edges looked at for each edge at first, of which few are left unless the grid resolves nothing, and in all, which takes
-/// a second.
+/// The most edges that are looked at: for each edge in the queue at first, and in all, which takes a second.
+/// Few are looked at so often unless the grid resolves nothing.
 const LOOKS: usize = 40;
 const MOST: usize = 20_000;
 
-/// With more edges to mend than this for each triangle (there are 1.5 edges to a triangle in all) the grid does not resolve
-/// the surface, and it is left alone.
+/// The largest number of edges to mend for each triangle, of which a mesh has 1.5 in all. With more the grid
+/// does not resolve the surface, and nothing is mended.
 const RESOLVED: f64 = 0.3;
 
-/// What is to be mended.
+/// What to mend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Aim {
     /// Edges that are far from the surface.
     Distance,
-    /// Folded triangles: their vertices may also be merged with others, by going where these are.
+    /// Folded triangles. Their vertices may also be merged with others, by moving to the same point.
     Folds,
 }
 
-/// Whether so few edges are to be mended that it is worth it.
+/// Whether there are edges to mend, and few enough of them.
 pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
     !edges.is_empty() && edges.len() as f64 <= RESOLVED * triangles.len() as f64
 }
 
-/// Mends what is around the given edges, ascending; returns the number of evaluations.
+/// Mends the mesh around the given edges, which ascend. Returns the number of evaluations.
 pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim) -> u64 {
     let looks = MOST.min(LOOKS * edges.len());
     let mut waiting: FxHashSet<[u32; 2]> = edges.iter().copied().collect();
@@ -68,19 +69,19 @@ pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, a
 
 #[derive(Debug, Clone, Copy)]
 enum Change {
-    /// The edge joins the apexes instead.
+    /// The edge is turned, so that it joins the apexes instead.
     Turn,
     /// The edge is cut.
     Cut(Vertex),
-    /// A vertex goes elsewhere.
+    /// A vertex moves.
     Move(u32, Vertex),
 }
 
-/// The change that helps most so far, and how much less is wrong after it.
+/// The change that helps most so far, with its gain: how much less is wrong after it.
 struct Choice(Option<(f64, Change)>);
 
 impl Choice {
-    /// The most that may be wrong after a change for it to be the choice.
+    /// The most that may be wrong after a change that is to be chosen.
     fn limit(&self, before: f64) -> f64 {
         f64::min(LEFT * before, before - self.0.map_or(0.0, |(most, _)| most))
     }
@@ -93,7 +94,7 @@ impl Choice {
     }
 }
 
-/// The change about an edge that helps most, if there is anything to mend and any helps.
+/// The change at an edge that helps most. `None` if there is nothing to mend, or no change helps.
 fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<Change> {
     let old = pair.triangles();
     let before = patch.badness(&old, &patch.along(pair.ends), f64::INFINITY);
@@ -124,7 +125,7 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
     let may_merge = aim == Aim::Folds || old.iter().any(|t| patch.fold(*t) > FACING);
     for v in pair.corners() {
         let old = patch.vertices.get(v);
-        if old.kind != Kind::Sharp {
+        if old.kind != VertexKind::Sharp {
             continue;
         }
         let before = patch.badness_around(v, f64::INFINITY);
@@ -138,7 +139,7 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
     choice.0.map(|(_, change)| change)
 }
 
-/// Makes a change; returns the edges that it touches.
+/// Makes a change. Returns the edges that it touches.
 fn make(patch: &mut Patch<'_>, pair: Pair, change: Change) -> Vec<[u32; 2]> {
     match change {
         Change::Turn => {
@@ -159,11 +160,11 @@ fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// Where on an edge the faces of its two ends are looked up, as a share of its length.
+/// The face of an edge's end is looked up at this share of the edge's length from the end.
 const BESIDE: f64 = 0.1;
 
-/// Points of the surface where an edge may be cut: the crease of the faces at its ends, and what lies across the edge from
-/// the point of it that is farthest off.
+/// Points of the surface where an edge may be cut: on the crease of the faces at its ends, and beside the
+/// point of the edge that is farthest off the surface.
 fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
     let [a, b] = pair.ends.map(|v| patch.vertices.get(v));
     let points = patch.along(pair.ends);
@@ -182,7 +183,7 @@ fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
     let mut found = Vec::new();
     if let [Some(first), Some(second)] = faces {
         let at = crease::find(field, start, &[first, second], reach, count);
-        found.extend(at.map(|position| Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp }));
+        found.extend(at.map(|position| Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp }));
     }
     let mean = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
     let mut near: Vec<_> = project::newton(field, start, reach, count).into_iter().collect();
@@ -196,15 +197,15 @@ fn cuts(patch: &mut Patch<'_>, pair: Pair) -> Vec<Vertex> {
     found
 }
 
-fn on_face(face: crease::Face) -> Vertex {
-    Vertex { position: face.point, normal: face.normal, kind: Kind::Sharp }
+fn on_face(face: project::FacePoint) -> Vertex {
+    Vertex { position: face.point, normal: face.normal, kind: VertexKind::Sharp }
 }
 
-/// A vertex nearer to the surface than this, in cells, has no place near it to go to.
+/// A vertex nearer to the surface than this, in cells, is on it and need not move onto it.
 const ON_SURFACE: f64 = 1e-6;
 
-/// Points of the surface where a vertex may go: near it, near the middle of its triangles, and where it may be merged with
-/// another.
+/// Points of the surface to which a vertex may move: near it, near the middle of its triangles, and where it
+/// may be merged with another vertex.
 fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
     let (mut facing, mut middle, mut count) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for t in patch.fan(v) {
@@ -218,7 +219,7 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
     let mut found = Vec::new();
     for start in [here, middle / count].into_iter().skip(usize::from(!is_off)) {
         let nearest = project::newton(patch.field, start, patch.size, &mut patch.count);
-        // the line along a normal leads to where Newton's method does, unless that is on another face
+        // the line along a normal leads to the same point as Newton's method, unless that found another face
         let other =
             unit(facing).filter(|f| nearest.is_none_or(|face| face.normal.dot(*f) < project::SAME_FACE));
         if let Some(facing) = other {
@@ -230,18 +231,19 @@ fn places(patch: &mut Patch<'_>, v: u32, may_merge: bool) -> Vec<Vertex> {
     found.retain(|vertex| patch.bounds.contains(vertex.position));
     if may_merge {
         let others = patch.mergeable(v).into_iter();
-        found.extend(others.map(|other| Vertex { kind: Kind::Sharp, ..patch.vertices.get(other) }));
+        found.extend(others.map(|other| Vertex { kind: VertexKind::Sharp, ..patch.vertices.get(other) }));
     }
     found
 }
 
-/// Triangles looked at together.
+/// Triangles in a batch.
 const BATCH: usize = 2048;
 
-/// Triangles that face less than this like the surface below them (cosine) are looked at once more.
+/// Triangles whose normals agree less than this with the surface below them (cosine) are looked at once more.
 const DOUBT: f64 = 0.8;
 
-/// Edges of triangles that lie upside down, ascending, and the number of evaluations; only vertices on creases make such.
+/// Edges of triangles that lie upside down, ascending, and the number of evaluations. Only triangles with
+/// vertices on creases can be folded.
 pub(super) fn folded(
     field: &dyn Field,
     vertices: &Vertices,
@@ -252,7 +254,7 @@ pub(super) fn folded(
         let mut suspects = Vec::new();
         for t in part {
             let kinds = t.map(|v| vertices.kinds[v as usize]);
-            if kinds.contains(&Kind::Sharp) && !kinds.contains(&Kind::Cap) {
+            if kinds.contains(&VertexKind::Sharp) && !kinds.contains(&VertexKind::Cap) {
                 suspects.push(*t);
             }
         }
@@ -300,12 +302,12 @@ mod tests {
         let mut vertices = Vertices::default();
         for place in places {
             let position = DVec3::from_array(*place);
-            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            vertices.push(Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
         }
         vertices
     }
 
-    /// Upwards facing triangles of a floor around a square that is cut so that one half is folded over: a dart whose
+    /// Two triangles of a floor that face upwards, one of them folded over: together they are a dart whose
     /// reflex corner lies inside the other half.
     #[test]
     fn a_fold_is_taken_out() {
@@ -321,7 +323,8 @@ mod tests {
         assert_eq!(triangles.len(), 2);
     }
 
-    /// A plate thinner than the edges that run around it: from its upper face to its lower one, through it.
+    /// A plate that is thinner than the edges around it. One edge runs through it, from its upper face to its
+    /// lower one.
     #[test]
     fn an_edge_through_a_plate_is_cut_at_its_rim() {
         let plate = Closures {

@@ -1,39 +1,41 @@
-//! The part of a mesh that is mended, and what is wrong with it.
+//! The part of a mesh that is mended, and the measure of what is wrong with it.
 //!
-//! Invariant: replacing the triangles of a pair by others with the same border leaves the mesh as closed as it was.
+//! Invariant: replacing the triangles of a pair by others with the same border leaves the mesh as closed as
+//! it was.
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 use super::super::normals::unit;
-use super::vertices::{Kind, Vertex, Vertices};
+use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 use crate::geom::Aabb;
 
-/// Triangles that face less like the surface below them than this (cosine) count as folded, the more the less they do.
+/// Triangles whose normals agree less than this with the surface below them (cosine) count as folded, and the
+/// more so the less they agree.
 pub(super) const FACING: f64 = 0.3;
 
-/// Steps of Newton's method from the middle of a triangle to the surface below, and the step that needs no other after it,
-/// in cells: what faces there is to be known, not where it is.
+/// Steps of Newton's method at most from the middle of a triangle to the surface below, and the step in cells
+/// that needs no other after it. Only the direction of the surface is sought, not its exact position.
 pub(super) const STEPS: usize = 4;
 pub(super) const NEAR: f64 = 0.01;
 
-/// Where an edge is compared with the surface, as shares of its length.
+/// The points at which an edge is compared with the surface, as shares of its length.
 const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
 
-/// How far from the edges to mend changes may spread, in edges.
+/// The distance from the edges to mend over which changes may spread, in edges.
 const RINGS: usize = 3;
 
 /// The mesh around the edges to mend.
 pub(super) struct Patch<'a> {
     pub field: &'a dyn Field,
-    /// The grid; vertices on its border stay where they are.
+    /// The grid's box. Vertices on its border stay where they are.
     pub bounds: &'a Aabb,
     /// The shortest side of a cell.
     pub size: f64,
     pub vertices: &'a mut Vertices,
     pub triangles: &'a mut Vec<[u32; 3]>,
-    /// Triangles around each vertex of the patch.
+    /// The triangles around each vertex of the patch.
     fans: FxHashMap<u32, Vec<u32>>,
     /// Evaluations of ω and ∇ω.
     pub count: u64,
@@ -53,13 +55,13 @@ impl Pair {
         [[a, b, c], [b, a, d]]
     }
 
-    /// With the edge joining the apexes instead.
+    /// The two triangles if the edge joins the apexes instead.
     pub fn turned(&self) -> [[u32; 3]; 2] {
         let ([a, b], [c, d]) = (self.ends, self.apexes);
         [[a, d, c], [d, b, c]]
     }
 
-    /// With the edge cut at a vertex.
+    /// The four triangles if the edge is cut at a vertex.
     pub fn cut(&self, m: u32) -> [[u32; 3]; 4] {
         let ([a, b], [c, d]) = (self.ends, self.apexes);
         [[a, m, c], [b, m, d], [m, b, c], [m, a, d]]
@@ -101,7 +103,7 @@ impl<'a> Patch<'a> {
         Self { field, bounds, size, vertices, triangles, fans, count: 0 }
     }
 
-    /// The triangles at an edge; none if it is gone, or leaves the patch, or touches the border.
+    /// The triangles at an edge. `None` if the edge is gone, leaves the patch or touches the border.
     pub fn pair(&self, [a, b]: [u32; 2]) -> Option<Pair> {
         let runs = |t: [u32; 3], [a, b]: [u32; 2]| (0..3).any(|i| t[i] == a && t[(i + 1) % 3] == b);
         let fan = self.fans.get(&a)?;
@@ -115,7 +117,7 @@ impl<'a> Patch<'a> {
     fn is_free(&self, v: u32) -> bool {
         let (p, Aabb { min, max }) = (self.position(v), *self.bounds);
         let is_within = p.cmpgt(min).all() && p.cmplt(max).all();
-        is_within && self.fans.contains_key(&v) && self.vertices.kinds[v as usize] != Kind::Cap
+        is_within && self.fans.contains_key(&v) && self.vertices.kinds[v as usize] != VertexKind::Cap
     }
 
     pub fn position(&self, v: u32) -> DVec3 {
@@ -132,13 +134,13 @@ impl<'a> Patch<'a> {
         fan.iter().map(|&t| self.triangles[t as usize])
     }
 
-    /// Vertices joined to one by an edge.
+    /// The vertices that edges join to a vertex.
     pub fn around(&self, v: u32) -> Vec<u32> {
         self.fan(v).filter_map(|t| (0..3).find(|&i| t[i] == v).map(|i| t[(i + 1) % 3])).collect()
     }
 
-    /// Vertices that may be merged with one: their common neighbours are the apexes of their edge, and no tetrahedron
-    /// closes.
+    /// The vertices with which a vertex may be merged: their common neighbours are the apexes of their edge,
+    /// and the mesh there is not a tetrahedron.
     pub fn mergeable(&self, v: u32) -> Vec<u32> {
         let around = self.around(v);
         let has_common = |other: u32| {
@@ -148,7 +150,7 @@ impl<'a> Patch<'a> {
         around.iter().copied().filter(|&other| self.is_free(other) && has_common(other)).collect()
     }
 
-    /// Puts triangles in the place of a pair, those that are too many to the end.
+    /// Replaces the triangles of a pair. Those that are too many go to the end.
     pub fn replace(&mut self, pair: Pair, now: &[[u32; 3]]) {
         for (place, t) in pair.places.into_iter().zip(pair.triangles()) {
             for v in t {
@@ -171,7 +173,7 @@ impl<'a> Patch<'a> {
         SHARES.map(|share| p.lerp(q, share))
     }
 
-    /// What is wrong about a vertex and its triangles; infinite if more than `limit`.
+    /// What is wrong with a vertex and its triangles, as [`Self::badness`]. Infinite if more than `limit`.
     pub fn badness_around(&mut self, v: u32, limit: f64) -> f64 {
         let triangles: Vec<[u32; 3]> = self.fan(v).collect();
         let mut points: Vec<DVec3> =
@@ -180,9 +182,9 @@ impl<'a> Patch<'a> {
         self.badness(&triangles, &points, limit)
     }
 
-    /// What is wrong with triangles, as a distance: how far their middles and some more points are from the surface, at
-    /// most, and how much they turn from it in all, a cell for a right angle or about so. Infinite if more than `limit`:
-    /// most changes are seen to be none after a point or two.
+    /// What is wrong with triangles, as a distance. It is the largest distance of their middles and of some
+    /// more points from the surface, plus their folds, of which a right angle counts as about a cell.
+    /// Infinite if it is more than `limit`; most changes are refused after a point or two.
     pub fn badness(&mut self, triangles: &[[u32; 3]], points: &[DVec3], limit: f64) -> f64 {
         let mut off = 0.0;
         for p in points {
@@ -203,12 +205,13 @@ impl<'a> Patch<'a> {
         off + self.size * folds
     }
 
-    /// How much less a triangle faces like the surface below its middle than it should; above [`FACING`] it is folded.
+    /// How much the agreement (cosine) of a triangle with the surface below its middle falls short of
+    /// [`FACING`]. Above [`FACING`] the triangle lies upside down.
     pub fn fold(&mut self, t: [u32; 3]) -> f64 {
         self.middle(t).1
     }
 
-    /// How far the middle of a triangle is from the surface, and its fold.
+    /// The distance of a triangle's middle from the surface, and the triangle's fold.
     fn middle(&mut self, t: [u32; 3]) -> (f64, f64) {
         let [a, b, c] = t.map(|v| self.position(v));
         let facing = unit((b - a).cross(c - a));
@@ -230,7 +233,7 @@ impl<'a> Patch<'a> {
         (distance, fold)
     }
 
-    /// About how far a point is from the surface, a cell at most: the length of [`Self::step`].
+    /// The approximate distance of a point from the surface, a cell at most: the length of [`Self::step`].
     pub fn distance(&mut self, p: DVec3) -> f64 {
         self.count += 1;
         let (omega, gradient) = self.field.omega_grad(p);
@@ -238,7 +241,7 @@ impl<'a> Patch<'a> {
         if distance.is_finite() { f64::min(distance, self.size) } else { 0.0 }
     }
 
-    /// The step of Newton's method at a point, of a cell at most, and the outward normal there.
+    /// The step of Newton's method at a point, a cell long at most, and the outward normal there.
     pub fn step(&mut self, p: DVec3) -> (DVec3, Option<DVec3>) {
         self.count += 1;
         let (omega, gradient) = self.field.omega_grad(p);
@@ -247,15 +250,15 @@ impl<'a> Patch<'a> {
         (step, unit(-gradient))
     }
 
-    /// Moves a vertex; returns the triangles around it. One that it comes upon is to be merged with it: both and all
-    /// around them then stay as they are, so that this remains possible.
+    /// Moves a vertex and returns the triangles around it. If it moves onto another vertex, the two are to be
+    /// merged later. Both and all vertices around them then stay as they are, so that this remains possible.
     pub fn put(&mut self, v: u32, vertex: Vertex) -> Vec<[u32; 3]> {
         let fan: Vec<[u32; 3]> = self.fan(v).collect();
         let around = self.around(v);
         let met = around.iter().copied().find(|&other| self.position(other) == vertex.position);
         self.vertices.set(v, vertex);
         if let Some(met) = met {
-            self.vertices.kinds[met as usize] = Kind::Sharp;
+            self.vertices.kinds[met as usize] = VertexKind::Sharp;
             let others = self.around(met);
             around.iter().chain(&others).for_each(|v| {
                 self.fans.remove(v);

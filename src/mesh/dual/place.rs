@@ -1,16 +1,18 @@
-//! Where the vertex of a loop goes: onto the surface, and onto its crease or corner where the loop encloses one.
+//! The vertex of a loop: on the surface, and on its crease or corner if the loop encloses one.
 //!
-//! Loops whose hits face nearly the same way take the mean of the hits, raised by half the mean height of the hits' tangent
-//! planes there and moved onto the surface by Newton's method, all of a task together; the others are left to `sharp`.
+//! A loop whose hits face nearly the same way takes the mean of the hits, raised by half the mean height of
+//! the hits' tangent planes there. Newton's method moves it onto the surface, together with the others of the
+//! task. All other loops are left to `sharp`.
 //!
-//! Invariant: a vertex lies within [`SLIDE`] of its cell or of where it began, on the border if its cell is in the ring.
+//! Invariant: a vertex lies within [`SLIDE`] of its cell or of the point where it began, and on the border if
+//! its cell is in the ring.
 
 use glam::DVec3;
 
 use super::super::{
     cases::{EDGES, tube},
     crossings::{Crossed, Task},
-    normals::Gradients,
+    normals::GradientColumns,
     patches::cell_low,
     prune::{BRICK, Lattice},
     signs::{
@@ -19,46 +21,45 @@ use super::super::{
     },
 };
 use super::loops::{CellLoops, LOOPS, Loop, Sheets};
-use super::vertices::{Hit, Hits, Kind, Rings, Vertex};
-use super::{project, sharp};
+use super::project;
+use super::sharp::{self, SLIDE};
+use super::vertices::{Hit, Hits, Rings, Vertex, VertexKind};
 use crate::field::Field;
 use crate::geom::Aabb;
 
-/// Hits whose normals all lie within this of their mean (cosine of 10°) see a smooth surface.
+/// Hits whose normals all lie within this of their mean (the cosine of 10°) belong to a smooth surface.
 const NEARLY_FLAT: f64 = 0.985;
 
-/// How far from its cell a point may slide onto the surface, in cells.
-pub(super) const SLIDE: f64 = 0.5;
-
-/// Newton steps onto a smooth surface.
+/// Newton steps onto a smooth surface, at most.
 const STEPS: usize = 4;
 
-/// A step of Newton's method onto a smooth surface that needs no other after it, in cells: what it leaves is the step's
+/// The step of Newton's method onto a smooth surface that needs no other after it, in cells. It leaves its
 /// square times the curvature per cell, which is below 1/3 in a cell with normals within [`NEARLY_FLAT`].
 const LAST_STEP: f64 = 3e-6;
 
-/// How far from a face into its cell the ends of a tunnel lie, as a share of the way to the middle.
+/// The ends of a tunnel lie this far from a face into the cell, as a share of the way to the middle.
 const INTO_CELL: f64 = 0.25;
 
-/// Where the vertices of a task go.
+/// The places for the vertices of a task.
 pub(super) struct Slots<'a> {
-    /// The number of the first.
+    /// The number of the first vertex.
     pub first: u32,
     pub positions: &'a mut [DVec3],
     pub normals: &'a mut [DVec3],
-    pub kinds: &'a mut [Kind],
+    pub kinds: &'a mut [VertexKind],
 }
 
-/// What the cells of a task give besides vertices.
+/// The results of a task besides its vertices.
 #[derive(Default)]
 pub(super) struct Placed {
-    /// For vertices that are not smooth where they go if the triangles around cannot do with their place, ascending.
+    /// For each vertex that is not smooth, ascending, the point to which it moves if the triangles around it
+    /// lie upside down.
     pub fallbacks: Vec<(u32, DVec3)>,
     pub twice: Vec<Twice>,
-    /// By hit and vertex: at the end of a tunnel a cell has two vertices at a hit, the one where the loop goes on and
-    /// this one, where it came from.
+    /// Second vertices of a cell by hit and first vertex. At the end of a tunnel a cell has two vertices at a
+    /// hit: the first is where the loop goes on, the second where it came from.
     pub seconds: Vec<((u32, u32), u32)>,
-    /// Triangles of tunnels.
+    /// The triangles of tunnels.
     pub tubes: Vec<[u32; 3]>,
     pub gradients: u64,
 }
@@ -72,44 +73,51 @@ pub(super) struct Twice {
 }
 
 /// Memory that a thread keeps from task to task.
-pub(super) struct Scratch {
+pub(super) struct PlacementScratch {
     table: Box<VertexTable>,
-    gradients: Gradients,
+    gradients: GradientColumns,
     hits: Vec<Hit>,
 }
 
-impl Default for Scratch {
+impl Default for PlacementScratch {
     fn default() -> Self {
-        Self { table: vertex_table(), gradients: Gradients::default(), hits: Vec::new() }
+        Self { table: vertex_table(), gradients: GradientColumns::default(), hits: Vec::new() }
     }
 }
 
+/// What a task writes.
+struct Output<'s, 'm> {
+    slots: Slots<'s>,
+    scratch: &'m mut PlacementScratch,
+    placed: Placed,
+}
+
 /// What all tasks read, and the rings that they fill.
-pub(super) struct Scene<'a> {
+pub(super) struct Placement<'a> {
     pub field: &'a dyn Field,
     pub lattice: &'a Lattice,
     pub signs: &'a [Signs],
     pub crossed: &'a Crossed<Sheets>,
     pub hits: &'a Hits,
     pub rings: &'a Rings,
-    /// Side lengths of a cell.
+    /// The side lengths of a cell.
     pub spacing: DVec3,
 }
 
-impl Scene<'_> {
+impl Placement<'_> {
     /// Places the vertices of a task's cells.
-    pub fn place(&self, task: &Task<Sheets>, mut slots: Slots<'_>, scratch: &mut Scratch) -> Placed {
-        let mut placed = Placed::default();
+    pub fn place(&self, task: &Task<Sheets>, slots: Slots<'_>, scratch: &mut PlacementScratch) -> Placed {
+        let mut output = Output { slots, scratch, placed: Placed::default() };
         let mut next = 0;
         for (brick, sheets) in task.bricks.iter().zip(&task.kept) {
-            brick.number_vertices(|number| self.crossed.get(number), &mut scratch.table);
+            brick.number_vertices(|number| self.crossed.get(number), &mut output.scratch.table);
             let around = brick.around(self.signs);
             let loops = &*LOOPS;
             for z in 0..BRICK {
                 let corners = around.corners(z);
                 for bit in set_positions(crossed_cells(&corners)) {
                     for of_cell in &loops[usize::from(inside_corners(&corners, bit))] {
-                        self.add(brick, (z, bit), of_cell, next, &mut slots, scratch, &mut placed);
+                        self.add(brick, (z, bit), of_cell, next, &mut output);
                         next += 1;
                     }
                 }
@@ -118,31 +126,30 @@ impl Scene<'_> {
                 let first = next;
                 for (number, of_cell) in cell.loops.iter().enumerate() {
                     if cell.opens(number) {
-                        self.add_ring(cell.cell, of_cell, next, &mut slots, scratch, &mut placed);
+                        self.add_ring(cell.cell, of_cell, next, &mut output);
                     } else {
-                        self.add(brick, cell.cell, of_cell, next, &mut slots, scratch, &mut placed);
+                        self.add(brick, cell.cell, of_cell, next, &mut output);
                     }
                     next += cell.vertices(number);
                 }
-                self.add_tube(cell, first, &slots, &mut placed);
+                self.add_tube(cell, first, &mut output);
             }
         }
+        let Output { mut slots, scratch, mut placed } = output;
         self.settle_smooth(&mut slots, &mut scratch.gradients, &mut placed);
         placed
     }
 
     /// Adds the vertex of a loop.
-    #[expect(clippy::too_many_arguments)]
     fn add(
         &self,
         brick: &Brick,
         cell: (usize, usize),
         around: &Loop,
         place: usize,
-        slots: &mut Slots<'_>,
-        scratch: &mut Scratch,
-        placed: &mut Placed,
+        output: &mut Output<'_, '_>,
     ) {
+        let Output { slots, scratch, placed } = output;
         let vertex = slots.first + place as u32;
         let base = edge_slot(0, [cell.1 % BRICK, cell.1 / BRICK, cell.0]);
         let hit = |e: u8| scratch.table[base + SLOT_OF_EDGE[usize::from(e)]];
@@ -164,7 +171,7 @@ impl Scene<'_> {
         let mean = position / count as f64;
         let length = normal.length();
         let normal = normal / length;
-        // over a bend the tangent planes of the hits pass as far above the surface as their mean lies below
+        // over a bend the tangent planes of the hits pass as far above the surface as the mean of the hits lies below it
         let (mut least_agreement, mut height) = (f64::INFINITY, 0.0);
         for &number in numbers {
             let of_hit = self.hits.normals[number];
@@ -176,29 +183,41 @@ impl Scene<'_> {
         slots.positions[place] = mean + (0.5 * height / count as f64) * normal;
         slots.normals[place] = normal;
         if !is_smooth {
-            scratch.hits.clear();
-            scratch.hits.extend(around.edges.iter().map(|&e| self.hits.get(hit(e))));
-            let high = self.lattice.position(low.map(|n| n + 1));
-            let cell = Aabb::new(self.lattice.position(low), high);
-            let (hits, count) = (&scratch.hits, &mut placed.gradients);
-            let (found, fallback) = match cell.size().min_element() > 0.0 {
-                true => (sharp::at_crease(self.field, &cell, self.spacing, hits, mean, count), mean),
-                false => sharp::on_border(self.field, &cell, hits, mean, count),
-            };
-            slots.set(place, found);
-            placed.fallbacks.push((vertex, fallback));
+            self.move_to_crease(low, numbers, mean, place, output);
         }
     }
 
-    /// Adds a vertex for each passage of a tunnel's end through a face: where the passage is, a little into the cell.
+    /// Moves the vertex of a loop that is not smooth to a crease or a corner, or onto the border. `low` are the extended
+    /// indices of the cell's low corner, and `mean` is the mean of the loop's hits.
+    fn move_to_crease(
+        &self,
+        low: [usize; 3],
+        numbers: &[usize],
+        mean: DVec3,
+        place: usize,
+        Output { slots, scratch, placed }: &mut Output<'_, '_>,
+    ) {
+        scratch.hits.clear();
+        scratch.hits.extend(numbers.iter().map(|&number| self.hits.get(number as u32)));
+        let high = self.lattice.position(low.map(|n| n + 1));
+        let cell = Aabb::new(self.lattice.position(low), high);
+        let (hits, count) = (&scratch.hits, &mut placed.gradients);
+        let (found, fallback) = match cell.size().min_element() > 0.0 {
+            true => (sharp::at_crease(self.field, &cell, self.spacing, hits, mean, count), mean),
+            false => sharp::on_border(self.field, &cell, hits, mean, count),
+        };
+        slots.set(place, found);
+        placed.fallbacks.push((slots.first + place as u32, fallback));
+    }
+
+    /// Adds a vertex for each passage of a tunnel's end through a face. It lies at the passage, a little into
+    /// the cell.
     fn add_ring(
         &self,
         cell: (usize, usize),
         around: &Loop,
         place: usize,
-        slots: &mut Slots<'_>,
-        scratch: &mut Scratch,
-        placed: &mut Placed,
+        Output { slots, scratch, placed }: &mut Output<'_, '_>,
     ) {
         let base = edge_slot(0, [cell.1 % BRICK, cell.1 / BRICK, cell.0]);
         let n = around.edges.len();
@@ -215,13 +234,13 @@ impl Scene<'_> {
             let start = at(i).midpoint(at(i + 1)).lerp(mean, INTO_CELL);
             let found = project::newton(self.field, start, INTO_CELL * size, &mut placed.gradients);
             let position = found.map_or(start, |face| face.point);
-            slots.set(place + i, Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            slots.set(place + i, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
             placed.fallbacks.push((vertex, start));
         }
     }
 
     /// Joins the rings at both ends of a tunnel. `first` is the place of the cell's first vertex.
-    fn add_tube(&self, cell: &CellLoops, first: usize, slots: &Slots<'_>, placed: &mut Placed) {
+    fn add_tube(&self, cell: &CellLoops, first: usize, Output { slots, placed, .. }: &mut Output<'_, '_>) {
         let Some(ends) = cell.tunnel else { return };
         let ring = |end: usize| {
             let before: usize = (0..end).map(|number| cell.vertices(number)).sum();
@@ -229,7 +248,7 @@ impl Scene<'_> {
         };
         let places: Vec<usize> = ends.into_iter().flat_map(ring).collect();
         let (a, b) = (ring(ends[0]).len(), ring(ends[1]).len());
-        // the tube's vertices count as inner ones: none of its cross edges lies in a face
+        // the tube's vertices count as inner ones, because none of its cross edges lies in a face
         let numbers: Vec<usize> = (EDGES..EDGES + a + b).collect();
         let low = slots.positions[places[0]];
         let place = |v: usize| ((slots.positions[places[v - EDGES]] - low) / self.spacing).to_array();
@@ -244,10 +263,10 @@ impl Scene<'_> {
     }
 
     /// Moves the vertices of smooth cells onto the surface, together.
-    fn settle_smooth(&self, slots: &mut Slots<'_>, gradients: &mut Gradients, placed: &mut Placed) {
+    fn settle_smooth(&self, slots: &mut Slots<'_>, gradients: &mut GradientColumns, placed: &mut Placed) {
         let size = self.spacing.min_element();
         let mut moving: Vec<usize> =
-            (0..slots.kinds.len()).filter(|&v| slots.kinds[v] == Kind::Smooth).collect();
+            (0..slots.kinds.len()).filter(|&v| slots.kinds[v] == VertexKind::Smooth).collect();
         let hints: Vec<DVec3> = moving.iter().map(|&v| slots.normals[v]).collect();
         let starts: Vec<DVec3> = moving.iter().map(|&v| slots.positions[v]).collect();
         let smooth = moving.clone();
@@ -273,7 +292,7 @@ impl Scene<'_> {
             if !is_near || slots.normals[v].dot(hint) < NEARLY_FLAT {
                 let found = project::along(self.field, start, hint, SLIDE * size, &mut placed.gradients);
                 let (position, normal) = found.map_or((start, DVec3::ZERO), |face| (face.point, face.normal));
-                slots.set(v, Vertex { position, normal, kind: Kind::Sharp });
+                slots.set(v, Vertex { position, normal, kind: VertexKind::Sharp });
                 placed.fallbacks.push((slots.first + v as u32, start));
             }
         }

@@ -1,32 +1,41 @@
 //! From a point near the surface onto it.
 //!
-//! Newton's method is quick, but a solid's parts may have unlike scales: a little below a steep face the flat one
-//! beside it may have the smaller ω, and Newton's method goes there. A line along a known normal finds the right one,
-//! because it asks for signs alone.
+//! Newton's method is quick, but a solid's parts may have unlike scales. A little below a steep face the flat
+//! face beside it may have the smaller ω, and Newton's method goes there. A search on the line along a known
+//! normal finds the right face, because it uses signs alone.
 
 use glam::DVec3;
 
 use super::super::normals::unit;
-use super::crease::Face;
 use crate::field::Field;
 
-/// Newton steps; twice as many as a smooth surface takes.
+/// Newton steps at most: twice as many as a smooth surface takes.
 const STEPS: usize = 8;
 
-/// A step this small, in sizes, ends the search: the next would be below rounding.
+/// A step this small, in sizes, ends the search, because the next one would be below rounding.
 const LAST_STEP: f64 = 1e-9;
 
-/// Faces turn by less than this between a point and its foot (cosine).
+/// A face turns by less than this between a point and its foot (cosine).
 pub(super) const SAME_FACE: f64 = 0.8;
 
-/// The first step along a line, in sizes; each next is twice as long.
+/// The first step along a line, in sizes. Each next step is twice as long.
 const FIRST_STEP: f64 = 1.0 / 64.0;
 
-/// Steps of the bracketed search: bisection alone would be done with fewer.
+/// Steps of the bracketed search at most. Bisection alone would need fewer.
 const BRACKETED: usize = 80;
 
-/// Newton's method within `size` of `start`.
-pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64) -> Option<Face> {
+/// A point of the surface and the face that it lies on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FacePoint {
+    /// The point shows on which side of a crease the face lies.
+    pub point: DVec3,
+    /// The outward unit normal at the point.
+    pub normal: DVec3,
+}
+
+/// The surface by Newton's method, within `size` of `start`. `None` if it leads farther away or does
+/// not converge.
+pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64) -> Option<FacePoint> {
     let mut at = start;
     for _ in 0..STEPS {
         *count += 1;
@@ -37,22 +46,22 @@ pub(super) fn newton(field: &dyn Field, start: DVec3, size: f64, count: &mut u64
             return None;
         }
         if step.length() <= LAST_STEP * size {
-            return Some(Face { point: at, normal: unit(-gradient)? });
+            return Some(FacePoint { point: at, normal: unit(-gradient)? });
         }
     }
     None
 }
 
-/// The surface on the line through `start` along an outward normal, at most `size` away.
+/// The surface on the line through `start` along an outward normal. `None` if it is more than `size` away.
 pub(super) fn along(
     field: &dyn Field,
     start: DVec3,
     normal: DVec3,
     size: f64,
     count: &mut u64,
-) -> Option<Face> {
+) -> Option<FacePoint> {
     if !(size > 0.0 && size.is_finite()) {
-        return None; // steps of no length would never end
+        return None; // steps without length would never end
     }
     let mut omega = |t: f64| {
         *count += 1;
@@ -71,7 +80,7 @@ pub(super) fn along(
         far = (outwards * reach, omega(outwards * reach));
         reach *= 2.0;
     }
-    // regula falsi; the end that stays counts half (Illinois), every third step is a bisection
+    // regula falsi; the end that stays counts half (Illinois), and every third step is a bisection
     for step in 0..BRACKETED {
         if (far.0 - near.0).abs() <= f64::EPSILON * size {
             break;
@@ -96,18 +105,19 @@ pub(super) fn along(
     let t = if ends[0].0 <= ends[1].0 { ends[0].1 } else { ends[1].1 };
     *count += 1;
     let point = start + t * normal;
-    Some(Face { point, normal: unit(-field.omega_grad(point).1)? })
+    Some(FacePoint { point, normal: unit(-field.omega_grad(point).1)? })
 }
 
-/// The surface near `start` where it faces about as `normal` does.
+/// The surface within `size` of `start` where it faces about as `normal` does. `None` if no such point
+/// is found.
 pub(super) fn onto_face(
     field: &dyn Field,
     start: DVec3,
     normal: DVec3,
     size: f64,
     count: &mut u64,
-) -> Option<Face> {
-    let faces_alike = |face: &Face| face.normal.dot(normal) > SAME_FACE;
+) -> Option<FacePoint> {
+    let faces_alike = |face: &FacePoint| face.normal.dot(normal) > SAME_FACE;
     newton(field, start, size, count)
         .filter(faces_alike)
         .or_else(|| along(field, start, normal, size, count).filter(faces_alike))
@@ -124,8 +134,8 @@ mod tests {
     use super::*;
     use crate::field::Closures;
 
-    /// A steep floor z ≤ 0 and a flat wall x ≤ 0.1: below the floor by more than a thousandth of the way to the wall,
-    /// the wall decides.
+    /// A steep floor z ≤ 0 and a flat wall x ≤ 0.1. A point that is deeper below the floor than a thousandth
+    /// of its way to the wall gets the wall's ω.
     fn unlike() -> impl Field {
         let (floor, wall) = (|p: DVec3| -1000.0 * p.z, |p: DVec3| 0.1 - p.x);
         Closures {

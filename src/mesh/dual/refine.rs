@@ -1,43 +1,46 @@
 //! Cuts edges in two where the mesh is farther from the surface than it should be.
 //!
-//! A chord of length h misses a surface of radius R by h²/8R: a tight bend that is only a cell or two wide keeps a
-//! large error in a mesh that is fine elsewhere. The middle of such an edge moves onto the surface; that of an edge
-//! across a crease which no vertex has caught moves onto the crease.
+//! A chord of length h misses a surface of radius R by h²/8R. A tight bend that is only a cell or two wide
+//! therefore keeps a large error in a mesh that is fine elsewhere. The middle of such an edge moves onto the
+//! surface. If the edge crosses a crease that no vertex has caught, its middle moves onto the crease.
 //!
-//! Invariant: cutting edges and the triangles beside them changes neither topology nor the order of what was there.
+//! Invariant: cutting edges and the triangles beside them changes neither topology nor the order of what
+//! was there.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::normals::{Gradients, gradients, unit};
+use super::super::normals::{GradientColumns, gradients, unit};
 use super::crease;
 
 use super::project;
-use super::vertices::{Kind, Vertex, Vertices};
+use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 
-/// The distance of an edge's middle from the surface above which it is cut, in cells. It bounds what is left: the pawn
-/// in [0, 3]³ at 256³ cells has a Hausdorff distance of 0.024 cells, where chords across its collar alone make 0.08.
+/// An edge is cut if its middle is farther from the surface than this, in cells. This bounds the error that
+/// is left: the pawn in [0, 3]³ at 256³ cells has a Hausdorff distance of 0.024 cells, while chords across
+/// its collar alone would make 0.08.
 pub(super) const TOLERANCE: f64 = 0.025;
 
-/// Each round quarters what is left.
+/// Rounds of cutting. Each round quarters the error that is left.
 const ROUNDS: usize = 3;
 
-/// Triangles looked at together.
+/// Triangles in a batch.
 const BATCH: usize = 2048;
 
-/// How far a middle may move on a smooth surface, in lengths of its edge: farther, and triangles would turn over.
+/// The longest move of a middle on a smooth surface, in lengths of its edge. Beyond it triangles would
+/// turn over.
 const LONGEST_MOVE: f64 = 0.4;
 
-/// How far it may drop onto a crease at most: an edge that bridges a narrow groove drops to its bottom, and the
-/// triangles beside it come to lie on the walls.
+/// The longest drop of a middle onto a crease, in lengths of its edge. An edge that bridges a narrow groove
+/// drops to its bottom, and the triangles beside it come to lie on the walls.
 const LONGEST_DROP: f64 = 2.0;
 
-/// Where on an edge the faces of its two ends are looked up, as a share of its length.
+/// The face of an edge's end is looked up at this share of the edge's length from the end.
 const BESIDE: f64 = 0.1;
 
-/// Cuts edges until the mesh is near the surface; returns the edges that are not and could not be cut, ascending, and the
-/// number of evaluations of ∇ω.
+/// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be cut,
+/// ascending, and the number of evaluations of ∇ω.
 pub(super) fn refine(
     field: &dyn Field,
     vertices: &mut Vertices,
@@ -46,13 +49,13 @@ pub(super) fn refine(
 ) -> (Vec<[u32; 2]>, u64) {
     let mut evaluations = 0;
     let mut left = Vec::new();
-    // triangles whose edges have not been looked at
+    // triangles whose edges have not been looked at yet
     let mut fresh = 0..triangles.len();
     let mut changed: Vec<u32> = Vec::new();
     for _ in 0..ROUNDS {
         let others: Vec<[u32; 3]> = changed.iter().map(|&t| triangles[t as usize]).collect();
         let found = cuts(field, vertices, (&triangles[fresh.clone()], &others), TOLERANCE * size);
-        let Found { cuts, left: uncut, evaluations: count } = found;
+        let FoundEdges { cuts, left: uncut, evaluations: count } = found;
         evaluations += count;
         left.extend(uncut);
         if cuts.is_empty() {
@@ -73,27 +76,27 @@ pub(super) fn refine(
 /// An edge's ends, ascending, and the vertex that cuts it.
 type EdgeCut = ([u32; 2], Vertex);
 
-/// What is found about edges.
+/// The findings about edges.
 #[derive(Default)]
-struct Found {
+struct FoundEdges {
     cuts: Vec<EdgeCut>,
-    /// Edges that are too far from the surface but have no vertex to cut them.
+    /// Edges that are too far from the surface, but for which no vertex to cut them was found.
     left: Vec<[u32; 2]>,
     evaluations: u64,
 }
 
-/// The edges of some triangles to cut, ascending by their ends.
+/// The cuts of the edges of some triangles, ascending by their ends.
 fn cuts(
     field: &dyn Field,
     vertices: &Vertices,
     (fresh, changed): (&[[u32; 3]], &[[u32; 3]]),
     tolerance: f64,
-) -> Found {
-    let parts: Vec<Found> = fresh
+) -> FoundEdges {
+    let parts: Vec<FoundEdges> = fresh
         .par_chunks(BATCH)
         .chain(changed.par_chunks(BATCH))
         .map_init(
-            || (Vec::new(), Gradients::default()),
+            || (Vec::new(), GradientColumns::default()),
             |(edges, gradients), triangles| {
                 edges.clear();
                 triangles.iter().for_each(|t| add_bulging(vertices, *t, tolerance, edges));
@@ -101,7 +104,7 @@ fn cuts(
             },
         )
         .collect();
-    let mut all = Found::default();
+    let mut all = FoundEdges::default();
     for part in parts {
         all.cuts.extend(part.cuts);
         all.left.extend(part.left);
@@ -111,14 +114,14 @@ fn cuts(
     all
 }
 
-/// The edges to cut among those that may bulge, in no order.
+/// The cuts among the edges that may bulge, in no particular order.
 fn cuts_of(
     field: &dyn Field,
     vertices: &Vertices,
     edges: &[[u32; 2]],
-    gradients: &mut Gradients,
+    gradients: &mut GradientColumns,
     tolerance: f64,
-) -> Found {
+) -> FoundEdges {
     let middle_of = |edge: &[u32; 2]| {
         let [a, b] = edge.map(|v| vertices.positions[v as usize]);
         0.5 * (a + b)
@@ -152,10 +155,11 @@ fn cuts_of(
             Middle::Nowhere => left.push(edge),
         }
     }
-    Found { cuts: cut, left, evaluations: count }
+    FoundEdges { cuts: cut, left, evaluations: count }
 }
 
-/// Edges that leave the surface although their middles are near it: they enter a wall thinner than a cell, or a gap.
+/// Edges that leave the surface although their middles are near it, because they enter a wall or a gap that
+/// is thinner than a cell.
 fn far_beside(
     field: &dyn Field,
     vertices: &Vertices,
@@ -163,7 +167,7 @@ fn far_beside(
     tolerance: f64,
     count: &mut u64,
 ) -> Vec<[u32; 2]> {
-    let is_sharp = |v: u32| vertices.kinds[v as usize] == Kind::Sharp;
+    let is_sharp = |v: u32| vertices.kinds[v as usize] == VertexKind::Sharp;
     let normal = |v: u32| vertices.normals[v as usize];
     let doubtful: Vec<[u32; 2]> =
         edges.filter(|&[a, b]| is_sharp(a) || is_sharp(b) || normal(a).dot(normal(b)) < 0.5).collect();
@@ -185,8 +189,9 @@ fn far_beside(
         .collect()
 }
 
-/// Adds those edges of a triangle, run along in ascending order, from whose middle the surface may be farther than
-/// `tolerance`, as far as their ends tell. Each edge of a closed mesh is run along once in ascending order.
+/// Adds those edges of a triangle whose middles may be farther than `tolerance` from the surface, as far as
+/// the ends show. Only edges that the triangle runs along in ascending order are added; each edge of a closed
+/// mesh is such an edge of one triangle.
 fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec<[u32; 2]>) {
     let [a, b, c] = t.map(|v| v as usize);
     let Vertices { positions, normals, kinds } = vertices;
@@ -197,41 +202,43 @@ fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec
         let chord = positions[j] - positions[i];
         let bulges = (normals[j] - normals[i]).dot(chord).abs() > 4.0 * tolerance;
         let may_bulge = match (kinds[i], kinds[j]) {
-            (Kind::Smooth, Kind::Smooth) => bulges,
+            (VertexKind::Smooth, VertexKind::Smooth) => bulges,
             // a cap is no part of ω = 0
-            (Kind::Cap, _) | (_, Kind::Cap) => false,
+            (VertexKind::Cap, _) | (_, VertexKind::Cap) => false,
             // sheets that touch
             _ => chord != DVec3::ZERO,
         };
-        // half of all edges ascend: a branch on that alone would be taken as often as not
+        // half of all edges ascend, so a branch on that alone could not be predicted
         if may_bulge & (t[i] < t[j]) {
             edges.push([t[i], t[j]]);
         }
     }
 }
 
-/// An edge over a smooth bend: the normal at its middle is about the mean of those at its ends, where across a crease it
-/// would be one of them.
+/// An edge over a smooth bend. The normal below its middle is about the mean of the normals at its ends,
+/// while across a crease it would be one of them.
 struct Bend {
     edge: [u32; 2],
     start: DVec3,
     /// The edge's length.
     length: f64,
-    /// Mean of the normals at the ends.
+    /// The mean of the normals at the ends.
     mean: DVec3,
     position: DVec3,
     normal: DVec3,
 }
 
 impl Bend {
-    /// The bend of an edge, if it is one, one step of Newton's method on; `found` are ω and ∇ω at its middle.
+    /// The bend of an edge after one step of Newton's method. `None` if the edge is not over a smooth bend.
+    /// `found` are ω and ∇ω at its middle.
     fn new(vertices: &Vertices, edge: [u32; 2], found: (f64, DVec3)) -> Option<Self> {
         let [a, b] = edge.map(|v| vertices.get(v));
-        if a.kind != Kind::Smooth || b.kind != Kind::Smooth {
+        if a.kind != VertexKind::Smooth || b.kind != VertexKind::Smooth {
             return None;
         }
         let (mean, normal) = (unit(a.normal + b.normal)?, unit(-found.1)?);
-        // nearer to the mean than to either: half of the way from the mean to an end
+        // the cosine of half the way from the mean to an end: within it the normal is nearer to the mean than
+        // to either end
         let half_way = unit(mean + a.normal)?.dot(mean).min(unit(mean + b.normal)?.dot(mean));
         let start = 0.5 * (a.position + b.position);
         let mut bend =
@@ -243,25 +250,25 @@ impl Bend {
         })
     }
 
-    /// One step of Newton's method; its length.
+    /// Makes one step of Newton's method and returns its length.
     fn step(&mut self, (omega, gradient): (f64, DVec3)) -> f64 {
         let step = gradient * (omega / gradient.length_squared());
         self.position -= step;
         step.length()
     }
 
-    /// The cut at the point that was found; none if the surface is near after all.
+    /// The cut at the point that was found. `None` if the surface is near after all.
     fn cut(&self, tolerance: f64) -> Option<EdgeCut> {
         let Self { edge, start, position, normal, .. } = *self;
         (position.distance(start) > tolerance)
-            .then_some((edge, Vertex { position, normal, kind: Kind::Smooth }))
+            .then_some((edge, Vertex { position, normal, kind: VertexKind::Smooth }))
     }
 }
 
-/// Steps of Newton's method on bends.
+/// Steps of Newton's method on bends, at most.
 const STEPS: usize = 6;
 
-/// Moves bends onto the surface, together; tells of each whether that went well.
+/// Moves bends onto the surface, all together. Returns for each whether it settled.
 fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) -> Vec<(Bend, bool)> {
     let mut bends: Vec<(Bend, bool)> = bends.into_iter().map(|bend| (bend, false)).collect();
     for _ in 0..STEPS {
@@ -285,13 +292,14 @@ fn settle(field: &dyn Field, bends: Vec<Bend>, tolerance: f64, count: &mut u64) 
     bends
 }
 
-/// A step, in tolerances, that needs no other after it: what it leaves is its square times the curvature, 1e-11 of it.
+/// A step in tolerances that needs no other after it. It leaves its square times the curvature, which is
+/// 1e-11 of a tolerance.
 const LAST_STEP: f64 = 1e-5;
 
 /// Where an edge is cut.
 enum Middle {
     At(Vertex),
-    /// The surface is near after all: the field told another face's distance.
+    /// The surface is near after all. The field had the distance of another face.
     Near,
     /// No point of the surface is near enough to the middle.
     Nowhere,
@@ -319,7 +327,7 @@ fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u6
         // the bottom of a groove between walls at ±angle/2 lies half a length · tan(angle/2) below the middle
         let drop = (0.5 * first.normal.angle_between(second.normal)).tan();
         if let Some(position) = found.filter(|p| is_near(p, (0.25 + 0.75 * drop).min(LONGEST_DROP))) {
-            return Middle::At(Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp });
+            return Middle::At(Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
         }
     }
     let normal = faces.into_iter().flatten().fold(DVec3::ZERO, |sum, face| sum + face.normal);
@@ -328,13 +336,15 @@ fn middle(field: &dyn Field, [a, b]: [Vertex; 2], tolerance: f64, count: &mut u6
         None => project::newton(field, start, length, count),
     };
     match found.filter(|face| is_near(&face.point, LONGEST_MOVE)) {
-        Some(face) => Middle::At(Vertex { position: face.point, normal: face.normal, kind: Kind::Smooth }),
+        Some(face) => {
+            Middle::At(Vertex { position: face.point, normal: face.normal, kind: VertexKind::Smooth })
+        }
         None => Middle::Nowhere,
     }
 }
 
-/// Divides triangles at cut edges: the first part takes the place of the whole, the others go to the end. Returns the
-/// places of those that were divided. `middles` are sorted by their edges.
+/// Divides triangles at cut edges. The first part takes the place of the whole, the others go to the end.
+/// Returns the numbers of the triangles that were divided. `middles` are sorted by their edges.
 fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 2], u32)]) -> Vec<u32> {
     let mut is_end = vec![false; vertices.len()];
     middles.iter().flat_map(|m| m.0).for_each(|v| is_end[v as usize] = true);
@@ -345,9 +355,22 @@ fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 
         let at = middles.binary_search_by_key(&[a.min(b), a.max(b)], |m| m.0).ok()?;
         Some(middles[at].1)
     };
-    let position = |v: u32| vertices.positions[v as usize];
-    let distance = |a: u32, b: u32| position(a).distance(position(b));
-    // few triangles have two ends of cut edges: counting them takes no branches
+    let mut changed = Vec::new();
+    let mut others = Vec::new();
+    for t in with_cut_ends(triangles, &is_end) {
+        let triangle = &mut triangles[t];
+        if let Some(first) = divide_one(vertices, *triangle, middle, &mut others) {
+            *triangle = first;
+            changed.push(t as u32);
+        }
+    }
+    triangles.extend(others);
+    changed
+}
+
+/// The triangles that have at least two ends of cut edges, ascending.
+fn with_cut_ends(triangles: &[[u32; 3]], is_end: &[bool]) -> Vec<usize> {
+    // few triangles have two such ends: counting them takes no branches
     let is_touched = |[a, b, c]: [u32; 3]| {
         u8::from(is_end[a as usize]) + u8::from(is_end[b as usize]) + u8::from(is_end[c as usize]) >= 2
     };
@@ -361,44 +384,49 @@ fn divide(vertices: &Vertices, triangles: &mut Vec<[u32; 3]>, middles: &[([u32; 
         touched
     };
     let touched: Vec<Vec<usize>> = triangles.par_chunks(BATCH).enumerate().map(find).collect();
-    let mut changed = Vec::new();
-    let mut others = Vec::new();
-    for t in touched.into_iter().flatten() {
-        let triangle = &mut triangles[t];
-        let [a, b, c] = *triangle;
-        // turned so that the first side is cut if one is, and the third is whole if one is
-        let turns = [[a, b, c], [b, c, a], [c, a, b]];
-        let cuts = turns.map(|[p, q, _]| middle(p, q));
-        let turn = match cuts.map(|m| m.is_some()) {
-            [false, false, false] => continue,
-            [false, true, _] => 1,
-            [_, false, true] => 2,
-            _ => 0,
-        };
-        changed.push(t as u32);
-        let [a, b, c] = turns[turn];
-        match [cuts[turn], cuts[(turn + 1) % 3], cuts[(turn + 2) % 3]] {
-            [Some(ab), Some(bc), Some(ca)] => {
-                *triangle = [a, ab, ca];
-                others.extend([[ab, b, bc], [bc, c, ca], [ab, bc, ca]]);
-            }
-            [Some(ab), Some(bc), None] if distance(ab, c) <= distance(a, bc) => {
-                *triangle = [ab, b, bc];
-                others.extend([[ab, bc, c], [a, ab, c]]);
-            }
-            [Some(ab), Some(bc), None] => {
-                *triangle = [ab, b, bc];
-                others.extend([[a, ab, bc], [a, bc, c]]);
-            }
-            [Some(ab), _, _] => {
-                *triangle = [a, ab, c];
-                others.push([ab, b, c]);
-            }
-            _ => {}
+    touched.concat()
+}
+
+/// Divides one triangle: returns its first part and adds the rest to `others`. `None` if `middle`, which
+/// gives the vertex that cuts an edge, knows of no cut on its sides.
+fn divide_one(
+    vertices: &Vertices,
+    [a, b, c]: [u32; 3],
+    middle: impl Fn(u32, u32) -> Option<u32>,
+    others: &mut Vec<[u32; 3]>,
+) -> Option<[u32; 3]> {
+    // turned so that the first side is cut if one is, and the third is whole if one is
+    let turns = [[a, b, c], [b, c, a], [c, a, b]];
+    let cuts = turns.map(|[p, q, _]| middle(p, q));
+    let turn = match cuts.map(|m| m.is_some()) {
+        [false, false, false] => return None,
+        [false, true, _] => 1,
+        [_, false, true] => 2,
+        [true, ..] => 0,
+    };
+    let [a, b, c] = turns[turn];
+    let ab = cuts[turn]?;
+    let position = |v: u32| vertices.positions[v as usize];
+    let distance = |a: u32, b: u32| position(a).distance(position(b));
+    let first = match [cuts[(turn + 1) % 3], cuts[(turn + 2) % 3]] {
+        [Some(bc), Some(ca)] => {
+            others.extend([[ab, b, bc], [bc, c, ca], [ab, bc, ca]]);
+            [a, ab, ca]
         }
-    }
-    triangles.extend(others);
-    changed
+        [Some(bc), None] if distance(ab, c) <= distance(a, bc) => {
+            others.extend([[ab, bc, c], [a, ab, c]]);
+            [ab, b, bc]
+        }
+        [Some(bc), None] => {
+            others.extend([[a, ab, bc], [a, bc, c]]);
+            [ab, b, bc]
+        }
+        [None, _] => {
+            others.push([ab, b, c]);
+            [a, ab, c]
+        }
+    };
+    Some(first)
 }
 
 #[cfg(test)]
@@ -411,7 +439,7 @@ mod tests {
             [DVec3::ZERO, DVec3::X, DVec3::Y, 0.5 * DVec3::X, DVec3::new(0.5, 0.5, 0.0), 0.5 * DVec3::Y];
         let mut vertices = Vertices::default();
         for position in places {
-            vertices.push(Vertex { position, normal: DVec3::Z, kind: Kind::Smooth });
+            vertices.push(Vertex { position, normal: DVec3::Z, kind: VertexKind::Smooth });
         }
         let sides = [([0, 1], 3), ([0, 2], 5), ([1, 2], 4)];
         for chosen in 0..8 {

@@ -1,39 +1,46 @@
-//! Where the vertex of a loop goes that encloses a crease or a corner, or lies on the border.
+//! The vertex of a loop that encloses a crease or a corner, or lies on the border.
 //!
-//! The candidates are tried in turn: the minimiser of the quadratic error if it lies on the surface already (plane faces,
-//! tips of cones), the crease of the two or three faces that the hits show, the minimiser moved onto the surface, the mean
-//! of the hits.
+//! Four candidates are tried in turn: the minimiser of the quadratic error if it lies on the surface already
+//! (plane faces, tips of cones); the crease of the two or three faces that the hits show; the minimiser moved
+//! onto the surface; the mean of the hits.
 
 use glam::DVec3;
 
 use super::super::normals::unit;
-use super::crease::{self, Face};
-use super::vertices::{Hit, Kind, Vertex};
-use super::{place::SLIDE, qef};
+use super::project::FacePoint;
+use super::vertices::{Hit, Vertex, VertexKind};
+use super::{crease, qef};
 use crate::field::Field;
 use crate::geom::Aabb;
 
-/// Normals that differ less than this from each face found so far belong to one of them (cosine of 25°).
+/// How far from its cell a point may slide onto the surface, in cells.
+pub(super) const SLIDE: f64 = 0.5;
+
+/// A normal that differs less than this from that of a face found before belongs to that face (the cosine
+/// of 25°).
 const NEW_FACE: f64 = 0.906;
 
-/// How far from its cell a vertex may lie, in cells: creases that curve pass a little beside the hits that show them.
+/// A vertex may lie this far from its cell, in cells, because creases that curve pass a little beside the
+/// hits that show them.
 const REACH: f64 = 0.05;
 
-/// Corners must lie in their cells up to rounding, in cells: else two cells would place a vertex in the same one.
+/// A corner may lie this far from its cell, in cells, which is rounding. Otherwise two cells would place a
+/// vertex in the same corner.
 const CORNER_REACH: f64 = 1e-9;
 
-/// How often a crease is sought. The point of it nearest to the middle may lie outside the cell although the crease cuts
-/// off one of its corners: then it is followed into the cell, or left for the cell's nearest point where it bends too much
-/// for that, and found once more.
+/// How often a crease is sought. Its point nearest to the middle may lie outside the cell although the crease
+/// cuts off one of the cell's corners. Then the crease is sought again from a point farther along it in the
+/// cell, or from the cell's nearest point if it bends too much for that.
 const TRIES: usize = 4;
 
-/// Newton steps: twice as many as a smooth surface takes.
+/// Newton steps at most: twice as many as a smooth surface takes.
 const STEPS: usize = 8;
 
-/// A distance from the surface that is none, in cells: plane faces give 1e-15.
+/// A point nearer to the surface than this, in cells, is on it. Plane faces give 1e-15.
 const ON_SURFACE: f64 = 1e-11;
 
-/// The vertex of a loop whose hits do not face the same way. `mean` is theirs, `count` counts evaluations.
+/// The vertex of a loop whose hits do not face the same way. `mean` is the mean of the hits, and `count`
+/// counts evaluations.
 pub(super) fn at_crease(
     field: &dyn Field,
     cell: &Aabb,
@@ -46,7 +53,7 @@ pub(super) fn at_crease(
     let lies_within = |p: DVec3, reach: f64| {
         p.cmpge(cell.min - reach * spacing).all() && p.cmple(cell.max + reach * spacing).all()
     };
-    let sharp = |position| Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp };
+    let sharp = |position| Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp };
 
     let planes = hits.iter().filter(|hit| hit.normal != DVec3::ZERO);
     let (least, rank) = qef::minimiser(planes.map(|hit| (hit.position, hit.normal)), mean);
@@ -65,7 +72,7 @@ pub(super) fn at_crease(
         _ => &[],
     };
     for chosen in pairs {
-        let few: Vec<Face> = chosen.iter().map(|&i| faces[i]).collect();
+        let few: Vec<FacePoint> = chosen.iter().map(|&i| faces[i]).collect();
         let mut start = mean;
         for _ in 0..TRIES {
             let Some(found) = crease::find(field, start, &few, size, count) else { break };
@@ -82,15 +89,16 @@ pub(super) fn at_crease(
     for start in [inside, mean] {
         let settled = settle(field, start, DVec3::ONE, size, count);
         if let Some((position, normal)) = settled.filter(|(p, _)| lies_within(*p, SLIDE)) {
-            return Vertex { position, normal, kind: Kind::Sharp };
+            return Vertex { position, normal, kind: VertexKind::Sharp };
         }
     }
     sharp(mean)
 }
 
-/// The vertex of a cell of the ring: on the border, and on the surface where that meets the border in the cell.
+/// The vertex of a cell of the ring. It lies on the border, and on the surface if that meets the border in
+/// the cell.
 ///
-/// Also where the vertex goes if the triangles around it cannot do with that.
+/// The second result is the point to which the vertex moves if the triangles around it lie upside down.
 pub(super) fn on_border(
     field: &dyn Field,
     cell: &Aabb,
@@ -103,17 +111,18 @@ pub(super) fn on_border(
     if on_surface.is_empty() {
         let normal = unit(hits.iter().map(|hit| hit.normal).sum()).unwrap_or(DVec3::ZERO);
         let position = clamped(mean);
-        return (Vertex { position, normal, kind: Kind::Cap }, position);
+        return (Vertex { position, normal, kind: VertexKind::Cap }, position);
     }
     let mean = clamped(on_surface.iter().sum::<DVec3>() / on_surface.len() as f64);
     let free = DVec3::select(cell.size().cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO);
     let size = cell.size().max_element();
     let settled = settle(field, mean, free, size, count).filter(|(p, _)| clamped(*p) == *p);
     let position = settled.map_or(mean, |(p, _)| p);
-    (Vertex { position, normal: DVec3::ZERO, kind: Kind::Sharp }, mean)
+    (Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp }, mean)
 }
 
-/// The surface near a point by Newton's method along the free axes, with its normal.
+/// The surface near a point by Newton's method along the free axes, and its normal there. `None` if the
+/// method leads more than `size` away or does not converge.
 fn settle(
     field: &dyn Field,
     start: DVec3,
@@ -141,7 +150,8 @@ fn settle(
     None
 }
 
-/// The middle of the part of a line through `p` that lies in a box with a margin.
+/// The middle of the part of a line through `p` that lies in a box with a margin. `None` if the line
+/// misses it.
 fn middle_within(p: DVec3, along: DVec3, cell: &Aabb, margin: DVec3) -> Option<DVec3> {
     let (a, b) = ((cell.min - margin - p) / along, (cell.max + margin - p) / along);
     let (from, to) = (a.min(b).max_element(), a.max(b).min_element());
@@ -149,17 +159,17 @@ fn middle_within(p: DVec3, along: DVec3, cell: &Aabb, margin: DVec3) -> Option<D
     (from <= to && middle.is_finite()).then_some(middle)
 }
 
-/// Up to three faces that the hits lie on: the two that differ most, and one that differs from both.
-fn faces(hits: &[Hit]) -> Vec<Face> {
-    let faces: Vec<Face> = hits
+/// Up to three faces on which the hits lie: the two that differ most, and one that differs from both.
+fn faces(hits: &[Hit]) -> Vec<FacePoint> {
+    let faces: Vec<FacePoint> = hits
         .iter()
         .filter(|hit| hit.normal != DVec3::ZERO)
-        .map(|hit| Face { point: hit.position, normal: hit.normal })
+        .map(|hit| FacePoint { point: hit.position, normal: hit.normal })
         .collect();
     let pairs = (0..faces.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
     let cosine = |(i, j): &(usize, usize)| faces[*i].normal.dot(faces[*j].normal);
     let Some((a, b)) = pairs.min_by(|p, q| cosine(p).total_cmp(&cosine(q))) else { return Vec::new() };
-    let likeness = |face: &&Face| face.normal.dot(faces[a].normal).max(face.normal.dot(faces[b].normal));
+    let likeness = |face: &&FacePoint| face.normal.dot(faces[a].normal).max(face.normal.dot(faces[b].normal));
     let third = faces.iter().min_by(|p, q| likeness(p).total_cmp(&likeness(q)));
     let mut found = vec![faces[a], faces[b]];
     found.extend(third.filter(|face| likeness(face) < NEW_FACE));

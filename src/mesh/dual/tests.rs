@@ -37,7 +37,7 @@ fn assert_close(found: f64, truth: f64, tolerance: f64) {
     assert!((found - truth).abs() <= tolerance, "found {found}, expected {truth} ± {tolerance}");
 }
 
-/// min/max box about the origin with exact gradients, turned about an axis.
+/// A min/max box about the origin with exact gradients, turned about an axis.
 fn turned_box(half: DVec3, axis: DVec3, angle: f64) -> impl Field {
     let turn = glam::DQuat::from_axis_angle(axis.normalize(), angle);
     let inner = move |p: DVec3| half - (turn.inverse() * p).abs();
@@ -67,7 +67,8 @@ fn a_ball_has_exact_vertices_and_its_volume() {
     }
 }
 
-/// Planes meet in edges and corners without any error. Where no hit shows an edge it may be missed by `TOLERANCE` cells.
+/// Planes meet in edges and corners without any error. An edge that no hit shows may be missed by
+/// `TOLERANCE` cells.
 #[test]
 fn boxes_have_exact_vertices_at_any_angle() {
     let half = DVec3::new(0.5, 0.7, 0.3);
@@ -105,7 +106,7 @@ fn faces_on_nodes_are_exact() {
     assert_close(report.volume, 4.0 / 3.0 * 0.75_f64.powi(3), 0.01 * 0.5625);
 }
 
-/// The rims of a cylinder are circles on which vertices lie exactly; the rest is the error of chords.
+/// The rims of a cylinder are circles on which vertices lie exactly. The rest is the error of chords.
 #[test]
 fn the_rim_of_a_cylinder_is_sharp() {
     let side = |p: DVec3| 0.25 - p.x * p.x - p.y * p.y;
@@ -207,7 +208,8 @@ fn threads_change_no_bit() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
 
-    /// Noise: every case, every neighbourhood of cases, faces passed twice, every way to meet the border.
+    /// Noise has every case, every neighbourhood of cases, faces passed twice and every way to meet
+    /// the border.
     #[test]
     fn random_grids_are_closed_and_manifold(values in prop::collection::vec(-1.0..1.0_f64, 125)) {
         let domain = Aabb::new(DVec3::ZERO, DVec3::splat(4.0));

@@ -1,6 +1,6 @@
-//! What dual contouring makes its mesh of: vertices, and the hits on crossed edges around which they stand.
+//! The parts of the mesh of dual contouring: vertices, and the hits on crossed edges around which they lie.
 //!
-//! Columns rather than rows: most steps read positions alone, or kinds alone.
+//! Both are stored as columns, because most steps read positions alone or kinds alone.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,13 +11,13 @@ use rayon::prelude::*;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vertex {
     pub position: DVec3,
-    /// Outward unit normal; zero on creases and where there is none.
+    /// The outward unit normal; zero on creases and where the field has none.
     pub normal: DVec3,
-    pub kind: Kind,
+    pub kind: VertexKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum VertexKind {
     /// The surface is smooth in the cell.
     Smooth,
     /// The surface may have a crease there.
@@ -31,14 +31,14 @@ pub(super) enum Kind {
 pub(super) struct Vertices {
     pub positions: Vec<DVec3>,
     pub normals: Vec<DVec3>,
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<VertexKind>,
 }
 
 impl Vertices {
     pub fn new(count: usize) -> Self {
         // rayon writes the zeros, so each thread touches memory of its own for the first time
         let zeros = || rayon::iter::repeat_n(DVec3::ZERO, count).collect();
-        Self { positions: zeros(), normals: zeros(), kinds: vec![Kind::Smooth; count] }
+        Self { positions: zeros(), normals: zeros(), kinds: vec![VertexKind::Smooth; count] }
     }
 
     pub fn len(&self) -> usize {
@@ -61,7 +61,7 @@ impl Vertices {
         (self.positions[v], self.normals[v], self.kinds[v]) = (vertex.position, vertex.normal, vertex.kind);
     }
 
-    /// Drops the last.
+    /// Drops the last vertex.
     pub fn pop(&mut self) {
         self.positions.pop();
         self.normals.pop();
@@ -69,13 +69,13 @@ impl Vertices {
     }
 }
 
-/// Where the surface crosses an edge.
+/// The point where the surface crosses an edge of the grid.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hit {
     pub position: DVec3,
-    /// Outward unit normal; zero where the field has none.
+    /// The outward unit normal; zero where the field has none.
     pub normal: DVec3,
-    /// Whether the edge leaves the grid: the hit lies on the border inside the solid.
+    /// Whether the edge leaves the grid. The hit then lies on the border inside the solid.
     pub is_cap: bool,
 }
 
@@ -94,10 +94,10 @@ impl Hits {
     }
 }
 
-/// The vertices of the four cells around each crossed edge, by the edge's place in the cell.
+/// The vertices of the four cells around each crossed edge, by the place of the edge in the cell.
 pub(super) struct Rings(Vec<[AtomicU32; 4]>);
 
-/// A place without a vertex; only a field whose ranges contradict its values leaves one.
+/// A place without a vertex. It stays empty only if the field's ranges contradict its values.
 pub(super) const NONE: u32 = u32::MAX;
 
 impl Rings {
@@ -110,7 +110,7 @@ impl Rings {
         self.0[hit as usize].each_ref().map(|vertex| vertex.load(Ordering::Relaxed))
     }
 
-    /// Each place is written by one cell.
+    /// Sets the vertex of one of the four cells. Each place is written by one cell only.
     pub fn set(&self, hit: u32, edge: u8, vertex: u32) {
         self.0[hit as usize][usize::from(edge & 3)].store(vertex, Ordering::Relaxed);
     }

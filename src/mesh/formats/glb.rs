@@ -1,8 +1,8 @@
-//! Binary glTF 2.0: one mesh of indexed triangles with normals, all in `f32`, for viewers and game engines.
+//! Binary glTF 2.0, for viewers and game engines: one mesh of indexed triangles with normals, all in `f32`.
 //!
-//! glTF has y up; the one node of the file is turned so that our z is up there.
+//! glTF has y up. The one node of the file is turned so that our z points up there.
 //!
-//! Invariant: a mesh without triangles becomes a file without a scene, since glTF knows no empty mesh.
+//! Invariant: a mesh without triangles becomes a file without a scene, because glTF knows no empty mesh.
 
 use std::io::{self, Write};
 
@@ -10,20 +10,25 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::super::Mesh;
+use super::format::Format;
 
 const MAGIC: &[u8; 4] = b"glTF";
 const VERSION: u32 = 2;
-/// Numbers of glTF for what is in a buffer.
+/// glTF's numbers for what is in a buffer.
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
+/// The entry of the table of formats.
+pub const FORMAT: Format =
+    Format { ending: "glb", purpose: "For viewers and browsers", write, write_text: None };
+
 /// Writes a mesh as GLB.
 ///
 /// # Errors
-/// What the writer reports; [`io::ErrorKind::FileTooLarge`] beyond the 4 GiB of the format.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream, and [`io::ErrorKind::FileTooLarge`] beyond the 4 GiB of the format.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let mut binary = Vec::with_capacity(24 * mesh.positions.len() + 12 * mesh.triangles.len());
     for vectors in [&mesh.positions, &mesh.normals] {
         binary.extend(vectors.iter().flat_map(|v| v.as_vec3().to_array()).flat_map(f32::to_le_bytes));
@@ -46,7 +51,7 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn chunk(out: &mut impl Write, kind: &[u8; 4], data: &[u8], length: u32) -> io::Result<()> {
+fn chunk(out: &mut dyn Write, kind: &[u8; 4], data: &[u8], length: u32) -> io::Result<()> {
     out.write_all(&length.to_le_bytes())?;
     out.write_all(kind)?;
     out.write_all(data)
@@ -105,7 +110,7 @@ mod tests {
         assert_eq!((positions.len(), normals.len()), (mesh.positions.len(), mesh.positions.len()));
         let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
         assert_eq!(indices, mesh.triangles.concat());
-        // z goes up: to y
+        // z points up, to y
         let (_, rotation, _) = read.nodes().next().unwrap().transform().decomposed();
         let up = glam::Quat::from_array(rotation) * Vec3::Z;
         assert!(up.distance(Vec3::Y) < 1e-6, "{up}");

@@ -5,12 +5,17 @@
 use std::io::{self, Write};
 
 use super::super::Mesh;
+use super::format::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format =
+    Format { ending: "obj", purpose: "Shared vertices with normals, text", write, write_text: None };
 
 /// Writes a mesh as OBJ with one normal for each vertex.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "# rfm, metres, outward normals")?;
     for p in &mesh.positions {
         writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
@@ -42,7 +47,7 @@ mod tests {
         });
         let (models, _) = load.unwrap();
         let [model] = &models[..] else { panic!("{} models", models.len()) };
-        // the reader numbers vertices anew in the order of faces
+        // the reader numbers vertices in the order of faces
         let corner = |flat: &[f64], index: u32| DVec3::from_slice(&flat[3 * index as usize..]);
         assert_eq!(model.mesh.indices.len(), 3 * mesh.triangles.len());
         for (i, v) in mesh.triangles.iter().flatten().enumerate() {

@@ -1,19 +1,25 @@
 //! Binary little-endian PLY with vertex normals.
 //!
-//! Positions are `double`, since exact vertices are the point of this mesher and `float` would move them by
-//! 1e-7 of their size; normals are `float`, since 1e-7 radians matter to nobody.
+//! Positions are `double`, because vertices are exact and `float` would move them by 1e-7 of their size.
+//! Normals are `float`, because 1e-7 radians matter to nobody.
 //!
-//! Invariant: indices are written as `int`, which more readers accept than `uint`; meshes are small enough.
+//! Invariant: indices are written as `int`, which more readers accept than `uint`. [`Mesh::MAX_VERTICES`]
+//! fits it.
 
 use std::io::{self, Write};
 
 use super::super::Mesh;
+use super::format::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format =
+    Format { ending: "ply", purpose: "Shared vertices with normals, binary", write, write_text: None };
 
 /// Writes a mesh as PLY.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\ncomment rfm, metres, outward normals\n\

@@ -1,20 +1,29 @@
-//! STL: triangles with their own normals, in `f32` as records or as text.
+//! STL: triangles with their own normals in `f32`, as binary records or as text.
 //!
-//! Invariant: normals come from the triangles in `f64`, before their corners are rounded, so slivers keep a
-//! direction; a triangle without area gets the zero normal, which readers take as "compute it".
+//! Invariant: normals are computed from the triangles in `f64`, before corners are rounded, so slivers keep a
+//! direction. A triangle without area gets the zero normal, which readers take as "compute it".
 
 use std::io::{self, Write};
 
 use glam::DVec3;
 
 use super::super::{Mesh, normals::unit};
+use super::format::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format = Format {
+    ending: "stl",
+    purpose: "Triangles as records, for nearly every program",
+    write,
+    write_text: Some(write_ascii),
+};
 
 /// Writes a mesh as binary STL.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
-    // A header that began with "solid" would be taken for the text form.
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+    // a header that began with "solid" would be taken for the text form
     let mut header = [b' '; 80];
     let title = b"binary STL by rfm";
     header[..title.len()].copy_from_slice(title);
@@ -32,11 +41,11 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes a mesh as STL text: ten times as large, for readers and people that want it.
+/// Writes a mesh as STL text, which is ten times as large.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write_ascii(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write_ascii(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "solid rfm")?;
     for triangle in &mesh.triangles {
         let [n, a, b, c] = facet(mesh, *triangle).map(|v| v.as_vec3());
@@ -49,7 +58,7 @@ pub fn write_ascii(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "endsolid rfm")
 }
 
-/// Normal and corners of a triangle.
+/// The normal and the corners of a triangle.
 fn facet(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 4] {
     let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
     [unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO), a, b, c]

@@ -1,13 +1,14 @@
 //! 3MF, for printers: a zip archive with the triangles as XML, in metres.
 //!
-//! Invariant: every number is written with the fewest digits that read back to the same `f64`; the same mesh gives
-//! the same bytes, since the archive holds no date.
+//! Invariant: every number is written with the fewest digits that read back to the same `f64`. Equal meshes
+//! give equal bytes, because the archive holds no date.
 
 use std::io::{self, Cursor, Write};
 
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 use super::super::Mesh;
+use super::format::Format;
 
 const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
@@ -17,11 +18,14 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Target="/3D/3dmodel.model" Id="model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>
 "#;
 
-/// Writes a mesh as 3MF; a mesh without triangles as a model without objects.
+/// The entry of the table of formats.
+pub const FORMAT: Format = Format { ending: "3mf", purpose: "For printers", write, write_text: None };
+
+/// Writes a mesh as 3MF. A mesh without triangles becomes a model without objects.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
     for (name, text) in [("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONSHIPS)] {
@@ -73,7 +77,7 @@ mod tests {
         let mesh = pawn_mesh();
         let mut bytes = Vec::new();
         write(&mesh, &mut bytes).unwrap();
-        // from the package's root to the model, as a reader goes
+        // from the package's root to the model, as a reader does
         let relations = part(&bytes, "_rels/.rels");
         let relations = roxmltree::Document::parse(&relations).unwrap();
         let target = relations.descendants().find_map(|n| n.attribute("Target")).unwrap();

@@ -1,8 +1,8 @@
 //! VTK polygonal data (`.vtp`) with its numbers as base64, for ParaView.
 //!
-//! Positions are `double`, since exact vertices are the point of this mesher; normals are `float`.
+//! Positions are `double`, because vertices are exact; normals are `float`.
 //!
-//! Invariant: everything is little-endian; the same mesh gives the same bytes.
+//! Invariant: everything is little-endian. Equal meshes give equal bytes.
 
 use std::io::{self, Write};
 
@@ -10,12 +10,16 @@ use base64::prelude::BASE64_STANDARD;
 use base64::write::EncoderWriter;
 
 use super::super::Mesh;
+use super::format::Format;
+
+/// The entry of the table of formats.
+pub const FORMAT: Format = Format { ending: "vtp", purpose: "For ParaView", write, write_text: None };
 
 /// Writes a mesh as VTP with one normal for each vertex.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+/// Those of the stream.
+pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let (points, polys) = (mesh.positions.len(), mesh.triangles.len());
     write!(
         out,
@@ -39,9 +43,9 @@ pub fn write(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>")
 }
 
-/// An array as base64: the number of its bytes, and its bytes.
+/// Writes an array as base64: the number of its bytes, then its bytes.
 fn array<const N: usize>(
-    out: &mut impl Write,
+    out: &mut dyn Write,
     kind: &str,
     name: &str,
     components: usize,

@@ -1,18 +1,21 @@
-//! Fewer triangles within a stated distance of the surface.
+//! A mesh of fewer triangles within a stated distance of the surface.
 //!
-//! Edges are contracted in the order of their quadric error (see `quadric`), to the place that the quadrics prefer, put
-//! back onto ω = 0, or to one of their ends. A contraction is done only if
-//! - it meets the link condition (see `collapse`), so that the mesh stays closed, manifold and of the same topology;
-//! - no triangle turns over, against its former self or against the surface below it, and none becomes a sliver;
-//! - every vertex of the first mesh, all of which lie on the surface, keeps a triangle within the tolerance: each is
-//!   kept with the triangle nearest to it, and moves on with every contraction;
+//! Edges are contracted in the order of their quadric error (see `quadric`). An edge goes to the point that
+//! the quadrics prefer, moved back onto ω = 0, or to one of its ends. A contraction is made only if
+//! - it meets the link condition (see `collapse`), so that the mesh stays closed, manifold and of the
+//!   same topology;
+//! - no triangle turns over, against its former self or against the surface below it, and none becomes
+//!   a sliver;
+//! - every vertex of the first mesh, all of which lie on the surface, keeps a triangle within the tolerance:
+//!   each is listed with the triangle nearest to it, and the lists follow every contraction;
 //! - points spread over the new triangles are within the tolerance of the surface, by ω/|∇ω|.
 //!
-//! So the tolerance holds both ways as far as those samples tell, not only for each step as with quadrics alone;
-//! [`measure`](super::measure) tells it from others. Two sheets closer to one another than the tolerance may come to
-//! touch. Caps at the grid's border stay as they are.
+//! So the tolerance holds both ways as far as those samples show, and not only for each step as with quadrics
+//! alone. [`measure`](super::measure) checks it with other samples. Two sheets closer to one another than the
+//! tolerance may come to touch. Caps at the grid's border stay as they are.
 //!
-//! Invariant: one thread, ties broken by vertex numbers: the same mesh and field give the same bits.
+//! Invariant: this runs on one thread and breaks ties by vertex numbers, so the same mesh and field give the
+//! same bits.
 
 mod quadric;
 
@@ -24,7 +27,7 @@ use glam::DVec3;
 use super::{
     Mesh,
     collapse::{Fans, compact},
-    normals::{Gradients, unit},
+    normals::{GradientColumns, unit},
     quality::nearest_point,
     slivers,
 };
@@ -32,34 +35,38 @@ use crate::field::Field;
 use crate::geom::Aabb;
 use quadric::Quadric;
 
-/// Passes over all edges: what a first pass had to refuse may be possible once the neighbours are gone.
+/// Passes over all edges at most. What a first pass had to refuse may be possible once the neighbours
+/// are gone.
 const PASSES: usize = 4;
 
-/// A pass that takes less than this part of the vertices is the last.
+/// A pass that removes less than this part of the vertices is the last.
 const LEAST_GAIN: f64 = 0.01;
 
-/// The cosine of the angle by which a triangle may turn.
+/// The cosine of the largest angle by which a triangle may turn.
 const LARGEST_TURN: f64 = 0.5;
 
-/// New triangles are at least this well shaped, or better than the worst they replace (see [`slivers::roundness`]).
+/// New triangles are at least this round, or rounder than the worst that they replace (see
+/// [`slivers::roundness`]).
 const WORST_SHAPE: f64 = 0.2;
 
-/// Quadrics may say this many tolerances and an edge is still tried: they measure from planes, which is often too much.
+/// An edge is tried if quadrics give up to this many tolerances. They measure from planes, which is often
+/// too much.
 const HOPEFUL: f64 = 2.0;
 
-/// Points of a new triangle are spread this many to a side.
+/// Intervals between sample points along a new triangle's side.
 const SPREAD: usize = 4;
 
-/// Contracts edges of a mesh of the surface of `distance` until none is left that may be; returns how many vertices it
-/// took. Near the surface |ω| / |∇ω| must be about the distance from it. A tolerance that is not positive changes
-/// nothing.
+/// Contracts edges of a mesh of the surface of `distance` until none is left that may be contracted. Returns
+/// the number of vertices that it removed. Near the surface |ω| / |∇ω| must be about the distance from it.
+/// `tolerance` is in metres; one that is not positive changes nothing. Source: Garland and Heckbert, SIGGRAPH
+/// 1997, for the order of contractions.
 pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize {
     let before = mesh.positions.len();
     if tolerance.is_nan() || tolerance <= 0.0 || mesh.triangles.is_empty() {
         return 0;
     }
     let original = mesh.positions.clone();
-    let samples = Samples::of(mesh);
+    let samples = OriginalVertices::of(mesh);
     let origin = mesh.positions.iter().fold(Aabb::EMPTY, |bounds, p| bounds.including(*p)).centre();
     let mut work = Contraction {
         is_fixed: fixed(mesh),
@@ -72,7 +79,7 @@ pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize 
         origin,
         original,
         samples,
-        gradients: Gradients::default(),
+        gradients: GradientColumns::default(),
     };
     let mut left = before;
     for _ in 0..PASSES {
@@ -88,7 +95,7 @@ pub fn simplify(mesh: &mut Mesh, distance: &dyn Field, tolerance: f64) -> usize 
     before - mesh.positions.len()
 }
 
-/// Caps, and the rim that they share with the surface.
+/// Whether a vertex is fixed: the caps, and the rim that they share with the surface.
 fn fixed(mesh: &Mesh) -> Vec<bool> {
     let is_cap = |v: &u32| mesh.caps.binary_search(v).is_ok();
     let mut is_fixed = vec![false; mesh.positions.len()];
@@ -100,7 +107,8 @@ fn fixed(mesh: &Mesh) -> Vec<bool> {
     is_fixed
 }
 
-/// The sum over the triangles around each vertex; positions are taken from `origin`, so that they keep their digits.
+/// The sum of the quadrics of the triangles around each vertex. Positions are relative to `origin`, so that
+/// they keep their digits.
 fn quadrics(mesh: &Mesh, origin: DVec3) -> Vec<Quadric> {
     let mut quadrics = vec![Quadric::ZERO; mesh.positions.len()];
     for triangle in &mesh.triangles {
@@ -112,10 +120,10 @@ fn quadrics(mesh: &Mesh, origin: DVec3) -> Vec<Quadric> {
     quadrics
 }
 
-/// For each triangle the vertices of the first mesh that it stands for.
-struct Samples(Vec<Vec<u32>>);
+/// For each triangle, the vertices of the first mesh that it stands for.
+struct OriginalVertices(Vec<Vec<u32>>);
 
-impl Samples {
+impl OriginalVertices {
     fn of(mesh: &Mesh) -> Self {
         let mut of_triangle = vec![Vec::new(); mesh.triangles.len()];
         let mut is_given = vec![false; mesh.positions.len()];
@@ -132,65 +140,65 @@ impl Samples {
 
 /// An edge in the queue: the cheapest first, then the one with the lowest vertices.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+struct EdgeCandidate {
     cost: f64,
     ends: [u32; 2],
-    /// Those of the ends when the cost was found; a vertex that has changed since has another.
+    /// The versions of the ends when the cost was found. A vertex that has changed since has another version.
     versions: [u32; 2],
 }
 
-impl Ord for Candidate {
+impl Ord for EdgeCandidate {
     fn cmp(&self, other: &Self) -> Ordering {
         self.cost.total_cmp(&other.cost).then(self.ends.cmp(&other.ends))
     }
 }
 
-impl PartialOrd for Candidate {
+impl PartialOrd for EdgeCandidate {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Candidate {
+impl PartialEq for EdgeCandidate {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Candidate {}
+impl Eq for EdgeCandidate {}
 
 struct Contraction<'a> {
     fans: Fans<'a>,
     distance: &'a dyn Field,
     tolerance: f64,
     origin: DVec3,
-    /// Vertices of the first mesh.
+    /// The vertices of the first mesh.
     original: Vec<DVec3>,
-    samples: Samples,
+    samples: OriginalVertices,
     quadrics: Vec<Quadric>,
     is_fixed: Vec<bool>,
-    /// How often a vertex has changed.
+    /// The number of times that a vertex has changed.
     version: Vec<u32>,
-    queue: BinaryHeap<Reverse<Candidate>>,
-    gradients: Gradients,
+    queue: BinaryHeap<Reverse<EdgeCandidate>>,
+    gradients: GradientColumns,
 }
 
-/// Where a contracted edge goes: a vertex with its normal.
+/// The vertex to which an edge is contracted.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct NewVertex {
     position: DVec3,
     normal: DVec3,
 }
 
 /// The triangles around an edge before its contraction.
 struct Ring {
-    /// Those that stay, with `None` in the place of the corner that moves.
+    /// The triangles that stay, with `None` in the place of the corner that moves.
     staying: Vec<(u32, [Option<u32>; 3])>,
-    /// The two on the edge.
+    /// The two triangles on the edge.
     vanishing: Vec<u32>,
-    /// Of the first mesh, all that these triangles stand for.
+    /// The vertices of the first mesh that all these triangles stand for.
     samples: Vec<u32>,
-    /// The worst shape among them.
+    /// The least roundness among them.
     worst_shape: f64,
 }
 
@@ -215,14 +223,15 @@ impl Contraction<'_> {
     }
 
     fn queue_edge(&mut self, a: u32, b: u32) {
-        /// Of the squared length that counts as error: in planes, where all quadrics are zero, short edges go first.
+        /// The share of the squared length that counts as error. In planes, where all quadrics are zero,
+        /// short edges then go first.
         const LENGTH: f64 = 1e-6;
         if self.is_fixed[a as usize] && self.is_fixed[b as usize] {
             return;
         }
         let (p, q) = (self.position(a), self.position(b));
         let quadric = self.quadrics[a as usize].plus(self.quadrics[b as usize]);
-        // the ends too: the pull towards the middle leaves a little of its way
+        // the ends too, because the pull towards the middle moves the point a little
         let places = [quadric.least(0.5 * (p + q) - self.origin), p - self.origin, q - self.origin];
         let least = places.into_iter().fold(f64::INFINITY, |least, place| least.min(quadric.at(place)));
         if least > (HOPEFUL * self.tolerance).powi(2) * quadric.area {
@@ -231,13 +240,13 @@ impl Contraction<'_> {
         let cost = least + LENGTH * quadric.area * p.distance_squared(q);
         let ends = [a.min(b), a.max(b)];
         let versions = ends.map(|v| self.version[v as usize]);
-        self.queue.push(Reverse(Candidate { cost, ends, versions }));
+        self.queue.push(Reverse(EdgeCandidate { cost, ends, versions }));
     }
 
-    /// Empties the queue; returns how many vertices went.
+    /// Empties the queue. Returns the number of vertices that were removed.
     fn contract_all(&mut self) -> usize {
         let mut taken = 0;
-        while let Some(Reverse(Candidate { ends, versions, .. })) = self.queue.pop() {
+        while let Some(Reverse(EdgeCandidate { ends, versions, .. })) = self.queue.pop() {
             let is_fresh = (0..2).all(|i| {
                 let v = ends[i] as usize;
                 !self.fans.is_lost[v] && self.version[v] == versions[i]
@@ -255,7 +264,7 @@ impl Contraction<'_> {
         let ring = self.ring(a, b);
         for place in self.places(a, b) {
             let Some(samples) = self.accepts(&ring, &place) else { continue };
-            // a fixed vertex is kept under its own number, which caps know
+            // a fixed vertex keeps its number, because caps refer to it
             let (kept, lost) = if self.is_fixed[b as usize] { (b, a) } else { (a, b) };
             self.fans.contract(kept, lost);
             self.fans.mesh.positions[kept as usize] = place.position;
@@ -293,9 +302,10 @@ impl Contraction<'_> {
         ring
     }
 
-    /// Places for the contracted edge, the one that the quadrics like best first.
-    fn places(&self, a: u32, b: u32) -> Vec<Place> {
-        let end = |v: u32| Place { position: self.position(v), normal: self.fans.mesh.normals[v as usize] };
+    /// Vertices to which the edge may be contracted; the one that the quadrics prefer comes first.
+    fn places(&self, a: u32, b: u32) -> Vec<NewVertex> {
+        let end =
+            |v: u32| NewVertex { position: self.position(v), normal: self.fans.mesh.normals[v as usize] };
         match (self.is_fixed[a as usize], self.is_fixed[b as usize]) {
             (true, true) => return Vec::new(),
             (true, false) => return vec![end(a)],
@@ -306,15 +316,15 @@ impl Contraction<'_> {
         let middle = 0.5 * (self.position(a) + self.position(b)) - self.origin;
         let mut places = vec![end(a), end(b)];
         places.extend(self.onto_surface(quadric.least(middle) + self.origin));
-        let error = |place: &Place| quadric.at(place.position - self.origin);
+        let error = |place: &NewVertex| quadric.at(place.position - self.origin);
         places.sort_by(|p, q| error(p).total_cmp(&error(q)));
         places
     }
 
-    /// Newton's method from a point that is about a tolerance off.
-    fn onto_surface(&self, start: DVec3) -> Option<Place> {
+    /// The surface near a point that is about a tolerance off, by Newton's method.
+    fn onto_surface(&self, start: DVec3) -> Option<NewVertex> {
         const STEPS: usize = 8;
-        /// Below this part of the coordinates ω is noise.
+        /// A step that is this small beside the coordinates is rounding.
         const ROUNDING: f64 = 64.0 * f64::EPSILON;
         let mut at = start;
         for _ in 0..STEPS {
@@ -325,14 +335,15 @@ impl Contraction<'_> {
                 return None;
             }
             if step.length() <= ROUNDING * at.abs().max_element() {
-                return Some(Place { position: at, normal: unit(-gradient)? });
+                return Some(NewVertex { position: at, normal: unit(-gradient)? });
             }
         }
         None
     }
 
-    /// Whether the ring may be drawn to a place; the samples of each staying triangle after that.
-    fn accepts(&mut self, ring: &Ring, place: &Place) -> Option<Vec<Vec<u32>>> {
+    /// The samples of each staying triangle after the ring is drawn to a new vertex. `None` if that is
+    /// not allowed.
+    fn accepts(&mut self, ring: &Ring, place: &NewVertex) -> Option<Vec<Vec<u32>>> {
         let corners: Vec<[DVec3; 3]> = ring
             .staying
             .iter()
@@ -343,7 +354,7 @@ impl Contraction<'_> {
             let old = self.fans.mesh.triangles[*t as usize].map(|v| self.position(v));
             let area = |[p, q, r]: [DVec3; 3]| (q - p).cross(r - p);
             let (was, is) = (area(old), area(new));
-            // slivers have hardly a direction: against the surface alone
+            // slivers hardly have a direction: only the surface is compared
             let turn = if slivers::roundness(old) < slivers::SLIVER { -1.0 } else { LARGEST_TURN };
             if was.dot(is) < turn * was.length() * is.length() || slivers::roundness(new) < least_shape {
                 return None;
@@ -353,7 +364,7 @@ impl Contraction<'_> {
         self.is_near_surface(ring, &corners).then_some(samples)
     }
 
-    /// Gives each sample to the triangle nearest to it, if that is within the tolerance.
+    /// Gives each sample to the triangle nearest to it. `None` if one is not within the tolerance.
     fn shared_out(&self, ring: &Ring, corners: &[[DVec3; 3]]) -> Option<Vec<Vec<u32>>> {
         let mut shared = vec![Vec::new(); corners.len()];
         let limit = self.tolerance * self.tolerance;
@@ -369,7 +380,8 @@ impl Contraction<'_> {
         Some(shared)
     }
 
-    /// Whether new triangles lie within the tolerance of the surface and face as it does; those of caps are let be.
+    /// Whether new triangles lie within the tolerance of the surface and face as it does. Those of caps are
+    /// not checked.
     fn is_near_surface(&mut self, ring: &Ring, corners: &[[DVec3; 3]]) -> bool {
         let is_cap = |v: &Option<u32>| v.is_some_and(|v| self.fans.mesh.caps.binary_search(&v).is_ok());
         let of_surface = || {
@@ -378,7 +390,7 @@ impl Contraction<'_> {
         };
         // false for what is not a number
         let is_near = |omega: f64, gradient: DVec3| omega.abs() <= self.tolerance * gradient.length();
-        // most that fail do so here
+        // most triangles that fail do so here
         let middles: Vec<DVec3> = of_surface().map(|[a, b, c]| (a + b + c) / 3.0).collect();
         let areas: Vec<DVec3> = of_surface().map(|[a, b, c]| (b - a).cross(c - a)).collect();
         let found = self.gradients.at(self.distance, &middles);
@@ -393,7 +405,7 @@ impl Contraction<'_> {
     }
 }
 
-/// Points of a triangle besides its corners, which lie on the surface.
+/// Points of a triangle without its corners, which lie on the surface.
 fn spread([a, b, c]: [DVec3; 3]) -> impl Iterator<Item = DVec3> {
     let n = SPREAD;
     let lattice = (0..=n).flat_map(move |i| (0..=n - i).map(move |j| [n - i - j, i, j]));

@@ -1,22 +1,22 @@
-//! Quadrics: the sum of squared distances of a point from many planes, weighted, as ten numbers (M. Garland,
+//! Quadrics: the weighted sum of squared distances of a point from many planes, as ten numbers (M. Garland,
 //! P. Heckbert, "Surface Simplification Using Quadric Error Metrics", SIGGRAPH 1997).
 
 use glam::{DMat3, DVec3};
 
-/// p·Ap + 2b·p + c, and the sum of the weights.
+/// The quadric p·Ap + 2b·p + c, and the sum of the weights.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Quadric {
     a: DMat3,
     b: DVec3,
     c: f64,
-    /// Square metres.
+    /// The sum of the weights, in m².
     pub area: f64,
 }
 
 impl Quadric {
     pub const ZERO: Self = Self { a: DMat3::ZERO, b: DVec3::ZERO, c: 0.0, area: 0.0 };
 
-    /// Of the plane of a triangle, weighted by its area.
+    /// The quadric of a triangle's plane, weighted by its area. It is zero for a triangle without area.
     pub fn of_triangle([p, q, r]: [DVec3; 3]) -> Self {
         let twice_area = (q - p).cross(r - p);
         let length = twice_area.length();
@@ -33,15 +33,16 @@ impl Quadric {
         Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c, area: self.area + other.area }
     }
 
-    /// Weighted sum of the squared distances from the planes; rounding does not make it negative.
+    /// The weighted sum of the squared distances from the planes. Rounding does not make it negative.
     pub fn at(&self, p: DVec3) -> f64 {
         (p.dot(self.a * p) + 2.0 * self.b.dot(p) + self.c).max(0.0)
     }
 
-    /// The point with the least sum, near `start` where the planes leave a choice: on one plane or along a straight
-    /// crease all points are as good.
+    /// The point with the least sum. On one plane or along a straight crease all points are as good; then it
+    /// is the one near `start`.
     pub fn least(&self, start: DVec3) -> DVec3 {
-        /// Part of the mean stiffness that pulls to `start`: moves a well-defined point by a thousandth of its way.
+        /// The part of the mean stiffness that pulls to `start`. It moves a well-defined point by a
+        /// thousandth of its way.
         const PULL: f64 = 1e-3;
         let stiffness = (self.a.x_axis.x + self.a.y_axis.y + self.a.z_axis.z) / 3.0;
         let pulled = self.a + DMat3::from_diagonal(DVec3::splat(PULL * stiffness));

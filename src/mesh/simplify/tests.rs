@@ -1,4 +1,4 @@
-//! Solids of which it is known how few triangles do.
+//! Solids for which the least number of triangles is known.
 
 use super::*;
 use crate::field::Closures;
@@ -6,7 +6,8 @@ use crate::mesh::{Grid, Quality, Report, Resolution, check, dual_contouring, mar
 
 type Mesher = fn(&dyn Field, &Grid, &(dyn Fn(f64) + Sync)) -> Result<Mesh, crate::mesh::MeshError>;
 
-/// Simplifies a mesh in [−1, 1]³; what it was, what it is, and the measured quality of that.
+/// Simplifies a mesh in [−1, 1]³. Returns the findings before and after, and the measured quality and the
+/// mesh after.
 fn simplified(
     mesher: Mesher,
     field: &dyn Field,
@@ -62,15 +63,15 @@ fn cube() -> impl Field {
     }
 }
 
-/// Triangles of a ball of radius r whose middles are d below it have sides of √(6 r d), if they are equilateral: the
-/// least possible number is 4πr² / (√3/4 · 6rd).
+/// If triangles of a ball of radius r are equilateral and their middles are d below it, their sides are √(6 r
+/// d). The least possible number is then 4πr² / (√3/4 · 6rd).
 #[test]
 fn a_ball_has_about_as_few_triangles_as_its_tolerance_allows() {
     for (tolerance, cells) in [(0.02, 40), (0.005, 40), (0.005, 80)] {
         let (_, after, quality, _) = simplified(marching_cubes, &ball(), cells, tolerance);
         let least = 16.0 * std::f64::consts::PI * 0.9 / (3.0_f64.sqrt() * 6.0 * tolerance);
         assert!(after.triangles as f64 > least && (after.triangles as f64) < 3.0 * least, "{least}");
-        // the samples of the tolerance are no others than those of the measure up to their spread
+        // the measure has other samples, which may lie a little further off
         assert!(quality.hausdorff() <= 1.05 * tolerance, "{quality:?}");
         assert!(after.max_distance < 1e-12 && quality.flipped == 0, "{quality:?}");
         assert!(quality.min_radius_ratio > 0.02, "{quality:?}");

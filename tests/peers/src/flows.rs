@@ -8,7 +8,7 @@
 
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::sph::{Dfsph, FluidBlock, FluidShape, Gradients, Method, Parameters, Precision, Simulation, Wcsph};
+use rfm::sph::{Dfsph, FluidBlock, FluidShape, Method, Parameters, Precision, Simulation, Wcsph};
 use salva3d::LiquidWorld;
 use salva3d::math::Vector;
 use salva3d::object::{Boundary, Fluid, interaction_groups::InteractionGroups};
@@ -71,10 +71,7 @@ fn dfsph() -> Method {
 
 fn wcsph() -> Method {
     let sound_speed = 10.0 * (2.0 * 9.81 * COLUMN.size().z).sqrt();
-    Method::Wcsph(Wcsph {
-sound_speed: Some(sound_speed),
-..Wcsph::default()
-})
+    Method::Wcsph(Wcsph { sound_speed: Some(sound_speed), ..Wcsph::default() })
 }
 
 /// With steps of one length, or those that sound allows if it is infinite.

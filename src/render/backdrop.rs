@@ -1,11 +1,11 @@
-//! A scene whose fixed parts are drawn once, and its frames.
+//! The fixed parts of a picture, which are drawn once, and the frames with particles in front of them.
 
 use super::{
-    Image, Mesh, Particles, RenderError, Rgb,
+    Image, MeshView, ParticlesView, RenderError, Rgb,
     camera::{Camera, SUBPIXELS, Seen},
     image::Layer,
     mesh::Facets,
-    overlay,
+    overlay::{self, Caption, Legend},
     particles::{discs, draw},
     raster::{BAND_ROWS, Band, Canvas, Corner, mix},
 };
@@ -13,56 +13,42 @@ use crate::geom::Aabb;
 
 const PAPER: Rgb = [255, 255, 255];
 const FLOOR: Rgb = [241, 240, 237];
-/// Edges of the box close to the eye and far from it.
+/// The colours of the box's edges close to the eye and far from it.
 const EDGE_NEAR: Rgb = [58, 58, 58];
 const EDGE_FAR: Rgb = [186, 186, 186];
-/// Of an edge, in sub-pixels of a picture 960 high.
+/// The thickness of an edge, in sub-pixels of a picture 960 high.
 const EDGE_THICKNESS: f64 = 2.8;
-/// The floor gives way to anything that lies on it.
+/// The floor's nearness is reduced by this factor, so that it gives way to anything that lies on it.
 const FLOOR_BEHIND: f64 = 1.0 - 1e-4;
 
-/// What is written beside the picture.
-#[derive(Debug, Clone, Copy)]
-pub struct Legend<'a> {
-    pub title: &'a str,
-    /// The speed shown in red, in m/s: fixed for a run, so that its frames can be compared.
-    pub fastest: f64,
-}
-
-/// What is written under a frame.
-#[derive(Debug, Clone, Copy)]
-pub struct Moment {
-    /// Simulated time in seconds.
-    pub time: f64,
-    pub step: u64,
-}
-
-/// Camera, box, obstacle and legend, ready for frames.
+/// The camera, the box, the obstacle and the legend, ready for frames.
 #[derive(Debug)]
-pub struct Scene {
+pub struct Backdrop {
     camera: Camera,
     fastest: f64,
-    /// Floor and mesh. The edges of the box are drawn last, also over particles: their soft borders need the colour
-    /// behind them.
+    /// The floor and the mesh. The edges of the box are drawn last, over particles too, because their soft
+    /// borders need the colour behind them.
     canvas: Canvas,
     edges: Vec<Edge>,
-    /// Canvas and edges as pixels.
+    /// The canvas and the edges as pixels.
     still: Vec<u8>,
     title: Layer,
     bar: Layer,
-    /// Triangles of the mesh that are not drawn: a corner is not finite, behind the eye, or does not exist.
+    /// The number of triangles of the mesh that are not drawn because a corner is not finite, lies behind the
+    /// eye, or does not exist.
     pub skipped_triangles: usize,
 }
 
-impl Scene {
-    /// Draws what does not move. The mesh may be empty.
+impl Backdrop {
+    /// Draws what does not move: the box with the corners of `bounds` in metres, and the mesh, which may
+    /// be empty.
     ///
     /// # Errors
-    /// [`RenderError::Legend`], a bug of ours.
+    /// [`RenderError::Legend`], which is a bug of ours.
     pub fn new(
         camera: Camera,
         bounds: &Aabb,
-        mesh: &Mesh<'_>,
+        mesh: &MeshView<'_>,
         legend: &Legend<'_>,
     ) -> Result<Self, RenderError> {
         let (width, height) = camera.subpixels();
@@ -92,11 +78,11 @@ impl Scene {
         })
     }
 
-    /// The picture with the particles in it.
+    /// The picture with particles in it, and the caption of its moment.
     ///
-    /// Particles whose position is not finite or lies behind the eye are left out and counted; those whose speed is
-    /// NaN are grey.
-    pub fn frame(&self, particles: &Particles<'_>, moment: &Moment) -> Image {
+    /// Particles whose position is not finite or lies behind the eye are left out and counted in
+    /// [`Image::skipped`]. Those whose speed is NaN are grey.
+    pub fn frame(&self, particles: &ParticlesView<'_>, moment: &Caption) -> Image {
         let discs = discs(particles, &self.camera, self.fastest);
         let total = particles.positions.len();
         let mut image = Image {
@@ -110,21 +96,21 @@ impl Scene {
         image
     }
 
-    fn write_on(&self, image: &mut Image, moment: &Moment, particles: usize) {
+    fn write_on(&self, image: &mut Image, moment: &Caption, particles: usize) {
         let scale = unit(&self.camera);
         let (width, height) = (f64::from(image.width), f64::from(image.height));
         let place = |units: f64, from: f64| (from - units * scale).max(0.0) as usize;
         image.lay(&self.title, 0, 0);
         let bar_top = 0.5 * height - 0.5 * overlay::BAR_HEIGHT * scale;
         image.lay(&self.bar, place(overlay::BAR_WIDTH, width), bar_top.max(0.0) as usize);
-        // Digits and letters of ours always make a caption.
+        // our own digits and letters always make a caption
         if let Ok(caption) = overlay::caption(moment, particles, scale) {
             image.lay(&caption, 0, place(overlay::CAPTION_HEIGHT, height));
         }
     }
 }
 
-/// Pixels for a unit of the layout, which is meant for a height of 960.
+/// The pixels for a unit of the layout, which is made for a height of 960.
 fn unit(camera: &Camera) -> f64 {
     f64::from(camera.height) / 960.0
 }
@@ -151,7 +137,7 @@ struct Edge {
     thickness: f64,
 }
 
-/// The twelve edges of the box, paler with distance.
+/// The twelve edges of the box. They are paler with distance.
 fn edges(bounds: &Aabb, camera: &Camera) -> Vec<Edge> {
     let Some(corners) = see(bounds, camera) else { return Vec::new() };
     let nearest = corners.iter().map(|c| c.nearness).fold(f64::NEG_INFINITY, f64::max);
@@ -174,7 +160,7 @@ fn draw_edges(edges: &[Edge], band: &mut Band<'_>) {
     }
 }
 
-/// The bottom of the box, seen from above only.
+/// The bottom of the box as two triangles. It is drawn only if it is seen from above.
 fn floor(bounds: &Aabb, camera: &Camera) -> Vec<[Corner; 3]> {
     let above = camera.to_eye(bounds.min).z > 0.0;
     let Some(corners) = see(bounds, camera).filter(|_| above) else { return Vec::new() };
@@ -194,25 +180,25 @@ mod tests {
     use super::*;
     use crate::field::Points;
 
-    const MOMENT: Moment = Moment { time: 0.0, step: 0 };
+    const MOMENT: Caption = Caption { time: 0.0, step: 0 };
     const LEGEND: Legend<'_> = Legend { title: "test", fastest: 1.0 };
 
     fn cube() -> Aabb {
         Aabb::new(DVec3::splat(-1.0), DVec3::ONE)
     }
 
-    /// Looks along −x at the cube from +x: y to the right, z up.
-    fn scene(mesh: &Mesh<'_>) -> Scene {
+    /// A view of the cube along −x, with y to the right and z up.
+    fn scene(mesh: &MeshView<'_>) -> Backdrop {
         let camera = Camera::new(&cube(), DVec3::X, (320, 240)).unwrap();
-        Scene::new(camera, &cube(), mesh, &LEGEND).unwrap()
+        Backdrop::new(camera, &cube(), mesh, &LEGEND).unwrap()
     }
 
-    fn frame(scene: &Scene, points: &[DVec3], speeds: &[f64]) -> Image {
+    fn frame(scene: &Backdrop, points: &[DVec3], speeds: &[f64]) -> Image {
         let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<_>>());
-        scene.frame(&Particles { positions: Points::new(&x, &y, &z), speeds, radius: 0.2 }, &MOMENT)
+        scene.frame(&ParticlesView { positions: Points::new(&x, &y, &z), speeds, radius: 0.2 }, &MOMENT)
     }
 
-    fn centre(image: &Image, scene: &Scene) -> Rgb {
+    fn centre(image: &Image, scene: &Backdrop) -> Rgb {
         let at = scene.camera.look(DVec3::ZERO).unwrap().at / SUBPIXELS as f64;
         image.pixel(at.x as u32, at.y as u32).unwrap()
     }
@@ -223,7 +209,7 @@ mod tests {
 
     #[test]
     fn the_nearer_particle_hides_the_farther_whatever_the_order() {
-        let scene = scene(&Mesh::default());
+        let scene = scene(&MeshView::default());
         let (near, far) = (DVec3::X * 0.5, DVec3::X * -0.5);
         for (points, speeds) in [([near, far], [1.0, 0.0]), ([far, near], [0.0, 1.0])] {
             assert!(is_red(centre(&frame(&scene, &points, &speeds), &scene)));
@@ -235,7 +221,7 @@ mod tests {
     fn the_mesh_hides_what_is_behind_it_and_is_drawn_from_both_sides() {
         let vertices = [(-0.9, -0.9), (0.9, -0.9), (0.0, 0.9)].map(|(y, z)| DVec3::new(0.0, y, z));
         for triangles in [[[0, 1, 2]], [[0, 2, 1]]] {
-            let scene = scene(&Mesh { vertices: &vertices, normals: &[], triangles: &triangles });
+            let scene = scene(&MeshView { vertices: &vertices, normals: &[], triangles: &triangles });
             assert!(is_red(centre(&frame(&scene, &[DVec3::X * 0.5], &[1.0]), &scene)));
             let [r, g, b] = centre(&frame(&scene, &[DVec3::X * -0.5], &[1.0]), &scene);
             assert!(r.abs_diff(b) < 40 && (100..230).contains(&g), "the mesh is grey: {r} {g} {b}");
@@ -245,8 +231,11 @@ mod tests {
     #[test]
     fn bad_positions_speeds_and_triangles_are_skipped_and_counted() {
         let vertices = [DVec3::ZERO, DVec3::Y, DVec3::NAN];
-        let scene =
-            scene(&Mesh { vertices: &vertices, normals: &[], triangles: &[[0, 1, 2], [0, 1, 9], [1, 1, 1]] });
+        let scene = scene(&MeshView {
+            vertices: &vertices,
+            normals: &[],
+            triangles: &[[0, 1, 2], [0, 1, 9], [1, 1, 1]],
+        });
         assert_eq!(scene.skipped_triangles, 2);
         let points = [DVec3::NAN, DVec3::X * 1e9, DVec3::ZERO, DVec3::new(0.0, f64::INFINITY, 0.0)];
         let image = frame(&scene, &points, &[0.0, 0.0, f64::NAN]);
@@ -257,24 +246,24 @@ mod tests {
 
     #[test]
     fn no_particles_and_odd_radii_make_a_picture() {
-        let scene = scene(&Mesh::default());
+        let scene = scene(&MeshView::default());
         assert_eq!(frame(&scene, &[], &[]).pixels.len(), 3 * 320 * 240);
         for radius in [f64::NAN, -1.0, 0.0, 1e300] {
             let one = [0.0];
-            let particles = Particles { positions: Points::new(&one, &one, &one), speeds: &one, radius };
+            let particles = ParticlesView { positions: Points::new(&one, &one, &one), speeds: &one, radius };
             assert_eq!(scene.frame(&particles, &MOMENT).skipped, 0);
         }
     }
 
     #[test]
     fn particles_beside_the_picture_leave_it_as_it_is() {
-        let scene = scene(&Mesh::default());
+        let scene = scene(&MeshView::default());
         let nothing = frame(&scene, &[], &[]).pixels;
         let far = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         for z in [-1.0, 0.0, 1.0] {
             let points = far.map(|p| 30.0 * p + z * DVec3::ONE);
             let mut image = frame(&scene, &points, &[0.0; 4]);
-            // The caption differs in the number of particles.
+            // the captions differ in the number of particles
             image.pixels.truncate(3 * 320 * 220);
             assert!(image.pixels == nothing[..3 * 320 * 220]);
         }
@@ -289,7 +278,7 @@ mod tests {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let scene = scene(&Mesh { vertices: &vertices, normals: &[], triangles: &[[0, 1, 2]] });
+                let scene = scene(&MeshView { vertices: &vertices, normals: &[], triangles: &[[0, 1, 2]] });
                 frame(&scene, &points, &speeds)
             })
         };

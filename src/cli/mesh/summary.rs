@@ -1,0 +1,150 @@
+//! What `rfm mesh` says about the mesh of a solid, as one JSON document or as text.
+
+use serde::Serialize;
+
+use super::simplified::Simplified;
+use crate::mesh::{Quality, Report};
+
+/// The JSON document. Lengths are in metres, areas in m², volumes in m³.
+#[derive(Serialize)]
+pub(super) struct MeshSummary {
+    schema: u32,
+    solid: String,
+    vertices: usize,
+    triangles: usize,
+    closed: bool,
+    manifold: bool,
+    components: usize,
+    euler: i64,
+    volume: f64,
+    area: f64,
+    max_distance: f64,
+    rms_distance: f64,
+    thin_cells: usize,
+    evaluations: u64,
+    milliseconds: f64,
+    method: &'static str,
+    /// Only with `--quality`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quality: Option<Quality>,
+    /// Only with `--simplify`.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    simplified: Option<SimplifiedFigures>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct SimplifiedFigures {
+    /// The number of triangles before.
+    simplified_from: usize,
+    /// In metres, as asked for.
+    simplify_tolerance: f64,
+    /// The measured Hausdorff distance from the surface, in metres.
+    simplify_error: f64,
+    /// The time to simplify and to measure.
+    simplify_milliseconds: f64,
+}
+
+impl From<&Simplified> for SimplifiedFigures {
+    fn from(simplified: &Simplified) -> Self {
+        Self {
+            simplified_from: simplified.from,
+            simplify_tolerance: simplified.tolerance,
+            simplify_error: simplified.quality.hausdorff(),
+            simplify_milliseconds: simplified.milliseconds,
+        }
+    }
+}
+
+impl MeshSummary {
+    /// The figures of a mesh that `method` made in some milliseconds, with `thin_cells` cells that hide
+    /// a surface.
+    pub fn new(
+        (solid, method): (&str, &'static str),
+        report: &Report,
+        thin_cells: usize,
+        quality: Option<Quality>,
+        simplified: Option<&Simplified>,
+        milliseconds: f64,
+    ) -> Self {
+        Self {
+            schema: 1,
+            solid: solid.to_string(),
+            vertices: report.vertices,
+            triangles: report.triangles,
+            closed: report.closed,
+            manifold: report.manifold,
+            components: report.components,
+            euler: report.euler,
+            volume: report.volume,
+            area: report.area,
+            max_distance: report.max_distance,
+            rms_distance: report.rms_distance,
+            thin_cells,
+            evaluations: report.evaluations,
+            milliseconds,
+            method,
+            quality,
+            simplified: simplified.map(SimplifiedFigures::from),
+        }
+    }
+
+    /// Prints the figures as text.
+    pub fn print(&self) {
+        let yes = |b: bool| if b { "yes" } else { "NO" };
+        say!(
+            "{} vertices, {} triangles in {:.1} ms ({} evaluations of ω)",
+            self.vertices,
+            self.triangles,
+            self.milliseconds,
+            self.evaluations
+        );
+        say!(
+            "closed: {}, manifold: {}, components: {}, Euler characteristic: {}",
+            yes(self.closed),
+            yes(self.manifold),
+            self.components,
+            self.euler
+        );
+        say!("volume: {:.9}, area: {:.9}", self.volume, self.area);
+        say!(
+            "distance of the vertices from the surface: {:.1e} at most, {:.1e} rms",
+            self.max_distance,
+            self.rms_distance
+        );
+        if let Some(simplified) = &self.simplified {
+            say!(
+                "simplified from {} triangles: at most {:.2e} from the surface, {:.2e} allowed",
+                simplified.simplified_from,
+                simplified.simplify_error,
+                simplified.simplify_tolerance
+            );
+        }
+        if let Some(quality) = &self.quality {
+            print_quality(quality);
+        }
+    }
+}
+
+fn print_quality(quality: &Quality) {
+    say!(
+        "Hausdorff distance: {:.2e} (mesh to surface {:.2e}, rms {:.1e}; surface to mesh {:.2e}, rms {:.1e})",
+        quality.hausdorff(),
+        quality.to_surface.max,
+        quality.to_surface.rms,
+        quality.from_surface.max,
+        quality.from_surface.rms
+    );
+    say!(
+        "volume error: {:+.1e}, area error: {:+.1e}, normals off by {:.2}° rms, {} triangles upside down",
+        quality.volume_error,
+        quality.area_error,
+        quality.normal_error.rms,
+        quality.flipped
+    );
+    say!(
+        "triangles: least angle {:.2}°, mean radius ratio {:.3}, {:.2} % slivers",
+        quality.min_angle,
+        quality.mean_radius_ratio,
+        100.0 * quality.slivers
+    );
+}
