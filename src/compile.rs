@@ -1,4 +1,5 @@
-//! The driver: text → solids and scenes, each stage inspectable.
+//! The driver of the compiler: from the text of a file to its solids and scenes. Every stage can be
+//! inspected.
 //!
 //! ```
 //! use rfm::{Program, glam::DVec3};
@@ -25,28 +26,28 @@ use crate::solid::{Bounds, Chosen, Engine, Solid};
 use crate::sph::Method;
 use crate::syntax::{self, Ast};
 
-/// Why a file gives no solid.
+/// Why a file, a solid or a scene cannot be used.
 #[derive(Debug)]
 pub enum Error {
     /// The file could not be read.
     File {
-        /// As it was given.
+        /// The path as the caller gave it.
         path: String,
-        /// Why.
+        /// The error of the file system.
         error: std::io::Error,
     },
-    /// The file has mistakes; prints as the compiler's own messages.
+    /// The file has mistakes. They print as the compiler's own messages.
     Diagnostics(Diagnostics),
     /// The file has no solid or scene of this name.
     UnknownName {
-        /// `solid` or `scene`.
+        /// What was asked for: `solid` or `scene`.
         kind: &'static str,
-        /// What was asked for.
+        /// The name that was asked for.
         name: String,
-        /// What the file has instead.
+        /// The names that the file has.
         known: Vec<String>,
     },
-    /// No machine code could be made, and the interpreter was not allowed.
+    /// Machine code could not be made, and the interpreter was not allowed.
     Codegen(CodegenError),
 }
 
@@ -99,7 +100,7 @@ impl Program {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// If it cannot be read as UTF-8 text, or has mistakes.
+    /// [`Error::File`] if the file cannot be read as UTF-8 text, [`Error::Diagnostics`] if it has mistakes.
     pub fn from_path(path: impl AsRef<Path>) -> Result<Self, Error> {
         let name = path.as_ref().display().to_string();
         let text = std::fs::read(path.as_ref())
@@ -108,18 +109,18 @@ impl Program {
         Self::from_source(name, text)
     }
 
-    /// Checks a text; the name stands in its messages.
+    /// Checks a text. Its messages show `name` in place of a path.
     ///
     /// # Errors
-    /// If the text has mistakes.
+    /// [`Error::Diagnostics`] if the text has mistakes.
     pub fn from_source(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Result<Self, Error> {
         Self::check(Source::file(name, text), Options::default()).map_err(Error::Diagnostics)
     }
 
-    /// Checks a text with params overridden and limits set.
+    /// Checks a text with the overrides of params and the limits that `options` state.
     ///
     /// # Errors
-    /// All messages, warnings included, if one of them is an error.
+    /// All messages, warnings included, if at least one of them is an error.
     pub fn check(source: Source, options: Options) -> Result<Self, Diagnostics> {
         let (ast, syntax_messages) = syntax::parse(&source);
         let sources = Arc::from([source, lower::prelude_source()]);
@@ -146,20 +147,21 @@ impl Program {
         Ok(Self { sources, ast, syntax_messages, options, module: Arc::new(module), warnings: list })
     }
 
-    /// The same file with another value for one of its params.
+    /// Checks the same file again with another value for one of its params.
     ///
     /// # Errors
-    /// If the file declares no such param, or the value makes it wrong.
+    /// [`Error::Diagnostics`] if the file declares no such param, or if the value makes it wrong.
     pub fn with(&self, param: &str, value: f64) -> Result<Self, Error> {
         let mut options = self.options.clone();
         options.overrides.insert(param.to_string(), value);
         self.lowered_again(options)
     }
 
-    /// The same file with all its scenes run by a method, whichever they state.
+    /// Checks the same file again with one method for all its scenes, in place of the methods that they
+    /// state.
     ///
     /// # Errors
-    /// If a scene has a key that the method does not know.
+    /// [`Error::Diagnostics`] if a scene has a key that the method does not know.
     pub fn with_method(&self, method: Method) -> Result<Self, Error> {
         self.lowered_again(Options { method: Some(method), ..self.options.clone() })
     }
@@ -169,23 +171,24 @@ impl Program {
             .map_err(Error::Diagnostics)
     }
 
-    /// The values of params that were set.
+    /// The params that were set, with their values. Params with the value of the file are not among them.
     pub fn overrides(&self) -> &BTreeMap<String, f64> {
         &self.options.overrides
     }
 
-    /// Compiles a solid by name.
+    /// Compiles a solid by its name, with the engine [`Engine::Auto`].
     ///
     /// # Errors
-    /// If there is no such solid.
+    /// [`Error::UnknownName`] if the file has no such solid.
     pub fn solid(&self, name: &str) -> Result<Solid, Error> {
         self.solid_with(name, Engine::Auto)
     }
 
-    /// Compiles a solid for an engine.
+    /// Compiles a solid by its name for an engine.
     ///
     /// # Errors
-    /// If there is no such solid, or the engine is not to be had.
+    /// [`Error::UnknownName`] if the file has no such solid, [`Error::Codegen`] if the engine is not
+    /// available.
     pub fn solid_with(&self, name: &str, engine: Engine) -> Result<Solid, Error> {
         let found = self.module.solids.iter().find(|solid| solid.name == name);
         let Some(solid) = found else {
@@ -195,10 +198,10 @@ impl Program {
         self.compile(&solid.name, solid.node, engine)
     }
 
-    /// A scene by name.
+    /// The scene with this name, as data.
     ///
     /// # Errors
-    /// If there is no such scene.
+    /// [`Error::UnknownName`] if the file has no such scene.
     pub fn scene(&self, name: &str) -> Result<&Scene, Error> {
         let found = self.module.scenes.iter().find(|scene| scene.name == name);
         found.ok_or_else(|| {
@@ -207,19 +210,20 @@ impl Program {
         })
     }
 
-    /// Compiles any shape of the file's graph, such as the shape of a scene's fluid.
+    /// Compiles any node of the file's graph, such as the shape of a scene's fluid.
     ///
-    /// `shape` must come from this very program's [`module`](Self::module): after [`with`](Self::with) a node of
-    /// the former program names another expression.
+    /// `shape` must come from the [`module`](Self::module) of this very program: after [`with`](Self::with)
+    /// the same node stands for another expression.
     ///
     /// # Errors
-    /// If the engine is not to be had.
+    /// [`Error::Codegen`] if the engine is not available.
     pub fn compile(&self, name: &str, shape: Node, engine: Engine) -> Result<Solid, Error> {
         Ok(Solid::new(name, &self.module.graph, shape, engine)?)
     }
 
-    /// The box in which a solid is looked at: that of the first scene with it as an obstacle, or of the only scene;
-    /// without a scene the solid's bounds and half their longest side around them.
+    /// The box in which a solid is plotted and judged. It is the box of the first scene with the solid as an
+    /// obstacle, or else of the only scene. Without such a scene it is the solid's bounds, grown on all sides
+    /// by half their longest side. `None` if there is no such scene and the solid has no bounds.
     pub fn domain(&self, solid: &Solid) -> Option<Aabb> {
         let scenes = &self.module.scenes;
         let used = scenes.iter().find(|scene| scene.obstacles.iter().any(|o| o.name == solid.name()));
@@ -230,7 +234,8 @@ impl Program {
         }
     }
 
-    /// The tolerance that the file states for a solid: its own, or that of the first scene with it as an obstacle.
+    /// The tolerance that the file states for the solid with this name: its own, or else that of the first
+    /// scene with it as an obstacle; `None` if there is neither.
     pub fn tolerance(&self, solid: &str) -> Option<Tolerance> {
         let named = self.module.solids.iter().find(|named| named.name == solid);
         let uses = |scene: &&Scene| scene.obstacles.iter().any(|o| o.name == solid);
@@ -238,11 +243,11 @@ impl Program {
         named.and_then(|named| named.tolerance).or_else(of_scene)
     }
 
-    /// The cheapest program that keeps the tolerance of a solid in its [`domain`](Self::domain); nothing if the file
-    /// states no tolerance for it, or it is empty.
+    /// The cheapest program that keeps the tolerance of a solid in its [`domain`](Self::domain); `None` if
+    /// the file states no tolerance for the solid, or if the solid is empty.
     ///
     /// # Errors
-    /// If no program is certified to keep it.
+    /// A message if no program is certified to keep the tolerance.
     pub fn within_tolerance(&self, solid: &Solid) -> Option<Result<Chosen, Box<Diagnostic>>> {
         let tolerance = self.tolerance(solid.name())?;
         let refused = |help: String| {
@@ -270,12 +275,12 @@ impl Program {
         }
     }
 
-    /// What the file defines.
+    /// What the file defines: its graph, params, solids and scenes.
     pub fn module(&self) -> &Module {
         &self.module
     }
 
-    /// The syntax tree, as the text was read.
+    /// The syntax tree of the text.
     pub fn ast(&self) -> &Ast {
         &self.ast
     }
@@ -285,17 +290,17 @@ impl Program {
         &self.sources
     }
 
-    /// Messages that do not keep the file from being used.
+    /// Messages that do not prevent the use of the file.
     pub fn warnings(&self) -> Diagnostics {
         Diagnostics { list: self.warnings.clone(), sources: self.sources.clone() }
     }
 }
 
-/// Bytes as text, or an error that says where they stop being text.
+/// Converts bytes to text.
 ///
 /// # Errors
-/// If the bytes are not UTF-8.
-pub fn text_of(bytes: Vec<u8>) -> std::io::Result<String> {
+/// [`InvalidData`](std::io::ErrorKind::InvalidData) if the bytes are not UTF-8; the message says where.
+pub(crate) fn text_of(bytes: Vec<u8>) -> std::io::Result<String> {
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let message = format!("it is not a UTF-8 text (byte {at} does not belong to a character)");

@@ -1,4 +1,5 @@
-//! What a consumer knows of an obstacle: a function ω(x, y, z), its gradient and its range over a box.
+//! The interface between obstacles and what uses them: a function ω(x, y, z), its gradient, and its range
+//! over a box.
 //!
 //! Sign convention everywhere: **ω > 0 inside the obstacle, 0 on its surface, < 0 in the fluid**; the outward
 //! unit normal is n = −∇ω/|∇ω|.
@@ -21,19 +22,19 @@ pub use walls::{Moving, Still, Walls, search_path};
 /// Borrowed points as a structure of arrays; the three slices have one length.
 #[derive(Debug, Clone, Copy)]
 pub struct Points<'a> {
-    /// In the scene's unit of length, as `y` and `z`.
+    /// x coordinates, in the scene's unit of length.
     pub x: &'a [f64],
-    /// See `x`.
+    /// y coordinates, in the scene's unit of length.
     pub y: &'a [f64],
-    /// See `x`.
+    /// z coordinates, in the scene's unit of length.
     pub z: &'a [f64],
 }
 
 impl<'a> Points<'a> {
-    /// Borrows three columns.
+    /// Borrows three slices as points.
     ///
     /// # Panics
-    /// If the slices differ in length: a bug of the caller, never of a file.
+    /// If the slices differ in length.
     pub fn new(x: &'a [f64], y: &'a [f64], z: &'a [f64]) -> Self {
         assert!(x.len() == y.len() && y.len() == z.len(), "coordinate slices differ in length");
         Self { x, y, z }
@@ -49,22 +50,25 @@ impl<'a> Points<'a> {
         self.x.is_empty()
     }
 
-    /// Point `i`; panics beyond the last, as a slice does.
+    /// Point `i`.
+    ///
+    /// # Panics
+    /// If there are not more than `i` points.
     pub fn get(&self, i: usize) -> DVec3 {
         DVec3::new(self.x[i], self.y[i], self.z[i])
     }
 }
 
-/// Caller's slices for ω and ∇ω of many points, each as long as the points.
+/// Slices that receive ω and ∇ω of many points. Each is as long as the points.
 #[derive(Debug)]
 pub struct GradientsMut<'a> {
     /// ω, positive inside.
     pub omega: &'a mut [f64],
-    /// ∂ω/∂x, pointing inwards where ω is near zero; likewise `y` and `z`.
+    /// ∂ω/∂x. Where ω is near zero, the gradient (`x`, `y`, `z`) points into the obstacle.
     pub x: &'a mut [f64],
-    /// ∂ω/∂y
+    /// ∂ω/∂y.
     pub y: &'a mut [f64],
-    /// ∂ω/∂z
+    /// ∂ω/∂z.
     pub z: &'a mut [f64],
 }
 
@@ -76,17 +80,18 @@ pub trait Field: Send + Sync {
     /// ω at a point.
     fn omega(&self, p: DVec3) -> f64;
 
-    /// ω and ∇ω at a point. At corners and edges ∇ω is one finite member of the limits, never NaN.
+    /// ω and ∇ω at a point. At corners and edges ∇ω is one finite member of its limits there, never NaN.
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3);
 
-    /// ω at many points; `omega` is as long as `points`. No allocation, caller's thread.
+    /// ω at many points, written to `omega`, which is as long as `points`. Allocates nothing and runs on the
+    /// calling thread.
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
         for (i, w) in omega.iter_mut().enumerate() {
             *w = self.omega(points.get(i));
         }
     }
 
-    /// ω and ∇ω at many points. No allocation, caller's thread.
+    /// ω and ∇ω at many points. Allocates nothing and runs on the calling thread.
     fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
         for i in 0..points.len() {
             let (w, g) = self.omega_grad(points.get(i));
@@ -94,13 +99,15 @@ pub trait Field: Send + Sync {
         }
     }
 
-    /// ω at a point, continuous in space. Differs from `omega` only where an implementation keeps nothing but the sign
-    /// and the zero set of ω there, which does for roots but not for interpolation; the sign is the same.
+    /// ω at a point, continuous in space. It has the sign of `omega` everywhere. The two differ only where an
+    /// implementation keeps no more of ω than its sign and zero set: that is enough to find roots, but not to
+    /// interpolate.
     fn continuous(&self, p: DVec3) -> f64 {
         self.omega(p)
     }
 
-    /// An interval that contains ω of every point of the box; the default knows nothing.
+    /// An interval that contains ω of every point of the box. The default knows nothing and returns
+    /// [`Interval::ALL`].
     fn range(&self, _over: &Aabb) -> Interval {
         Interval::ALL
     }
@@ -137,7 +144,7 @@ impl<F: Field + ?Sized> Field for &F {
 pub struct Closures<V, G> {
     /// Point → ω.
     pub omega: V,
-    /// Point → ∇ω; finite everywhere, also where the formula has an edge.
+    /// Point → ∇ω. It is finite everywhere, also where the formula has an edge.
     pub gradient: G,
 }
 

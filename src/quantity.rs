@@ -1,9 +1,9 @@
-//! Quantities: dimensions, units (a factor to SI and the exponents of metre, kilogram, second and radian), and the bounds
-//! that a number may have to keep.
+//! Quantities: dimensions, units (a factor to SI and the exponents of metre, kilogram, second and radian),
+//! and the bounds that a number may have to keep.
 
 use std::fmt;
 
-/// Exponents of m, kg, s and rad.
+/// A physical dimension, as the exponents of m, kg, s and rad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dimension {
     /// Exponent of the metre.
@@ -17,27 +17,27 @@ pub struct Dimension {
 }
 
 impl Dimension {
-    /// A number without a unit.
+    /// The dimension of a plain number.
     pub const NONE: Self = Self::new(0, 0, 0, 0);
-    /// m
+    /// Length, m.
     pub const LENGTH: Self = Self::new(1, 0, 0, 0);
-    /// kg
+    /// Mass, kg.
     pub const MASS: Self = Self::new(0, 1, 0, 0);
-    /// s
+    /// Time, s.
     pub const TIME: Self = Self::new(0, 0, 1, 0);
-    /// rad
+    /// Angle, rad.
     pub const ANGLE: Self = Self::new(0, 0, 0, 1);
-    /// m/s
+    /// Speed, m/s.
     pub const SPEED: Self = Self::new(1, 0, -1, 0);
-    /// m/s²
+    /// Acceleration, m/s².
     pub const ACCELERATION: Self = Self::new(1, 0, -2, 0);
-    /// kg/m³
+    /// Density, kg/m³.
     pub const DENSITY: Self = Self::new(-3, 1, 0, 0);
     /// Dynamic viscosity, Pa·s.
     pub const VISCOSITY: Self = Self::new(-1, 1, -1, 0);
     /// Surface tension, N/m.
     pub const TENSION: Self = Self::new(0, 1, -2, 0);
-    /// J
+    /// Energy, J.
     pub const ENERGY: Self = Self::new(2, 1, -2, 0);
 
     /// The dimension m^length · kg^mass · s^time · rad^angle.
@@ -73,7 +73,7 @@ impl Dimension {
     }
 }
 
-/// What a number may be.
+/// A condition on the value of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
     /// Finite and above zero.
@@ -82,12 +82,12 @@ pub enum Bound {
     NotNegative,
     /// From 0 to 1.
     Fraction,
-    /// At least the first number and below the second.
+    /// At least the first number, and below the second.
     From(f64, f64),
 }
 
 impl Bound {
-    /// Whether the bound admits a number; it admits no infinity and no NaN.
+    /// Whether the bound admits a number. No bound admits an infinity or NaN.
     pub fn admits(self, number: f64) -> bool {
         number.is_finite()
             && match self {
@@ -98,7 +98,7 @@ impl Bound {
             }
     }
 
-    /// What the bound demands, to follow the name of a number: "must be positive".
+    /// What the bound demands, as text that follows the name of a number: "must be positive".
     pub fn demand(self) -> String {
         match self {
             Self::Positive => "must be positive".into(),
@@ -110,7 +110,7 @@ impl Bound {
 }
 
 impl fmt::Display for Bound {
-    /// The numbers that the bound admits: "a finite number above 0".
+    /// Writes which numbers the bound admits: "a finite number above 0".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Positive => write!(f, "a finite number above 0"),
@@ -121,16 +121,17 @@ impl fmt::Display for Bound {
     }
 }
 
-/// A unit as it is written at a number.
+/// A unit of measurement, as a scene writes it at a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
-    /// How many SI units one of these is.
+    /// Size of the unit in SI units: 0.001 for mm.
     pub factor: f64,
-    /// What it measures.
+    /// The dimension of what the unit measures.
     pub dimension: Dimension,
 }
 
-/// Reads a unit as the grammar lets it through: `kg/m^3`, `Pa·s`, `deg/s`. A `/` divides by the one next unit.
+/// Reads a unit in the notation of the grammar: `kg/m^3`, `Pa·s`, `deg/s`. A `/` divides by the next unit
+/// only. `None` if a part of the text is not a known unit.
 pub fn parse_unit(text: &str) -> Option<Unit> {
     let mut unit = Unit { factor: 1.0, dimension: Dimension::NONE };
     let mut rest = text;

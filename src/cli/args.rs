@@ -113,7 +113,7 @@ pub(super) struct Check {
     /// Check again whenever a file changes
     #[arg(long)]
     pub watch: bool,
-    /// The time at which solids that move are looked at, s
+    /// Time at which moving solids are evaluated, s
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// Treat a kind of message as an error
@@ -139,7 +139,7 @@ pub(super) struct Eval {
     /// A CSV file of points with the header x,y,z; `-` is standard input
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
-    /// The time at which solids that move are looked at, s
+    /// Time at which moving solids are evaluated, s
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// Columns to print
@@ -150,7 +150,7 @@ pub(super) struct Eval {
     pub precision: Option<Precision>,
 }
 
-/// In the order of their columns.
+/// A column of the output of `rfm eval`. The variants stand in the order of the columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub(super) enum What {
     /// ω, positive inside
@@ -182,19 +182,20 @@ pub(super) struct Mesh {
     /// The solid [default: the only one, or the first obstacle of the scene]
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
-    // where the mesh goes; the help lists the formats
+    // where the mesh goes; `output_help` writes the help, which lists the formats
     #[arg(short, long, value_name = "FILE", help = output_help())]
     pub output: Option<PathBuf>,
     /// Cells along the longest side
     #[arg(long, value_name = "N", default_value_t = 128, conflicts_with = "cell")]
     pub cells: usize,
-    /// Size of a cell instead of their number, in metres or with a unit; with --fluid half the radius by default
+    /// Size of a cell instead of their number, in metres or with a unit; with --fluid half the radius by
+    /// default
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = length)]
     pub cell: Option<f64>,
     /// Mesh this box instead of the solid's own bounds; the mesh is closed at its border
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = aabb, allow_hyphen_values = true)]
     pub domain: Option<Aabb>,
-    /// The time at which solids that move are looked at, s
+    /// Time at which moving solids are evaluated, s
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// How the surface is found
@@ -203,8 +204,8 @@ pub(super) struct Mesh {
     /// Contract thin triangles; all vertices stay on the surface
     #[arg(long)]
     pub no_slivers: bool,
-    /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of the mesh's
-    /// diagonal as in 0.1%. The distance is measured; vertices stay on the surface
+    /// Contract edges as long as the mesh stays this near to the surface: a length as in 2mm, or a part of
+    /// the mesh's diagonal as in 0.1%. The distance is measured; vertices stay on the surface
     #[arg(long, value_name = "ERROR", value_parser = tolerance, allow_negative_numbers = true)]
     pub simplify: Option<Tolerance>,
     /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
@@ -241,23 +242,25 @@ pub(super) struct Mesh {
 /// How far a simplified mesh may be from the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Tolerance {
-    /// Metres.
+    /// A length, m.
     Length(f64),
-    /// Part of the diagonal of the mesh's bounds.
+    /// A part of the diagonal of the mesh's bounds.
     OfDiagonal(f64),
 }
 
 /// A range of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Frames {
+    /// The first frame.
     pub first: usize,
-    /// The first that is left out.
+    /// The first frame that is left out; `None`: all frames from `first` on.
     pub end: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum MeshMethod {
-    /// Marching cubes with vertices on the exact surface: a third of the time at as many cells, but edges are cut off
+    /// Marching cubes with vertices on the exact surface: a third of the time at as many cells, but edges are
+    /// cut off
     Mc,
     /// Dual contouring: also edges and corners are exact, so an eighth of the cells do for the same error
     Dc,
@@ -321,12 +324,12 @@ pub(super) struct Report {
     pub flow: Flow,
 }
 
-/// What is asked of a flow.
+/// How a flow is measured.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Flows")]
 pub(super) struct Flow {
-    /// Run the scene with so many particles, by its `param particles` [default: 1/16, 1/4 and all of what the file
-    /// states]
+    /// Run the scene with so many particles, by its `param particles` [default: 1/16, 1/4 and all of what the
+    /// file states]
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = count, conflicts_with_all = ["solid", "mesh_plot"])]
     pub particles: Vec<usize>,
     /// Run the scene by these methods [default: its own]
@@ -375,7 +378,7 @@ fn definition(text: &str) -> Result<(String, f64), String> {
     Ok((name.trim().to_string(), value))
 }
 
-/// More threads than this are a slip of the keyboard, and starting them would take minutes.
+/// Most threads. A larger number is a typing error, and starting the threads would take minutes.
 const MOST_THREADS: usize = 1024;
 
 fn threads(text: &str) -> Result<NonZeroUsize, String> {

@@ -60,7 +60,7 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     }
 }
 
-/// What became of one solid.
+/// Prints what the stages of the compiler make of one solid.
 fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]) -> Result<(), Failure> {
     let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?;
     let text = Explanation { program, solid: &solid };
@@ -110,7 +110,7 @@ fn stages(shared: &Shared, program: &Program, named: &NamedSolid, show: &[Stage]
     Ok(())
 }
 
-/// The code generator's texts of a program for one point in `f64`.
+/// The code generator's listings of a program for one point in `f64`.
 fn listing(solid: &Solid, kind: ProgramKind) -> Result<Listing, CodegenError> {
     let (graph, outputs) = solid.graph(kind);
     let (precision, shape, forms) = (Precision::F64, Shape::Point, solid.forms(kind, Precision::F64));
@@ -118,26 +118,26 @@ fn listing(solid: &Solid, kind: ProgramKind) -> Result<Listing, CodegenError> {
     Listing::of(Request { graph, inputs: &[], outputs, precision, shape, forms, parameters: false, uniforms })
 }
 
-/// Leaves that are listed one by one.
+/// Most leaves that are listed one by one.
 const MOST_LEAVES: usize = 24;
 
-/// Programs of more operations than this are not compiled only to be counted.
+/// Most operations of a program that is compiled only to be counted.
 const MOST_OPERATIONS: usize = 5_000;
 
-/// The parts of the text about one solid.
+/// The text about one solid, part by part.
 struct Explanation<'a> {
     program: &'a Program,
     solid: &'a Solid,
 }
 
 impl Explanation<'_> {
-    /// `pawn.rfm:8:11` and the first line of what stands there.
+    /// The place `pawn.rfm:8:11` and the beginning of the text there.
     fn place(&self, span: Span) -> String {
         let Some(source) = self.program.sources().iter().find(|s| s.id == span.source) else {
             return String::new();
         };
         let at = source.position(span.start as usize);
-        // without the remark and the line end that may follow an expression
+        // without the comments and line ends that an expression may contain
         let code: Vec<&str> =
             source.slice(span).lines().map(|l| l.split('#').next().unwrap_or("").trim()).collect();
         let text = code.join(" ").trim().to_string();
@@ -146,7 +146,7 @@ impl Explanation<'_> {
         format!("{}:{}:{}  `{cut}{more}`", source.name, at.line, at.column)
     }
 
-    /// What is found once for each time, if the solid moves.
+    /// What is computed once for each time, if the solid moves.
     fn motion(&self) {
         if let Some(numbers) = self.solid.time_dependent(ProgramKind::Value) {
             let s = if numbers == 1 { "" } else { "s" };
@@ -156,7 +156,7 @@ impl Explanation<'_> {
         }
     }
 
-    /// Which rules changed what, and where it stood.
+    /// Which rules were applied, and to which places of the text.
     fn simplification(&self, named: &NamedSolid) {
         let (written, _) = self.program.module().graph.extract(&[named.node]);
         let (graph, outputs) = self.solid.graph(ProgramKind::Value);
@@ -201,7 +201,7 @@ impl Explanation<'_> {
         }
     }
 
-    /// The inequalities that decide the sign.
+    /// The leaves, which are the inequalities that decide the sign.
     fn leaves(&self) {
         let Some(leaves) = self.solid.leaves() else {
             say!("  leaves: too many to be taken apart");
@@ -230,7 +230,7 @@ impl Explanation<'_> {
         }
     }
 
-    /// What ranges prove to be irrelevant in the solid's bounds and in their eighths.
+    /// Which leaves are irrelevant, as ranges prove, in the solid's bounds and in their eighths.
     fn specialisation(&self) {
         let bounds = match self.solid.bounds() {
             Bounds::Within(bounds) => *bounds,
@@ -253,7 +253,7 @@ impl Explanation<'_> {
         self.say_left(bounds.corners().map(eighth).into());
     }
 
-    /// What is left in some boxes, those with the same leaves together.
+    /// The leaves that are left in some boxes. Boxes with the same leaves are named together.
     fn say_left(&self, boxes: Vec<(String, Aabb)>) {
         let mut groups: Vec<(Remainder, String, Vec<Interval>)> = Vec::new();
         for (name, over) in boxes {
@@ -278,6 +278,7 @@ impl Explanation<'_> {
         }
     }
 
+    /// Prints which leaves are left in some boxes, and why the others are dropped.
     fn say_dropped(&self, names: &str, kept: &[bool], ranges: &[Interval]) {
         let left: Vec<String> = (0..kept.len()).filter(|&i| kept[i]).map(|i| (i + 1).to_string()).collect();
         let more = if left.len() > MOST_LEAVES { ", …" } else { "" };
@@ -297,7 +298,7 @@ impl Explanation<'_> {
         }
     }
 
-    /// What each question costs.
+    /// The operations and instructions of each program.
     fn programs(&self) {
         say!("  programs for one point in f64:");
         for (name, kind) in [
@@ -321,7 +322,7 @@ impl Explanation<'_> {
     }
 }
 
-/// Lines of an assembly text that are instructions: neither labels nor remarks.
+/// Number of lines of an assembly text that are instructions, neither labels nor comments.
 fn instructions(assembly: &str) -> usize {
     let is_instruction = |line: &&str| {
         let line = line.trim();

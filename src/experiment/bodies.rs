@@ -11,19 +11,20 @@ use crate::solid::MovingMap;
 use crate::sph::{Obstacle, Parameters};
 use crate::{Engine, Program, Solid};
 
-/// Obstacles without a known range would be sampled in steps of this part of the support radius; compiled ones are swept.
+/// Distance of samples, over the support radius, along paths at obstacles without a known range. Compiled
+/// obstacles are swept instead.
 const PATH_RESOLUTION: f64 = 0.05;
 
-/// A window of time in which the map of a moving solid stays, in steps.
+/// Length of the window of time for which the map of a moving solid holds, in steps.
 const WINDOW: f64 = 16.0;
 
-/// A solid in the fluid's way.
+/// A solid in the way of the fluid: an obstacle, or the outside of the container.
 pub struct Body {
-    /// The solid as it is at the start.
+    /// The solid as it is at the start, t = 0.
     pub solid: Solid,
-    /// What the scene says of its surface.
+    /// What the scene states about the solid's surface.
     pub skin: Skin,
-    /// The solid as the simulation meets it.
+    /// The solid in the form that the simulation uses.
     pub(super) obstacle: Obstacle,
 }
 
@@ -64,19 +65,20 @@ fn body(
     Ok(Body { solid, skin, obstacle })
 }
 
-/// The cheapest field that answers for a solid in the box of a scene.
+/// The cheapest field that represents a solid in the box of a scene.
 fn at_rest(solid: &Solid, scene: &Scene, parameters: &Parameters) -> Arc<dyn Walls> {
     if parameters.walls_have_density() {
         solid.walls(scene.domain, parameters.support_radius).into()
     } else if solid.has_many_leaves() {
-        // ω itself for a few leaves; for many, only those that matter where a particle is
+        // with few leaves ω itself is cheap; with many, only the leaves that matter near a particle are
+        // evaluated
         solid.surface(scene.domain).into()
     } else {
         Arc::new(solid.clone())
     }
 }
 
-/// The same for a solid that moves, during a run.
+/// The cheapest field that represents a moving solid in the box of a scene during a run.
 fn in_motion(solid: &Solid, scene: &Scene, parameters: &Parameters) -> Arc<dyn Moving> {
     let run = (0.0, scene.run.until);
     let window = WINDOW * parameters.stable_dt(parameters.expected_speed).min(parameters.time_step);

@@ -1,48 +1,49 @@
-//! How far a flow is from what its scene knows of it.
+//! How far a simulated flow is from the solution that its scene states in the block `truth`.
 //!
-//! Each deviation is a relative one in the L2 norm over the particles and all instants that were looked at together:
-//! √(Σ (a − a*)² / Σ a*²). An instant at which what is known vanishes (a wave that turns) weighs nothing in the denominator
-//! and as much as any other in the numerator.
+//! Each deviation is relative, in the L2 norm over the particles and all sampled instants together: √(Σ (a −
+//! a*)² / Σ a*²). At an instant at which the known value vanishes, such as a wave that turns, the denominator
+//! gains nothing, and the numerator as much as at any other instant.
 
 use super::Experiment;
 use crate::ir::{Given, Interpreter, Node};
 use crate::lower::Scene;
 use crate::sph::Simulation;
 
-/// How far a flow is from what is known of it; nothing where nothing is.
+/// Relative deviations of a flow from its known solution; `None` for each quantity of which nothing is known.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Deviation {
-    /// Of the particles' pressures.
+    /// Deviation of the particles' pressures.
     pub pressure: Option<f64>,
-    /// Of their velocities.
+    /// Deviation of the particles' velocities.
     pub velocity: Option<f64>,
-    /// Of the front on the floor: where the outermost of the particles in the lowest layer and a half ends, half a spacing
-    /// beyond its middle.
+    /// Deviation of the front on the floor of the box. The front lies half a spacing beyond the outermost
+    /// particle of the lowest layer and a half.
     pub front: Option<f64>,
 }
 
 impl Deviation {
-    /// What may be known of a flow, in the order of [`Deviation::parts`].
+    /// Names of the quantities that may be known, in the order of [`Deviation::parts`].
     pub const NAMES: [&str; 3] = ["pressure", "velocity", "front"];
 
-    /// All of it.
+    /// The deviations as an array, in the order of [`Deviation::NAMES`].
     pub fn parts(&self) -> [Option<f64>; 3] {
         [self.pressure, self.velocity, self.front]
     }
 }
 
-/// What is added up over the instants of a run.
+/// Sums over the instants of a run from which the [`Deviation`] follows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Deviations {
     /// Σ (a − a*)², in the order of [`Deviation::NAMES`].
     off: [f64; 3],
-    /// Σ a*²
+    /// Σ a*², in the order of [`Deviation::NAMES`].
     size: [f64; 3],
     instants: usize,
 }
 
 impl Deviations {
-    /// Takes the present state, if the scene knows anything of this instant.
+    /// Adds the present state of a simulation. Does nothing if the scene has no `truth`, or if the `truth`
+    /// begins later.
     pub fn look(&mut self, experiment: &Experiment, simulation: &Simulation) {
         let (program, scene) = (experiment.program(), experiment.scene());
         let now = simulation.time();
@@ -68,33 +69,33 @@ impl Deviations {
             compare(1, &nodes, &|i, k| particles.velocity.get(i)[k], particles.len());
         }
         if let Some(node) = truth.front {
-            // a formula of t alone: the same for any particle
+            // the formula depends on t alone, so any particle will do
             compare(2, &[node], &|_, _| front(scene, simulation), 1);
         }
         self.instants += 1;
     }
 
-    /// Over all instants so far.
+    /// The deviations over all instants so far.
     pub fn total(&self) -> Deviation {
-        // not known at all: both sums are as they began
+        // both sums are zero if the quantity is not known
         let relative = |k: usize| {
             (self.off[k] != 0.0 || self.size[k] != 0.0).then(|| (self.off[k] / self.size[k]).sqrt())
         };
         Deviation { pressure: relative(0), velocity: relative(1), front: relative(2) }
     }
 
-    /// Of how many instants something was known.
+    /// Number of instants that were compared.
     pub fn instants(&self) -> usize {
         self.instants
     }
 
-    /// All that is remembered, as numbers.
+    /// The sums as numbers, for a checkpoint: [`Deviations::remembered`] takes them back.
     pub fn memory(&self) -> [f64; 7] {
         let ([a, b, c], [d, e, f]) = (self.off, self.size);
         [a, b, c, d, e, f, self.instants as f64]
     }
 
-    /// The other way.
+    /// The sums that [`Deviations::memory`] returned.
     pub fn remembered([a, b, c, d, e, f, instants]: [f64; 7]) -> Self {
         Self { off: [a, b, c], size: [d, e, f], instants: instants as usize }
     }

@@ -1,4 +1,5 @@
-//! A scene of the language → a simulation: obstacles compiled, parameters checked, particles put and carved.
+//! From a scene of the language to a simulation: obstacles are compiled, parameters checked, particles
+//! placed, and those removed that an obstacle leaves no room for.
 //!
 //! ```no_run
 //! let program = rfm::Program::from_path("examples/pawn.rfm")?;
@@ -8,8 +9,8 @@
 //! # Ok::<(), rfm::Error>(())
 //! ```
 //!
-//! An [`Experiment`] owns all that it needs, and so does a [`Simulation`]: both may be sent to another thread. What is
-//! known of the flow is compared by [`Deviations`].
+//! An [`Experiment`] owns all that it needs, and so does a [`Simulation`]: both may be sent to another
+//! thread. [`Deviations`] compares the flow with the solution that the scene states.
 
 mod bodies;
 mod deviation;
@@ -35,10 +36,10 @@ pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
 pub use parameters::TimeStep;
 
-/// Particles start at least this part of the spacing away from an obstacle.
+/// Least distance of particles from obstacles at the start, over the spacing.
 const CLEARANCE: f64 = 0.5;
 
-/// A scene, compiled and checked: what a simulation needs besides its particles.
+/// A scene, compiled and checked: all that a simulation needs besides its particles.
 pub struct Experiment {
     program: Program,
     scene: Scene,
@@ -50,21 +51,23 @@ pub struct Experiment {
     warnings: Vec<Diagnostic>,
 }
 
-/// A simulation at its start.
+/// A simulation at its start, as [`Experiment::start`] returns it.
 pub struct Start {
-    /// It has taken no step.
+    /// The simulation. It has taken no step yet.
     pub simulation: Simulation,
-    /// Particles of the fluid that were carved off, because they lay in an obstacle, too close to one, or outside the box.
+    /// Number of particles that were removed because they lay in an obstacle, too close to one, or outside
+    /// the box.
     pub carved: usize,
-    /// What a person should know of the start, and does not keep it from being run.
+    /// Warnings about the start. They do not prevent a run.
     pub warnings: Diagnostics,
 }
 
 impl Experiment {
-    /// Compiles the solids of a scene and derives the numbers of its method.
+    /// Compiles the solids of a scene and derives the parameters of its method.
     ///
     /// # Errors
-    /// If the file has no scene of this name, the engine is not to be had, or the fluid's figures do not fit together.
+    /// [`Error::UnknownName`] if the file has no scene of this name, [`Error::Codegen`] if the engine is not
+    /// available, [`Error::Diagnostics`] if the fluid's parameters do not fit together.
     pub fn new(program: &Program, scene: &str, engine: Engine) -> Result<Self, Error> {
         let (program, scene) = (program.clone(), program.scene(scene)?.clone());
         let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
@@ -86,17 +89,17 @@ impl Experiment {
         &self.program
     }
 
-    /// The scene.
+    /// The scene, as the file states it.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The box.
+    /// The box of the scene, m.
     pub fn domain(&self) -> Aabb {
         self.scene.domain
     }
 
-    /// Numbers of the fluid and the method.
+    /// Parameters of the fluid and of its method, in SI units.
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }
@@ -106,7 +109,7 @@ impl Experiment {
         self.time_step
     }
 
-    /// A speed that the scene can reach by gravity, m/s.
+    /// A speed that the fluid can reach by its velocity at the start and a fall through the box, m/s.
     pub fn typical_speed(&self) -> f64 {
         self.typical_speed
     }
@@ -116,15 +119,15 @@ impl Experiment {
         &self.bodies
     }
 
-    /// What a person should know of the scene, and does not keep it from being run.
+    /// Warnings about the scene. They do not prevent a run.
     pub fn warnings(&self) -> Diagnostics {
         self.diagnostics(self.warnings.clone())
     }
 
-    /// The simulation at its start.
+    /// Starts a simulation: places the particles, and finds the densities and forces of the first instant.
     ///
     /// # Errors
-    /// If the fluid has no room.
+    /// [`Error::Diagnostics`] if the fluid has no room.
     pub fn start(&self) -> Result<Start, Error> {
         let fluid = &self.scene.fluid;
         let mut particles = self.seed()?;
@@ -141,10 +144,10 @@ impl Experiment {
         Ok(Start { simulation, carved, warnings: self.diagnostics(warning.into_iter().collect()) })
     }
 
-    /// The simulation at a checkpoint.
+    /// Starts a simulation at a checkpoint.
     ///
     /// # Errors
-    /// If the checkpoint does not fit the scene.
+    /// [`SetupError`] if the checkpoint does not fit the scene.
     pub fn resume(&self, checkpoint: &Checkpoint) -> Result<Simulation, SetupError> {
         let obstacles = self.obstacles();
         let mut simulation =
@@ -157,7 +160,7 @@ impl Experiment {
         self.bodies.iter().map(|body| body.obstacle.clone()).collect()
     }
 
-    /// Gravity that depends on the time or on the place; what stays is a parameter.
+    /// Sets a gravity that depends on the time or on the place. A constant gravity is a parameter.
     fn set_gravity(&self, simulation: &mut Simulation) {
         match &self.scene.gravity {
             Gravity::Still(_) => {}
@@ -169,7 +172,7 @@ impl Experiment {
         }
     }
 
-    /// Particles that fill the shape of the fluid, at rest.
+    /// Particles at rest that fill the shape of the fluid.
     fn seed(&self) -> Result<Particles, Error> {
         let fluid = &self.scene.fluid;
         let bounds = match self.fluid.bounds() {
@@ -193,7 +196,7 @@ impl Experiment {
         block.seed(&self.parameters, self.scene.domain).map_err(|e| no_fluid(&self.program, &e, span))
     }
 
-    /// Velocities at the start: each particle's own, where the scene gives them as formulas.
+    /// Gives each particle its velocity at the start, by the formulas of the scene.
     fn set_in_motion(&self, particles: &mut Particles) {
         let velocities = velocities(&self.program, &self.scene.fluid);
         for i in 0..particles.len() {
@@ -201,7 +204,8 @@ impl Experiment {
         }
     }
 
-    /// Removes particles that obstacles leave no room for; how many, and a warning that says so.
+    /// Removes particles that obstacles leave no room for. Returns their number, and a warning if there are
+    /// any.
     fn carve(
         &self,
         particles: &mut Particles,
@@ -210,7 +214,7 @@ impl Experiment {
         let (span, domain) = (self.scene.fluid.shape_span, &self.scene.domain);
         let mut clearance = CLEARANCE * self.parameters.spacing();
         if self.parameters.makes_room_at_start() {
-            // those too near may move, and only what finds no place goes
+            // particles that are too near may move; only those that find no place are removed
             make_room(particles, domain, obstacles, clearance);
             clearance *= 0.5;
         }
@@ -227,8 +231,8 @@ impl Experiment {
         Ok((lost, (lost > 0).then(|| Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message()))))
     }
 
-    /// The densities of a fluid at rest under its own weight, its surface half a spacing above the highest particle, for
-    /// methods that start so.
+    /// Sets the densities of a fluid at rest under its own weight, for methods that start so. The fluid's
+    /// surface lies half a spacing above the highest particle.
     fn put_under_pressure(&self, particles: &mut Particles) {
         let p = &self.parameters;
         let up = -p.gravity.normalize_or_zero();
@@ -247,12 +251,12 @@ impl Experiment {
     }
 }
 
-/// The velocity of the fluid at the start, m/s, at a place.
+/// The velocity of the fluid at the start, m/s, as a function of the place.
 fn velocities(program: &Program, fluid: &Fluid) -> Arc<VectorField> {
     vector_field(program, &fluid.velocity)
 }
 
-/// Formulas of the place and of t.
+/// Formulas of the place and of t as a function.
 fn vector_field(program: &Program, nodes: &[Node; 3]) -> Arc<VectorField> {
     let formulas = Interpreter::new(&program.module().graph, nodes);
     Arc::new(move |p, time| {

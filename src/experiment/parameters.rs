@@ -1,4 +1,4 @@
-//! The numbers of a scene as parameters of a simulation, and the length of its steps.
+//! The parameters of a simulation from the numbers of a scene, and the length of its steps.
 
 use glam::DVec3;
 
@@ -8,16 +8,16 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::lower::{Gravity, Scene};
 use crate::sph::Parameters;
 
-/// The length of a simulation's steps.
+/// The length of a simulation's steps, and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeStep {
-    /// The length, or the longest if steps follow the state, s.
+    /// The length of a step, s. If steps follow the state, it is the longest.
     pub seconds: f64,
-    /// Where it comes from.
+    /// Where the length comes from, in words.
     pub reason: &'static str,
 }
 
-/// A speed that the scene can reach: by its velocity at the start, and by a fall through the box, m/s.
+/// A speed that the fluid can reach by its velocity at the start and a fall through the box, m/s.
 pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
     let gravity = at_start(program, &scene.gravity);
     let height = gravity.normalize_or_zero().abs().dot(scene.domain.size());
@@ -25,7 +25,7 @@ pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
     (start * start + 2.0 * gravity.length() * height).sqrt()
 }
 
-/// All parameters but the time step.
+/// All parameters except the time step, which is 1 s here.
 pub(super) fn of_scene(program: &Program, scene: &Scene, typical_speed: f64) -> Parameters {
     let (fluid, method) = (&scene.fluid, scene.method.fluid());
     Parameters {
@@ -66,7 +66,7 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
             (TimeStep { seconds: save_every, reason }, None)
         }
         None => {
-            // a whole number of steps between frames
+            // fit a whole number of steps between frames
             let steps = (save_every / stable).ceil().max(1.0);
             let reason = "derived: stable for a fall through the box";
             (TimeStep { seconds: save_every / steps, reason }, None)
@@ -74,7 +74,7 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
     }
 }
 
-/// Gravity of the first instant that is the same at all places, m/s².
+/// The part of gravity that does not depend on the place, at t = 0, m/s².
 fn at_start(program: &Program, gravity: &Gravity) -> DVec3 {
     match gravity {
         Gravity::Still(gravity) => *gravity,
@@ -83,7 +83,7 @@ fn at_start(program: &Program, gravity: &Gravity) -> DVec3 {
     }
 }
 
-/// The greatest speed at the start, m/s, sought on a grid over the box.
+/// The greatest speed at the start, m/s, of the points of a grid over the box.
 fn fastest(program: &Program, scene: &Scene) -> f64 {
     const SIDE: usize = 16;
     let velocities = velocities(program, &scene.fluid);

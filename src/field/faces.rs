@@ -1,29 +1,29 @@
-//! The surface near a point as faces, and how they are joined: what walls without wall particles are made of.
+//! The surface near a point as a tree of faces. Walls without wall particles are computed from it.
 
 use glam::DVec3;
 use smallvec::SmallVec;
 
-/// A piece of surface, seen from a point.
+/// A piece of an obstacle's surface, seen from a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Face {
-    /// Of the point from the face, positive in the fluid.
+    /// Distance of the point from the face, positive in the fluid, in the scene's unit of length.
     pub distance: f64,
-    /// Outward unit normal at the nearest place.
+    /// Outward unit normal at the nearest place of the face.
     pub normal: DVec3,
-    /// Positive where the obstacle is convex, 1/length.
+    /// Mean curvature, 1/length; positive where the obstacle is convex.
     pub mean_curvature: f64,
 }
 
-/// A node of a tree of faces.
+/// A node of a tree of faces: a face, or a combination of the trees that follow it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Part {
-    /// The obstacle lies behind the face.
+    /// A face: the obstacle lies behind it.
     Face(Face),
-    /// It is what the next so many trees have in common: an edge that stands out.
+    /// The intersection of this many of the trees that follow: an edge that stands out of the obstacle.
     All(u32),
-    /// It is what belongs to any of the next so many trees: an edge that reaches in.
+    /// The union of this many of the trees that follow: an edge that reaches into the obstacle.
     Any(u32),
 }
 
-/// A tree in prefix order: a node is followed by its parts. Empty: no surface is near.
+/// A tree of faces in prefix order: each node is followed by its parts. It is empty if no surface is near.
 pub type Faces = SmallVec<[Part; 16]>;

@@ -1,9 +1,10 @@
-//! What a fluid needs to know of an obstacle besides its field: where paths enter it, its faces near a point, how its
-//! surface moves, and what is surely free of it.
+//! What a fluid asks of an obstacle besides its field: where paths enter it, which faces are near a point,
+//! how its surface moves, and which regions are surely free of it.
 //!
-//! Invariant: where a field knows its range, nothing of a path before an [`Entry`] touches the obstacle, and a path
-//! without one does not touch it at all. If the obstacle moves, this holds for each place at the time at which it is
-//! passed. A field that knows nothing of its range is sampled, and what lies between two samples is not seen.
+//! Invariant: if a field knows its range, no part of a path before an [`Entry`] touches the obstacle, and a
+//! path without an entry does not touch it at all. If the obstacle moves, this holds for each place at the
+//! time at which the path passes it. A field that does not know its range is sampled, and what lies between
+//! two samples is not seen.
 
 use glam::DVec3;
 
@@ -11,30 +12,31 @@ use super::{Closures, Entry, Face, Faces, Field, Normals, Part, Path, last_outsi
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
-/// Radii that [`Walls::clearance`] tries, each half of the one before.
+/// Number of radii that [`Walls::clearance`] tries, each half of the one before.
 const CLEARANCES: u32 = 5;
 
 /// Parts of a path shorter than this are not divided further.
 const SHORTEST: f64 = 1e-9;
 
-/// Most ranges that are asked for on one path; what is undecided then is reported as uncertain.
+/// Most ranges that are evaluated on one path. What is still undecided then is reported as uncertain.
 const MOST_RANGES: usize = 2_000;
 
-/// An obstacle as a fluid meets it. Every method has a default that follows from [`Field`] alone, so
-/// `impl Walls for MyField {}` is enough; an implementation overrides what it knows better.
+/// An obstacle as a fluid meets it. Every method has a default that follows from [`Field`] alone, so the line
+/// `impl Walls for MyField {}` is enough. An implementation overrides the methods that it can answer better.
 pub trait Walls: Field {
-    /// Where a path first meets the obstacle, from [`Path::start`] on; ω = 0 counts as met.
+    /// Where a path first meets the obstacle, from [`Path::start`] on; ω = 0 counts as met. `None` if it does
+    /// not.
     ///
-    /// The default halves the path until [`Field::range`] proves its parts to be in the fluid, down to 1e-9 of its
-    /// length; a field that knows nothing of its range is sampled, see [`Path::resolution`].
+    /// The default halves the path until [`Field::range`] proves its parts to be in the fluid, down to 1e-9
+    /// of its length. A field that does not know its range is sampled, see [`Path::resolution`].
     fn first_entry(&self, path: &Path) -> Option<Entry> {
         search_path(self, path)
     }
 
-    /// The faces of the obstacle's surface that may lie within `reach` of a point, and how they are joined; nothing is
-    /// added if the whole ball of that radius lies in the fluid.
+    /// Adds to `faces` the faces of the obstacle's surface that may lie within `reach` of a point, and how
+    /// they are joined. Adds nothing if the whole ball of that radius lies in the fluid.
     ///
-    /// The default knows one face, by the distance −ω/|∇ω|, which holds near the surface only.
+    /// The default adds one face at the distance −ω/|∇ω|, which is accurate near the surface only.
     fn faces(&self, p: DVec3, reach: f64, faces: &mut Faces) {
         let (w, gradient) = self.omega_grad(p);
         let slope = gradient.length();
@@ -45,30 +47,32 @@ pub trait Walls: Field {
         }
     }
 
-    /// ω at a part of a path, at the time at which it is passed: the same as at any other time, unless the obstacle
-    /// moves.
+    /// ω at a part `t` of a path, 0 to 1. If the obstacle moves, ω is that of the time at which the path
+    /// passes this place.
     fn on_path(&self, path: &Path, t: f64) -> f64 {
         self.omega(path.at(t))
     }
 
-    /// The velocity of the surface near a point, in the scene's units of length and time, along the surface's normal.
+    /// The velocity of the surface near a point along the surface's normal, in the scene's units of length
+    /// and time.
     ///
-    /// On the surface ω(x(t), t) = 0, so it moves along n = −∇ω/|∇ω| with the speed ω_t/|∇ω|; at edges it is that of
-    /// one of the faces, or their mean. A motion within the surface itself, as of a turning cylinder, is not in ω.
+    /// On the surface ω(x(t), t) = 0, so it moves along n = −∇ω/|∇ω| with the speed ω_t/|∇ω|. At an edge this
+    /// is the velocity of one of the faces, or their mean. ω does not contain a motion within the surface
+    /// itself, such as that of a turning cylinder.
     fn wall_velocity(&self, _p: DVec3) -> DVec3 {
         DVec3::ZERO
     }
 
-    /// A radius, `most` at the utmost, of a ball around a point that is proven to lie in the fluid at all times that the
-    /// field speaks of; 0 where nothing is proven.
+    /// The radius, at most `most`, of a ball around a point that is proven to lie in the fluid at all times
+    /// that the field covers; 0 if nothing is proven.
     ///
-    /// The default asks for ranges of the boxes around a few such balls.
+    /// The default takes the ranges of the boxes around a few such balls.
     fn clearance(&self, p: DVec3, most: f64) -> f64 {
         clearance_by_ranges(self, p, most)
     }
 
-    /// Whether a box is proven to lie in the fluid, and nothing of it nearer than `reach` to a surface, at all times that
-    /// the field speaks of.
+    /// Whether a box is proven to lie in the fluid, with every point of it at least `reach` away from any
+    /// surface, at all times that the field covers.
     fn is_far(&self, over: &Aabb, reach: f64) -> bool {
         self.range(&over.grown(reach)).hi < 0.0
     }
@@ -109,19 +113,20 @@ where
 
 /// An obstacle that may move.
 pub trait Moving: Send + Sync {
-    /// The obstacle during one time step, s: values, gradients and signs are those at `to`, ranges hold for the whole
-    /// step, and [`Walls::first_entry`] lets time run evenly from `from` to `to` while the path is passed.
+    /// The obstacle during one time step, between two times in seconds. Values, gradients and signs are those
+    /// at `to`; ranges hold for the whole step. [`Walls::first_entry`] lets time run evenly from `from` to
+    /// `to` along a path.
     ///
-    /// Cheap enough to be asked for in every step.
+    /// The call is cheap enough for every step.
     fn during(&self, from: f64, to: f64) -> Box<dyn Walls>;
 
-    /// Whether it does move: otherwise it is the same during every step.
+    /// Whether the obstacle moves. If not, it is the same during every step.
     fn moves(&self) -> bool {
         true
     }
 }
 
-/// An obstacle at rest, where one that may move is asked for.
+/// An obstacle at rest as a [`Moving`] one.
 #[derive(Debug, Clone, Copy)]
 pub struct Still<F>(pub F);
 
@@ -135,8 +140,8 @@ impl<F: Walls + Clone + 'static> Moving for Still<F> {
     }
 }
 
-/// The largest of `most`, its half and so on that a field's ranges prove to be free around a point: what
-/// [`Walls::clearance`] does unless a field knows better.
+/// The largest of `most`, `most`/2, … whose ball around a point is free by the field's ranges; 0 if none is.
+/// This is the default of [`Walls::clearance`].
 pub(crate) fn clearance_by_ranges<F: Walls + ?Sized>(field: &F, p: DVec3, most: f64) -> f64 {
     let mut radius = most;
     for _ in 0..CLEARANCES {
@@ -145,14 +150,15 @@ pub(crate) fn clearance_by_ranges<F: Walls + ?Sized>(field: &F, p: DVec3, most: 
             return radius;
         }
         if range == Interval::ALL && radius == most && field.range(&Aabb::new(p, p)) == Interval::ALL {
-            break; // it knows nothing, and will not know more
+            break; // the field knows nothing of its range
         }
         radius *= 0.5;
     }
     0.0
 }
 
-/// The first entry found by a field's ranges, or by samples if it has none: the default of [`Walls::first_entry`].
+/// The first entry of a path by the field's ranges, or by samples if it has none; `None` if the path does not
+/// enter. This is the default of [`Walls::first_entry`].
 pub fn search_path<F: Walls + ?Sized>(field: &F, path: &Path) -> Option<Entry> {
     let knows = |t0, t1| field.range(&path.hull(t0, t1)) != Interval::ALL;
     let found = if knows(path.start, 1.0) || knows(path.start, path.start) {
@@ -167,8 +173,8 @@ pub fn search_path<F: Walls + ?Sized>(field: &F, path: &Path) -> Option<Entry> {
     })
 }
 
-/// Halves the path, the earlier half first, until a range proves a part to be in the fluid or it is too short to be
-/// divided; parts that cannot be decided and follow one another are one.
+/// Halves the path, the earlier half first, until a range proves a part to be in the fluid or the part is too
+/// short to be divided. Undecided parts that follow one another are joined.
 fn by_ranges<F: Walls + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), bool)> {
     let mut stack = vec![(path.start, 1.0)];
     let mut left = MOST_RANGES;
@@ -202,7 +208,8 @@ fn by_ranges<F: Walls + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), b
     open.map(|stretch| (stretch, false))
 }
 
-/// The first sample that is not in the fluid, and the last place before it that is.
+/// The first sample that is not in the fluid, and the last place before it that is; `None` if all samples are
+/// in the fluid.
 fn by_samples<F: Walls + ?Sized>(field: &F, path: &Path) -> Option<((f64, f64), bool)> {
     let start = field.on_path(path, path.start);
     if start >= 0.0 || start.is_nan() {

@@ -1,9 +1,10 @@
-//! Ast → one graph with named roots, and scenes: names are looked up, functions unrolled, ranges checked.
+//! Lowering: the syntax tree becomes one graph with named roots, and scenes. Names are looked up, functions
+//! unrolled, ranges checked.
 //!
-//! Items are read in order; a name means what was defined above it. Errors are collected, and an item that failed
-//! stands for nothing further down, so that one mistake gives one message.
+//! Items are read in order, and a name means what was defined above it. Errors are collected. An item that
+//! failed counts as defined further down, so that one mistake gives one message.
 //!
-//! Invariant: what is written is what is built: no formula is rearranged here.
+//! Invariant: the graph is built as the text is written. No formula is rearranged here.
 
 mod arguments;
 mod builtins;
@@ -30,40 +31,53 @@ use lowering::Lowering;
 use names::{Kind, RESERVED};
 use value::Value;
 
-/// A file, lowered.
+/// What a file defines, after lowering.
 #[derive(Debug, Clone, Default)]
 pub struct Module {
+    /// The expressions of all items.
     pub graph: Graph,
+    /// The params, in the order of the file.
     pub params: Vec<ParamValue>,
+    /// The solids, in the order of the file.
     pub solids: Vec<NamedSolid>,
+    /// The scenes, in the order of the file.
     pub scenes: Vec<Scene>,
 }
 
-/// A `param` with the value that it had in this lowering.
+/// A `param` with the value that it has in this lowering.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParamValue {
+    /// Name of the param.
     pub name: String,
+    /// Value, from the file or from an override.
     pub value: f64,
+    /// Least and greatest value, if the file states them.
     pub range: Option<(f64, f64)>,
+    /// The text that the file has behind the param, if any.
     pub doc: Option<String>,
+    /// Place of the name in its definition.
     pub span: Span,
 }
 
+/// A `solid` of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedSolid {
+    /// Name of the solid.
     pub name: String,
+    /// Its ω in the graph of the [`Module`].
     pub node: Node,
-    /// The largest error of ω that its user accepts, as `@tolerance(…)` states it.
+    /// The largest error of ω that is accepted, as `@tolerance(…)` states it.
     pub tolerance: Option<Tolerance>,
-    /// Of the name in its definition.
+    /// Place of the name in its definition.
     pub span: Span,
 }
 
 /// The largest |computed ω − exact ω| that is accepted; positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
+    /// The largest error.
     pub value: f64,
-    /// Where it is stated.
+    /// Place where it is stated.
     pub span: Span,
 }
 
@@ -72,9 +86,10 @@ pub struct Tolerance {
 pub struct Options {
     /// Values for params, as `-D name=value` gives them.
     pub overrides: BTreeMap<String, f64>,
-    /// Operations that a file may unroll to.
+    /// Most operations to which a file may unroll.
     pub max_nodes: usize,
-    /// The method of every scene instead of the one that it states; defaults that depend on the method follow it.
+    /// The method of every scene, in place of the one that it states. Defaults that depend on the method
+    /// follow it.
     pub method: Option<Method>,
 }
 
@@ -102,10 +117,11 @@ fn prelude() -> &'static Ast {
     })
 }
 
-/// Stack of the lowering thread: enough for the deepest evaluation in debug builds, whatever the caller's stack is.
+/// Stack of the lowering thread, bytes. It is enough for the deepest evaluation in debug builds, whatever
+/// stack the caller has.
 const STACK_BYTES: usize = 64 << 20;
 
-/// Lowers a file. The messages tell which items failed; the module holds the others.
+/// Lowers a file. The messages say which items failed; the module holds the others.
 pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
     std::thread::scope(|scope| {
         let spawned = std::thread::Builder::new()
@@ -115,7 +131,7 @@ pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
         match spawned.map(std::thread::ScopedJoinHandle::join) {
             Ok(Ok(lowered)) => lowered,
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => lower_here(ast, options), // no thread to be had
+            Err(_) => lower_here(ast, options), // no thread could be started
         }
     })
 }
@@ -132,7 +148,7 @@ fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
         lowering.item(item, options);
     }
     if !lowering.diagnostics.iter().any(|d| d.severity == Severity::Error) {
-        lowering.unused(); // what failed may have been the use
+        lowering.unused(); // an item that failed may contain the use
     }
     lowering.unknown_overrides(ast, options);
     (lowering.module, lowering.diagnostics)
@@ -195,7 +211,7 @@ impl<'a> Lowering<'a> {
         });
     }
 
-    /// Whether a param's value is a finite number within its range; what is wrong is reported.
+    /// Whether a param's value is a finite number within its range. If not, this is reported.
     fn param_fits(&mut self, param: &Param, value: f64, range: Option<(f64, f64)>, overridden: bool) -> bool {
         if let Some((low, high)) = range
             && low > high
@@ -254,7 +270,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// The attributes of a solid; one so far.
+    /// Reads the attributes of a solid. `@tolerance` is the only one.
     fn attributes(&mut self, attributes: &'a [Attribute]) -> Option<Tolerance> {
         const KNOWN: [&str; 1] = ["tolerance"];
         let mut tolerance = None;
@@ -303,7 +319,7 @@ impl<'a> Lowering<'a> {
             }
         }
         if !fits {
-            // calls of it would only repeat the message
+            // a definition that failed, so that calls do not repeat the message
             self.names.define(self.scope.source, &function.name, Kind::Value(Value::Failed));
         }
         fits

@@ -1,4 +1,4 @@
-//! Probes of a scene: what is measured while it runs, and how often.
+//! The probes of a scene: what is measured while it runs, and how often.
 //!
 //! Invariant: every place lies in the scene's box, and every normal has length one.
 
@@ -14,26 +14,41 @@ use crate::syntax::ast::{Entry, Expr, ExprKind};
 /// A measurement that goes on while a scene runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
+    /// Name of the probe, and of its files.
     pub name: String,
+    /// Place of the name.
     pub span: Span,
+    /// What is measured.
     pub measured: Measured,
-    /// Simulated time between samples, s; that between frames if it is not given.
+    /// Simulated time between samples, s; `None`: that between frames.
     pub every: Option<f64>,
 }
 
+/// What a probe measures, with numbers in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Measured {
-    /// z of the fluid's surface above a place (x, y), m.
+    /// Height z of the fluid's surface above a place (x, y), m.
     Height([f64; 2]),
-    /// Pa
+    /// Pressure at a place, Pa.
     Pressure(DVec3),
-    /// m/s
+    /// Velocity at a place, m/s.
     Velocity(DVec3),
-    /// Force on a body, N, and its torque about a point, N·m. The container comes first, then the obstacles.
-    Force { body: usize, about: DVec3 },
-    /// Mass per second through a plane, along its normal of length one, kg/s.
-    Flux { point: DVec3, normal: DVec3 },
-    /// Kinetic, potential and elastic energy of the fluid, J.
+    /// Force on a body, N, and its torque about a point, N·m. Bodies are numbered: the container first, then
+    /// the obstacles.
+    Force {
+        /// Number of the body, from 0.
+        body: usize,
+        /// The point to which the torque refers, m.
+        about: DVec3,
+    },
+    /// Mass flow through a plane along its normal, kg/s.
+    Flux {
+        /// A point of the plane, m.
+        point: DVec3,
+        /// Unit normal of the plane.
+        normal: DVec3,
+    },
+    /// Kinetic, potential and elastic energy of the fluid and their sum, J.
     Energy,
 }
 
@@ -41,10 +56,10 @@ const MEASURED: [&str; 6] = ["height", "pressure", "velocity", "force", "flux", 
 const PROBE_KEYS: [&str; 8] = ["height", "pressure", "velocity", "force", "flux", "energy", "about", "every"];
 const FLUX_KEYS: [&str; 2] = ["point", "normal"];
 
-/// What a probe may name.
+/// What the probes of a scene may refer to.
 pub(super) struct Surroundings<'a> {
     pub domain: Aabb,
-    /// In the order of their numbers.
+    /// Names of the bodies, in the order of their numbers.
     pub bodies: Vec<&'a str>,
     pub fluid: &'a str,
 }
@@ -84,7 +99,7 @@ impl<'a> Lowering<'a> {
             block.entries.iter().map(Entry::key).filter(|key| MEASURED.contains(&key.text.as_str()));
         let Some(key) = stated.next() else {
             if block.entries.iter().any(|entry| !PROBE_KEYS.contains(&entry.key().text.as_str())) {
-                return None; // it may be the misspelt one, which was reported
+                return None; // the misspelt key, which was reported, may be the one that is missing
             }
             let message = format!("a probe needs one of {}", MEASURED.join(", "));
             self.report(
@@ -111,7 +126,7 @@ impl<'a> Lowering<'a> {
         if key.text == "flux" {
             return self.flux(block, domain);
         }
-        let (_, value) = block.setting(&key.text)?; // a block in its place was reported
+        let (_, value) = block.setting(&key.text)?; // a block in place of the value was reported
         match key.text.as_str() {
             "height" => self.place_on_ground(value, domain).map(Measured::Height),
             "pressure" => self.place(block, "pressure", domain).map(Measured::Pressure),
@@ -147,14 +162,14 @@ impl<'a> Lowering<'a> {
         Some(Measured::Flux { point: point?, normal: unit })
     }
 
-    /// A place in the box.
+    /// Reads a place, which must lie in the box.
     fn place(&mut self, block: &Block<'_>, key: &'static str, domain: &Aabb) -> Option<DVec3> {
         let at = self.vector_key(block, key, Dimension::LENGTH, DVec3::ZERO)?;
         let (_, value) = block.setting(key)?;
         self.within(domain.contains(at), value, format!("{at}"), domain).then_some(at)
     }
 
-    /// A place seen from above.
+    /// Reads a place `[x, y]`, seen from above, which must lie in the box.
     fn place_on_ground(&mut self, value: &Expr, domain: &Aabb) -> Option<[f64; 2]> {
         let ExprKind::Vector(parts) = &value.kind else {
             return self.no_pair(value);
@@ -185,7 +200,7 @@ impl<'a> Lowering<'a> {
         inside
     }
 
-    /// The number of a name among those that are known.
+    /// Reads a name, and returns its index among those that are known.
     fn one_of(&mut self, value: &Expr, key: &str, known: &[&str], what: &str) -> Option<usize> {
         let ExprKind::Name(name) = &value.kind else {
             let message = format!("`{key}` needs a name: that of the {what}");

@@ -1,12 +1,13 @@
-//! What a run needs to go on from an instant bit for bit, and its form in bytes.
+//! The state from which a run goes on bit for bit, and its form in bytes.
 //!
 //! ```text
 //! "rfm run\n" │ version u32 │ fingerprint [u8; 32] │ steps u64 │ time f64 │ particles u64, their ids u32 …
 //!             │ columns u32 │ name: length u32, UTF-8 │ length u64, f64 … │ … │ BLAKE3 of all that [u8; 32]
 //! ```
 //!
-//! All little-endian, numbers with all their digits, particles in the solver's order: the order of sums decides their
-//! last digit. Columns have names, so that each method keeps what it needs and no more, and a caller can keep its own.
+//! Numbers are little-endian and keep all their digits. Particles stand in the solver's order, because the
+//! order of sums decides their last digit. Columns have names, so that each method keeps what it needs and no
+//! more, and a caller can add its own.
 //!
 //! Invariant: bytes that were cut off or changed are never taken for a checkpoint.
 
@@ -20,10 +21,10 @@ use super::{
 
 const MAGIC: [u8; 8] = *b"rfm run\n";
 
-/// Of the layout above, and of what the columns mean.
+/// Version of the layout above and of the meaning of the columns.
 const VERSION: u32 = 1;
 
-/// Columns of vectors.
+/// Names of the columns that hold components of vectors.
 const VECTORS: [&str; 9] = [
     "position x",
     "position y",
@@ -36,29 +37,31 @@ const VECTORS: [&str; 9] = [
     "acceleration z",
 ];
 
-/// A state between two steps.
+/// The state of a simulation between two steps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Checkpoint {
-    /// Of whatever must not have changed when a run goes on; the caller's, who compares it.
+    /// Fingerprint of all that must not change when a run goes on. The caller sets and compares it.
     pub fingerprint: [u8; 32],
+    /// Number of steps taken.
     pub steps: u64,
-    /// s
+    /// Simulated time, s.
     pub time: f64,
     /// Numbers of the particles, in the solver's order.
     pub ids: Vec<u32>,
     columns: Vec<(String, Vec<f64>)>,
 }
 
-/// Bytes that are no checkpoint, or not one for this simulation.
+/// Why bytes are not a checkpoint, or not one for this simulation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CheckpointError {
-    /// It does not begin as one.
+    /// The bytes do not begin like a checkpoint.
     Foreign,
-    /// Of a program that writes another version.
+    /// A program with another version of the format wrote it.
     Version(u32),
-    /// It was cut off or changed: its checksum does not fit.
+    /// It was cut off or changed: the checksum does not fit.
     Damaged,
-    /// A column that the method needs is missing, or has not a number for each particle.
+    /// A column that the method needs, with this name, is missing or does not have a number for each
+    /// particle.
     Column(String),
 }
 
@@ -78,20 +81,22 @@ impl fmt::Display for CheckpointError {
 impl error::Error for CheckpointError {}
 
 impl Checkpoint {
-    /// Keeps numbers under a name, in place of those that had it before.
+    /// Stores numbers under a name. They replace those that had the name before.
     pub fn set(&mut self, name: &str, values: Vec<f64>) {
         self.columns.retain(|(other, _)| other != name);
         self.columns.push((name.to_string(), values));
     }
 
+    /// The numbers with a name.
+    ///
     /// # Errors
-    /// [`CheckpointError::Column`] if there is none of this name.
+    /// [`CheckpointError::Column`] if there are none with this name.
     pub fn get(&self, name: &str) -> Result<&[f64], CheckpointError> {
         let found = self.columns.iter().find(|(other, _)| other == name);
         found.map(|(_, values)| &values[..]).ok_or_else(|| CheckpointError::Column(name.to_string()))
     }
 
-    /// One number for each particle.
+    /// The numbers with a name, one for each particle.
     pub(super) fn of_particles(&self, name: &str) -> Result<Vec<f64>, CheckpointError> {
         let values = self.get(name)?;
         if values.len() == self.ids.len() {
@@ -101,7 +106,7 @@ impl Checkpoint {
         }
     }
 
-    /// All that belongs to every method.
+    /// The part of a checkpoint that all methods share.
     pub(super) fn of(core: &Core) -> Self {
         let Core { particles, acceleration, steps, time, .. } = core;
         let mut checkpoint =
@@ -118,7 +123,7 @@ impl Checkpoint {
         checkpoint
     }
 
-    /// The same, the other way; the core has as many particles.
+    /// Restores what [`Checkpoint::of`] stored. The core has the same number of particles.
     pub(super) fn restore(&self, core: &mut Core) -> Result<(), CheckpointError> {
         core.particles = self.particles()?;
         let components = core.acceleration.components_mut();
@@ -143,8 +148,10 @@ impl Checkpoint {
         Ok(particles)
     }
 
+    /// Writes the checkpoint in the format above.
+    ///
     /// # Errors
-    /// Those of the writer.
+    /// Errors of the writer.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let mut out = Hashed { out, hasher: blake3::Hasher::new() };
         out.write_all(&MAGIC)?;
@@ -165,11 +172,13 @@ impl Checkpoint {
         out.out.write_all(hash.as_bytes())
     }
 
+    /// Reads a checkpoint.
+    ///
     /// # Errors
-    /// [`CheckpointError`] says what the bytes are instead.
+    /// [`CheckpointError`] says why the bytes are not one.
     pub fn read(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let rest = bytes.strip_prefix(&MAGIC).ok_or(CheckpointError::Foreign)?;
-        // the version first: another one may have another checksum
+        // check the version first: another one may have another checksum
         let version = rest.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
         if let Some(version) = version.filter(|version| *version != VERSION) {
             return Err(CheckpointError::Version(version));
@@ -181,7 +190,7 @@ impl Checkpoint {
         Self::read_body(&mut Reader(&body[MAGIC.len() + 4..])).ok_or(CheckpointError::Damaged)
     }
 
-    /// What stands between version and checksum.
+    /// Reads what stands between version and checksum; `None` if it is not complete.
     fn read_body(from: &mut Reader<'_>) -> Option<Self> {
         let fingerprint = from.take()?;
         let (steps, time) = (u64::from_le_bytes(from.take()?), f64::from_le_bytes(from.take()?));
@@ -196,7 +205,7 @@ impl Checkpoint {
     }
 }
 
-/// A writer that hashes what passes.
+/// A writer that hashes all bytes that it passes on.
 struct Hashed<'a, W> {
     out: &'a mut W,
     hasher: blake3::Hasher,
@@ -208,7 +217,7 @@ impl<W: Write> Hashed<'_, W> {
         self.out.write_all(bytes)
     }
 
-    /// Many at a time, so that neither hash nor writer is asked for a few bytes.
+    /// Writes many numbers at a time, so that neither the hash nor the writer handles single ones.
     fn numbers<T: Copy, const N: usize>(&mut self, values: &[T], bytes: fn(T) -> [u8; N]) -> io::Result<()> {
         let mut buffer = Vec::with_capacity(N * 4096);
         for chunk in values.chunks(4096) {
@@ -220,7 +229,7 @@ impl<W: Write> Hashed<'_, W> {
     }
 }
 
-/// Bytes yet to be read; nothing is believed to be there before it was looked for.
+/// The bytes that remain to be read. All lengths are checked against them.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -236,7 +245,7 @@ impl<'a> Reader<'a> {
         Some(taken)
     }
 
-    /// A count and as many numbers.
+    /// Reads a count and that many numbers.
     fn numbers<T, const N: usize>(&mut self, number: fn([u8; N]) -> T) -> Option<Vec<T>> {
         let count = usize::try_from(u64::from_le_bytes(self.take()?)).ok()?;
         let bytes = self.split(count.checked_mul(N)?)?;

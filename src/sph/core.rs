@@ -1,5 +1,5 @@
-//! What all methods share: the particles, where they are, what bounds them, and the stages that do not depend on how
-//! pressure is found.
+//! What all methods share: the particles, their neighbours, the boundary, and those stages of a step that do
+//! not depend on how the pressure is found.
 
 use std::sync::Arc;
 
@@ -19,43 +19,44 @@ use super::{
     walls::{Boundary, Coverage, Friction, MARKED, UNKNOWN, Wall},
 };
 
-/// Particles that a loop over all of them leaves to one thread together.
+/// Number of particles that one task of a parallel loop handles.
 pub(super) const CHUNK: usize = 2048;
 
-/// A step shorter than this part of the longest so far leads nowhere: speeds have grown a million times, or forces a
-/// million million.
+/// A step shorter than this part of the longest so far leads nowhere: speeds have grown by a factor of 10⁶,
+/// or forces by 10¹².
 const SHORTEST: f64 = 1e-6;
 
+/// The state of a simulation and the stages that all methods share.
 pub(super) struct Core {
     pub parameters: Parameters,
-    /// Gravity besides that of the parameters, m/s².
+    /// Gravity that depends on the place, m/s², in addition to that of the parameters.
     pub gravity_field: Option<Arc<VectorField>>,
-    /// Gravity at a time, s, where that of the parameters turns.
+    /// Gravity as a function of time, if it replaces that of the parameters at each step.
     pub turning_gravity: Option<Arc<VectorOfTime>>,
     pub boundary: Boundary,
     pub particles: Particles,
-    /// m/s²
+    /// Accelerations of the particles, m/s².
     pub acceleration: Vectors,
     pub steps: u64,
-    /// s
+    /// Simulated time, s.
     pub time: f64,
     /// The greatest speed at the beginning of the present step, m/s.
     pub speed: f64,
-    /// Of obstacles, if somebody asks.
+    /// Impulses of particles on obstacles, if a probe asks for them.
     pub contacts: Option<Contacts>,
-    /// Of the steps that were allowed so far, s.
+    /// The longest step that was allowed so far, s.
     longest_dt: f64,
     level: Level,
     wall: Wall,
     columns: Columns,
-    /// What is near each particle, where a method has asked for it, see [`Core::find_near`].
+    /// Neighbours of each particle, if a method has asked for them, see [`Core::find_near`].
     near: Near,
     near_is_known: bool,
-    /// How far each particle is from all obstacles at least, m, see [`Boundary::collide`].
+    /// Least distance of each particle from all obstacles, m, see [`Boundary::collide`].
     clear: Vec<f64>,
-    /// Whether a wall may be near one of so many particles, see [`Boundary::mark`].
+    /// Whether a wall may be near one of [`MARKED`] particles, see [`Boundary::mark`].
     near_walls: Vec<bool>,
-    /// Working memory: where the particles go before they collide, or what a method needs a vector for.
+    /// Working memory: the targets of the particles before they collide, or a vector that a method needs.
     pub spare: Vectors,
     sorted_id: Vec<u32>,
 }
@@ -91,19 +92,19 @@ impl Core {
         }
     }
 
-    /// Sets the obstacles to the coming step.
+    /// Moves the obstacles to the coming step.
     pub fn move_obstacles(&mut self, dt: f64) {
         self.boundary.move_to(self.time, self.time + dt);
     }
 
-    /// Moves the particles by v·dt, and back out of whatever they met on their way. A second velocity, a field with its
-    /// factor, moves them too, but is none that they have.
+    /// Moves the particles by v·dt, and out of walls and obstacles that they hit on the way. `shift`, a field
+    /// and its factor, moves them too, but does not belong to their velocity.
     pub fn drift(&mut self, dt: f64, shift: Option<(&Vectors, f64)>) -> Result<(), StepError> {
         set_sum(&mut self.spare, &self.particles.position, &self.particles.velocity, dt);
         if let Some((shift, factor)) = shift {
             add_scaled(&mut self.spare, shift, factor * dt);
         }
-        // infinite positions would be clamped to the box and never seen
+        // check now: infinite positions would be clamped to the box and never noticed
         if let Some(i) = first_non_finite(&self.spare) {
             return Err(self.non_finite(i, Quantity::Position, dt));
         }
@@ -129,8 +130,8 @@ impl Core {
         Ok(())
     }
 
-    /// Brings all that belongs to a particle into the order of the columns: position, velocity, acceleration, number,
-    /// and what a method keeps besides.
+    /// Sorts all that belongs to particles into the order of the columns: position, velocity, acceleration,
+    /// number, and the columns `kept` of the method.
     pub fn sort(&mut self, kept: &mut [&mut Vec<f64>]) {
         self.near_is_known = false;
         self.columns.sort(&self.particles.position, self.parameters.support_radius);
@@ -151,18 +152,18 @@ impl Core {
         }
     }
 
-    /// What walls take of the kernel of a particle; nothing if they are farther away than the support radius.
+    /// What walls take of the kernel of a particle; `None` if they are farther away than the support radius.
     pub fn coverage<F: Friction>(&self, i: usize) -> Option<Coverage<F>> {
         let near = self.near_walls[i / MARKED];
         near.then(|| self.boundary.coverage(&self.wall, self.particles.position.get(i)))?
     }
 
-    /// What walls are to the method's sums.
+    /// How walls enter the sums of the method.
     pub fn wall(&self) -> &Wall {
         &self.wall
     }
 
-    /// What acts on a particle from afar, m/s², at the end of the present step.
+    /// Gravity at a particle, m/s², at the end of the present step.
     pub fn gravity(&self, i: usize) -> DVec3 {
         let field = self
             .gravity_field
@@ -171,7 +172,7 @@ impl Core {
         self.parameters.gravity + field.unwrap_or(DVec3::ZERO)
     }
 
-    /// Adds to the accelerations what of gravity depends on the place, if any does.
+    /// Adds to the accelerations the gravity that depends on the place, if there is any.
     pub fn pull(&mut self) {
         let Some(field) = &self.gravity_field else { return };
         let (position, time) = (&self.particles.position, self.boundary.time);
@@ -200,7 +201,7 @@ impl Core {
         }
     }
 
-    /// Finds what is near each particle, once for all sums until particles move.
+    /// Finds the neighbours of each particle. All sums use them until particles move.
     pub fn find_near(&mut self) {
         let mut near = std::mem::take(&mut self.near);
         match self.parameters.precision {
@@ -221,7 +222,7 @@ impl Core {
         }
     }
 
-    /// Ordered pairs of particles within the support radius, counted now.
+    /// Number of ordered pairs of particles within the support radius, counted by this call.
     pub fn pairs(&self) -> usize {
         let mut counts = vec![0.0; self.particles.len()];
         let count = Count { radius: self.parameters.support_radius };
@@ -229,8 +230,10 @@ impl Core {
         counts.iter().map(|&count| count as usize).sum()
     }
 
+    /// Checks that densities and accelerations are finite.
+    ///
     /// # Errors
-    /// The first particle whose density or acceleration is no number.
+    /// The first particle whose density or acceleration is not.
     pub fn check_finite(&self, dt: f64) -> Result<(), StepError> {
         if !all_finite(&self.particles.density)
             && let Some(i) = self.particles.density.iter().position(|rho| !rho.is_finite())
@@ -243,13 +246,13 @@ impl Core {
         }
     }
 
-    /// The longest step that this state allows, s: the parameters' limits for the present greatest speed, and the force
-    /// limit for the present greatest acceleration.
+    /// The longest step that this state allows, s: the least of the parameters' limits at the present
+    /// greatest speed and the force limit at the present greatest acceleration.
     pub fn stable_dt(&self) -> f64 {
         self.stable_dt_at(longest(&self.particles.velocity))
     }
 
-    /// The same, for particles of which the fastest is known.
+    /// The longest step that this state allows, s, for a greatest speed that is known, m/s.
     fn stable_dt_at(&self, speed: f64) -> f64 {
         let limit = self.parameters.stable_dt(speed);
         limit.min(self.parameters.present_force_dt(longest(&self.acceleration)))
@@ -258,7 +261,7 @@ impl Core {
     /// The step to take now, s, at most `most`.
     ///
     /// # Errors
-    /// If it would be shorter than any that leads somewhere.
+    /// [`StepError::Stalled`] if the step would be so short that it leads nowhere.
     pub fn next_dt(&mut self, most: f64) -> Result<f64, StepError> {
         self.speed = longest(&self.particles.velocity);
         let stated = self.parameters.time_step;
@@ -270,11 +273,11 @@ impl Core {
         if dt < SHORTEST * self.longest_dt {
             return Err(self.stalled(dt));
         }
-        // equal steps to the instant that is to be met, rather than full ones and a small rest
+        // take equal steps to the instant, rather than full ones and a small rest
         Ok(if most.is_finite() { most / (most / dt - 1e-9).ceil().max(1.0) } else { dt })
     }
 
-    /// Memory of the state and of what belongs to all methods.
+    /// Memory of the state and of the parts that all methods share, bytes.
     pub fn bytes(&self) -> usize {
         let Particles { position, velocity, density, pressure, id } = &self.particles;
         let vectors = [position, velocity, &self.acceleration, &self.spare].map(Vectors::bytes);
@@ -301,7 +304,7 @@ impl Core {
     }
 }
 
-/// How many others are within the radius.
+/// Counts the neighbours within the radius.
 #[derive(Clone, Copy)]
 struct Count {
     radius: f64,
@@ -324,7 +327,7 @@ impl PairPass<0, 1, 1> for Count {
     }
 
     fn finish(&self, _: usize, [count]: [f64; 1]) -> [f64; 1] {
-        [count - 1.0] // itself
+        [count - 1.0] // without the particle itself
     }
 }
 
@@ -338,14 +341,14 @@ fn permute<T: Copy + Default + Send + Sync>(order: &[u32], values: &mut Vec<T>, 
     std::mem::swap(values, buffer);
 }
 
-/// to = a + b·t
+/// Sets `to` = a + b·t.
 pub(super) fn set_sum(to: &mut Vectors, a: &Vectors, b: &Vectors, t: f64) {
     for (to, a, b) in [(&mut to.x, &a.x, &b.x), (&mut to.y, &a.y, &b.y), (&mut to.z, &a.z, &b.z)] {
         set_sum_column(to, a, b, t);
     }
 }
 
-/// to = a + b·t
+/// Sets `to` = a + b·t.
 pub(super) fn set_sum_column(to: &mut Vec<f64>, a: &[f64], b: &[f64], t: f64) {
     to.resize(a.len(), 0.0);
     to.par_chunks_mut(CHUNK).zip(a.par_chunks(CHUNK)).zip(b.par_chunks(CHUNK)).for_each(|((to, a), b)| {
@@ -355,14 +358,14 @@ pub(super) fn set_sum_column(to: &mut Vec<f64>, a: &[f64], b: &[f64], t: f64) {
     });
 }
 
-/// to += from·t
+/// Adds from·t to `to`.
 pub(super) fn add_scaled(to: &mut Vectors, from: &Vectors, t: f64) {
     for (to, from) in [(&mut to.x, &from.x), (&mut to.y, &from.y), (&mut to.z, &from.z)] {
         add_scaled_column(to, from, t);
     }
 }
 
-/// to += from·t
+/// Adds from·t to `to`.
 pub(super) fn add_scaled_column(to: &mut [f64], from: &[f64], t: f64) {
     to.par_chunks_mut(CHUNK).zip(from.par_chunks(CHUNK)).for_each(|(to, from)| {
         for (to, from) in to.iter_mut().zip(from) {
@@ -371,16 +374,17 @@ pub(super) fn add_scaled_column(to: &mut [f64], from: &[f64], t: f64) {
     });
 }
 
-/// Of the longest vector.
+/// Length of the longest vector.
 fn longest(vectors: &Vectors) -> f64 {
     let longest =
         |range: std::ops::Range<usize>| range.map(|i| vectors.get(i).length_squared()).fold(0.0, f64::max);
     let n = vectors.len();
     let chunks = (0..n.div_ceil(CHUNK)).into_par_iter();
-    // the greatest is the same in whatever order it is looked for
+    // the maximum does not depend on the order
     chunks.map(|c| longest(c * CHUNK..((c + 1) * CHUNK).min(n))).reduce(|| 0.0, f64::max).sqrt()
 }
 
+/// Index of the first vector that is not finite, if there is one.
 pub(super) fn first_non_finite(vectors: &Vectors) -> Option<usize> {
     if vectors.components().into_iter().all(|column| all_finite(column)) {
         return None;
@@ -388,11 +392,12 @@ pub(super) fn first_non_finite(vectors: &Vectors) -> Option<usize> {
     (0..vectors.len()).find(|&i| !vectors.get(i).is_finite())
 }
 
-/// Asked of every particle in every step; which one it is not is looked for only when one is not.
+/// Whether all values are finite. Every step checks every particle, so this is fast and does not say which
+/// value is not finite.
 fn all_finite(values: &[f64]) -> bool {
     const LANES: usize = 8;
     let is_finite = |chunk: &[f64]| {
-        // x·0 is zero, or NaN, which stays
+        // x·0 is zero for a finite x and NaN otherwise; NaN stays in the sum
         let mut zeros = [0.0; LANES];
         let (whole, rest) = chunk.as_chunks::<LANES>();
         for values in whole {

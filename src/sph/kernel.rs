@@ -1,10 +1,11 @@
-//! Smoothing kernels, all with support radius h. Those of the paper:
+//! Smoothing kernels, all with the support radius h. The paper has three:
 //!
 //! - poly6, for density and the colour field (equations 8, 13, 14);
 //! - spiky, for pressure (equation 10): its gradient does not vanish where particles meet;
 //! - viscosity (equation 11): its Laplacian is positive everywhere.
 //!
-//! And Wendland's C2 (1995), whose Fourier transform is positive: particles under it do not pair.
+//! The other methods use Wendland's C2 (1995). Its Fourier transform is positive, so that particles do not
+//! pair.
 //!
 //! Invariant: each kernel integrates to one over the ball of radius h and is exactly zero beyond it.
 
@@ -14,15 +15,15 @@ use fearless_simd::{Simd, SimdFloat};
 
 use super::pairs::Real;
 
-/// Kernels of one support radius with their constants.
+/// The three kernels of the paper for one support radius, with their constants.
 ///
-/// Functions of r² are called so because they need no root. A gradient is returned as the factor g in
-/// ∇W = g·**r**, with **r** from the neighbour to the particle.
+/// Arguments named `r2` are squares of distances, m²: those functions need no root. A gradient is returned as
+/// the factor g in ∇W = g·**r**, with **r** from the neighbour to the particle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kernels {
     /// Support radius h, m.
     pub h: f64,
-    /// h²
+    /// h², m².
     pub h2: f64,
     poly6: f64,
     poly6_gradient: f64,
@@ -32,6 +33,7 @@ pub struct Kernels {
 }
 
 impl Kernels {
+    /// Kernels of this support radius, m.
     pub fn new(support_radius: f64) -> Self {
         let h = support_radius;
         Self {
@@ -45,33 +47,33 @@ impl Kernels {
         }
     }
 
-    /// W_poly6 = 315/(64πh⁹)·(h² − r²)³, 1/m³.
+    /// The kernel W_poly6 = 315/(64πh⁹)·(h² − r²)³, 1/m³.
     #[inline(always)]
     pub fn poly6(&self, r2: f64) -> f64 {
         let q = positive(self.h2 - r2);
         self.poly6 * q * q * q
     }
 
-    /// ∇W_poly6 = −945/(32πh⁹)·(h² − r²)²·**r**.
+    /// The factor of ∇W_poly6 = −945/(32πh⁹)·(h² − r²)²·**r**, 1/m⁵.
     #[inline(always)]
     pub fn poly6_gradient(&self, r2: f64) -> f64 {
         let q = positive(self.h2 - r2);
         self.poly6_gradient * q * q
     }
 
-    /// ∇²W_poly6 = −945/(32πh⁹)·(h² − r²)(3h² − 7r²), 1/m⁵.
+    /// The Laplacian ∇²W_poly6 = −945/(32πh⁹)·(h² − r²)(3h² − 7r²), 1/m⁵.
     #[inline(always)]
     pub fn poly6_laplacian(&self, r2: f64) -> f64 {
         self.poly6_gradient * positive(self.h2 - r2) * (3.0 * self.h2 - 7.0 * r2)
     }
 
-    /// W_spiky = 15/(πh⁶)·(h − r)³, 1/m³.
+    /// The kernel W_spiky = 15/(πh⁶)·(h − r)³, 1/m³.
     pub fn spiky(&self, r: f64) -> f64 {
         self.spiky * positive(self.h - r).powi(3)
     }
 
-    /// ∇W_spiky = −45/(πh⁶)·(h − r)²·**r**/r. Coinciding particles have no direction: the factor stays
-    /// finite there, so that its product with **r** = 0 is zero.
+    /// The factor of ∇W_spiky = −45/(πh⁶)·(h − r)²·**r**/r, 1/m⁵. Coinciding particles have no direction: the
+    /// factor stays finite there, so that its product with **r** = 0 is zero.
     #[inline(always)]
     pub fn spiky_gradient(&self, r: f64) -> f64 {
         let q = positive(self.h - r);
@@ -79,12 +81,12 @@ impl Kernels {
         self.spiky_gradient * q * q / if r > least { r } else { least }
     }
 
-    /// The constant of ∇W_spiky with h² taken out: ∇W = this·(1 − r/h)²·**r**/r.
+    /// The constant of ∇W_spiky with h² taken out, 1/m⁴: ∇W = this·(1 − r/h)²·**r**/r.
     pub fn spiky_steepness(&self) -> f64 {
         self.spiky_gradient * self.h2
     }
 
-    /// W_viscosity = 15/(2πh³)·(−r³/2h³ + r²/h² + h/2r − 1), 1/m³; infinite at r = 0.
+    /// The kernel W_viscosity = 15/(2πh³)·(−r³/2h³ + r²/h² + h/2r − 1), 1/m³; infinite at r = 0.
     pub fn viscosity(&self, r: f64) -> f64 {
         if r > self.h {
             return 0.0;
@@ -93,37 +95,39 @@ impl Kernels {
         self.viscosity * (-0.5 * q * q * q + q * q + 0.5 / q - 1.0)
     }
 
-    /// ∇²W_viscosity = 45/(πh⁶)·(h − r), 1/m⁵.
+    /// The Laplacian ∇²W_viscosity = 45/(πh⁶)·(h − r), 1/m⁵.
     #[inline(always)]
     pub fn viscosity_laplacian(&self, r: f64) -> f64 {
         -self.spiky_gradient * positive(self.h - r)
     }
 }
 
-/// Wendland C2: W = w·(1 − q)⁴(1 + 4q), ∇W = −c·(1 − q)³·**r**, with q = r/h.
+/// The kernel Wendland C2: W = w·(1 − q)⁴(1 + 4q), ∇W = −c·(1 − q)³·**r**, with q = r/h.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wendland {
     /// Support radius h, m.
     pub h: f64,
-    /// w = 21/(2πh³), 1/m³
+    /// The factor w = 21/(2πh³), 1/m³.
     pub weight: f64,
-    /// c = 210/(πh⁵), 1/m⁵
+    /// The factor c = 210/(πh⁵), 1/m⁵.
     pub steepness: f64,
 }
 
 impl Wendland {
+    /// The kernel of this support radius, m.
     pub fn new(h: f64) -> Self {
         Self { h, weight: 21.0 / (2.0 * PI * h.powi(3)), steepness: 210.0 / (PI * h.powi(5)) }
     }
 
-    /// W, 1/m³.
+    /// W at the square of a distance, 1/m³.
     pub fn at(&self, r2: f64) -> f64 {
         let s = positive(1.0 - r2.sqrt() / self.h);
         self.weight * s.powi(4) * (5.0 - 4.0 * s)
     }
 
-    /// Σ W·V over a cubic lattice with so many spacings per support radius: a little more than ∫ W = 1, because a particle
-    /// is always its own neighbour; body- and face-centred lattices have the same to 2e-3.
+    /// Σ W·V over a cubic lattice with `ratio` spacings per support radius. It is a little more than ∫ W = 1,
+    /// because a particle is always its own neighbour. Body- and face-centred lattices have the same sum to
+    /// 2e-3.
     pub fn lattice_sum(ratio: f64) -> f64 {
         let reach = ratio.ceil() as i32;
         let weight = |x: i32, y: i32, z: i32| {
@@ -136,7 +140,7 @@ impl Wendland {
         sum * Self::new(ratio).weight
     }
 
-    /// 1 − q of many at once, zero beyond the support.
+    /// 1 − q for the squares of many distances, zero beyond the support.
     #[inline(always)]
     pub fn nearness<S: Simd, V: SimdFloat<S, Element: Real>>(&self, r2: V) -> V {
         let of = V::Element::of;
@@ -144,7 +148,8 @@ impl Wendland {
     }
 }
 
-/// max(x, 0) in one instruction; `f64::max` takes three to return the number when the other is NaN.
+/// max(x, 0) in one instruction. `f64::max` takes three, because it returns the number if the other argument
+/// is NaN.
 #[inline(always)]
 fn positive(x: f64) -> f64 {
     if x > 0.0 { x } else { 0.0 }

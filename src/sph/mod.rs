@@ -1,8 +1,8 @@
 //! Smoothed particle hydrodynamics around obstacles given as fields.
 //!
-//! The method of the paper (equations 7–14, table 1): density and pressure from neighbours within the
-//! support radius, pressure, viscosity and surface-tension forces, velocity Verlet, and contact with
-//! obstacles through ω and ∇ω alone — no boundary particles, no mesh.
+//! A fluid is a set of particles. [`Method`] has three ways to find its pressure: that of the paper
+//! (equations 7–14, table 1), a weakly compressible and a divergence-free one. Walls are fields: there are no
+//! boundary particles and there is no mesh.
 //!
 //! ```text
 //! Parameters ─┐
@@ -32,16 +32,17 @@
 //! ```
 //!
 //! Invariants:
-//! - An obstacle is a [`Field`](crate::field::Field) and nothing else; this module knows no compiler,
-//!   no file, no clock and no terminal.
+//! - An obstacle is known by [`Field`](crate::field::Field) and [`Walls`](crate::field::Walls) alone; this
+//!   module knows no compiler, no file, no clock and no terminal.
 //! - The same input gives the same bits for any number of threads: every sum is a gather in a fixed order.
 //! - After a step every particle is finite, in the box, and in the fluid (ω < 0), or the step was an error.
-//! - A step allocates nothing once the buffers have grown to the flow's size.
+//! - A step allocates nothing once the buffers have grown to the size of the flow.
 
 mod checkpoint;
 mod core;
 mod kernel;
-// loops over the few components of registers are counted: what an iterator's closure holds is not compiled for wide ones
+// loops over the few components of a register use an index: a closure of an iterator over them is not
+// compiled for wide registers
 #[allow(clippy::needless_range_loop)]
 mod methods;
 #[allow(clippy::needless_range_loop)]
@@ -61,11 +62,11 @@ mod scenes;
 #[cfg(test)]
 mod tests;
 
-/// A vector at a place and a time, s.
+/// A vector as a function of a place, m, and a time, s.
 pub type VectorField = dyn Fn(glam::DVec3, f64) -> glam::DVec3 + Send + Sync;
 
 pub use crate::precision::Precision;
-/// A vector at a time, s.
+/// A vector as a function of a time, s.
 pub type VectorOfTime = dyn Fn(f64) -> glam::DVec3 + Send + Sync;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
@@ -82,5 +83,6 @@ pub use probes::{Gauge, Probe};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};
 pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
 pub use stats::Stats;
-pub use vtp::{short_time, write_pvd, write_vtp};
+pub(crate) use vtp::short_time;
+pub use vtp::{write_pvd, write_vtp};
 pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};

@@ -1,5 +1,5 @@
-//! The numbers of a fluid, each with its unit, checked once before a run. Those of the method are declared with it, see
-//! [`Method`].
+//! The parameters of a fluid, each with its unit, checked once before a run. The numbers of a method are
+//! declared with the method, see [`Method`].
 
 use std::{error, fmt};
 
@@ -10,17 +10,17 @@ use super::methods::Method;
 use crate::precision::Precision;
 use crate::quantity::Bound;
 
-/// What a wall does to a fluid that moves along it.
+/// How a wall acts on a fluid that moves along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Slip {
-    /// Nothing.
+    /// The fluid slips along the wall without friction.
     #[default]
     Free,
     /// The fluid at the wall has the wall's velocity: viscosity acts between the two.
     No,
 }
 
-/// Everything a step needs to know of the fluid. Defaults are table 1 of the paper where it has a row.
+/// The parameters of a fluid. Defaults are table 1 of the paper where it has a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     /// Rest density ρ₀, kg/m³. 998.29: water at 20 °C (table 1).
@@ -30,34 +30,36 @@ pub struct Parameters {
     /// Support radius h, m: every kernel is zero beyond it. 0.1 (table 1), that is 3.7 spacings and some
     /// 200 neighbours; 0.055 would give 30.
     pub support_radius: f64,
-    /// Dynamic viscosity, Pa·s (the paper's ν). 3.5 (table 1), 3500 times that of water. Zero: the pass does not run.
+    /// Dynamic viscosity, Pa·s (the paper's ν). 3.5 (table 1), 3500 times that of water. Zero: the pass does
+    /// not run.
     pub viscosity: f64,
     /// Surface tension σ, N/m. 0.0728 (table 1): water against air. Zero: the pass does not run.
     pub surface_tension: f64,
     /// Gravity, m/s². (0, 0, −9.81). Zero: the pass does not run.
     pub gravity: DVec3,
-    /// Restitution c_R of the container's walls, 0 (stick) to 1 (mirror). 0.5: half of the normal speed returns.
+    /// Restitution c_R of the container's walls, 0 (stick) to 1 (mirror). 0.5: half of the normal speed
+    /// returns.
     pub wall_restitution: f64,
-    /// Time step dt, s. 0.002: below [`Parameters::stable_dt`] of the paper's scene (2.7 ms after a fall of
-    /// 3 m), so that no particle crosses more than a sixth of its support in one step. The paper's own 0.01
-    /// is three times the bound; in that scene, soft and viscous as it is, it still does not diverge, but loses
+    /// Time step dt, s. 0.002: below [`Parameters::stable_dt`] of the paper's scene (2.7 ms after a fall of 3
+    /// m), so that no particle crosses more than a sixth of its support in one step. The paper's own 0.01 is
+    /// three times the bound; in that scene, soft and viscous as it is, it still does not diverge, but loses
     /// 3 % more energy in the first second.
     pub time_step: f64,
-    /// Whether a step may be shorter than that where the state demands it (see
-    /// [`Simulation::stable_dt`](super::Simulation::stable_dt)).
+    /// Whether a step may be shorter than `time_step` where the state demands it, see
+    /// [`Simulation::stable_dt`](super::Simulation::stable_dt).
     pub adaptive: bool,
-    /// The greatest speed that is expected, m/s: a compressible method takes its speed of sound from it unless that is
-    /// stated. 7.7: a fall through the paper's box, 3 m.
+    /// The greatest speed that is expected, m/s. A compressible method derives its speed of sound from it,
+    /// unless that is stated. 7.7: a fall through the paper's box, 3 m.
     pub expected_speed: f64,
-    /// How pressure is found, with the numbers of the method.
+    /// The method that finds the pressure, with its numbers.
     pub method: Method,
-    /// At the walls of the box; obstacles have their own.
+    /// How the walls of the box act on a fluid that moves along them. Obstacles have their own.
     pub slip: Slip,
-    /// Coefficient of friction μ of the container's walls: of the speed along the wall, μ times what the wall takes of
-    /// the speed into it is lost. Zero: none.
+    /// Coefficient of friction μ of the container's walls: when a particle hits a wall, its speed along the
+    /// wall falls by μ times the change of its velocity normal to the wall. Zero: no friction.
     pub wall_friction: f64,
-    /// Of the sums over neighbours; state and motion are always in `f64`. `f32` has seven digits relative to a few support
-    /// radii.
+    /// Precision of the sums over neighbours. State and motion are always in `f64`. `f32` has seven digits,
+    /// relative to a few support radii.
     pub precision: Precision,
 }
 
@@ -85,11 +87,11 @@ impl Default for Parameters {
 /// A parameter outside the values for which the method has a meaning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterError {
-    /// Its name: a field of [`Parameters`], or a key of the method.
+    /// Name of the parameter: a field of [`Parameters`], or a key of the method.
     pub name: &'static str,
-    /// Its value.
+    /// The value that was found.
     pub found: f64,
-    /// What would be accepted.
+    /// What would be accepted, in words.
     pub expected: String,
 }
 
@@ -102,8 +104,10 @@ impl fmt::Display for ParameterError {
 impl error::Error for ParameterError {}
 
 impl Parameters {
+    /// Checks all parameters and the numbers of the method.
+    ///
     /// # Errors
-    /// The first parameter that is not finite, or lies outside the values the method is defined for.
+    /// The first parameter that is not finite, or lies outside the values for which the method has a meaning.
     pub fn validate(&self) -> Result<(), ParameterError> {
         let check = |name, found: f64, holds: bool, expected: &str| {
             if holds { Ok(()) } else { Err(ParameterError { name, found, expected: expected.into() }) }
@@ -142,30 +146,34 @@ impl Parameters {
         (self.particle_mass / self.rest_density).cbrt()
     }
 
-    /// Whether walls and obstacles add to the density, or act on positions and velocities only.
+    /// Whether walls and obstacles add to the density of particles. If not, they act on positions and
+    /// velocities only.
     pub fn walls_have_density(&self) -> bool {
         self.method.numerics().walls_have_density()
     }
 
-    /// The density, kg/m³, of a particle that starts under this pressure, Pa; `None` if all start at rest density.
+    /// The density, kg/m³, of a particle that starts under a pressure, Pa; `None` if the method starts all
+    /// particles at the rest density.
     pub fn density_at_start(&self, pressure: f64) -> Option<f64> {
         self.method.numerics().density_at_start(self, pressure)
     }
 
-    /// Whether particles that start too near to an obstacle may be moved away from it, instead of being dropped.
+    /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.
     pub fn makes_room_at_start(&self) -> bool {
         self.method.numerics().makes_room_at_start()
     }
 
-    /// Speed of sound, m/s; 0 if the method knows no compression.
+    /// Speed of sound, m/s; 0 if the method has no compression.
     pub fn sound_speed(&self) -> f64 {
         self.method.numerics().sound_speed(self)
     }
 
-    /// The longest step, s, that is stable while no particle is faster than `max_speed` (m/s): the least of four limits,
-    /// those of sound and motion, viscosity, ripples under surface tension, and gravity. The method has their formulas.
+    /// The longest step, s, that is stable while no particle is faster than `max_speed`, m/s: the least of
+    /// the limits of sound and motion, of viscosity, of ripples under surface tension, and of gravity. The
+    /// method has their formulas.
     ///
-    /// Pressure forces have no bound before the run; see [`Simulation::stable_dt`](super::Simulation::stable_dt).
+    /// Pressure forces have no bound before a run, see
+    /// [`Simulation::stable_dt`](super::Simulation::stable_dt).
     pub fn stable_dt(&self, max_speed: f64) -> f64 {
         let numerics = self.method.numerics();
         numerics
@@ -175,12 +183,12 @@ impl Parameters {
             .min(self.force_dt(self.gravity.length()))
     }
 
-    /// The longest step for an acceleration (m/s²), a multiple of √(h/a), s.
+    /// The longest step, s, for an acceleration a, m/s²: a multiple of √(h/a), with the support radius h.
     pub fn force_dt(&self, acceleration: f64) -> f64 {
         self.method.numerics().force_factor() * (self.support_radius / acceleration).sqrt()
     }
 
-    /// The longest step for the acceleration that particles have now, pressure included, s.
+    /// The longest step, s, for the present acceleration of the particles, pressure included, m/s².
     pub(super) fn present_force_dt(&self, acceleration: f64) -> f64 {
         self.method.numerics().present_force_gain() * self.force_dt(acceleration)
     }

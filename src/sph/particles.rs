@@ -1,55 +1,72 @@
 //! The fluid's particles as a structure of arrays.
 //!
-//! Invariant: all arrays have one length; the solver reorders particles as they move, `id` says which is which.
+//! Invariant: all arrays have one length. The solver reorders particles as they move; `id` identifies them.
 
 use glam::DVec3;
 
 use crate::field::Points;
 
-/// Many vectors, component by component.
+/// Many vectors as three columns of one length.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Vectors {
+    /// x components.
     pub x: Vec<f64>,
+    /// y components.
     pub y: Vec<f64>,
+    /// z components.
     pub z: Vec<f64>,
 }
 
 impl Vectors {
+    /// Number of vectors.
     pub fn len(&self) -> usize {
         self.x.len()
     }
 
+    /// Whether there is no vector.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }
 
+    /// Vector `i`.
+    ///
+    /// # Panics
+    /// If there are not more than `i` vectors.
     pub fn get(&self, i: usize) -> DVec3 {
         DVec3::new(self.x[i], self.y[i], self.z[i])
     }
 
+    /// Replaces vector `i`.
+    ///
+    /// # Panics
+    /// If there are not more than `i` vectors.
     pub fn set(&mut self, i: usize, v: DVec3) {
         (self.x[i], self.y[i], self.z[i]) = (v.x, v.y, v.z);
     }
 
+    /// Adds a vector at the end.
     pub fn push(&mut self, v: DVec3) {
         self.x.push(v.x);
         self.y.push(v.y);
         self.z.push(v.z);
     }
 
+    /// Cuts off vectors, or adds zero vectors, until there are `len`.
     pub fn resize(&mut self, len: usize) {
         self.components_mut().into_iter().for_each(|component| component.resize(len, 0.0));
     }
 
+    /// Removes all vectors.
     pub fn clear(&mut self) {
         self.components_mut().into_iter().for_each(Vec::clear);
     }
 
+    /// The vectors in their order.
     pub fn iter(&self) -> impl Iterator<Item = DVec3> + '_ {
         (0..self.len()).map(|i| self.get(i))
     }
 
-    /// The same numbers as points of a field.
+    /// The vectors as points at which a field can be evaluated.
     pub fn points(&self) -> Points<'_> {
         Points::new(&self.x, &self.y, &self.z)
     }
@@ -67,31 +84,33 @@ impl Vectors {
     }
 }
 
-/// State of the fluid. All particles have the mass of the parameters.
+/// The state of a fluid. All particles have the mass that the parameters state.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Particles {
-    /// m
+    /// Positions, m.
     pub position: Vectors,
-    /// m/s, at the same instant as the positions
+    /// Velocities at the same instant as the positions, m/s.
     pub velocity: Vectors,
-    /// kg/m³, from equation (8)
+    /// Densities, kg/m³. Equation (8) of the paper gives them in its method.
     pub density: Vec<f64>,
-    /// Pa, from equation (9)
+    /// Pressures, Pa. Equation (9) of the paper gives them in its method.
     pub pressure: Vec<f64>,
-    /// The particle's number at seeding.
+    /// Numbers of the particles at seeding.
     pub id: Vec<u32>,
 }
 
 impl Particles {
+    /// Number of particles.
     pub fn len(&self) -> usize {
         self.id.len()
     }
 
+    /// Whether there is no particle.
     pub fn is_empty(&self) -> bool {
         self.id.is_empty()
     }
 
-    /// Adds a particle with the next free id; density and pressure are found by the first step.
+    /// Adds a particle with the next free id. The first step finds its density and pressure.
     pub fn push(&mut self, position: DVec3, velocity: DVec3) {
         self.id.push(self.len() as u32);
         self.position.push(position);
@@ -100,7 +119,7 @@ impl Particles {
         self.pressure.push(0.0);
     }
 
-    /// Adds all particles of another fluid after these; ids go on counting.
+    /// Adds all particles of another fluid after these. Their ids continue those of this fluid.
     pub fn append(&mut self, other: &Self) {
         for i in 0..other.len() {
             self.push(other.position.get(i), other.velocity.get(i));

@@ -1,4 +1,4 @@
-//! The passes of a step: which of them a simulation runs, and why it leaves out the others.
+//! The passes of a step: which ones a simulation runs, and why it leaves out the others.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -8,10 +8,11 @@ use glam::DVec3;
 use super::methods::Method;
 use super::params::{Parameters, Slip};
 
-/// A stage of a step, in the order in which a step runs them. Those that a scene does not need do not run.
+/// A stage of a step. The variants stand in the order in which a step runs them. Passes that a scene does not
+/// need do not run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Pass {
-    /// Velocities and places.
+    /// Velocities and positions advance in time.
     Integrate,
     /// Particles stay in the box.
     Walls,
@@ -19,7 +20,7 @@ pub enum Pass {
     Obstacles,
     /// Particles are sorted into columns.
     Neighbours,
-    /// What walls take of the kernel.
+    /// What walls take of the kernel of each particle.
     Coverage,
     /// The density of each particle.
     Density,
@@ -29,9 +30,9 @@ pub enum Pass {
     Pressure,
     /// Pressure by iteration.
     PressureSolver,
-    /// The fluid's own viscosity.
+    /// The physical viscosity of the fluid.
     Viscosity,
-    /// The viscosity that damps noise.
+    /// Artificial viscosity, which damps noise.
     ArtificialViscosity,
     /// Particles drift to where there are fewer of them.
     Shifting,
@@ -39,12 +40,12 @@ pub enum Pass {
     NoSlip,
     /// Tension of the free surface.
     SurfaceTension,
-    /// Acceleration of all of the fluid.
+    /// Gravity accelerates the fluid.
     Gravity,
 }
 
 impl Pass {
-    /// The reason of methods that need no solver for the pressure.
+    /// Why methods with an equation of state have no solver for the pressure.
     pub(super) const STATE: &'static str = "the method has an equation of state";
 
     /// All passes in the order of a step, each with the reason if it does not run.
@@ -74,7 +75,7 @@ impl Pass {
         plan
     }
 
-    /// Why a method that does not declare the pass has none.
+    /// Why a method that does not declare the pass does not run it: names the methods that have it.
     fn belongs(self) -> String {
         let has_pass = |method: &Method| method.info().passes.contains(&self);
         let names: Vec<&str> = Method::all().iter().filter(|m| has_pass(m)).map(Method::name).collect();
@@ -100,7 +101,7 @@ impl Pass {
         }
     }
 
-    /// What `rfm explain` and summaries call it.
+    /// Name of the pass in the output of `rfm explain` and in summaries.
     pub fn name(self) -> &'static str {
         match self {
             Self::Integrate => "integrate",

@@ -21,6 +21,7 @@ pub const BOX: Aabb = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
 /// A box far from everything.
 const SPACE: Aabb = Aabb::new(DVec3::splat(-1e3), DVec3::splat(1e3));
 
+/// Points in a cube of this side around the origin, evenly distributed at random.
 pub fn random_cloud(count: usize, side: f64) -> Vectors {
     let mut random = Pcg64::seed_from_u64(count as u64);
     let mut number = || (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
@@ -31,6 +32,7 @@ pub fn random_cloud(count: usize, side: f64) -> Vectors {
     cloud
 }
 
+/// A simulation of particles, given by position and velocity, far from all walls.
 pub fn free(parameters: Parameters, particles: &[(DVec3, DVec3)]) -> Simulation {
     let mut fluid = Particles::default();
     for &(position, velocity) in particles {
@@ -39,12 +41,14 @@ pub fn free(parameters: Parameters, particles: &[(DVec3, DVec3)]) -> Simulation 
     Simulation::new(parameters, fluid, SPACE, Vec::new()).unwrap()
 }
 
+/// A simulation of particles with random positions in a cube and random velocities, far from all walls.
 pub fn free_cloud(parameters: Parameters, count: usize, side: f64) -> Simulation {
     let velocity = random_cloud(count + 1, 2.0);
     let cloud: Vec<_> = random_cloud(count, side).iter().zip(velocity.iter()).collect();
     free(parameters, &cloud)
 }
 
+/// A simulation of a drop at rest, far from all walls.
 pub fn free_drop(parameters: Parameters, count: usize) -> Simulation {
     let drop = FluidBlock::drop(DVec3::ZERO, count).seed(&parameters, SPACE).unwrap();
     Simulation::new(parameters, drop, SPACE, Vec::new()).unwrap()
@@ -63,7 +67,7 @@ pub fn half_space(origin: DVec3, normal: DVec3) -> Arc<dyn Walls> {
     Arc::new(Closures { omega: move |p: DVec3| (origin - p).dot(normal), gradient: move |_: DVec3| -normal })
 }
 
-/// R₀ node with its gradient; one symmetric member of the limits at 0.
+/// An R₀ operation with its gradient; at 0 the gradient is one symmetric member of the limits.
 fn r0(sign: f64, (u, du): (f64, DVec3), (v, dv): (f64, DVec3)) -> (f64, DVec3) {
     let h = u.hypot(v);
     let (a, b) = if h > 0.0 { (u / h, v / h) } else { (0.0, 0.0) };
@@ -87,11 +91,12 @@ pub fn pawn() -> Arc<dyn Walls> {
     Arc::new(Closures { omega: move |p: DVec3| both(p).0, gradient: move |p: DVec3| both(p).1 })
 }
 
+/// A field as an obstacle at rest.
 pub fn obstacle(field: &Arc<dyn Walls>) -> Obstacle {
     Obstacle::at_rest(field.clone(), 0.005)
 }
 
-/// A drop of the paper's fluid above the pawn, the drop's lowest point near the pawn's head.
+/// A drop of the paper's fluid above the pawn. Its lowest point is near the pawn's head.
 pub fn drop_on(pawn: &Arc<dyn Walls>, parameters: Parameters, count: usize) -> Simulation {
     let mut drop = FluidBlock::drop(DVec3::new(1.5, 1.5, 2.2), count).seed(&parameters, BOX).unwrap();
     carve(&mut drop, &BOX, &[obstacle(pawn)], 0.0).unwrap();

@@ -1,6 +1,7 @@
-//! Where the fluid starts: particles on a lattice of the rest spacing, in a shape, in the box, in the fluid.
+//! Where a fluid starts: particles on a lattice with the rest spacing, inside a shape, the box and outside
+//! obstacles.
 //!
-//! Invariant: no two particles coincide, whatever the jitter (each stays within its own lattice cell), and the
+//! Invariant: no two particles coincide for any jitter, because each stays within its own lattice cell. The
 //! same input gives the same particles.
 
 use std::{error, fmt};
@@ -18,28 +19,34 @@ use super::{params::Parameters, particles::Particles, walls::Obstacle};
 /// More lattice sites than this are a mistake in the scene, not a fluid.
 const MAX_SITES: f64 = 5e7;
 
-/// Which sites of a field's shape are taken when fewer particles are wanted than it has room for.
+/// Which part of a field's shape is filled if it has room for more particles than are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fill {
-    /// The lowest, as a vessel is filled.
+    /// The lowest sites, as a vessel is filled.
     #[default]
     Below,
-    /// Those with the largest ω: a smaller body inside the shape, such as a drop of an exact number of particles.
+    /// The sites with the largest ω: a smaller body inside the shape, such as a drop of an exact number of
+    /// particles.
     Middle,
 }
 
 /// The space that a fluid fills.
 #[derive(Clone, Copy)]
 pub enum FluidShape<'a> {
+    /// The box, m.
     Box(Aabb),
-    /// Where ω > 0; nothing outside `bounds` is looked at.
+    /// The region where ω > 0, within bounds.
     Field {
+        /// Positive inside the shape.
         field: &'a dyn Field,
+        /// Box that is searched for the shape, m.
         bounds: Aabb,
+        /// Which part is filled if there is more room than particles.
         fill: Fill,
     },
     /// A ball around a centre, as large as the number of particles makes it.
     Drop {
+        /// Centre of the ball, m.
         centre: DVec3,
     },
 }
@@ -47,15 +54,17 @@ pub enum FluidShape<'a> {
 /// A body of fluid at the start of a run.
 #[derive(Clone, Copy)]
 pub struct FluidBlock<'a> {
+    /// The space that the fluid fills.
     pub shape: FluidShape<'a>,
-    /// Particles wanted; `None` fills the shape. A box that has more room is filled from below, as a vessel
-    /// is, a field as its [`Fill`] says; a drop takes the sites nearest to its centre. A drop has no other size: it must have a count.
+    /// Number of particles wanted; `None` fills the shape. A box with more room is filled from below, as a
+    /// vessel is, and a field as its [`Fill`] states. A drop takes the sites nearest to its centre; it needs
+    /// a count, because nothing else determines its size.
     pub count: Option<usize>,
-    /// Accept fewer particles where the shape has no room for `count`.
+    /// Whether fewer particles are accepted if the shape has no room for `count`.
     pub allow_fewer: bool,
     /// Initial velocity, m/s.
     pub velocity: DVec3,
-    /// Random displacement as a part of the spacing, 0 (none) to below 1.
+    /// Random displacement as a part of the spacing, from 0 (none) to below 1.
     pub jitter: f64,
     /// Seed of the jitter.
     pub seed: u64,
@@ -73,20 +82,31 @@ impl<'a> FluidBlock<'a> {
     }
 }
 
-/// A fluid that cannot be placed.
+/// Why a fluid cannot be placed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SeedError {
     /// The shape, cut with the container, has room for fewer particles than wanted.
-    DoesNotFit { wanted: usize, room: usize },
-    /// A drop without a number of particles.
+    DoesNotFit {
+        /// Number of particles wanted.
+        wanted: usize,
+        /// Number of particles that fit.
+        room: usize,
+    },
+    /// A drop has no number of particles.
     NoCount,
     /// The jitter is not in 0..1.
     Jitter(f64),
     /// The shape is infinite, or would hold more particles than a machine does.
-    TooLarge { sites: f64 },
+    TooLarge {
+        /// Number of lattice sites; infinite for an infinite shape.
+        sites: f64,
+    },
     /// The shape or an obstacle has no value at a lattice site.
-    Undefined { at: DVec3 },
-    /// Carving left nothing.
+    Undefined {
+        /// The site, m.
+        at: DVec3,
+    },
+    /// Carving left no particle.
     NothingLeft(Carved),
 }
 
@@ -115,7 +135,8 @@ impl FluidBlock<'_> {
     /// The particles of this block inside `container`.
     ///
     /// # Errors
-    /// [`SeedError`]: no room, no number, or a shape without values.
+    /// [`SeedError`] if there is no room for the particles, a drop has no count, the jitter or the size is
+    /// out of range, or the shape has no value at a site.
     pub fn seed(&self, parameters: &Parameters, container: Aabb) -> Result<Particles, SeedError> {
         if !(0.0..1.0).contains(&self.jitter) {
             return Err(SeedError::Jitter(self.jitter));
@@ -157,7 +178,8 @@ impl FluidBlock<'_> {
     }
 }
 
-/// Sites of the lattice in a box, half a spacing from its lower faces; lowest z first, then y, then x.
+/// Sites of the lattice in a box, beginning half a spacing from its lower faces; lowest z first, then y, then
+/// x.
 fn lattice(aabb: Aabb, spacing: f64) -> Result<Vec<DVec3>, SeedError> {
     if aabb.is_empty() {
         return Ok(Vec::new());
@@ -196,7 +218,8 @@ fn keep_inside(field: &dyn Field, sites: Vec<DVec3>) -> Result<Vec<(f64, DVec3)>
     Ok(kept)
 }
 
-/// The `count` lattice sites nearest to a centre, nearest first; equal distances in the order z, y, x.
+/// The `count` lattice sites nearest to a centre, nearest first. Sites at equal distances stand in the order
+/// z, y, x.
 fn ball(centre: DVec3, spacing: f64, count: usize) -> Result<Vec<DVec3>, SeedError> {
     if !(count as f64 <= MAX_SITES && centre.is_finite()) {
         return Err(SeedError::TooLarge { sites: count as f64 });
@@ -222,22 +245,26 @@ fn ball(centre: DVec3, spacing: f64, count: usize) -> Result<Vec<DVec3>, SeedErr
     Ok(sites.into_iter().map(place).collect())
 }
 
-/// What carving took away.
+/// How many particles carving removed, by reason, and how many it kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Carved {
-    /// In an obstacle or on its surface (ω ≥ 0).
+    /// Removed: in an obstacle or on its surface (ω ≥ 0).
     pub inside: usize,
-    /// In the fluid, but nearer to an obstacle than the clearance.
+    /// Removed: in the fluid, but nearer to an obstacle than the clearance.
     pub too_close: usize,
+    /// Removed: outside the box.
     pub outside_box: usize,
+    /// Particles that are left.
     pub kept: usize,
 }
 
-/// Removes particles that lie outside the box, in an obstacle, or nearer to one than `clearance` metres
-/// (by the estimate −ω/|∇ω|, unless a ball of that radius is proven to be free); the rest are numbered anew.
+/// Removes particles that lie outside the box, in an obstacle, or nearer to one than `clearance`, m. The
+/// distance is estimated by −ω/|∇ω|, unless a ball of that radius is proven to be free. The remaining
+/// particles get new ids from 0 on.
 ///
 /// # Errors
-/// [`SeedError::NothingLeft`], or [`SeedError::Undefined`] where an obstacle has no value.
+/// [`SeedError::NothingLeft`] if no particle is left, [`SeedError::Undefined`] where an obstacle has no
+/// value.
 pub fn carve(
     particles: &mut Particles,
     domain: &Aabb,
@@ -262,7 +289,8 @@ pub fn carve(
                 continue 'particles;
             }
             if clearance > 0.0 && obstacle.field.clearance(p, clearance) < clearance {
-                // taken together: away from surfaces a map of cells has a value of its own, without a gradient to it
+                // take value and gradient together: away from surfaces a map of cells has a value of its own,
+                // without a gradient to it
                 let (w, gradient) = obstacle.field.omega_grad(p);
                 if -w < clearance * gradient.length() {
                     carved.too_close += 1;
@@ -277,8 +305,9 @@ pub fn carve(
     if carved.kept == 0 { Err(SeedError::NothingLeft(carved)) } else { Ok(carved) }
 }
 
-/// Moves particles of the fluid that are nearer to an obstacle than `clearance`, m, to that distance: a lattice that a
-/// surface cuts keeps its volume, where without those particles a gap would remain along the wall.
+/// Moves particles that are nearer to an obstacle than `clearance`, m, to that distance. A lattice that a
+/// surface cuts keeps its volume this way; if those particles were removed, a gap would remain along the
+/// wall.
 pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], clearance: f64) {
     for i in 0..particles.len() {
         let mut p = particles.position.get(i);

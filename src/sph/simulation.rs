@@ -1,6 +1,6 @@
-//! The simulation: a state that is checked at the start, stepped, and asked for figures.
+//! The simulation: its state is checked at the start, advanced by steps, and measured.
 //!
-//! Invariant: between steps positions, velocities, densities, pressures and accelerations belong to one
+//! Invariant: between steps, positions, velocities, densities, pressures and accelerations belong to one
 //! instant, and particles lie in the order of the columns.
 
 use std::borrow::Cow;
@@ -25,29 +25,37 @@ use super::{
     walls::{Boundary, Obstacle},
 };
 
-/// Particles stop this part of the support radius before an obstacle.
+/// Distance from an obstacle at which particles stop, over the support radius.
 const CLEARANCE: f64 = 1e-6;
 
-/// A simulation that cannot be started.
+/// Why a simulation cannot be started.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SetupError {
+    /// A parameter is out of range.
     Parameter(ParameterError),
     /// The box is empty, flat or infinite.
     Domain(Aabb),
-    /// An obstacle's restitution is not in 0..=1, its friction is negative, or its resolution is not positive.
+    /// An obstacle's restitution is not in 0..=1, its friction is negative, or its resolution is not
+    /// positive.
     Obstacle {
+        /// Number of the obstacle, from 0.
         index: usize,
     },
+    /// There are no particles.
     NoParticles,
-    /// The checkpoint is not one of this method.
+    /// The checkpoint does not belong to this method.
     Checkpoint(CheckpointError),
     /// A particle's position or velocity is not finite.
     NonFinite {
+        /// The particle's number at seeding.
         id: u32,
     },
-    /// Particles outside the box or not in the fluid (ω ≥ 0); [`carve`](super::carve) removes such.
+    /// Some particles lie outside the box or not in the fluid (ω ≥ 0). [`carve`](super::carve) removes such
+    /// particles.
     NotInFluid {
+        /// Number of particles outside the box.
         outside_box: usize,
+        /// Number of particles in obstacles or on their surfaces.
         inside_obstacles: usize,
     },
 }
@@ -75,40 +83,62 @@ impl fmt::Display for SetupError {
 
 impl error::Error for SetupError {}
 
-/// What ceased to be a number.
+/// The quantity that ceased to be finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
+    /// The position of a particle.
     Position,
+    /// The density of a particle.
     Density,
+    /// The acceleration of a particle.
     Acceleration,
+    /// The field ω of an obstacle at a particle.
     Omega,
 }
 
-/// Why, most likely.
+/// The most likely reason why a quantity ceased to be finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
-    /// The step exceeds what this state allows, s.
-    StepTooLong { dt: f64, stable: f64 },
+    /// The step is longer than this state allows.
+    StepTooLong {
+        /// The length of the step, s.
+        dt: f64,
+        /// The longest stable step, s.
+        stable: f64,
+    },
     /// The obstacle's formula has no value at a point.
-    FieldUndefined { at: DVec3 },
+    FieldUndefined {
+        /// The point, m.
+        at: DVec3,
+    },
     /// The step was short enough: values grew until they left the range of a double.
     Overflow,
 }
 
-/// A step that could not be completed; the state is not to be used any more.
+/// Why a step could not be completed. The state must not be used any more.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepError {
+    /// A quantity ceased to be finite.
     NonFinite {
+        /// Number of the step.
         step: u64,
+        /// The particle's number at seeding.
         id: u32,
+        /// What is not finite.
         quantity: Quantity,
+        /// The most likely reason.
         cause: Cause,
     },
-    /// The state allows only steps so short, s, that the run would never end: a particle has become too fast, m/s.
+    /// The state allows only steps so short that the run would never end, because a particle has become too
+    /// fast.
     Stalled {
+        /// Number of the step.
         step: u64,
+        /// The longest stable step, s.
         dt: f64,
+        /// The number, at seeding, of the fastest particle.
         id: u32,
+        /// The speed of this particle, m/s.
         speed: f64,
     },
 }
@@ -151,10 +181,10 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Checks the input and finds densities and forces of the first instant.
+    /// Checks the input and finds the densities and forces of the first instant.
     ///
     /// # Errors
-    /// [`SetupError`] names the first thing that makes a run meaningless.
+    /// [`SetupError`] names the first finding that makes a run meaningless.
     pub fn new(
         parameters: Parameters,
         particles: Particles,
@@ -164,7 +194,7 @@ impl Simulation {
         Self::at(parameters, particles, domain, obstacles, None)
     }
 
-    /// After so many steps, at a time.
+    /// The simulation at an instant: the number of steps taken, and the time, s.
     fn at(
         parameters: Parameters,
         particles: Particles,
@@ -194,11 +224,11 @@ impl Simulation {
         Ok(Self { core, scheme })
     }
 
-    /// A simulation that goes on from a checkpoint: with the same parameters, box and obstacles every later step has
-    /// the bits that it would have had without the interruption.
+    /// A simulation that goes on from a checkpoint. With the same parameters, box and obstacles, every later
+    /// step has the bits that it would have had without the interruption.
     ///
     /// # Errors
-    /// [`SetupError`] as for [`Simulation::new`], or because the checkpoint is one of another method.
+    /// [`SetupError`] as for [`Simulation::new`], or if the checkpoint belongs to another method.
     pub fn resume(
         parameters: Parameters,
         checkpoint: &Checkpoint,
@@ -206,7 +236,7 @@ impl Simulation {
         obstacles: Vec<Obstacle>,
     ) -> Result<Self, SetupError> {
         let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
-        // sorting leaves in their places what was sorted before
+        // the particles of a checkpoint are sorted already: sorting them again leaves their order
         let instant = Some((checkpoint.steps, checkpoint.time));
         let mut simulation = Self::at(parameters, particles, domain, obstacles, instant)?;
         let restored = checkpoint.restore(&mut simulation.core);
@@ -214,7 +244,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// What [`Simulation::resume`] needs; the fingerprint is the caller's.
+    /// The present state, for [`Simulation::resume`]. The caller sets the fingerprint.
     pub fn checkpoint(&self) -> Checkpoint {
         let mut checkpoint = Checkpoint::of(&self.core);
         self.scheme.save(&mut checkpoint);
@@ -224,12 +254,14 @@ impl Simulation {
     /// Advances by one time step.
     ///
     /// # Errors
-    /// [`StepError`] when a value is not finite any more; nothing is clamped to hide it.
+    /// [`StepError`] if a value is not finite any more, or steps have become too short. Nothing is clamped to
+    /// hide it.
     pub fn step(&mut self) -> Result<(), StepError> {
         self.step_at_most(f64::INFINITY)
     }
 
-    /// Advances by one time step of at most `longest` seconds: to arrive at an instant exactly.
+    /// Advances by one time step of at most `longest` seconds, so that a caller can arrive at an exact
+    /// instant.
     ///
     /// # Errors
     /// As [`Simulation::step`].
@@ -247,6 +279,7 @@ impl Simulation {
         Ok(())
     }
 
+    /// The parameters. Gravity is that of the present step.
     pub fn parameters(&self) -> &Parameters {
         &self.core.parameters
     }
@@ -256,12 +289,12 @@ impl Simulation {
         &self.core.particles
     }
 
-    /// m/s², in the order of the particles.
+    /// The accelerations, m/s², in the order of the particles.
     pub fn acceleration(&self) -> &Vectors {
         &self.core.acceleration
     }
 
-    /// Steps taken; after an error, the one that failed included.
+    /// Number of steps taken, including one that failed.
     pub fn steps(&self) -> u64 {
         self.core.steps
     }
@@ -271,7 +304,8 @@ impl Simulation {
         self.core.time
     }
 
-    /// Steps until a time, s, at which the last step ends; `after_step` sees each state on the way, and may end it.
+    /// Takes steps until a time, s, at which the last step ends. `after_step` is called with each state on
+    /// the way and may stop earlier.
     ///
     /// # Errors
     /// As [`Simulation::step`].
@@ -289,18 +323,19 @@ impl Simulation {
         Ok(())
     }
 
-    /// Sets gravity, m/s², from the next step on.
+    /// Sets a constant gravity, m/s², from the next step on.
     pub fn set_gravity(&mut self, gravity: DVec3) {
         self.core.parameters.gravity = gravity;
         self.core.turning_gravity = None;
     }
 
-    /// Makes gravity a function of the time, s: each step takes that of its beginning, m/s² (a container that rotates).
+    /// Makes gravity, m/s², a function of the time, s, as in a container that rotates. Each step takes the
+    /// value at its beginning.
     pub fn set_turning_gravity(&mut self, gravity: Arc<VectorOfTime>) {
         self.core.turning_gravity = Some(gravity);
     }
 
-    /// Adds to gravity what depends on the place, m/s².
+    /// Adds to gravity an acceleration that depends on the place and the time, m/s².
     pub fn set_gravity_field(&mut self, field: Arc<VectorField>) {
         self.core.gravity_field = Some(field);
         if self.core.steps == 0 {
@@ -308,16 +343,17 @@ impl Simulation {
         }
     }
 
-    /// A probe that may be asked for samples from now on, at most once at each instant.
+    /// Prepares a probe. It may be sampled from now on, at most once at each instant.
     ///
     /// # Errors
-    /// The number of an obstacle that does not exist.
+    /// [`SetupError::Obstacle`] if the probe names an obstacle that does not exist.
     pub fn gauge(&mut self, probe: Probe) -> Result<Gauge, SetupError> {
         self.prepare(probe)?;
         Ok(Gauge::new(probe))
     }
 
-    /// A probe of a run that goes on from a checkpoint, with the memory that it had then.
+    /// Prepares a probe of a run that goes on from a checkpoint, with the [memory](Gauge::memory) that it had
+    /// then.
     ///
     /// # Errors
     /// As [`Simulation::gauge`].
@@ -348,33 +384,34 @@ impl Simulation {
         Ok(())
     }
 
-    /// What a probe reads now: a figure for each of its [columns](Probe::columns).
+    /// Samples a probe now: one figure for each of its [columns](Probe::columns).
     pub fn sample(&self, gauge: &mut Gauge) -> Vec<f64> {
         gauge.sample(&self.core)
     }
 
-    /// The longest step, s, that this state allows: the parameters' limits for the present greatest speed,
-    /// and the force limit for the present greatest acceleration.
+    /// The longest step, s, that this state allows: the least of the parameters' limits at the present
+    /// greatest speed and the force limit at the present greatest acceleration.
     pub fn stable_dt(&self) -> f64 {
         self.core.stable_dt()
     }
 
-    /// Ordered pairs of particles within the support radius, the work count of a step; counted when asked for.
+    /// Number of ordered pairs of particles within the support radius, which measures the work of a step.
+    /// This call counts them.
     pub fn pairs(&self) -> usize {
         self.core.pairs()
     }
 
-    /// Iterations of the last step's solver; nothing for methods without one.
+    /// Iterations of the last step's solver; `None` for methods without one.
     pub fn iterations(&self) -> Option<u32> {
         self.scheme.iterations()
     }
 
-    /// Memory of the state and all that a step needs, bytes.
+    /// Memory of the state and of all that a step needs, bytes.
     pub fn bytes(&self) -> usize {
         self.core.bytes() + self.scheme.bytes()
     }
 
-    /// Figures of the present state.
+    /// Figures of the present state, computed by this call.
     pub fn stats(&self) -> Stats {
         Stats::of(&self.core)
     }

@@ -1,34 +1,36 @@
-//! Figures that tell whether a state is sound.
+//! Figures by which one judges whether a state is sound.
 //!
-//! Invariant: computed afresh from the state; nothing here is remembered by the solver.
+//! Invariant: the figures follow from the state alone; the solver remembers none of them.
 
 use glam::DVec3;
 
 use super::{core::Core, walls::Boundary};
 
-/// Figures of one instant.
+/// Figures of a state at one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stats {
+    /// Number of particles.
     pub particles: usize,
-    /// Mean number of others within the support radius.
+    /// Mean number of neighbours within the support radius, without the particle itself.
     pub neighbours_per_particle: f64,
-    /// Largest (ρ − ρ₀)/ρ₀ above zero: compression. A density below ρ₀ is the free surface, not an error.
+    /// Largest compression (ρ − ρ₀)/ρ₀, at least 0. A density below ρ₀ belongs to the free surface and is not
+    /// an error.
     pub max_density_error: f64,
-    /// Σ ½mv², J
+    /// Kinetic energy Σ ½mv², J.
     pub kinetic_energy: f64,
-    /// −Σ m g·(x − corner), J, from the box's lowest corner along gravity
+    /// Potential energy −Σ m g·(x − corner), J, from the box's lowest corner along gravity.
     pub potential_energy: f64,
-    /// Σ mv, kg·m/s
+    /// Momentum Σ mv, kg·m/s.
     pub momentum: DVec3,
-    /// m/s
+    /// Largest speed, m/s.
     pub max_speed: f64,
-    /// Largest ω/|∇ω| where ω > 0, m
+    /// Largest depth of a particle in an obstacle, ω/|∇ω| where ω > 0, m; 0 if no particle is inside.
     pub max_penetration: f64,
-    /// Particles with ω > 0 for some obstacle
+    /// Number of particles in an obstacle (ω > 0).
     pub inside: usize,
-    /// Particles outside the box
+    /// Number of particles outside the box.
     pub lost: usize,
-    /// Particles with a position, velocity or density that is no number
+    /// Number of particles with a position, velocity or density that is not finite.
     pub non_finite: usize,
 }
 
@@ -65,7 +67,7 @@ impl Stats {
     }
 }
 
-/// Kinetic and potential energy, J, the latter from the box's lowest corner along gravity.
+/// Kinetic and potential energy, J. The potential one is measured from the box's lowest corner along gravity.
 pub(super) fn energies(core: &Core) -> [f64; 2] {
     let Core { parameters, boundary, particles, .. } = core;
     let (mass, g) = (parameters.particle_mass, parameters.gravity);
@@ -76,7 +78,7 @@ pub(super) fn energies(core: &Core) -> [f64; 2] {
 }
 
 impl Boundary {
-    /// Largest ω/|∇ω| of the obstacles that hold the point, m; zero in the fluid.
+    /// Largest ω/|∇ω| of the obstacles that contain the point, m; zero in the fluid.
     fn penetration(&self, p: DVec3) -> f64 {
         let depth = |field: &dyn crate::field::Walls| {
             if field.omega(p) > 0.0 {

@@ -1,4 +1,4 @@
-//! The whole method against physics: falls, bounces, slides, drops.
+//! All methods against physics: falls, bounces, slides, drops.
 
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ fn momentum_is_conserved_in_free_space() {
     assert!((simulation.stats().momentum - before).length() < 1e-14 * scale);
 }
 
-/// Heights of the first tops of a ball's bounces.
+/// Heights of the first maxima of a bouncing ball.
 fn tops(parameters: Parameters, obstacles: Vec<Obstacle>, floor: f64, count: usize) -> Vec<f64> {
     let start = one(DVec3::new(1.5, 1.5, floor + 1.0), DVec3::ZERO);
     let mut simulation = Simulation::new(parameters, start, scenes::BOX, obstacles).unwrap();
@@ -110,7 +110,8 @@ fn a_particle_slides_down_a_slope() {
 
 #[test]
 fn a_particle_swings_through_a_bowl() {
-    // the hollow of a sphere, started at the height of its centre: it must come up on the other side
+    // in the hollow of a sphere, started at the height of its centre: the particle must come up on the other
+    // side
     let bowl: Arc<dyn Walls> = Arc::new(Closures {
         omega: |p: DVec3| p.distance_squared(DVec3::splat(1.5)) - 1.0,
         gradient: |p: DVec3| 2.0 * (p - DVec3::splat(1.5)),

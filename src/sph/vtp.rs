@@ -1,16 +1,18 @@
-//! Frames for ParaView: VTK PolyData with appended raw data, and the collection that lists them in time.
+//! Frames for ParaView: VTK PolyData with appended raw data, and the collection that lists the frames in
+//! time.
 //!
-//! Invariant: particles are written in the order of their ids, little-endian, as 32-bit floats (a picture
-//! needs no more); the same state gives the same bytes.
+//! Invariant: particles are written in the order of their ids, little-endian, as 32-bit floats, which are
+//! enough for a picture. The same state gives the same bytes.
 
 use std::io::{self, Write};
 
 use super::particles::{Particles, Vectors};
 
-/// Writes one frame: points, and per point speed (m/s), velocity (m/s), density (kg/m³), pressure (Pa), id.
+/// Writes one frame: the positions of the particles (m) and, for each, speed (m/s), velocity (m/s), density
+/// (kg/m³), pressure (Pa) and id.
 ///
 /// # Errors
-/// Those of the writer.
+/// Errors of the writer.
 pub fn write_vtp(out: &mut impl Write, particles: &Particles) -> io::Result<()> {
     let order = particles.order_by_id();
     let n = order.len();
@@ -58,10 +60,10 @@ _"#
     out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
 }
 
-/// Writes the collection of frames: each frame's time (s) and file name.
+/// Writes the collection of frames: the time (s) and the file name of each.
 ///
 /// # Errors
-/// Those of the writer.
+/// Errors of the writer.
 pub fn write_pvd<'a>(
     out: &mut impl Write,
     frames: impl IntoIterator<Item = (f64, &'a str)>,
@@ -76,12 +78,12 @@ pub fn write_pvd<'a>(
     writeln!(out, "</Collection>\n</VTKFile>")
 }
 
-/// A time in seconds to twelve digits: the sum of many steps is 0.04999999999999996 where 0.05 is meant.
+/// A time rounded to twelve digits: the sum of many steps is 0.04999999999999996 where 0.05 is meant.
 pub fn short_time(time: f64) -> f64 {
     format!("{time:.11e}").parse().unwrap_or(time)
 }
 
-/// The raw block behind the document: each array is its length in bytes (u64) and its bytes.
+/// The raw block that follows the document: for each array its length in bytes (u64), then its bytes.
 #[derive(Default)]
 struct Appended {
     bytes: Vec<u8>,

@@ -1,4 +1,5 @@
-//! Error against cost of a flow, both logarithmic: a line for each method and each quantity that is known.
+//! A plot of error against cost of a flow, both logarithmic, with a line for each method and each known
+//! quantity.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -11,10 +12,10 @@ use crate::experiment::Deviation;
 /// Each method with its colour.
 const METHODS: [(&str, &str); 3] = [("wcsph", "#1b6ca8"), ("dfsph", "#c05621"), ("paper", "#2f855a")];
 
-/// How the lines of the first, second and third quantity that is known are drawn.
+/// Dash patterns for the lines of the first, second and third known quantity.
 const DASHES: [&str; 3] = ["none", "7 4", "2 4"];
 
-/// As SVG or PNG; runs that failed or took no time that could be told are left out.
+/// Draws the plot as SVG or PNG. Runs that failed, or took no measurable time, are left out.
 pub(super) fn draw(scene: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
     let is_shown = |x: f64| x > 0.0 && x.is_finite();
     let known: Vec<usize> =

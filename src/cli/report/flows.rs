@@ -1,6 +1,7 @@
-//! Error against cost of a flow that is known: a scene run at growing resolution by each method.
+//! Error against cost for a flow with a known solution: a scene is run at growing resolution by each method.
 //!
-//! scene with a `truth` × methods × sizes → rows → table, JSON, picture. A run that fails is a row that says so.
+//! A scene with a `truth`, the methods and the sizes give rows, which are printed as a table or JSON and
+//! drawn as a picture. A run that fails is a row that says so.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -18,47 +19,47 @@ use crate::lower::{Scene, Truth};
 use crate::sph::{Method, Simulation};
 use crate::{Error, Experiment, Program};
 
-/// The param of a file that says how fine its scene is.
+/// The param of a file that sets the resolution of its scene.
 const SIZE: &str = "particles";
 
-/// Without `--particles`: these parts of what the file states. In space two spacings differ by 4^⅓ = 1.6, in a layer of
-/// fixed number of spacings by 2.
+/// Sizes without `--particles`, as parts of what the file states. In space two spacings then differ by 4^⅓ =
+/// 1.6, in a layer of a fixed number of spacings by 2.
 const PARTS: [f64; 3] = [1.0 / 16.0, 1.0 / 4.0, 1.0];
 
-/// A run stands still if so many steps take less than this part of its time: one that goes on like that has a hundred
-/// million steps before it.
+/// A run stands still if this number of steps covers less than this part of its time: at that pace a hundred
+/// million steps lie before it.
 const STANDSTILL: (u64, f64) = (200, 1e-6);
 
-/// One run.
+/// One run of a scene, as a row of the report.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Row {
     pub method: &'static str,
-    /// Of the sums over neighbours.
+    /// Precision of the sums over neighbours.
     precision: &'static str,
     pub particles: usize,
-    /// m
+    /// Particle spacing, m.
     spacing: f64,
     steps: u64,
-    /// s
+    /// Simulated time, s.
     simulated_seconds: f64,
     pressure_error: Option<f64>,
     velocity_error: Option<f64>,
     front_error: Option<f64>,
-    /// p of error ∝ spacingᵖ between this run and the coarser one before it.
+    /// Order p of error ∝ spacingᵖ between this run and the coarser one before it.
     pressure_order: Option<f64>,
     velocity_order: Option<f64>,
     front_order: Option<f64>,
-    /// Of all threads on the processor, for the steps alone, s.
+    /// Processor time of all threads, for the steps alone, s.
     pub cpu_seconds: f64,
     cpu_seconds_per_simulated_second: f64,
-    /// By the clock, s.
+    /// Time by the clock, for the steps alone, s.
     seconds: f64,
     /// Why the run ended before its end.
     failure: Option<String>,
 }
 
 impl Row {
-    /// In the order of [`Deviation::NAMES`]; not of a run that failed.
+    /// The errors in the order of [`Deviation::NAMES`]; `None` if the run failed.
     pub fn errors(&self) -> [Option<f64>; 3] {
         [self.pressure_error, self.velocity_error, self.front_error]
     }
@@ -67,7 +68,7 @@ impl Row {
         [self.pressure_order, self.velocity_order, self.front_order]
     }
 
-    /// Finds the orders from the run before.
+    /// Sets the orders of convergence from the coarser run before this one.
     fn compare(&mut self, coarser: &Self) {
         let halvings = (coarser.spacing / self.spacing).ln();
         if coarser.method != self.method || halvings <= 0.0 {
@@ -87,7 +88,7 @@ struct Document<'a> {
     schema: u32,
     scene: &'a str,
     threads: usize,
-    /// Saved instants for which something is known, of a run that does not fail.
+    /// Number of saved instants that were compared in a run that did not fail.
     instants: usize,
     rows: &'a [Row],
 }
@@ -139,7 +140,7 @@ pub(super) fn run(
     }
 }
 
-/// What went wrong in which run, a line each.
+/// The failures of runs, one in each line; `None` if there are none.
 fn failures(rows: &[Row]) -> Option<String> {
     let failed = rows.iter().filter_map(|row| {
         Some(format!("{}, {} particles: {}", row.method, row.particles, row.failure.as_ref()?))
@@ -148,7 +149,8 @@ fn failures(rows: &[Row]) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("\n"))
 }
 
-/// The sizes asked for, or [`PARTS`] of the file's own within its range; nothing is one run as the file has it.
+/// The sizes that were asked for, or [`PARTS`] of the file's own size within its range. `None` stands for one
+/// run as the file is.
 fn sizes(program: &Program, asked: &[usize]) -> Result<Vec<Option<usize>>, Failure> {
     let param = program.module().params.iter().find(|param| param.name == SIZE);
     let mut sizes: Vec<usize> = match (param, asked) {
@@ -170,7 +172,7 @@ fn sizes(program: &Program, asked: &[usize]) -> Result<Vec<Option<usize>>, Failu
     Ok(sizes.into_iter().map(Some).collect())
 }
 
-/// What all runs of a report share.
+/// The state that all runs of a report share.
 struct Study<'a> {
     shared: &'a Shared,
     scene: &'a str,
@@ -179,7 +181,8 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
-    /// Runs the scene by each method in each size; a row is printed as soon as it is known, because the next may take long.
+    /// Runs the scene by each method in each size. A row is printed as soon as it is known, because the next
+    /// may take long.
     fn rows(
         &mut self,
         program: &Program,
@@ -211,7 +214,8 @@ impl Study<'_> {
         Ok(rows)
     }
 
-    /// Runs the scene to its end and looks at it whenever it would be saved.
+    /// Runs the scene to its end, and compares it with the known solution at every instant at which it would
+    /// be saved.
     fn measure(&mut self, program: &Program, size: Option<usize>) -> Result<Row, Failure> {
         let scene = choose::scene(program, Some(self.scene))?;
         let experiment = Experiment::new(program, &scene.name, self.shared.engine.into()).map_err(refused)?;
@@ -264,8 +268,8 @@ impl Study<'_> {
 }
 
 impl Row {
-    /// A run that has ended, with the seconds that it took of processors and of the clock; orders of convergence are not
-    /// known yet.
+    /// The row of a run that has ended, with the seconds that it took on processors and by the clock. The
+    /// orders of convergence are not known yet.
     fn of(
         simulation: &Simulation,
         deviation: Deviation,
@@ -294,7 +298,7 @@ impl Row {
     }
 }
 
-/// About how long a run takes, in a unit of its own: N particles in steps as long as the spacing allows.
+/// Relative duration of a run: N particles, in steps whose length is proportional to the spacing.
 fn work(size: Option<usize>) -> f64 {
     (size.unwrap_or(1000) as f64).powf(4.0 / 3.0)
 }
@@ -304,7 +308,8 @@ fn bar(sizes: &[Option<usize>], methods: usize) -> ProgressBar {
     progress::bar(once * methods as u64, "running")
 }
 
-/// Seconds that all threads of this process have spent on processors; of the clock where the system does not tell.
+/// Seconds that all threads of this process have spent on processors; seconds of the clock where the system
+/// does not say.
 fn processor_seconds() -> f64 {
     #[cfg(unix)]
     {
@@ -318,7 +323,7 @@ fn processor_seconds() -> f64 {
     }
 }
 
-/// Shows messages about the file and makes them findings, or a wrong command line.
+/// Shows the messages about a file, and returns the failure for them.
 fn refused(error: Error) -> Failure {
     match error {
         Error::Diagnostics(diagnostics) => {
@@ -329,9 +334,9 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// The columns of what is known, a row at a time.
+/// The table of a report, printed a row at a time.
 struct Table {
-    /// Numbers in [`Deviation::NAMES`].
+    /// Indices, in [`Deviation::NAMES`], of the quantities that are known.
     known: Vec<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! The obstacles of a run as meshes: once if they stand still, for every frame if one of them moves.
+//! The obstacles of a run as meshes: one mesh if all stand still, one for every frame if any of them moves.
 
 use super::super::args::Run;
 use super::super::{Failure, note};
@@ -10,7 +10,7 @@ use crate::{Experiment, Solid};
 pub(super) struct Bodies {
     solids: Vec<Solid>,
     domain: Aabb,
-    /// Along the longest side of each.
+    /// Number of mesh cells along the longest side of each solid.
     cells: usize,
 }
 
@@ -24,12 +24,12 @@ impl Bodies {
         self.solids.is_empty()
     }
 
-    /// Whether a mesh of one instant is wrong at another.
+    /// Whether any solid moves, so that each instant needs its own mesh.
     pub fn move_about(&self) -> bool {
         self.solids.iter().any(Solid::moves)
     }
 
-    /// As they are at the start; says which of them are not in the box.
+    /// The mesh of all solids at the start. Notes which of them have no surface in the box.
     pub fn mesh_at_start(&self) -> Result<Mesh, Failure> {
         let mut all = Mesh::default();
         for solid in &self.solids {
@@ -42,7 +42,7 @@ impl Bodies {
         Ok(all)
     }
 
-    /// All of them as one mesh at a time, s, cut off at the box.
+    /// The mesh of all solids at a time, s, cut off at the box.
     pub fn mesh_at(&self, time: f64) -> Result<Mesh, Failure> {
         let mut all = Mesh::default();
         for solid in &self.solids {

@@ -1,6 +1,6 @@
-//! Checkpoints of a run: written beside the frames, the last two kept, found again by `--resume`.
+//! Checkpoints of a run. They are written beside the frames, and the last two are kept for `--resume`.
 //!
-//! Invariant: an older checkpoint goes only after a newer one is whole.
+//! Invariant: an older checkpoint is removed only after a newer one is complete.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::ir;
 use crate::lower::Scene;
 use crate::sph::{Checkpoint, CheckpointError, Parameters, Simulation};
 
-/// The one before the last is for the case that the last is found damaged.
+/// Number of checkpoints that are kept. The second serves if the last is found damaged.
 const KEPT: usize = 2;
 
 const FOLDER: &str = "checkpoints";
@@ -19,9 +19,9 @@ const FOLDER: &str = "checkpoints";
 pub(super) struct Checkpoints {
     folder: PathBuf,
     fingerprint: [u8; 32],
-    /// Of those between frames; without, one goes with every frame.
+    /// Times of checkpoints; `None`: one is saved with every frame.
     every: Option<Every>,
-    /// Steps of those that lie in the folder, oldest first.
+    /// Step numbers of the checkpoints in the folder, oldest first.
     steps: Vec<u64>,
 }
 
@@ -40,12 +40,12 @@ impl Checkpoints {
         Self { folder, fingerprint, every, steps }
     }
 
-    /// Whether one is to be written at this instant, at which a frame was saved or was not.
+    /// Whether a checkpoint is to be written at this instant; `with_frame`: a frame has been saved at it.
     pub fn is_due(&mut self, time: f64, with_frame: bool) -> bool {
         self.every.as_mut().map_or(with_frame, |every| every.is_due(time))
     }
 
-    /// Writes the present instant with whatever `more` adds to it.
+    /// Writes the present state, with what `more` adds to it.
     pub fn save(
         &mut self,
         simulation: &Simulation,
@@ -68,7 +68,7 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// The newest, if there is one.
+    /// The newest checkpoint, if there is one.
     pub fn last(&self) -> Option<PathBuf> {
         self.steps.last().map(|steps| path(&self.folder, *steps))
     }
@@ -113,8 +113,9 @@ pub(super) fn remove_all(run_folder: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Of whatever decides the bits of a state: the fluid, the box, obstacles and the method's numbers. Not the step, how
-/// long the run is and what is saved of it: a run may go on with others.
+/// Fingerprint of all that determines the bits of a state: the fluid, the box, the obstacles and the method's
+/// numbers. The length of steps, the length of the run and what it saves are not part of it, so a run may go
+/// on with others.
 pub(super) fn fingerprint(experiment: &Experiment) -> [u8; 32] {
     let (program, scene) = (experiment.program(), experiment.scene());
     let fluid = &scene.fluid;
@@ -126,7 +127,7 @@ pub(super) fn fingerprint(experiment: &Experiment) -> [u8; 32] {
     let roots: Vec<_> =
         fluid_shape.chain(container).chain(obstacles).chain(velocity).chain(gravity).collect();
     let skins: Vec<_> = experiment.bodies().iter().map(|body| &body.skin).collect();
-    // gravity that turns is in the formulas, and in the parameters as it was last
+    // a gravity that turns has one value in the parameters; its formulas are among the roots
     let parameters = Parameters { time_step: 0.0, adaptive: false, ..experiment.parameters().clone() };
     // numbers print with all their digits
     let text = format!(
@@ -145,7 +146,7 @@ fn path(folder: &Path, steps: u64) -> PathBuf {
     folder.join(format!("step_{steps:010}.checkpoint"))
 }
 
-/// Steps of the checkpoints in a folder, ascending.
+/// Step numbers of the checkpoints in a folder, ascending.
 fn list(folder: &Path) -> Vec<u64> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut steps: Vec<u64> = entries
@@ -158,7 +159,7 @@ fn list(folder: &Path) -> Vec<u64> {
     steps
 }
 
-/// Why a file is not used.
+/// Why a file is not used as a checkpoint.
 enum Unusable {
     File(std::io::Error),
     Content(CheckpointError),

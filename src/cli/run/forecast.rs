@@ -11,7 +11,7 @@ use super::summary::pass_names;
 use crate::Experiment;
 use crate::sph::Simulation;
 
-/// What `--dry-run` says.
+/// The output of `--dry-run`.
 #[derive(Debug, Serialize)]
 struct Forecast {
     schema: u32,
@@ -27,16 +27,17 @@ struct Forecast {
     seconds: f64,
 }
 
-/// Runs a few steps and tells what all of them would cost.
+/// Runs a few steps, and prints what all of them would cost.
 pub(super) fn dry_run(
     shared: &Shared,
     simulation: &mut Simulation,
     experiment: &Experiment,
     goal: Goal,
 ) -> Result<(), Failure> {
-    /// Steps that are taken before the clock starts: buffers grow, and solvers begin without an answer to start from.
+    /// Number of steps before the clock starts: buffers grow in them, and solvers have no answer yet to start
+    /// from.
     const FIRST: u32 = 2;
-    /// Steps at most, and seconds after which no further one is begun.
+    /// Most steps that are timed, and the seconds after which no further step begins.
     const TRIAL: (u32, f64) = (20, 1.0);
     let parameters = experiment.parameters();
     let mut step = || simulation.step().map_err(|e| Failure::Numerical(e.to_string()));
@@ -50,7 +51,7 @@ pub(super) fn dry_run(
         trial += 1;
     }
     let per_step = started.elapsed().as_secs_f64() / f64::from(trial);
-    // at the start a fluid is slower than it will be
+    // the fluid will become faster than it is at the start
     let time_step = if parameters.adaptive {
         parameters.stable_dt(experiment.typical_speed()).min(simulation.stable_dt())
     } else {

@@ -1,5 +1,5 @@
-//! The files of a run: ParaView frames with their collection, pictures, the obstacles' mesh; if an obstacle moves, also a
-//! frame of it for each of the fluid.
+//! The files of a run: ParaView frames with their collection, pictures, and the obstacles' mesh. If an
+//! obstacle moves, there is also a frame of the obstacles for each of the fluid.
 //!
 //! Invariant: after every frame the collections list exactly the frames that are complete.
 
@@ -17,9 +17,10 @@ use crate::mesh::{self, Mesh};
 use crate::render;
 use crate::sph::{self, Checkpoint, Simulation};
 
-/// Name in a checkpoint of the frames' times.
+/// Name of the frames' times in a checkpoint.
 const TIMES: &str = "frames";
 
+/// The frames and pictures of a run.
 pub(super) struct Frames {
     folder: PathBuf,
     /// Time and file of each frame, relative to the folder.
@@ -33,7 +34,7 @@ pub(super) struct Frames {
 
 /// What all pictures share.
 struct Pictures {
-    /// With what stands still.
+    /// The scene that is drawn, with the box, the obstacles and the legend.
     scene: render::Backdrop,
     title: String,
     domain: Aabb,
@@ -44,7 +45,7 @@ struct Pictures {
 }
 
 impl Frames {
-    /// The files of a run that begins, or goes on from a checkpoint.
+    /// Prepares the folder of a run that begins, or that goes on from a checkpoint.
     pub fn new(
         options: &Run,
         experiment: &Experiment,
@@ -52,7 +53,7 @@ impl Frames {
     ) -> Result<Self, Failure> {
         let folder = folder(options);
         let write_frames = !options.no_frames;
-        // whatever can be refused comes before the first change to the folder
+        // all that can fail comes before the first change to the folder
         let bodies = Bodies::new(options, experiment);
         let obstacle = if write_frames { bodies.mesh_at_start()? } else { Mesh::default() };
         let pictures = if write_frames && !options.no_pictures {
@@ -82,7 +83,7 @@ impl Frames {
         Ok(frames)
     }
 
-    /// Lists the frames up to a checkpoint again, and removes those after it.
+    /// Takes over the frames up to a checkpoint, and removes those after it.
     fn take_up(&mut self, checkpoint: &Checkpoint) -> Result<(), Failure> {
         let times = checkpoint.get(TIMES).unwrap_or_default();
         self.last_time = times.last().copied().unwrap_or_default();
@@ -101,8 +102,8 @@ impl Frames {
         remove_numbered(&self.folder.join("pictures"), "frame_", ".png", self.count)
     }
 
-    /// Puts into a checkpoint which frames there are; one that was saved out of turn, because the run ended, is not
-    /// among them: a run that goes on has the frames of one that never stopped.
+    /// Puts into a checkpoint which frames there are. A frame that was saved out of turn, because the run
+    /// ended, is left out: a resumed run has the frames of one that never stopped.
     pub fn remember(&self, checkpoint: &mut Checkpoint, in_turn: bool) {
         let mut times: Vec<f64> = self.saved.iter().map(|(time, _)| *time).collect();
         if !in_turn && self.last_time == checkpoint.time {
@@ -124,6 +125,7 @@ impl Frames {
         self.last_time
     }
 
+    /// The files that were written, as text.
     pub fn describe(&self) -> String {
         let mut parts = vec!["summary.json".to_string()];
         if self.write_frames {
@@ -139,7 +141,7 @@ impl Frames {
         parts.join(", ")
     }
 
-    /// Saves the present instant.
+    /// Saves the present state as a frame and a picture.
     pub fn save(&mut self, simulation: &Simulation) -> Result<(), Failure> {
         self.last_time = simulation.time();
         if !self.write_frames {
@@ -183,8 +185,8 @@ impl Frames {
 }
 
 impl Pictures {
-    /// Of the speed of a fall through the whole box, the part that is drawn red: obstacles stop most particles
-    /// long before.
+    /// The speed that is drawn red, as a part of the speed of a fall through the whole box: obstacles stop
+    /// most particles long before.
     const FASTEST: f64 = 0.6;
 
     fn new(experiment: &Experiment, obstacle: &Mesh) -> Result<Self, Failure> {
@@ -223,7 +225,7 @@ impl Pictures {
     }
 }
 
-/// What stands still in a picture: the box, the obstacles, the legend.
+/// The scene of a picture without its particles: the box, the obstacles, the legend.
 fn drawn(domain: &Aabb, title: &str, fastest: f64, obstacle: &Mesh) -> Result<render::Backdrop, Failure> {
     let camera = render::Camera::three_quarter(domain, render::Camera::SIZE).map_err(Failure::usage)?;
     let mesh = render::MeshView {
@@ -235,7 +237,8 @@ fn drawn(domain: &Aabb, title: &str, fastest: f64, obstacle: &Mesh) -> Result<re
     render::Backdrop::new(camera, domain, &mesh, &legend).map_err(Failure::usage)
 }
 
-/// Where a run's files go: by default `pawn.rfm` → `pawn.out`, beside the file; standard input → `rfm.out`.
+/// The folder for a run's files. The default is beside the file, `pawn.rfm` → `pawn.out`; for standard input
+/// it is `rfm.out`.
 pub(super) fn folder(options: &Run) -> PathBuf {
     match &options.output {
         Some(folder) => folder.clone(),
@@ -244,7 +247,7 @@ pub(super) fn folder(options: &Run) -> PathBuf {
     }
 }
 
-/// What the names of frames begin with.
+/// Beginnings of the names of frames.
 const PARTICLES: &str = "particles_";
 const OBSTACLE: &str = "obstacle_";
 
@@ -261,7 +264,7 @@ fn create(folder: &Path) -> Result<(), Failure> {
         .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.display())))
 }
 
-/// Removes the files of an earlier run, which would mix with this one's, and no others.
+/// Removes the files of an earlier run, which would mix with those of this one, and no other files.
 fn remove_old(folder: &Path) -> Result<(), Failure> {
     for name in ["summary.json", "particles.pvd", "obstacle.pvd", "obstacle.stl", "obstacle.vtp"] {
         let path = folder.join(name);
@@ -276,7 +279,7 @@ fn remove_old(folder: &Path) -> Result<(), Failure> {
     remove_numbered(&folder.join("pictures"), "frame_", ".png", 0)
 }
 
-/// Removes files by their number, from one on.
+/// Removes the numbered files whose number is at least `first`.
 fn remove_numbered(folder: &Path, prefix: &str, suffix: &str, first: usize) -> Result<(), Failure> {
     if !folder.is_dir() {
         return Ok(());

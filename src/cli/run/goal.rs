@@ -5,12 +5,12 @@ use super::super::args::Run;
 use crate::Experiment;
 use crate::sph::Simulation;
 
-/// Where a run ends.
+/// The end of a run.
 #[derive(Clone, Copy)]
 pub(super) enum Goal {
-    /// After so many steps.
+    /// A number of steps.
     Steps(u64),
-    /// At an instant, s, which steps of any length arrive at.
+    /// A time, s, at which steps of any length arrive.
     Time(f64),
 }
 
@@ -39,7 +39,7 @@ impl Goal {
         }
     }
 
-    /// Time to the end, s, if it is known.
+    /// Time that is left, s; infinite if the goal is a number of steps.
     pub fn left(self, simulation: &Simulation) -> f64 {
         match self {
             Self::Steps(_) => f64::INFINITY,
@@ -47,7 +47,7 @@ impl Goal {
         }
     }
 
-    /// For the bar: steps, or microseconds.
+    /// The whole length for the progress bar, in steps or microseconds.
     pub fn total(self) -> u64 {
         match self {
             Self::Steps(steps) => steps,
@@ -55,6 +55,7 @@ impl Goal {
         }
     }
 
+    /// The part of [`Goal::total`] that is done.
     pub fn done(self, simulation: &Simulation) -> u64 {
         match self {
             Self::Steps(_) => simulation.steps(),
@@ -62,7 +63,7 @@ impl Goal {
         }
     }
 
-    /// Steps to come if each were as long as this, s.
+    /// Number of steps if each has this length, s.
     pub fn steps(self, dt: f64) -> u64 {
         match self {
             Self::Steps(steps) => steps,
@@ -78,7 +79,7 @@ pub(super) enum Pace {
 }
 
 impl Pace {
-    /// From a time on, s.
+    /// The frames of a run from a time on, s.
     pub fn new(experiment: &Experiment, time: f64) -> Self {
         let every = experiment.scene().run.save_every;
         if experiment.parameters().adaptive {
@@ -88,7 +89,7 @@ impl Pace {
         }
     }
 
-    /// Time to the next frame, s, if steps are to be fitted to it.
+    /// Time to the next frame, s, if steps are fitted to frames; otherwise infinite.
     pub fn left(&self, simulation: &Simulation) -> f64 {
         match self {
             Self::Steps(_) => f64::INFINITY,
@@ -96,6 +97,7 @@ impl Pace {
         }
     }
 
+    /// Whether a frame is due after a step. A due frame counts as saved.
     pub fn frame_is_due(&mut self, simulation: &Simulation) -> bool {
         match self {
             Self::Steps(steps) => simulation.steps().is_multiple_of(*steps),

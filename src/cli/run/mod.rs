@@ -1,6 +1,7 @@
 //! `rfm run`: the fluid of a scene, step by step, with frames, pictures and a summary.
 //!
-//! experiment (scene → simulation) → steps, with a frame, a checkpoint and samples of probes every so often → summary.
+//! A scene becomes an experiment, and this a simulation. It takes steps, with a frame, a checkpoint and
+//! samples of probes at their times, and ends with a summary.
 
 mod bodies;
 mod checkpoints;
@@ -96,21 +97,22 @@ fn conclude(
     Ok(())
 }
 
-/// The experiment of a scene; its warnings are shown.
+/// The experiment of a scene. Its warnings are shown.
 pub(super) fn experiment(shared: &Shared, program: &Program, scene: &str) -> Result<Experiment, Failure> {
     let experiment = Experiment::new(program, scene, shared.engine.into()).map_err(refused)?;
     input::show(&experiment.warnings());
     Ok(experiment)
 }
 
-/// The simulation at its start, and how many particles were carved off; the warnings of the start are shown.
+/// The simulation at its start, and the number of particles that were removed. Warnings about the start are
+/// shown.
 pub(super) fn start(experiment: &Experiment) -> Result<(Simulation, usize), Failure> {
     let start = experiment.start().map_err(refused)?;
     input::show(&start.warnings);
     Ok((start.simulation, start.carved))
 }
 
-/// Shows messages about the scene and makes them findings.
+/// Shows the messages about a scene, and returns the failure for them.
 fn refused(error: Error) -> Failure {
     match error {
         Error::Diagnostics(diagnostics) => {
@@ -121,7 +123,7 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// All that is written while a run goes on.
+/// All that a run writes while it goes on.
 struct Recording<'a> {
     experiment: &'a Experiment,
     frames: Frames,
@@ -137,7 +139,7 @@ enum Stop {
 }
 
 impl Recording<'_> {
-    /// Steps to the goal, or as far as it goes.
+    /// Takes steps until the goal is reached, the user interrupts, or a step fails.
     fn go_on(
         &mut self,
         simulation: &mut Simulation,
@@ -174,7 +176,7 @@ impl Recording<'_> {
                 return Ok(Err(Stop::Interrupted));
             }
         }
-        // a run that goes on and is at its end already has lost the frame that was saved there out of turn
+        // a run that is resumed at its end has lost the frame that was saved there out of turn
         if self.frames.last_time() != simulation.time() {
             self.frames.save(simulation)?;
         }
@@ -182,7 +184,8 @@ impl Recording<'_> {
         Ok(Ok(()))
     }
 
-    /// Writes what is due after a step: frames first, so that a checkpoint never knows of one that is not there.
+    /// Writes what is due after a step. Frames come first, so that a checkpoint never lists a frame that does
+    /// not exist.
     fn record(&mut self, simulation: &Simulation, in_turn: bool, last: bool) -> Result<(), Failure> {
         self.probes.sample(simulation)?;
         if in_turn {
@@ -205,7 +208,7 @@ impl Recording<'_> {
         Ok(())
     }
 
-    /// What is left of a run that ended early.
+    /// Says what a run that ended early has left.
     fn kept(&self) -> String {
         let frames = format!("the frames up to {} s are kept", short_time(self.frames.last_time()));
         match self.checkpoints.last() {
@@ -215,13 +218,13 @@ impl Recording<'_> {
     }
 }
 
-/// Set by Ctrl-C: the run ends after the step that is under way.
+/// A flag that Ctrl-C sets. The run ends after the present step.
 fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     let set = Arc::clone(&flag);
     let handler = move || {
         if set.swap(true, Ordering::Relaxed) {
-            std::process::exit(130); // asked twice
+            std::process::exit(130); // the user pressed Ctrl-C twice
         }
     };
     ctrlc::set_handler(handler).map_err(|e| Failure::usage(format!("cannot listen for Ctrl-C: {e}")))?;

@@ -1,12 +1,12 @@
-//! When something is done again while a run goes on.
+//! Regular instants at which something is done while a run goes on.
 
-/// Instants k·period, each met by the first step that reaches it: steps are not fitted to them, so that whoever
-/// measures does not change what is measured.
+/// Instants k·period. Each is met by the first step that reaches it. Steps are not fitted to them, so that a
+/// measurement does not change what it measures.
 #[derive(Debug, Clone)]
 pub(super) struct Every {
-    /// s
+    /// Time between the instants, s.
     period: f64,
-    /// Number of the next instant, a whole number.
+    /// Number k of the next instant, a whole number.
     next: f64,
 }
 
@@ -18,9 +18,9 @@ impl Every {
         every
     }
 
-    /// Whether an instant has been reached since the last time that one was.
+    /// Whether an instant has been reached since the last one that this function reported.
     pub fn is_due(&mut self, time: f64) -> bool {
-        /// Times are sums of many steps.
+        /// Relative tolerance for times, which are sums of many steps.
         const ROUNDING: f64 = 1e-9;
         let passed = (time / self.period * (1.0 + ROUNDING)).floor();
         let due = passed >= self.next;

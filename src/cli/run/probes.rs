@@ -1,7 +1,7 @@
-//! What probes read, as CSV that grows by one line at a time, and as a plot at the end.
+//! The samples of probes, as CSV that grows by one line at a time, and as a plot at the end.
 //!
-//! Invariant: whatever ends a run, a file holds its header and the lines of all samples before that, and at most one
-//! that is cut off, which `--resume` removes.
+//! Invariant: however a run ends, a file holds its header and the lines of all samples before that. At most
+//! one line is cut off, which `--resume` removes.
 
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
@@ -17,13 +17,14 @@ use crate::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
 
 const FOLDER: &str = "probes";
 
-/// A resumed run takes over samples up to this part after the checkpoint's time, which are those before it: times are
-/// written with twelve digits.
+/// A resumed run takes over samples up to this relative tolerance after the checkpoint's time. Times are
+/// written with twelve digits, so these are the samples before the checkpoint.
 const ROUNDING: f64 = 1e-10;
 
-/// Points of a line of a plot, at most.
+/// Most points of a line of a plot.
 const MOST_POINTS: usize = 2000;
 
+/// The probes of a run.
 pub(super) struct Probes(Vec<Recorder>);
 
 /// One probe with its file.
@@ -36,7 +37,7 @@ struct Recorder {
 }
 
 impl Probes {
-    /// Begins the files, or takes up those of a run that goes on.
+    /// Begins the files of the probes, or continues those of a resumed run.
     pub fn start(
         run_folder: &Path,
         scene: &Scene,
@@ -66,14 +67,14 @@ impl Probes {
             output::write(&path, |out| write!(out, "{header}\n{kept}"))?;
             let file = OpenOptions::new().append(true).open(&path).map_err(|e| not_written(&path, &e))?;
             let every = stated.every.unwrap_or(scene.run.save_every);
-            // a probe that was not there before begins with the present instant
+            // a new probe begins with the present instant
             let clock = Every::after(every, if kept.is_empty() { -every } else { simulation.time() });
             recorders.push(Recorder { name: stated.name.clone(), gauge, clock, path, file });
         }
         Ok(Self(recorders))
     }
 
-    /// Reads those that are due.
+    /// Samples the probes that are due.
     pub fn sample(&mut self, simulation: &Simulation) -> Result<(), Failure> {
         for recorder in &mut self.0 {
             if !recorder.clock.is_due(simulation.time()) {
@@ -85,7 +86,7 @@ impl Probes {
                 let _ = if value.is_nan() { write!(line, ",nan") } else { write!(line, ",{value}") };
             }
             line.push('\n');
-            // in one piece, and not held back
+            // the line is written in one piece and not buffered
             recorder.file.write_all(line.as_bytes()).map_err(|e| not_written(&recorder.path, &e))?;
         }
         Ok(())
@@ -98,7 +99,7 @@ impl Probes {
         }
     }
 
-    /// Draws what was read, as SVG and PNG beside each file.
+    /// Draws the samples as SVG and PNG beside each file.
     pub fn plot(&self) -> Result<(), Failure> {
         for recorder in &self.0 {
             let text = std::fs::read_to_string(&recorder.path)
@@ -117,7 +118,7 @@ impl Probes {
     }
 }
 
-/// Removes what probes of an earlier run have left: its tables and plots, and nothing else.
+/// Removes the tables and plots that the probes of an earlier run have left, and nothing else.
 pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
     let folder = run_folder.join(FOLDER);
     if !folder.is_dir() {
@@ -146,7 +147,7 @@ fn header(probe: &Probe) -> String {
     std::iter::once(TIME.to_string()).chain(columns).collect()
 }
 
-/// Name in a checkpoint.
+/// Name of a probe's memory in a checkpoint.
 fn column(name: &str) -> String {
     format!("probe {name}")
 }
@@ -162,7 +163,7 @@ fn probe(measured: &Measured) -> Probe {
     }
 }
 
-/// The whole lines of a table with times up to `end`; nothing of a table of other columns.
+/// The complete lines of a table with times up to `end`; empty if the table has other columns.
 fn lines_until(path: &Path, header: &str, end: f64) -> String {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let mut lines = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
@@ -178,7 +179,7 @@ fn not_written(path: &Path, error: &std::io::Error) -> Failure {
     Failure::usage(format!("cannot write `{}`: {error}", path.display()))
 }
 
-/// One line for each column over time; where a value is missing, the line is interrupted.
+/// A plot with a line for each column over time. A line is interrupted where a value is missing.
 fn drawn(name: &str, probe: &Probe, table: &str) -> String {
     const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
     let rows: Vec<Vec<f64>> = table

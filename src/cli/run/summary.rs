@@ -1,4 +1,4 @@
-//! What a run says of itself at its end.
+//! The summary of a run at its end.
 
 use serde::Serialize;
 
@@ -8,7 +8,8 @@ use super::watch::Watch;
 use crate::experiment::Deviation;
 use crate::sph::{Pass, Simulation};
 
-/// What `summary.json` and `--json` say; figures that judge the run are the worst of all saved instants.
+/// The content of `summary.json` and the output of `--json`. Figures that judge the run are the worst of all
+/// saved instants.
 #[derive(Debug, Serialize)]
 pub(super) struct Summary {
     schema: u32,
@@ -18,9 +19,9 @@ pub(super) struct Summary {
     time_step: f64,
     particles: usize,
     particles_carved: usize,
-    /// Of one particle, kg.
+    /// Mass of one particle, kg.
     particle_mass: f64,
-    /// kg/m³
+    /// Rest density, kg/m³.
     rest_density: f64,
     milliseconds_per_step: f64,
     neighbours_per_particle: f64,
@@ -32,17 +33,17 @@ pub(super) struct Summary {
     kinetic_energy: f64,
     potential_energy: f64,
     energy_at_start: f64,
-    /// Largest energy of a saved instant above the one at the start, as a part of that; 0 if it only fell, null if
-    /// a fluid that had none at the start has some.
+    /// The largest energy of a saved instant over the one at the start, minus 1; 0 if the energy only fell,
+    /// null if a fluid that had none at the start has some.
     energy_growth: Option<f64>,
     max_speed: f64,
     /// Relative L2 deviation of the pressure from the scene's `truth`, over all saved instants.
     #[serde(skip_serializing_if = "Option::is_none")]
     pressure_error: Option<f64>,
-    /// The same of the velocity.
+    /// Relative L2 deviation of the velocity from the scene's `truth`, over all saved instants.
     #[serde(skip_serializing_if = "Option::is_none")]
     velocity_error: Option<f64>,
-    /// The same of the front on the floor.
+    /// Relative L2 deviation of the front on the floor from the scene's `truth`, over all saved instants.
     #[serde(skip_serializing_if = "Option::is_none")]
     front_error: Option<f64>,
     passes: Vec<&'static str>,
@@ -52,7 +53,7 @@ pub(super) struct Summary {
 }
 
 impl Summary {
-    /// The figures of a run that has ended.
+    /// The summary of a run that has ended.
     pub fn of(watch: &Watch, scene: &str, simulation: &Simulation, frames: usize, finished: bool) -> Self {
         let steps = simulation.steps();
         let deviation = watch.deviations.total();
@@ -89,7 +90,7 @@ impl Summary {
     }
 }
 
-/// The figures as text.
+/// Prints the summary as text.
 pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
     say!(
         "{} particles, {} steps of {:.3e} s = {:.3} s simulated",

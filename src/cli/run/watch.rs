@@ -1,4 +1,5 @@
-//! The figures of a run while it goes on: the last ones and the worst ones of all saved instants.
+//! The figures of a run while it goes on: those of the last saved instant, and the worst of all saved
+//! instants.
 
 use std::time::Duration;
 
@@ -6,23 +7,23 @@ use crate::Experiment;
 use crate::experiment::Deviations;
 use crate::sph::{Checkpoint, Simulation, Stats};
 
-/// Name in a checkpoint of what [`Watch`] remembers.
+/// Name of the memory of [`Watch`] in a checkpoint.
 pub(super) const WATCH: &str = "watch";
 
 /// The figures of a run while it goes on.
 pub(super) struct Watch {
-    /// Spent in steps.
+    /// Time that the steps have taken.
     pub spent: Duration,
     pub carved: usize,
     pub energy_at_start: f64,
     pub most_energy: f64,
-    /// Of the last saved instant.
+    /// Figures of the last saved instant.
     pub now: Stats,
     /// The worst of each figure over all saved instants.
     pub worst: Stats,
-    /// Sum of the neighbours per particle, and the instants that were summed.
+    /// Sum of the neighbours per particle, and the number of instants in it.
     pub neighbours: (f64, usize),
-    /// From what is known of the flow.
+    /// Deviations from the known solution of the flow.
     pub deviations: Deviations,
 }
 
@@ -46,7 +47,7 @@ impl Watch {
         watch
     }
 
-    /// What a run that goes on must know of its beginning.
+    /// The figures as numbers, for a checkpoint.
     pub fn memory(&self) -> Vec<f64> {
         let Self { spent, carved, energy_at_start, most_energy, neighbours, worst, .. } = self;
         let mut memory = vec![
@@ -67,7 +68,7 @@ impl Watch {
         memory
     }
 
-    /// The other way; a memory of another length is none.
+    /// Restores the figures from a memory. A memory of another length is ignored.
     fn take_up(&mut self, memory: &[f64]) {
         let Ok(
             [
@@ -105,6 +106,7 @@ impl Watch {
         };
     }
 
+    /// Takes the figures of the present state.
     pub fn look(&mut self, experiment: &Experiment, simulation: &Simulation) {
         self.deviations.look(experiment, simulation);
         let now = simulation.stats();

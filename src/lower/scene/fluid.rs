@@ -1,4 +1,5 @@
-//! The fluid of a scene and how it is solved: the keys of every method, and those that a method declares for itself.
+//! Reads the fluid of a scene and how it is solved: the keys of every method, and those that a method
+//! declares.
 
 use super::super::lowering::Lowering;
 use super::{Block, Fluid, Solver};
@@ -9,7 +10,7 @@ use crate::quantity::{Bound, Dimension};
 use crate::sph::{Fill, KeyBlock, KeyReader, Method};
 use crate::syntax::ast::Entry;
 
-/// Keys of a fluid in every method.
+/// Keys of a fluid that every method has.
 const FLUID_KEYS: [&str; 12] = [
     "shape",
     "fill",
@@ -25,10 +26,10 @@ const FLUID_KEYS: [&str; 12] = [
     "seed",
 ];
 
-/// Keys of a solver in every method.
+/// Keys of a solver that every method has.
 const SOLVER_KEYS: [&str; 1] = ["precision"];
 
-/// What a scene says of its fluid and of the method.
+/// What a scene states about its fluid and method.
 pub(super) struct FluidAndMethod {
     pub fluid: Fluid,
     pub method: Method,
@@ -50,7 +51,7 @@ impl<'a> Lowering<'a> {
         let stated = self.word_key(scene, "method", &words);
         let fluid = self.fluid_block(scene, stated);
         let solver = self.solver_block(scene, stated);
-        // another method than the stated one reads what both of them have
+        // a method that replaces the stated one reads the keys that both of them have
         let mut method = self.method.or(stated).unwrap_or_default();
         let before = self.errors();
         method.read(&mut MethodKeys { lowering: self, fluid: fluid.as_ref(), solver: &solver });
@@ -68,7 +69,7 @@ impl<'a> Lowering<'a> {
         })
     }
 
-    /// The entries of the fluid; no scene is without one, and this version has no more than one.
+    /// The entries of the fluid. A scene must have one fluid, and this version allows no more.
     fn fluid_block(&mut self, scene: &Block<'a>, method: Option<Method>) -> Option<Block<'a>> {
         let mut fluids = scene.blocks("fluid");
         let Some((label, entries, span)) = fluids.next() else {
@@ -88,7 +89,7 @@ impl<'a> Lowering<'a> {
         Some(block)
     }
 
-    /// The entries of the solver; none if there is no such block.
+    /// The entries of the solver; the block is empty if the scene has none.
     fn solver_block(&mut self, scene: &Block<'a>, method: Option<Method>) -> Block<'a> {
         let (entries, span) =
             scene.blocks("solver").next().map_or((&[][..], scene.span), |(_, entries, span)| (entries, span));
@@ -96,7 +97,8 @@ impl<'a> Lowering<'a> {
         self.block(entries, "a solver", span, &known, &[])
     }
 
-    /// The keys of a block: those of every method and those of this one. A key that only other methods have is reported.
+    /// The known keys of a block: those of every method and those of this one. A key that only other methods
+    /// have is reported.
     fn keys_of(
         &mut self,
         method: Option<Method>,
@@ -107,7 +109,7 @@ impl<'a> Lowering<'a> {
         let own = |method: Method| method.info().keys.into_iter().filter(|key| key.block == block);
         let names = |method: Method| own(method).map(|key| key.name);
         let Some(method) = method else {
-            // which keys are right is not known
+            // the method is unknown, so the keys of all methods are accepted
             let all = Method::all().into_iter().flat_map(names);
             return of_every_method.iter().copied().chain(all).collect();
         };
@@ -121,7 +123,7 @@ impl<'a> Lowering<'a> {
                 let help =
                     format!("{} has it: leave it out, or write `method: {}`", methods.join(", "), methods[0]);
                 self.report(Diagnostic::error(Code::SCENE_KEY, key.span, message).help(help));
-                // known enough not to be reported again
+                // it was reported: known from here on, so that it is not reported twice
                 known.extend(Method::all().into_iter().flat_map(names).filter(|name| *name == key.text));
             }
         }
@@ -168,7 +170,7 @@ impl<'a> Lowering<'a> {
         })
     }
 
-    /// Density, mass and support radius of the particles; a spacing says as much as a mass.
+    /// Reads density, mass and support radius of the particles. A spacing may replace the mass.
     fn resolution(&mut self, block: &Block<'_>, method: &Method) -> Option<Resolution> {
         let mut number =
             |key, dimension, default| self.number_key(block, key, dimension, Some(default), Bound::Positive);
@@ -191,7 +193,7 @@ impl<'a> Lowering<'a> {
         Some(Resolution { density, mass, support_radius })
     }
 
-    /// Three speeds, which may depend on the place.
+    /// Reads the velocity at the start, which may depend on the place.
     fn velocity(&mut self, block: &Block<'_>) -> Option<[Node; 3]> {
         match block.setting("velocity") {
             Some((_, value)) => self.components(value, Dimension::SPEED, "velocity"),
@@ -200,7 +202,7 @@ impl<'a> Lowering<'a> {
     }
 }
 
-/// The keys of a method as a scene states them.
+/// Gives a method the keys that a scene states.
 struct MethodKeys<'r, 'a> {
     lowering: &'r mut Lowering<'a>,
     /// `None` if the scene has no fluid, which was reported.
@@ -209,7 +211,7 @@ struct MethodKeys<'r, 'a> {
 }
 
 impl<'r, 'a> MethodKeys<'r, 'a> {
-    /// The block, if it states the key.
+    /// The block; `None` if it does not state the key.
     fn stating(&self, block: KeyBlock, key: &str) -> Option<&'r Block<'a>> {
         let block = match block {
             KeyBlock::Fluid => self.fluid?,

@@ -1,4 +1,4 @@
-//! Keys of blocks: known ones, each once, with the unit, the range or the word that it asks for.
+//! Keys of blocks: each must be known, stand once, and have the unit, range or word that it asks for.
 
 use glam::DVec3;
 
@@ -13,7 +13,7 @@ use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
 const BLOCKS: [&str; 9] =
     ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux"];
 
-/// The entries of a block whose keys are known, each at most once unless it may be repeated.
+/// The entries of a block. Unknown and repeated keys have been reported.
 pub(in crate::lower) struct Block<'a> {
     pub entries: &'a [Entry],
     /// The name that follows the key, as in `fluid water { … }`.
@@ -23,19 +23,22 @@ pub(in crate::lower) struct Block<'a> {
 }
 
 impl<'a> Lowering<'a> {
+    /// Number of errors so far.
     pub(super) fn errors(&self) -> usize {
         self.diagnostics.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error).count()
     }
 
+    /// Reports that a block lacks a key that it needs.
     pub(in crate::lower) fn missing(&mut self, block: &Block<'_>, key: &str, help: &str) {
         if block.entries.iter().any(|entry| entry.key().text == key) {
-            return; // there, but of the wrong form, which was reported
+            return; // the key is there in the wrong form, which was reported
         }
         let message = format!("{} needs `{key}`", block.what);
         self.report(Diagnostic::error(Code::SCENE_MISSING, block.span, message).help(help));
     }
 
-    /// Reports unknown keys, and known ones that stand twice.
+    /// Makes a [`Block`], and reports unknown keys and known ones that stand twice without being
+    /// `repeatable`.
     pub(in crate::lower) fn block<'b>(
         &mut self,
         entries: &'b [Entry],
@@ -74,7 +77,7 @@ impl<'a> Lowering<'a> {
         Block { entries, label: None, what, span }
     }
 
-    /// The components of a vector, formulas or quantities.
+    /// Reads the components of a vector, each a formula or a quantity.
     pub(super) fn components(&mut self, value: &Expr, dimension: Dimension, key: &str) -> Option<[Node; 3]> {
         let parts = match &value.kind {
             ExprKind::Vector(parts) if parts.len() == 3 => parts,
@@ -101,7 +104,7 @@ impl<'a> Lowering<'a> {
         nodes.try_into().ok()
     }
 
-    /// One of a few words; the first is the default.
+    /// Reads one of a few words. The first is the default; `None` if the word is unknown, which is reported.
     pub(super) fn word_key<T: Copy>(
         &mut self,
         block: &Block<'_>,
@@ -125,7 +128,8 @@ impl<'a> Lowering<'a> {
         meaning
     }
 
-    /// The value of a key, checked; `None` was reported. A key without a default must be present.
+    /// Reads a number and checks its unit and bound; `None` if it is wrong, which is reported. A key without
+    /// a default must be present.
     pub(in crate::lower) fn number_key(
         &mut self,
         block: &Block<'_>,
@@ -144,6 +148,7 @@ impl<'a> Lowering<'a> {
         None
     }
 
+    /// Reads a vector of finite numbers with a unit; `None` if it is wrong, which is reported.
     pub(in crate::lower) fn vector_key(
         &mut self,
         block: &Block<'_>,
@@ -169,7 +174,8 @@ impl<'a> Lowering<'a> {
         None
     }
 
-    /// A whole number of at least `least`; the outer option is an error, the inner one an absent key.
+    /// Reads a whole number of at least `least`. The outer option is `None` if the number is wrong, which is
+    /// reported; the inner one if the key is absent.
     pub(super) fn count_key(&mut self, block: &Block<'_>, key: &str, least: u32) -> Option<Option<usize>> {
         const MOST: f64 = 1e9;
         let Some((_, value)) = block.setting(key) else { return Some(None) };
@@ -182,7 +188,7 @@ impl<'a> Lowering<'a> {
         None
     }
 
-    /// A constant in SI units; a unit, where one is written, must fit.
+    /// Evaluates a constant in SI units. A unit, where one is written, must fit.
     pub(in crate::lower) fn quantity_expr(
         &mut self,
         expr: &Expr,
@@ -218,6 +224,7 @@ impl<'a> Lowering<'a> {
 }
 
 impl<'a> Block<'a> {
+    /// The key and the value of a setting; `None` if the block does not state it.
     pub(in crate::lower) fn setting(&self, key: &str) -> Option<(&'a Name, &'a Expr)> {
         self.entries.iter().find_map(|entry| match entry {
             Entry::Setting { key: name, value } if name.text == key => Some((name, value)),
@@ -225,6 +232,7 @@ impl<'a> Block<'a> {
         })
     }
 
+    /// The inner blocks with a key, each with its label, entries and place.
     pub(in crate::lower) fn blocks(
         &self,
         key: &'static str,

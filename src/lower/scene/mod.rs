@@ -1,8 +1,9 @@
-//! Scenes: keys with units and defaults → plain data for the solver.
+//! Scenes: keys with units and defaults become plain data for the solver.
 //!
 //! Invariant: after this stage every number is finite and in SI units, and every size is positive.
 //!
-//! This file has the data, [`read`] the blocks of a scene, [`fluid`] its fluid and method, [`keys`] what a key may hold.
+//! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, and [`keys`]
+//! what a key may hold.
 
 mod fluid;
 mod keys;
@@ -20,18 +21,19 @@ use crate::ir::Node;
 use crate::precision::Precision;
 use crate::sph::{Fill, Method, Slip};
 
-/// Acceleration of all of the fluid, m/s².
+/// The acceleration of the whole fluid by gravity, m/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Gravity {
+    /// The same at all places and times.
     Still(DVec3),
-    /// Formulas of t alone: a container that turns.
+    /// Formulas of t alone, as for a container that turns.
     Turning([Node; 3]),
-    /// Formulas of the place, and perhaps of t: any body force.
+    /// Formulas of the place, and perhaps of t, for any body force.
     Field([Node; 3]),
 }
 
 impl Gravity {
-    /// Its formulas, if it is not always the same.
+    /// The formulas of gravity; `None` if it is constant.
     pub fn formulas(&self) -> Option<&[Node; 3]> {
         match self {
             Self::Still(_) => None,
@@ -40,127 +42,153 @@ impl Gravity {
     }
 }
 
-/// What a simulation needs, as a file states it.
+/// A scene as a file states it: all that a simulation needs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
+    /// Name of the scene.
     pub name: String,
+    /// Place of the name.
     pub span: Span,
-    /// The container.
+    /// The box of the scene, m.
     pub domain: Aabb,
+    /// Place of the box in the text.
     pub domain_span: Span,
-    /// What the walls of the box do to a particle that hits them.
+    /// How the walls of the box act on a particle that hits them.
     pub walls: Bounce,
-    /// Whether a fluid sticks to the walls of the box, and to obstacles that do not say otherwise.
+    /// Whether the fluid sticks to the walls of the box, and to obstacles that do not say otherwise.
     pub slip: Slip,
-    /// The vessel within the box, if there is one: the fluid stays where it is positive.
+    /// The vessel within the box, if there is one. The fluid stays where its solid is positive.
     pub container: Option<Container>,
+    /// The fluid.
     pub fluid: Fluid,
+    /// The obstacles, in the order of the file.
     pub obstacles: Vec<Obstacle>,
+    /// Gravity.
     pub gravity: Gravity,
+    /// The method that finds the pressure.
     pub method: Method,
+    /// How the method is run.
     pub solver: Solver,
+    /// How long the simulation runs, and what it saves.
     pub run: Run,
-    /// What is known of the flow, to be compared with.
+    /// The known solution with which the flow is compared.
     pub truth: Option<Truth>,
+    /// What is measured during the run.
     pub probes: Vec<Probe>,
-    /// The largest error of ω that is accepted of its obstacles in the box, if one is stated.
+    /// The largest error of ω that is accepted for the obstacles in the box, if it is stated.
     pub tolerance: Option<Tolerance>,
 }
 
-/// What becomes of a particle at a wall.
+/// How a wall acts on a particle that hits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounce {
-    /// Part of the normal speed that is given back, 0 … 1.
+    /// Part of the normal speed that is returned, 0 … 1.
     pub restitution: f64,
     /// Coefficient of friction μ.
     pub friction: f64,
 }
 
-/// What a solid does to the fluid at its surface.
+/// How a solid acts on the fluid at its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Skin {
+    /// How it acts on a particle that hits it.
     pub bounce: Bounce,
+    /// Whether the fluid sticks to it.
     pub slip: Slip,
-    /// Motion within the surface as formulas of x, y, z and t, m/s: of a belt, or of a cylinder that turns.
+    /// Motion within the surface, m/s, as formulas of x, y, z and t: that of a belt, or of a turning
+    /// cylinder.
     pub velocity: Option<[Node; 3]>,
 }
 
-/// A vessel.
+/// A vessel that holds the fluid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Container {
+    /// Name of the solid, or `obstacle` for a shape written on the spot.
     pub name: String,
-    /// Positive outside the vessel: what the fluid meets.
+    /// The wall that the fluid meets: positive outside the vessel.
     pub outside: Node,
+    /// Place of the solid in the text.
     pub span: Span,
+    /// What happens at its surface.
     pub skin: Skin,
 }
 
-/// A flow that is known, as formulas of x, y, z and t.
+/// A known solution of a flow, as formulas of x, y, z and t; `None` for a quantity that is not stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// Pa
+    /// Pressure, Pa.
     pub pressure: Option<Node>,
-    /// m/s
+    /// Velocity, m/s.
     pub velocity: Option<[Node; 3]>,
     /// How far along x the fluid has come on the floor of the box, m: a formula of t alone.
     pub front: Option<Node>,
-    /// From when on it holds, s.
+    /// The time from which on the solution holds, s.
     pub from: f64,
 }
 
 /// How a method is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solver {
-    /// Of sums over neighbours; the method decides if it is not given.
+    /// Precision of the sums over neighbours; `None`: the method decides.
     pub precision: Option<Precision>,
 }
 
-/// The defaults are table 1 of the paper for its method, and those of water and of the particles' spacing for others.
+/// The fluid of a scene. Defaults are table 1 of the paper for its method, and for other methods those of
+/// water and of the particles' spacing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fluid {
+    /// Name of the fluid; `fluid` if it has none.
     pub name: String,
     /// Positive where particles are put at the start.
     pub shape: Node,
+    /// Place of the shape in the text.
     pub shape_span: Span,
     /// Which part of the shape is taken when it has room for more particles than are wanted.
     pub fill: Fill,
-    /// As many as fit if it is not given.
+    /// Number of particles; `None`: as many as fit.
     pub particles: Option<usize>,
+    /// Place of the number of particles in the text, if it is stated.
     pub particles_span: Option<Span>,
     /// Rest density ρ₀, kg/m³.
     pub density: f64,
-    /// Of one particle, kg.
+    /// Mass of one particle, kg.
     pub mass: f64,
     /// Dynamic viscosity, Pa·s.
     pub viscosity: f64,
-    /// N/m
+    /// Surface tension, N/m.
     pub surface_tension: f64,
-    /// h, m
+    /// Support radius h, m.
     pub support_radius: f64,
-    /// At the start, m/s.
+    /// Velocity at the start, m/s, as formulas of x, y and z.
     pub velocity: [Node; 3],
     /// Random displacement of the start positions, as a part of the particle spacing.
     pub jitter: f64,
+    /// Seed of the random displacement.
     pub seed: u64,
 }
 
+/// An obstacle of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
     /// The name of the solid, or `obstacle` for a shape written on the spot.
     pub name: String,
+    /// Positive inside the obstacle.
     pub shape: Node,
+    /// Place of the solid in the text.
     pub span: Span,
+    /// What happens at its surface.
     pub skin: Skin,
 }
 
+/// How long a simulation runs, and how often it saves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Run {
-    /// Fixed time step, s; derived from the fluid if it is not given.
+    /// Fixed time step, s; `None`: it follows from the fluid and the method.
     pub dt: Option<f64>,
     /// End of the simulated time, s.
     pub until: f64,
     /// Time between saved frames, s.
     pub save_every: f64,
-    /// Time between checkpoints, s; one goes with every frame if it is not given.
+    /// Time between checkpoints, s; `None`: one is saved with every frame.
     pub checkpoint_every: Option<f64>,
 }

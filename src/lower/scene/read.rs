@@ -1,4 +1,4 @@
-//! The blocks of a scene, read one after the other.
+//! Reads the blocks of a scene, one after the other.
 
 use glam::DVec3;
 
@@ -37,6 +37,7 @@ const NO_SLIP: (&str, Slip) = ("no_slip", Slip::No);
 const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
 
 impl<'a> Lowering<'a> {
+    /// Reads a scene; `None` if it has errors, which are reported.
     pub fn scene(&mut self, scene: &'a ast::Scene) -> Option<Scene> {
         let errors_before = self.errors();
         let block = self.block(
@@ -93,7 +94,7 @@ impl<'a> Lowering<'a> {
         })
     }
 
-    /// A tolerance of ω; what it may not be is reported.
+    /// Reads a tolerance of ω; `None` if it is not positive and finite, which is reported.
     pub fn tolerance(&mut self, value: &Expr) -> Option<Tolerance> {
         let number = self.quantity_expr(value, Dimension::NONE, "tolerance")?;
         if number > 0.0 && number.is_finite() {
@@ -153,7 +154,8 @@ impl<'a> Lowering<'a> {
         Some(Container { name, outside, span, skin })
     }
 
-    /// What a solid does at its surface; the fluid sticks to it as to all `walls`, unless it says otherwise.
+    /// Reads how a solid acts at its surface. Unless it says otherwise, it lets the fluid slip or stick as
+    /// `walls` do.
     fn skin(&mut self, block: &Block<'_>, walls: Slip) -> Option<Skin> {
         let bounce = self.bounce(block);
         let words = if walls == Slip::No { [NO_SLIP, FREE_SLIP] } else { [FREE_SLIP, NO_SLIP] };

@@ -1,7 +1,7 @@
-//! What a method of the solver says of itself, once: its keys, defaults, passes, and what it saves.
+//! The declaration of a method of the solver: its keys, defaults and passes, and what it saves.
 //!
 //! The reader of scenes, `rfm explain`, the checks of parameters and the tables of the manual all read these
-//! declarations; nothing about a single method is written anywhere else.
+//! declarations. No other place describes a single method.
 
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
@@ -29,45 +29,45 @@ impl KeyBlock {
 
 /// A key of a scene that belongs to a method with the numbers `M`.
 pub struct Key<M: 'static> {
-    /// As scenes write it.
+    /// The key's name, as scenes write it.
     pub name: &'static str,
-    /// Where it stands.
+    /// The block that it stands in.
     pub block: KeyBlock,
-    /// What it is, in one line.
+    /// Its meaning, in one line.
     pub about: &'static str,
-    /// What it may hold, and where that goes.
+    /// What it may hold, and which number that sets.
     pub value: Value<M>,
 }
 
 /// What a key may hold.
 pub enum Value<M: 'static> {
-    /// A number.
+    /// A number with a unit.
     Number {
         /// Its dimension; [`Dimension::NONE`] for a plain number.
         dimension: Dimension,
-        /// What it may be.
+        /// The condition that it must fulfil.
         bound: Bound,
-        /// The number, or `None` while it is derived from others.
+        /// Returns the number; `None` if it is derived from others.
         get: fn(&M) -> Option<f64>,
-        /// States the number.
+        /// Sets the number.
         set: fn(&mut M, f64),
-        /// What the number is where it is derived, in words; empty if it never is.
+        /// How the number is derived if it is not stated, in words; empty if it never is.
         derived: &'static str,
     },
     /// A whole number of at least `least`.
     Count {
         /// The smallest that is accepted.
         least: u32,
-        /// The number.
+        /// Returns the number.
         get: fn(&M) -> u32,
-        /// States the number.
+        /// Sets the number.
         set: fn(&mut M, u32),
     },
-    /// One of a few words, each with what it sets; the first is the default.
+    /// One of a few words, each with the function that sets it. The first is the default.
     Word(&'static [(&'static str, fn(&mut M))]),
 }
 
-/// What a fluid is like when its scene does not say, in a method.
+/// The defaults of a fluid in a method, for keys that its scene does not state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FluidDefaults {
     /// Dynamic viscosity, Pa·s.
@@ -76,18 +76,18 @@ pub struct FluidDefaults {
     pub surface_tension: f64,
     /// Support radius of the kernel.
     pub support: Support,
-    /// Of the sums over neighbours.
+    /// Precision of the sums over neighbours.
     pub precision: Precision,
-    /// Whether steps follow the state unless the scene states their length.
+    /// Whether the length of steps follows the state, unless the scene states it.
     pub adaptive: bool,
 }
 
-/// How large a support radius is.
+/// The size of a support radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Support {
     /// A length, m.
     Metres(f64),
-    /// So many particle spacings.
+    /// A number of particle spacings.
     Spacings(f64),
 }
 
@@ -101,14 +101,15 @@ impl Support {
     }
 }
 
-/// Why a pass of a method does not run with these numbers; `None` if it runs.
+/// The function that says why a pass of a method does not run with given numbers; it returns `None` if the
+/// pass runs.
 pub type Absence<M> = fn(&M, &Parameters) -> Option<&'static str>;
 
-/// A method's description of itself. Its numbers are the type that implements this.
+/// The declaration of a method. The type that implements it holds the method's numbers.
 pub(in crate::sph) trait Declaration: Default + 'static {
-    /// As scenes write it.
+    /// The method's name, as scenes write it.
     const NAME: &'static str;
-    /// What it is, in a few words.
+    /// The method, in a few words.
     const TITLE: &'static str;
     /// How pressure is found, in a few words.
     const PRESSURE: &'static str;
@@ -116,9 +117,9 @@ pub(in crate::sph) trait Declaration: Default + 'static {
     const KERNEL: &'static str;
     /// How long steps are.
     const STEP: &'static str;
-    /// What a fluid is like unless its scene says otherwise.
+    /// The defaults of a fluid.
     const FLUID: FluidDefaults;
-    /// Keys of the method's own.
+    /// Keys that the method declares, besides those that every method has.
     const KEYS: &'static [Key<Self>];
     /// Passes besides those that every method has, each with the reason if it does not run.
     const PASSES: &'static [(Pass, Absence<Self>)];
@@ -126,9 +127,10 @@ pub(in crate::sph) trait Declaration: Default + 'static {
     const SAVES: &'static [&'static str];
 }
 
-/// What asks for the values of keys: the reader of a scene.
+/// A source of values for keys: the reader of a scene implements it. Values out of range are reported to the
+/// user there.
 pub trait KeyReader {
-    /// A number in SI units; `None` if the key is absent, or was reported.
+    /// A number in SI units; `None` if the key is absent, or if its value was wrong and was reported.
     fn number(
         &mut self,
         block: KeyBlock,
@@ -137,14 +139,16 @@ pub trait KeyReader {
         bound: Bound,
     ) -> Option<f64>;
 
-    /// A whole number of at least `least`; `None` if the key is absent, or was reported.
+    /// A whole number of at least `least`; `None` if the key is absent, or if its value was wrong and was
+    /// reported.
     fn count(&mut self, block: KeyBlock, key: &'static str, least: u32) -> Option<u32>;
 
-    /// The index of one of the words; `None` if the key is absent, or was reported.
+    /// The index of one of the words; `None` if the key is absent, or if its value was wrong and was
+    /// reported.
     fn word(&mut self, block: KeyBlock, key: &'static str, words: &[&'static str]) -> Option<usize>;
 }
 
-/// Reads all keys of a method into its numbers.
+/// Sets the numbers of a method from the keys that a scene states.
 pub(super) fn read<M: Declaration>(numbers: &mut M, reader: &mut dyn KeyReader) {
     for Key { name, block, value, .. } in M::KEYS {
         match value {
@@ -168,6 +172,8 @@ pub(super) fn read<M: Declaration>(numbers: &mut M, reader: &mut dyn KeyReader) 
     }
 }
 
+/// Checks the numbers of a method against the bounds of its keys.
+///
 /// # Errors
 /// The first number that its key's bound does not admit.
 pub(super) fn check<M: Declaration>(numbers: &M) -> Result<(), ParameterError> {
@@ -191,12 +197,12 @@ pub(super) fn check<M: Declaration>(numbers: &M) -> Result<(), ParameterError> {
     Ok(())
 }
 
-/// A method in words, for messages and tables.
+/// A method's declaration in words, for messages and tables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodInfo {
-    /// As scenes write it.
+    /// The method's name, as scenes write it.
     pub name: &'static str,
-    /// What it is, in a few words.
+    /// The method, in a few words.
     pub title: &'static str,
     /// How pressure is found, in a few words.
     pub pressure: &'static str,
@@ -204,30 +210,30 @@ pub struct MethodInfo {
     pub kernel: &'static str,
     /// How long steps are.
     pub step: &'static str,
-    /// What a fluid is like unless its scene says otherwise.
+    /// The defaults of a fluid.
     pub fluid: FluidDefaults,
-    /// Its own keys, in the order in which they are read.
+    /// The keys that the method declares, in the order in which they are read.
     pub keys: Vec<KeyInfo>,
-    /// Its own passes.
+    /// The passes that the method declares.
     pub passes: Vec<Pass>,
-    /// Columns that it adds to a checkpoint.
+    /// Names of the columns that the method adds to a checkpoint.
     pub saves: &'static [&'static str],
 }
 
-/// A key in words.
+/// A key's declaration in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyInfo {
-    /// As scenes write it.
+    /// The key's name, as scenes write it.
     pub name: &'static str,
-    /// Where it stands.
+    /// The block that it stands in.
     pub block: KeyBlock,
-    /// What it is, in one line.
+    /// Its meaning, in one line.
     pub about: &'static str,
     /// Its unit; `None` for plain numbers and words.
     pub unit: Option<&'static str>,
-    /// What it accepts: a bound, or the words.
+    /// What it accepts: the range of a number, or the words.
     pub accepts: String,
-    /// What it is unless it is stated.
+    /// Its value if it is not stated.
     pub default: String,
 }
 
@@ -246,7 +252,7 @@ impl MethodInfo {
         }
     }
 
-    /// The key of a block by its name, if the method has it.
+    /// The key with this name in a block; `None` if the method does not have it.
     pub fn key(&self, block: KeyBlock, name: &str) -> Option<&KeyInfo> {
         self.keys.iter().find(|key| key.block == block && key.name == name)
     }

@@ -1,8 +1,8 @@
-//! How pressure is found: a folder for each method, which declares it and holds its scheme, a readable `step` over the
-//! stages of [`Core`].
+//! The methods that find the pressure. Each has a folder, which declares the method and holds its scheme, a
+//! readable `step` over the stages of [`Core`](super::core::Core).
 //!
-//! To add a method: a folder with its numbers, their [`Declaration`] and their [`Numerics`], and one line in the list at
-//! the end of this file.
+//! To add a method, write a folder with its numbers, their [`Declaration`] and their [`Numerics`], and one
+//! line in the list in the middle of this file.
 
 mod declaration;
 mod dfsph;
@@ -28,10 +28,11 @@ pub(super) use numerics::{Numerics, Scheme};
 use super::params::{ParameterError, Parameters};
 use super::passes::Pass;
 
-/// Makes the type [`Method`] of a list of methods, and hands its questions to the one that is chosen.
+/// Makes the type [`Method`] from a list of methods, and forwards its functions to the method that is chosen.
 macro_rules! methods {
     ($($(#[$about:meta])* $method:ident),* $(,)?) => {
-        /// How pressure is found. Every method has density and motion; what else runs, its numbers decide.
+        /// A method that finds the pressure, with its numbers. Every method has density and motion; its
+        /// numbers decide what else runs.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum Method {
             $($(#[$about])* $method($method)),*
@@ -43,26 +44,28 @@ macro_rules! methods {
                 vec![$(Self::$method($method::default())),*]
             }
 
-            /// The method in words.
+            /// The method's declaration in words, for messages and tables.
             pub fn info(&self) -> MethodInfo {
                 match self { $(Self::$method(_) => MethodInfo::of::<$method>()),* }
             }
 
-            /// As scenes write it.
+            /// The method's name, as scenes write it.
             pub fn name(&self) -> &'static str {
                 match self { $(Self::$method(_) => $method::NAME),* }
             }
 
-            /// What a fluid is like unless its scene says otherwise.
+            /// The defaults of a fluid in this method.
             pub fn fluid(&self) -> FluidDefaults {
                 match self { $(Self::$method(_) => $method::FLUID),* }
             }
 
-            /// Reads the keys that a scene states into the method's numbers.
+            /// Sets the numbers of the method from the keys that a scene states.
             pub fn read(&mut self, reader: &mut dyn KeyReader) {
                 match self { $(Self::$method(numbers) => read(numbers, reader)),* }
             }
 
+            /// Checks the numbers of the method against the bounds of its keys.
+            ///
             /// # Errors
             /// The first number that its bound does not admit.
             pub(super) fn check(&self) -> Result<(), ParameterError> {
@@ -92,16 +95,17 @@ macro_rules! methods {
 }
 
 methods! {
-    /// Equations 8–14 of the paper, corrected.
+    /// The method of the paper, equations 8–14, corrected.
     Paper,
     /// Weakly compressible: density from the equation of continuity, pressure by Tait's equation.
     Wcsph,
-    /// Divergence-free (Bender & Koschier 2017): pressure is solved for, so that the density stays.
+    /// Divergence-free (Bender & Koschier 2017): the pressure is solved for, so that the density stays
+    /// constant.
     Dfsph,
 }
 
 impl Method {
-    /// A method by its name, with its default numbers.
+    /// The method with this name and default numbers; `None` if there is no such method.
     pub fn named(name: &str) -> Option<Self> {
         Self::all().into_iter().find(|method| method.name() == name)
     }
@@ -123,7 +127,7 @@ impl Default for Method {
 mod tests {
     use super::*;
 
-    /// States nothing, or the first word of each key.
+    /// A reader that states no key, or the first word of each key.
     struct FirstWords(bool);
 
     impl KeyReader for FirstWords {

@@ -1,22 +1,23 @@
-//! What becomes of a pressure below zero.
+//! What happens to a pressure below zero.
 
-/// What an equation of state answers where the density is below the rest density.
+/// What an equation of state returns where the density is below the rest density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NegativePressure {
-    /// Pressure is not below zero: the fluid pushes, and never pulls.
+    /// Pressure is cut off at zero: the fluid pushes, and never pulls.
     ///
-    /// The default. At a free surface half of the neighbours are missing, so the density found there is about
-    /// half of the rest density, and the unclamped law of the paper answers with a tension of kρ₀/2: an artefact of the
-    /// sum, not a property of the fluid. Under tension the pressure kernel pulls until particles coincide;
-    /// with the values of table 1 some 32 of them must lie in one point before their density reaches ρ₀.
+    /// This is the default. At a free surface half of the neighbours are missing, so the density found there
+    /// is about half of the rest density, and the unclamped law of the paper gives a tension of kρ₀/2. That
+    /// is an artefact of the sum, not a property of the fluid. Under tension the pressure kernel pulls until
+    /// particles coincide: with the values of table 1 some 32 of them must lie in one point before their
+    /// density reaches ρ₀.
     #[default]
     Clamp,
-    /// Pressure may be negative, as in Kelager (2006): keeps a drop together, and makes particles clump.
+    /// Pressure may be negative, as in Kelager (2006). This keeps a drop together, and makes particles clump.
     Keep,
 }
 
 impl NegativePressure {
-    /// The pressure that acts, from that of the equation of state, Pa.
+    /// The pressure that acts, Pa, from that of the equation of state, Pa.
     #[inline]
     pub(super) fn of(self, pressure: f64) -> f64 {
         match self {

@@ -1,4 +1,5 @@
-//! What the solver asks of a method: of its numbers, and of its scheme at work.
+//! The interface between the solver and a method: its numbers ([`Numerics`]) and its scheme at work
+//! ([`Scheme`]).
 
 use std::f64::consts::PI;
 
@@ -8,31 +9,35 @@ use crate::sph::params::{ParameterError, Parameters};
 use crate::sph::simulation::StepError;
 use crate::sph::walls::{Wall, WallKernel};
 
-/// Fraction of the support radius that a particle and a sound wave together may cross in one step: the customary value for
-/// weakly compressible fluids, cautious for the paper's. A drop of 3000 particles on the pawn has, at 0.5 s and 1 s, 1037.8
-/// and 300.6 J with steps of 0.5 ms; 1037.6 and 297.6 J with 2 ms; 1037.0 and 297.2 J with 4 ms; 1034.3 and 290.3 J with
-/// 10 ms. The bound at the fastest instant is 3.2 ms.
+/// Part of the support radius that a particle and a sound wave together may cross in one step: the customary
+/// value for weakly compressible fluids, cautious for the paper's. A drop of 3000 particles on the pawn has,
+/// at 0.5 s and 1 s, 1037.8 and 300.6 J with steps of 0.5 ms; 1037.6 and 297.6 J with 2 ms; 1037.0 and 297.2
+/// J with 4 ms; 1034.3 and 290.3 J with 10 ms. The bound at the fastest instant is 3.2 ms.
 const COURANT: f64 = 0.25;
 
-/// Factor of √(h/a): a particle that is accelerated from rest moves 1/32 of h in such a step.
+/// Factor of √(h/a) in the limit for an acceleration a: a particle that is accelerated from rest moves 1/32
+/// of h in such a step.
 const FORCE_FACTOR: f64 = 0.25;
 
-/// What the solver asks of a method's numbers.
+/// What the solver needs to know of a method's numbers.
 pub(in crate::sph) trait Numerics {
-    /// Makes the scheme and finds densities and forces of the first instant. If the fluid is not new, those of a
-    /// checkpoint replace them afterwards.
+    /// Makes the scheme and finds densities and forces of the first instant. If the fluid goes on from a
+    /// checkpoint, those of the checkpoint replace them afterwards.
     fn start(&self, core: &mut Core, is_new: bool) -> Box<dyn Scheme>;
 
+    /// Checks what the bounds of single keys do not cover.
+    ///
     /// # Errors
-    /// What the bounds of single keys do not say.
+    /// The first parameter that is out of range.
     fn validate(&self, _parameters: &Parameters) -> Result<(), ParameterError> {
         Ok(())
     }
 
-    /// Speed of sound, m/s; 0 if the method knows no compression.
+    /// Speed of sound, m/s; 0 if the method has no compression.
     fn sound_speed(&self, parameters: &Parameters) -> f64;
 
-    /// The longest step, s, for which sound and particles of this speed (m/s) stay within their part of the support.
+    /// The longest step, s, in which sound and particles with this greatest speed, m/s, stay within their
+    /// part of the support.
     fn courant_dt(&self, parameters: &Parameters, max_speed: f64) -> f64 {
         COURANT * parameters.support_radius / (self.sound_speed(parameters) + max_speed)
     }
@@ -42,8 +47,8 @@ pub(in crate::sph) trait Numerics {
         0.125 * (0.5 * parameters.support_radius).powi(2) * parameters.rest_density / parameters.viscosity
     }
 
-    /// The longest step, s, that surface tension allows, ¼√(ρ(h/2)³/2πσ): a ripple as short as the smoothing length
-    /// (Brackbill et al. 1992).
+    /// The longest step, s, that surface tension allows: ¼√(ρ(h/2)³/2πσ), for a ripple as short as the
+    /// smoothing length (Brackbill et al. 1992).
     fn capillary_dt(&self, parameters: &Parameters) -> f64 {
         let half = 0.5 * parameters.support_radius;
         let ripple = parameters.rest_density * half.powi(3) / (2.0 * PI * parameters.surface_tension);
@@ -55,28 +60,30 @@ pub(in crate::sph) trait Numerics {
         FORCE_FACTOR
     }
 
-    /// How much longer a step may be when a is the particles' present acceleration, pressure included.
+    /// Factor by which a step may be longer if the acceleration a is the present one, pressure included.
     fn present_force_gain(&self) -> f64 {
         1.0
     }
 
-    /// Whether walls and obstacles add to the density, or act on positions and velocities only.
+    /// Whether walls and obstacles add to the density of particles. If not, they act on positions and
+    /// velocities only.
     fn walls_have_density(&self) -> bool {
         true
     }
 
-    /// What walls are to the method's sums.
+    /// How walls enter the sums of the method.
     fn wall(&self, parameters: &Parameters) -> Wall {
         Wall { kernel: WallKernel::WendlandC2, h: parameters.support_radius, layer: None }
     }
 
-    /// The density, kg/m³, of a particle that starts under this pressure, Pa; `None` if all start at rest density.
+    /// The density, kg/m³, of a particle that starts under a pressure, Pa; `None` if all start at the rest
+    /// density.
     fn density_at_start(&self, _parameters: &Parameters, _pressure: f64) -> Option<f64> {
         None
     }
 
-    /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped. Only
-    /// densities that do not follow from the particles' places bear that.
+    /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.
+    /// This suits only methods whose densities do not follow from the places of particles.
     fn makes_room_at_start(&self) -> bool {
         false
     }
@@ -85,17 +92,19 @@ pub(in crate::sph) trait Numerics {
     fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64;
 }
 
-/// A method at work: what it keeps between steps.
+/// A method at work, with what it keeps between steps.
 pub(in crate::sph) trait Scheme: Send + Sync {
     /// Advances by one step of at most `longest` seconds, and returns how long it was.
     ///
     /// # Errors
-    /// What is not finite any more.
+    /// [`StepError`] if a value is not finite any more, or steps have become too short.
     fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError>;
 
     /// Puts into a checkpoint what the next step needs besides the particles and their accelerations.
     fn save(&self, _checkpoint: &mut Checkpoint) {}
 
+    /// Restores from a checkpoint what [`Scheme::save`] put there.
+    ///
     /// # Errors
     /// The column that the checkpoint lacks.
     fn restore(&mut self, _checkpoint: &Checkpoint) -> Result<(), CheckpointError> {

@@ -1,11 +1,11 @@
-//! The methods and their keys as a page for people, in Markdown: what `rfm explain --methods` prints.
+//! The methods and their keys as a page in Markdown, which `rfm explain --methods` prints.
 
 use std::fmt::Write as _;
 
 use super::declaration::{KeyInfo, MethodInfo, Support};
 use super::{KeyBlock, Method};
 
-/// One line for each method: how it finds the pressure, and its own keys.
+/// A table with one row for each method: how it finds the pressure, and which keys it has.
 pub fn overview() -> String {
     let mut text = String::from(
         "| `method:` | pressure | kernel; neighbours | time step | keys of its own |\n|---|---|---|---|---|\n",
@@ -17,7 +17,7 @@ pub fn overview() -> String {
     text
 }
 
-/// The overview, and a section for each method with all that it declares.
+/// The [`overview`], followed by a section for each method with all that it declares.
 pub fn reference() -> String {
     let mut text = format!(
         "# Methods of the solver\n\nThis page is what `rfm explain --methods` prints. A key that the method of a scene does \
@@ -60,7 +60,7 @@ fn section(text: &mut String, method: &MethodInfo) -> std::fmt::Result {
     Ok(())
 }
 
-/// A key as one writes it: those of the solver within their block.
+/// A key as a scene writes it: keys of the solver stand within their block.
 fn in_its_block(key: &KeyInfo) -> String {
     match key.block {
         KeyBlock::Fluid => format!("`{}`", key.name),

@@ -1,14 +1,16 @@
-//! Surface tension as a force on the surface's layer of particles (Brackbill et al. 1992), for a fluid without an outside.
+//! Surface tension as a force on the layer of particles at the surface (Brackbill et al. 1992), for a fluid
+//! without an outer phase.
 //!
 //! ```text
 //! n_i = Σ V ∇W + ∇λ          into the fluid, of the length A(δ)/h at the depth δh below a flat surface
-//! κ_i = −∇·(n/|n|)           Σ over those that have a normal, over what the sum makes of the gradient of a position
+//! κ_i = −∇·(n/|n|)           Σ over neighbours with a normal, divided by the sum's own tangential moment
 //! a_i = (2σ/ρ₀)·κ_i·n_i
 //! ```
 //!
-//! Only half of ∫|∇c| across the surface lies within the fluid, hence the factor 2: over a closed drop the pressure jumps
-//! by σκ. The sums for κ are one-sided as the fluid is, so they are divided by their own tangential moment
-//! Σ V c f·½(r² − (r·n̂)²), which is exact where the normals turn evenly (Sirotkin & Yoh 2012 renormalise the full matrix).
+//! Only half of ∫|∇c| across the surface lies within the fluid, hence the factor 2: over a closed drop the
+//! pressure jumps by σκ. The sums for κ are one-sided, as the fluid is, so they are divided by their own
+//! tangential moment Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly (Sirotkin & Yoh
+//! 2012 renormalise the full matrix).
 //!
 //! Walls count as fluid: a surface meets a wall at a right angle.
 
@@ -23,27 +25,27 @@ use crate::sph::{
     particles::Vectors,
 };
 
-/// Of |n|·h: a flat surface has 1.5 where the particle lies in it, and noise in the depth has some 0.05. Below the first
-/// a particle has no normal, from the second on it has one.
+/// Limits of |n|·h: below the first a particle has no normal, from the second on it has one. A flat surface
+/// has 1.5 where the particle lies in it, and noise in the depth has some 0.05.
 const NORMAL: [f64; 2] = [0.1, 0.3];
 
 /// A neighbourhood with less than this part of a full tangential moment has no curvature.
 const LEAST_MOMENT: f64 = 0.05;
 
-/// Working memory, kept between steps.
+/// The stage that adds surface tension, with its working memory.
 #[derive(Default)]
 pub(super) struct Tension {
     /// n̂ times its weight.
     direction: Vectors,
-    /// 0 to 1
+    /// Weight of the normal, 0 to 1.
     weight: Vec<f64>,
-    /// n, 1/m
+    /// Normals n, 1/m.
     normal: Vectors,
     force: Vectors,
 }
 
 impl Tension {
-    /// Adds the tension's accelerations, if the fluid has any.
+    /// Adds the accelerations by surface tension, if the fluid has any.
     pub fn act(&mut self, core: &mut Core) {
         let parameters = &core.parameters;
         if parameters.surface_tension == 0.0 {
@@ -75,11 +77,11 @@ impl Tension {
     }
 }
 
-/// n, n̂ and its weight.
+/// Finds n, n̂ and its weight.
 #[derive(Clone, Copy)]
 struct Normals<'a> {
     kernel: Wendland,
-    /// V·c
+    /// The factor V·c of the kernel's gradient.
     steepness: f64,
     core: &'a Core,
 }
@@ -114,11 +116,11 @@ impl PairPass<0, 3, 7> for Normals<'_> {
     }
 }
 
-/// a by tension.
+/// Finds the acceleration by surface tension.
 #[derive(Clone, Copy)]
 struct Curvature<'a> {
     kernel: Wendland,
-    /// V·c
+    /// The factor V·c of the kernel's gradient.
     steepness: f64,
     parameters: &'a Parameters,
     normal: &'a Vectors,

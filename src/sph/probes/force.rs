@@ -1,4 +1,4 @@
-//! What a fluid does to an obstacle: minus what the obstacle does to the fluid.
+//! The force of a fluid on an obstacle, which is minus the force of the obstacle on the fluid.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -14,12 +14,12 @@ use crate::{
     },
 };
 
-/// Impulses that obstacles took from particles that hit them, since the start.
+/// Impulses that obstacles have received from particles that hit them since the start.
 #[derive(Debug, Default)]
 pub struct Contacts {
     /// Impulse and moment of impulse about the origin of each obstacle, N·s and N·m·s.
     totals: Vec<[f64; 6]>,
-    /// Of the step that is under way, as threads find them.
+    /// Hits of the present step, in the order in which threads find them.
     now: Mutex<Vec<Hit>>,
 }
 
@@ -33,16 +33,19 @@ struct Hit {
 }
 
 impl Contacts {
+    /// The state before any contact, for a number of obstacles.
     pub fn of(obstacles: usize) -> Self {
         Self { totals: vec![[0.0; 6]; obstacles], now: Mutex::default() }
     }
 
+    /// Notes that an obstacle changed the velocity of a particle at a place.
     pub fn add(&self, particle: usize, obstacle: usize, change: DVec3, at: DVec3) {
         let mut now = self.now.lock().unwrap_or_else(PoisonError::into_inner);
         now.push(Hit { particle, obstacle, change, at });
     }
 
-    /// Adds the step's hits, particle by particle, whichever thread found them first.
+    /// Adds the hits of the step to the totals, particle by particle, so that the sum does not depend on
+    /// which thread was first.
     pub fn settle(&mut self, mass: f64) {
         let now = self.now.get_mut().unwrap_or_else(PoisonError::into_inner);
         now.sort_by_key(|hit| hit.particle); // stable: the hits of one particle stay in their order
@@ -56,16 +59,17 @@ impl Contacts {
         }
     }
 
+    /// Impulse, N·s, and moment of impulse about the origin, N·m·s, that an obstacle has received.
     pub fn total(&self, obstacle: usize) -> [f64; 6] {
         self.totals[obstacle]
     }
 
-    /// All totals, one after the other.
+    /// The totals of all obstacles in their order.
     pub fn totals(&self) -> &[[f64; 6]] {
         &self.totals
     }
 
-    /// The other way; as many as there are.
+    /// Restores the totals of a checkpoint, for as many obstacles as both have.
     pub fn restore(&mut self, totals: &[f64]) {
         for (total, values) in self.totals.iter_mut().zip(totals.as_chunks::<6>().0) {
             *total = *values;
@@ -73,19 +77,20 @@ impl Contacts {
     }
 }
 
-/// A force and its moment about the origin, as one about a point.
+/// A force and its moment about the origin → the force and its moment about a point.
 pub fn about([x, y, z, u, v, w]: [f64; 6], point: DVec3) -> [f64; 6] {
     let force = DVec3::new(x, y, z);
     let moment = DVec3::new(u, v, w) - point.cross(force);
     [x, y, z, moment.x, moment.y, moment.z]
 }
 
-/// Force and torque by pressure and, where the fluid sticks to walls, by friction: ∫ p n over the obstacle's surface.
+/// Force and torque by pressure, ∫ p n over the obstacle's surface, and by friction where the fluid sticks to
+/// walls.
 ///
-/// ∇λ of an obstacle is a layer over its surface that weighs ½ in the fluid, so that the integral is a sum of 2V·p·∇λ
-/// over the particles, with the pressure taken on to the surface by the balance ∇p = ρ(g − a). (What the method's wall
-/// terms give to the particles, summed, is less in a narrow vessel: its completed sums let the side walls carry 7 % of a
-/// column ten spacings wide.)
+/// ∇λ of an obstacle is a layer over its surface that weighs ½ in the fluid. The integral is therefore a sum
+/// of 2V·p·∇λ over the particles, with the pressure continued to the surface by the balance ∇p = ρ(g − a).
+/// (The sum of what the method's wall terms give to the particles is too small in a narrow vessel: its
+/// completed sums let the side walls carry 7 % of a column ten spacings wide.)
 pub fn pressure_on(core: &Core, obstacle: usize, point: DVec3) -> [f64; 6] {
     let Core { parameters, particles, .. } = core;
     if !parameters.walls_have_density() {
@@ -93,7 +98,7 @@ pub fn pressure_on(core: &Core, obstacle: usize, point: DVec3) -> [f64; 6] {
     }
     let field = core.boundary.field(obstacle);
     let (h, mass) = (parameters.support_radius, parameters.particle_mass);
-    // an integral over the surface, whatever the walls are to the sums
+    // the integral over the surface needs a continuous wall, even if the method's sums take it in layers
     let surface = Wall { layer: None, ..*core.wall() };
     let friction = match core.boundary.obstacles[obstacle].slip {
         Slip::Free => 0.0,

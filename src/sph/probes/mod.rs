@@ -1,10 +1,11 @@
-//! Figures at places, through planes and on bodies, from the particles alone.
+//! Probes: figures at places, through planes and on bodies, computed from the particles alone.
 //!
-//! A field A at a place x is a fit to the particles around it, weighted by the method's kernel: where at least half of
-//! the kernel's free part is filled, a linear one, A(x) + ∇A·(x_j − x), by least squares, so that a field that is linear
-//! in space is met exactly, at a wall too; elsewhere the mean Σ A_j V_j W / Σ V_j W (Shepard 1968).
+//! The value of a field A at a place x is a fit to the particles around it, weighted by the method's kernel.
+//! Where at least half of the kernel's free part is filled, the fit is linear, A(x) + ∇A·(x_j − x), by least
+//! squares, so that a field that is linear in space is met exactly, also at a wall. Elsewhere it is the mean
+//! Σ A_j V_j W / Σ V_j W (Shepard 1968).
 //!
-//! Invariants: a probe looks at a state and leaves it as it was; sums run in the solver's order, so that the same state
+//! Invariants: a probe leaves the state as it is. Sums run in the solver's order, so that the same state
 //! gives the same bits.
 
 mod force;
@@ -22,39 +23,63 @@ use super::{
 
 pub(super) use force::Contacts;
 
-/// Of the variance of places along the weakest direction, in units of h²: below it a slope along that direction is not
-/// asked for. In a full neighbourhood the variance is 0.05 (Wendland) to 0.1 (poly6), at a wall half of it.
+/// Regularisation of the variance of places along each direction, in units of h². Along a direction in which
+/// the variance is below it, the fit has no slope. In a full neighbourhood the variance is 0.05 (Wendland) to
+/// 0.1 (poly6), at a wall half of that.
 const LEAST_SPREAD: f64 = 1e-5;
 
-/// Walls take no more of a kernel than this; in the corner of a box they take seven eighths.
+/// Largest part of a kernel that walls are taken to cover. In the corner of a box they cover seven eighths.
 const MOST_COVERED: f64 = 0.9;
 
 /// What is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Probe {
-    /// z of the fluid's surface above (x, y), m: the highest place at which half of what walls leave of the kernel is
-    /// filled. Drops and spray are not, a dry place has the z of the box's floor.
-    Height { x: f64, y: f64 },
-    /// Pa; zero where no fluid is within the support radius.
-    Pressure { at: DVec3 },
-    /// m/s; NaN where no fluid is within the support radius.
-    Velocity { at: DVec3 },
-    /// What the fluid does to an obstacle, N, and its torque about a point, N·m.
+    /// Height z of the fluid's surface above (x, y), m: the highest place at which half of the kernel's part
+    /// outside walls is filled. Drops and spray do not count. A dry place has the z of the box's floor.
+    Height {
+        /// x of the place, m.
+        x: f64,
+        /// y of the place, m.
+        y: f64,
+    },
+    /// Pressure at a place, Pa; zero if no fluid is within the support radius.
+    Pressure {
+        /// The place, m.
+        at: DVec3,
+    },
+    /// Velocity at a place, m/s; NaN if no fluid is within the support radius.
+    Velocity {
+        /// The place, m.
+        at: DVec3,
+    },
+    /// Force of the fluid on an obstacle, N, and its torque about a point, N·m.
     ///
-    /// Counted are the fluid's pressure on the obstacle's faces, the friction where the fluid sticks to walls, and the
-    /// contacts of particles, averaged over the time since the last sample. The paper's method knows contacts only. Pressures
-    /// of `dfsph` are means over the time in which a density comes back: of an impact it tells that much later.
-    Force { obstacle: usize, about: DVec3 },
-    /// Mass per second through a plane, along its normal, kg/s: ∫ ρ v·n over the plane with the density and velocity
-    /// that the kernel makes of the particles.
-    Flux { point: DVec3, normal: DVec3 },
-    /// Kinetic, potential and elastic energy and their sum, J. Potential: from the box's lowest corner along gravity.
-    /// Elastic: ∫ p/ρ² dρ from the density at rest, zero for a fluid that is not compressible.
+    /// The force consists of the fluid's pressure on the obstacle's faces, the friction where the fluid
+    /// sticks to walls, and the contacts of particles, averaged over the time since the last sample. With the
+    /// paper's method there are contacts only. `dfsph` averages pressures over its relaxation time, so the
+    /// force of an impact appears that much later.
+    Force {
+        /// Number of the obstacle, from 0.
+        obstacle: usize,
+        /// The point to which the torque refers, m.
+        about: DVec3,
+    },
+    /// Mass flow through a plane along its normal, kg/s: ∫ ρ v·n over the plane, with the density and
+    /// velocity that the kernel interpolates between the particles.
+    Flux {
+        /// A point of the plane, m.
+        point: DVec3,
+        /// Unit normal of the plane.
+        normal: DVec3,
+    },
+    /// Kinetic, potential and elastic energy and their sum, J. Potential energy is measured from the box's
+    /// lowest corner along gravity. Elastic energy is ∫ p/ρ² dρ from the rest density, zero for an
+    /// incompressible fluid.
     Energy,
 }
 
 impl Probe {
-    /// Names and units of the figures.
+    /// Names and units of the figures that a sample has.
     pub fn columns(&self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::Height { .. } => &[("height", "m")],
@@ -74,25 +99,27 @@ impl Probe {
     }
 }
 
-/// A probe with what it remembers of its last sample.
+/// A probe with its memory of the last sample. [`Simulation::gauge`](super::Simulation::gauge) makes one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gauge {
+    /// What is measured.
     pub probe: Probe,
-    /// Time, impulse and moment of impulse of the obstacle's contacts at the last sample.
+    /// Time of the last sample, and impulse and moment of impulse of the obstacle's contacts up to then.
     last: [f64; 7],
 }
 
 impl Gauge {
+    /// A probe that has not been sampled yet.
     pub fn new(probe: Probe) -> Self {
         Self { probe, last: [0.0; 7] }
     }
 
-    /// What must not be lost between two samples.
+    /// What the probe remembers between two samples, for a checkpoint.
     pub fn memory(&self) -> &[f64] {
         &self.last
     }
 
-    /// A probe that goes on; a memory of the wrong length is none.
+    /// A probe with the memory of an earlier one; a memory of the wrong length is ignored.
     pub fn remembering(probe: Probe, memory: &[f64]) -> Self {
         Self { probe, last: memory.try_into().unwrap_or([0.0; 7]) }
     }
@@ -125,7 +152,7 @@ impl Gauge {
     }
 }
 
-/// The kernel of a method, from the square of a distance.
+/// The kernel of a method, as a function of the square of a distance.
 #[derive(Clone, Copy)]
 struct Weight {
     poly6: Kernels,
@@ -140,13 +167,13 @@ impl Weight {
         Self { poly6: Kernels::new(h), wendland: Wendland::new(h), kernel, h }
     }
 
-    /// 1/m³
+    /// W, 1/m³.
     fn at(&self, r2: f64) -> f64 {
         if self.kernel == WallKernel::Poly6 { self.poly6.poly6(r2) } else { self.wendland.at(r2) }
     }
 }
 
-/// How much of the kernel at a place is filled with fluid, of what walls leave of it: one in the fluid's depth.
+/// The filled part of the kernel at a place, relative to its part outside walls: one deep in the fluid.
 fn filling(core: &Core, weight: &Weight, at: DVec3, particles: impl Iterator<Item = DVec3>) -> f64 {
     let volume = core.parameters.particle_mass / core.parameters.rest_density;
     let filled: f64 = particles.map(|p| volume * weight.at(p.distance_squared(at))).sum();
@@ -183,7 +210,7 @@ fn height(core: &Core, x: f64, y: f64) -> f64 {
 struct Neighbourhood<'a> {
     core: &'a Core,
     at: DVec3,
-    /// Particle and weight V·W.
+    /// Index and weight V·W of each particle within the support radius.
     near: Vec<(usize, f64)>,
     filling: f64,
 }
@@ -210,7 +237,7 @@ impl<'a> Neighbourhood<'a> {
         self.fit(|i| self.core.particles.velocity.get(i)).unwrap_or(DVec3::NAN)
     }
 
-    /// Of three fields at once; none where no particle is near.
+    /// The fit of three fields at once; `None` if no particle is near.
     fn fit(&self, field: impl Fn(usize) -> DVec3) -> Option<DVec3> {
         let h = self.core.parameters.support_radius;
         let place = |i: usize| (self.core.particles.position.get(i) - self.at) / h;
@@ -236,7 +263,8 @@ impl<'a> Neighbourhood<'a> {
     }
 }
 
-/// ∫ W over the plane is the slope of what a wall there would take of the kernel.
+/// The mass flow through a plane. ∫ W over the plane is the slope of what a wall there would cover of the
+/// kernel.
 fn flux(core: &Core, point: DVec3, normal: DVec3) -> f64 {
     let Weight { kernel, h, .. } = Weight::of(core);
     let particles = core.particles.position.iter().zip(core.particles.velocity.iter());

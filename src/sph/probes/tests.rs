@@ -53,7 +53,7 @@ fn bowl() -> Aabb {
     Aabb::new(DVec3::ZERO, DVec3::new(WIDTH, WIDTH, 1.0))
 }
 
-/// A state that is given, not computed.
+/// A simulation whose state is given, not computed.
 fn state(method: Method, particles: Particles, domain: Aabb) -> Core {
     state_around(method, particles, domain, Vec::new())
 }
@@ -87,7 +87,8 @@ fn a_linear_pressure_is_met_exactly_at_walls_too() {
         for z in [0.0, 0.03, 0.2, 0.33] {
             let found = Neighbourhood::around(&core, DVec3::new(x, y, z)).pressure();
             let exact = RHO * G * (DEPTH - z);
-            // LEAST_SPREAD against the variance of the places: some 1e-3 of the pressure over a support radius
+            // LEAST_SPREAD against the variance of the places: some 1e-3 of the pressure over a support
+            // radius
             assert!(
                 (found - exact).abs() < 2e-3 * RHO * G * core.parameters.support_radius,
                 "{x} {y} {z}: {found} {exact}"
@@ -137,7 +138,7 @@ fn a_falling_block_carries_its_mass_through_a_plane() {
         let area = (to.x - from.x) * (to.y - from.y);
         for z in [0.5, 0.512, 0.55, 0.63] {
             let found = flux(&core, DVec3::new(0.0, 0.0, z), -DVec3::Z);
-            // the lattice's layers are summed where an integral is meant
+            // the sum over the lattice's layers stands for an integral
             assert!((found / (RHO * area * 2.0) - 1.0).abs() < 3e-3, "{z}: {found}");
             assert_eq!(flux(&core, DVec3::new(0.0, 0.0, z), DVec3::Z), -found);
         }
@@ -151,7 +152,7 @@ fn energies_of_a_fall() {
     let domain = Aabb::new(DVec3::splat(-10.0), DVec3::splat(10.0));
     let block = lattice(DVec3::ZERO, DVec3::splat(0.2));
     let mass = RHO * 0.008;
-    // diffusion would take a density that is even for one that is not at rest
+    // diffusion would treat an even density as that of a fluid not at rest
     let method = Method::Wcsph(Wcsph {
         sound_speed: Some(30.0),
         density_diffusion: 0.0,
@@ -211,10 +212,10 @@ fn a_block_carries_the_water_on_it() {
         core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
         let [x, y, z, torque_x, torque_y, torque_z] =
             force::pressure_on(&core, 0, DVec3::new(WIDTH, 0.0, 0.0));
-        // the lattice's layers are summed where an integral is meant
+        // the sum over the lattice's layers stands for an integral
         assert!((z / weight + 1.0).abs() < 0.01, "{z} {weight}");
         assert!(x == 0.0 && y == 0.0 && torque_z.abs() < 1e-9 * weight, "{x} {y} {torque_z}");
-        // the weight attacks in the middle, half the width away from the corner along x and y
+        // the weight acts at the middle, half the width away from the corner along x and y
         let arm = 0.5 * WIDTH * weight;
         assert!((torque_x / arm + 1.0).abs() < 0.01 && (torque_y / arm + 1.0).abs() < 0.01, "{torque_x}");
     }
@@ -269,7 +270,7 @@ fn a_bounce_gives_its_impulse_once() {
     }
     let [_, _, force, torque, ..] = simulation.sample(&mut gauge)[..] else { panic!() };
     let impulse = 0.02 * (1.0 + e) * (2.0 * G * height).sqrt();
-    // the speed at the contact is that of the step's end: g·dt more at most
+    // the contact uses the speed at the end of the step: g·dt more at most
     assert!((-force * simulation.time() / impulse - 1.0).abs() < 1e-3, "{force}");
     // (0, 2, 1) × (0, 0, F) = (2F, 0, 0)
     assert!((torque / (2.0 * force) - 1.0).abs() < 1e-12, "{torque} {force}");

@@ -1,18 +1,19 @@
 //! Collision: particles that a step has carried into an obstacle or out of the box are put back.
 //!
-//! A particle keeps the radius of a ball around it that is proven to lie in the fluid, less what it has moved since: as long
-//! as that lasts no obstacle need be asked, and none is needed for a block of particles whose paths all lie in a box of
-//! which the field's range knows that it is fluid. Other paths are swept.
+//! For each particle the solver keeps the radius of a ball that is proven to lie in the fluid, less the
+//! distance moved since. While it is positive, no obstacle is evaluated. Nor is one for a block of particles
+//! whose paths all lie in a box that the field's range proves to be fluid. Other paths are swept.
 //!
-//! At a contact the particle stops on the surface, its velocity is reflected, and the rest of its path goes on
-//! along the surface: without that, a particle that slides would touch at once in every step and never move.
-//! The bounce is left to the velocity: a mirrored rest of path could lift a particle above the height it fell
-//! from.
+//! At a contact the particle stops on the surface, its velocity is reflected, and the rest of its path goes
+//! on along the surface. Without that, a sliding particle would touch at once in every step and never move.
+//! The rest of the path is not mirrored, because it could lift a particle above the height from which it
+//! fell: only the velocity bounces.
 //!
-//! This stage acts on positions and velocities only; what walls add to density and pressure, see [`Coverage`].
+//! This stage acts on positions and velocities only. [`Coverage`] has what walls add to density and pressure.
 //!
-//! Invariant: every particle leaves this stage finite, in the box, and with ω < 0 for every obstacle; where the
-//! wedge between a wall and an obstacle leaves no such place near the target, it stays where it last had one.
+//! Invariant: every particle leaves this stage finite, in the box, and with ω < 0 for every obstacle. If the
+//! wedge between a wall and an obstacle has no such place near the target, the particle stays at the last
+//! such place.
 
 use std::sync::Arc;
 
@@ -33,49 +34,52 @@ use super::{
     kernel::Wall,
 };
 
-/// Particles whose common way is asked about first.
+/// Number of particles whose paths are first tested together.
 const BLOCK: usize = 128;
 
-/// Particles of which [`Boundary::mark`] knows together whether a wall may be near.
+/// Number of particles that [`Boundary::mark`] tests together.
 pub(in crate::sph) const MARKED: usize = 32;
 
-/// Contacts of one particle in one step, before it is left where it is.
+/// Most contacts of one particle in one step. After them it stays where it is.
 const MAX_CONTACTS: usize = 4;
 
-/// A particle that a moving wall overtakes is looked for so many clearances (a support radius) away, and as far a ball may
-/// reach of which it is asked whether it is free.
+/// A support radius, in clearances. A particle that a moving wall overtakes is moved at most this far, and no
+/// larger ball is tested for being free.
 const REACH: f64 = 1e6;
 
-/// How far a particle is from all obstacles, if that is not known; less than nothing says the same.
+/// Distance of a particle from all obstacles that is not known. Any negative number means the same.
 pub(in crate::sph) const UNKNOWN: f64 = -1.0;
 
-/// Of a radius that is proven, the part that is used: the rest is for the rounding of many subtractions.
+/// Part of a proven radius that is used. The rest allows for the rounding of many subtractions.
 const SURELY: f64 = 1.0 - 1e-9;
 
-/// A body in the fluid's way.
+/// An obstacle: a body in the way of the fluid.
 #[derive(Clone)]
 pub struct Obstacle {
-    /// ω > 0 inside the body; of one that moves, as it is at the start.
+    /// The field of the body, ω > 0 inside. For a body that moves it is the field at the start.
     pub field: Arc<dyn Walls>,
-    /// The body as it moves, if it does.
+    /// The motion of the body; `None` if it is at rest.
     pub moving: Option<Arc<dyn Moving>>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
-    /// Coefficient of friction μ: of the speed along the face, μ times what the face takes of the speed into it is lost.
+    /// Coefficient of friction μ: when a particle hits the body, its speed along the face falls by μ times
+    /// the change of its velocity normal to the face.
     pub friction: f64,
-    /// Thickness in metres of the thinnest part that must hold whatever the speed, for fields that do not know their
-    /// range (closures): their paths are sampled this closely. A twentieth of the support radius is a good value;
-    /// thinner costs more samples per step. Compiled solids hold however thin they are.
+    /// Thickness, m, of the thinnest part that must stop particles of any speed, for fields that do not know
+    /// their range (closures): their paths are sampled this closely. A twentieth of the support radius is a
+    /// good value; a smaller one costs more samples per step. Compiled solids stop particles at any
+    /// thickness.
     pub resolution: f64,
-    /// Whether the fluid sticks to it.
+    /// How the body acts on a fluid that moves along it.
     pub slip: Slip,
-    /// How its surface moves within itself, m/s, as that of a belt or of a cylinder that turns; a fluid that sticks is taken
-    /// along.
+    /// Motion of the surface within itself, m/s, as that of a belt or of a turning cylinder. It takes along a
+    /// fluid that sticks.
     pub surface_velocity: Option<Arc<VectorField>>,
 }
 
 impl Obstacle {
-    /// A body at rest: the fluid slips along it, and half of a speed into it is given back.
+    /// A body at rest along which the fluid slips. It returns half of a speed into it. See
+    /// [`Obstacle::resolution`] for `resolution`.
     pub fn at_rest(field: Arc<dyn Walls>, resolution: f64) -> Self {
         Self {
             field,
@@ -94,10 +98,10 @@ pub(in crate::sph) struct Boundary {
     pub domain: Aabb,
     pub wall_restitution: f64,
     pub wall_friction: f64,
-    /// Whether the fluid sticks to the box.
+    /// How the walls of the box act on a fluid that moves along them.
     pub slip: Slip,
     pub obstacles: Vec<Obstacle>,
-    /// The obstacles that move, during the present step.
+    /// For each obstacle that moves, its field during the present step.
     pub during: Vec<Option<Box<dyn Walls>>>,
     /// The end of the present step, s.
     pub time: f64,
@@ -105,7 +109,7 @@ pub(in crate::sph) struct Boundary {
     pub clearance: f64,
 }
 
-/// A particle (index) for which a field had no value.
+/// A particle at which a field had no value, by its index and place.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::sph) struct Fault {
     pub index: usize,
@@ -113,7 +117,7 @@ pub(in crate::sph) struct Fault {
 }
 
 impl Boundary {
-    /// Sets the obstacles that move to a step from one time to another, s.
+    /// Sets the moving obstacles to a step between two times, s.
     pub fn move_to(&mut self, from: f64, to: f64) {
         self.time = to;
         self.during.clear();
@@ -121,7 +125,7 @@ impl Boundary {
             .extend(self.obstacles.iter().map(|o| o.moving.as_ref().map(|moving| moving.during(from, to))));
     }
 
-    /// An obstacle during the present step.
+    /// The field of an obstacle during the present step.
     pub fn field(&self, k: usize) -> &dyn Walls {
         match self.during.get(k) {
             Some(Some(moving)) => &**moving,
@@ -129,14 +133,14 @@ impl Boundary {
         }
     }
 
-    /// All of them.
+    /// The fields of all obstacles during the present step.
     pub fn fields(&self) -> impl Iterator<Item = &dyn Walls> {
         (0..self.obstacles.len()).map(|k| self.field(k))
     }
 
-    /// Moves particles from `position` to `target` and corrects both target and velocity where they collide; what
-    /// obstacles do to velocities is added to `contacts`, if somebody asks. `clear` holds for each particle how far it is
-    /// from all obstacles at least, m, or [`UNKNOWN`]; without obstacles nothing.
+    /// Moves particles from `position` to `target`, and corrects target and velocity where they collide.
+    /// Changes of velocity by obstacles are added to `contacts`, if given. `clear` holds for each particle
+    /// its least distance from all obstacles, m, or [`UNKNOWN`]; it is empty if there are no obstacles.
     ///
     /// # Errors
     /// The first particle, in the order of the arrays, at which a field is undefined.
@@ -188,8 +192,8 @@ impl Boundary {
         });
     }
 
-    /// Finds the blocks of [`MARKED`] particles in which one may be nearer than h to the box or an obstacle: most blocks need
-    /// be asked no more than that.
+    /// Finds the blocks of [`MARKED`] particles of which one may be nearer than h to the box or an obstacle.
+    /// Most blocks need no further test.
     pub fn mark(&self, position: &Vectors, h: f64, is_near: &mut Vec<bool>) {
         is_near.resize(position.len().div_ceil(MARKED), true);
         let [x, y, z] = position.components().map(|c| c.par_chunks(MARKED));
@@ -201,7 +205,8 @@ impl Boundary {
         });
     }
 
-    /// What the box and the obstacles take of the kernel of a particle; nothing if they are farther away than h.
+    /// What the box and the obstacles take of the kernel of a particle; `None` if they are farther away than
+    /// h.
     pub fn coverage<F: Friction>(&self, wall: &Wall, p: DVec3) -> Option<Coverage<F>> {
         let h = wall.h;
         let mut whole = Coverage::<F>::default();
@@ -248,7 +253,7 @@ impl Boundary {
             return Ok(());
         }
         let swept = block.swept();
-        // a ball that is free now says nothing of the next step of an obstacle that moves
+        // if an obstacle moves, a ball that is free now may not be free in the next step
         let at_rest = self.obstacles.iter().all(|obstacle| obstacle.moving.is_none());
         let most = REACH * self.clearance;
         if self.fields().all(|field| field.range(&swept).hi < 0.0) {
@@ -264,7 +269,7 @@ impl Boundary {
             let (from, to) = (block.from(k), block.target(k));
             let free = SURELY * self.fields().map(|field| field.clearance(from, most)).fold(most, f64::min);
             let left = free - from.distance(to);
-            // a particle that does not move needs a proof, too: a wall may come to it
+            // a particle that does not move needs a proof as well: a wall may reach it
             if free > 0.0 && left >= 0.0 {
                 block.clear[k] = if at_rest { left } else { UNKNOWN };
                 continue;
@@ -284,7 +289,8 @@ impl Boundary {
         Ok(())
     }
 
-    /// A wall that moves may come to where a particle has stopped earlier in the step: it takes the particle along.
+    /// Moves a particle out of a wall that has reached the place where the particle stopped earlier in the
+    /// step.
     fn leave_moving(&self, mut at: DVec3, mut velocity: DVec3) -> Result<(DVec3, DVec3), Undefined> {
         for (k, obstacle) in self.obstacles.iter().enumerate().filter(|(_, o)| o.moving.is_some()) {
             let field = self.field(k);
@@ -303,7 +309,8 @@ impl Boundary {
         Ok((at, velocity))
     }
 
-    /// Clamps to the box; the part of the velocity that points out of a wall that was crossed is returned.
+    /// Clamps a particle to the box. The part of its velocity that points out of a crossed wall is reflected,
+    /// with restitution and friction.
     fn hold_in_box(&self, mut at: DVec3, mut velocity: DVec3) -> (DVec3, DVec3) {
         for axis in 0..3 {
             let (low, high) = (self.domain.min[axis], self.domain.max[axis]);
@@ -327,8 +334,8 @@ impl Boundary {
         (at, velocity)
     }
 
-    /// Where a particle comes to rest on its way, and with what velocity; `hit` hears of each obstacle's change of the
-    /// velocity, and where it was.
+    /// Where the path of a particle ends, and the velocity there. `hit` is called for each contact with the
+    /// obstacle's number, the change of velocity, and the place.
     fn resolve(
         &self,
         from: DVec3,
@@ -344,7 +351,7 @@ impl Boundary {
             };
             let (obstacle, field) = (&self.obstacles[index], self.field(index));
             let before = velocity;
-            // what counts is the velocity that the wall sees
+            // the bounce depends on the velocity relative to the wall
             let wall =
                 if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
             let arriving = velocity - wall;
@@ -354,7 +361,7 @@ impl Boundary {
             let slide = turn_back(rest, &contact, 0.0);
             here = contact.point;
             target = here + slide;
-            // A tangent enters a hollow surface, and by rounding a flat one: lift its end out again.
+            // A tangent enters a hollow surface, and by rounding also a flat one: lift its end out again.
             if field.omega(target) >= 0.0
                 && let Some(lifted) = push_out(field, target, slide.length(), self.clearance)?
             {
@@ -380,15 +387,15 @@ impl Boundary {
     }
 }
 
-/// The place of the nearest face.
+/// The nearest point of the nearest face.
 fn nearest_place(p: DVec3, faces: &[Part]) -> DVec3 {
     let faces = faces.iter().filter_map(|part| if let Part::Face(face) = part { Some(face) } else { None });
     let nearest = faces.min_by(|a, b| a.distance.abs().total_cmp(&b.distance.abs()));
     nearest.map_or(p, |face| p - face.distance * face.normal)
 }
 
-/// A velocity after a contact that changed it from `before` to `after`, with friction: along the face it loses μ times
-/// the change along the normal, until nothing is left to lose.
+/// A velocity after a contact with friction. The contact changed it from `before` to `after`; along the face
+/// it loses μ times the change along the normal, at most all of it.
 fn rubbed(before: DVec3, after: DVec3, normal: DVec3, friction: f64) -> DVec3 {
     let change = (after - before).dot(normal).abs();
     let along = after - after.dot(normal) * normal;
@@ -413,7 +420,7 @@ fn bounds(values: &[f64]) -> (f64, f64) {
     (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
-/// A block's particles: where they were, where they go, how fast.
+/// The particles of a block: their positions, targets and velocities.
 struct Block<'a> {
     first: usize,
     position: &'a Vectors,
@@ -427,7 +434,7 @@ impl Block<'_> {
         self.target[0].len()
     }
 
-    /// The box around all of its paths.
+    /// The box around all paths of the block.
     fn swept(&self) -> Aabb {
         let own = self.first..self.first + self.len();
         let begin = self.position.components().map(|column| bounds(&column[own.clone()]));
@@ -438,7 +445,8 @@ impl Block<'_> {
         Aabb::new(side(|b| b.0, f64::min), side(|b| b.1, f64::max))
     }
 
-    /// Takes the paths' lengths off what is clear; whether all of it lasts.
+    /// Subtracts the lengths of the paths from the clear distances. Returns whether all of them remain
+    /// non-negative.
     fn stays_clear(&mut self) -> bool {
         let own = self.first..self.first + self.len();
         let [x, y, z] = self.position.components().map(|column| &column[own.clone()]);

@@ -1,24 +1,25 @@
-//! One path against one field: where it first meets the obstacle, and the way out for a point inside.
+//! The contact of one path with one obstacle, and the way out for a point inside.
 //!
-//! The field finds the meeting itself ([`Walls::first_entry`]): for compiled solids it is proven that no wall is passed,
-//! however thin; a closure, of whose range nothing is known, is sampled, and its `resolution` is the thinnest wall that
-//! surely holds.
+//! The field finds the contact itself ([`Walls::first_entry`]). For compiled solids it is proven that no wall
+//! is passed, however thin. A closure, whose range is unknown, is sampled: its `resolution` is the thinnest
+//! wall that surely stops a particle.
 //!
-//! A particle stops a little before the surface, so that its next path does not begin within the rounding errors of
-//! the obstacle's formula.
+//! A particle stops a little before the surface, so that its next path does not begin within the rounding
+//! errors of the obstacle's formula.
 //!
-//! Invariant: a point returned here is in the fluid (ω < 0, strictly) and no division is by an unguarded |∇ω|.
-//! ω = 0 counts as contact: an obstacle that stands on the container's floor has ω = 0 all over its
+//! Invariant: a point returned here is strictly in the fluid (ω < 0), and no division is by an unguarded
+//! |∇ω|. ω = 0 counts as contact: an obstacle that stands on the container's floor has ω = 0 all over its
 //! footprint, and particles must not creep under it.
 
 use glam::DVec3;
 
 use crate::field::{Entry, Normals, Path, Walls, last_outside};
 
-/// A bracket shorter than this part of the coordinates' size is a point.
+/// A bracket shorter than this part of the coordinates' size counts as a point.
 const POINT: f64 = 4.0 * f64::EPSILON;
 
-/// Stretches of a path in which the field cannot say whether it is met, and samples say that it is not.
+/// Most uncertain stretches of a path that samples may show to be free. A path with more of them counts as a
+/// contact.
 const MOST_DOUBTS: usize = 16;
 
 /// Where a path meets an obstacle.
@@ -26,22 +27,25 @@ const MOST_DOUBTS: usize = 16;
 pub struct Contact {
     /// Part of the path before the contact, 0 to 1.
     pub fraction: f64,
-    /// A point of the path in the fluid (ω < 0), the clearance away from the surface, or its beginning.
+    /// A point of the path in the fluid (ω < 0): the clearance away from the surface, or the beginning of the
+    /// path.
     pub point: DVec3,
-    /// Outward unit normal there; at edges and corners that of the faces that meet.
+    /// Outward unit normal of the surface. At edges and corners it is the mean of the normals of the faces
+    /// that meet.
     pub normal: DVec3,
-    /// All of those faces; none where the gradient vanishes.
+    /// Unit normals of these faces; empty where the gradient vanishes.
     pub faces: Normals,
 }
 
 /// The field has no finite value or gradient at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Undefined {
+    /// The point, m.
     pub at: DVec3,
 }
 
-/// First contact of a path that begins in the fluid; the contact's point is `clearance` metres before the surface,
-/// measured along its normal.
+/// First contact of a path that begins in the fluid; `None` if there is none. The contact's point is
+/// `clearance`, m, before the surface, measured along its normal.
 ///
 /// # Errors
 /// [`Undefined`] where ω is NaN, or ∇ω at the contact is not finite.
@@ -49,7 +53,7 @@ pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<O
     let mut rest = *path;
     for _ in 0..MOST_DOUBTS {
         let Some(entry) = field.first_entry(&rest) else {
-            // the field's own value at the end has the last word: it decides whether a particle is inside
+            // the value of the field at the end decides, because it also decides whether a particle is inside
             return match omega(field, path.to)? {
                 w if w < 0.0 => Ok(None),
                 _ => stop(field, path, &Entry::new(path, (1.0, 1.0), true, Normals::default()), clearance)
@@ -68,7 +72,7 @@ pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<O
             return stop(field, path, &entry, clearance).map(Some);
         }
         if entry.until >= 1.0 {
-            return Ok(None); // its last sample was the end
+            return Ok(None); // the last sample was the end of the path
         }
         rest.start = entry.until.next_up();
     }
@@ -76,7 +80,7 @@ pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<O
     stop(field, path, &entry, clearance).map(Some)
 }
 
-/// The place to stop before an entry.
+/// The contact at which a path stops before an entry.
 fn stop(field: &dyn Walls, path: &Path, entry: &Entry, clearance: f64) -> Result<Contact, Undefined> {
     let step = path.to - path.from;
     let normal = match entry.normals.mean() {
@@ -84,7 +88,7 @@ fn stop(field: &dyn Walls, path: &Path, entry: &Entry, clearance: f64) -> Result
         None => normal(field, entry.point, -step)?,
     };
     let approach = -step.dot(normal);
-    // a path that hardly approaches goes back to its beginning, and loses nothing: the rest of it goes on from there
+    // a path that hardly approaches goes back to its beginning and loses nothing: its rest goes on from there
     let back = clearance / if approach > 0.0 { approach } else { step.length() };
     let mut fraction = if back.is_finite() { (entry.t - back).max(0.0) } else { 0.0 };
     let mut less = POINT * (1.0 + path.from.abs().max(path.to.abs()).max_element() / step.length());
@@ -97,9 +101,10 @@ fn stop(field: &dyn Walls, path: &Path, entry: &Entry, clearance: f64) -> Result
     Ok(Contact { fraction, point, normal, faces: entry.normals })
 }
 
-/// The nearest place in the fluid for a point inside, at most `reach` away: Newton steps of ω/|∇ω| along the
-/// outward normal, or, where the gradient gives no answer, the shortest way along an axis; then `clearance` farther,
-/// if that is in the fluid. `None`: no way out.
+/// The nearest place in the fluid for a point inside an obstacle, at most `reach`, m, away; `None` if there
+/// is no way out. The search takes Newton steps of ω/|∇ω| along the outward normal. Where the gradient is no
+/// help, it takes the shortest way along an axis. The place is then moved `clearance`, m, farther, if that is
+/// in the fluid.
 ///
 /// # Errors
 /// [`Undefined`] where ω is NaN.
@@ -112,7 +117,7 @@ pub fn push_out(
     push_out_to(field, inside, reach, clearance, |_| true)
 }
 
-/// The same, to a place that is wanted.
+/// The nearest place as by [`push_out`] that also fulfils a condition.
 ///
 /// # Errors
 /// [`Undefined`] where ω is NaN.
@@ -126,7 +131,7 @@ pub(super) fn push_out_to(
     let contact = |from: DVec3, to: DVec3| -> Result<Contact, Undefined> {
         let (outer, inner) = (omega(field, to)?, omega(field, from)?);
         let path = Path::new(to, from, f64::INFINITY);
-        // the way out is found where the obstacle is at the end of the step, not on its way there
+        // the obstacle is taken at the end of the step, not on its way there
         let fraction = last_outside(|t| field.omega(path.at(t)), &path, (0.0, outer), (1.0, inner));
         let point = path.at(fraction);
         let mut faces = Normals::default();
@@ -176,7 +181,8 @@ pub(super) fn push_out_to(
     Ok(None)
 }
 
-/// A velocity (or a way) turned back by each of several faces that it goes into, one after the other.
+/// A velocity (or a displacement) reflected by each of several faces into which it points, one after the
+/// other.
 pub(super) fn turn_back(mut velocity: DVec3, contact: &Contact, restitution: f64) -> DVec3 {
     if contact.faces.len() < 2 {
         return reflect(velocity, contact.normal, restitution);
@@ -184,21 +190,21 @@ pub(super) fn turn_back(mut velocity: DVec3, contact: &Contact, restitution: f64
     for normal in contact.faces.iter() {
         velocity = reflect(velocity, normal, restitution);
     }
-    // what the later faces have turned into the earlier ones
+    // reflection at a later face may turn it into an earlier one again
     for normal in contact.faces.iter() {
         velocity = reflect(velocity, normal, 0.0);
     }
     velocity
 }
 
-/// v − (1 + c_R)(v·n)n for a velocity into the obstacle; one that leaves it is kept. The paper prints
-/// (1 − c_R), which for c_R = 1 would let the particle through.
+/// The reflected velocity v − (1 + c_R)(v·n)n, if it points into the obstacle; one that leaves it is kept.
+/// The paper prints (1 − c_R), which for c_R = 1 would let the particle through.
 pub(super) fn reflect(velocity: DVec3, normal: DVec3, restitution: f64) -> DVec3 {
     let speed = velocity.dot(normal);
     if speed < 0.0 { velocity - (1.0 + restitution) * speed * normal } else { velocity }
 }
 
-/// ω at a part of a path, when it is passed.
+/// ω at a part of a path, at the time at which the path passes it.
 fn on_path(field: &dyn Walls, path: &Path, t: f64) -> Result<f64, Undefined> {
     let w = field.on_path(path, t);
     if w.is_nan() { Err(Undefined { at: path.at(t) }) } else { Ok(w) }
@@ -209,7 +215,7 @@ fn omega(field: &dyn Walls, at: DVec3) -> Result<f64, Undefined> {
     if w.is_nan() { Err(Undefined { at }) } else { Ok(w) }
 }
 
-/// −∇ω/|∇ω|, or the direction the particle came from where the gradient vanishes.
+/// The normal −∇ω/|∇ω|, or the direction from which the particle came where the gradient vanishes.
 fn normal(field: &dyn Walls, at: DVec3, backward: DVec3) -> Result<DVec3, Undefined> {
     let (_, gradient) = field.omega_grad(at);
     if !gradient.is_finite() {

@@ -1,18 +1,20 @@
-//! What the walls around a particle take of its kernel: the closed forms of [`Wall`] for each face that is near,
-//! joined as the faces are joined.
+//! What the walls around a particle take of its kernel: the closed forms of [`Wall`] for each face nearby,
+//! combined as the faces are joined.
 //!
-//! For two faces A and B the part of the kernel behind both is λ_A·λ_B where they meet at a right angle, the smaller of
-//! the two where they look the same way, and what exceeds one where they face each other. Between these the weight
-//! (2/π)·arcsin|n_A·n_B| leads over: at the edge itself, λ_A = λ_B = ½, that is exact for every kernel, because there
-//! the wedge's angle alone counts. "Any of" follows by complement.
+//! For two faces A and B, the part of the kernel behind both is λ_A·λ_B where they meet at a right angle, the
+//! smaller of the two where they look the same way, and what exceeds one where they face each other. Between
+//! these cases it is interpolated with the weight (2/π)·arcsin|n_A·n_B|. On the edge itself, λ_A = λ_B = ½,
+//! this is exact for every kernel, because only the wedge's angle counts there. "Any of" follows by
+//! complement.
 //!
-//! With λ go its gradient ∇λ = ∫ ∇W over the wall, and the moment K = ∫ y ⊗ ∇W (y from the particle): integrating by
-//! parts over a half-space leaves K = λ·1 + d·(A/h)·n⊗n. With K a pressure that is linear in space is continued into the
-//! wall: a column of fluid at rest stays so, whatever the shape of its vessel.
+//! The gradient ∇λ = ∫ ∇W over the wall and the moment K = ∫ y ⊗ ∇W (y from the particle) belong to λ.
+//! Integration by parts over a half-space leaves K = λ·1 + d·(A/h)·n⊗n. With K, a pressure that is linear in
+//! space is continued into the wall: a column of fluid at rest stays at rest in a vessel of any shape.
 //!
-//! (So for a wall that is continuous; of one in layers both terms are sums over them, see [`Wall`].)
+//! (These formulas hold for a continuous wall. For a wall in layers both terms are sums over the layers, see
+//! [`Wall`].)
 //!
-//! Invariant: 0 ≤ λ ≤ 1; beyond the support radius of every face all is zero.
+//! Invariant: 0 ≤ λ ≤ 1. Beyond the support radius of every face all quantities are zero.
 
 use glam::{DMat3, DVec3};
 
@@ -24,10 +26,10 @@ use super::{
     symmetric::Symmetric,
 };
 
-/// Curvatures are believed up to this part of 1/h: beyond it the series behind the correction does not hold.
+/// Curvatures, in units of 1/h, are cut off here: the series behind the correction does not hold beyond.
 const MOST_CURVED: f64 = 0.4;
 
-/// Corrections for walls divide by what is left of the kernel, but never by less than this.
+/// Least free part of a kernel by which corrections for walls divide.
 pub(super) const LEAST_FREE: f64 = 0.25;
 
 /// Integrals of a kernel over the walls near a particle.
@@ -35,18 +37,18 @@ pub(super) const LEAST_FREE: f64 = 0.25;
 pub(in crate::sph) struct Coverage<F = ()> {
     /// λ = ∫ W, 0 to 1.
     pub part: f64,
-    /// ∇λ = ∫ ∇W, 1/m, out of the fluid.
+    /// ∇λ = ∫ ∇W, 1/m; it points out of the fluid.
     pub gradient: DVec3,
     /// K − λ·1 = Σ d·(A/h)·n⊗n over the faces.
     pub spread: Symmetric,
-    /// ∇λ·v of walls that move, 1/s.
+    /// ∇λ·v for walls that move with the velocity v, 1/s.
     pub sweep: f64,
-    /// What a viscous fluid feels.
+    /// Friction with a viscous fluid.
     pub friction: F,
 }
 
 impl<F: Friction> Coverage<F> {
-    /// One face.
+    /// The coverage by one face.
     pub fn of_face(wall: &Wall, face: &Face) -> Self {
         let h = wall.h;
         let delta = face.distance / h;
@@ -64,18 +66,18 @@ impl<F: Friction> Coverage<F> {
         }
     }
 
-    /// All of these walls move with one velocity.
+    /// Lets all of these walls move with one velocity, m/s.
     pub fn set_in_motion(&mut self, velocity: DVec3) {
         self.sweep = self.gradient.dot(velocity);
         self.friction.take_along(velocity);
     }
 
-    /// The fluid slips along all of these walls.
+    /// Lets the fluid slip along all of these walls.
     pub fn let_slip(&mut self) {
         self.friction.let_slip(self.part);
     }
 
-    /// A tree of faces, from its front.
+    /// The coverage by a tree of faces.
     pub fn of_faces(wall: &Wall, faces: &Faces) -> Self {
         if faces.is_empty() { Self::default() } else { Self::of_tree(wall, faces, &mut 0) }
     }
@@ -96,45 +98,47 @@ impl<F: Friction> Coverage<F> {
         whole
     }
 
-    /// What lies behind both.
+    /// The coverage by what lies behind both.
     pub fn and(&self, other: &Self) -> Self {
         let (part, da, db) = common(self.part, other.part, self.cosine(other));
         self.joined(other, part, da, db)
     }
 
-    /// What lies behind either: all but what lies before both.
+    /// The coverage by what lies behind either: all but what lies before both.
     pub fn or(&self, other: &Self) -> Self {
         if self.part == 0.0 || other.part == 0.0 {
             return if self.part == 0.0 { *other } else { *self };
         }
-        // the complements' faces look the other way, both of them: the angle between them is the same
+        // the faces of both complements look the other way, so the angle between them stays the same
         let (part, da, db) = common(1.0 - self.part, 1.0 - other.part, self.cosine(other));
         self.joined(other, 1.0 - part, da, db)
     }
 
-    /// Of the angle between the directions in which two walls lie.
+    /// Cosine of the angle between the directions in which two walls lie.
     fn cosine(&self, other: &Self) -> f64 {
         let (a, b) = (self.gradient, other.gradient);
         let lengths = (a.length_squared() * b.length_squared()).sqrt();
         if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
     }
 
+    /// The coverage without its friction.
     pub fn without_friction(self) -> Coverage {
         let Self { part, gradient, spread, sweep, friction: _ } = self;
         Coverage { part, gradient, spread, sweep, friction: () }
     }
 
-    /// ⅓ tr K: the walls' part of the gradient of a position.
+    /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
     pub fn share(&self) -> f64 {
         self.part + self.spread.trace() / 3.0
     }
 
-    /// (1 − K)⁻¹: makes of a sum over the fluid alone what it would be if the fluid went on behind the walls as it is
-    /// before them. No direction is stretched by more than 1/[`LEAST_FREE`].
+    /// (1 − K)⁻¹, by which a sum over the fluid alone becomes what it would be if the fluid continued behind
+    /// the walls. No direction is stretched by more than 1/[`LEAST_FREE`].
     pub fn completion(&self) -> DMat3 {
         let free = DMat3::from_diagonal(DVec3::splat((1.0 - self.part).max(LEAST_FREE)));
         let moment = free - self.spread.to_matrix();
-        // along a face's normal K is hardly more than ½ in the fluid; in corners the sum of several is held back
+        // along a face's normal K is hardly more than ½ in the fluid; in corners the sum of several is
+        // limited
         let largest = DMat3::from_diagonal(DVec3::splat(1.0 / LEAST_FREE));
         if moment.determinant() < LEAST_FREE.powi(3) { largest } else { moment.inverse() }
     }
@@ -150,7 +154,7 @@ impl<F: Friction> Coverage<F> {
     }
 }
 
-/// The part of a kernel behind two faces of which each takes a and b, with its derivatives by a and b.
+/// The part of a kernel behind two faces that cover a and b of it, with its derivatives by a and b.
 fn common(a: f64, b: f64, cosine: f64) -> (f64, f64, f64) {
     let weight = std::f64::consts::FRAC_2_PI * arcsine(cosine.abs());
     // the limit for parallel faces, with its derivatives
@@ -165,7 +169,8 @@ fn common(a: f64, b: f64, cosine: f64) -> (f64, f64, f64) {
     (mix(a * b, limit), mix(b, da), mix(a, db))
 }
 
-/// arcsin x for 0 ≤ x ≤ 1, off by 7e-5 at most (Abramowitz & Stegun 1964, 4.4.45): the rule that it serves is off by 3e-2.
+/// arcsin x for 0 ≤ x ≤ 1, with an error of at most 7e-5 (Abramowitz & Stegun 1964, 4.4.45). The rule that
+/// uses it has an error of 3e-2.
 fn arcsine(x: f64) -> f64 {
     let series = ((-0.018_729_3 * x + 0.074_261) * x - 0.212_114_4) * x + 1.570_728_8;
     std::f64::consts::FRAC_PI_2 - (1.0 - x).max(0.0).sqrt() * series
@@ -199,7 +204,7 @@ mod tests {
             }
             let volume = step.powi(3) * 21.0 / (2.0 * std::f64::consts::PI * H.powi(3));
             part += volume * (1.0 - q).powi(4) * (1.0 + 4.0 * q);
-            // ∇W by the particle's place is against y
+            // the gradient by the particle's place points against that by y
             let slope = volume * 20.0 * (1.0 - q).powi(3) / (H * H) * y;
             gradient += slope;
             moment += DMat3::from_cols(y * slope.x, y * slope.y, y * slope.z);

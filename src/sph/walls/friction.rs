@@ -1,4 +1,5 @@
-//! What walls do to a viscous fluid that sticks to them or slips along them; a fluid without viscosity carries none of it.
+//! Friction between walls and a viscous fluid, which sticks to them or slips along them. A fluid without
+//! viscosity carries none of this data.
 
 use glam::DVec3;
 
@@ -6,24 +7,27 @@ use crate::field::Face;
 
 use super::{coverage::LEAST_FREE, symmetric::Symmetric};
 
-/// A face nearer than this part of the support radius counts as so near where a velocity's slope is asked for.
+/// A face nearer than this part of the support radius counts as that far away where the slope of a velocity
+/// is computed.
 const NEAREST: f64 = 0.1;
 
-/// A part of [`super::Coverage`]: of the faces near a particle, joined as they are. `()` for a fluid without viscosity.
+/// The friction of the faces near a particle, a part of [`super::Coverage`]. It is `()` for a fluid without
+/// viscosity.
 pub(in crate::sph) trait Friction: Copy + Default {
-    /// One face, of which ∇λ has the length `area`, 1/m.
+    /// The friction of one face whose ∇λ has the length `area`, 1/m.
     fn of_face(face: &Face, area: f64, h: f64) -> Self;
 
-    /// Two walls in common, of whose λ the derivatives by theirs are `da` and `db`.
+    /// The friction of two walls combined; `da` and `db` are the derivatives of the combined λ by their λ.
     fn joined(&self, other: &Self, da: f64, db: f64) -> Self;
 
-    /// All of these walls move with one velocity, besides any other motion.
+    /// Adds a velocity, m/s, to the motion of all of these walls.
     fn take_along(&mut self, velocity: DVec3);
 
-    /// The fluid slips along all of these walls, which have this λ.
+    /// Lets the fluid slip along all of these walls, whose λ is `part`.
     fn let_slip(&mut self, part: f64);
 
-    /// What a fluid of this velocity feels, m/s², from its friction with itself alone and its kinematic viscosity, m²/s.
+    /// The acceleration by viscosity, m/s², of a fluid with a velocity, m/s, from the acceleration by the
+    /// fluid alone and the kinematic viscosity, m²/s.
     fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3;
 }
 
@@ -44,9 +48,10 @@ impl Friction for () {
 /// The friction of a viscous fluid with walls.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct WallDrag {
-    /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks: what it feels of a velocity.
+    /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks. Times −2ν and a velocity it is
+    /// the drag of walls at rest.
     pub tensor: Symmetric,
-    /// λ of the walls along which the fluid slips.
+    /// λ of those walls along which the fluid slips.
     slippery: f64,
     /// The drag of the walls' own velocity, 1/(m·s).
     haul: DVec3,

@@ -1,45 +1,48 @@
-//! What a wall takes of a kernel: closed forms for walls without wall particles.
+//! What a wall takes of a kernel, in closed form, so that walls need no wall particles.
 //!
-//! A particle at the distance d from a wall has the part λ of its kernel inside the wall. With δ = d/h and
-//! W = h⁻³·w(r/h):
+//! For a particle at the distance d from a wall, the part λ of its kernel lies inside the wall. With δ = d/h
+//! and W = h⁻³·w(r/h):
 //!
-//! - λ(δ) = 2π ∫ (q − δ)·q·w(q) dq from δ to 1: what the wall adds to a density, as a part of the rest density;
+//! - λ(δ) = 2π ∫ (q − δ)·q·w(q) dq from δ to 1: what the wall adds to a density, as a part of the rest
+//!   density;
 //! - A(δ) = −h·dλ/dd = 2π ∫ q·w(q) dq: ∫ ∇W over the wall is −A/h times its normal, out of the wall;
-//! - j(δ) = 2π ∫ (q² − δ²)·q·w(q) dq: a wall of mean curvature H (positive where it is convex) has
-//!   λ − ½·H·h·j instead of λ.
+//! - j(δ) = 2π ∫ (q² − δ²)·q·w(q) dq: a wall of mean curvature H (positive where it is convex) has λ −
+//!   ½·H·h·j instead of λ.
 //!
-//! λ of a plane is the "wall weight" that Harada et al. (2007) tabulate and Fujisawa & Miura (2015) integrate; the
-//! polynomials here are the integrals above, carried out. They are written with the factor 1 − δ and positive terms,
-//! so that nothing cancels as the particle leaves the wall; the inner piece of the spline, which stays away from zero,
-//! is written out.
+//! λ of a plane is the "wall weight" that Harada et al. (2007) tabulate and Fujisawa & Miura (2015)
+//! integrate. The polynomials here are the integrals above, carried out. They are written with the factor 1 −
+//! δ and positive terms, so that nothing cancels as the particle leaves the wall. The inner piece of the
+//! spline stays away from zero and is expanded.
 //!
-//! A fluid is summed, not integrated: its particles lie in layers, a spacing apart, the first half a spacing from the wall.
-//! At h = 2.2 spacings an integral takes 0.195 of the kernel of such a first layer, the mirrored layers of a lattice 0.158:
-//! with integrals it stands off the wall and finds 4 % too much pressure. A [`Wall`] therefore takes the same integrals by
-//! the midpoint rule, a layer of the wall after the other: λ = τ·Σ A(δ_k) with δ_k = δ + (k + ½)τ and so on, τ being a
-//! spacing over h. (A lattice's second layer hears of one layer of the wall only, too.)
+//! A fluid is summed, not integrated: its particles lie in layers, a spacing apart, the first half a spacing
+//! from the wall. At h = 2.2 spacings, integration takes 0.195 of the kernel of such a first layer, and the
+//! mirrored layers of a lattice 0.158. With integrals the layer stands off the wall, and the pressure comes
+//! out 4 % too high. A [`Wall`] in layers therefore takes the same integrals by the midpoint rule, one layer
+//! of the wall after the other: λ = τ·Σ A(δ_k) with δ_k = δ + (k + ½)τ and so on, where τ is a spacing over
+//! h. (In a lattice, too, only one layer of the wall reaches the second layer of the fluid.)
 //!
-//! What is found of the faces near a particle is joined in [`super::coverage`].
+//! [`super::coverage`] combines the results for the faces near a particle.
 //!
-//! Invariant: λ(δ) + λ(−δ) = 1 of a continuous wall; all vanish from δ = 1 on.
+//! Invariant: λ(δ) + λ(−δ) = 1 for a continuous wall. All quantities vanish from δ = 1 on.
 
 /// A smoothing kernel whose integrals over a wall are known; h is the radius of its support.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WallKernel {
-    /// w = 315/64π·(1 − q²)³
+    /// Poly6: w = 315/64π·(1 − q²)³.
     Poly6,
-    /// w = 15/π·(1 − q)³
+    /// Spiky: w = 15/π·(1 − q)³.
     Spiky,
-    /// w = 8/π·(1 − 6q² + 6q³) up to q = ½, then 16/π·(1 − q)³ (Monaghan 1992)
+    /// Cubic spline: w = 8/π·(1 − 6q² + 6q³) up to q = ½, then 16/π·(1 − q)³ (Monaghan 1992).
     CubicSpline,
-    /// w = 21/2π·(1 − q)⁴·(1 + 4q) (Wendland 1995)
+    /// Wendland C2: w = 21/2π·(1 − q)⁴·(1 + 4q) (Wendland 1995).
     WendlandC2,
 }
 
 impl WallKernel {
+    /// All kernels.
     pub const ALL: [Self; 4] = [Self::Poly6, Self::Spiky, Self::CubicSpline, Self::WendlandC2];
 
-    /// λ: the part of the kernel beyond a plane at the distance δ = d/h; negative δ is inside the wall.
+    /// λ: the part of the kernel beyond a plane at the distance δ = d/h. A negative δ is inside the wall.
     pub fn covered(self, delta: f64) -> f64 {
         if delta < 0.0 {
             return 1.0 - self.covered(-delta);
@@ -68,7 +71,7 @@ impl WallKernel {
         }
     }
 
-    /// −dA/dδ = 2πδ·w(|δ|): how a layer of the wall at this distance repels, odd in δ.
+    /// The derivative −dA/dδ = 2πδ·w(|δ|): how a layer of the wall at this distance repels, odd in δ.
     pub fn steepness(self, delta: f64) -> f64 {
         let d = delta.abs().min(1.0);
         let s = 1.0 - d;
@@ -83,7 +86,7 @@ impl WallKernel {
             }
     }
 
-    /// A and −dA/dδ together.
+    /// A and −dA/dδ, computed together.
     #[inline]
     fn slope_and_steepness(self, delta: f64) -> (f64, f64) {
         if self != Self::WendlandC2 {
@@ -95,7 +98,7 @@ impl WallKernel {
         (1.5 * s4 * s * ((8.0 * d + 5.0) * d + 1.0), 21.0 * delta * s4 * (1.0 + 4.0 * d))
     }
 
-    /// j: the moment that goes with the wall's curvature, even in δ; dj/dδ = −2δA.
+    /// j: the moment for the wall's curvature, even in δ; dj/dδ = −2δA.
     pub fn curvature_moment(self, delta: f64) -> f64 {
         let d = delta.abs().min(1.0);
         let s = 1.0 - d;
@@ -110,36 +113,37 @@ impl WallKernel {
         }
     }
 
-    /// λ of a curved wall; `curvature` is H·h, its mean curvature in units of 1/h, positive where it is convex. Against
-    /// balls and cavities the error is at most 0.026·(h/R)², a tenth of the plane's at h/R = 0.4.
+    /// λ of a curved wall. `curvature` is H·h, the mean curvature in units of 1/h, positive where the wall is
+    /// convex. For balls and cavities the error is at most 0.026·(h/R)², which at h/R = 0.4 is a tenth of the
+    /// plane's error.
     pub fn covered_by_curved(self, delta: f64, curvature: f64) -> f64 {
         self.covered(delta) - 0.5 * curvature * self.curvature_moment(delta)
     }
 }
 
-/// What a wall is to the sums of a method.
+/// How walls enter the sums of a method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::sph) struct Wall {
     pub kernel: WallKernel,
     /// Support radius, m.
     pub h: f64,
-    /// τ: the thickness of its layers over h; none for a wall that is continuous.
+    /// τ: the thickness of the wall's layers over h; `None` for a continuous wall.
     pub layer: Option<f64>,
 }
 
 /// What one face takes of a kernel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::sph) struct OfFace {
-    /// λ
+    /// λ: the covered part of the kernel.
     pub part: f64,
     /// A: ∇λ is −A/h times the normal.
     pub area: f64,
-    /// ∫ y·∂W/∂y along the normal, less λ: δ·A for a plane.
+    /// ∫ y·∂W/∂y along the normal, minus λ: δ·A for a plane.
     pub spread: f64,
 }
 
 impl Wall {
-    /// Of a face at the distance δ = d/h with the mean curvature H·h.
+    /// The part of a face at the distance δ = d/h with the mean curvature H·h.
     #[inline]
     pub fn of_face(&self, delta: f64, curvature: f64) -> OfFace {
         if delta <= -1.0 {
@@ -154,8 +158,8 @@ impl Wall {
         if delta >= 0.0 {
             return layered;
         }
-        // behind a face all layers together are one but for half a hundredth, by where they happen to lie: the deeper the
-        // particle is, the more of the wall counts as continuous
+        // behind a face the sum over all layers is one up to half a hundredth, depending on where they lie:
+        // the deeper the particle is, the more of the wall counts as continuous
         let whole = Wall { layer: None, ..*self }.of_face(delta, curvature);
         let mix = |layered: f64, whole: f64| layered + delta * (layered - whole);
         OfFace {
@@ -165,7 +169,7 @@ impl Wall {
         }
     }
 
-    /// The midpoint rule, for δ > −1.
+    /// The part of a face by the midpoint rule over the wall's layers, for δ > −1.
     #[inline]
     fn of_layers(&self, layer: f64, delta: f64, curvature: f64) -> OfFace {
         // Σ A, Σ −A′, Σ δA and Σ −δA′
@@ -187,7 +191,7 @@ impl Wall {
     }
 }
 
-/// The polynomial with these coefficients, the highest power first.
+/// The value at x of the polynomial with these coefficients, the highest power first.
 fn horner(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().fold(0.0, |sum, c| sum * x + c)
 }
@@ -307,15 +311,15 @@ mod tests {
         for i in 1..=2000 {
             let delta = -1.0 + f64::from(i) * 1e-3;
             let next = wall.of_face(delta, 0.0);
-            // slopes of A and below: no step anywhere
+            // the differences stay below the greatest slopes, so nothing jumps
             assert!((next.part - last.part).abs() < 2e-3, "{delta}: {last:?} {next:?}");
             assert!((next.area - last.area).abs() < 6e-3, "{delta}: {last:?} {next:?}");
             last = next;
         }
     }
 
-    /// A lattice between walls half a spacing away is as dense at them as anywhere: the layers it would have behind them are
-    /// those of the wall.
+    /// A lattice between walls half a spacing away is as dense at the walls as anywhere: the layers of the
+    /// walls replace those that it would have behind them.
     #[test]
     fn a_lattice_is_even_up_to_a_layered_wall() {
         let kernel = WallKernel::WendlandC2;
@@ -335,7 +339,7 @@ mod tests {
         }
     }
 
-    /// Thin layers are the continuous wall, curved ones too.
+    /// The sums over thin layers tend to the continuous wall, also for a curved one.
     #[test]
     fn many_layers_come_to_the_integral() {
         for kernel in WallKernel::ALL {
@@ -365,7 +369,8 @@ mod tests {
         }
     }
 
-    /// λ of a ball of radius R (h = 1), or of all but a ball, by the part of each sphere of radius q that is in it.
+    /// λ of a ball of radius R (h = 1), or of all but a ball, by the part of each sphere of radius q that
+    /// lies in it.
     fn of_ball(kernel: WallKernel, delta: f64, radius: f64, cavity: bool) -> f64 {
         let centre = if cavity { radius - delta } else { radius + delta };
         integral(0.0, 1.0, 4000, |q| {
@@ -388,7 +393,7 @@ mod tests {
                         corrected = corrected.max((kernel.covered_by_curved(delta, curvature) - exact).abs());
                     }
                 }
-                // a bound of the second-order term, with a tenth for the terms behind it
+                // the bound of the second-order term, and a tenth of it for higher terms
                 assert!(corrected < 0.0286 * ratio * ratio, "{kernel:?} {ratio}: {corrected:e}");
                 assert!(plane > 0.08 * ratio, "{kernel:?} {ratio}: {plane:e}");
             }

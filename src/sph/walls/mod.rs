@@ -1,4 +1,4 @@
-//! Walls without wall particles: what they add to sums over neighbours, and what stops a particle at them.
+//! Walls without wall particles: what they add to sums over neighbours, and how they stop particles.
 //!
 //! ```text
 //! Field::faces ─▶ Coverage: λ, ∇λ, K in closed form ─▶ density, pressure, viscosity

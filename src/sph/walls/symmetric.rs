@@ -7,16 +7,16 @@ use glam::{DMat3, DVec3};
 /// A symmetric 3×3 matrix.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct Symmetric {
-    /// xx, yy, zz
+    /// The components xx, yy, zz.
     diagonal: DVec3,
-    /// yz, zx, xy
+    /// The components yz, zx, xy.
     beside: DVec3,
 }
 
 impl Symmetric {
     pub const IDENTITY: Self = Self { diagonal: DVec3::ONE, beside: DVec3::ZERO };
 
-    /// n⊗n
+    /// The tensor n⊗n.
     pub fn square(n: DVec3) -> Self {
         Self { diagonal: n * n, beside: DVec3::new(n.y * n.z, n.z * n.x, n.x * n.y) }
     }

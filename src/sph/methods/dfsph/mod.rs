@@ -13,26 +13,27 @@ use crate::sph::params::Parameters;
 use crate::sph::passes::Pass;
 use crate::sph::walls::{Wall, WallKernel};
 
-/// Part of the spacing that a particle may cross in one step where there is no sound: the customary 0.4.
+/// Part of the spacing that a particle may cross in one step of a method without sound: the customary 0.4.
 const ADVECTION: f64 = 0.4;
 
-/// Factor of √(h/a) at the beginning of a run, when the acceleration that pressure takes away counts too.
+/// Factor of √(h/a) at the beginning of a run, when a still contains the acceleration that pressure will take
+/// away.
 const IMPLICIT_FORCE_FACTOR: f64 = 0.1;
 
-/// Factor of √(h/a) once the pressure is known: its acceleration is part of what is limited. With 0.25 a column of forty
+/// Factor of √(h/a) once the pressure is known and its acceleration is part of a. With 0.25 a column of forty
 /// layers bursts at its start.
 const SOLVED_FORCE_FACTOR: f64 = 0.15;
 
 /// Numbers of the divergence-free method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dfsph {
-    /// Mean compression by one step that is accepted, as a part of the rest density. 1e-4: a tenth of that hardly changes
-    /// the pressure of a fluid at rest, ten times that makes it 5 % too high.
+    /// Mean compression in one step that is accepted, as a part of the rest density. Default 1e-4: a tenth of
+    /// that hardly changes the pressure of a fluid at rest, ten times that makes it 5 % too high.
     pub tolerance: f64,
-    /// Iterations of the solver, at most. 100.
+    /// Most iterations of the solver in one step. Default 100.
     pub most_iterations: u32,
-    /// How strongly particles drift to where there are fewer of them; zero: they do not. 1 halves the deviation of a fluid at
-    /// rest, and makes that of a shear flow two to three times as large.
+    /// How strongly particles drift to where there are fewer of them. Default 0: no drift. 1 halves the
+    /// deviation of a fluid at rest, and makes that of a shear flow two to three times as large.
     pub shifting: f64,
 }
 
@@ -127,8 +128,9 @@ impl Numerics for Dfsph {
         SOLVED_FORCE_FACTOR / IMPLICIT_FORCE_FACTOR
     }
 
-    /// In layers: only then a divergence-free fluid stands right at a wall. (Differences of pressure are steady only at a
-    /// wall that is continuous; with layers a standing wave of `wcsph` grows noise at the walls.)
+    /// The wall in layers: only with these does a divergence-free fluid have the right distance from a wall
+    /// at rest. (Differences of pressure are steady only at a continuous wall; with layers a standing wave of
+    /// `wcsph` grows noise at the walls.)
     fn wall(&self, parameters: &Parameters) -> Wall {
         let h = parameters.support_radius;
         Wall { kernel: WallKernel::WendlandC2, h, layer: Some(parameters.spacing() / h) }

@@ -1,4 +1,4 @@
-//! Sums over neighbours: densities, pressure's push, what it does to densities, viscosity.
+//! Sums over neighbours: densities, the acceleration by pressure, its effect on densities, and viscosity.
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::{DMat3, DVec3};
@@ -14,13 +14,14 @@ use crate::sph::{
 
 use super::walls::{Walls, WallsNear};
 
+/// Constants that the passes share.
 #[derive(Clone, Copy)]
 pub(super) struct Constants {
     pub kernel: Wendland,
     pub rest_density: f64,
-    /// m·w, over the sum on a lattice: an even fluid has its rest density.
+    /// m·w over the sum on a lattice, so that an even fluid has its rest density, kg/m³.
     pub mass_weight: f64,
-    /// m·c
+    /// m·c, kg/m⁵.
     pub mass_steepness: f64,
     /// Σ m²|∇W|² in a full neighbourhood: mρ₀·c²·4π∫(1 − q)⁶r⁴ dr, where ∫q⁴(1 − q)⁶ dq = 1/2310.
     pub full_factor: f64,
@@ -46,7 +47,7 @@ impl Constants {
     }
 }
 
-/// ρ, the factor, where the particles crowd, and their moment.
+/// Finds the density ρ, the diagonal of the solver's system, the direction in which particles crowd, and G.
 #[derive(Clone, Copy)]
 pub(super) struct Densities<'a> {
     pub constants: Constants,
@@ -86,7 +87,7 @@ impl PairPass<0, 6, 6> for Densities<'_> {
             density += rest_density * wall.part;
             crowding += wall.gradient;
             spread += wall.share();
-            // the neighbours are completed about as much as the particle itself
+            // the walls of the neighbours complete their sums about as much as those of the particle itself
             squares *= completion.determinant().max(1.0).cbrt().powi(2);
             own = *completion * (slope + 2.0 * rest_density * wall.gradient);
         }
@@ -96,7 +97,7 @@ impl PairPass<0, 6, 6> for Densities<'_> {
     }
 }
 
-/// a(s)
+/// Finds the acceleration a(s) by pressure.
 #[derive(Clone, Copy)]
 pub(super) struct Push<'a> {
     pub constants: Constants,
@@ -134,12 +135,12 @@ impl PairPass<1, 3, 3> for Push<'_> {
     }
 }
 
-/// dρ/dt
+/// Finds the rate of density dρ/dt.
 #[derive(Clone, Copy)]
 pub(super) struct Squeeze<'a> {
     pub constants: Constants,
     pub walls: &'a Walls,
-    /// M·v
+    /// M·v of each particle.
     pub completed: &'a Vectors,
     pub with_walls: bool,
 }
@@ -164,7 +165,7 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
     fn finish(&self, i: usize, [sum]: [f64; 1]) -> [f64; 1] {
         let rate = -self.constants.mass_steepness * sum;
         let mirrored = |(wall, _): (&WallsNear, &DMat3)| {
-            // walls move with a velocity, and nothing moves with an acceleration by pressure
+            // the walls' motion belongs to a velocity, not to an acceleration by pressure
             let sweep = if self.with_walls { wall.sweep } else { 0.0 };
             2.0 * self.constants.rest_density * (wall.gradient.dot(self.completed.get(i)) - sweep)
         };
@@ -172,13 +173,13 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
     }
 }
 
-/// Laminar viscosity (Morris et al. 1997) and gravity.
+/// Finds the acceleration by laminar viscosity (Morris et al. 1997) and gravity.
 #[derive(Clone, Copy)]
 pub(super) struct Drag<'a> {
     pub constants: Constants,
     pub walls: &'a Walls,
     pub velocity: &'a Vectors,
-    /// ν, m²/s
+    /// Kinematic viscosity ν, m²/s.
     pub kinematic: f64,
     pub gravity: DVec3,
 }

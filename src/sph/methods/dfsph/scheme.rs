@@ -1,4 +1,5 @@
-//! Divergence-free fluid, after Bender & Koschier (2017): pressure is what keeps the density, found by iteration.
+//! The scheme of a divergence-free fluid, after Bender & Koschier (2017). The pressure that keeps the density
+//! is found by iteration.
 //!
 //! ```text
 //! v ← v + dt·(g + viscosity)
@@ -9,22 +10,24 @@
 //! with s = p/ρ², a(s)_i = −M_i[Σ m (s_i + s_j) ∇W + 2ρ₀ s_i ∇λ] and dρ_i/dt = Σ m (M_i v_i − M_j v_j)·∇W +
 //! 2ρ₀ (M_i v_i)·∇λ.
 //!
-//! One solve does the work of their two. A velocity free of divergence is asked for, and besides that a density that is
-//! off comes back within some time τ (Baumgarte 1972). Where a density is to be right after a single step, as in their
-//! second solver, each small error of it becomes a speed: a fluid at rest simmers, and its pressure with it.
+//! One solve does the work of their two. It demands a velocity free of divergence and, besides, that a
+//! density that is off returns within a relaxation time τ (Baumgarte 1972). If a density had to be right
+//! after a single step, as in their second solver, each of its small errors would become a speed: a fluid at
+//! rest would simmer, and its pressure with it.
 //!
-//! Walls enter by λ, ∇λ and M = (1 − K)⁻¹: a pressure that is linear in space goes on behind the wall. The rate of density
-//! is the adjoint of that: a velocity that is linear in space goes on behind the wall and is mirrored at it. So the system
-//! to be solved is symmetric and has no negative eigenvalue, whatever the vessel, and its solution adds no energy.
-//! (Measured on a still column: with λ and ∇λ alone the pressure of the first layer comes out 2.2 times too high; with the
-//! mirrored pressure but not the mirrored velocity the column boils.)
+//! Walls enter by λ, ∇λ and M = (1 − K)⁻¹: a pressure that is linear in space continues behind the wall. The
+//! rate of density is the adjoint of that: a velocity that is linear in space continues behind the wall and
+//! is mirrored at it. So the system to be solved is symmetric and has no negative eigenvalue for any vessel,
+//! and its solution adds no energy. (Measured on a still column: with λ and ∇λ alone the pressure of the
+//! first layer comes out 2.2 times too high; with the mirrored pressure but not the mirrored velocity the
+//! column boils.)
 //!
-//! The particles' pressure is what follows from that: G·ρ²s, because the sums make G·∇p of a pressure that is linear in
-//! space (G = 0.98 in the depth of a fluid that has left the lattice), and its mean over the time τ, because what is left of a velocity's
-//! divergence in one step is a pressure in the next: of a fluid at rest single steps differ by a tenth, their sum is its
-//! weight.
+//! The reported pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
+//! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over the relaxation
+//! time τ, because the divergence of velocity that one step leaves is a pressure in the next: in a fluid at
+//! rest single steps differ by a tenth, and only their sum is its weight.
 //!
-//! Invariant: the density belongs to the positions.
+//! Invariant: the densities are those of the present positions.
 
 use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
@@ -45,53 +48,56 @@ use crate::sph::{
     simulation::StepError,
 };
 
-/// Walls and disorder make the system stiffer than the even fluid that [`stiffness`] speaks of.
+/// Factor by which walls and disorder make the system stiffer than the even fluid of [`stiffness`].
 const STIFFNESS: f64 = 1.5;
 
-/// A particle without neighbours has no pressure to find: a factor below this part of that in a full neighbourhood.
+/// A particle whose factor is below this part of that in a full neighbourhood has no neighbours, and no
+/// pressure is solved for.
 const LONELY: f64 = 1e-3;
 
-/// A density that is off comes back within so many steps: the first where the fastest particle passes as much in a step as
-/// it may, the second at least where nothing moves. What moves loses its density step by step (with ten everywhere a dam
-/// that breaks is 0.5 % too dense in the mean, with four 0.3 %); at rest each correction is noise of the pressure.
+/// The relaxation time, in steps: the first where the fastest particle moves as far in a step as it may, the
+/// second at least where nothing moves. Moving fluid loses its density step by step (with ten everywhere a
+/// breaking dam is 0.5 % too dense in the mean, with four 0.3 %). At rest each correction is noise of the
+/// pressure.
 const RELAXATION_STEPS: [f64; 2] = [4.0, 10.0];
 
-/// … and at rest in no less than so many times √(h/g), however short the steps: the error of a whole column comes back at
-/// once, and with ten steps a column of eighty layers bursts at its start.
+/// The least relaxation time at rest, in units of √(h/g), however short the steps are: the error of a whole
+/// column returns at once, and with ten steps a column of eighty layers bursts at its start.
 const RELAXATION_FALLS: f64 = 2.0;
 
-/// … but not in more steps than these, in a gravity that is next to nothing; where a column bursts, steps are so short
-/// that the time of a fall has some sixty.
+/// The most steps of a relaxation time, for a gravity close to zero. Where a column would burst, steps are so
+/// short that a relaxation time has some sixty of them.
 const MOST_RELAXATION_STEPS: f64 = 100.0;
 
-/// What is kept between steps: the solver's answer; the rest is working memory.
+/// The scheme. It keeps the solver's answer between steps; the rest is working memory.
 pub struct DivergenceFree {
     numbers: Dfsph,
-    /// s = p/ρ²
+    /// Specific pressure s = p/ρ².
     specific: Vec<f64>,
-    /// How much a unit of p/ρ² lowers the own dρ/dt in a second: (1 − K)⁻¹(…)·(…) + Σ m²|∇W|².
+    /// The diagonal of the system: how much a unit of p/ρ² lowers the particle's own dρ/dt in a second, (1 −
+    /// K)⁻¹(…)·(…) + Σ m²|∇W|².
     factor: Vec<f64>,
-    /// G = −⅓ Σ V r·∇W + ⅓ tr K
+    /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
     spread: Vec<f64>,
-    /// dρ/dt
+    /// Rate of density dρ/dt.
     rate: Vec<f64>,
-    /// The same without pressure.
+    /// Rate of density without pressure, plus the rate at which a density that is off returns.
     free: Vec<f64>,
-    /// a(s)
+    /// Acceleration a(s) by pressure.
     push: Vectors,
-    /// Σ V ∇W + ∇λ, 1/m: where the particles crowd; zero at the surface.
+    /// Σ V ∇W + ∇λ, 1/m: the direction in which particles crowd; zero at the surface.
     crowding: Vectors,
     tension: Tension,
-    /// M·v
+    /// M·v of each particle.
     completed: Vectors,
     walls: Walls,
-    /// The guess before momentum carried it on.
+    /// The last guess, without the momentum that was added to it.
     last: Vec<f64>,
     /// Greatest eigenvalue of the system over its diagonal: the inverse of a step that cannot overshoot.
     stiffness: f64,
-    /// Σ of errors and of the momentum's work, chunk by chunk.
+    /// Sums of the errors and of the momentum's work, chunk by chunk.
     errors: Vec<[f64; 2]>,
-    /// Of the last step's solver.
+    /// Iterations of the last step's solver.
     iterations: u32,
 }
 
@@ -108,7 +114,7 @@ impl Scheme for DivergenceFree {
         Ok(dt)
     }
 
-    /// The answers of the last step; all else follows from the positions.
+    /// Saves the answers of the last step. All else follows from the positions.
     fn save(&self, checkpoint: &mut Checkpoint) {
         checkpoint.set("specific pressure", self.specific.clone());
         checkpoint.set("stiffness", vec![self.stiffness]);
@@ -140,7 +146,7 @@ impl Scheme for DivergenceFree {
 }
 
 impl DivergenceFree {
-    /// A scheme for a fluid that is new, or that goes on from a state which will be restored.
+    /// Makes the scheme of a fluid that is new, or that goes on from a state which will be restored.
     pub fn start(numbers: Dfsph, core: &mut Core, is_new: bool) -> Self {
         let n = core.particles.len();
         core.particles.density.resize(n, 0.0);
@@ -170,10 +176,10 @@ impl DivergenceFree {
         scheme
     }
 
-    /// Moves the particles of the start apart where they are too dense, at walls above all, for which no lattice is made:
-    /// a first step would give them speeds for it. Their velocities stay.
+    /// Moves the particles of a start apart where they are too dense, above all at walls, to which the
+    /// lattice does not fit: otherwise the first step would give them speeds. Their velocities stay.
     fn relax(&mut self, core: &mut Core) {
-        /// So often at most; what is left is small.
+        /// Most rounds; the compression that is left then is small.
         const ROUNDS: usize = 40;
         let dt = core.parameters.force_dt(core.parameters.gravity.length().max(1e-3));
         let gravity = std::mem::take(&mut core.parameters.gravity);
@@ -188,7 +194,7 @@ impl DivergenceFree {
             }
             core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
             self.keep_density(core, dt);
-            // a place that cannot be left is found by the first step
+            // the first step will report a place at which an obstacle has no value
             if core.drift(dt, None).is_err() {
                 break;
             }
@@ -202,7 +208,7 @@ impl DivergenceFree {
         core.particles.pressure.fill(0.0);
     }
 
-    /// Order, walls, densities and factors of the present positions.
+    /// Finds the order, walls, densities and factors for the present positions.
     fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
         let mut columns: SmallVec<[&mut Vec<f64>; 4]> = smallvec![&mut self.specific];
         columns.extend(kept.iter_mut().map(|column| &mut **column));
@@ -218,7 +224,7 @@ impl DivergenceFree {
         core.particles.density = density;
     }
 
-    /// Gravity, viscosity and tension.
+    /// Finds the accelerations by gravity, viscosity and surface tension.
     fn find_other_accelerations(&mut self, core: &mut Core) {
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let g = core.parameters.gravity;
@@ -243,12 +249,12 @@ impl DivergenceFree {
         self.tension.act(core);
     }
 
-    /// Changes velocities so that nothing is compressed, and what is too dense expands.
+    /// Changes velocities by pressure so that nothing is compressed, and what is too dense expands.
     fn keep_density(&mut self, core: &mut Core, dt: f64) {
         let rest = core.parameters.rest_density;
         let mut pressure = std::mem::take(&mut self.specific);
         let relaxation = relaxation_time(&core.parameters, core.speed, dt);
-        // the compression to come without pressure; that which s takes away is found in each iteration
+        // the compression to come without pressure; each iteration finds what s takes away
         self.find_rate_of(core, &core.particles.velocity, true);
         let mut free = std::mem::take(&mut self.free);
         for ((free, rate), rho) in free.iter_mut().zip(&self.rate).zip(&core.particles.density) {
@@ -259,7 +265,7 @@ impl DivergenceFree {
         add_scaled(&mut core.particles.velocity, &self.push, dt);
         add_scaled(&mut core.acceleration, &self.push, 1.0);
         let Particles { pressure: p, density, .. } = &mut core.particles;
-        // at first a mean since the start
+        // until the relaxation time has passed, the mean is taken since the start
         let share = (dt / relaxation.min(core.time + dt)).min(1.0);
         for (((p, s), rho), g) in p.iter_mut().zip(&pressure).zip(density).zip(&self.spread) {
             *p += share * ((1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho - *p);
@@ -267,11 +273,13 @@ impl DivergenceFree {
         self.specific = pressure;
     }
 
-    /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0, and is not positive
-    /// elsewhere, to a mean of `tolerance`; leaves a(s) in `push`. Returns the iterations.
+    /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0 and is not
+    /// positive elsewhere, with a mean error of at most `tolerance`. Leaves a(s) in `push`, and returns the
+    /// number of iterations.
     ///
-    /// Projected gradients with momentum (Nesterov 1983), scaled by the diagonal, and begun anew when the momentum leads
-    /// uphill (O'Donoghue & Candès 2015): some √κ iterations where Jacobi's method needs κ.
+    /// The method is projected gradients with momentum (Nesterov 1983), scaled by the diagonal, and restarted
+    /// when the momentum leads uphill (O'Donoghue & Candès 2015). It takes some √κ iterations where Jacobi's
+    /// method needs κ.
     fn solve(&mut self, core: &Core, pressure: &mut [f64], free: &[f64], dt: f64, tolerance: f64) -> u32 {
         let least = LONELY * Constants::of(&core.parameters).full_factor;
         let n = pressure.len() as f64;
@@ -304,7 +312,8 @@ impl DivergenceFree {
         iteration
     }
 
-    /// The sum of the errors at a guess, and whether momentum leads from it uphill: a sum above zero.
+    /// The sum of the errors at a guess, and a second sum that is above zero if momentum leads uphill from
+    /// it.
     fn find_errors(&mut self, pressure: &[f64], free: &[f64], dt: f64, least: f64) -> [f64; 2] {
         let scale = 1.0 / (dt * self.stiffness);
         self.rate
@@ -319,7 +328,7 @@ impl DivergenceFree {
                     if factor[k] > least {
                         let error = free[k] + dt * rate[k];
                         let next = projected(scale, s[k], error, factor[k]);
-                        // an expansion that no pressure can end is no error
+                        // no pressure can end an expansion, so it is no error
                         sums[0] += if s[k] > 0.0 { error.abs() } else { error.max(0.0) };
                         sums[1] += factor[k] * (s[k] - next) * (next - last[k]);
                     }
@@ -330,7 +339,7 @@ impl DivergenceFree {
         self.errors.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
     }
 
-    /// Takes the step along the gradient, and the part `beta` of the last step again.
+    /// Takes a step along the gradient, and repeats the part `beta` of the last step.
     fn guess_again(&mut self, pressure: &mut [f64], free: &[f64], dt: f64, least: f64, beta: f64) {
         let scale = 1.0 / (dt * self.stiffness);
         pressure
@@ -353,14 +362,15 @@ impl DivergenceFree {
             });
     }
 
-    /// a(s)
+    /// Finds the acceleration a(s) by pressure.
     fn find_push(&mut self, core: &Core, pressure: &[f64]) {
         let pass = Push { constants: Constants::of(&core.parameters), walls: &self.walls, pressure };
         let Vectors { x, y, z } = &mut self.push;
         core.sum(&pass, [pressure], [&mut x[..], y, z]);
     }
 
-    /// dρ/dt of a velocity among walls that move, or of an acceleration per second.
+    /// Finds the dρ/dt of a velocity, with the motion of the walls, or of an acceleration in a second,
+    /// without it.
     fn find_rate_of(&mut self, core: &Core, velocity: &Vectors, with_walls: bool) {
         self.walls.complete(velocity, &mut self.completed);
         let pass = Squeeze {
@@ -374,8 +384,8 @@ impl DivergenceFree {
     }
 }
 
-/// How long a density that is off may take to come back, s, after a step of the length `dt` with this greatest speed; which is
-/// also the time over which reported pressures are averaged.
+/// The relaxation time, s, in which a density that is off returns, after a step of the length `dt` with this
+/// greatest speed. Reported pressures are averaged over the same time.
 fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
     let [moving, at_rest] = RELAXATION_STEPS;
     let fall = (parameters.support_radius / parameters.gravity.length()).sqrt();
@@ -386,14 +396,14 @@ fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
     slow + (moving * dt - slow) * courant
 }
 
-/// A step along the gradient from a guess, not below zero.
+/// The guess after a step along the gradient, not below zero.
 #[inline]
 fn projected(scale: f64, s: f64, error: f64, factor: f64) -> f64 {
     (s + scale * error / factor).max(0.0)
 }
 
-/// Greatest eigenvalue over diagonal in an even fluid with so many spacings per support radius: waves of pressure of the
-/// length 1.65 h, by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
+/// Greatest eigenvalue over diagonal in an even fluid with `ratio` spacings per support radius. It belongs to
+/// waves of pressure of the length 1.65 h, by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
 fn stiffness(ratio: f64) -> f64 {
     1.775 * (0.5 * ratio).powi(3)
 }

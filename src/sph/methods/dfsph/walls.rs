@@ -12,17 +12,20 @@ use crate::sph::{
 /// What walls take of the kernels of the particles near them.
 #[derive(Default)]
 pub(super) struct Walls {
-    /// Place in `found` of each particle; `NONE`: no wall is near.
+    /// Index into `found` of each particle; [`NONE`] if no wall is near.
     place: Vec<u32>,
-    /// Particle, what walls take of its kernel, and M = (1 − K)⁻¹.
+    /// For each particle near walls: its index, what walls take of its kernel, and M = (1 − K)⁻¹.
     found: Vec<(u32, WallsNear, DMat3)>,
 }
 
+/// What walls take of the kernel of one particle.
 pub(super) type WallsNear = Coverage<WallDrag>;
 
+/// Index of a particle that has no wall near it.
 const NONE: u32 = u32::MAX;
 
 impl Walls {
+    /// Finds the walls near all particles at their present positions.
     pub fn find(&mut self, core: &Core) {
         let n = core.particles.len();
         self.found.clear();
@@ -37,6 +40,7 @@ impl Walls {
         }
     }
 
+    /// What walls take of a particle's kernel, and its M; `None` if no wall is near.
     #[inline]
     pub fn near(&self, i: usize) -> Option<(&WallsNear, &DMat3)> {
         let place = self.place[i];
@@ -46,7 +50,7 @@ impl Walls {
         })
     }
 
-    /// M·v, into `completed`.
+    /// Writes M·v of each particle to `completed`.
     pub fn complete(&self, v: &Vectors, completed: &mut Vectors) {
         completed.clone_from(v);
         for &(i, _, completion) in &self.found {
@@ -54,6 +58,7 @@ impl Walls {
         }
     }
 
+    /// Memory of this table, bytes.
     pub fn bytes(&self) -> usize {
         4 * self.place.capacity() + size_of::<(u32, WallsNear, DMat3)>() * self.found.capacity()
     }

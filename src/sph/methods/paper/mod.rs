@@ -1,4 +1,5 @@
-//! The method of the paper (equations 8–14), corrected: its numbers, keys and limits. The scheme is in [`scheme`].
+//! The method of the paper (equations 8–14), corrected: its numbers, keys and limits. The scheme is in
+//! [`scheme`].
 
 mod scheme;
 
@@ -17,12 +18,12 @@ use crate::sph::walls::{Wall, WallKernel};
 /// Numbers of the paper's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Paper {
-    /// Stiffness k of p = k(ρ − ρ₀), m²/s² = J/kg. 3.0 (table 1): the speed of sound is √k = 1.7 m/s, so the fluid is far
-    /// softer than water and long steps are stable. Zero: there is no pressure.
+    /// Stiffness k of p = k(ρ − ρ₀), m²/s² = J/kg. 3.0 (table 1): the speed of sound is √k = 1.7 m/s, so the
+    /// fluid is far softer than water and long steps are stable. Zero: there is no pressure.
     pub stiffness: f64,
     /// Threshold l on |∇c|, 1/m, above which a particle counts as surface. 7.065 (table 1) = √(ρ₀/20 kg/m³).
     pub surface_threshold: f64,
-    /// What becomes of negative pressure; clamped to zero by default.
+    /// What happens to a negative pressure. By default it is cut off at zero.
     pub negative_pressure: NegativePressure,
 }
 
@@ -33,8 +34,8 @@ impl Default for Paper {
 }
 
 impl Paper {
-    /// Pressure of a density, Pa (equation 9, read as p = k(ρ − ρ₀): the printed p = κρ pushes a fluid apart even at
-    /// rest).
+    /// Pressure of a density, Pa (equation 9, read as p = k(ρ − ρ₀): the printed p = κρ pushes a fluid apart
+    /// even at rest). Densities are in kg/m³.
     pub fn pressure(&self, density: f64, rest_density: f64) -> f64 {
         self.negative_pressure.of(self.stiffness * (density - rest_density))
     }
@@ -107,14 +108,14 @@ impl Numerics for Paper {
         Box::new(scheme::PaperScheme::start(*self, core))
     }
 
-    /// √(dp/dρ) = √k
+    /// The speed of sound √(dp/dρ) = √k.
     fn sound_speed(&self, _parameters: &Parameters) -> f64 {
         self.stiffness.sqrt()
     }
 
-    /// The relative velocity of two lone, coinciding particles decays at the rate 2·viscosity·m·∇²W(0)/ρ² with
-    /// ρ = mW(0), the fastest that the method can produce, because denser surroundings divide by a larger ρ. The limit is
-    /// one decay time, half of what an explicit step endures.
+    /// One decay time of the relative velocity of two lone, coinciding particles, half of what an explicit
+    /// step tolerates. It decays at the rate 2·viscosity·m·∇²W(0)/ρ² with ρ = mW(0), the fastest that the
+    /// method can produce, because denser surroundings divide by a larger ρ.
     fn viscous_dt(&self, parameters: &Parameters) -> f64 {
         let (h, mass) = (parameters.support_radius, parameters.particle_mass);
         let lone_density = mass * 315.0 / (64.0 * PI * h.powi(3));
@@ -122,7 +123,7 @@ impl Numerics for Paper {
         lone_density.powi(2) / (2.0 * parameters.viscosity * mass * laplacian)
     }
 
-    /// The paper's method has no such limit.
+    /// No limit: the paper's method has none for surface tension.
     fn capillary_dt(&self, _parameters: &Parameters) -> f64 {
         f64::INFINITY
     }
@@ -135,7 +136,7 @@ impl Numerics for Paper {
         Wall { kernel: WallKernel::Poly6, h: parameters.support_radius, layer: None }
     }
 
-    /// k(ln x + 1/x − 1) with x = ρ/ρ₀
+    /// The energy k(ln x + 1/x − 1) with x = ρ/ρ₀.
     fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64 {
         let x = density / parameters.rest_density;
         if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {

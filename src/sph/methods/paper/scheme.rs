@@ -1,14 +1,15 @@
-//! The method of the paper (equations 8–14), corrected.
+//! The scheme of the paper's method (equations 8–14), corrected.
 //!
-//! Velocity Verlet in kick–drift–kick form. Viscosity depends on the velocity, which is not yet known when
-//! the forces are found; it is predicted as v + a·dt/2 from the half-step velocity and the last acceleration,
-//! the paper's "approximation of a new velocity vector". One evaluation of the forces per step.
+//! Time: velocity Verlet in kick–drift–kick form, with one evaluation of the forces per step. Viscosity
+//! depends on the velocity, which is not yet known when the forces are found. It is predicted as v + a·dt/2
+//! from the half-step velocity and the last acceleration, the paper's "approximation of a new velocity
+//! vector".
 //!
-//! The paper gives force densities f_i; here a_i = f_i/ρ_i, with m_j/ρ_j as the volume of a neighbour in every
-//! sum. The paper prints m_j/ρ_i in (11) and (14). With m_j/ρ_j each pair of particles exchanges
-//! m·a = ∓ m²/(ρ_i ρ_j)·(…), the same number with opposite signs: momentum is conserved to rounding.
-//! With the printed factor the lighter of two particles would push less than it is pushed.
-//! Surface tension is no pair force and conserves momentum only as far as the surface is closed.
+//! The paper gives force densities f_i; here a_i = f_i/ρ_i, with m_j/ρ_j as the volume of a neighbour in
+//! every sum. The paper prints m_j/ρ_i in (11) and (14). With m_j/ρ_j each pair of particles exchanges m·a =
+//! ∓ m²/(ρ_i ρ_j)·(…), the same number with opposite signs: momentum is conserved to rounding. With the
+//! printed factor the lighter of two particles would push less than it is pushed. Surface tension is not a
+//! pair force, and conserves momentum only as far as the surface is closed.
 //!
 //! Walls act on positions and velocities only, as in the paper.
 
@@ -26,7 +27,7 @@ use crate::sph::{
     simulation::StepError,
 };
 
-/// What is kept between steps: working memory only.
+/// The scheme. It keeps only working memory between steps.
 pub struct PaperScheme {
     numbers: Paper,
     kernels: Kernels,
@@ -74,7 +75,7 @@ impl PaperScheme {
         }
     }
 
-    /// Accelerations for the velocities predicted `ahead` seconds from those stored.
+    /// Finds the accelerations for the velocities predicted `ahead` seconds from those stored.
     fn find_accelerations(&mut self, core: &mut Core, ahead: f64) {
         let terms = Terms::of(&self.numbers, &core.parameters);
         let mut acceleration = std::mem::take(&mut core.acceleration);
@@ -119,7 +120,7 @@ impl PaperScheme {
     }
 }
 
-/// Which terms a fluid has; a term that it lacks is not compiled into its loop.
+/// The force terms that a fluid has. A term that it lacks is not compiled into its loop.
 #[derive(Debug, Clone, Copy)]
 struct Terms {
     pressure: bool,
@@ -174,14 +175,14 @@ impl PairPass<0, 1, 1> for Density {
 struct Forces<'a, const VISCOSITY: bool, const TENSION: bool> {
     kernels: Kernels,
     parameters: &'a Parameters,
-    /// Of the surface, 1/m.
+    /// Threshold on |∇c| above which a particle counts as surface, 1/m.
     threshold: f64,
-    /// m/ρ, m³
+    /// Volume m/ρ of each particle, m³.
     volume: &'a [f64],
 }
 
-/// Σ V_j (p_i + p_j)(1 − q)²/r·d, Σ V_j (u_j − u_i)(1 − q), Σ V_j (1 − q²)²·d, Σ V_j (1 − q²)(3 − 7q²), with q = r/h:
-/// the sums of the forces without their constants.
+/// The sums of the forces without their constants, with q = r/h: Σ V_j (p_i + p_j)(1 − q)²/r·d, Σ V_j (u_j −
+/// u_i)(1 − q), Σ V_j (1 − q²)²·d, and Σ V_j (1 − q²)(3 − 7q²).
 impl<const VISCOSITY: bool, const TENSION: bool> PairPass<5, 10, 3> for Forces<'_, VISCOSITY, TENSION> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
@@ -197,7 +198,8 @@ impl<const VISCOSITY: bool, const TENSION: bool> PairPass<5, 10, 3> for Forces<'
         let s = r.mul_add(of(-1.0 / self.kernels.h), of(1.0)).max(of(0.0));
         let [.., p_own, _] = *own;
         let [.., p, volume] = other;
-        // coinciding particles have no direction: the quotient stays finite, and its product with d = 0 is zero
+        // coinciding particles have no direction: the quotient stays finite, and its product with d = 0 is
+        // zero
         let push = volume * (p_own + p) * s * s / r.max(of(1e-12 * self.kernels.h));
         for k in 0..3 {
             sums[k] = push.mul_add(d[k], sums[k]);

@@ -14,38 +14,42 @@ use crate::sph::passes::Pass;
 /// The exponent of Tait's equation for water.
 const EXPONENT: i32 = 7;
 
-/// The speed of sound over the greatest expected speed, unless it is stated: keeps the density within 1 %.
+/// The speed of sound over the greatest expected speed, unless it is stated. This keeps changes of the
+/// density within 1 %.
 const SOUND_OVER_SPEED: f64 = 10.0;
 
-/// The pressures that make the acceleration of a particle.
+/// How the pressures of two particles enter their acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Gradients {
-    /// Sums p_i + p_j: what one particle gains another loses, momentum is conserved to rounding.
+    /// Sums p_i + p_j: what one particle gains, the other loses, so momentum is conserved to rounding.
     #[default]
     Pairs,
-    /// Differences p_j − p_i in the fluid's depth: exact where pressure is linear in space, and five to ten times as accurate
-    /// in fluids at rest, in viscous ones and in those without a free surface. Needs shifting, and, at a free surface, an
-    /// artificial viscosity of some 0.05: without it, waves gain energy.
+    /// Differences p_j − p_i in the fluid's depth: exact where the pressure is linear in space, and five to
+    /// ten times as accurate in fluids at rest, in viscous ones and in those without a free surface. They
+    /// need shifting and, at a free surface, an artificial viscosity of some 0.05: without it, waves gain
+    /// energy.
     Differences,
 }
 
 /// Numbers of the weakly compressible method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wcsph {
-    /// Speed of sound c, m/s; `None`: ten times the greatest expected speed, which keeps the density within 1 %.
+    /// Speed of sound c, m/s. `None`: ten times the greatest expected speed, which keeps changes of the
+    /// density within 1 %.
     pub sound_speed: Option<f64>,
-    /// δ of the density diffusion (Molteni & Colagrossi 2009), 0.1; zero: the term is not computed.
+    /// δ of the density diffusion (Molteni & Colagrossi 2009). Default 0.1; zero: the term is not computed.
     pub density_diffusion: f64,
-    /// α of the artificial viscosity (Monaghan 1992), 0.02; zero: the term is not computed.
+    /// α of the artificial viscosity (Monaghan 1992). Default 0.02; zero: the term is not computed.
     pub artificial_viscosity: f64,
-    /// The pressures that make accelerations.
+    /// How the pressures of two particles enter their acceleration.
     pub gradients: Gradients,
-    /// How strongly particles drift to where there are fewer of them, which keeps them even; zero: they do not. `None`: 1
-    /// with differences of pressure, 0 with pairs.
+    /// How strongly particles drift to where there are fewer of them, which keeps them evenly distributed.
+    /// Zero: no drift. `None`: 1 with differences of pressure, 0 with sums.
     pub shifting: Option<f64>,
-    /// What becomes of negative pressure; clamped to zero by default.
+    /// What happens to a negative pressure. By default it is cut off at zero.
     pub negative_pressure: NegativePressure,
-    /// Whether the fluid starts under the pressure of its own weight: otherwise it starts without, and rings.
+    /// Whether the fluid starts under the pressure of its own weight. If not, it starts without pressure, and
+    /// oscillates.
     pub hydrostatic_start: bool,
 }
 
@@ -64,7 +68,7 @@ impl Default for Wcsph {
 }
 
 impl Wcsph {
-    /// The strength of the shifting that acts.
+    /// The strength of the shifting, stated or derived.
     pub fn shifting(&self) -> f64 {
         self.shifting.unwrap_or(match self.gradients {
             Gradients::Pairs => 0.0,
@@ -200,7 +204,7 @@ impl Numerics for Wcsph {
         self.sound_speed.unwrap_or(SOUND_OVER_SPEED * parameters.expected_speed)
     }
 
-    /// ρ₀(1 + 7p/(c²ρ₀))^(1/7), the inverse of Tait's equation
+    /// The density ρ₀(1 + 7p/(c²ρ₀))^(1/7), the inverse of Tait's equation.
     fn density_at_start(&self, parameters: &Parameters, pressure: f64) -> Option<f64> {
         let stiffness = self.sound_speed(parameters).powi(2) * parameters.rest_density / 7.0;
         self.hydrostatic_start.then(|| parameters.rest_density * (1.0 + pressure / stiffness).powf(1.0 / 7.0))
@@ -210,7 +214,7 @@ impl Numerics for Wcsph {
         true
     }
 
-    /// c²/7·((x⁶ − 1)/6 + 1/x − 1) with x = ρ/ρ₀
+    /// The energy c²/7·((x⁶ − 1)/6 + 1/x − 1) with x = ρ/ρ₀.
     fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64 {
         let x = density / parameters.rest_density;
         if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {

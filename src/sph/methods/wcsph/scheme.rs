@@ -1,4 +1,5 @@
-//! Weakly compressible fluid: the density follows the motion (equation of continuity), the pressure the density (Tait).
+//! The scheme of a weakly compressible fluid: the density follows from the motion (equation of continuity),
+//! and the pressure from the density (Tait).
 //!
 //! ```text
 //! dρ_i/dt = ρ_i/G_i [Σ V v_ij·∇W + (v_i − v_wall)·∇λ]  + δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V r_ji·∇W/r²
@@ -6,22 +7,24 @@
 //! p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1)
 //! ```
 //!
-//! Kernel: Wendland C2 (1995), whose pairs do not clump. Density diffusion: Molteni & Colagrossi (2009), with the
-//! hydrostatic part ρᴴ taken off (Fourtakas et al. 2019), so that it does not lift a fluid at rest. Viscosity: laminar
-//! (Morris et al. 1997) or artificial (Monaghan 1992).
+//! Kernel: Wendland C2 (1995), under which particles do not clump. Density diffusion: Molteni & Colagrossi
+//! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
+//! Viscosity: laminar (Morris et al. 1997) or artificial (Monaghan 1992).
 //!
-//! Those are gradients by differences, divided by what the sum makes of the gradient of a position, G = −⅓ Σ V r·∇W + ⅓ tr K
-//! (0.98 on a lattice at h = 2.6 spacings): a pressure that is linear in space has its exact gradient, however far above
-//! zero it lies. Such forces do not push particles apart; shifting keeps them even instead ([`super::shifting`]). At a free
-//! surface and in spray, where G is small, and everywhere if the scene says so ([`Gradients`]), pressures act in equal pairs
-//! p_i + p_j, which conserve momentum to rounding, and G is taken as one.
+//! These formulas have gradients by differences, divided by what the sum makes of the gradient of a position,
+//! G = −⅓ Σ V r·∇W + ⅓ tr K (0.98 on a lattice at h = 2.6 spacings). A pressure that is linear in space has
+//! its exact gradient, however far above zero it lies. Such forces do not push particles apart; shifting
+//! keeps the particles evenly distributed instead ([`super::super::shifting`]). At a free surface and in
+//! spray, where G is small, and everywhere if the scene says so ([`Gradients`]), pressures act as sums p_i +
+//! p_j, which conserve momentum to rounding, and G is taken as one.
 //!
-//! Walls enter by λ, ∇λ and K in closed form ([`Coverage`]). The pressure beyond a wall is that of the particle,
-//! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a); since a is what is asked for, that is a linear
-//! system of three unknowns for each particle at a wall, solved at once: the factor (1 − K)⁻¹. Along walls that let it slip
-//! a flow is mirrored: their part of the kernel adds to the viscosity what the rest does.
+//! Walls enter by λ, ∇λ and K in closed form ([`Coverage`](crate::sph::walls::Coverage)). The pressure beyond
+//! a wall is that of the particle, continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a).
+//! Since a is the unknown, this is a linear system of three unknowns for each particle at a wall; the factor
+//! (1 − K)⁻¹ solves it. Along walls that let it slip the flow is mirrored: the part of the kernel inside them
+//! adds to the viscosity what the rest does.
 //!
-//! Time: kick–drift–kick with one evaluation per step; velocity and density at the new place are predicted.
+//! Time: kick–drift–kick with one evaluation per step. Velocity and density at the new place are predicted.
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
@@ -45,10 +48,10 @@ use crate::sph::{
     walls::{Friction, WallDrag},
 };
 
-/// The method's numbers as they act: what was left open is derived.
+/// The method's numbers, with derived values where the scene states none.
 #[derive(Debug, Clone, Copy)]
 struct Numbers {
-    /// m/s
+    /// Speed of sound, m/s.
     sound_speed: f64,
     density_diffusion: f64,
     artificial_viscosity: f64,
@@ -70,14 +73,14 @@ impl Numbers {
     }
 }
 
-/// What is kept between steps: the rates of change; the rest is working memory.
+/// The scheme. It keeps the rates of change between steps; the rest is working memory.
 pub struct Weakly {
     numbers: Numbers,
-    /// dρ/dt, kg/m³/s
+    /// Rates of density dρ/dt, kg/m³/s.
     density_rate: Vec<f64>,
-    /// Σ V ∇W + ∇λ, 1/m: where the particles crowd; zero at the surface.
+    /// Σ V ∇W + ∇λ, 1/m: the direction in which particles crowd; zero at the surface.
     crowding: Vectors,
-    /// ρ − ρ₀ as predicted
+    /// Predicted ρ − ρ₀.
     excess: Vec<f64>,
     tension: Tension,
 }
@@ -119,7 +122,7 @@ impl Weakly {
     pub fn start(wcsph: &Wcsph, core: &mut Core) -> Self {
         let numbers = Numbers::of(wcsph, &core.parameters);
         let n = core.particles.len();
-        // a density that was not stated is that at rest
+        // a particle without a density starts at the rest density
         core.particles.density.resize(n, 0.0);
         for rho in core.particles.density.iter_mut().filter(|rho| **rho == 0.0) {
             *rho = core.parameters.rest_density;
@@ -138,7 +141,7 @@ impl Weakly {
         scheme
     }
 
-    /// v += a·t, ρ += dρ/dt·t
+    /// Advances velocities and densities: v += a·t, ρ += dρ/dt·t.
     fn kick(&self, core: &mut Core, t: f64) {
         add_scaled(&mut core.particles.velocity, &core.acceleration, t);
         add_scaled_column(&mut core.particles.density, &self.density_rate, t);
@@ -155,8 +158,8 @@ impl Weakly {
         );
     }
 
-    /// Accelerations and rates of density for velocities and densities predicted `ahead` seconds from those stored. The
-    /// pressures that belong to them take the place of the particles'.
+    /// Finds accelerations and rates of density for velocities and densities predicted `ahead` seconds from
+    /// those stored. The pressures of the particles become those of the predicted densities.
     fn find_rates(&mut self, core: &mut Core, ahead: f64) {
         let n = core.particles.len();
         let mut predicted = std::mem::take(&mut core.spare);
@@ -166,7 +169,8 @@ impl Weakly {
         let mut pressure = std::mem::take(&mut core.particles.pressure);
         let (numbers, parameters) = (&self.numbers, &core.parameters);
         let even = is_kept_even(numbers);
-        // of fluids that are not kept even only differences of it are asked for, less that of a fluid at rest
+        // where particles are not kept even, only differences of the excess matter, so that of a fluid at
+        // rest is subtracted
         let (at_rest, from) = (at_rest(numbers, parameters), core.boundary.domain.min);
         let Vectors { x, y, z } = &core.particles.position;
         let places = x.par_chunks(CHUNK).zip(y.par_chunks(CHUNK)).zip(z.par_chunks(CHUNK));
@@ -208,7 +212,7 @@ impl Weakly {
     }
 }
 
-/// Whether particles are kept even: for differences, and for shifting itself.
+/// Whether particles are kept evenly distributed: with differences of pressure, and with shifting.
 fn is_kept_even(numbers: &Numbers) -> bool {
     numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences
 }
@@ -218,7 +222,7 @@ fn at_rest(numbers: &Numbers, parameters: &Parameters) -> DVec3 {
     parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity
 }
 
-/// p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1), not below zero unless that is kept.
+/// The pressure p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1), cut off at zero unless negative pressures are kept.
 #[inline]
 fn tait(numbers: &Numbers, parameters: &Parameters, density: f64) -> f64 {
     let stiffness = numbers.sound_speed.powi(2) * parameters.rest_density / f64::from(EXPONENT);
@@ -226,32 +230,32 @@ fn tait(numbers: &Numbers, parameters: &Parameters, density: f64) -> f64 {
     numbers.negative_pressure.of(p)
 }
 
-/// The sums over neighbours and what is made of them.
+/// What the pass over pairs needs besides the columns that it sums.
 #[derive(Clone, Copy)]
 struct Rates<'a> {
     parameters: &'a Parameters,
     core: &'a Core,
     velocity: &'a Vectors,
     pressure: &'a [f64],
-    /// ρ − ρ₀; of particles that are not kept even, less what a fluid at rest would have
+    /// ρ − ρ₀; where particles are not kept even, less the excess in a fluid at rest.
     excess: &'a [f64],
     kernel: Wendland,
-    /// V·c of V∇W = −V·c·(1 − q)³·r
+    /// The factor V·c of V∇W = −V·c·(1 − q)³·r.
     steepness: f64,
-    /// 2δ·h/2·c·ρ₀ of the diffusion, over ρ₀
+    /// The factor 2δ·h/2·c·ρ₀ of the diffusion, over ρ₀.
     diffusion: f64,
     at_rest: DVec3,
-    /// ν = μ/ρ₀, m²/s
+    /// Kinematic viscosity ν = μ/ρ₀, m²/s.
     laminar: f64,
-    /// α·h/2·c·ρ₀
+    /// The factor α·h/2·c·ρ₀ of the artificial viscosity.
     artificial: f64,
-    /// Whether pressures act by their differences.
+    /// Whether pressures act by their differences in the fluid's depth.
     differences: bool,
-    /// Of the density to what the places say, 1/s.
+    /// Rate at which densities return to what the places say, 1/s.
     return_rate: f64,
-    /// Σ V W on a lattice
+    /// Σ V W on a lattice.
     lattice: f64,
-    /// [`is_kept_even`]
+    /// Whether particles are kept even, see [`is_kept_even`].
     even: bool,
 }
 
@@ -289,17 +293,19 @@ impl<'a> Rates<'a> {
     }
 }
 
-/// One pass, with laminar and artificial viscosity or without, and for particles that are kept even or not. With f = (1 − q)³
-/// and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d, f·(ρ_j − ρ_i), f·d, f·d², W and f·(v_j − v_i);
-/// for particles that are not kept even p_j + p_i instead, and neither f·d nor what comes after it.
+/// The pass over pairs, with laminar and artificial viscosity or without, and for particles that are kept
+/// even or not. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
+/// f·(ρ_j − ρ_i), f·d, f·d², W and f·(v_j − v_i). For particles that are not kept even it sums p_j + p_i
+/// instead of p_j − p_i, and omits f·d, f·d² and W.
 #[derive(Clone, Copy)]
 struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
 
 impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 13, 7>
     for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
 {
-    /// The artificial viscosity is a pressure between particles that approach and a tension between those that part: with the
-    /// pressure alone, noise at rest would hold up a part of the fluid's weight (3 % of it with α = 0.1).
+    /// The artificial viscosity is a pressure between particles that approach, and a tension between those
+    /// that part. With the pressure alone, noise at rest would hold up a part of the fluid's weight (3 % of
+    /// it with α = 0.1).
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
@@ -319,7 +325,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let mut push = if EVEN { other[3] - own[3] } else { other[3] + own[3] };
         if ARTIFICIAL {
             let least = of(0.01 * (0.5 * rates.kernel.h).powi(2));
-            // a viscosity made up needs no more than the twelve digits of an estimate in single precision
+            // an artificial viscosity needs no more than the twelve bits of an estimate in single precision
             push -= departing * of(rates.artificial) * (r2 + least).approximate_recip();
         }
         let push = push * f;
@@ -375,8 +381,9 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let smooth = if rates.differences { depth } else { 0.0 };
         let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
         let density = parameters.rest_density + smooth * rates.excess[i];
-        // where particles are not kept even, their own pressure pushes them apart; without EVEN the pairs' part of that is
-        // in the sums already
+        //
+        // where particles are not kept even, their own pressure pushes them apart; without EVEN the sums
+        // contain the part of the pairs already
         push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
         if let Some(wall) = &wall {
             push = wall.completion() * push;
