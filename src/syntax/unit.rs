@@ -1,6 +1,6 @@
-//! Units of literals: a factor to SI and the exponents of metre, kilogram, second and radian.
+//! Units of literals: their factor to SI units and their exponents of metre, kilogram, second and radian.
 
-/// Exponents of m, kg, s and rad.
+/// A dimension: the exponents of m, kg, s and rad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dimension {
     pub length: i8,
@@ -46,7 +46,8 @@ pub struct Unit {
     pub dimension: Dimension,
 }
 
-/// Reads a unit as the grammar lets it through: `kg/m^3`, `Pa·s`, `deg/s`. A `/` divides by the one next unit.
+/// Reads a unit that the grammar has accepted: `kg/m^3`, `Pa·s`, `deg/s`. A `/` divides by the next unit
+/// only.
 pub fn parse_unit(text: &str) -> Option<Unit> {
     let mut unit = Unit { factor: 1.0, dimension: Dimension::NONE };
     let mut rest = text;
