@@ -19,7 +19,7 @@ fn main() -> Result<(), rfm::Error> {
             let p = DVec3::new(x[i], y[i], z[i]) + v[i] * dt;
             (x[i], y[i], z[i]) = (p.x, p.y, p.z.max(0.0));
         }
-        pawn.omega_many([&x, &y, &z], &mut omega); // one call for all: nothing is allocated
+        pawn.omega_many([&x, &y, &z], &mut omega); // one call for all points: nothing is allocated
         for i in (0..1000).filter(|&i| omega[i] > 0.0) {
             hits += 1;
             let (mut w, mut gradient) = pawn.omega_grad(DVec3::new(x[i], y[i], z[i]));

@@ -1,4 +1,4 @@
-//! The syntax tree: what was written, with its spans, and nothing that was concluded from it.
+//! The syntax tree: what was written, with its spans. Nothing is concluded here.
 
 use crate::diagnostic::Span;
 
@@ -34,13 +34,13 @@ pub struct Param {
 /// `let name = value` or `@attribute(…) solid name = value`
 #[derive(Debug, Clone, PartialEq)]
 pub struct Definition {
-    /// Of solids only.
+    /// Attributes; only solids have them.
     pub attributes: Vec<Attribute>,
     pub name: Name,
     pub value: Expr,
 }
 
-/// `@name(arguments)`: what is wanted of a solid, beside its shape.
+/// `@name(arguments)`: a demand on a solid, beside its shape.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attribute {
     pub name: Name,
@@ -105,7 +105,7 @@ pub enum ExprKind {
         operands: Vec<Expr>,
     },
     Not(Box<Expr>),
-    /// Comparisons in a row; one or more after the first operand.
+    /// A chain of comparisons: the first operand, then one or more comparisons with the next.
     Compare {
         first: Box<Expr>,
         rest: Vec<(Comparison, Span, Expr)>,
@@ -165,10 +165,10 @@ pub enum Logic {
 pub enum Comparison {
     LessEqual,
     GreaterEqual,
-    /// `<`: read as `<=`, with a hint.
+    /// `<`: read as `<=`, with a warning.
     Less,
     Greater,
-    /// `==` and `!=`: always errors, kept for their messages.
+    /// `==` and `!=`: always errors; kept for the messages about them.
     Equal,
     NotEqual,
 }
@@ -195,7 +195,7 @@ impl Item {
         }
     }
 
-    /// The place in its expressions that lies deeper than so many levels, if there is one.
+    /// The first place in its expressions that is nested deeper than `levels`, or `None`.
     pub fn deeper_than(&self, levels: usize) -> Option<Span> {
         match self {
             Self::Param(param) => {
@@ -216,7 +216,7 @@ impl Item {
 }
 
 impl Entry {
-    /// Blocks nest no deeper than brackets may, which the parser has seen to.
+    /// The depth of blocks is not counted: the parser lets them nest no deeper than brackets.
     fn deeper_than(&self, levels: usize) -> Option<Span> {
         match self {
             Self::Setting { value, .. } => value.deeper_than(levels),
@@ -230,7 +230,7 @@ impl Expr {
         if levels == 0 { Some(self.span) } else { deepest(self.children(), levels - 1) }
     }
 
-    /// The expressions that this one is made of, in the order in which they are written.
+    /// The direct parts of this expression, in the order in which they are written.
     pub fn children(&self) -> Vec<&Self> {
         match &self.kind {
             ExprKind::Number(_) | ExprKind::Quantity { .. } | ExprKind::Text(_) | ExprKind::Name(_) => vec![],

@@ -1,7 +1,7 @@
-//! The grammar's pairs → [`Ast`]: one function per rule, in the grammar's order.
+//! Turns the grammar's pairs into an [`Ast`]: one function per rule, in the grammar's order.
 //!
-//! The grammar has already accepted the text, so the shapes of the pairs are known; where a child could only be
-//! missing through a bug here, an empty name or a zero stands in, and the tests of the grammar would show it.
+//! The grammar has already accepted the text, so the shapes of the pairs are known. Where a child could only
+//! be missing through a bug here, an empty name or a zero stands in; the tests of the grammar would show it.
 
 use pest::iterators::{Pair, Pairs};
 
@@ -52,7 +52,7 @@ pub(super) fn file(source: &Source, pairs: Pairs<'_, Rule>, diagnostics: &mut Ve
     Ast { items }
 }
 
-/// Items of a piece of a file that begins `offset` bytes into it.
+/// The items of a piece of a file. The piece begins `offset` bytes into the file.
 pub(super) fn items(
     source: &Source,
     offset: usize,
@@ -67,7 +67,7 @@ pub(super) fn items(
         .collect()
 }
 
-/// The children of a pair that mean something: punctuation is there for the messages only.
+/// The children of a pair that carry meaning. Punctuation is only there for the messages.
 fn parts(pair: Node<'_>) -> impl Iterator<Item = Node<'_>> {
     pair.into_inner().filter(|part| {
         !matches!(
@@ -84,20 +84,20 @@ fn parts(pair: Node<'_>) -> impl Iterator<Item = Node<'_>> {
     })
 }
 
-/// Links of one chain of powers or methods: each is one level of the tree.
+/// The most links in one chain of powers or methods. Each link is one level of the tree.
 const LONGEST_CHAIN: usize = 100;
 
 struct Builder {
     source: SourceId,
     offset: usize,
-    /// Where a chain became longer than [`LONGEST_CHAIN`]; its rest was left out.
+    /// Where a chain became longer than [`LONGEST_CHAIN`]; the rest of it was left out.
     cut: Cell<Option<Span>>,
 }
 
 impl Builder {
     fn span(&self, pair: &Node<'_>) -> Span {
         let span = pair.as_span();
-        // rules end behind trailing white space: a message should not underline that
+        // rules end behind trailing white space, which a message should not underline
         let length = pair.as_str().trim_end().len();
         Span::new(self.source, self.offset + span.start(), self.offset + span.start() + length)
     }
@@ -109,7 +109,7 @@ impl Builder {
         }
     }
 
-    /// The item, unless it is nested too deeply for the stages to come.
+    /// The item, or `None` if it is nested too deeply for the later stages.
     fn whole_item(&self, pair: Node<'_>, diagnostics: &mut Vec<Diagnostic>) -> Option<Item> {
         let item = self.item(pair);
         let Some(span) = self.cut.take().or_else(|| item.deeper_than(DEEPEST_TREE)) else {
@@ -148,7 +148,7 @@ impl Builder {
         let span = self.span(&pair);
         let mut inner = parts(pair);
         let Name { text, span: whole } = self.name(inner.next());
-        // without the sign that makes it an attribute
+        // leaves out the `@` that makes it an attribute
         let name = Name {
             text: text.trim_start_matches('@').to_string(),
             span: Span::new(self.source, whole.range().start + 1, whole.range().end),
@@ -214,7 +214,8 @@ impl Builder {
         }
     }
 
-    /// Runs of one operator become one n-ary node; where the operator changes, the run so far is its operand.
+    /// A run of one operator becomes one n-ary node. Where the operator changes, the run so far becomes its
+    /// operand.
     fn expr(&self, pair: Node<'_>) -> Expr {
         let operands = parts(pair).filter(|p| p.as_rule() == Rule::conjunction);
         let operands: Vec<_> = operands.map(|p| self.conjunction(p)).collect();
@@ -332,7 +333,7 @@ impl Builder {
         if negative { Expr { kind: ExprKind::Negate(Box::new(operand)), span } } else { operand }
     }
 
-    /// a^b^c is a^(b^c).
+    /// Powers group to the right: a^b^c is a^(b^c).
     fn power(&self, pair: Node<'_>) -> Expr {
         let mut inner = parts(pair);
         let Some(base) = inner.next() else { return self.expr_or_zero(None) };
@@ -401,7 +402,8 @@ impl Builder {
             Rule::vector => ExprKind::Vector(parts(pair).map(|p| self.expr(p)).collect()),
             Rule::name => ExprKind::Name(pair.as_str().to_string()),
             Rule::group => {
-                // the brackets belong to the span, not to the tree: grouping is the tree's own shape
+                // the brackets belong to the span but not to the tree, whose shape already says how things
+                // are grouped
                 let inner = self.expr_or_zero(parts(pair).next());
                 return Expr { span, ..inner };
             }
@@ -460,7 +462,7 @@ fn text_of(pair: Node<'_>) -> String {
     pair.into_inner().next().map_or_else(String::new, |body| body.as_str().to_string())
 }
 
-/// The grammar admits only what `f64` reads, but for a pasted minus sign in the exponent.
+/// Reads a number. The grammar admits only what `f64` reads, except for a pasted minus sign in the exponent.
 fn number(text: &str) -> f64 {
     text.replace('−', "-").parse().unwrap_or(f64::NAN)
 }

@@ -1,7 +1,7 @@
-//! Text → [`Ast`].
+//! From text to [`Ast`].
 //!
-//! Invariant: the parser generator's types never leave this module, and nothing is concluded here: no name is
-//! looked up, no number computed. Every node carries its span.
+//! Invariant: the parser generator's types never leave this module, and it concludes nothing: it looks up no
+//! name and computes no number. Every node carries its span.
 
 pub mod ast;
 mod build;

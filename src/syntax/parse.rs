@@ -15,13 +15,15 @@ pub(super) struct Grammar;
 /// The newest edition of the language that this program reads.
 pub const EDITION: u32 = 1;
 
-/// Brackets nested deeper than this are refused: beyond what a person writes, and well inside the stack.
+/// Brackets nested deeper than this are refused. The limit is beyond what a person writes and well inside the
+/// stack.
 const DEEPEST_NESTING: usize = 200;
 
-/// Levels of an expression's tree, at most: what the recursive stages can take on any stack.
+/// The most levels of an expression's tree: what the recursive stages can take on any stack.
 pub(super) const DEEPEST_TREE: usize = 500;
 
-/// Stack of the parsing thread: the same limit on every platform, enough for [`DEEPEST_NESTING`] in debug builds.
+/// Stack of the parsing thread, in bytes: the same limit on every platform, and enough for
+/// [`DEEPEST_NESTING`] in debug builds.
 const STACK_BYTES: usize = 32 << 20;
 
 const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"];
@@ -29,7 +31,8 @@ const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"]
 const KEYWORDS: [&str; 12] =
     ["param", "let", "fn", "solid", "scene", "import", "and", "or", "not", "any", "all", "in"];
 
-/// Parses a text. Items that fit the grammar are returned even if others do not; the messages tell which.
+/// Parses a text. Items that fit the grammar are returned even if others do not; the messages tell which do
+/// not.
 pub fn parse(source: &Source) -> (Ast, Vec<Diagnostic>) {
     if source.text.len() > Source::MAX_LEN {
         let message =
@@ -54,7 +57,7 @@ pub fn parse(source: &Source) -> (Ast, Vec<Diagnostic>) {
         match spawned.map(std::thread::ScopedJoinHandle::join) {
             Ok(Ok(parsed)) => parsed,
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            // no thread to be had: the caller's own stack serves, and the grammar guards it
+            // if no thread can be started, the caller's own stack serves, and the grammar guards it
             Err(_) => parse_here(source, &scan),
         }
     })
@@ -69,7 +72,7 @@ fn parse_here(source: &Source, scan: &Scan) -> (Ast, Vec<Diagnostic>) {
     (ast, diagnostics)
 }
 
-/// Parses item by item, so that one slip does not hide the next.
+/// Parses item by item, so that one mistake does not hide the next.
 fn recover(source: &Source, scan: &Scan, diagnostics: &mut Vec<Diagnostic>) -> Ast {
     let text = &source.text;
     let mut ast = Ast::default();
@@ -86,7 +89,7 @@ fn recover(source: &Source, scan: &Scan, diagnostics: &mut Vec<Diagnostic>) -> A
         }
     }
     if diagnostics.is_empty() {
-        // every piece fits although the whole does not: report the whole's own error
+        // every piece fits although the whole does not: report the error of the whole
         if let Err(error) = Grammar::parse(Rule::file, text) {
             diagnostics.push(syntax_error(source, 0, text.len(), &error));
         }
@@ -100,7 +103,7 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
             InputLocation::Pos(at) => at,
             InputLocation::Span((at, _)) => at,
         };
-    // at the end of an item point behind its last character, not at the next item
+    // at the end of an item, point behind its last character and not at the next item
     let at = if at >= end { source.text[..end].trim_end().len().max(start.min(end)) } else { at };
     let found = token_at(&source.text, at, end);
     let span = Span::new(source.id, at, at + found.len());
@@ -131,7 +134,7 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) }
 }
 
-/// Slips that deserve better words than a list of what the grammar would accept.
+/// Mistakes that deserve better words than a list of what the grammar would accept.
 fn familiar_slip(source: &Source, at: usize, found: &str, span: Span) -> Option<Diagnostic> {
     let before = source.text[..at].trim_end_matches([' ', '\t']);
     let is_word = found.chars().next().is_some_and(char::is_alphabetic);
@@ -194,7 +197,7 @@ fn number_ends(text: &str) -> bool {
     text[start..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
 }
 
-/// The word, number or single character at a place.
+/// The word, number or single character at a place in the text.
 fn token_at(text: &str, at: usize, end: usize) -> &str {
     let rest = &text[at..end.max(at)];
     let Some(first) = rest.chars().next() else { return "" };
@@ -209,7 +212,7 @@ fn token_at(text: &str, at: usize, end: usize) -> &str {
     &rest[..first.len_utf8()]
 }
 
-/// Rule names in the words of the language, each said once.
+/// Rule names in the words of the language, each only once.
 fn expectation(rules: &[Rule]) -> String {
     let mut words: Vec<&str> = Vec::new();
     let mut add = |word| {
@@ -218,7 +221,7 @@ fn expectation(rules: &[Rule]) -> String {
         }
     };
     let may_end = rules.contains(&Rule::EOI);
-    // what must come stands before what may come
+    // what must come is listed before what may come
     for rule in rules {
         match rule {
             Rule::equals => add("`=`"),
@@ -269,10 +272,10 @@ fn expectation(rules: &[Rule]) -> String {
     }
 }
 
-/// One pass over the characters before the grammar runs: nesting depth, and where items begin.
+/// One pass over the characters, before the grammar runs, finds the nesting depth and where items begin.
 struct Scan {
     too_deep: Option<usize>,
-    /// Item keywords that stand first on their line, outside braces.
+    /// Where item keywords stand first on their line, outside braces.
     items: Vec<usize>,
 }
 
@@ -282,7 +285,7 @@ impl Scan {
         let mut nesting = Nesting::default();
         let mut line_blank = true;
         let mut in_word = false;
-        // after an attribute, before the item that it belongs to
+        // true after an attribute, before the item that it belongs to
         let mut attributed = false;
         let mut chars = text.char_indices();
         while let Some((at, c)) = chars.next() {
@@ -322,11 +325,11 @@ impl Scan {
                 _ if word_starts => {
                     let word = token_at(text, at, text.len());
                     if attributed && nesting.depth() == 0 && ITEM_WORDS.contains(&word) {
-                        attributed = false; // the item began with its attribute
+                        attributed = false; // this item began with its attribute
                     } else if line_blank && nesting.braces == 0 && ITEM_WORDS.contains(&word) {
                         attributed = false;
                         scan.items.push(at);
-                        nesting = Nesting::default(); // an unclosed bracket of the item above is that item's error
+                        nesting = Nesting::default(); // an unclosed bracket above is that item's error
                     } else if word == "any" || word == "all" {
                         nesting.fold();
                     }
@@ -342,7 +345,7 @@ impl Scan {
     }
 }
 
-/// How deep a place in the text lies: in brackets, and in folds, which take everything to their right.
+/// How deeply a place in the text is nested: in brackets, and in folds, which take everything to their right.
 #[derive(Default)]
 struct Nesting {
     /// Folds begun outside of all brackets.
@@ -415,7 +418,7 @@ mod tests {
     fn attributes_belong_to_the_solid_below() {
         let text = "solid a = x\n@tolerance(1e-6)\nsolid b = y";
         assert_eq!(tree(text), "solid a\n  x\n@tolerance\n  0.000001\nsolid b\n  y\n");
-        // the slip above it does not take it along
+        // the mistake above it does not swallow it
         let source = Source::file("t.rfm", "rfm 1\nlet c = 2 +\n@tolerance(1e-6)\nsolid b = y");
         let (ast, diagnostics) = parse(&source);
         assert_eq!((print(&ast).as_str(), diagnostics.len()), ("@tolerance\n  0.000001\nsolid b\n  y\n", 1));

@@ -1,7 +1,8 @@
 //! What a cell map costs, for sign and contact at random points: `cargo bench --bench cells`.
 //!
-//! Unions of balls in [0, 3]³, the volume they take up the same for any number of them; one thread. The points are
-//! taken in portions; the best of several passes counts for each, so that a busy machine disturbs less. The solid itself, which evaluates every leaf at every point, is asked for fewer points in the same run.
+//! Unions of balls in [0, 3]³, whose volume is the same for any number of them, on one thread. The points are
+//! taken in portions, and the best of several passes counts for each, so that a busy machine disturbs less.
+//! The solid itself evaluates every leaf at every point, so it is asked for fewer points in the same run.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -30,7 +31,7 @@ fn main() {
     println!("|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
     for balls in [500, 10_000] {
         let solid = union(balls);
-        // some milliseconds for each pass over all leaves
+        // each pass over all leaves takes some milliseconds
         let few = if balls > 1_000 { 20 } else { 400 };
         let mut sign = vec![0.0; few];
         let plain_sign = best(few, few, 9, &mut |i, n| {
@@ -88,7 +89,7 @@ fn union(balls: usize) -> Solid {
     program.and_then(|program| program.solid("s")).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Nanoseconds for each point; the pass is given where a portion begins and how long it is.
+/// Nanoseconds per point. The pass is told where a portion begins and how long it is.
 fn best(points: usize, portion: usize, rounds: usize, pass: &mut dyn FnMut(usize, usize)) -> f64 {
     let mut best = vec![f64::INFINITY; points.div_ceil(portion)];
     for _ in 0..=rounds {

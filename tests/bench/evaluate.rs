@@ -1,11 +1,11 @@
 //! How fast ω and ∇ω are answered, and how exactly: `cargo bench --bench evaluate`.
 //!
-//! Single thread; 4096 random points in [0, 3]³; the median of many passes over them, all ways taking turns in one
-//! run, so that a busy machine slows every row alike. Errors are those against the interpreter in f64 at the very
-//! same points; what that interpreter is worth is shown elsewhere, by 40-digit arithmetic in `tests/it/agreement.rs`.
+//! One thread, 4096 random points in [0, 3]³, and the median of many passes over them. All ways take turns in
+//! one run, so that a busy machine slows every row alike. Errors are against the interpreter in f64 at the
+//! same points; `tests/it/agreement.rs` compares that interpreter with 40-digit arithmetic.
 //!
-//! The hand-written rows are what a person would type: the paper's formulas with u + v ∓ √(u² + v²), compiled by
-//! rustc for the same 128-bit vectors that Cargo uses by default.
+//! The hand-written rows are what a person would type: the paper's formulas with u + v ∓ √(u² + v²), compiled
+//! by rustc for the 128-bit vectors that Cargo uses by default.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -31,7 +31,7 @@ struct Row<'a> {
     pass: Box<dyn FnMut() + 'a>,
     /// ω, or ω and ∇ω, of all points.
     answers: Box<dyn FnMut() -> Vec<f64> + 'a>,
-    /// What the answers should be.
+    /// What the answers should be, by the interpreter.
     truth: Vec<f64>,
     nanoseconds: Vec<f64>,
 }
@@ -62,7 +62,7 @@ fn compile(name: &str) -> [Solid; 2] {
         .map(|engine| program.solid_with(name, engine).unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// Points that f32 can hold, so that both precisions are asked the same question.
+/// Points that f32 holds exactly, so that both precisions are asked the same question.
 fn points() -> Columns<f64> {
     let mut seed = 1u64;
     let mut random = || {
@@ -72,7 +72,7 @@ fn points() -> Columns<f64> {
     std::array::from_fn(|_| (0..POINTS).map(|_| random()).collect())
 }
 
-/// The two answers that programs differ in, behind one face for f32 and f64.
+/// Hides the two precisions of programs, f32 and f64, behind one interface.
 trait Precision: Lane + Into<f64> + 'static {
     const NAME: &'static str;
     fn omega(solid: &Solid, p: [Self; 3]) -> Self;
@@ -116,7 +116,8 @@ fn solid_rows<'a, T: Precision>(
     }
 }
 
-/// The min/max twin, of which only the sign is meant: its error is 0 if no sign is wrong, otherwise 1 or 2.
+/// The min/max twin, of which only the sign means something: its error is 0 if no sign is wrong, otherwise 1
+/// or 2.
 fn sign<'a, T: Precision>(
     name: &'static str,
     solid: &'a Solid,
@@ -260,7 +261,7 @@ fn print(rows: &mut [Row<'_>], what: &str) {
 }
 
 impl Row<'_> {
-    /// The largest absolute error, and that as a part of the largest value.
+    /// The largest absolute error, and the same as a fraction of the largest value.
     fn error(&mut self) -> [f64; 2] {
         let answers = (self.answers)();
         let largest = self.truth.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
@@ -296,7 +297,8 @@ macro_rules! precision {
                 body + top + (body * body + top * top).sqrt()
             }
 
-            /// By the chain rule from the root down; 0/0 at edges and corners, as everybody's textbook form.
+            /// By the chain rule from the root down. It is 0/0 at edges and corners, as every textbook form
+            /// is.
             #[inline(always)]
             fn pawn_grad([x, y, z]: [$t; 3]) -> [$t; 4] {
                 let (u, v) = (x - 1.5, y - 1.5);

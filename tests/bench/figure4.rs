@@ -1,15 +1,15 @@
-//! The paper's figure 4, again: time of one step against the number of particles. `cargo bench --bench figure4`
-//! prints a table and writes target/figure4.svg and target/figure4.png; it takes two minutes.
+//! The paper's figure 4 again: time of one step against the number of particles. `cargo bench --bench
+//! figure4` prints a table and writes target/figure4.svg and target/figure4.png. It takes two minutes.
 //!
 //! The obstacle is the compiled pawn of examples/pawn.rfm. Two ways to have more particles:
 //! - *table 1*: mass and support radius stay those of the paper, so the drop grows;
 //! - *refined*: the drop stays and its particles shrink, as `-D particles=N` does.
 //!
-//! What is timed: windows of 8 whole steps; the median of 5 to 25 of them. *Falling*: the first steps after the
-//! start, each window from a fresh drop. *Settled*: after 1.2 s, when the fluid lies around the pawn, where more
-//! particles touch something and each has fewer neighbours; for N up to 10 000, so that the bench stays short.
-//! Numbers of threads take turns, window by window. The fastest window stands beside the median: where the two differ
-//! much, something else used the machine. Frames are not written.
+//! What is timed: windows of 8 whole steps, and the median of 5 to 25 windows. *Falling*: the first steps
+//! after the start, each window from a fresh drop. *Settled*: after 1.2 s, when the fluid lies around the
+//! pawn, where more particles touch something and each has fewer neighbours; only for N up to 10 000, so that
+//! the bench stays short. Numbers of threads take turns, window by window. The fastest window stands beside
+//! the median: where the two differ much, something else used the machine. Frames are not written.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -30,8 +30,8 @@ const PATIENCE: Duration = Duration::from_millis(1500);
 const SETTLED_AFTER: f64 = 1.2;
 const LARGEST_SETTLED: usize = 10_000;
 
-/// The authors' published program, measured on another machine than yours: N, ms per step. It finds 29 neighbours
-/// per particle, ours as many as lie within the support radius.
+/// The authors' published program, measured on another machine: N and ms per step. It finds 29 neighbours per
+/// particle, rfm finds all that lie within the support radius.
 const PAPERS_CODE: [(f64, f64); 2] = [(10_000.0, 27.0), (100_000.0, 738.0)];
 const PAPERS_NEIGHBOURS: f64 = 29.0;
 
@@ -67,7 +67,7 @@ fn main() {
     for count in COUNTS {
         for scene in ["table 1", "refined"] {
             if count == 10_000 && scene == "refined" {
-                continue; // the same scene
+                continue; // it is the same scene
             }
             let start = rows.len();
             run(&program, scene, count, &all, &pools, &mut rows);
@@ -91,7 +91,7 @@ fn pool(threads: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started")
 }
 
-/// Falling and, if there are few enough particles, settled; with each pool.
+/// The rows *falling* and, if there are few enough particles, *settled*, with each pool.
 fn run(
     program: &Program,
     name: &'static str,
@@ -137,7 +137,8 @@ fn add(
     }
 }
 
-/// For each pool the median and the fastest of its windows, ms per step, and the mean of the neighbours.
+/// For each pool, the median and the fastest of its windows in ms per step, and the mean number of
+/// neighbours.
 fn medians(
     pools: &[rayon::ThreadPool],
     mut window: impl FnMut(&rayon::ThreadPool) -> (f64, Stats),
@@ -163,7 +164,7 @@ fn medians(
     times.into_iter().zip(neighbours).map(figures).collect()
 }
 
-/// Milliseconds per step of the next steps; one before them wakes the pool's threads.
+/// Milliseconds per step of the next steps, after one step that wakes the pool's threads.
 fn window(simulation: &mut Simulation) -> f64 {
     step(simulation);
     let started = Instant::now();
@@ -171,8 +172,8 @@ fn window(simulation: &mut Simulation) -> f64 {
     started.elapsed().as_secs_f64() * 1e3 / f64::from(STEPS)
 }
 
-/// The drop of the scene with as many particles as wanted, around the scene's centre; what touches the pawn is
-/// carved off.
+/// The drop of the scene, around the scene's centre, with the wanted number of particles. What touches the
+/// pawn is carved off.
 fn simulation(scene: &Scene, pawn: &Solid, count: usize) -> Simulation {
     let Gravity::Still(gravity) = scene.gravity else { panic!("the scene has gravity that stays") };
     let mut parameters = Parameters {

@@ -1,11 +1,12 @@
-//! How long marching cubes and dual contouring take, how that grows with the grid, and how far the meshes are from the
-//! surface. `cargo bench --bench mesh` prints all tables; `-- methods` or `-- growth` one of them, `-- --large` 2048
-//! cells too. Asserts nothing about time.
+//! How long marching cubes and dual contouring take, how that grows with the grid, and how far the meshes are
+//! from the surface. `cargo bench --bench mesh` prints all tables, `-- methods` or `-- growth` one of them,
+//! and `-- --large` 2048 cells too. It asserts nothing about time.
 //!
-//! Pawn and bishop stand in the box [0, 3]³, as in the paper; the balls are 500 at random places. The fastest of several
-//! runs counts, runs with one thread and with all taking turns. Where the system tells (Linux), the processor's time of
-//! one thread stands beside it, which other programs hardly disturb. What a solid prepares once (machine code, cell map)
-//! is timed apart. The exponent is that of the least-squares line through log time of one thread against log cells.
+//! Pawn and bishop stand in the box [0, 3]³, as in the paper; the balls are 500 at random places. The fastest
+//! of several runs counts, and runs on one thread and on all take turns. Where the system tells (Linux), the
+//! processor time of one thread stands beside it, which other programs hardly disturb. What a solid prepares
+//! once (machine code, cell map) is timed separately. The exponent is that of the least-squares line through
+//! log time on one thread against log cells.
 
 use std::fmt::Write;
 use std::time::{Duration, Instant};
@@ -64,8 +65,9 @@ fn dual(field: &dyn Field, grid: &Grid) -> Mesh {
     dual_contouring(field, grid, &|_| {}).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Both methods side by side: time, and what the mesh is like. The last but one column is what counts in the choice
-/// between them: the error times the time, in µm·s; halving the cells of either leaves it about as it is.
+/// Both methods side by side: time, and the quality of the mesh. To choose between them, look at the last
+/// column but one, the error times the time in µm·s: halving the cells of either method leaves it about as it
+/// is.
 fn methods() {
     println!(
         "| solid | cells | method | 1 thread, ms | {} threads, ms | triangles | Hausdorff distance, m | surface to mesh, rms m | volume error | upside down | slivers | error × time, µm·s | closed |",
@@ -212,13 +214,13 @@ fn found_volume(mesh: &Mesh) -> f64 {
     corners.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
-/// Seconds that this thread has run, waiting left out; nothing where the system does not tell.
+/// Seconds that this thread has run, without waiting; `None` where the system does not tell.
 fn processor_time() -> Option<f64> {
     let line = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     line.split(' ').next()?.parse::<f64>().ok().map(|nanoseconds| 1e-9 * nanoseconds)
 }
 
-/// The most memory that this process ever had, in MiB; zero where the system does not tell.
+/// The most memory that this process has used, in MiB; zero where the system does not tell.
 fn peak_memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

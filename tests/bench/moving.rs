@@ -1,8 +1,8 @@
 //! What it costs that a solid moves: `cargo bench --bench moving`.
 //!
-//! A turning blade against the same blade at rest, one thread, all ways taking turns in one run, the best of several
-//! passes; then the cell map of a machine with parts that move: how long it takes to prepare the run and each window of
-//! time, on all threads, and what is then near a surface.
+//! A turning blade against the same blade at rest: one thread, all ways taking turns in one run, the best of
+//! several passes. Then the cell map of a machine with moving parts: how long it takes to prepare the run and
+//! each window of time on all threads, and what is then near a surface.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -116,7 +116,7 @@ fn maps() {
     }
 }
 
-/// The best time of each solid, in ns for each point.
+/// The best time of each solid, in ns per point.
 fn compare(name: &str, solids: [&Solid; 2], question: impl Fn(&Solid)) {
     let mut best = [f64::INFINITY; 2];
     for _ in 0..ROUNDS {

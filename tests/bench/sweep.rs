@@ -1,8 +1,8 @@
 //! How long a swept contact takes, against sampling the path: `cargo bench --bench sweep`.
 //!
-//! Random paths in the pawn's box, one thread, in portions of which the best of several passes counts, so that a busy
-//! machine disturbs less; all ways take turns in one run. Sampling looks every 5 mm, a
-//! twentieth of the paper's support radius, and misses what lies between two samples.
+//! Random paths in the pawn's box, on one thread, in portions of which the best of several passes counts, so
+//! that a busy machine disturbs less. All ways take turns in one run. Sampling looks every 5 mm, a twentieth
+//! of the paper's support radius, and misses what lies between two samples.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -68,7 +68,7 @@ fn paths(domain: &Aabb, length: f64, solid: &dyn Walls) -> Vec<Path> {
     paths
 }
 
-/// Nanoseconds for each portion of the paths; what was shorter before stays.
+/// Nanoseconds for each portion of the paths; the shortest time so far stays.
 fn time(field: &dyn Walls, paths: &[Path], best: &mut Vec<f64>) {
     const PORTION: usize = 100;
     best.resize(paths.len().div_ceil(PORTION), f64::INFINITY);

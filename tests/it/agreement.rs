@@ -1,4 +1,5 @@
-//! Machine code = interpreter bit for bit, and both = 40-digit arithmetic to a few units in the last place.
+//! Machine code gives the bits of the interpreter, and both agree with 40-digit arithmetic to a few units in
+//! the last place.
 
 use rfm::codegen::Form;
 use rfm::glam::{DVec3, Vec3};
@@ -32,7 +33,7 @@ fn same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a == 0.0 && b == 0.0)
 }
 
-/// A fold written by hand: in `f32` some of its operations are scaled, in `f64` none.
+/// A fold written by hand. In `f32` some of its operations are scaled, in `f64` none.
 fn left_fold(members: usize) -> String {
     let steps = (1..members).map(|i| format!("let u{i} = u{} or {i}*x - y\n", i - 1)).collect::<String>();
     format!("rfm 1\nlet u0 = x - z\n{steps}solid fold = u{}\n", members - 1)
@@ -85,7 +86,7 @@ fn batches_of_any_length_are_the_single_points() {
     };
     for n in [0, 1, 2, 3, 4, 5, 7, 8, 31, 100] {
         let [x, y, z] = std::array::from_fn(|_| (0..n + 1).map(|_| random()).collect::<Vec<f64>>());
-        // one past the start: no alignment may be needed
+        // begins one past the start: no alignment may be needed
         let points = [&x[1..], &y[1..], &z[1..]];
         let mut omega = vec![0.0; n];
         jit.omega_many(points, &mut omega);
@@ -142,7 +143,7 @@ fn the_twin_has_the_sign_of_omega() {
             assert!(same(twin[i], Field::omega(&interpreter.twin(), p)), "{jit:?} at {p}");
             assert!(p.is_finite() || sign.is_nan(), "{jit:?} at {p}: {sign}");
             let omega = jit.omega(p);
-            // far from the origin leaves overflow: then only one of the two may know an answer
+            // far from the origin leaves overflow, and then perhaps only one of the two has an answer
             if p.abs().max_element() < 1e70 && !omega.is_nan() {
                 let expected = f64::from(i8::from(omega > 0.0) - i8::from(omega < 0.0));
                 assert!(sign == expected || sign.is_nan(), "{jit:?} at {p}: sign {sign}, ω {omega}");

@@ -1,4 +1,5 @@
-//! Input that no person would write, or that a person wrote by mistake: a clear message, never a panic or a hang.
+//! Input that no person would write, or that a person wrote by mistake, gets a clear message, never a panic
+//! or a hang.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -6,7 +7,7 @@ use rfm::Program;
 
 use crate::tool::{rfm, rfm_reading, root};
 
-/// What `rfm check -` says of it: an exit code of the contract.
+/// What `rfm check -` says of it, with one of the documented exit codes.
 #[track_caller]
 fn check(text: impl AsRef<[u8]>, code: i32, says: &str) {
     let outcome = rfm_reading(root(), &["check", "-"], text.as_ref()).expect(code);
@@ -51,7 +52,7 @@ fn nested_ten_thousand_times() {
     check(solid(&("-".repeat(n) + "x")), 0, "W0403");
     check(solid(&")".repeat(n)), 1, "unexpected `)`");
     check(format!("rfm 1\n{}", "}".repeat(n)), 1, "unexpected `}`");
-    // as deep as allowed
+    // this is as deep as allowed
     check(solid(&("(".repeat(199) + "sphere(1)" + &")".repeat(199))), 0, "");
     check(solid(&("sqrt(".repeat(199) + "1 - x^2" + &")".repeat(199))), 0, "");
 }
@@ -181,7 +182,7 @@ const TOKENS: &[&str] = &[
     "é",
 ];
 
-/// The whole way to a compiled solid; only the absence of a panic is asserted.
+/// Goes the whole way to a compiled solid. Only the absence of a panic is asserted.
 fn compile(text: &str) {
     let source = rfm::diagnostic::Source::file("soup.rfm", text);
     let options = rfm::lower::Options { max_nodes: 2_000, ..Default::default() };

@@ -1,9 +1,10 @@
-//! Columns are evaluated in blocks, step by step: whatever the steps are, the bits are those of the interpreter.
+//! Columns are evaluated in blocks, step by step. Whatever the steps are, the bits are those of the
+//! interpreter.
 
 use rfm::glam::{DVec3, Vec3};
 use rfm::{Engine, Program, Solid};
 
-/// Scenes whose graphs fall apart in every way that there is.
+/// Scenes whose graphs fall into blocks in every possible way.
 fn scenes() -> Vec<(&'static str, String)> {
     let balls = |joined: &dyn Fn(usize) -> String, n: usize| (0..n).map(joined).collect::<String>();
     let fold = balls(&|i| format!("let u{} = u{i} or ball([{i}/9, 1, 2 - {i}/40], 0.3)\n", i + 1), 40);
@@ -35,7 +36,7 @@ fn compile(name: &str, text: &str) -> [Solid; 2] {
     [Engine::Jit, Engine::Interpreter].map(|engine| program.solid_with("s", engine).unwrap())
 }
 
-/// Random places, and some where operands are zero, equal, huge or no number.
+/// Random places, and some where operands are zero, equal, huge or NaN.
 fn points(count: usize) -> [Vec<f64>; 3] {
     let special = [0.0, 1.0, -1.0, 2.0, 1e30, -1e-30, f64::NAN, f64::INFINITY, 5e-324];
     let mut seed = 7u64;

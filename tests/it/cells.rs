@@ -1,5 +1,5 @@
-//! The cell map: same sign everywhere, same gradient on the surface, same mesh, cost that does not grow with the
-//! number of primitives.
+//! The cell map has the same sign everywhere, the same gradient on the surface and the same mesh, at a cost
+//! that does not grow with the number of primitives.
 
 use std::fmt::Write;
 
@@ -64,7 +64,7 @@ fn signs_and_surface_gradients_are_those_of_the_twin() {
             let map = CellMap::new(&solid, domain()).unwrap();
             let twin = solid.twin();
             let mut random = Random(5);
-            let over = domain().grown(0.2); // some points are outside the map
+            let over = domain().grown(0.2); // so that some points are outside the map
             let count = if engine == Engine::Jit { 20_000 } else { 1_000 };
             let points: Vec<DVec3> = (0..count).map(|_| random.point(&over)).collect();
             let column = |axis: usize| points.iter().map(|p| p[axis]).collect::<Vec<f64>>();
@@ -150,7 +150,7 @@ fn leaves_of_one_shape_share_a_program_and_far_cells_need_none() {
     assert!(map.omega(DVec3::NAN).is_nan());
 }
 
-/// Distances of [`Solid::contact`] that are less than the reach are found, by the same surface, and no others.
+/// Every distance of [`Solid::contact`] below the reach is found, from the same surface, and no other.
 #[test]
 fn contacts_are_those_of_the_solid() {
     let example = |name: &str| {
@@ -185,7 +185,7 @@ fn contacts_are_those_of_the_solid() {
                 continue;
             }
             near += 1;
-            // one ulp: the solid's program joins leaves in another order
+            // one ulp is allowed, because the solid's program joins leaves in another order
             let same = (found.distance - truth.distance).abs() <= 1e-15
                 && (found.normal - truth.normal).length() <= 1e-12
                 && (found.mean_curvature - truth.mean_curvature).abs()
@@ -210,8 +210,8 @@ fn contacts_are_those_of_the_solid() {
     }
 }
 
-/// Of the balls that are said to be free no place is in the solid or on it, whether a map knows it or ranges alone; and
-/// boxes that are said to be far have no near place.
+/// No point of a ball that is said to be free lies in the solid or on it, whether a map knows it or only
+/// ranges do. Boxes that are said to be far contain no near place.
 #[test]
 fn what_is_said_to_be_clear_is_clear() {
     let example = |name: &str| {
@@ -282,7 +282,7 @@ fn surfaces_that_lie_on_one_another_do_not_divide_cells_for_ever() {
     let s = solid(text, "s", Engine::Auto);
     let map = CellMap::new(&s, Aabb::new(DVec3::splat(-1.1), DVec3::splat(1.1))).unwrap();
     let stats = map.stats();
-    // some six squares of 64² cells; divided as deep as cells go, they would be millions
+    // about six squares of 64² cells; if they were divided as deep as cells go, there would be millions
     assert!(stats.leaves == 30 && stats.near < 100_000, "{stats:?}");
     assert_eq!((map.place_of(DVec3::ZERO), map.place_of(DVec3::ONE)), (Place::Inside, Place::Fluid));
 }

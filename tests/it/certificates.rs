@@ -1,4 +1,4 @@
-//! Certificates against 120-digit arithmetic: what a program gets wrong never exceeds what was certified.
+//! Certificates against 120-digit arithmetic: the error of a program never exceeds what was certified.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -57,7 +57,7 @@ fn build(steps: &[Step]) -> (Graph, Node) {
     (graph, root)
 }
 
-/// The whole box, its corners, its middle, zeros where it has them, and some points in between.
+/// The whole box, its corners, its centre, its zeros where it has any, and some points in between.
 fn points(over: &Aabb, inside: &[[f64; 3]]) -> Vec<DVec3> {
     let mut points = over.corners().to_vec();
     points.push(over.centre());
@@ -81,8 +81,8 @@ fn error(program: &Interpreter, precision: Precision, input: DVec3, exact: &exac
     }
 }
 
-/// With R₀ in place of all operations that are not of degree 1: between 1e150 and a constant or a square of it even
-/// 120 digits cancel, and its sine takes too long.
+/// Replaces all operations that are not of degree 1 by R₀. Between 1e150 and a constant, or a square of it,
+/// even 120 digits cancel, and its sine takes too long.
 fn homogeneous(steps: &[Step]) -> Vec<Step> {
     let not_of_degree_one = |op: u8| matches!(op, 4..=7 | 21.. );
     let replaced = |op| if not_of_degree_one(op) { 8 + op % 8 } else { op };
@@ -127,7 +127,7 @@ proptest! {
         let forms = Magnitudes::over(&program, &local).forms(&program, form, precision);
         let analysis = ErrorAnalysis::new(&program, start, Arithmetic { precision, forms: &forms, inputs });
         let (whole, divided) = (analysis.bound(&local), analysis.certify(&local, 0.0));
-        // up to the rounding of the bounds themselves, each of which sums outwards on its own (1.3e-8 was seen)
+        // the bounds themselves are rounded, and each sums outwards on its own (1.3e-8 was seen)
         prop_assert!(divided <= whole * (1.0 + 1e-6), "{divided:e} {whole:e}");
         prop_assume!(divided.is_finite());
         let interpreter = Interpreter::with_forms(&program, &[start], [&forms, &forms]);
@@ -153,7 +153,7 @@ fn spheres() -> Solid {
     Program::from_source("s.rfm", text).unwrap().solid_with("s", Engine::Interpreter).unwrap()
 }
 
-/// A bound is of use if it lies near what happens: within two orders of magnitude on ordinary scenes.
+/// A bound is useful if it lies close to what happens: within two orders of magnitude on ordinary scenes.
 #[test]
 fn certificates_of_ordinary_solids_are_useful() {
     let box3 = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));

@@ -1,4 +1,4 @@
-//! The commands as a contract: exit codes, what goes where, the keys of the documents, files that are whole.
+//! The contract of the commands: exit codes, what goes where, the keys of the documents, and complete files.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ fn keys(value: &serde_json::Value) -> Vec<&str> {
     value.as_object().unwrap().keys().map(String::as_str).collect()
 }
 
-/// The keys of the contract, all there; `schema` is 1 and comes first in the text.
+/// All keys of the contract are there; `schema` is 1 and comes first in the text.
 #[track_caller]
 fn contract(text: &str, value: &serde_json::Value, expected: &[&str]) {
     assert!(text.trim_start().trim_start_matches('{').trim_start().starts_with("\"schema\": 1"), "{text}");
@@ -114,7 +114,7 @@ fn check_prints_facts() {
     );
 }
 
-/// What depends on the processor is masked: its name, and how many instructions it needs.
+/// Masks what depends on the processor: its name, and how many instructions it needs.
 #[test]
 fn explain_shows_what_was_dropped_and_why() {
     let solids = "rfm 1\nlet far = sphere(1).move([9, 0, 0])\nlet d = 0 - (x - 1)\n\
@@ -260,7 +260,7 @@ const MESH_KEYS: [&str; 13] = [
     "evaluations",
 ];
 
-/// Every directed edge once, and its opposite once.
+/// Every directed edge occurs once, and so does its opposite.
 fn closed_and_manifold(triangles: impl Iterator<Item = [usize; 3]>) {
     let mut edges = std::collections::HashSet::new();
     for [a, b, c] in triangles {
@@ -393,7 +393,7 @@ fn reports_measure_flows() {
     let arguments =
         ["report", "-", "--particles", "64,27", "--methods", "wcsph,dfsph", "--threads", "1", "-o", &plot];
     let text = rfm_reading(root(), &arguments, STILL.as_bytes()).expect(0).stdout;
-    // the two last columns of the table are times
+    // the last two columns of the table are times
     let masked: Vec<String> = text
         .lines()
         .filter(|line| !line.starts_with("plot written"))
@@ -440,7 +440,7 @@ fn a_report_says_which_run_failed() {
     let row = &outcome.json()["rows"][0];
     assert!(row["failure"].is_string() && row["pressure_error"].is_null(), "{row}");
 
-    // two thousand million steps to the end
+    // two billion steps to the end
     let text = STILL.replace("until: 20 ms", "dt: 1e-11, until: 20 ms");
     let outcome = rfm_reading(root(), &["report", "-", "--particles", "27"], text.as_bytes()).expect(3);
     assert!(

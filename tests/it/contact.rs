@@ -24,7 +24,7 @@ fn quadrics_are_exact_along_the_normal() {
     check("x^2 + y^2 <= 4", [0.0, 2.25, 7.0], 0.25, [0.0, 1.0, 0.0], 0.5 / 2.25);
     check("x^2 + y^2 + z^2 >= 4", [1.5, 0.0, 0.0], 0.5, [-1.0, 0.0, 0.0], -1.0 / 1.5);
     check("z <= 1", [5.0, 6.0, 3.0], 2.0, [0.0, 0.0, 1.0], 0.0);
-    // the scale of a leaf does not matter, nor does the product of a slab
+    // neither the scale of a leaf nor the product of a layer matters
     check("100*z <= 100", [5.0, 6.0, 3.0], 2.0, [0.0, 0.0, 1.0], 0.0);
     check("0 <= x <= 3", [1000.0, 1.5, 1.5], 997.0, [1.0, 0.0, 0.0], 0.0);
     check("box([0,0,0], [3,3,3])", [-2.0, 1.0, 1.0], 2.0, [-1.0, 0.0, 0.0], 0.0);
@@ -68,7 +68,7 @@ fn machine_code_is_the_interpreter() {
     }
 }
 
-/// The part of each arc of the pawn's profile (radius, z) that is on its surface, densely sampled.
+/// The part of each arc of the pawn's profile (radius, z) that lies on its surface, densely sampled.
 fn pawn_profile(pawn: &Solid) -> Vec<DVec2> {
     const N: usize = 40_000;
     let mut profile = Vec::new();
@@ -124,6 +124,6 @@ fn pawn_distances_near_the_wall() {
         "pawn, 1–10 mm from the wall: median {median:.1e}, p95 {p95:.1e}, largest {:.1e}",
         errors.last().unwrap()
     );
-    // median and p95 of the method: 5e-6 and 0.1 %; the sampled profile resolves 1e-7
+    // the method's median is 5e-6 and its p95 0.1 %; the sampled profile resolves 1e-7
     assert!(median < 2e-5 && p95 < 2e-3, "median {median:e}, p95 {p95:e}");
 }

@@ -1,4 +1,4 @@
-//! One mistake per file: its message, as a person reads it.
+//! One mistake per file, with its message as a person reads it.
 
 use std::collections::BTreeSet;
 
@@ -6,10 +6,11 @@ use crate::tool::{cases, rfm, root, snapshot, stem};
 
 const FOLDERS: [&str; 5] = ["parse_error", "name_error", "type_error", "range_error", "scene_error"];
 
-/// Codes that no file can raise by itself: a file of more than 256 MiB, and flags of the command line.
+/// Codes that no file can raise by itself: one is for files of more than 256 MiB, the other for flags of the
+/// command line.
 const NOT_OF_A_FILE: [&str; 2] = ["E0103", "E0211"];
 
-/// What a person who runs the file sees of it: `check`, and for a scene that passes it, the start of a run.
+/// What a person who runs the file sees: `check`, and for a scene that passes it, the start of a run.
 fn messages(path: &str) -> String {
     let folder = root().join("tests/cases");
     let mut outcome = rfm(&folder, &["check", path]);

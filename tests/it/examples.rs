@@ -1,4 +1,4 @@
-//! The files in examples/ are what a new user reads first: they check without a word and run well.
+//! The files in examples/ are what a new user reads first: they check without a warning and run well.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -30,7 +30,7 @@ fn every_example_checks_without_a_word() {
     }
 }
 
-/// A small drop on the piece: the invariants that the long run has too.
+/// A small drop falls on the piece. The invariants are those of the long run.
 #[track_caller]
 fn falls_well(name: &str) {
     let folder = tempfile::tempdir().unwrap();
@@ -86,7 +86,8 @@ fn frames_are_whole(out: &Path, frames: usize) {
     }
 }
 
-/// The first tenths of a scene in which something moves: frames of the obstacle go with those of the fluid, and change.
+/// Runs the first tenths of a second of a scene in which something moves. Frames of the obstacle are written
+/// beside those of the fluid, and they differ.
 #[track_caller]
 fn moves_well(name: &str, until: &str) {
     let folder = tempfile::tempdir().unwrap();
@@ -125,13 +126,13 @@ fn a_box_turns_about_its_fluid() {
     let scene = &program.module().scenes[0];
     let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap();
     let mut simulation = experiment.start().unwrap().simulation;
-    // a second at rest and a quarter of a turn: the wall x = 3 is the floor
+    // it rests for a second and makes a quarter of a turn: the wall x = 3 is then the floor
     simulation.advance(4.0, |_| ControlFlow::Continue(())).unwrap();
     let gravity = simulation.parameters().gravity;
     assert!(gravity.x > 9.8 && gravity.z.abs() < 0.1, "{gravity}");
     let x = &simulation.particles().position.x;
     let mean = x.iter().sum::<f64>() / x.len() as f64;
-    // the paper's fluid lies flat: half a support radius of it at the most
+    // the paper's fluid lies flat, at most half a support radius high
     assert!(mean > 2.5, "{mean}");
     let stats = simulation.stats();
     assert_eq!((stats.inside, stats.lost, stats.non_finite), (0, 0, 0));

@@ -1,4 +1,4 @@
-//! Surfaces of the fluid of a run, by the real binary.
+//! Surfaces around the particles of a run, made by the real binary.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::tool::{Outcome, rfm};
 
-/// A block of some 1000 particles that falls onto a post.
+/// A block of about 1000 particles that falls onto a post.
 const SCENE: &str = "rfm 1
 solid post = cylinder(0.1, 0.1).move([0.5, 0.5, 0])
 let block = 0.3 <= x <= 0.7 and 0.3 <= y <= 0.7 and 0.15 <= z <= 0.6
@@ -71,15 +71,15 @@ fn frames_become_closed_surfaces_about_as_large_as_the_fluid() {
     for (i, surface) in surfaces.iter().enumerate() {
         assert_eq!((&surface["frame"], &surface["closed"]), (&i.into(), &true.into()));
         assert!((number(&surface["time"]) - 0.01 * i as f64).abs() < 1e-9);
-        // the mass of a particle over its density
+        // the mass of a particle divided by its density
         let expected = number(&surface["particles"]) * 0.05 / 1000.0;
         assert!((number(&surface["particle_volume"]) / expected - 1.0).abs() < 1e-12);
         let ratio = number(&surface["volume_ratio"]);
         assert!((ratio - number(&surface["volume"]) / expected).abs() < 1e-12);
-        // edges and corners of the block are rounded off, in 20 ms little else happens
+        // edges and corners of the block are rounded off; within 20 ms little else happens
         assert!((0.9..1.1).contains(&ratio), "{surface}");
         triangles += surface["triangles"].as_u64().unwrap();
-        // what an independent reader sees is what was reported: closed, with that volume
+        // an independent reader sees what was reported: a closed surface with that volume
         let (points, found) = read(&out.join(surface["file"].as_str().unwrap()));
         assert_eq!(
             (points.len() as u64 / 3, found.len() as u64),
@@ -144,7 +144,7 @@ fn what_is_no_run_is_refused_with_advice() {
     refused(&["mesh", "drop.out", "--fluid", "-o", "drop.rfm"], "cannot make the folder");
     assert!(!here.join("drop.out/surface").exists());
 
-    // a frame that was cut off: those before it are kept, and the file as it was
+    // one frame was cut off: those before it are kept, and the damaged file stays as it was
     let frame = here.join("drop.out/frames/particles_000001.vtp");
     let whole = std::fs::read(&frame).unwrap();
     std::fs::write(&frame, &whole[..whole.len() / 2]).unwrap();
@@ -156,14 +156,14 @@ fn what_is_no_run_is_refused_with_advice() {
     refused(&["mesh", "drop.out", "--fluid"], "is missing");
     mesh(here, &["--frames", "..1"]).expect(0);
 
-    // a run that was cut off wrote no summary: the radius is asked for
+    // a run that was cut off wrote no summary, so the radius must be given
     std::fs::remove_file(here.join("drop.out/summary.json")).unwrap();
     refused(&["mesh", "drop.out", "--fluid", "--frames", "0"], "--radius");
     let document = mesh(here, &["--frames", "0", "--radius", "18.4mm", "--json"]).expect(0).json();
     assert!((0.9..1.1).contains(&number(&document["surfaces"][0]["volume_ratio"])), "{document}");
 }
 
-/// The crate that makes surfaces counts on sane particles; these are not.
+/// The crate that makes surfaces relies on sane particles; these are not.
 #[test]
 fn strange_particles_end_in_a_mesh_or_a_message() {
     let folder = tempfile::tempdir().unwrap();

@@ -9,6 +9,7 @@ mod circles;
 mod cli;
 mod contact;
 mod diagnostics;
+mod documents;
 mod examples;
 mod fluid_surface;
 mod hard_cases;

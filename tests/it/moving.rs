@@ -1,5 +1,5 @@
-//! Obstacles that move: time in formulas, ranges, swept paths, cell maps, wall velocities, against closed forms, 40-digit
-//! arithmetic and brute force.
+//! Obstacles that move: time in formulas, ranges, swept paths, cell maps and wall velocities, compared with
+//! closed forms, 40-digit arithmetic and brute force.
 
 use glam::DVec3;
 use rfm::field::{Field, Moving, Path, Still, Walls};
@@ -102,8 +102,8 @@ fn both_engines_find_the_same_entries() {
     assert!(hits > 200, "{hits}");
 }
 
-/// ω and ∂ω/∂t against the same formula in 120-digit arithmetic: its value, and the difference quotient over 2⁻⁴⁰ s,
-/// whose own error is some 2⁻⁸⁰ of the third derivative.
+/// Compares ω and ∂ω/∂t with the same formula in 120-digit arithmetic: its value, and the difference quotient
+/// over 2⁻⁴⁰ s, whose own error is about 2⁻⁸⁰ of the third derivative.
 #[test]
 fn values_and_rates_agree_with_many_digits() {
     let mut random = Random(5);
@@ -119,13 +119,13 @@ fn values_and_rates_agree_with_many_digits() {
             let found = solid.at(time).omega(p);
             let truth = at(time);
             assert!(truth.error_of(found) < 1e-13 * (1.0 + found.abs()), "{formula}: {found}");
-            // times that are exact sums
+            // these times are exact sums
             let (time, h) = ((time * 1024.0).round() / 1024.0, (-20.0f64).exp2());
             let (before, after) = (at(time - h).to_f64(), at(time + h).to_f64());
             let mut found = [0.0];
             interpreter.eval_given(Given { time, ..Given::point(p.to_array()) }, &mut found);
             let quotient = (after - before) / (2.0 * h);
-            // rounding of the two values 1e-16/h, third derivative h²
+            // the two values are rounded by 1e-16/h, and the third derivative adds h²
             assert!(
                 (found[0] - quotient).abs() < 1e-8 * (1.0 + quotient.abs()),
                 "{formula}: {found:?} {quotient}"
@@ -160,7 +160,7 @@ fn ranges_hold_all_times_of_a_stretch() {
     }
 }
 
-/// |a + s·b| = r for the smallest s from 0 to 1: the entry of a path into a ball, seen from the ball.
+/// The smallest s from 0 to 1 with |a + s·b| = r: where a path enters a ball, seen from the ball.
 fn into_ball(a: DVec3, b: DVec3, r: f64) -> Option<f64> {
     if a.length() <= r {
         return Some(0.0);
@@ -207,8 +207,8 @@ fn paths_enter_a_flying_ball_where_algebra_says() {
     assert!(hits > 2_000, "{hits}");
 }
 
-/// A plane that swings: its distance along the path is the closed form d(s) = a + b·s − A·sin(w·t(s)), whose first root
-/// is looked for in 4000 steps and by bisection.
+/// A plane that swings. Its distance along the path is the closed form d(s) = a + b·s − A·sin(w·t(s)), whose
+/// first root is found in 4000 steps and by bisection.
 #[test]
 fn paths_meet_a_swinging_plane_where_its_distance_vanishes() {
     let plane = solid("half_space([0, 0, 1]).move([0, 0, 0.3*sin(5*t)])");
@@ -222,7 +222,7 @@ fn paths_meet_a_swinging_plane_where_its_distance_vanishes() {
         let found = plane.during(begin, end).first_entry(&Path::new(from, to, f64::INFINITY));
         let first = (0..=4000).map(|k| f64::from(k) / 4000.0).find(|&s| height(s) <= 0.0);
         let Some(first) = first else {
-            // what lies between two samples is no deeper than the curvature, 0.3·25·(1.5/4000)²/8
+            // between two samples it is no deeper than the curvature allows, 0.3·25·(1.5/4000)²/8
             assert!(found.is_none_or(|entry| height(entry.t) < 2e-7), "{found:?}");
             continue;
         };
@@ -244,8 +244,8 @@ fn paths_meet_a_swinging_plane_where_its_distance_vanishes() {
 /// Half lengths of the blade below.
 const BLADE: DVec3 = DVec3::new(0.8, 0.05, 0.3);
 
-/// A turning blade: no path is let through that any of 2000 samples sees inside, and nothing inside comes before an
-/// entry.
+/// A turning blade: no path passes that any of 2000 samples sees inside, and no sample before an entry is
+/// inside.
 #[test]
 fn no_path_slips_through_a_turning_blade() {
     let blade = solid("box([-0.8, -0.05, -0.3], [0.8, 0.05, 0.3]).rotate_z(2*pi*t)");
@@ -259,7 +259,7 @@ fn no_path_slips_through_a_turning_blade() {
     for _ in 0..4_000 {
         let (from, to) = (random.point(1.0), random.point(1.0));
         let begin = random.within(0.0, 1.0);
-        // up to a whole turn in one step
+        // one step makes up to a whole turn
         let end = begin + random.next().powi(2);
         let path = Path::new(from, to, f64::INFINITY);
         let found = blade.during(begin, end).first_entry(&path);
@@ -315,14 +315,14 @@ fn the_wall_of_a_turning_blade_moves_as_a_rigid_body() {
         let expected = (3.0 * axis).cross(p).dot(n) * n;
         let found = now.wall_velocity(p);
         assert!(found.distance(expected) < 1e-12, "{found} {expected}");
-        // just outside, where R₀ mixes the faces, it is that of the face too
+        // just outside, where R₀ mixes the faces, the velocity is still that of the face
         let near = now.wall_velocity(p + 1e-3 * n);
         let there = (3.0 * axis).cross(p + 1e-3 * n).dot(n) * n;
         assert!(near.distance(there) < 1e-12, "{near} {there}");
         looked_at += 1;
     }
     assert_eq!(looked_at, 2_000);
-    // a motion within the surface is not in ω
+    // a motion within the surface does not appear in ω
     assert_eq!(solid("sphere(1).rotate_z(t)").at(0.3).wall_velocity(DVec3::new(1.0, 0.0, 0.0)).length(), 0.0);
 }
 
@@ -331,7 +331,7 @@ fn a_growing_ball_pushes_its_surface_outwards() {
     let ball = solid("sphere(0.5 + 0.25*t)").at(1.0);
     for direction in [DVec3::X, DVec3::new(0.6, 0.0, -0.8)] {
         assert!(ball.wall_velocity(0.75 * direction).distance(0.25 * direction) < 1e-15);
-        // the surface that is nearest to it, also from inside
+        // this is the surface nearest to it, also from inside
         assert!(ball.wall_velocity(0.6 * direction).dot(direction) > 0.2);
     }
 }
@@ -448,7 +448,7 @@ fn the_answer_of_a_map_does_not_depend_on_the_steps_before() {
         let p = random.point(1.5);
         assert_eq!((a.place_of(p), a.omega(p).to_bits()), (b.place_of(p), b.omega(p).to_bits()));
     }
-    // outside the run, and in steps too long for a window, the solid itself answers
+    // outside the run, and for steps too long for a window, the solid itself answers
     for (from, to) in [(5.0, 5.01), (0.0, 1.0), (-0.1, 0.0)] {
         assert!(maps[0].between(from, to).is_none());
         assert_eq!(maps[0].during(from, to).omega(DVec3::X), solid.at(to).omega(DVec3::X));
@@ -484,7 +484,8 @@ fn certificates_hold_at_the_time_they_are_for() {
     }
 }
 
-/// The piston of `examples/paddle.rfm` lies between −0.05 and 0.05 at t = 0, and 0.3 farther half a period later.
+/// The piston of `examples/paddle.rfm` lies between −0.05 and 0.05 at t = 0, and 0.3 farther half a period
+/// later.
 #[test]
 fn the_command_line_looks_at_the_time_that_is_asked_for() {
     let file = "examples/paddle.rfm";
@@ -508,7 +509,8 @@ fn the_command_line_looks_at_the_time_that_is_asked_for() {
         let outcome = rfm(root(), &[&mesh[..], &[time]].concat()).expect(0);
         outcome.json()["volume"].as_f64().unwrap()
     };
-    // it turns, and stays what it is: marching cubes at 48 cells find the volume of thin blades to a few per cent
+    // it turns and keeps its shape: marching cubes with 48 cells find the volume of thin blades to a few per
+    // cent
     assert!((volume("0") / volume("0.2") - 1.0).abs() < 0.1);
 
     let text = rfm(root(), &["explain", "examples/paddle.rfm:piston"]).expect(0).stdout;

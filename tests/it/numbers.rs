@@ -1,4 +1,4 @@
-//! Long folds, and what tests of exactly known numbers share; the other hard cases are in `hard_cases`.
+//! Long folds, and the helpers for tests of exactly known numbers. The other hard cases are in `hard_cases`.
 //!
 //! The expected numbers come from 40-digit arithmetic; tolerances are in units of the last place (ulp).
 
@@ -34,7 +34,7 @@ fn omega(expression: &str, at: [f64; 3], expected: f64) {
 
 #[test]
 fn long_folds_do_not_overflow() {
-    // balanced as the language writes them; 1024 equal operands are a perfect tree
+    // the language balances them, so 1024 equal operands are a perfect tree
     omega("any i in 0..1024: x", [1.0, 0.0, 0.0], 215_231.995_242_343_04);
     for solid in solid("any i in 0..1000: x") {
         let found = solid.omega(DVec3::X);
@@ -54,7 +54,7 @@ fn long_folds_do_not_overflow() {
     }
 }
 
-/// `let u1 = u0 or …`: a fold by hand that no limit on nesting stops.
+/// `let u1 = u0 or …`: a fold written by hand, which no limit on nesting stops.
 fn left_fold(members: usize, op: &str) -> [Solid; 2] {
     let steps = (1..members).map(|i| format!("let u{i} = u{} {op} x\n", i - 1)).collect::<String>();
     solids(&format!("let u0 = x\n{steps}solid s = u{}", members - 1))
@@ -95,13 +95,13 @@ fn folds_by_hand_in_single_precision() {
                 near(omega, expected);
                 near(gradient.x, expected * f64::from(x));
             } else {
-                // neither has a value in the type, and neither is NaN
+                // no type holds the value, and neither answer is NaN
                 assert_eq!((omega, gradient.x), (f32::INFINITY, f32::INFINITY));
             }
             assert_eq!((gradient.y, gradient.z), (0.0, 0.0));
         }
     }
-    // 128 members are beyond the type in every form: the value is infinite with the right sign
+    // 128 members exceed the type in every form: the value is infinite with the right sign
     for solid in left_fold(135, "or") {
         assert_eq!(solid.omega_f32(Vec3::X), f32::INFINITY);
         assert!(solid.omega_f32(-Vec3::X) < 0.0);

@@ -1,4 +1,4 @@
-//! The stages: what the text becomes, printed.
+//! What each stage makes of the text, printed.
 
 use rfm::Program;
 use rfm::ir::dump;
@@ -138,7 +138,7 @@ fn the_file_shadows_the_standard_solids_but_not_inside_them() {
     for program in [&own, &plain] {
         assert_eq!(program.solid("s").unwrap().omega(rfm::glam::DVec3::ZERO), 3.0);
     }
-    // a global named like a parameter of a standard solid does not get into it
+    // a global that is named like a parameter of a standard solid must not leak into it
     let shadowed = program("let r = 5\nsolid s = sphere(1) and sphere(r)");
     assert!(shadowed.solid("s").unwrap().omega(rfm::glam::DVec3::new(2.0, 0.0, 0.0)) < 0.0);
 }

@@ -1,5 +1,5 @@
-//! Properties of whole solids: R₀ identities bit for bit, engines that agree, simplification that changes nothing,
-//! ranges that hold.
+//! Properties of whole solids: R₀ identities hold bit for bit, engines agree, simplification changes no
+//! value, and ranges hold.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -79,7 +79,7 @@ proptest! {
         let (jit, interpreter) = (solid(&text, Engine::Jit), solid(&text, Engine::Interpreter));
         for p in points {
             let (a, b) = (jit.omega_grad(p), interpreter.omega_grad(p));
-            // where ω is not a number its gradient has no meaning, and the engines differ in it
+            // where ω is NaN its gradient has no meaning, and the engines differ in it
             if a.0.is_nan() {
                 prop_assert!(b.0.is_nan(), "{} at {}: {:?} {:?}", text, p, a, b);
                 continue;
@@ -115,7 +115,7 @@ proptest! {
             let inside = over.min + (over.max - over.min) * DVec3::from_array(t);
             for p in [inside, over.min, over.max, over.centre()] {
                 let omega = solid.omega(p.clamp(over.min, over.max));
-                // also what overflows; and where ω is not a number, the range is everything
+                // this holds for overflow too; where ω is NaN, the range is everything
                 let held = if omega.is_nan() { range == Interval::ALL } else { range.contains(omega) };
                 prop_assert!(held, "{} at {}: {} not in {:?}", text, p, omega, range);
             }

@@ -88,7 +88,7 @@ fn most_cells_of_the_pawn_are_decided() {
         let range = twin.range(&Aabb::new(corner, corner + side));
         if range.lo > 0.0 || range.hi < 0.0 { decided += 1 } else { near += 1 }
     }
-    // the monotone rule: 98 % of the cells at depth five
+    // the monotone rule decides 98 % of the cells at depth five
     assert!(decided * 100 >= 98 * (decided + near), "{decided} decided, {near} not");
 }
 
@@ -106,7 +106,7 @@ fn odd_boxes_have_an_answer() {
     }
 }
 
-/// ω as written, and a range program of it for each way to round that this processor can be asked for.
+/// ω as written, and a range program of it for each way of rounding that this processor supports.
 fn formulas() -> Vec<(Graph, Node, RangeEvaluator, Vec<RangeProgram>)> {
     const FORMULAS: [&str; 8] = [
         "x*(3 - x)",
@@ -124,7 +124,7 @@ fn formulas() -> Vec<(Graph, Node, RangeEvaluator, Vec<RangeProgram>)> {
         let module = program.module();
         let (graph, roots, _) = simplify(&module.graph, &[module.solids[0].node]);
         let root = roots[0];
-        // rounding to nearest is there on every machine that has machine code
+        // rounding to nearest is available on every machine that has machine code
         let nearest = RangeProgram::with_rounding(&graph, root, Rounding::Nearest).unwrap();
         let upward = RangeProgram::with_rounding(&graph, root, Rounding::Upward).ok();
         let evaluator = RangeEvaluator::new(&graph, root);
@@ -133,7 +133,7 @@ fn formulas() -> Vec<(Graph, Node, RangeEvaluator, Vec<RangeProgram>)> {
     FORMULAS.iter().map(formula).collect()
 }
 
-/// Boxes per formula and per solid; RFM_RANGE_BOXES=1000000 asks for a night's work.
+/// Boxes per formula and per solid. RFM_RANGE_BOXES=1000000 asks for a night's work.
 fn boxes() -> usize {
     std::env::var("RFM_RANGE_BOXES").ok().and_then(|n| n.parse().ok()).unwrap_or(10_000)
 }
@@ -161,7 +161,8 @@ fn neither_exact_values_nor_rounded_ones_leave_the_range() {
                 }
             }
             for range in fast {
-                // R₀ is widened by 16 ulp of its larger operand, here up to 5e3; other nodes by a few of their own
+                // R₀ is widened by 16 ulp of its larger operand, here up to 5e3; other nodes by a few ulp of
+                // their own
                 let slack = 1e-10 * (1.0 + slow.lo.abs().max(slow.hi.abs()));
                 let close = range.lo >= slow.lo - slack && range.hi <= slow.hi + slack;
                 assert!(close, "{graph:?} over {over:?}: {range:?} {slow:?}");
@@ -179,7 +180,7 @@ fn the_rounding_of_the_caller_is_put_back() {
     let first = pawn.range(&over);
     assert_eq!(third().to_bits(), before.to_bits());
     assert_eq!(pawn.range(&over), first);
-    // upwards would be the neighbour above
+    // rounding upwards would give the neighbour above
     assert_eq!(before, 0.333_333_333_333_333_31);
 }
 
@@ -206,7 +207,7 @@ fn leaves_of_one_shape_have_ranges_from_one_program() {
         }
     }
     let [a, b] = maps.each_ref().map(|map| map.stats());
-    // cells that touch a surface in a corner are decided by one way of rounding and not by the other
+    // cells that touch a surface in a corner are decided by one way of rounding and not by another
     assert!(a.fluid > 1000 && a.near > 100 && a.near.abs_diff(b.near) < b.near / 50, "{a:?} {b:?}");
     let [a, b] = [&jit, &interpreter].map(|solid| solid.bounds().aabb().unwrap());
     assert!((a.min - b.min).length() + (a.max - b.max).length() < 1e-4, "{a:?} {b:?}");

@@ -1,5 +1,5 @@
-//! Runs that are interrupted, damaged, starved of space, or diverge: nothing that was saved is lost, and what goes on is
-//! what would have been. Probes in their files.
+//! Runs that are interrupted, damaged, out of space, or that diverge: nothing that was saved is lost, and a
+//! resumed run gives what an uninterrupted one would have given. Also probes and their files.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -42,7 +42,7 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// What must not differ between a run in one go and one with a stop in between.
+/// What must not differ between a run in one go and a run with a stop in between.
 fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = vec![];
     let mut add = |name: String| {
@@ -78,7 +78,7 @@ fn a_run_that_was_stopped_goes_on_as_if_it_had_not_been() {
         let here = folder.path();
         std::fs::write(here.join("drop.rfm"), scene(method, "until: 0.1 s, save_every: 10 ms")).unwrap();
         run(here, &["straight"]).expect(0);
-        // stopped between two frames, and then at its end
+        // it stops between two frames, and then at its end
         run(here, &["broken", "--steps", "11"]).expect(0);
         let summary = run(here, &["broken", "--resume", "--json"]).expect(0).json();
         assert_same_results(&here.join("straight"), &here.join("broken"));
@@ -90,7 +90,7 @@ fn a_run_that_was_stopped_goes_on_as_if_it_had_not_been() {
             assert_eq!(summary[key], straight[key], "{method}: {key}");
         }
         assert_eq!(names(&here.join("broken/checkpoints")).len(), 2);
-        // a run that is at its end stays there
+        // a run that has ended stays as it is
         run(here, &["broken", "--resume"]).expect(0);
         assert_same_results(&here.join("straight"), &here.join("broken"));
         for name in PROBES {
@@ -128,7 +128,7 @@ fn damaged_and_foreign_checkpoints() {
     let (older, newer) = (here.join("out/checkpoints").join(older), here.join("out/checkpoints").join(newer));
     let sound = std::fs::read(&newer).unwrap();
 
-    // another post, another name
+    // the post differs, and so does its name
     let changed = run(here, &["out", "--resume", "-D", "r=0.11"]).expect(2);
     let cut = &sound[..sound.len() / 2];
     std::fs::write(&newer, cut).unwrap();
@@ -196,7 +196,7 @@ fn an_interrupted_run_has_a_checkpoint_and_goes_on() {
     }
 }
 
-/// The frames that a collection lists; each must be there, and whole.
+/// The frames that a collection lists. Each must exist and be complete.
 fn listed(out: &Path) -> usize {
     let text = std::fs::read_to_string(out.join("particles.pvd")).unwrap();
     let document = roxmltree::Document::parse(&text).unwrap();
@@ -215,7 +215,7 @@ fn a_full_disk_ends_a_run_in_order_and_it_goes_on_when_there_is_room() {
     let here = folder.path();
     let few = scene("paper", "dt: 1 ms, until: 0.3 s, save_every: 1 ms").replace("0.14", "0.05");
     std::fs::write(here.join("drop.rfm"), few).unwrap();
-    // no file may exceed 16 KiB; the collection does after some two hundred frames
+    // no file may exceed 16 KiB, and the collection does so after about two hundred frames
     let shell = "trap '' XFSZ; ulimit -f 16; [ $(ulimit -f) = 16 ] && exec \"$0\" \"$@\"";
     let output = Command::new("bash")
         .args(["-c", shell, env!("CARGO_BIN_EXE_rfm"), "run", "drop.rfm", "--threads", "1", "--no-pictures"])
@@ -259,7 +259,7 @@ fn checkpoints_as_often_as_a_scene_says() {
     let often = scene("paper", "dt: 1 ms, until: 50 ms, save_every: 10 ms, checkpoint_every: 20 ms");
     std::fs::write(here.join("drop.rfm"), often).unwrap();
     run(here, &["out"]).expect(0);
-    // after 20, 40 and 50 ms: the last two
+    // it was saved after 20, 40 and 50 ms: the last two are kept
     assert_eq!(
         names(&here.join("out/checkpoints")),
         ["step_0000000040.checkpoint", "step_0000000050.checkpoint"]
@@ -285,7 +285,7 @@ fn probes_write_tables_with_units() {
     assert_eq!(times("balance"), ["0", "0.01", "0.02", "0.03", "0.04"]);
     assert_eq!(times("fall"), ["0", "0.02", "0.04"]);
     assert_eq!(times("level").len(), 14);
-    // before the drop meets the post it falls freely: kinetic energy is what potential energy was
+    // before the drop meets the post it falls freely: kinetic energy is what was potential energy
     let rows: Vec<Vec<f64>> = table("balance")
         .lines()
         .skip(1)

@@ -1,4 +1,4 @@
-//! `rfm mesh --simplify`: fewer triangles, as near to the surface as was promised.
+//! `rfm mesh --simplify`: fewer triangles, within the promised distance of the surface.
 
 use serde_json::Value;
 
@@ -50,7 +50,7 @@ fn an_error_that_the_mesh_itself_exceeds_is_admitted() {
     assert!(outcome.stderr.contains("--method dc"), "{}", outcome.stderr);
     let found = outcome.json();
     assert!(number(&found, "simplify_error") > 1e-4 && found["closed"] == true, "{found}");
-    // nothing to simplify, nothing to measure
+    // there is nothing to simplify and nothing to measure
     let empty = b"rfm 1\nsolid s = sphere(1) and sphere(1).move([3, 0, 0])";
     let outcome = rfm_reading(root(), &["mesh", "-", "--simplify", "1%", "--json"], empty).expect(0);
     assert_eq!(outcome.json()["triangles"], 0);

@@ -1,4 +1,5 @@
-//! Swept contact: no hit is missed, no clear miss is reported, and the time of entry is that of exact arithmetic.
+//! Swept contact: no hit is missed, no clear miss is reported, and the time of entry is that of exact
+//! arithmetic.
 
 use rfm::field::{Entry, Path, Walls};
 use rfm::geom::Aabb;
@@ -7,7 +8,8 @@ use rfm::ir::exact;
 use rfm::solid::{CellMap, ProgramKind};
 use rfm::{Engine, Field, Program, Solid};
 
-/// What is swept: the paper's obstacles, leaves that are no polynomials, thin and touching parts.
+/// What is swept: the paper's obstacles, leaves that are not polynomials, and parts that are thin or touch
+/// each other.
 const SHAPES: &str = "rfm 1
 solid ring = torus(0.8, 0.3).rotate_x(0.7)
 solid cap = cone(0.7, 1.2).rotate_y(0.4)
@@ -46,7 +48,7 @@ fn solid(definition: &str) -> Solid {
     program.unwrap_or_else(|e| panic!("{e}")).solid("s").unwrap()
 }
 
-/// Solids with the middle of the box [−1.2, 1.2]³ around them.
+/// Solids, each with the centre of the box of half size 1.2 around it.
 fn solids(engine: Engine) -> Vec<(Solid, DVec3)> {
     let shapes = Program::from_source("shapes.rfm", SHAPES).unwrap_or_else(|e| panic!("{e}"));
     let mut all: Vec<_> =
@@ -59,20 +61,20 @@ fn solids(engine: Engine) -> Vec<(Solid, DVec3)> {
     all
 }
 
-/// The sign of the solid at a part of a path, exactly: of the point that the path really has there.
+/// The exact sign of the solid at a fraction of a path, at the point that the path really has there.
 fn exact_sign(solid: &Solid, from: DVec3, to: DVec3, t: f64) -> Option<f64> {
     // multiples of 2⁻³⁰ make the point exact in a double
     let (graph, outputs) = solid.graph(ProgramKind::Sign);
     Some(exact::evaluate(graph, outputs, (from + (to - from) * t).to_array())?[0].sign())
 }
 
-/// A point that leaves room for exact multiples: coordinates become multiples of 2⁻³⁰.
+/// A point whose coordinates are multiples of 2⁻³⁰, so that multiples of it are exact.
 fn coarse(p: DVec3) -> DVec3 {
     (p * f64::from(1 << 30)).round() / f64::from(1 << 30)
 }
 
-/// Judges one path by dense samples: every sample before the entry is in the fluid, an entry that is certain has a
-/// point inside, and a path without entry has none. Samples whose sign is in doubt are asked exactly.
+/// Judges one path by dense samples. Every sample before the entry is in the fluid, a certain entry has a
+/// point inside, and a path without an entry has none. Samples whose sign is in doubt are evaluated exactly.
 fn judge(solid: &Solid, from: DVec3, to: DVec3, found: Option<Entry>, places: &mut dyn Iterator<Item = f64>) {
     let name = solid.name();
     for t in places {
@@ -88,7 +90,7 @@ fn judge(solid: &Solid, from: DVec3, to: DVec3, found: Option<Entry>, places: &m
         let steps = (0..=64).map(|k| entry.t + (entry.until - entry.t) * f64::from(k) / 64.0);
         let nearest =
             steps.map(|t| Field::omega(&solid.twin(), from + (to - from) * t)).fold(f64::MIN, f64::max);
-        // a certain entry has a point inside; one that is not grazes within rounding
+        // a certain entry has a point inside; an uncertain one grazes the surface within rounding
         assert!(nearest >= -1e-13, "{name}: {from} → {to} is not met at {entry:?}: {nearest:e}");
     }
 }
@@ -117,8 +119,8 @@ fn random_paths_miss_nothing() {
     }
 }
 
-/// Paths that touch the surface, or pass it at 1e-3 to 1e-15 on either side, judged where it matters: around the
-/// touching point, and in exact arithmetic.
+/// Paths that touch the surface, or pass it at 1e-3 to 1e-15 on either side. They are judged where it
+/// matters, around the touching point, and in exact arithmetic.
 #[test]
 fn grazing_paths_miss_nothing() {
     let mut random = Random(2);
@@ -149,8 +151,8 @@ fn grazing_paths_miss_nothing() {
 
 #[test]
 fn a_thin_wall_is_hit_where_it_is() {
-    // (0.05 − 5e-7)/0.1. Undecided stretches are 1e-12 long; the product (x + w)(w − x) at x = −0.05 is known to 1e-16
-    // of its value, 0.0025, which its slope at the wall, 1e-7, turns into 1e-10 of the path
+    // (0.05 − 5e-7)/0.1. Undecided stretches are 1e-12 long. The product (x + w)(w − x) at x = −0.05 is known
+    // to 1e-16 of its value, 0.0025, which its slope at the wall, 1e-7, turns into 1e-10 of the path
     for (definition, tolerance) in
         [("abs(x) <= 5e-7", 2e-12), ("-5e-7 <= x <= 5e-7", 2e-10), ("sqrt(x^2) <= 5e-7", 2e-12)]
     {
@@ -167,8 +169,8 @@ fn a_sphere_is_grazed_or_passed() {
     let sphere = solid("x^2 + y^2 + z^2 <= 1");
     let at = |y: f64| sphere.first_entry(DVec3::new(-2.0, y, 0.0), DVec3::new(2.0, y, 0.0));
     let hit = at(1.0 - 1e-12).unwrap();
-    // 16(t − ½)² = 2e-12. The coefficients −4, 16 and −16 are known to some 4 roundings of 16 (8e-15), which move the
-    // root by that over the slope there, 1.1e-5
+    // 16(t − ½)² = 2e-12. The coefficients −4, 16 and −16 are known to about 4 roundings of 16 (8e-15), which
+    // move the root by that over the slope there, 1.1e-5
     assert!((hit.t - 0.4999996464466094).abs() < 2e-9 && hit.certain, "{hit:?}");
     assert!((hit.until - 0.5000003535533906).abs() < 2e-9, "{hit:?}");
     assert_eq!(at(1.0 + 1e-12), None);
@@ -222,7 +224,7 @@ fn every_engine_and_view_finds_the_same_entry() {
             hits += i32::from(found.is_some());
             assert_eq!(found.is_some(), by_map.is_some(), "{jit:?}: {from} → {to}, {found:?} {by_map:?}");
             if let (Some(a), Some(b)) = (found, by_map) {
-                // leaves are narrowed from other stretches: the ends of undecided ones are 1e-12 long
+                // leaves are narrowed from other stretches, and the ends of undecided ones are 1e-12 long
                 assert!((a.t - b.t).abs() < 2e-12 && a.certain == b.certain, "{jit:?}: {a:?} {b:?}");
             }
         }

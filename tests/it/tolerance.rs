@@ -1,4 +1,4 @@
-//! Tolerances: which program is chosen, that it keeps its word, and what is said of it.
+//! Tolerances: which program is chosen, whether it keeps its bound, and what is reported.
 
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
@@ -65,7 +65,7 @@ fn the_cheapest_program_that_keeps_the_tolerance_is_chosen_and_keeps_it() {
 fn engines_and_batches_give_the_same_bits_and_points_beyond_the_box_the_solids_own() {
     for name in ["rough", "fine", "far"] {
         let [jit, interpreter] = [Engine::Jit, Engine::Interpreter].map(|e| chosen(THREE, name, e));
-        // some 600 points, of which a part lies outside: two blocks and a rest
+        // about 600 points, some of them outside: two blocks and a remainder
         let over = jit.over().grown(0.2 * jit.over().size().max_element());
         let mut points = random_points(&over, 600);
         points.extend([DVec3::NAN, DVec3::INFINITY, jit.over().min, jit.over().max]);
@@ -97,7 +97,7 @@ fn tiny_solids_are_scaled_in_single_precision() {
         let chosen = solid.within(1e-30, over).unwrap();
         assert_eq!(chosen.variant(), ProgramVariant::BY_COST[0], "{chosen:?}");
         let found = chosen.omega(DVec3::splat(1e-24));
-        // of single precision, whose squares of 1e-24 would be zero
+        // computed in single precision, where the squares of 1e-24 are zero unless they are scaled
         assert!((found / 5.857_864_376_269_049_5e-25 - 1.0).abs() < 1e-6, "{found:e}");
     }
 }

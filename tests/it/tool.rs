@@ -1,4 +1,4 @@
-//! The real binary, run as a person or another program runs it.
+//! Runs the real binary, as a person or another program would.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ pub fn rfm(folder: &Path, arguments: &[&str]) -> Outcome {
     rfm_reading(folder, arguments, b"")
 }
 
-/// Runs the tool in a folder with something on its standard input; longer than a minute is a hang.
+/// Runs the tool in a folder with the given standard input. Longer than a minute counts as a hang.
 #[track_caller]
 pub fn rfm_reading(folder: &Path, arguments: &[&str], input: &[u8]) -> Outcome {
     let mut child = Command::new(env!("CARGO_BIN_EXE_rfm"))
@@ -52,7 +52,7 @@ pub fn rfm_reading(folder: &Path, arguments: &[&str], input: &[u8]) -> Outcome {
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
     let input = input.to_vec();
-    // a command that does not read its input closes it: no error
+    // a command that does not read its input closes it: that is no error
     let writer = std::thread::spawn(move || drop(stdin.write_all(&input)));
     let id = child.id();
     let started = Instant::now();
@@ -84,7 +84,7 @@ pub fn stem(path: &Path) -> &str {
     path.file_stem().unwrap().to_str().unwrap()
 }
 
-/// Snapshots of a topic lie in a folder of their own.
+/// The snapshots of each topic have a folder of their own.
 pub fn snapshot(topic: &str, name: &str, text: &str) {
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path(root().join("tests/snapshots").join(topic));

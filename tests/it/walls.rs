@@ -1,5 +1,5 @@
-//! Walls a thousandth of a millimetre thick, corners and cusps hold particles at 100 m/s: judged after every step, by
-//! where the particles are and not by what the solver says of itself.
+//! Walls a thousandth of a millimetre thick, corners and cusps hold particles at 100 m/s. This is judged
+//! after every step by where the particles are, not by what the solver says about itself.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use rfm::{Engine, Experiment, Program, Solid};
 
 use crate::sweep::Random;
 
-/// Hollow bodies with a wall of 1e-6, and the hollows within.
+/// Hollow bodies with a wall of 1e-6, and the hollows inside them.
 const SHELLS: &str = "rfm 1
 let w = 1e-6
 solid plate = abs(z - 0.1*x) <= w/2
@@ -35,7 +35,7 @@ fn solid(name: &str) -> Solid {
     Program::from_source("shells.rfm", SHELLS).unwrap_or_else(|e| panic!("{e}")).solid(name).unwrap()
 }
 
-/// Free particles at 100 m/s among obstacles; `check` is asked for every particle after every step.
+/// Free particles at 100 m/s among obstacles. `check` is called for every particle after every step.
 fn fly(field: Arc<dyn Walls>, starts: &[DVec3], steps: usize, check: &dyn Fn(DVec3, DVec3) -> bool) {
     let mut random = Random(17);
     let mut fluid = Particles::default();
@@ -52,7 +52,7 @@ fn fly(field: Arc<dyn Walls>, starts: &[DVec3], steps: usize, check: &dyn Fn(DVe
         ..Parameters::default()
     };
     let domain = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
-    // an infinite resolution: nothing may depend on it
+    // an infinite resolution, because nothing may depend on it
     let obstacle = Obstacle { restitution: 1.0, ..Obstacle::at_rest(field.clone(), f64::INFINITY) };
     let mut simulation = Simulation::new(parameters, fluid, domain, vec![obstacle]).unwrap();
     for step in 0..steps {
@@ -65,7 +65,7 @@ fn fly(field: Arc<dyn Walls>, starts: &[DVec3], steps: usize, check: &dyn Fn(DVe
             assert!(domain.contains(p) && check(start, p), "step {step}: a particle from {start} is at {p}");
         }
     }
-    // they have not been caught: the mean speed is near that at the start
+    // no particle was caught: the mean speed is near that at the start
     let speeds: f64 = simulation.particles().velocity.iter().map(DVec3::length).sum();
     assert!(speeds > 50.0 * starts.len() as f64, "{}", speeds / starts.len() as f64);
 }
@@ -106,7 +106,7 @@ scene stirred {
   run { until: 0.4 s, save_every: 0.05 s }
 }";
 
-/// A flap as wide as its tank: the nearest way out of it may lead through the tank's wall.
+/// A flap as wide as its tank. The nearest way out of it may lead through the tank's wall.
 const FLAP: &str = "rfm 1
 solid blade = box([-0.02, -0.2, 0], [0.02, 0.2, 0.5]).rotate_y(0.3*sin(6*t))
 scene wavy {
@@ -117,7 +117,8 @@ scene wavy {
   run { until: 2 s, save_every: 0.05 s }
 }";
 
-/// Balls in a corner, enough of them for a map of cells that knows only their sign, and coarse particles far away from them.
+/// Balls in a corner, enough of them for a cell map that knows only their sign, and coarse particles far away
+/// from them.
 const FAR_BALLS: &str = "rfm 1
 solid balls = any i in 0..40: ball([0.05 + 0.01*i, 0.1, 0.1], 0.02)
 scene apart {
@@ -135,7 +136,7 @@ fn what_is_far_from_many_balls_is_not_too_close_to_them() {
     });
 }
 
-/// Hands over a file's scene at its start, with the number of particles that were carved off.
+/// Passes on a file's scene at its start, with the number of particles that were carved off.
 fn with_scene(text: &str, look: impl FnOnce(&Program, &Scene, &mut Simulation, usize)) {
     let program = Program::from_source("scene.rfm", text).unwrap_or_else(|e| panic!("{e}"));
     let scene = &program.module().scenes[0];
@@ -144,7 +145,7 @@ fn with_scene(text: &str, look: impl FnOnce(&Program, &Scene, &mut Simulation, u
     look(&program, scene, &mut simulation, carved);
 }
 
-/// A lone stone floats, quite still; a wall comes along and must not pass over it.
+/// A lone particle floats at rest. A wall comes along and must not pass over it.
 const STONE: &str = "rfm 1
 solid wall = box([-0.1, -1, -0.1], [0, 1, 0.5]).move([-0.2 + 0.5*t, 0, 0])
 scene pushed {

@@ -215,10 +215,6 @@ impl Variant<'_> {
 
 /// The certified bound of a program over the box. The box is grown by the rounding of its points to the type.
 fn certified<T: Lane>(solid: &Solid, over: Aabb) -> Option<f64> {
-    let float = match T::PRECISION {
-        Precision::F32 => FloatType::F32,
-        Precision::F64 => FloatType::F64,
-    };
     let forms = solid.forms(ProgramKind::Value, T::PRECISION);
     let (graph, root) = solid.formula();
     let margin = 2.0 * FloatType::of(T::PRECISION).unit * over.min.abs().max(over.max.abs()).max_element();

@@ -11,7 +11,7 @@ use resvg::{
 
 pub struct Curve {
     pub name: String,
-    /// N, ms per step.
+    /// N and ms per step.
     pub points: Vec<(f64, f64)>,
     pub settled: bool,
     pub single: bool,
@@ -99,7 +99,7 @@ fn axes(out: &mut String) {
     );
 }
 
-/// 20000 → 20 000, with a narrow space.
+/// 20000 becomes 20 000, with a narrow space.
 fn thousands(value: f64) -> String {
     if value < 1.0 {
         return format!("{value:.1}");
@@ -173,7 +173,7 @@ fn legend(out: &mut String, curves: &[Curve]) {
     );
 }
 
-/// Rasterised with the font that the slices use, at two pixels per unit.
+/// Rasterises with the font that the slices use, at two pixels per unit.
 pub fn write_png(svg: &str, path: &Path) {
     const SCALE: f32 = 2.0;
     let mut fonts = fontdb::Database::new();

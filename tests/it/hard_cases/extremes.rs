@@ -1,4 +1,5 @@
-//! Numbers that no scene has: every program still gives a defined answer, and the same one in every way of asking.
+//! Numbers that no scene has. Every program still gives a defined answer, and the same one in every way of
+//! asking.
 
 use rfm::geom::Aabb;
 use rfm::glam::{DVec3, Vec3};
@@ -7,7 +8,7 @@ use rfm::{Field, Solid};
 
 use crate::numbers::solid;
 
-/// Fields that divide by zero, leave the domain of a function, overflow, or join a thing with itself.
+/// Fields that divide by zero, leave the domain of a function, overflow, or join a field with itself.
 const FIELDS: &[&str] = &[
     "1/x",
     "1/(x - x)",
@@ -69,7 +70,7 @@ fn same(a: f64, b: f64) -> bool {
     a == b || (a.is_nan() && b.is_nan())
 }
 
-/// One answer of a solid at a point, by every way of asking for it.
+/// One answer of a solid at a point, by every way of asking.
 fn answers(solid: &Solid, p: DVec3) -> [f64; 3] {
     let omega = solid.omega(p);
     let what = || format!("{solid:?} at {p}");
@@ -107,7 +108,7 @@ fn every_program_has_a_defined_answer() {
 
 #[test]
 fn ranges_hold_what_overflows_and_own_up_to_nan() {
-    // coordinates whose sum does not overflow: beyond, ω is NaN by definition
+    // coordinates whose sum does not overflow; beyond them ω is NaN by definition
     let finite: Vec<f64> = COORDINATES.iter().copied().filter(|c| c.abs() <= 1e160).collect();
     for expression in FIELDS {
         for solid in solid(expression) {

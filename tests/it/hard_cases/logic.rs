@@ -9,14 +9,14 @@ use rfm::glam::{DVec3, Vec3};
 const SQRT_2: f64 = std::f64::consts::SQRT_2;
 
 const NODES: &[Case] = &[
-    // all exactly known: 3, 4, 5
+    // all of 3, 4 and 5 are exact
     case(1, "x and y", [3.0, 4.0, 0.0], 2.0).gradient([0.4, 0.2, 0.0]),
     case(1, "x or y", [3.0, 4.0, 0.0], 12.0).gradient([1.6, 1.8, 0.0]),
     case(1, "x and y", [-3.0, -4.0, 0.0], -12.0).gradient([1.6, 1.8, 0.0]),
     case(1, "x or y", [-3.0, -4.0, 0.0], -2.0).gradient([0.4, 0.2, 0.0]),
     case(1, "x and y", [3.0, -4.0, 0.0], -6.0).gradient([0.4, 1.8, 0.0]),
     case(1, "x or y", [3.0, -4.0, 0.0], 4.0).gradient([1.6, 0.2, 0.0]),
-    // u + v − √(u² + v²) is 0 here in single and in double precision
+    // the textbook u + v − √(u² + v²) is 0 here, in single and in double precision
     case(2, "x and y", [1.0, 9.313_225_746_154_785e-10, 0.0], 9.313_225_741_817_976_5e-10),
     case(3, "x and y", [1.0, -9.313_225_746_154_785e-10, 0.0], -9.313_225_750_491_593_8e-10),
     case(4, "x and y", [1.0, 8.673_617_379_884_035e-19, 0.0], 8.673_617_379_884_035e-19),
@@ -29,7 +29,7 @@ const NODES: &[Case] = &[
     case(9, "x and y", [0.0, -1.0, 0.0], -2.0).gradient([1.0, 2.0, 0.0]),
     case(9, "x or y", [0.0, 1.0, 0.0], 2.0).gradient([1.0, 2.0, 0.0]),
     case(9, "x or y", [0.0, -1.0, 0.0], 0.0).gradient([1.0, 0.0, 0.0]),
-    // idempotence is false
+    // R₀ is not idempotent
     case(12, "x and x", [1.0, 0.0, 0.0], 2.0 - SQRT_2).gradient([2.0 - SQRT_2, 0.0, 0.0]),
     case(12, "x and x", [-1.0, 0.0, 0.0], -2.0 - SQRT_2).gradient([2.0 + SQRT_2, 0.0, 0.0]),
     case(12, "x and x", [1e-9, 0.0, 0.0], (2.0 - SQRT_2) * 1e-9)
@@ -37,15 +37,15 @@ const NODES: &[Case] = &[
         .double_only(),
     case(13, "x or x", [1.0, 0.0, 0.0], 3.414_213_562_373_095_0),
     case(13, "x or x", [-1.0, 0.0, 0.0], SQRT_2 - 2.0),
-    // the empty set and the whole space, with a spurious zero
+    // the empty set and the whole space, each with a spurious zero
     case(14, "x and not x", [1.0, 0.0, 0.0], -SQRT_2),
     case(14, "x and not x", [-1.0, 0.0, 0.0], -SQRT_2),
     case(14, "x and not x", [0.0; 3], 0.0).gradient([0.0; 3]),
     case(15, "x or not x", [1.0, 0.0, 0.0], SQRT_2),
     case(15, "x or not x", [0.0; 3], 0.0).gradient([0.0; 3]),
-    // scale invariance
+    // R₀ is invariant to scale
     case(24, "x and y", [1e-24, 1e-24, 0.0], 5.857_864_376_269_049_5e-25).double_only(),
-    // not associative
+    // R₀ is not associative
     case(29, "x and y and z", [1.0; 3], 0.426_844_786_590_227_52),
     case(29, "x and y and z", [-1.0; 3], -7.971_860_853_700_944),
 ];
@@ -150,7 +150,7 @@ fn rows_14_and_15_nothing_and_everything() {
             }
         }
     }
-    // the surface of nothing has no normal, and its gradient vanishes
+    // the empty solid has no surface normal, and its gradient vanishes
     for solid in solid("sphere(1) and not sphere(1)") {
         let contact = solid.contact(DVec3::X);
         assert!(contact.normal.is_finite() && contact.distance.is_finite(), "{contact:?}");
@@ -169,7 +169,7 @@ fn row_39_the_range_of_a_node_is_exact() {
         for solid in solid(expression) {
             let range = solid.range(&over);
             assert!(range.contains(lo) && range.contains(hi), "{expression}: {range:?}");
-            // no wider than the roundings of the operands' sum, 5
+            // no wider than the rounding of the operands' sum, 5
             let margin = 40.0 * f64::EPSILON * 5.0;
             assert!(range.lo >= lo - margin && range.hi <= hi + margin, "{expression}: {range:?}");
         }
@@ -184,7 +184,7 @@ fn row_40_a_dropped_operand_changes_the_value_by_half_the_ratio() {
                 let (u, v) = (f64::from(i) / 200.0, 1.0 + f64::from(j) / 10.0);
                 let omega = solid.omega(DVec3::new(u, v, 0.0));
                 assert_eq!(sign(omega), sign(u));
-                // (u ∧ v)/u = 1 − q/2 + q³/8 − …, q = u/v; a rounding beside it
+                // (u ∧ v)/u = 1 − q/2 + q³/8 − … with q = u/v, apart from a rounding
                 let deviation = (omega - u).abs();
                 assert!(deviation <= u.abs() * (0.5 * (u / v).abs() + 1e-15), "{u} {v}: {omega}");
             }

@@ -1,8 +1,8 @@
-//! Hard cases with exactly known answers, through every program: machine code and interpreter, double and single
-//! precision, one point and many, value, gradient, sign, range and contact.
+//! Hard cases with exactly known answers, through every program: machine code and interpreter, double and
+//! single precision, one point and many, value, gradient, sign, range and contact.
 //!
-//! The expected numbers come from closed forms or 40-digit arithmetic; tolerances are in units of the last place
-//! (ulp) of the scale that a case names. What is tested elsewhere: paths through thin and grazed walls in `sweep`,
+//! The expected numbers come from closed forms or 40-digit arithmetic. Tolerances are in units of the last
+//! place (ulp) of the scale that a case names. Paths through thin and grazed walls are tested in `sweep`,
 //! folds of a thousand operands in `numbers`.
 
 mod extremes;
@@ -18,21 +18,21 @@ use crate::numbers::solid;
 
 /// One row of a table: a solid, a point and what is known there.
 struct Case {
-    /// Of which case in the list it is a part.
+    /// The case of the list to which it belongs.
     row: u32,
     expression: &'static str,
     at: [f64; 3],
     omega: f64,
-    /// ∇ω, where it is known.
+    /// ∇ω, or `None` if it is not known.
     gradient: Option<[f64; 3]>,
-    /// Size of the numbers that ω is made of: one ulp of it is the unit of the tolerance, four of them (six for
-    /// gradients) the tolerance. At least |ω|.
+    /// Size of the numbers that ω is made of, at least |ω|. One ulp of it is the unit of the tolerance, which
+    /// is four units (six for gradients).
     scale: f64,
-    /// Whether single precision holds the point, and no intermediate result leaves its range.
+    /// Whether single precision holds the point exactly and no intermediate result leaves its range.
     single: bool,
 }
 
-/// A case whose operands are the coordinates themselves: exact in every precision.
+/// A case whose operands are the coordinates themselves, so it is exact in every precision.
 const fn case(row: u32, expression: &'static str, at: [f64; 3], omega: f64) -> Case {
     Case { row, expression, at, omega, gradient: None, scale: 0.0, single: true }
 }
@@ -46,7 +46,7 @@ impl Case {
         Self { scale, ..self }
     }
 
-    /// Not for single precision.
+    /// A case that is not meant for single precision.
     const fn double_only(self) -> Self {
         Self { single: false, ..self }
     }
@@ -75,7 +75,7 @@ fn check(case: &Case, solid: &Solid) {
     let omega = solid.omega(p);
     assert!(near(omega, case.omega, 4.0 * f64::EPSILON * scale), "{what}: {omega:?}, not {:?}", case.omega);
     let (same, gradient) = solid.omega_grad(p);
-    assert_eq!(same, omega, "{what}"); // but for the sign of a zero
+    assert_eq!(same, omega, "{what}"); // the sign of a zero may differ
     if let Some(expected) = case.gradient.map(DVec3::from_array) {
         let tolerance = 6.0 * f64::EPSILON * expected.abs().max_element().max(case.scale);
         let close = (0..3).all(|i| near(gradient[i], expected[i], tolerance));
@@ -84,7 +84,7 @@ fn check(case: &Case, solid: &Solid) {
     assert!(gradient.is_finite(), "{what}: gradient {gradient}");
     batches(solid, p, omega, gradient, &what);
 
-    // the sign is that of ω, in every program, in the range of the point and of boxes around it
+    // the sign is that of ω in every program, in the range of the point and in those of boxes around it
     assert_eq!(solid.sign(p), sign(omega), "{what}");
     assert_eq!(sign(Field::omega(&solid.twin(), p)), sign(omega), "{what}");
     for size in [0.0, 1e-9, 0.5] {
@@ -110,7 +110,7 @@ fn check(case: &Case, solid: &Solid) {
     }
 }
 
-/// Points of a precision, for what is the same in both.
+/// One precision, for what both have in common.
 trait Point: Copy {
     type Number: rfm::solid::Lane + PartialEq;
     fn number(self, axis: usize) -> Self::Number;
@@ -130,7 +130,7 @@ impl Point for Vec3 {
     }
 }
 
-/// Many points give what one does, whichever place in a block it has.
+/// Many points give what one gives, whichever place in a block it has.
 #[track_caller]
 fn batches<P: Point>(solid: &Solid, p: P, omega: P::Number, gradient: P, what: &str) {
     let columns = [0, 1, 2].map(|axis| vec![p.number(axis); 7]);
@@ -146,7 +146,7 @@ fn batches<P: Point>(solid: &Solid, p: P, omega: P::Number, gradient: P, what: &
     }
 }
 
-/// A solid of the examples, by both engines.
+/// A solid of the examples, compiled and interpreted.
 fn example(name: &str) -> [Solid; 2] {
     let path = format!("{}/examples/{name}.rfm", env!("CARGO_MANIFEST_DIR"));
     let program = rfm::Program::from_path(path).unwrap_or_else(|e| panic!("{e}"));

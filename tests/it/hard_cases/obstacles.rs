@@ -1,4 +1,4 @@
-//! Whole obstacles: rows 16 to 38, but for paths (18, 19) and long folds (20 to 22).
+//! Whole obstacles: rows 16 to 38, except paths (18, 19) and long folds (20 to 22).
 
 use super::{Case, case, check, check_all, example};
 use crate::numbers::{near, solid, solids};
@@ -30,7 +30,7 @@ const CUBE: &[Case] = &[
 ];
 
 const SOLIDS: &[Case] = &[
-    // leaves of −1e-12: only a factored form has their digits
+    // leaves are −1e-12 here, and only a factored form keeps their digits
     case(
         16,
         "(x*(2 - x) - y^2 - z^2) or (-x*(2 + x) - y^2 - z^2)",
@@ -48,7 +48,7 @@ const SOLIDS: &[Case] = &[
         .gradient([0.0; 3]),
     case(16, "(1 - sqrt((x - 1)^2 + y^2 + z^2)) and (1 - sqrt((x + 1)^2 + y^2 + z^2))", [0.0; 3], 0.0)
         .gradient([0.0; 3]),
-    // a thin shell: the leaves are 1e-6 with the rounding of 1
+    // a thin shell: the leaves are 1e-6, with the rounding of 1
     case(
         17,
         "1 - (x^2 + y^2 + z^2) and (x^2 + y^2 + z^2) - (1 - 1e-6)^2",
@@ -63,14 +63,14 @@ const SOLIDS: &[Case] = &[
         [0.0; 3],
         -1.414_210_148_161_946_9,
     ),
-    // a million away: x − 10⁶ is exact, x² − 2·10⁶x + 10¹² is not
+    // a million metres away x − 10⁶ is exact, x² − 2·10⁶x + 10¹² is not
     case(23, "0.5^2 - (x - 1e6)^2 - y^2 - z^2", [1_000_000.3, 0.0, 0.0], 0.159_999_999_972_060_32)
         .scale(0.25)
         .double_only(),
     case(24, "1e-24 - x^2 - y^2 - z^2", [0.0; 3], 1e-24),
     case(24, "sphere(1e-12)", [0.0; 3], 5e-13),
     case(33, "1 + 10*(z - 0.75)^2 - 20*((x - 1.5)^2 + (y - 1.5)^2)", [1.5, 1.5, -10.0], 1156.625),
-    // roots at their singular point: the gradient is a member of the limits
+    // at the singular point of a root the gradient is one of its limits
     case(35, "0.5 - sqrt(x^2 + y^2)", [0.0; 3], 0.5).gradient([0.0; 3]),
     case(35, "(0.25 - x^2 - y^2)/(2*0.5)", [0.0; 3], 0.25).gradient([0.0; 3]),
     case(36, "0.25^2 - (sqrt(x^2 + y^2) - 1)^2 - z^2", [0.0; 3], 0.0625 - 1.0).gradient([0.0; 3]),
@@ -165,7 +165,8 @@ fn row_23_expansion_would_lose_the_digits() {
     for solid in solid("0.5^2 - (x - 1e6)^2 - y^2 - z^2") {
         assert!((solid.omega(at) - 0.159_999_999_972_060_32).abs() < 1e-16);
     }
-    // what a rewrite to powers of x gives: the compiler must not do that, and a file that does shows it
+    // this is what a rewrite to powers of x gives: the compiler must not do it, and a file that does shows
+    // why
     for solid in solid("0.25 - x^2 + 2e6*x - 1e12 - y^2 - z^2") {
         assert!((solid.omega(at) - 0.16).abs() > 1e-5, "{}", solid.omega(at));
     }
@@ -186,7 +187,7 @@ fn row_34_leaves_of_unlike_scale() {
         for (p, sign) in [([0.0; 3], 1.0), ([0.3, 0.0, 0.0], -1.0), ([0.0, 0.0, 1.0], -1.0)] {
             assert_eq!(solid.sign(DVec3::from_array(p)), sign);
         }
-        // the distance does not see the scale: 0.3 − √0.05 from the first leaf
+        // the distance does not depend on the scale: 0.3 − √0.05 from the first leaf
         let contact = solid.contact(DVec3::new(0.3, 0.0, 0.0));
         assert!((contact.distance - (0.3 - 0.05f64.sqrt())).abs() < 1e-12, "{contact:?}");
     }
@@ -203,7 +204,7 @@ fn rows_35_to_38_singular_places_have_a_distance() {
             assert!(contact.normal.is_finite() && contact.mean_curvature.is_finite(), "{contact:?}");
         }
     }
-    // the axis of a cylinder: an estimate, see `ir::contact`
+    // on the axis of a cylinder it is an estimate, see `ir::contact`
     for solid in solid("x^2 + y^2 <= 0.25") {
         let contact = solid.contact(DVec3::ZERO);
         assert!(contact.distance < -0.4 && contact.distance > -0.7, "{contact:?}");

@@ -1,5 +1,5 @@
-//! Walls of the solver: row 43. The law of reflection, row 44, is private to the solver and tested beside it, in
-//! `sph::contact` as a formula and in `sph::tests` by bounces.
+//! Walls of the solver: row 43. The law of reflection, row 44, is private to the solver and tested there, as
+//! a formula in `sph::contact` and by bounces in `sph::tests`.
 
 use rfm::sph::WallKernel;
 
@@ -12,7 +12,7 @@ fn row_43_the_part_of_a_kernel_in_a_wall() {
         (WallKernel::WendlandC2, 0.025_390_625),
     ];
     for (kernel, half) in expected {
-        // λ is made of numbers up to ½
+        // λ consists of numbers up to ½
         let close = |a: f64, b: f64| assert!((a - b).abs() <= f64::EPSILON, "{kernel:?}: {a:?} {b:?}");
         close(kernel.covered(0.0), 0.5);
         close(kernel.covered(0.5), half);
