@@ -14,10 +14,7 @@
 use std::io::{self, Write};
 use std::{error, fmt};
 
-use super::{
-    core::Core,
-    particles::{Particles, Vectors},
-};
+use super::particles::{Particles, Vectors};
 
 const MAGIC: [u8; 8] = *b"rfm run\n";
 
@@ -25,7 +22,7 @@ const MAGIC: [u8; 8] = *b"rfm run\n";
 const VERSION: u32 = 1;
 
 /// Names of the columns that hold components of vectors.
-const VECTORS: [&str; 9] = [
+pub(super) const VECTORS: [&str; 9] = [
     "position x",
     "position y",
     "position z",
@@ -104,34 +101,6 @@ impl Checkpoint {
         } else {
             Err(CheckpointError::Column(name.to_string()))
         }
-    }
-
-    /// The part of a checkpoint that all methods share.
-    pub(super) fn of(core: &Core) -> Self {
-        let Core { particles, acceleration, steps, time, .. } = core;
-        let mut checkpoint =
-            Self { steps: *steps, time: *time, ids: particles.id.clone(), ..Self::default() };
-        let vectors = [&particles.position, &particles.velocity, acceleration];
-        for (name, column) in VECTORS.iter().zip(vectors.into_iter().flat_map(Vectors::components)) {
-            checkpoint.set(name, column.clone());
-        }
-        checkpoint.set("density", particles.density.clone());
-        checkpoint.set("pressure", particles.pressure.clone());
-        if let Some(contacts) = &core.contacts {
-            checkpoint.set("contacts", contacts.totals().as_flattened().to_vec());
-        }
-        checkpoint
-    }
-
-    /// Restores what [`Checkpoint::of`] stored. The core has the same number of particles.
-    pub(super) fn restore(&self, core: &mut Core) -> Result<(), CheckpointError> {
-        core.particles = self.particles()?;
-        let components = core.acceleration.components_mut();
-        for (name, column) in VECTORS[6..].iter().zip(components) {
-            *column = self.of_particles(name)?;
-        }
-        (core.steps, core.time) = (self.steps, self.time);
-        Ok(())
     }
 
     pub(super) fn particles(&self) -> Result<Particles, CheckpointError> {

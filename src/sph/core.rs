@@ -11,11 +11,12 @@ use crate::precision::Precision;
 
 use super::{
     VectorField, VectorOfTime,
+    checkpoint::{Checkpoint, CheckpointError, VECTORS},
+    contacts::Contacts,
+    error::{Cause, Quantity, StepError},
     pairs::{Cloud, Columns, Near, PairPass, Real},
     params::Parameters,
     particles::{Particles, Vectors},
-    probes::Contacts,
-    simulation::{Cause, Quantity, StepError},
     walls::{Boundary, Coverage, Friction, MARKED, UNKNOWN, Wall},
 };
 
@@ -66,7 +67,7 @@ impl Core {
         let mut acceleration = Vectors::default();
         acceleration.resize(particles.len());
         let speed = longest(&particles.velocity);
-        let wall = parameters.method.numerics().wall(&parameters);
+        let wall = parameters.method.numerics().wall(&parameters.scales());
         let clear = if boundary.obstacles.is_empty() { Vec::new() } else { vec![UNKNOWN; particles.len()] };
         Self {
             parameters,
@@ -275,6 +276,35 @@ impl Core {
         }
         // take equal steps to the instant, rather than full ones and a small rest
         Ok(if most.is_finite() { most / (most / dt - 1e-9).ceil().max(1.0) } else { dt })
+    }
+
+    /// The part of a checkpoint that all methods share.
+    pub fn checkpoint(&self) -> Checkpoint {
+        let Core { particles, acceleration, steps, time, .. } = self;
+        let mut checkpoint = Checkpoint::default();
+        (checkpoint.steps, checkpoint.time) = (*steps, *time);
+        checkpoint.ids.clone_from(&particles.id);
+        let vectors = [&particles.position, &particles.velocity, acceleration];
+        for (name, column) in VECTORS.iter().zip(vectors.into_iter().flat_map(Vectors::components)) {
+            checkpoint.set(name, column.clone());
+        }
+        checkpoint.set("density", particles.density.clone());
+        checkpoint.set("pressure", particles.pressure.clone());
+        if let Some(contacts) = &self.contacts {
+            checkpoint.set("contacts", contacts.totals().as_flattened().to_vec());
+        }
+        checkpoint
+    }
+
+    /// Restores what [`Checkpoint::of`] stored. The core has the same number of particles.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.particles = checkpoint.particles()?;
+        let components = self.acceleration.components_mut();
+        for (name, column) in VECTORS[6..].iter().zip(components) {
+            *column = checkpoint.of_particles(name)?;
+        }
+        (self.steps, self.time) = (checkpoint.steps, checkpoint.time);
+        Ok(())
     }
 
     /// Memory of the state and of the parts that all methods share, bytes.

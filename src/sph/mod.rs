@@ -39,7 +39,9 @@
 //! - A step allocates nothing once the buffers have grown to the size of the flow.
 
 mod checkpoint;
+mod contacts;
 mod core;
+mod error;
 mod kernel;
 // loops over the few components of a register use an index: a closure of an iterator over them is not
 // compiled for wide registers
@@ -49,8 +51,10 @@ mod methods;
 mod pairs;
 mod params;
 mod particles;
-mod passes;
+mod pass;
+mod plan;
 mod probes;
+mod scales;
 mod seed;
 mod simulation;
 mod stats;
@@ -70,18 +74,20 @@ pub use crate::precision::Precision;
 pub type VectorOfTime = dyn Fn(f64) -> glam::DVec3 + Send + Sync;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
+pub use error::{Cause, ParameterError, Quantity, SetupError, StepError};
 pub use kernel::Kernels;
 pub use methods::{
     Dfsph, FluidDefaults, Gradients, KeyBlock, KeyInfo, KeyReader, Method, MethodInfo, NegativePressure,
     Paper, Support, Wcsph,
 };
 pub use methods::{overview as methods_overview, reference as methods_reference};
-pub use params::{ParameterError, Parameters, Slip};
+pub use params::Parameters;
 pub use particles::{Particles, Vectors};
-pub use passes::Pass;
+pub use pass::Pass;
 pub use probes::{Gauge, Probe};
+pub use scales::{Scales, Slip};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};
-pub use simulation::{Cause, Quantity, SetupError, Simulation, StepError};
+pub use simulation::Simulation;
 pub use stats::Stats;
 pub(crate) use vtp::short_time;
 pub use vtp::{write_pvd, write_vtp};

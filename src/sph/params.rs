@@ -1,24 +1,14 @@
 //! The parameters of a fluid, each with its unit, checked once before a run. The numbers of a method are
 //! declared with the method, see [`Method`].
 
-use std::{error, fmt};
-
 use glam::DVec3;
 
+use super::error::ParameterError;
 use super::kernel::Kernels;
 use super::methods::Method;
+use super::scales::{Scales, Slip};
 use crate::precision::Precision;
 use crate::quantity::Bound;
-
-/// How a wall acts on a fluid that moves along it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Slip {
-    /// The fluid slips along the wall without friction.
-    #[default]
-    Free,
-    /// The fluid at the wall has the wall's velocity: viscosity acts between the two.
-    No,
-}
 
 /// The parameters of a fluid. Defaults are table 1 of the paper where it has a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,25 +74,6 @@ impl Default for Parameters {
     }
 }
 
-/// A parameter outside the values for which the method has a meaning.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ParameterError {
-    /// Name of the parameter: a field of [`Parameters`], or a key of the method.
-    pub name: &'static str,
-    /// The value that was found.
-    pub found: f64,
-    /// What would be accepted, in words.
-    pub expected: String,
-}
-
-impl fmt::Display for ParameterError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} is {}, expected {}", self.name, self.found, self.expected)
-    }
-}
-
-impl error::Error for ParameterError {}
-
 impl Parameters {
     /// Checks all parameters and the numbers of the method.
     ///
@@ -130,7 +101,7 @@ impl Parameters {
             check("gravity", g, g.is_finite(), "finite components")?;
         }
         self.method.check()?;
-        self.method.numerics().validate(self)?;
+        self.method.numerics().validate(&self.scales())?;
         // Kernels divide by h⁹: far from metres that leaves the range of a double.
         let weight = self.particle_mass * Kernels::new(self.support_radius).poly6(0.0);
         check(
@@ -141,9 +112,22 @@ impl Parameters {
         )
     }
 
+    /// What the method derives numbers from.
+    pub(super) fn scales(&self) -> Scales {
+        Scales {
+            rest_density: self.rest_density,
+            particle_mass: self.particle_mass,
+            support_radius: self.support_radius,
+            viscosity: self.viscosity,
+            surface_tension: self.surface_tension,
+            expected_speed: self.expected_speed,
+            slip: self.slip,
+        }
+    }
+
     /// Distance between particles at rest, (m/ρ₀)^⅓, m.
     pub fn spacing(&self) -> f64 {
-        (self.particle_mass / self.rest_density).cbrt()
+        self.scales().spacing()
     }
 
     /// Whether walls and obstacles add to the density of particles. If not, they act on positions and
@@ -155,7 +139,7 @@ impl Parameters {
     /// The density, kg/m³, of a particle that starts under a pressure, Pa; `None` if the method starts all
     /// particles at the rest density.
     pub fn density_at_start(&self, pressure: f64) -> Option<f64> {
-        self.method.numerics().density_at_start(self, pressure)
+        self.method.numerics().density_at_start(&self.scales(), pressure)
     }
 
     /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.
@@ -165,7 +149,7 @@ impl Parameters {
 
     /// Speed of sound, m/s; 0 if the method has no compression.
     pub fn sound_speed(&self) -> f64 {
-        self.method.numerics().sound_speed(self)
+        self.method.numerics().sound_speed(&self.scales())
     }
 
     /// The longest step, s, that is stable while no particle is faster than `max_speed`, m/s: the least of
@@ -175,11 +159,11 @@ impl Parameters {
     /// Pressure forces have no bound before a run, see
     /// [`Simulation::stable_dt`](super::Simulation::stable_dt).
     pub fn stable_dt(&self, max_speed: f64) -> f64 {
-        let numerics = self.method.numerics();
+        let (numerics, scales) = (self.method.numerics(), self.scales());
         numerics
-            .courant_dt(self, max_speed)
-            .min(numerics.viscous_dt(self))
-            .min(numerics.capillary_dt(self))
+            .courant_dt(&scales, max_speed)
+            .min(numerics.viscous_dt(&scales))
+            .min(numerics.capillary_dt(&scales))
             .min(self.force_dt(self.gravity.length()))
     }
 

@@ -5,8 +5,9 @@
 
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
-use crate::sph::params::{ParameterError, Parameters};
-use crate::sph::passes::Pass;
+use crate::sph::error::ParameterError;
+use crate::sph::pass::Pass;
+use crate::sph::scales::Scales;
 
 /// The block of a scene that a key stands in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,7 +104,7 @@ impl Support {
 
 /// The function that says why a pass of a method does not run with given numbers; it returns `None` if the
 /// pass runs.
-pub type Absence<M> = fn(&M, &Parameters) -> Option<&'static str>;
+pub type Absence<M> = fn(&M, &Scales) -> Option<&'static str>;
 
 /// The declaration of a method. The type that implements it holds the method's numbers.
 pub(in crate::sph) trait Declaration: Default + 'static {

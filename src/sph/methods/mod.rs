@@ -10,7 +10,9 @@ mod negative_pressure;
 mod numerics;
 mod paper;
 mod reference;
+mod scheme;
 mod shifting;
+mod start;
 mod tension;
 mod wcsph;
 
@@ -23,10 +25,13 @@ pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read};
 
-pub(super) use numerics::{Numerics, Scheme};
+pub(super) use numerics::Numerics;
+pub(super) use scheme::Scheme;
+pub(super) use start::start;
 
-use super::params::{ParameterError, Parameters};
-use super::passes::Pass;
+use super::error::ParameterError;
+use super::pass::Pass;
+use super::scales::Scales;
 
 /// Makes the type [`Method`] from a list of methods, and forwards its functions to the method that is chosen.
 macro_rules! methods {
@@ -73,10 +78,10 @@ macro_rules! methods {
             }
 
             /// The method's own passes, each with the reason if it does not run.
-            pub(super) fn passes(&self, parameters: &Parameters) -> Vec<(Pass, Option<&'static str>)> {
+            pub(super) fn passes(&self, scales: &Scales) -> Vec<(Pass, Option<&'static str>)> {
                 match self {
                     $(Self::$method(numbers) => {
-                        $method::PASSES.iter().map(|(pass, absence)| (*pass, absence(numbers, parameters))).collect()
+                        $method::PASSES.iter().map(|(pass, absence)| (*pass, absence(numbers, scales))).collect()
                     })*
                 }
             }

@@ -1,12 +1,9 @@
-//! The interface between the solver and a method: its numbers ([`Numerics`]) and its scheme at work
-//! ([`Scheme`]).
+//! What the solver asks of a method's numbers: limits of the step, walls, pressures.
 
 use std::f64::consts::PI;
 
-use crate::sph::checkpoint::{Checkpoint, CheckpointError};
-use crate::sph::core::Core;
-use crate::sph::params::{ParameterError, Parameters};
-use crate::sph::simulation::StepError;
+use crate::sph::error::ParameterError;
+use crate::sph::scales::Scales;
 use crate::sph::walls::{Wall, WallKernel};
 
 /// Part of the support radius that a particle and a sound wave together may cross in one step: the customary
@@ -21,37 +18,33 @@ const FORCE_FACTOR: f64 = 0.25;
 
 /// What the solver needs to know of a method's numbers.
 pub(in crate::sph) trait Numerics {
-    /// Makes the scheme and finds densities and forces of the first instant. If the fluid goes on from a
-    /// checkpoint, those of the checkpoint replace them afterwards.
-    fn start(&self, core: &mut Core, is_new: bool) -> Box<dyn Scheme>;
-
     /// Checks what the bounds of single keys do not cover.
     ///
     /// # Errors
     /// The first parameter that is out of range.
-    fn validate(&self, _parameters: &Parameters) -> Result<(), ParameterError> {
+    fn validate(&self, _scales: &Scales) -> Result<(), ParameterError> {
         Ok(())
     }
 
     /// Speed of sound, m/s; 0 if the method has no compression.
-    fn sound_speed(&self, parameters: &Parameters) -> f64;
+    fn sound_speed(&self, scales: &Scales) -> f64;
 
     /// The longest step, s, in which sound and particles with this greatest speed, m/s, stay within their
     /// part of the support.
-    fn courant_dt(&self, parameters: &Parameters, max_speed: f64) -> f64 {
-        COURANT * parameters.support_radius / (self.sound_speed(parameters) + max_speed)
+    fn courant_dt(&self, scales: &Scales, max_speed: f64) -> f64 {
+        COURANT * scales.support_radius / (self.sound_speed(scales) + max_speed)
     }
 
     /// The longest step, s, that viscosity allows: ⅛·(h/2)²/ν (Morris et al. 1997).
-    fn viscous_dt(&self, parameters: &Parameters) -> f64 {
-        0.125 * (0.5 * parameters.support_radius).powi(2) * parameters.rest_density / parameters.viscosity
+    fn viscous_dt(&self, scales: &Scales) -> f64 {
+        0.125 * (0.5 * scales.support_radius).powi(2) * scales.rest_density / scales.viscosity
     }
 
     /// The longest step, s, that surface tension allows: ¼√(ρ(h/2)³/2πσ), for a ripple as short as the
     /// smoothing length (Brackbill et al. 1992).
-    fn capillary_dt(&self, parameters: &Parameters) -> f64 {
-        let half = 0.5 * parameters.support_radius;
-        let ripple = parameters.rest_density * half.powi(3) / (2.0 * PI * parameters.surface_tension);
+    fn capillary_dt(&self, scales: &Scales) -> f64 {
+        let half = 0.5 * scales.support_radius;
+        let ripple = scales.rest_density * half.powi(3) / (2.0 * PI * scales.surface_tension);
         0.25 * ripple.sqrt()
     }
 
@@ -72,13 +65,13 @@ pub(in crate::sph) trait Numerics {
     }
 
     /// How walls enter the sums of the method.
-    fn wall(&self, parameters: &Parameters) -> Wall {
-        Wall { kernel: WallKernel::WendlandC2, h: parameters.support_radius, layer: None }
+    fn wall(&self, scales: &Scales) -> Wall {
+        Wall { kernel: WallKernel::WendlandC2, h: scales.support_radius, layer: None }
     }
 
     /// The density, kg/m³, of a particle that starts under a pressure, Pa; `None` if all start at the rest
     /// density.
-    fn density_at_start(&self, _parameters: &Parameters, _pressure: f64) -> Option<f64> {
+    fn density_at_start(&self, _scales: &Scales, _pressure: f64) -> Option<f64> {
         None
     }
 
@@ -89,33 +82,5 @@ pub(in crate::sph) trait Numerics {
     }
 
     /// Energy that compression has stored in a kilogram of fluid of this density, J/kg.
-    fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64;
-}
-
-/// A method at work, with what it keeps between steps.
-pub(in crate::sph) trait Scheme: Send + Sync {
-    /// Advances by one step of at most `longest` seconds, and returns how long it was.
-    ///
-    /// # Errors
-    /// [`StepError`] if a value is not finite any more, or steps have become too short.
-    fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError>;
-
-    /// Puts into a checkpoint what the next step needs besides the particles and their accelerations.
-    fn save(&self, _checkpoint: &mut Checkpoint) {}
-
-    /// Restores from a checkpoint what [`Scheme::save`] put there.
-    ///
-    /// # Errors
-    /// The column that the checkpoint lacks.
-    fn restore(&mut self, _checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        Ok(())
-    }
-
-    /// Iterations of the last step's solver; `None` for methods without one.
-    fn iterations(&self) -> Option<u32> {
-        None
-    }
-
-    /// Memory that is kept between steps, bytes.
-    fn bytes(&self) -> usize;
+    fn elastic_energy(&self, scales: &Scales, density: f64) -> f64;
 }

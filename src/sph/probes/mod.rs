@@ -21,8 +21,6 @@ use super::{
     walls::{Wall, WallKernel},
 };
 
-pub(super) use force::Contacts;
-
 /// Regularisation of the variance of places along each direction, in units of h². Along a direction in which
 /// the variance is below it, the fit has no slope. In a full neighbourhood the variance is 0.05 (Wendland) to
 /// 0.1 (poly6), at a wall half of that.
@@ -274,8 +272,8 @@ fn flux(core: &Core, point: DVec3, normal: DVec3) -> f64 {
 
 fn elastic_energy(core: &Core) -> f64 {
     let parameters = &core.parameters;
-    let method = parameters.method.numerics();
-    let energies = core.particles.density.iter().map(|&rho| method.elastic_energy(parameters, rho));
+    let (method, scales) = (parameters.method.numerics(), parameters.scales());
+    let energies = core.particles.density.iter().map(|&rho| method.elastic_energy(&scales, rho));
     parameters.particle_mass * energies.sum::<f64>()
 }
 

@@ -72,7 +72,7 @@ fn state_around(method: Method, particles: Particles, domain: Aabb, obstacles: V
     let mut core = Core::new(water(method), boundary, particles);
     // not the first step: dfsph would move the particles of a start apart
     core.steps = 1;
-    method.numerics().start(&mut core, true);
+    crate::sph::methods::start(&mut core, true);
     core.particles.density.fill(RHO);
     core
 }

@@ -25,7 +25,7 @@ use crate::{
     geom::Aabb,
 };
 
-use crate::sph::{VectorField, params::Slip, particles::Vectors, probes::Contacts};
+use crate::sph::{VectorField, contacts::Contacts, particles::Vectors, scales::Slip};
 
 use super::{
     contact::{Contact, Undefined, first_contact, push_out, push_out_to, reflect, turn_back},

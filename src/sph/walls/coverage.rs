@@ -21,16 +21,13 @@ use glam::{DMat3, DVec3};
 use crate::field::{Face, Faces, Part};
 
 use super::{
-    friction::Friction,
+    friction::{Friction, LEAST_FREE},
     kernel::{OfFace, Wall},
     symmetric::Symmetric,
 };
 
 /// Curvatures, in units of 1/h, are cut off here: the series behind the correction does not hold beyond.
 const MOST_CURVED: f64 = 0.4;
-
-/// Least free part of a kernel by which corrections for walls divide.
-pub(super) const LEAST_FREE: f64 = 0.25;
 
 /// Integrals of a kernel over the walls near a particle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

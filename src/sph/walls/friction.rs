@@ -5,7 +5,10 @@ use glam::DVec3;
 
 use crate::field::Face;
 
-use super::{coverage::LEAST_FREE, symmetric::Symmetric};
+use super::symmetric::Symmetric;
+
+/// Least free part of a kernel by which corrections for walls divide.
+pub(super) const LEAST_FREE: f64 = 0.25;
 
 /// A face nearer than this part of the support radius counts as that far away where the slope of a velocity
 /// is computed.

@@ -4,13 +4,14 @@ mod passes;
 mod scheme;
 mod walls;
 
+pub(super) use scheme::DivergenceFree;
+
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
-use super::numerics::{Numerics, Scheme};
+use super::numerics::Numerics;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
-use crate::sph::core::Core;
-use crate::sph::params::Parameters;
-use crate::sph::passes::Pass;
+use crate::sph::pass::Pass;
+use crate::sph::scales::Scales;
 use crate::sph::walls::{Wall, WallKernel};
 
 /// Part of the spacing that a particle may cross in one step of a method without sound: the customary 0.4.
@@ -98,26 +99,22 @@ impl Declaration for Dfsph {
         (Pass::Density, |_, _| None),
         (Pass::Pressure, |_, _| Some("the method solves for the pressure")),
         (Pass::PressureSolver, |_, _| None),
-        (Pass::Viscosity, |_, parameters| Pass::without_viscosity(parameters)),
+        (Pass::Viscosity, |_, scales| Pass::without_viscosity(scales)),
         (Pass::Shifting, |dfsph, _| (dfsph.shifting == 0.0).then_some("the shifting is zero")),
-        (Pass::NoSlip, |_, parameters| Pass::without_friction(parameters)),
-        (Pass::SurfaceTension, |_, parameters| Pass::without_tension(parameters)),
+        (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
+        (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
     const SAVES: &'static [&'static str] =
         &["specific pressure", "stiffness", "crowding x", "crowding y", "crowding z"];
 }
 
 impl Numerics for Dfsph {
-    fn start(&self, core: &mut Core, is_new: bool) -> Box<dyn Scheme> {
-        Box::new(scheme::DivergenceFree::start(*self, core, is_new))
-    }
-
-    fn sound_speed(&self, _parameters: &Parameters) -> f64 {
+    fn sound_speed(&self, _scales: &Scales) -> f64 {
         0.0
     }
 
-    fn courant_dt(&self, parameters: &Parameters, max_speed: f64) -> f64 {
-        ADVECTION * parameters.spacing() / max_speed
+    fn courant_dt(&self, scales: &Scales, max_speed: f64) -> f64 {
+        ADVECTION * scales.spacing() / max_speed
     }
 
     fn force_factor(&self) -> f64 {
@@ -131,12 +128,12 @@ impl Numerics for Dfsph {
     /// The wall in layers: only with these does a divergence-free fluid have the right distance from a wall
     /// at rest. (Differences of pressure are steady only at a continuous wall; with layers a standing wave of
     /// `wcsph` grows noise at the walls.)
-    fn wall(&self, parameters: &Parameters) -> Wall {
-        let h = parameters.support_radius;
-        Wall { kernel: WallKernel::WendlandC2, h, layer: Some(parameters.spacing() / h) }
+    fn wall(&self, scales: &Scales) -> Wall {
+        let h = scales.support_radius;
+        Wall { kernel: WallKernel::WendlandC2, h, layer: Some(scales.spacing() / h) }
     }
 
-    fn elastic_energy(&self, _parameters: &Parameters, _density: f64) -> f64 {
+    fn elastic_energy(&self, _scales: &Scales, _density: f64) -> f64 {
         0.0
     }
 }

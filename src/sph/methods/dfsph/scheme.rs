@@ -33,7 +33,7 @@ use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
 use super::super::{
-    numerics::Scheme,
+    scheme::Scheme,
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
@@ -43,9 +43,9 @@ use super::{ADVECTION, Dfsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled},
+    error::StepError,
     params::Parameters,
     particles::{Particles, Vectors},
-    simulation::StepError,
 };
 
 /// Factor by which walls and disorder make the system stiffer than the even fluid of [`stiffness`].

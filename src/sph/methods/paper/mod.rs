@@ -5,14 +5,15 @@ mod scheme;
 
 use std::f64::consts::PI;
 
+pub(super) use scheme::PaperScheme;
+
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::negative_pressure::NegativePressure;
-use super::numerics::{Numerics, Scheme};
+use super::numerics::Numerics;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
-use crate::sph::core::Core;
-use crate::sph::params::Parameters;
-use crate::sph::passes::Pass;
+use crate::sph::pass::Pass;
+use crate::sph::scales::Scales;
 use crate::sph::walls::{Wall, WallKernel};
 
 /// Numbers of the paper's method.
@@ -96,35 +97,31 @@ impl Declaration for Paper {
         (Pass::Density, |_, _| None),
         (Pass::Pressure, |paper, _| (paper.stiffness == 0.0).then_some("the stiffness is zero")),
         (Pass::PressureSolver, |_, _| Some(Pass::STATE)),
-        (Pass::Viscosity, |_, parameters| Pass::without_viscosity(parameters)),
+        (Pass::Viscosity, |_, scales| Pass::without_viscosity(scales)),
         (Pass::NoSlip, |_, _| Some(POSITIONS_ONLY)),
-        (Pass::SurfaceTension, |_, parameters| Pass::without_tension(parameters)),
+        (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
     const SAVES: &'static [&'static str] = &[];
 }
 
 impl Numerics for Paper {
-    fn start(&self, core: &mut Core, _is_new: bool) -> Box<dyn Scheme> {
-        Box::new(scheme::PaperScheme::start(*self, core))
-    }
-
     /// The speed of sound √(dp/dρ) = √k.
-    fn sound_speed(&self, _parameters: &Parameters) -> f64 {
+    fn sound_speed(&self, _scales: &Scales) -> f64 {
         self.stiffness.sqrt()
     }
 
     /// One decay time of the relative velocity of two lone, coinciding particles, half of what an explicit
     /// step tolerates. It decays at the rate 2·viscosity·m·∇²W(0)/ρ² with ρ = mW(0), the fastest that the
     /// method can produce, because denser surroundings divide by a larger ρ.
-    fn viscous_dt(&self, parameters: &Parameters) -> f64 {
-        let (h, mass) = (parameters.support_radius, parameters.particle_mass);
+    fn viscous_dt(&self, scales: &Scales) -> f64 {
+        let (h, mass) = (scales.support_radius, scales.particle_mass);
         let lone_density = mass * 315.0 / (64.0 * PI * h.powi(3));
         let laplacian = 45.0 / (PI * h.powi(5));
-        lone_density.powi(2) / (2.0 * parameters.viscosity * mass * laplacian)
+        lone_density.powi(2) / (2.0 * scales.viscosity * mass * laplacian)
     }
 
     /// No limit: the paper's method has none for surface tension.
-    fn capillary_dt(&self, _parameters: &Parameters) -> f64 {
+    fn capillary_dt(&self, _scales: &Scales) -> f64 {
         f64::INFINITY
     }
 
@@ -132,13 +129,13 @@ impl Numerics for Paper {
         false
     }
 
-    fn wall(&self, parameters: &Parameters) -> Wall {
-        Wall { kernel: WallKernel::Poly6, h: parameters.support_radius, layer: None }
+    fn wall(&self, scales: &Scales) -> Wall {
+        Wall { kernel: WallKernel::Poly6, h: scales.support_radius, layer: None }
     }
 
     /// The energy k(ln x + 1/x − 1) with x = ρ/ρ₀.
-    fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64 {
-        let x = density / parameters.rest_density;
+    fn elastic_energy(&self, scales: &Scales, density: f64) -> f64 {
+        let x = density / scales.rest_density;
         if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {
             return 0.0;
         }
@@ -149,6 +146,7 @@ impl Numerics for Paper {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sph::params::Parameters;
 
     #[test]
     fn pressure_below_rest_density_is_zero_unless_kept() {
@@ -165,6 +163,6 @@ mod tests {
         let dt = parameters.stable_dt(fall);
         assert!(parameters.time_step < dt && dt < 0.003, "{dt}");
         // without sound and motion the viscous limit remains: 4.8 ms
-        assert!(Paper::default().viscous_dt(&parameters) < 0.005);
+        assert!(Paper::default().viscous_dt(&parameters.scales()) < 0.005);
     }
 }

@@ -16,15 +16,15 @@
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
-use super::super::numerics::Scheme;
+use super::super::scheme::Scheme;
 use super::Paper;
 use crate::sph::{
     core::{Core, add_scaled, set_sum},
+    error::StepError,
     kernel::Kernels,
     pairs::{PairPass, Real},
     params::Parameters,
     particles::Vectors,
-    simulation::StepError,
 };
 
 /// The scheme. It keeps only working memory between steps.

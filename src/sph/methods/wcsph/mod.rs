@@ -2,14 +2,16 @@
 
 mod scheme;
 
+pub(super) use scheme::Weakly;
+
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::negative_pressure::NegativePressure;
-use super::numerics::{Numerics, Scheme};
+use super::numerics::Numerics;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
-use crate::sph::core::Core;
-use crate::sph::params::{ParameterError, Parameters};
-use crate::sph::passes::Pass;
+use crate::sph::error::ParameterError;
+use crate::sph::pass::Pass;
+use crate::sph::scales::Scales;
 
 /// The exponent of Tait's equation for water.
 const EXPONENT: i32 = 7;
@@ -176,38 +178,34 @@ impl Declaration for Wcsph {
         }),
         (Pass::Pressure, |_, _| None),
         (Pass::PressureSolver, |_, _| Some(Pass::STATE)),
-        (Pass::Viscosity, |_, parameters| Pass::without_viscosity(parameters)),
+        (Pass::Viscosity, |_, scales| Pass::without_viscosity(scales)),
         (Pass::ArtificialViscosity, |wcsph, _| {
             (wcsph.artificial_viscosity == 0.0).then_some("the artificial viscosity is zero")
         }),
         (Pass::Shifting, |wcsph, _| (wcsph.shifting() == 0.0).then_some("the shifting is zero")),
-        (Pass::NoSlip, |_, parameters| Pass::without_friction(parameters)),
-        (Pass::SurfaceTension, |_, parameters| Pass::without_tension(parameters)),
+        (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
+        (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
     const SAVES: &'static [&'static str] = &["density rate", "crowding x", "crowding y", "crowding z"];
 }
 
 impl Numerics for Wcsph {
-    fn start(&self, core: &mut Core, _is_new: bool) -> Box<dyn Scheme> {
-        Box::new(scheme::Weakly::start(self, core))
-    }
-
-    fn validate(&self, parameters: &Parameters) -> Result<(), ParameterError> {
-        let found = self.sound_speed(parameters);
+    fn validate(&self, scales: &Scales) -> Result<(), ParameterError> {
+        let found = self.sound_speed(scales);
         if Bound::Positive.admits(found) {
             return Ok(());
         }
         Err(ParameterError { name: "sound_speed", found, expected: Bound::Positive.to_string() })
     }
 
-    fn sound_speed(&self, parameters: &Parameters) -> f64 {
-        self.sound_speed.unwrap_or(SOUND_OVER_SPEED * parameters.expected_speed)
+    fn sound_speed(&self, scales: &Scales) -> f64 {
+        self.sound_speed.unwrap_or(SOUND_OVER_SPEED * scales.expected_speed)
     }
 
     /// The density ρ₀(1 + 7p/(c²ρ₀))^(1/7), the inverse of Tait's equation.
-    fn density_at_start(&self, parameters: &Parameters, pressure: f64) -> Option<f64> {
-        let stiffness = self.sound_speed(parameters).powi(2) * parameters.rest_density / 7.0;
-        self.hydrostatic_start.then(|| parameters.rest_density * (1.0 + pressure / stiffness).powf(1.0 / 7.0))
+    fn density_at_start(&self, scales: &Scales, pressure: f64) -> Option<f64> {
+        let stiffness = self.sound_speed(scales).powi(2) * scales.rest_density / 7.0;
+        self.hydrostatic_start.then(|| scales.rest_density * (1.0 + pressure / stiffness).powf(1.0 / 7.0))
     }
 
     fn makes_room_at_start(&self) -> bool {
@@ -215,11 +213,11 @@ impl Numerics for Wcsph {
     }
 
     /// The energy c²/7·((x⁶ − 1)/6 + 1/x − 1) with x = ρ/ρ₀.
-    fn elastic_energy(&self, parameters: &Parameters, density: f64) -> f64 {
-        let x = density / parameters.rest_density;
+    fn elastic_energy(&self, scales: &Scales, density: f64) -> f64 {
+        let x = density / scales.rest_density;
         if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {
             return 0.0;
         }
-        self.sound_speed(parameters).powi(2) / 7.0 * ((x.powi(6) - 1.0) / 6.0 + 1.0 / x - 1.0)
+        self.sound_speed(scales).powi(2) / 7.0 * ((x.powi(6) - 1.0) / 6.0 + 1.0 / x - 1.0)
     }
 }

@@ -32,7 +32,7 @@ use rayon::prelude::*;
 
 use super::super::{
     negative_pressure::NegativePressure,
-    numerics::Scheme,
+    scheme::Scheme,
     shifting::{depth, restore_crowding, return_rate, save_crowding, shift},
     tension::Tension,
 };
@@ -40,11 +40,11 @@ use super::{EXPONENT, Gradients, Wcsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{CHUNK, Core, add_scaled, add_scaled_column, set_sum, set_sum_column},
+    error::StepError,
     kernel::Wendland,
     pairs::{PairPass, Real},
     params::Parameters,
     particles::Vectors,
-    simulation::StepError,
     walls::{Friction, WallDrag},
 };
 

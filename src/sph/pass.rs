@@ -1,12 +1,8 @@
-//! The passes of a step: which ones a simulation runs, and why it leaves out the others.
+//! The passes of a step, and why some do not run.
 
-use std::borrow::Cow;
 use std::fmt;
 
-use glam::DVec3;
-
-use super::methods::Method;
-use super::params::{Parameters, Slip};
+use super::scales::{Scales, Slip};
 
 /// A stage of a step. The variants stand in the order in which a step runs them. Passes that a scene does not
 /// need do not run.
@@ -48,56 +44,21 @@ impl Pass {
     /// Why methods with an equation of state have no solver for the pressure.
     pub(super) const STATE: &'static str = "the method has an equation of state";
 
-    /// All passes in the order of a step, each with the reason if it does not run.
-    pub(super) fn plan(parameters: &Parameters, obstacles: usize) -> Vec<(Self, Option<Cow<'static, str>>)> {
-        let unless = |needed: bool, reason: &'static str| (!needed).then_some(reason);
-        let of_all_methods = [
-            (Self::Integrate, None),
-            (Self::Walls, None),
-            (Self::Obstacles, unless(obstacles > 0, "the scene has no obstacle")),
-            (Self::Neighbours, None),
-            (Self::Gravity, unless(parameters.gravity != DVec3::ZERO, "gravity is zero")),
-        ];
-        let own = parameters.method.passes(parameters);
-        let mut plan: Vec<(Self, Option<Cow<'static, str>>)> = of_all_methods
-            .into_iter()
-            .chain(own)
-            .map(|(pass, reason)| (pass, reason.map(Cow::Borrowed)))
-            .collect();
-        for method in Method::all() {
-            for pass in method.info().passes {
-                if !plan.iter().any(|(known, _)| *known == pass) {
-                    plan.push((pass, Some(Cow::Owned(pass.belongs()))));
-                }
-            }
-        }
-        plan.sort_by_key(|(pass, _)| *pass);
-        plan
-    }
-
-    /// Why a method that does not declare the pass does not run it: names the methods that have it.
-    fn belongs(self) -> String {
-        let has_pass = |method: &Method| method.info().passes.contains(&self);
-        let names: Vec<&str> = Method::all().iter().filter(|m| has_pass(m)).map(Method::name).collect();
-        let methods = if names.len() == 1 { "method" } else { "methods" };
-        format!("it belongs to the {methods} {}", names.join(" and "))
-    }
-
     /// Why the pass of the viscosity does not run.
-    pub(super) fn without_viscosity(parameters: &Parameters) -> Option<&'static str> {
-        (parameters.viscosity == 0.0).then_some("the viscosity is zero")
+    pub(super) fn without_viscosity(scales: &Scales) -> Option<&'static str> {
+        (scales.viscosity == 0.0).then_some("the viscosity is zero")
     }
 
     /// Why the pass of the surface tension does not run.
-    pub(super) fn without_tension(parameters: &Parameters) -> Option<&'static str> {
-        (parameters.surface_tension == 0.0).then_some("the surface tension is zero")
+    pub(super) fn without_tension(scales: &Scales) -> Option<&'static str> {
+        (scales.surface_tension == 0.0).then_some("the surface tension is zero")
     }
 
     /// Why the pass that makes the fluid stick to walls does not run.
-    pub(super) fn without_friction(parameters: &Parameters) -> Option<&'static str> {
-        match parameters.slip {
+    pub(super) fn without_friction(scales: &Scales) -> Option<&'static str> {
+        match scales.slip {
             Slip::Free => Some("the fluid slips along walls"),
-            Slip::No => Self::without_viscosity(parameters),
+            Slip::No => Self::without_viscosity(scales),
         }
     }
 

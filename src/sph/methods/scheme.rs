@@ -1,0 +1,33 @@
+//! A method at work.
+
+use crate::sph::checkpoint::{Checkpoint, CheckpointError};
+use crate::sph::core::Core;
+use crate::sph::error::StepError;
+
+/// A method at work, with what it keeps between steps.
+pub(in crate::sph) trait Scheme: Send + Sync {
+    /// Advances by one step of at most `longest` seconds, and returns how long it was.
+    ///
+    /// # Errors
+    /// [`StepError`] if a value is not finite any more, or steps have become too short.
+    fn step(&mut self, core: &mut Core, longest: f64) -> Result<f64, StepError>;
+
+    /// Puts into a checkpoint what the next step needs besides the particles and their accelerations.
+    fn save(&self, _checkpoint: &mut Checkpoint) {}
+
+    /// Restores from a checkpoint what [`Scheme::save`] put there.
+    ///
+    /// # Errors
+    /// The column that the checkpoint lacks.
+    fn restore(&mut self, _checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        Ok(())
+    }
+
+    /// Iterations of the last step's solver; `None` for methods without one.
+    fn iterations(&self) -> Option<u32> {
+        None
+    }
+
+    /// Memory that is kept between steps, bytes.
+    fn bytes(&self) -> usize;
+}
