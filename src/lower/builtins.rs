@@ -69,7 +69,11 @@ fn all() -> impl Iterator<Item = Builtin> {
     let operation = |op: Unary| Builtin { name: op.name(), arity: (1, 1), meaning: Meaning::Unary(op) };
     let functions = UnaryFunction::ALL.iter().map(move |&function| operation(function.into()));
     let instructions = [Unary::Sqrt, Unary::Abs].into_iter().map(operation);
-    instructions.chain(functions).chain([operation(Unary::Sign)]).chain(COMPOSED).chain([POSITIVE])
+    instructions
+        .chain(functions)
+        .chain([operation(Unary::Sign)])
+        .chain(COMPOSED.iter().copied())
+        .chain([POSITIVE])
 }
 
 pub(super) fn exists(name: &str) -> bool {
