@@ -23,6 +23,7 @@ pub mod fluid_surface;
 pub mod geom;
 pub mod interval;
 pub mod ir;
+mod lettering;
 pub mod lower;
 pub mod mesh;
 pub mod render;

@@ -2,26 +2,15 @@
 //!
 //! Invariant: no font of the system is looked at, so the picture does not depend on the machine.
 
-use std::{
-    io,
-    sync::{Arc, LazyLock},
-};
+use std::io;
 
 use resvg::{
     tiny_skia::{Pixmap, Transform},
-    usvg::{Options, Tree, fontdb},
+    usvg::Tree,
 };
 
 use super::SliceError;
-
-/// The family that [`super::svg`] asks for first and that the rasteriser has.
-pub(super) const FONT_FAMILY: &str = "Ubuntu";
-
-static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
-    let mut fonts = fontdb::Database::new();
-    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
-    Arc::new(fonts)
-});
+use crate::lettering;
 
 /// Writes any SVG drawing with an opaque ground as an RGB PNG with `scale` pixels per unit of the drawing.
 ///
@@ -48,7 +37,5 @@ pub fn rasterise(svg: &str, scale: f32, out: impl io::Write) -> Result<(), Slice
 }
 
 pub(super) fn parse(svg: &str) -> Result<Tree, SliceError> {
-    let options =
-        Options { font_family: FONT_FAMILY.to_owned(), fontdb: Arc::clone(&FONTS), ..Options::default() };
-    Tree::from_str(svg, &options).map_err(|error| SliceError::Drawing(error.to_string()))
+    lettering::tree(svg).map_err(SliceError::Drawing)
 }
