@@ -42,6 +42,8 @@ pub mod slice;
 pub mod solid;
 pub mod sph;
 
+mod lettering;
+
 #[doc(hidden)]
 pub mod cli;
 #[doc(hidden)]

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::Module;
+use super::module::Module;
 use super::names::Names;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};

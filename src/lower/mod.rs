@@ -10,6 +10,7 @@ mod arguments;
 mod builtins;
 mod eval;
 mod lowering;
+mod module;
 mod names;
 mod probes;
 mod scene;
@@ -19,67 +20,17 @@ mod value;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
+pub use module::{Module, NamedSolid, ParamValue, Tolerance};
 pub use probes::{Measured, Probe};
 pub use scene::{Bounce, Container, Fluid, Gravity, Obstacle, Run, Scene, Skin, Solver, Truth};
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
-use crate::ir::{Graph, Node};
 use crate::sph::Method;
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Attribute, Definition, Function, Item, Name, Param};
 use lowering::Lowering;
 use names::{Kind, RESERVED};
 use value::Value;
-
-/// What a file defines, after lowering.
-#[derive(Debug, Clone, Default)]
-pub struct Module {
-    /// The expressions of all items.
-    pub graph: Graph,
-    /// The params, in the order of the file.
-    pub params: Vec<ParamValue>,
-    /// The solids, in the order of the file.
-    pub solids: Vec<NamedSolid>,
-    /// The scenes, in the order of the file.
-    pub scenes: Vec<Scene>,
-}
-
-/// A `param` with the value that it has in this lowering.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ParamValue {
-    /// Name of the param.
-    pub name: String,
-    /// Value, from the file or from an override.
-    pub value: f64,
-    /// Least and greatest value, if the file states them.
-    pub range: Option<(f64, f64)>,
-    /// The text that the file has behind the param, if any.
-    pub doc: Option<String>,
-    /// Place of the name in its definition.
-    pub span: Span,
-}
-
-/// A `solid` of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NamedSolid {
-    /// Name of the solid.
-    pub name: String,
-    /// Its ω in the graph of the [`Module`].
-    pub node: Node,
-    /// The largest error of ω that is accepted, as `@tolerance(…)` states it.
-    pub tolerance: Option<Tolerance>,
-    /// Place of the name in its definition.
-    pub span: Span,
-}
-
-/// The largest |computed ω − exact ω| that is accepted; positive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tolerance {
-    /// The largest error.
-    pub value: f64,
-    /// Place where it is stated.
-    pub span: Span,
-}
 
 /// Limits and overrides of a lowering.
 #[derive(Debug, Clone)]

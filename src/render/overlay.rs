@@ -1,15 +1,9 @@
 //! Words and numbers over the picture: the title, the colour bar and the caption, in the one font that is
 //! built in.
 
-use std::{
-    fmt::Write,
-    sync::{Arc, LazyLock},
-};
+use std::fmt::Write;
 
-use resvg::{
-    tiny_skia::{Pixmap, Transform},
-    usvg::{Options, Tree, fontdb},
-};
+use resvg::tiny_skia::{Pixmap, Transform};
 
 use super::{RenderError, colour::STOPS, image::Layer};
 
@@ -32,22 +26,17 @@ pub struct Caption {
     pub step: u64,
 }
 
-const INK: &str = "#1c1c1c";
+use crate::lettering;
 
-static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
-    let mut fonts = fontdb::Database::new();
-    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
-    Arc::new(fonts)
-});
+const INK: &str = "#1c1c1c";
 
 /// Draws an SVG body on a page of `size` units, at `scale` pixels per unit.
 fn draw(size: (f64, f64), scale: f64, body: &str) -> Result<Layer, RenderError> {
     let svg = format!(
-        r#"<svg xmlns="http://www.w3.org/2000/svg" width="{}" height="{}" font-family="Ubuntu" font-weight="300" fill="{INK}">{body}</svg>"#,
+        r#"<svg xmlns="http://www.w3.org/2000/svg" width="{}" height="{}" fill="{INK}">{body}</svg>"#,
         size.0, size.1
     );
-    let options = Options { fontdb: Arc::clone(&FONTS), ..Options::default() };
-    let tree = Tree::from_str(&svg, &options).map_err(|error| RenderError::Legend(error.to_string()))?;
+    let tree = lettering::tree(&svg).map_err(RenderError::Legend)?;
     let pixels = |units: f64| (units * scale).ceil().clamp(1.0, 8192.0) as u32;
     let (width, height) = (pixels(size.0), pixels(size.1));
     let mut pixmap = Pixmap::new(width, height)

@@ -23,6 +23,8 @@ pub mod terminal;
 
 use std::io;
 
+pub use self::png::rasterise;
+pub(crate) use self::svg::escaped;
 use self::{
     colour::{Rgb, Scale, UNDEFINED},
     isolines::Outline,
@@ -34,7 +36,6 @@ pub use self::{
     plane::{Axis, Plane, Window},
     sample::{Samples, sample},
 };
-pub(crate) use self::{png::rasterise, svg::escaped};
 use crate::field::Field;
 
 /// The number of samples along the longer side that makes a plot smooth at the printed size.

@@ -2,26 +2,16 @@
 //!
 //! Invariant: fonts of the system are not used, so the picture does not depend on the machine.
 
-use std::{
-    io,
-    sync::{Arc, LazyLock},
-};
+use std::io;
 
 use resvg::{
     tiny_skia::{Pixmap, Transform},
-    usvg::{Options, Tree, fontdb},
+    usvg::Tree,
 };
 
 use super::SliceError;
 
-/// The font family that [`super::svg`] names first, which the rasteriser has.
-pub(super) const FONT_FAMILY: &str = "Ubuntu";
-
-static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
-    let mut fonts = fontdb::Database::new();
-    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
-    Arc::new(fonts)
-});
+use crate::lettering;
 
 /// Writes an SVG drawing with an opaque ground as an RGB PNG, with `scale` pixels per unit of the drawing.
 ///
@@ -49,7 +39,5 @@ pub fn rasterise(svg: &str, scale: f32, out: impl io::Write) -> Result<(), Slice
 }
 
 pub(super) fn parse(svg: &str) -> Result<Tree, SliceError> {
-    let options =
-        Options { font_family: FONT_FAMILY.to_owned(), fontdb: Arc::clone(&FONTS), ..Options::default() };
-    Tree::from_str(svg, &options).map_err(|error| SliceError::Drawing(error.to_string()))
+    lettering::tree(svg).map_err(SliceError::Drawing)
 }

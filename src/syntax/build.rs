@@ -11,7 +11,7 @@ use super::ast::{
     AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic,
     MulOp, Name, Param, Parameter, Scene,
 };
-use super::parse::{DEEPEST_TREE, EDITION, Rule};
+use super::grammar::{DEEPEST_TREE, EDITION, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
 
 type Node<'i> = Pair<'i, Rule>;

@@ -5,9 +5,11 @@
 
 pub mod ast;
 mod build;
+mod grammar;
 mod parse;
 mod print;
 
 pub use ast::Ast;
-pub use parse::{EDITION, parse};
+pub use grammar::EDITION;
+pub use parse::parse;
 pub use print::print;

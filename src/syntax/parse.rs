@@ -2,25 +2,15 @@
 
 use pest::Parser;
 use pest::error::{Error, ErrorVariant, InputLocation};
-use pest_derive::Parser;
 
 use super::ast::Ast;
 use super::build;
+use super::grammar::{Grammar, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, Span, nearest};
-
-#[derive(Parser)]
-#[grammar = "grammar/rfm.pest"]
-pub(super) struct Grammar;
-
-/// The newest edition of the language that this program reads.
-pub const EDITION: u32 = 1;
 
 /// Brackets nested deeper than this are refused. The limit is beyond what a person writes and well inside the
 /// stack.
 const DEEPEST_NESTING: usize = 200;
-
-/// The most levels of an expression's tree: what the recursive stages can take on any stack.
-pub(super) const DEEPEST_TREE: usize = 500;
 
 /// Stack of the parsing thread, in bytes: the same limit on every platform, and enough for
 /// [`DEEPEST_NESTING`] in debug builds.

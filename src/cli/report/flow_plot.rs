@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::super::Failure;
 use super::super::plot::{self, LogAxis};
-use super::flows::Row;
+use super::flow_run::FlowRun;
 use crate::experiment::Deviation;
 
 /// Each method with its colour.
@@ -16,11 +16,11 @@ const METHODS: [(&str, &str); 3] = [("wcsph", "#1b6ca8"), ("dfsph", "#c05621"), 
 const DASHES: [&str; 3] = ["none", "7 4", "2 4"];
 
 /// Draws the plot as SVG or PNG. Runs that failed, or took no measurable time, are left out.
-pub(super) fn draw(scene: &str, rows: &[Row], path: &Path) -> Result<Vec<u8>, Failure> {
+pub(super) fn draw(scene: &str, rows: &[FlowRun], path: &Path) -> Result<Vec<u8>, Failure> {
     let is_shown = |x: f64| x > 0.0 && x.is_finite();
     let known: Vec<usize> =
         (0..3).filter(|&k| rows.iter().any(|row| row.errors()[k].is_some_and(is_shown))).collect();
-    let marks: Vec<(&Row, usize, f64)> = rows
+    let marks: Vec<(&FlowRun, usize, f64)> = rows
         .iter()
         .filter(|row| is_shown(row.cpu_seconds))
         .flat_map(|row| known.iter().filter_map(move |&k| Some((row, k, row.errors()[k]?))))

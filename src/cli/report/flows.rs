@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::super::args::{Flow, Shared};
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
+use super::flow_run::FlowRun;
 use crate::experiment::{Deviation, Deviations};
 use crate::lower::{Scene, Truth};
 use crate::sph::{Method, Simulation};
@@ -30,59 +31,6 @@ const PARTS: [f64; 3] = [1.0 / 16.0, 1.0 / 4.0, 1.0];
 /// million steps lie before it.
 const STANDSTILL: (u64, f64) = (200, 1e-6);
 
-/// One run of a scene, as a row of the report.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct Row {
-    pub method: &'static str,
-    /// Precision of the sums over neighbours.
-    precision: &'static str,
-    pub particles: usize,
-    /// Particle spacing, m.
-    spacing: f64,
-    steps: u64,
-    /// Simulated time, s.
-    simulated_seconds: f64,
-    pressure_error: Option<f64>,
-    velocity_error: Option<f64>,
-    front_error: Option<f64>,
-    /// Order p of error ∝ spacingᵖ between this run and the coarser one before it.
-    pressure_order: Option<f64>,
-    velocity_order: Option<f64>,
-    front_order: Option<f64>,
-    /// Processor time of all threads, for the steps alone, s.
-    pub cpu_seconds: f64,
-    cpu_seconds_per_simulated_second: f64,
-    /// Time by the clock, for the steps alone, s.
-    seconds: f64,
-    /// Why the run ended before its end.
-    failure: Option<String>,
-}
-
-impl Row {
-    /// The errors in the order of [`Deviation::NAMES`]; `None` if the run failed.
-    pub fn errors(&self) -> [Option<f64>; 3] {
-        [self.pressure_error, self.velocity_error, self.front_error]
-    }
-
-    fn orders(&self) -> [Option<f64>; 3] {
-        [self.pressure_order, self.velocity_order, self.front_order]
-    }
-
-    /// Sets the orders of convergence from the coarser run before this one.
-    fn compare(&mut self, coarser: &Self) {
-        let halvings = (coarser.spacing / self.spacing).ln();
-        if coarser.method != self.method || halvings <= 0.0 {
-            return;
-        }
-        let order = |coarse: Option<f64>, fine: Option<f64>| {
-            Some((coarse? / fine?).ln() / halvings).filter(|order| order.is_finite())
-        };
-        self.pressure_order = order(coarser.pressure_error, self.pressure_error);
-        self.velocity_order = order(coarser.velocity_error, self.velocity_error);
-        self.front_order = order(coarser.front_error, self.front_error);
-    }
-}
-
 #[derive(Serialize)]
 struct Document<'a> {
     schema: u32,
@@ -90,7 +38,7 @@ struct Document<'a> {
     threads: usize,
     /// Number of saved instants that were compared in a run that did not fail.
     instants: usize,
-    rows: &'a [Row],
+    rows: &'a [FlowRun],
 }
 
 pub(super) fn run(
@@ -141,7 +89,7 @@ pub(super) fn run(
 }
 
 /// The failures of runs, one in each line; `None` if there are none.
-fn failures(rows: &[Row]) -> Option<String> {
+fn failures(rows: &[FlowRun]) -> Option<String> {
     let failed = rows.iter().filter_map(|row| {
         Some(format!("{}, {} particles: {}", row.method, row.particles, row.failure.as_ref()?))
     });
@@ -189,8 +137,8 @@ impl Study<'_> {
         methods: &[Option<Method>],
         sizes: &[Option<usize>],
         table: &Table,
-    ) -> Result<Vec<Row>, Failure> {
-        let mut rows: Vec<Row> = Vec::new();
+    ) -> Result<Vec<FlowRun>, Failure> {
+        let mut rows: Vec<FlowRun> = Vec::new();
         for method in methods {
             let by_method = match method {
                 Some(method) => program.with_method(*method).map_err(refused)?,
@@ -216,7 +164,7 @@ impl Study<'_> {
 
     /// Runs the scene to its end, and compares it with the known solution at every instant at which it would
     /// be saved.
-    fn measure(&mut self, program: &Program, size: Option<usize>) -> Result<Row, Failure> {
+    fn measure(&mut self, program: &Program, size: Option<usize>) -> Result<FlowRun, Failure> {
         let scene = choose::scene(program, Some(self.scene))?;
         let experiment = Experiment::new(program, &scene.name, self.shared.engine.into()).map_err(refused)?;
         let start = experiment.start().map_err(refused)?;
@@ -263,38 +211,7 @@ impl Study<'_> {
         self.bar.set_position(before + work(size) as u64);
         self.instants = self.instants.max(deviations.instants());
         let deviation = if failure.is_none() { deviations.total() } else { Deviation::default() };
-        Ok(Row::of(&simulation, deviation, [cpu_seconds, seconds], failure))
-    }
-}
-
-impl Row {
-    /// The row of a run that has ended, with the seconds that it took on processors and by the clock. The
-    /// orders of convergence are not known yet.
-    fn of(
-        simulation: &Simulation,
-        deviation: Deviation,
-        [cpu_seconds, seconds]: [f64; 2],
-        failure: Option<String>,
-    ) -> Self {
-        let parameters = simulation.parameters();
-        Self {
-            method: parameters.method.name(),
-            precision: parameters.precision.name(),
-            particles: simulation.particles().len(),
-            spacing: parameters.spacing(),
-            steps: simulation.steps(),
-            simulated_seconds: simulation.time(),
-            pressure_error: deviation.pressure,
-            velocity_error: deviation.velocity,
-            front_error: deviation.front,
-            pressure_order: None,
-            velocity_order: None,
-            front_order: None,
-            cpu_seconds,
-            cpu_seconds_per_simulated_second: cpu_seconds / simulation.time(),
-            seconds,
-            failure,
-        }
+        Ok(FlowRun::of(&simulation, deviation, [cpu_seconds, seconds], failure))
     }
 }
 
@@ -361,7 +278,7 @@ impl Table {
         );
     }
 
-    fn row(&self, row: &Row) {
+    fn row(&self, row: &FlowRun) {
         let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));
         let error = |error: Option<f64>| error.map_or("failed".to_string(), |error| format!("{error:.2e}"));
         let (errors, orders) = (row.errors(), row.orders());

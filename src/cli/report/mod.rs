@@ -6,6 +6,7 @@
 //! is run at several resolutions instead ([`flows`]).
 
 mod flow_plot;
+mod flow_run;
 mod flows;
 mod meshes;
 mod plot;

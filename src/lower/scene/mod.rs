@@ -13,7 +13,7 @@ use glam::DVec3;
 
 pub(super) use keys::Block;
 
-use super::Tolerance;
+use super::module::Tolerance;
 use super::probes::Probe;
 use crate::diagnostic::Span;
 use crate::geom::Aabb;

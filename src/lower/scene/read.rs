@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::super::Tolerance;
 use super::super::lowering::Lowering;
+use super::super::module::Tolerance;
 use super::super::probes::Surroundings;
 use super::fluid::FluidAndMethod;
 use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Truth};

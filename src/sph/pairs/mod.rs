@@ -21,7 +21,6 @@ mod columns;
 mod near;
 
 use std::cell::RefCell;
-use std::ops::Range;
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdFloatElement};
 use rayon::prelude::*;
@@ -29,7 +28,8 @@ use smallvec::SmallVec;
 
 use super::particles::Vectors;
 
-pub(super) use columns::{Block, Columns};
+pub(super) use columns::Columns;
+use columns::{BLOCK, Block};
 pub(super) use near::Near;
 use near::{OfBlock, Reach};
 
@@ -105,6 +105,9 @@ pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>:
 /// So many blocks are one task: small enough to balance, large enough to forget.
 const TASK: usize = 4;
 
+/// Numbers in the widest register.
+const MOST_LANES: usize = 16;
+
 /// Where the particles are, and how they are sorted.
 #[derive(Clone, Copy)]
 pub(super) struct Cloud<'a> {
@@ -126,8 +129,45 @@ pub(super) struct Surroundings<T> {
     ranges: SmallVec<[(usize, usize); 9]>,
     /// How many copies there are; the vectors may be longer.
     count: usize,
-    /// The copies that are near a register's particles.
-    near: Vec<u32>,
+    /// The copy of the block's first particle.
+    own: usize,
+    /// The copies that are near each register.
+    near: OfBlock,
+    /// [`BLOCK`] places for each sum, one for each particle.
+    sums: Vec<f64>,
+}
+
+/// Consecutive blocks for one thread, and where their results go.
+struct Task<'a> {
+    /// Number of the first block among all.
+    number: usize,
+    blocks: &'a [Block],
+    /// The first particle.
+    first: usize,
+    /// Results of these particles, one slice for each number that a pass makes.
+    out: SmallVec<[&'a mut [f64]; 8]>,
+}
+
+impl<'a> Task<'a> {
+    /// Halves the blocks among the threads. This is compiled once for all passes: hence the function behind a pointer.
+    fn run(self, one: &(dyn Fn(Task<'_>) + Sync)) {
+        if self.blocks.len() <= TASK {
+            return one(self);
+        }
+        let (left, right) = self.halves();
+        rayon::join(|| left.run(one), || right.run(one));
+    }
+
+    fn halves(self) -> (Self, Self) {
+        let Task { number, blocks, first, out } = self;
+        let (left, right) = blocks.split_at(blocks.len() / 2);
+        let middle = right[0].first as usize;
+        let (low, high) = out.into_iter().map(|out| out.split_at_mut(middle - first)).unzip();
+        (
+            Task { number, blocks: left, first, out: low },
+            Task { number: number + left.len(), blocks: right, first: middle, out: high },
+        )
+    }
 }
 
 impl Cloud<'_> {
@@ -141,7 +181,22 @@ impl Cloud<'_> {
         T: Real,
         P: PairPass<IN, SUMS, OUT>,
     {
-        self.sum_blocks::<T, P, IN, SUMS, OUT>(pass, fields, 0, self.columns.blocks(), 0, out);
+        let all = Task { number: 0, blocks: self.columns.blocks(), first: 0, out: out.into_iter().collect() };
+        all.run(&|mut task: Task<'_>| {
+            T::with_surroundings(|around| {
+                for (k, block) in task.blocks.iter().enumerate() {
+                    let found = self.near.map(|near| &near.of_blocks[task.number + k]);
+                    self.gather(&fields, block, around);
+                    let mut near = std::mem::take(&mut around.near);
+                    if found.is_none() {
+                        self.collect_near(block, around, &mut near);
+                    }
+                    add_up::<T, P, IN, SUMS, OUT>(self.level, pass, block, found.unwrap_or(&near), around);
+                    around.near = near;
+                    finish::<P, IN, SUMS, OUT>(pass, block, &around.sums, task.first, &mut task.out);
+                }
+            });
+        });
     }
 
     /// Finds what is near each particle, for passes to come: worth it from three of them on.
@@ -150,226 +205,188 @@ impl Cloud<'_> {
         near.of_blocks.resize_with(blocks.len(), OfBlock::default);
         blocks.par_iter().zip(&mut near.of_blocks).with_min_len(TASK).for_each(|(block, of_block)| {
             T::with_surroundings(|around| {
-                at_level!(self.level, simd => self.find_near_block::<T, _>(simd, block, around, of_block));
+                self.gather(&[], block, around);
+                self.collect_near(block, around, of_block);
             });
         });
     }
 
-    #[inline(always)]
-    fn find_near_block<T: Real, S: Simd>(
-        &self,
-        simd: S,
-        block: &Block,
-        around: &mut Surroundings<T>,
-        of_block: &mut OfBlock,
-    ) {
-        let lanes = T::Native::<S>::LEN;
-        let particles = block.particles();
-        let own_copy = self.gather([], block, lanes, around);
-        let OfBlock { copies, ends } = of_block;
-        copies.clear();
-        ends.clear();
-        let mut first = particles.start;
-        while first < particles.end {
-            let last = (first + lanes).min(particles.end);
-            let here = places_of(simd, around, own_copy + first - particles.start);
-            self.collect_near(simd, block, first..last, &here, around, copies);
-            ends.push(copies.len() as u32);
-            first = last;
-        }
-    }
-
-    /// Appends the copies that are near the particles of a register, which are `here`.
-    #[inline(always)]
-    fn collect_near<T: Real, S: Simd>(
-        &self,
-        simd: S,
-        block: &Block,
-        particles: Range<usize>,
-        here: &[T::Native<S>; 3],
-        around: &Surroundings<T>,
-        copies: &mut Vec<u32>,
-    ) {
-        let reach = Reach::around(simd, here, particles.len(), self.radius);
-        let ranges = self.columns.ranges_around(block, extent(&self.position.z[particles]), self.radius);
-        let [x, y, z, ..] = &around.values[..] else { unreachable!("places come first") };
-        for (&(start, end), &(source, copy)) in ranges.iter().zip(&around.ranges) {
-            let (start, end) = (start as usize - source + copy, end as usize - source + copy);
-            reach.collect([x, y, z], (start, end), copies);
-        }
-    }
-
-    /// Halves the blocks among the threads. `blocks` begin with block `number`, `out` with particle `first`.
-    fn sum_blocks<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
-        &self,
-        pass: &P,
-        fields: [&[f64]; IN],
-        number: usize,
-        blocks: &[Block],
-        first: usize,
-        mut out: [&mut [f64]; OUT],
-    ) where
-        T: Real,
-        P: PairPass<IN, SUMS, OUT>,
-    {
-        if blocks.len() > TASK {
-            let (left, right) = blocks.split_at(blocks.len() / 2);
-            let middle = right[0].first as usize;
-            let mut rest = out.iter_mut();
-            let halves: [(&mut [f64], &mut [f64]); OUT] = std::array::from_fn(|_| {
-                std::mem::take(rest.next().expect("as many as there are")).split_at_mut(middle - first)
-            });
-            let mut low: [&mut [f64]; OUT] = std::array::from_fn(|_| Default::default());
-            let mut high: [&mut [f64]; OUT] = std::array::from_fn(|_| Default::default());
-            for (k, (a, b)) in halves.into_iter().enumerate() {
-                (low[k], high[k]) = (a, b);
-            }
-            rayon::join(
-                || self.sum_blocks::<T, P, IN, SUMS, OUT>(pass, fields, number, left, first, low),
-                || {
-                    self.sum_blocks::<T, P, IN, SUMS, OUT>(
-                        pass,
-                        fields,
-                        number + left.len(),
-                        right,
-                        middle,
-                        high,
-                    )
-                },
-            );
-            return;
-        }
-        T::with_surroundings(|around| {
-            for (k, block) in blocks.iter().enumerate() {
-                let found = self.near.map(|near| &near.of_blocks[number + k]);
-                let at = block.first as usize - first;
-                let own = at..at + block.len as usize;
-                let out = out.each_mut().map(|out| &mut out[own.clone()]);
-                at_level!(self.level, simd => self.sum_block::<T, _, P, IN, SUMS, OUT>(simd, pass, fields, (block, found), around, out));
-            }
-        });
-    }
-
-    #[inline(always)]
-    fn sum_block<T, S, P, const IN: usize, const SUMS: usize, const OUT: usize>(
-        &self,
-        simd: S,
-        pass: &P,
-        fields: [&[f64]; IN],
-        (block, found): (&Block, Option<&OfBlock>),
-        around: &mut Surroundings<T>,
-        mut out: [&mut [f64]; OUT],
-    ) where
-        T: Real,
-        S: Simd,
-        P: PairPass<IN, SUMS, OUT>,
-    {
-        // Loops over the few fields are written out: what a closure holds would not be compiled for the wide registers.
-        let lanes = T::Native::<S>::LEN;
-        // a copy of its own: what the pass's numbers come to is then found before the loop over neighbours, not in it
-        let pass = *pass;
-        let particles = block.particles();
-        let own_copy = self.gather(fields, block, lanes, around);
-        let zero = T::Native::<S>::splat(simd, T::default());
-        let mut first = particles.start;
-        while first < particles.end {
-            let last = (first + lanes).min(particles.end);
-            let at = own_copy + first - particles.start;
-            let here = places_of(simd, around, at);
-            let mut own = [zero; IN];
-            for k in 0..IN {
-                own[k] = T::Native::<S>::from_slice(simd, &around.values[3 + k][at..at + lanes]);
-            }
-            let mut sums = [zero; SUMS];
-            if found.is_none() {
-                let mut near = std::mem::take(&mut around.near);
-                near.clear();
-                self.collect_near(simd, block, first..last, &here, around, &mut near);
-                around.near = near;
-            }
-            let near = match found {
-                Some(of_block) => of_block.register((first - particles.start) / lanes),
-                None => &around.near,
-            };
-            let count = around.count;
-            let x = &around.values[0][..count];
-            let y = &around.values[1][..count];
-            let z = &around.values[2][..count];
-            let mut values: [&[T]; IN] = [&[]; IN];
-            for k in 0..IN {
-                values[k] = &around.values[3 + k][..count];
-            }
-            for &j in near {
-                let j = j as usize;
-                let d = [
-                    here[0] - T::Native::<S>::splat(simd, x[j]),
-                    here[1] - T::Native::<S>::splat(simd, y[j]),
-                    here[2] - T::Native::<S>::splat(simd, z[j]),
-                ];
-                let r2 = d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]));
-                let mut other = [zero; IN];
-                for k in 0..IN {
-                    other[k] = T::Native::<S>::splat(simd, values[k][j]);
-                }
-                pass.add(d, r2, &own, other, &mut sums);
-            }
-            for lane in 0..last - first {
-                let mut of_lane = [0.0; SUMS];
-                for (of_lane, sum) in of_lane.iter_mut().zip(&sums) {
-                    *of_lane = sum.as_slice()[lane].wide();
-                }
-                let results = pass.finish(first + lane, of_lane);
-                for (out, result) in out.iter_mut().zip(results) {
-                    out[first - particles.start + lane] = result;
-                }
-            }
-            first = last;
-        }
-    }
-
-    /// Copies what is around a block, and returns where in it the block is.
-    #[inline(always)]
-    fn gather<T: Real, const IN: usize>(
-        &self,
-        fields: [&[f64]; IN],
-        block: &Block,
-        lanes: usize,
-        around: &mut Surroundings<T>,
-    ) -> usize {
+    /// Copies what is around a block.
+    fn gather<T: Real>(&self, fields: &[&[f64]], block: &Block, around: &mut Surroundings<T>) {
         let particles = block.particles();
         let centre = self.position.get(particles.start + particles.len() / 2);
-        around.values.resize_with((3 + IN).max(around.values.len()), Vec::new);
+        let columns = 3 + fields.len();
+        around.values.resize_with(columns.max(around.values.len()), Vec::new);
         around.ranges.clear();
         let near =
             self.columns.ranges_around(block, extent(&self.position.z[particles.clone()]), self.radius);
-        let (mut count, mut own) = (0, 0);
+        let mut count = 0;
         for &(start, end) in &near {
             let (start, end) = (start as usize, end as usize);
             if (start..end).contains(&particles.start) {
-                own = count + particles.start - start;
+                around.own = count + particles.start - start;
             }
             around.ranges.push((start, count));
             count += end - start;
         }
         around.count = count;
         // the last register of the block may reach beyond what was copied
-        let room = count + lanes;
-        for values in &mut around.values[..3 + IN] {
+        let room = count + MOST_LANES;
+        for values in &mut around.values[..columns] {
             if values.len() < room {
                 values.resize(2 * room, T::default());
             }
         }
         let Vectors { x, y, z } = self.position;
         let places = [(&x[..], centre.x), (&y[..], centre.y), (&z[..], centre.z)];
-        let others = fields.map(|field| (field, 0.0));
+        let others = fields.iter().map(|&field| (field, 0.0));
         for (values, (source, origin)) in around.values.iter_mut().zip(places.into_iter().chain(others)) {
-            for (&(start, end), &(_, copy)) in near.iter().zip(&around.ranges) {
-                for (to, from) in values[copy..].iter_mut().zip(&source[start as usize..end as usize]) {
-                    *to = T::of(from - origin);
-                }
+            at_level!(self.level, simd => copy_ranges(simd, source, origin, &near, &around.ranges, values));
+        }
+    }
+
+    /// Finds the copies that are near each register of a block.
+    fn collect_near<T: Real>(&self, block: &Block, around: &Surroundings<T>, near: &mut OfBlock) {
+        near.clear();
+        at_level!(self.level, simd => self.collect_near_registers(simd, block, around, near));
+    }
+
+    #[inline(always)]
+    fn collect_near_registers<T: Real, S: Simd>(
+        &self,
+        simd: S,
+        block: &Block,
+        around: &Surroundings<T>,
+        near: &mut OfBlock,
+    ) {
+        let lanes = T::Native::<S>::LEN;
+        let particles = block.particles();
+        let [x, y, z, ..] = &around.values[..] else { unreachable!("places come first") };
+        let mut first = particles.start;
+        while first < particles.end {
+            let last = (first + lanes).min(particles.end);
+            let here = places_of(simd, around, around.own + first - particles.start);
+            let reach = Reach::around(simd, &here, last - first, self.radius);
+            let ranges =
+                self.columns.ranges_around(block, extent(&self.position.z[first..last]), self.radius);
+            for (&(start, end), &(source, copy)) in ranges.iter().zip(&around.ranges) {
+                let (start, end) = (start as usize - source + copy, end as usize - source + copy);
+                reach.collect([x, y, z], (start, end), &mut near.copies);
+            }
+            near.ends.push(near.copies.len() as u32);
+            first = last;
+        }
+    }
+}
+
+/// Copies ranges of numbers, less an origin.
+#[inline(always)]
+fn copy_ranges<T: Real, S: Simd>(
+    _: S,
+    source: &[f64],
+    origin: f64,
+    near: &[(u32, u32)],
+    ranges: &[(usize, usize)],
+    values: &mut [T],
+) {
+    for (&(start, end), &(_, copy)) in near.iter().zip(ranges) {
+        for (to, from) in values[copy..].iter_mut().zip(&source[start as usize..end as usize]) {
+            *to = T::of(from - origin);
+        }
+    }
+}
+
+/// Sums over the neighbours of a block's particles into `around.sums`. This alone is compiled for each pass, precision
+/// and width.
+fn add_up<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
+    level: Level,
+    pass: &P,
+    block: &Block,
+    near: &OfBlock,
+    around: &mut Surroundings<T>,
+) where
+    T: Real,
+    P: PairPass<IN, SUMS, OUT>,
+{
+    at_level!(level, simd => add_up_registers(simd, pass, block.len as usize, near, around));
+}
+
+#[inline(always)]
+fn add_up_registers<T, S, P, const IN: usize, const SUMS: usize, const OUT: usize>(
+    simd: S,
+    pass: &P,
+    len: usize,
+    near: &OfBlock,
+    around: &mut Surroundings<T>,
+) where
+    T: Real,
+    S: Simd,
+    P: PairPass<IN, SUMS, OUT>,
+{
+    // Loops over the few fields are written out: what a closure holds would not be compiled for the wide registers.
+    let lanes = T::Native::<S>::LEN;
+    // a copy of its own: what the pass's numbers come to is then found before the loop over neighbours, not in it
+    let pass = *pass;
+    let zero = T::Native::<S>::splat(simd, T::default());
+    if around.sums.len() < SUMS * BLOCK {
+        around.sums.resize(SUMS * BLOCK, 0.0);
+    }
+    let mut first = 0;
+    while first < len {
+        let at = around.own + first;
+        let here = places_of(simd, around, at);
+        let mut own = [zero; IN];
+        for k in 0..IN {
+            own[k] = T::Native::<S>::from_slice(simd, &around.values[3 + k][at..at + lanes]);
+        }
+        let mut sums = [zero; SUMS];
+        let count = around.count;
+        let x = &around.values[0][..count];
+        let y = &around.values[1][..count];
+        let z = &around.values[2][..count];
+        let mut values: [&[T]; IN] = [&[]; IN];
+        for k in 0..IN {
+            values[k] = &around.values[3 + k][..count];
+        }
+        for &j in near.register(first / lanes) {
+            let j = j as usize;
+            let d = [
+                here[0] - T::Native::<S>::splat(simd, x[j]),
+                here[1] - T::Native::<S>::splat(simd, y[j]),
+                here[2] - T::Native::<S>::splat(simd, z[j]),
+            ];
+            let r2 = d[2].mul_add(d[2], d[1].mul_add(d[1], d[0] * d[0]));
+            let mut other = [zero; IN];
+            for k in 0..IN {
+                other[k] = T::Native::<S>::splat(simd, values[k][j]);
+            }
+            pass.add(d, r2, &own, other, &mut sums);
+        }
+        for k in 0..SUMS {
+            let place = k * BLOCK + first;
+            for (to, from) in around.sums[place..place + lanes].iter_mut().zip(sums[k].as_slice()) {
+                *to = from.wide();
             }
         }
-        own
+        first += lanes;
+    }
+}
+
+/// Makes results of a block's sums. `out` begins with particle `first`.
+fn finish<P, const IN: usize, const SUMS: usize, const OUT: usize>(
+    pass: &P,
+    block: &Block,
+    sums: &[f64],
+    first: usize,
+    out: &mut [&mut [f64]],
+) where
+    P: PairPass<IN, SUMS, OUT>,
+{
+    for (lane, i) in block.particles().enumerate() {
+        let results = pass.finish(i, std::array::from_fn(|k| sums[k * BLOCK + lane]));
+        for (out, result) in out.iter_mut().zip(results) {
+            out[i - first] = result;
+        }
     }
 }
 

@@ -81,6 +81,11 @@ pub(super) struct OfBlock {
 }
 
 impl OfBlock {
+    pub fn clear(&mut self) {
+        self.copies.clear();
+        self.ends.clear();
+    }
+
     /// Of the register of this number.
     #[inline(always)]
     pub fn register(&self, number: usize) -> &[u32] {

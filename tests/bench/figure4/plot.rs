@@ -2,12 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::sync::Arc;
-
-use resvg::{
-    tiny_skia::{Pixmap, Transform},
-    usvg::{Options, Tree, fontdb},
-};
 
 pub struct Curve {
     pub name: String,
@@ -175,19 +169,6 @@ fn legend(out: &mut String, curves: &[Curve]) {
 
 /// Rasterises with the font that the slices use, at two pixels per unit.
 pub fn write_png(svg: &str, path: &Path) {
-    const SCALE: f32 = 2.0;
-    let mut fonts = fontdb::Database::new();
-    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
-    let options = Options { font_family: "Ubuntu".into(), fontdb: Arc::new(fonts), ..Options::default() };
-    let tree = Tree::from_str(svg, &options).expect("our own drawing is valid");
-    let [width, height] = [WIDTH, HEIGHT].map(|side| (side as f32 * SCALE) as u32);
-    let mut pixels = Pixmap::new(width, height).expect("the size is not zero");
-    resvg::render(&tree, Transform::from_scale(SCALE, SCALE), &mut pixels.as_mut());
-    let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     let file = std::fs::File::create(path).expect("target/ is writable");
-    let mut encoder = png::Encoder::new(file, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_compression(png::Compression::High);
-    let mut writer = encoder.write_header().expect("the picture can be written");
-    writer.write_image_data(&rgb).expect("the picture can be written");
+    rfm::slice::rasterise(svg, 2.0, file).expect("our own drawing is valid");
 }
