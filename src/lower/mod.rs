@@ -20,9 +20,10 @@ mod value;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-pub use module::{Module, NamedSolid, ParamValue, Tolerance};
-pub use probes::{Measured, Probe};
-pub use scene::{Bounce, Container, Fluid, Gravity, Obstacle, Run, Scene, Skin, Solver, Truth};
+pub use module::{Module, NamedSolid, ParamValue};
+pub use scene::{
+    Bounce, Container, Fluid, Gravity, Measured, Obstacle, Probe, Run, Scene, Skin, Solver, Tolerance, Truth,
+};
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 use crate::sph::Method;

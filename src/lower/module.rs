@@ -1,6 +1,6 @@
 //! A file after lowering: its graph, and what the file defines in it.
 
-use super::scene::Scene;
+use super::scene::{Scene, Tolerance};
 use crate::diagnostic::Span;
 use crate::ir::{Graph, Node};
 
@@ -42,14 +42,5 @@ pub struct NamedSolid {
     /// The largest error of ω that is accepted, as `@tolerance(…)` states it.
     pub tolerance: Option<Tolerance>,
     /// Place of the name in its definition.
-    pub span: Span,
-}
-
-/// The largest |computed ω − exact ω| that is accepted; positive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tolerance {
-    /// The largest error.
-    pub value: f64,
-    /// Place where it is stated.
     pub span: Span,
 }

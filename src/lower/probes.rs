@@ -5,52 +5,11 @@
 use glam::DVec3;
 
 use super::lowering::Lowering;
-use super::scene::Block;
+use super::scene::{Block, Measured, Probe};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
 use crate::quantity::{Bound, Dimension};
 use crate::syntax::ast::{Entry, Expr, ExprKind};
-
-/// A measurement that goes on while a scene runs.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Probe {
-    /// Name of the probe, and of its files.
-    pub name: String,
-    /// Place of the name.
-    pub span: Span,
-    /// What is measured.
-    pub measured: Measured,
-    /// Simulated time between samples, s; `None`: that between frames.
-    pub every: Option<f64>,
-}
-
-/// What a probe measures, with numbers in SI units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Measured {
-    /// Height z of the fluid's surface above a place (x, y), m.
-    Height([f64; 2]),
-    /// Pressure at a place, Pa.
-    Pressure(DVec3),
-    /// Velocity at a place, m/s.
-    Velocity(DVec3),
-    /// Force on a body, N, and its torque about a point, N·m. Bodies are numbered: the container first, then
-    /// the obstacles.
-    Force {
-        /// Number of the body, from 0.
-        body: usize,
-        /// The point to which the torque refers, m.
-        about: DVec3,
-    },
-    /// Mass flow through a plane along its normal, kg/s.
-    Flux {
-        /// A point of the plane, m.
-        point: DVec3,
-        /// Unit normal of the plane.
-        normal: DVec3,
-    },
-    /// Kinetic, potential and elastic energy of the fluid and their sum, J.
-    Energy,
-}
 
 const MEASURED: [&str; 6] = ["height", "pressure", "velocity", "force", "flux", "energy"];
 const PROBE_KEYS: [&str; 8] = ["height", "pressure", "velocity", "force", "flux", "energy", "about", "every"];

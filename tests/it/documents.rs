@@ -1,14 +1,15 @@
 //! The documents beside the code: what they show is accepted, and what they link to is there.
 
-use crate::tool::{rfm_reading, root};
+use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 6] = [
+const DOCUMENTS: [&str; 7] = [
     "README.md",
     "CHANGELOG.md",
     "examples/README.md",
     "examples/validation/README.md",
     "tests/bench/README.md",
     "tests/peers/README.md",
+    "src/sph/methods/README.md",
 ];
 
 fn text(document: &str) -> String {
@@ -62,4 +63,14 @@ fn every_example_is_in_the_gallery() {
 fn the_first_page_stays_short() {
     let lines = text("README.md").lines().count();
     assert!(lines <= 300, "{lines} lines");
+}
+
+#[test]
+fn the_methods_are_described_as_they_are_declared() {
+    let page = rfm(root(), &["explain", "--methods"]).expect(0).stdout;
+    assert_eq!(page, text("src/sph/methods/README.md"), "write the output of `rfm explain --methods` there");
+    let readme = text("README.md");
+    for line in rfm::sph::methods_overview().lines() {
+        assert!(readme.contains(line), "README lacks: {line}");
+    }
 }

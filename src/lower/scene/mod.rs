@@ -13,8 +13,6 @@ use glam::DVec3;
 
 pub(super) use keys::Block;
 
-use super::module::Tolerance;
-use super::probes::Probe;
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
 use crate::ir::Node;
@@ -191,4 +189,54 @@ pub struct Run {
     pub save_every: f64,
     /// Time between checkpoints, s; `None`: one is saved with every frame.
     pub checkpoint_every: Option<f64>,
+}
+
+/// A measurement that goes on while a scene runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Name of the probe, and of its files.
+    pub name: String,
+    /// Place of the name.
+    pub span: Span,
+    /// What is measured.
+    pub measured: Measured,
+    /// Simulated time between samples, s; `None`: that between frames.
+    pub every: Option<f64>,
+}
+
+/// What a probe measures, with numbers in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Measured {
+    /// Height z of the fluid's surface above a place (x, y), m.
+    Height([f64; 2]),
+    /// Pressure at a place, Pa.
+    Pressure(DVec3),
+    /// Velocity at a place, m/s.
+    Velocity(DVec3),
+    /// Force on a body, N, and its torque about a point, N·m. Bodies are numbered: the container first, then
+    /// the obstacles.
+    Force {
+        /// Number of the body, from 0.
+        body: usize,
+        /// The point to which the torque refers, m.
+        about: DVec3,
+    },
+    /// Mass flow through a plane along its normal, kg/s.
+    Flux {
+        /// A point of the plane, m.
+        point: DVec3,
+        /// Unit normal of the plane.
+        normal: DVec3,
+    },
+    /// Kinetic, potential and elastic energy of the fluid and their sum, J.
+    Energy,
+}
+
+/// The largest |computed ω − exact ω| that is accepted; positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    /// The largest error.
+    pub value: f64,
+    /// Place where it is stated.
+    pub span: Span,
 }

@@ -3,10 +3,9 @@
 use glam::DVec3;
 
 use super::super::lowering::Lowering;
-use super::super::module::Tolerance;
 use super::super::probes::Surroundings;
 use super::fluid::FluidAndMethod;
-use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Truth};
+use super::{Block, Bounce, Container, Gravity, Obstacle, Run, Scene, Skin, Tolerance, Truth};
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
 use crate::ir::Unary;
