@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::lowering::Lowering;
 use super::scene::{Block, Measured, Probe};
-use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Aabb;
 use crate::quantity::{Bound, Dimension};
 use crate::syntax::ast::{Entry, Expr, ExprKind};
