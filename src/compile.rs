@@ -158,10 +158,10 @@ impl Program {
     }
 
     /// Checks the same file again with one method for all its scenes, in place of the methods that they
-    /// state.
+    /// state. Keys that only the stated method has are left out.
     ///
     /// # Errors
-    /// [`Error::Diagnostics`] if a scene has a key that the method does not know.
+    /// [`Error::Diagnostics`] if the method makes the file wrong.
     pub fn with_method(&self, method: Method) -> Result<Self, Error> {
         self.lowered_again(Options { method: Some(method), ..self.options.clone() })
     }

@@ -27,6 +27,8 @@
 //! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) and the commands (`cli`) are not part of
 //! the interface: they are reachable for this package's own tests and benches, and change without notice.
 
+#![warn(missing_docs)]
+
 pub mod compile;
 pub mod diagnostic;
 pub mod experiment;

@@ -104,7 +104,7 @@ impl Bound {
             Self::Positive => "must be positive".into(),
             Self::NotNegative => "must not be negative".into(),
             Self::Fraction => "must lie between 0 and 1".into(),
-            Self::From(least, limit) => format!("must be at least {least:?} and below {limit:?}"),
+            Self::From(least, limit) => format!("must be at least {least:?} and below {limit}"),
         }
     }
 }
@@ -116,7 +116,7 @@ impl fmt::Display for Bound {
             Self::Positive => write!(f, "a finite number above 0"),
             Self::NotNegative => write!(f, "a finite number of at least 0"),
             Self::Fraction => write!(f, "a number from 0 to 1"),
-            Self::From(least, limit) => write!(f, "a number of at least {least:?} and below {limit:?}"),
+            Self::From(least, limit) => write!(f, "a number of at least {least:?} and below {limit}"),
         }
     }
 }

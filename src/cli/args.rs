@@ -332,7 +332,7 @@ pub(super) struct Flow {
     /// file states]
     #[arg(long, value_name = "N,N,…", value_delimiter = ',', value_parser = count, conflicts_with_all = ["solid", "mesh_plot"])]
     pub particles: Vec<usize>,
-    /// Run the scene by these methods [default: its own]
+    /// Run the scene by these methods, without keys that only its own method has [default: its own]
     #[arg(long, value_parser = flow_method(), value_delimiter = ',', conflicts_with_all = ["solid", "mesh_plot"])]
     pub methods: Vec<Method>,
 }

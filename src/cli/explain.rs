@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::args::{Explain, Shared, Stage};
 use super::run::{experiment, start};
 use super::{Failure, choose, input};
-use crate::codegen::{CodegenError, Listing, Precision, Request, Shape, target_description};
+use crate::codegen::{CodegenError, Listing, Request, Shape, target_description};
 use crate::diagnostic::{Span, explain};
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -17,7 +17,7 @@ use crate::simplify::{Exactness, MOST_PLACES, simplify};
 use crate::solid::{Bounds, ProgramKind, Remainder};
 use crate::sph::methods_reference;
 use crate::syntax;
-use crate::{Program, Solid};
+use crate::{Precision, Program, Solid};
 
 pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if shared.json {

@@ -177,7 +177,28 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
                 within(a, LARGEST_OPERAND) && within(b, LARGEST_OPERAND)
             }
             // all others overflow only where their result does
-            _ => true,
+            Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Unary(..)
+            | Expr::Binary(
+                Binary::Add
+                | Binary::Sub
+                | Binary::Mul
+                | Binary::Div
+                | Binary::DivOrZero
+                | Binary::Min
+                | Binary::Max
+                | Binary::PlainMin
+                | Binary::PlainMax
+                | Binary::MinWeight
+                | Binary::MaxWeight
+                | Binary::Call(_)
+                | Binary::AndWeight
+                | Binary::OrWeight,
+                ..,
+            ) => true,
         };
         operands_fit && within(node, LARGEST)
     })
@@ -212,15 +233,15 @@ pub(super) fn emit(
         let (low, high) = (bound(i), bound(i + 3));
         let low = ranges.emitter.builder.ins().splat(types::F64X2, low);
         let pair = ranges.emitter.builder.ins().insertlane(low, high, 1);
-        ranges.flip(pair, Lane::Low)
+        ranges.flip(pair, BoundLane::Low)
     });
     for ((node, _), &instruction) in std::iter::zip(request.graph.nodes(), instructions) {
         let value = match instruction {
-            Instruction::Constant(c) => ranges.number(node, Number::Constant(c)),
+            Instruction::Constant(c) => ranges.number(node, RangeNumber::Constant(c)),
             Instruction::Coordinate(axis) => axes[axis],
             Instruction::Parameter(i) => {
                 let splat = ranges.emitter.parameter(parameters, i);
-                ranges.number(node, Number::Parameter(splat))
+                ranges.number(node, RangeNumber::Parameter(splat))
             }
             Instruction::Uniform(i) => ranges.uniform(uniforms, i),
             Instruction::Square(a) => ranges.square(ranges.values[&a]),
@@ -232,14 +253,14 @@ pub(super) fn emit(
         ranges.values.insert(node, value);
     }
     let root = ranges.values[&request.outputs[0]];
-    let root = ranges.flip(root, Lane::Low);
+    let root = ranges.flip(root, BoundLane::Low);
     ranges.emitter.builder.ins().store(MemFlagsData::new(), root, output, 0);
     ranges.emitter.builder.ins().return_(&[]);
 }
 
 /// A node with one value.
 #[derive(Clone, Copy)]
-enum Number {
+enum RangeNumber {
     Constant(f64),
     /// In both lanes.
     Parameter(Value),
@@ -247,7 +268,7 @@ enum Number {
 
 /// The lane of a register that holds −lo, or that of hi.
 #[derive(Clone, Copy, PartialEq)]
-enum Lane {
+enum BoundLane {
     Low,
     High,
 }
@@ -255,7 +276,7 @@ enum Lane {
 struct Ranges<'a, 'f> {
     emitter: Emitter<'a, 'f>,
     rounding: Rounding,
-    numbers: HashMap<Node, Number>,
+    numbers: HashMap<Node, RangeNumber>,
     values: HashMap<Node, Value>,
 }
 
@@ -274,7 +295,7 @@ impl Ranges<'_, '_> {
             RangeBinary::Add => self.add(a, b),
             RangeBinary::Sub => {
                 let b = match self.numbers.get(&v) {
-                    Some(&Number::Constant(c)) => self.pair(c, -c),
+                    Some(&RangeNumber::Constant(c)) => self.pair(c, -c),
                     _ => self.swap(b),
                 };
                 self.add(a, b)
@@ -293,17 +314,17 @@ impl Ranges<'_, '_> {
                 let (low, high) = (self.min(a, b), self.emitter.max(a, b));
                 self.lanes(low, high)
             }
-            RangeBinary::And => self.r0(a, b, Lane::High),
-            RangeBinary::Or => self.r0(a, b, Lane::Low),
+            RangeBinary::And => self.r0(a, b, BoundLane::High),
+            RangeBinary::Or => self.r0(a, b, BoundLane::Low),
         }
     }
 
     /// The range of a number, which is kept for operations that are cheaper with one.
-    fn number(&mut self, node: Node, number: Number) -> Value {
+    fn number(&mut self, node: Node, number: RangeNumber) -> Value {
         self.numbers.insert(node, number);
         match number {
-            Number::Constant(c) => self.pair(-c, c),
-            Number::Parameter(splat) => self.flip(splat, Lane::Low),
+            RangeNumber::Constant(c) => self.pair(-c, c),
+            RangeNumber::Parameter(splat) => self.flip(splat, BoundLane::Low),
         }
     }
 
@@ -312,7 +333,7 @@ impl Ranges<'_, '_> {
         let Some(base) = uniforms else { return self.pair(f64::NAN, f64::NAN) };
         let flags = MemFlagsData::new();
         let pair = self.emitter.builder.ins().load(types::F64X2, flags, base, 16 * i as i32);
-        self.flip(pair, Lane::Low)
+        self.flip(pair, BoundLane::Low)
     }
 
     /// A constant with two different lanes.
@@ -323,15 +344,15 @@ impl Ranges<'_, '_> {
     }
 
     /// A constant with `low` in one lane and `high` in the other, whichever is meant.
-    fn signed(&mut self, lane: Lane, inside: f64, outside: f64) -> Value {
+    fn signed(&mut self, lane: BoundLane, inside: f64, outside: f64) -> Value {
         match lane {
-            Lane::Low => self.pair(inside, outside),
-            Lane::High => self.pair(outside, inside),
+            BoundLane::Low => self.pair(inside, outside),
+            BoundLane::High => self.pair(outside, inside),
         }
     }
 
     /// Negates one lane.
-    fn flip(&mut self, v: Value, lane: Lane) -> Value {
+    fn flip(&mut self, v: Value, lane: BoundLane) -> Value {
         let mask = self.signed(lane, -0.0, 0.0);
         self.emitter.builder.ins().bxor(v, mask)
     }
@@ -386,13 +407,13 @@ impl Ranges<'_, '_> {
     }
 
     /// A vector, or where a number is negative its lanes exchanged; and the number's magnitude in both lanes.
-    fn turned(&mut self, v: Value, number: Number) -> (Value, Value) {
+    fn turned(&mut self, v: Value, number: RangeNumber) -> (Value, Value) {
         match number {
-            Number::Constant(c) => {
+            RangeNumber::Constant(c) => {
                 let v = if c < 0.0 { self.swap(v) } else { v };
                 (v, self.emitter.constant(c.abs()))
             }
-            Number::Parameter(splat) => {
+            RangeNumber::Parameter(splat) => {
                 let zero = self.emitter.constant(0.0);
                 let negative = self.emitter.compare(FloatCC::LessThan, splat, zero);
                 let swapped = self.swap(v);
@@ -401,13 +422,13 @@ impl Ranges<'_, '_> {
         }
     }
 
-    fn times(&mut self, v: Value, number: Number) -> Value {
+    fn times(&mut self, v: Value, number: RangeNumber) -> Value {
         let (v, magnitude) = self.turned(v, number);
         let product = self.fmul(v, magnitude);
         self.up(product)
     }
 
-    fn divide(&mut self, v: Value, number: Number) -> Value {
+    fn divide(&mut self, v: Value, number: RangeNumber) -> Value {
         let (v, magnitude) = self.turned(v, number);
         let quotient = self.emitter.builder.ins().fdiv(v, magnitude);
         self.up(quotient)
@@ -415,8 +436,8 @@ impl Ranges<'_, '_> {
 
     /// The largest of the four products of bounds, and of their negatives.
     fn multiply(&mut self, a: Value, b: Value) -> Value {
-        let (a_low, a_high) = (self.both(a, Lane::Low), self.both(a, Lane::High));
-        let (b_low, b_high) = (self.both(b, Lane::Low), self.both(b, Lane::High));
+        let (a_low, a_high) = (self.both(a, BoundLane::Low), self.both(a, BoundLane::High));
+        let (b_low, b_high) = (self.both(b, BoundLane::Low), self.both(b, BoundLane::High));
         let (a_turned, b_turned) = (self.swap(a), self.swap(b));
         let (a_low, a_high) = (self.emitter.negate(a_low), self.emitter.negate(a_high));
         let products = [(a, b_high), (a_turned, b_low), (b, a_low), (b_turned, a_high)];
@@ -427,8 +448,8 @@ impl Ranges<'_, '_> {
     }
 
     /// One lane in both.
-    fn both(&mut self, v: Value, lane: Lane) -> Value {
-        let first = if lane == Lane::Low { 0 } else { 8 };
+    fn both(&mut self, v: Value, lane: BoundLane) -> Value {
+        let first = if lane == BoundLane::Low { 0 } else { 8 };
         self.shuffle(v, v, std::array::from_fn(|i| first + i as u8 % 8))
     }
 
@@ -475,19 +496,19 @@ impl Ranges<'_, '_> {
     /// (p·e + q)·(r·e + s) of one node e, where p and r are ±1: from the values at the ends of e, and at the
     /// point t of e nearest to the vertex.
     fn slab(&mut self, e: Value, first: Affine, second: Affine) -> Value {
-        let plain = self.flip(e, Lane::Low);
+        let plain = self.flip(e, BoundLane::Low);
         let turned = self.swap(plain);
         // a concave product has its largest value at t and its least at an end: [lo, t] and [hi, t] are
         // looked at; a convex one is looked at at [t, lo] and [t, hi]
         let concave = first.slope != second.slope;
         let (at_vertex, near, far) =
-            if concave { (Lane::High, turned, plain) } else { (Lane::Low, plain, turned) };
+            if concave { (BoundLane::High, turned, plain) } else { (BoundLane::Low, plain, turned) };
         let (middle, slack) = self.vertex(first, second, at_vertex);
         let (above, below) = (self.emitter.max(near, middle), self.min(far, middle));
         let places = [self.min(above, far), self.emitter.max(below, near)];
         let [f, g] = places.map(|at| {
             let (p, q) = (self.factor(at, first), self.factor(at, second));
-            let p = self.flip(p, Lane::Low);
+            let p = self.flip(p, BoundLane::Low);
             self.fmul(p, q)
         });
         let range = self.emitter.max(f, g);
@@ -518,20 +539,20 @@ impl Ranges<'_, '_> {
     fn splat(&mut self, node: Node) -> Value {
         // offsets are numbers: see `ir::bounds::range`
         match self.numbers[&node] {
-            Number::Constant(c) => self.emitter.constant(c),
-            Number::Parameter(splat) => splat,
+            RangeNumber::Constant(c) => self.emitter.constant(c),
+            RangeNumber::Parameter(splat) => splat,
         }
     }
 
     /// Where a slab has its vertex, halfway between its roots, in both lanes. Where rounding moves it, by d,
     /// also d² in the lane of the value there, which misses the extreme value by so much.
-    fn vertex(&mut self, first: Affine, second: Affine, at_vertex: Lane) -> (Value, Option<Value>) {
+    fn vertex(&mut self, first: Affine, second: Affine, at_vertex: BoundLane) -> (Value, Option<Value>) {
         // the root of slope·e ± offset is ∓slope·offset
         let sign = |affine: Affine| if affine.minus { affine.slope } else { -affine.slope };
         let known = |affine: Affine| match affine.offset {
             None => Some(0.0),
             Some(node) => match self.numbers.get(&node) {
-                Some(Number::Constant(c)) => Some(sign(affine) * c),
+                Some(RangeNumber::Constant(c)) => Some(sign(affine) * c),
                 _ => None,
             },
         };
@@ -565,7 +586,7 @@ impl Ranges<'_, '_> {
     /// left the operands themselves bound the result, and keep its sign exact: u ∧ v ≤ min(u, v), and with m
     /// = max(u, v) u ∨ v ≤ 4m where m > 0, ≤ ½m where m < 0 (2 + √2 and 2 − √2 but for underflow in the
     /// program). So nothing waits for a division after the root.
-    fn r0(&mut self, a: Value, b: Value, and: Lane) -> Value {
+    fn r0(&mut self, a: Value, b: Value, and: BoundLane) -> Value {
         let lost = self.emitter.constant(R0_UNDERFLOW);
         let sum = self.fadd(a, b);
         let sum = self.fadd(sum, lost);
@@ -578,8 +599,8 @@ impl Ranges<'_, '_> {
 
         let (least, most) = (self.min(a, b), self.emitter.max(a, b));
         let limit = match and {
-            Lane::Low => self.lanes(least, most),
-            Lane::High => self.lanes(most, least),
+            BoundLane::Low => self.lanes(least, most),
+            BoundLane::High => self.lanes(most, least),
         };
         let (positive, negative) = (self.signed(and, 1.0, 4.0), self.signed(and, 1.0, 0.5));
         let (one, other) = (self.fmul(limit, positive), self.fmul(limit, negative));

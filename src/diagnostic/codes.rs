@@ -98,8 +98,8 @@ SCENE_KEY = "E0301":
       box      { min: [0, 0, 0], max: [3, 3, 3], restitution: 0.5 }
       fluid water {
         shape: ball([1.5, 1.5, 2], 0.5), fill: below, particles: 10000, density: 998.29 kg/m^3, mass: 0.02 kg,
-        viscosity: 3.5 Pa·s, surface_tension: 0.0728 N/m, threshold: 7.065, stiffness: 3 J, support_radius: 0.1 m,
-        velocity: [0, 0, -1 m/s], jitter: 0, seed: 1
+        viscosity: 3.5 Pa·s, surface_tension: 0.0728 N/m, support_radius: 0.1 m, velocity: [0, 0, -1 m/s],
+        jitter: 0, seed: 1
       }
       obstacle { solid: post, restitution: 0.5 }
       gravity: [0, 0, -9.81 m/s^2]
@@ -109,7 +109,9 @@ SCENE_KEY = "E0301":
       tolerance: 1e-6
     }
 
-`fill` is `below` or `middle`; without `particles` the shape is filled, without `dt` a stable step is derived.";
+`fill` is `below` or `middle`; without `particles` the shape is filled, without `dt` a stable step is derived.
+`spacing` may stand in place of `mass`. There are also `container { solid: … }`, `walls: no_slip`, `truth { … }` and
+`solver { precision: f64 }`. Each method has keys of its own: `rfm explain --methods` lists them.";
 SCENE_MISSING = "E0302":
 "The scene lacks something without which it cannot be run: a box with its far corner `max`, a fluid with a `shape`, or
 the `solid` of an obstacle. All other keys have defaults.";

@@ -307,6 +307,12 @@ impl Core {
         Ok(())
     }
 
+    /// Whether anything acts on all of the fluid: gravity that stays, turns, or depends on the place.
+    pub fn has_gravity(&self) -> bool {
+        let Self { parameters, gravity_field, turning_gravity, .. } = self;
+        parameters.gravity != DVec3::ZERO || gravity_field.is_some() || turning_gravity.is_some()
+    }
+
     /// Memory of the state and of the parts that all methods share, bytes.
     pub fn bytes(&self) -> usize {
         let Particles { position, velocity, density, pressure, id } = &self.particles;

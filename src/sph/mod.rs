@@ -69,18 +69,14 @@ mod tests;
 /// A vector as a function of a place, m, and a time, s.
 pub type VectorField = dyn Fn(glam::DVec3, f64) -> glam::DVec3 + Send + Sync;
 
-pub use crate::precision::Precision;
 /// A vector as a function of a time, s.
 pub type VectorOfTime = dyn Fn(f64) -> glam::DVec3 + Send + Sync;
 
+pub use crate::precision::Precision;
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use error::{Cause, ParameterError, Quantity, SetupError, StepError};
 pub use kernel::Kernels;
-pub use methods::{
-    Dfsph, FluidDefaults, Gradients, KeyBlock, KeyInfo, KeyReader, Method, MethodInfo, NegativePressure,
-    Paper, Support, Wcsph,
-};
-pub use methods::{overview as methods_overview, reference as methods_reference};
+pub use methods::*;
 pub use params::Parameters;
 pub use particles::{Particles, Vectors};
 pub use pass::Pass;

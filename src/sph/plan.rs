@@ -2,21 +2,23 @@
 
 use std::borrow::Cow;
 
-use glam::DVec3;
-
 use super::methods::Method;
 use super::params::Parameters;
 use super::pass::Pass;
 
 /// All passes in the order of a step, each with the reason if it does not run.
-pub(super) fn plan(parameters: &Parameters, obstacles: usize) -> Vec<(Pass, Option<Cow<'static, str>>)> {
+pub(super) fn plan(
+    parameters: &Parameters,
+    obstacles: usize,
+    has_gravity: bool,
+) -> Vec<(Pass, Option<Cow<'static, str>>)> {
     let unless = |needed: bool, reason: &'static str| (!needed).then_some(reason);
     let of_all_methods = [
         (Pass::Integrate, None),
         (Pass::Walls, None),
         (Pass::Obstacles, unless(obstacles > 0, "the scene has no obstacle")),
         (Pass::Neighbours, None),
-        (Pass::Gravity, unless(parameters.gravity != DVec3::ZERO, "gravity is zero")),
+        (Pass::Gravity, unless(has_gravity, "gravity is zero")),
     ];
     let own = parameters.method.passes(&parameters.scales());
     let mut plan: Vec<(Pass, Option<Cow<'static, str>>)> = of_all_methods

@@ -187,6 +187,7 @@ impl Simulation {
     /// Makes gravity, m/s², a function of the time, s, as in a container that rotates. Each step takes the
     /// value at its beginning.
     pub fn set_turning_gravity(&mut self, gravity: Arc<VectorOfTime>) {
+        self.core.parameters.gravity = gravity(self.core.time);
         self.core.turning_gravity = Some(gravity);
     }
 
@@ -278,7 +279,7 @@ impl Simulation {
 
     /// All passes in the order in which a step would run them, each with the reason if it does not run.
     pub fn plan(&self) -> Vec<(Pass, Option<Cow<'static, str>>)> {
-        plan(&self.core.parameters, self.core.boundary.obstacles.len())
+        plan(&self.core.parameters, self.core.boundary.obstacles.len(), self.core.has_gravity())
     }
 }
 

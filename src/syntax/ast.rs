@@ -19,7 +19,7 @@ pub enum Item {
     Let(Definition),
     Function(Function),
     Solid(Definition),
-    Scene(Scene),
+    Scene(SceneItem),
 }
 
 /// `param name = value in low .. high "doc"`
@@ -62,7 +62,7 @@ pub struct Parameter {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scene {
+pub struct SceneItem {
     pub name: Name,
     pub entries: Vec<Entry>,
     pub span: Span,

@@ -9,7 +9,7 @@ use std::cell::Cell;
 
 use super::ast::{
     AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic,
-    MulOp, Name, Param, Parameter, Scene,
+    MulOp, Name, Param, Parameter, SceneItem,
 };
 use super::grammar::{DEEPEST_TREE, EDITION, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
@@ -187,12 +187,12 @@ impl Builder {
         Item::Function(Function { name, parameters, body: self.expr_or_zero(body) })
     }
 
-    fn scene(&self, pair: Node<'_>) -> Scene {
+    fn scene(&self, pair: Node<'_>) -> SceneItem {
         let span = self.span(&pair);
         let mut inner = parts(pair);
         inner.next();
         let name = self.name(inner.next());
-        Scene { name, entries: inner.map(|e| self.entry(e)).collect(), span }
+        SceneItem { name, entries: inner.map(|e| self.entry(e)).collect(), span }
     }
 
     fn entry(&self, pair: Node<'_>) -> Entry {

@@ -8,9 +8,10 @@ use super::super::Failure;
 use super::super::plot::{self, LogAxis};
 use super::flow_run::FlowRun;
 use crate::experiment::Deviation;
+use crate::sph::Method;
 
-/// Each method with its colour.
-const METHODS: [(&str, &str); 3] = [("wcsph", "#1b6ca8"), ("dfsph", "#c05621"), ("paper", "#2f855a")];
+/// Colours of the methods, in the order of their list; a longer list begins anew.
+const COLOURS: [&str; 6] = ["#2f855a", "#1b6ca8", "#c05621", "#6b46c1", "#b83280", "#4a5568"];
 
 /// Dash patterns for the lines of the first, second and third known quantity.
 const DASHES: [&str; 3] = ["none", "7 4", "2 4"];
@@ -32,7 +33,8 @@ pub(super) fn draw(scene: &str, rows: &[FlowRun], path: &Path) -> Result<Vec<u8>
     let mut out = plot::begin(&format!("{scene}: error against cost"));
     plot::grid(&mut out, &x, &y, ["processor time, s", "relative deviation"]);
     let mut legend = Vec::new();
-    for (method, colour) in METHODS {
+    let methods = Method::all();
+    for (method, colour) in methods.iter().map(Method::name).zip(COLOURS.into_iter().cycle()) {
         for (&k, dashes) in known.iter().zip(DASHES) {
             let own: Vec<(f64, f64, usize)> = marks
                 .iter()

@@ -37,7 +37,7 @@ const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
 
 impl<'a> Lowering<'a> {
     /// Reads a scene; `None` if it has errors, which are reported.
-    pub fn scene(&mut self, scene: &'a ast::Scene) -> Option<Scene> {
+    pub fn scene(&mut self, scene: &'a ast::SceneItem) -> Option<Scene> {
         let errors_before = self.errors();
         let block = self.block(
             &scene.entries,

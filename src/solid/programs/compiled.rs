@@ -6,10 +6,11 @@ use glam::DVec3;
 
 use super::columns::{ColumnPlace, Frame};
 use super::number::Number;
-use crate::codegen::{self, Code, CodegenError, Form, Forms, Precision, Request, Rounding, Shape};
+use crate::codegen::{self, Code, CodegenError, Form, Forms, Request, Rounding, Shape};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{Expr, Graph, Node};
+use crate::precision::Precision;
 
 /// The largest number of outputs of a program: distance, normal and curvature.
 const MAX_OUTPUTS: usize = 5;
@@ -21,6 +22,27 @@ const MAX_LANES: usize = 4;
 fn uniforms_of(graph: &Graph) -> usize {
     let number = |expr| if let Expr::Uniform(i) = expr { i as usize + 1 } else { 0 };
     graph.exprs().iter().map(|&expr| number(expr)).max().unwrap_or(0)
+}
+
+/// Machine code for the outputs of a graph in the numbers `T`, and how many uniforms it reads.
+fn compile<T: Number>(
+    graph: &Graph,
+    outputs: &[Node],
+    forms: &Forms,
+    shape: Shape,
+) -> Result<(Code, usize), CodegenError> {
+    let uniforms = uniforms_of(graph);
+    let request = Request {
+        graph,
+        inputs: &[],
+        outputs,
+        precision: T::PRECISION,
+        shape,
+        forms,
+        parameters: false,
+        uniforms: uniforms > 0,
+    };
+    Ok((codegen::compile(request)?, uniforms))
 }
 
 /// A compiled program for one point, in the numbers `T`.
@@ -37,18 +59,8 @@ impl<T: Number> PointProgram<T> {
     /// # Errors
     /// Those of [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
-        let uniforms = uniforms_of(graph);
-        let request = Request {
-            graph,
-            inputs: &[],
-            outputs,
-            precision: T::PRECISION,
-            shape: Shape::Point,
-            forms,
-            parameters: false,
-            uniforms: uniforms > 0,
-        };
-        Ok(Self { code: codegen::compile(request)?, uniforms, lane: std::marker::PhantomData })
+        let (code, uniforms) = compile::<T>(graph, outputs, forms, Shape::Point)?;
+        Ok(Self { code, uniforms, lane: std::marker::PhantomData })
     }
 
     /// All outputs at a point, in the order in which they were asked for.
@@ -83,18 +95,8 @@ impl<T: Number> BatchProgram<T> {
     /// # Errors
     /// Those of [`codegen::compile`].
     pub fn compile(graph: &Graph, outputs: &[Node], forms: &Forms) -> Result<Self, CodegenError> {
-        let uniforms = uniforms_of(graph);
-        let request = Request {
-            graph,
-            inputs: &[],
-            outputs,
-            precision: T::PRECISION,
-            shape: Shape::Batch,
-            forms,
-            parameters: false,
-            uniforms: uniforms > 0,
-        };
-        Ok(Self { code: codegen::compile(request)?, uniforms, lane: std::marker::PhantomData })
+        let (code, uniforms) = compile::<T>(graph, outputs, forms, Shape::Batch)?;
+        Ok(Self { code, uniforms, lane: std::marker::PhantomData })
     }
 
     /// All outputs at many points: whole blocks straight from and to the caller's columns, the rest through

@@ -1,8 +1,8 @@
 //! The methods that find the pressure. Each has a folder, which declares the method and holds its scheme, a
 //! readable `step` over the stages of [`Core`](super::core::Core).
 //!
-//! To add a method, write a folder with its numbers, their [`Declaration`] and their [`Numerics`], and one
-//! line in the list in the middle of this file.
+//! To add a method: a folder with its numbers, their declaration and limits (`mod.rs`) and its scheme (`scheme.rs`),
+//! a line in the list of this file, and an arm in `start.rs`. `rfm explain --methods` then writes the page beside it.
 
 mod declaration;
 mod dfsph;
@@ -20,7 +20,7 @@ pub use declaration::{FluidDefaults, KeyBlock, KeyInfo, KeyReader, MethodInfo, S
 pub use dfsph::Dfsph;
 pub use negative_pressure::NegativePressure;
 pub use paper::Paper;
-pub use reference::{overview, reference};
+pub use reference::{methods_overview, methods_reference};
 pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read};

@@ -6,7 +6,7 @@ use super::declaration::{KeyInfo, MethodInfo, Support};
 use super::{KeyBlock, Method};
 
 /// A table with one row for each method: how it finds the pressure, and which keys it has.
-pub fn overview() -> String {
+pub fn methods_overview() -> String {
     let mut text = String::from(
         "| `method:` | pressure | kernel; neighbours | time step | keys of its own |\n|---|---|---|---|---|\n",
     );
@@ -18,11 +18,11 @@ pub fn overview() -> String {
 }
 
 /// The [`overview`], followed by a section for each method with all that it declares.
-pub fn reference() -> String {
+pub fn methods_reference() -> String {
     let mut text = format!(
         "# Methods of the solver\n\nThis page is what `rfm explain --methods` prints. A key that the method of a scene does \
          not have is an error.\n\n{}",
-        overview()
+        methods_overview()
     );
     for method in Method::all().iter().map(Method::info) {
         // writing to a String cannot fail

@@ -64,7 +64,7 @@ impl Declaration for Paper {
             about: "k of the equation of state p = k(ρ − ρ₀), per kilogram",
             value: Value::Number {
                 dimension: Dimension::ENERGY,
-                bound: Bound::Positive,
+                bound: Bound::NotNegative,
                 get: |paper| Some(paper.stiffness),
                 set: |paper, stiffness| paper.stiffness = stiffness,
                 derived: "",
