@@ -158,7 +158,7 @@ fn unsafe_stands_where_machine_code_is_made_and_called() {
             let code = line.split("//").next().unwrap_or("");
             if code.contains("unsafe {") || code.contains("unsafe fn") || code.contains("unsafe impl") {
                 assert!(allowed, "{}:{}: unsafe", path.display(), i + 1);
-                let said = lines[i.saturating_sub(4)..=i].iter().any(|l| l.contains("SAFETY:"));
+                let said = lines[i.saturating_sub(6)..=i].iter().any(|l| l.contains("SAFETY:"));
                 assert!(said, "{}:{}: no SAFETY sentence", path.display(), i + 1);
             }
         }
