@@ -1,4 +1,5 @@
-//! A simulation on a thread of its own, followed and stopped from another one: what a viewer or a server does.
+//! A simulation on a thread of its own, followed and stopped from another one: what a viewer or a server
+//! does.
 //!
 //! ```text
 //! cargo run --release --example background

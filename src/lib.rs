@@ -1,5 +1,5 @@
-//! `rfm` compiles obstacles written as R-functions into machine code for ω(x, y, z) and ∇ω, and gives them to a
-//! mesher, a fluid solver, pictures and other programs.
+//! `rfm` compiles obstacles written as R-functions into machine code for ω(x, y, z) and ∇ω, and gives them to
+//! a mesher, a fluid solver, pictures and other programs.
 //!
 //! ```text
 //! source text ─ syntax ─▶ Ast ─ lower ─▶ ir::Graph ─ simplify ─▶ ir::Graph ─ codegen ─▶ Solid
@@ -10,8 +10,8 @@
 //! Each stage is a function from data to data, and what it makes can be printed (`rfm explain --show …`). The
 //! consumers know only the traits [`Field`] and [`field::Walls`], never the compiler.
 //!
-//! Sign convention, everywhere: **ω > 0 inside the obstacle, 0 on its surface, < 0 in the fluid**; the outward
-//! unit normal is −∇ω/|∇ω|.
+//! Sign convention, everywhere: **ω > 0 inside the obstacle, 0 on its surface, < 0 in the fluid**; the
+//! outward unit normal is −∇ω/|∇ω|.
 //!
 //! What a program that embeds obstacles uses:
 //!
@@ -24,8 +24,9 @@
 //! | [`diagnostic`] | messages with their places in a file |
 //! | [`geom`], [`interval`], [`precision`], [`quantity`] | boxes, guaranteed ranges, number types, units |
 //!
-//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) and the commands (`cli`) are not part of
-//! the interface: they are reachable for this package's own tests and benches, and change without notice.
+//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) and the commands (`cli`) are
+//! not part of the interface: they are reachable for this package's own tests and benches, and change without
+//! notice.
 
 #![warn(missing_docs)]
 

@@ -1,7 +1,7 @@
 //! No two files of a room import each other in a circle, however long.
 //!
-//! A `mod.rs` that only names and re-exports its children is seen through: who imports a name from it imports the
-//! child that defines it.
+//! A `mod.rs` that only names and re-exports its children is seen through: who imports a name from it imports
+//! the child that defines it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

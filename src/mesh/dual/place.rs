@@ -171,7 +171,8 @@ impl Placement<'_> {
         let mean = position / count as f64;
         let length = normal.length();
         let normal = normal / length;
-        // over a bend the tangent planes of the hits pass as far above the surface as the mean of the hits lies below it
+        // over a bend the tangent planes of the hits pass as far above the surface as the mean of the hits
+        // lies below it
         let (mut least_agreement, mut height) = (f64::INFINITY, 0.0);
         for &number in numbers {
             let of_hit = self.hits.normals[number];
@@ -187,8 +188,8 @@ impl Placement<'_> {
         }
     }
 
-    /// Moves the vertex of a loop that is not smooth to a crease or a corner, or onto the border. `low` are the extended
-    /// indices of the cell's low corner, and `mean` is the mean of the loop's hits.
+    /// Moves the vertex of a loop that is not smooth to a crease or a corner, or onto the border. `low` are
+    /// the extended indices of the cell's low corner, and `mean` is the mean of the loop's hits.
     fn move_to_crease(
         &self,
         low: [usize; 3],

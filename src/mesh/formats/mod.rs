@@ -3,8 +3,8 @@
 //! Coordinates are in metres with z up, and triangles run counter-clockwise as seen from the fluid. Normals
 //! are written where the format has them.
 //!
-//! The command line takes its help, its messages and its writers from [`FORMATS`]. A new format is a file here
-//! with a constant `FORMAT`, declared as a module and listed in the table.
+//! The command line takes its help, its messages and its writers from [`FORMATS`]. A new format is a file
+//! here with a constant `FORMAT`, declared as a module and listed in the table.
 
 mod format;
 pub mod glb;

@@ -1,8 +1,9 @@
 //! The methods that find the pressure. Each has a folder, which declares the method and holds its scheme, a
 //! readable `step` over the stages of [`Core`](super::core::Core).
 //!
-//! To add a method: a folder with its numbers, their declaration and limits (`mod.rs`) and its scheme (`scheme.rs`),
-//! a line in the list of this file, and an arm in `start.rs`. `rfm explain --methods` then writes the page beside it.
+//! To add a method: a folder with its numbers, their declaration and limits (`mod.rs`) and its scheme
+//! (`scheme.rs`), a line in the list of this file, and an arm in `start.rs`. `rfm explain --methods` then
+//! writes the page beside it.
 
 mod declaration;
 mod dfsph;
