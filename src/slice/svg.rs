@@ -8,11 +8,12 @@ use std::fmt::Write;
 use glam::DVec2;
 
 use super::{
-    Outline, Rgb, Samples, Scale,
     axes::{self, INK, PlotFrame},
-    isolines::outlines,
+    colour::{Rgb, Scale},
+    isolines::{Outline, outlines},
     labels::{LevelLabel, Placer},
     paths,
+    sample::Samples,
 };
 use crate::field::Field;
 

@@ -9,7 +9,23 @@ use std::path::{Path, PathBuf};
 use crate::tool::root;
 
 /// Rooms without circles of files.
-const ROOMS: [&str; 4] = ["ir", "codegen", "simplify", "solid"];
+const ROOMS: [&str; 15] = [
+    "cli",
+    "codegen",
+    "diagnostic",
+    "experiment",
+    "field",
+    "fluid_surface",
+    "ir",
+    "lower",
+    "mesh",
+    "render",
+    "simplify",
+    "slice",
+    "solid",
+    "sph",
+    "syntax",
+];
 
 type Segments = Vec<String>;
 
