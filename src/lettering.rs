@@ -1,9 +1,10 @@
-//! Words in drawings: the texts of an SVG document as outlines of the one font that is built in.
+//! Words in drawings: the texts of an SVG document become outlines of the one built-in font.
 //!
-//! Our drawings hold a few words that run from left to right. A glyph for each character, ligatures and kerning are
-//! enough for them, where layout for every script would take longer to build than all other parts of the pictures.
+//! Our drawings hold a few words that run from left to right. A glyph for each character, ligatures and
+//! kerning are enough for them. Layout for every script would take longer to build than all other parts of
+//! the pictures.
 //!
-//! Invariant: no font of the system is looked at, so a picture does not depend on the machine.
+//! Invariant: no font of the system is read, so a picture does not depend on the machine.
 
 use std::fmt::Write;
 use std::sync::LazyLock;
@@ -15,20 +16,20 @@ use ttf_parser::gsub::SubstitutionSubtable;
 use ttf_parser::opentype_layout::{LayoutTable, Lookup};
 use ttf_parser::{Face, GlyphId, OutlineBuilder, Tag};
 
-/// What an SVG renderer takes for `font-size` where none is given.
+/// Font size that an SVG renderer assumes if no `font-size` is given.
 const DEFAULT_SIZE: f64 = 12.0;
 
-/// Reads an SVG document, its words as outlines. Of a text only `x`, `y`, `font-size`, `text-anchor`, and `dx` of the
-/// `<tspan>`s in it say where the letters stand.
+/// Reads an SVG document and turns its words into outlines. Letters are placed only by `x`, `y`, `font-size`
+/// and `text-anchor` of a text, and by `dx` of the `<tspan>`s in it.
 ///
 /// # Errors
-/// What is wrong with the document.
+/// Returns what is wrong with the document.
 pub(crate) fn tree(svg: &str) -> Result<Tree, String> {
     let document = Document::parse(svg).map_err(|error| error.to_string())?;
     Tree::from_str(&outlined(svg, &document), &Options::default()).map_err(|error| error.to_string())
 }
 
-/// The document with a group of paths in place of each text.
+/// Returns the document with a group of paths in place of each text.
 fn outlined(svg: &str, document: &Document<'_>) -> String {
     let mut out = String::new();
     let mut copied = 0;
@@ -41,14 +42,14 @@ fn outlined(svg: &str, document: &Document<'_>) -> String {
     out
 }
 
-/// Attributes that say how a text is drawn, as they are written.
+/// Attributes that say how a text is drawn, exactly as the document writes them.
 fn style(svg: &str, text: Node<'_, '_>) -> String {
     let places = ["x", "y", "dx", "font-size", "font-weight", "text-anchor"];
     let kept = text.attributes().filter(|attribute| !places.contains(&attribute.name()));
     kept.map(|attribute| format!(" {}", &svg[attribute.range()])).collect()
 }
 
-/// A path for each part of a text.
+/// Writes a path for each part of a text.
 fn paths(svg: &str, text: Node<'_, '_>) -> String {
     let number = |node: Node<'_, '_>, name: &str| node.attribute(name).and_then(|x| x.parse::<f64>().ok());
     let inherited = |name: &str| text.ancestors().find_map(|node| node.attribute(name));
@@ -79,7 +80,7 @@ fn paths(svg: &str, text: Node<'_, '_>) -> String {
     parts.into_iter().map(path).collect()
 }
 
-/// The font, and what it does to glyphs side by side.
+/// Built-in font with its rules for adjacent glyphs.
 struct Font {
     face: Face<'static>,
     ligatures: Vec<Lookup<'static>>,
@@ -96,7 +97,7 @@ static FONT: LazyLock<Font> = LazyLock::new(|| {
     }
 });
 
-/// The tables of a feature for Latin script; a script without letters of its own has them too.
+/// Tables of a feature for Latin script. Text in a script without letters of its own uses them too.
 fn lookups(table: LayoutTable<'static>, feature: &[u8; 4]) -> Vec<Lookup<'static>> {
     let script = table.scripts.find(Tag::from_bytes(b"latn"));
     let Some(language) = script.and_then(|script| script.default_language) else { return Vec::new() };
@@ -106,7 +107,8 @@ fn lookups(table: LayoutTable<'static>, feature: &[u8; 4]) -> Vec<Lookup<'static
 }
 
 impl Font {
-    /// A glyph for each character, the font's box for unknown ones; ligatures are joined.
+    /// Returns a glyph for each character, or the font's box if the character is unknown. Ligatures are
+    /// joined.
     fn glyphs(&self, words: &str) -> Vec<GlyphId> {
         let of = |character| self.face.glyph_index(character).unwrap_or_default();
         let mut glyphs: Vec<GlyphId> = words.chars().filter(|c| !c.is_control()).map(of).collect();
@@ -122,7 +124,7 @@ impl Font {
         glyphs
     }
 
-    /// To the next glyph, in units of the font.
+    /// Distance to the next glyph, in units of the font.
     fn advance(&self, glyph: GlyphId, next: Option<&GlyphId>) -> f64 {
         let own = self.face.glyph_hor_advance(glyph).unwrap_or(0);
         let kerning = self.kerning.iter().filter_map(|lookup| kerning(lookup, glyph, *next?));
@@ -133,7 +135,7 @@ impl Font {
         (0..glyphs.len()).map(|i| self.advance(glyphs[i], glyphs.get(i + 1))).sum()
     }
 
-    /// The data of an SVG path.
+    /// Returns the data of an SVG path.
     fn outline(&self, glyphs: &[GlyphId], [x, y]: [f64; 2], scale: f64) -> String {
         let mut pen = Pen { path: String::new(), x, y, scale };
         for (i, &glyph) in glyphs.iter().enumerate() {
@@ -144,7 +146,7 @@ impl Font {
     }
 }
 
-/// The ligature that begins these glyphs, and how many more than the first it takes.
+/// Returns the ligature that begins these glyphs, and how many glyphs it takes after the first.
 fn ligature(lookup: &Lookup<'_>, glyphs: &[GlyphId]) -> Option<(GlyphId, usize)> {
     lookup.subtables.into_iter().find_map(|table| {
         let SubstitutionSubtable::Ligature(table) = table else { return None };
@@ -159,7 +161,7 @@ fn ligature(lookup: &Lookup<'_>, glyphs: &[GlyphId]) -> Option<(GlyphId, usize)>
     })
 }
 
-/// What the first of two glyphs is wider by, in units of the font.
+/// Extra width of the first of two glyphs, in units of the font.
 fn kerning(lookup: &Lookup<'_>, first: GlyphId, second: GlyphId) -> Option<i16> {
     lookup.subtables.into_iter().find_map(|table| {
         let PositioningSubtable::Pair(table) = table else { return None };
@@ -177,10 +179,10 @@ fn kerning(lookup: &Lookup<'_>, first: GlyphId, second: GlyphId) -> Option<i16> 
 /// Draws glyphs on a page whose y points down.
 struct Pen {
     path: String,
-    /// Where the present glyph begins.
+    /// Position where the present glyph begins.
     x: f64,
     y: f64,
-    /// Units of the page in one of the font.
+    /// Units of the page in one unit of the font.
     scale: f64,
 }
 
@@ -188,7 +190,7 @@ impl Pen {
     fn draw<const N: usize>(&mut self, command: char, points: [(f32, f32); N]) {
         self.path.push(command);
         for (x, y) in points {
-            // single precision is what the rasteriser has
+            // The rasteriser has single precision only.
             let x = (self.x + self.scale * f64::from(x)) as f32;
             let y = (self.y - self.scale * f64::from(y)) as f32;
             let _ = write!(self.path, "{x} {y} ");

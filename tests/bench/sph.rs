@@ -1,12 +1,14 @@
-//! What a step costs: `cargo bench --bench sph`. Asserts nothing about time.
+//! Cost of a time step: `cargo bench --bench sph`. It asserts nothing about time.
 //!
-//! Per particle and neighbour, by method and precision, for a dam that breaks in the box [0, 3]³ (a column of water fills a
-//! third of the floor); on one thread and on two; what walls and contact take of it in a pool around a pawn and around 500
-//! posts; and how long a pawn takes until a fluid can meet it. `-- --million` adds a million particles, `-- --only PART`
-//! leaves the others out (methods, threads, walls).
+//! The benchmark measures time per particle and neighbour, by method and precision, for a dam that breaks in
+//! the box [0, 3]³; a column of water fills a third of the floor. It compares one thread with two. It finds
+//! the share of walls and contact in a pool around a pawn and in one around 500 posts, and the time to
+//! prepare a pawn until a fluid can meet it. `-- --million` adds a million particles, and `-- --only PART`
+//! runs one part alone (methods, threads, walls).
 //!
-//! Times are of the processor, all threads of the process together, where the system tells (Unix), else of the clock. A
-//! repetition takes as many steps as last a quarter of a second; the median of the repetitions is told, and the least.
+//! Times are processor times of all threads of the process together if the system provides them (Unix), else
+//! times of the clock. A repetition takes as many steps as last a quarter of a second. The tables show the
+//! median of the repetitions, and the least.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,11 +24,12 @@ use rfm::{Engine, Program};
 
 const BOX: Aabb = Aabb::new(DVec3::ZERO, DVec3::splat(3.0));
 
-/// Seconds of a repetition, and how many there are.
+/// Length of a repetition in seconds, and the number of repetitions.
 const REPETITION: f64 = 0.25;
 const REPETITIONS: usize = 7;
 
-/// Support radii per spacing: 74 neighbours, and 45 where pressure is solved for, as the scenes of the language have it.
+/// Support radii per spacing: 74 neighbours, or 45 if pressure is solved for, just like scenes in the
+/// language.
 fn support(method: Method) -> f64 {
     if matches!(method, Method::Dfsph(_)) { 2.2 } else { 2.6 }
 }
@@ -39,10 +42,10 @@ fn wcsph(gradients: Gradients) -> Method {
     })
 }
 
-/// 1 m wide, 3 m deep, 1.5 m high.
+/// Column of water, 1 m wide, 3 m deep and 1.5 m high.
 const COLUMN: Aabb = Aabb::new(DVec3::ZERO, DVec3::new(1.0, 3.0, 1.5));
 
-/// As much water, half a metre deep.
+/// Pool with an equal volume of water, half a metre deep.
 const POOL: Aabb = Aabb::new(DVec3::ZERO, DVec3::new(3.0, 3.0, 0.5));
 
 fn parameters(particles: usize, method: Method, precision: Precision) -> Parameters {
@@ -81,7 +84,7 @@ fn processor() -> f64 {
     }
 }
 
-/// Steps that last about a repetition, after a few that fill the buffers.
+/// Number of steps that last about a repetition, found after a few that fill the buffers.
 fn steps_per_repetition(simulation: &mut Simulation) -> u32 {
     let started = processor();
     for _ in 0..4 {
@@ -99,7 +102,7 @@ fn seconds_per_step(simulation: &mut Simulation, steps: u32) -> f64 {
     (processor() - started) / f64::from(steps)
 }
 
-/// Median and least.
+/// Median and least value.
 fn middle(mut values: Vec<f64>) -> (f64, f64) {
     values.sort_by(f64::total_cmp);
     (values[values.len() / 2], values[0])
@@ -112,7 +115,7 @@ fn head() {
     println!("|---|---|--:|--:|--:|--:|--:|--:|--:|");
 }
 
-/// One row of the methods' table.
+/// Prints one row of the methods' table.
 fn row(name: &str, particles: usize, method: Method, precision: Precision) {
     let mut simulation = dam_break(particles, method, precision);
     let steps = steps_per_repetition(&mut simulation);
@@ -159,7 +162,7 @@ fn methods(sizes: &[usize]) {
     }
 }
 
-/// The clock on one thread over that on two, in turns, so that what else the machine does meets both.
+/// Clock time on one thread over that on two. They take turns, so that other work of the machine slows both.
 fn threads(sizes: &[usize]) {
     println!("\nwcsph in f32 on one thread and on two, by the clock, in turns.\n");
     println!("| particles | ms on one | ms on two | quotient |");
@@ -190,13 +193,13 @@ fn threads(sizes: &[usize]) {
 
 const PAWN: &str = include_str!("../../examples/pawn.rfm");
 
-/// Posts in 25 rows of 20, thinner than the support radius, higher than the pool.
+/// Posts in 25 rows of 20, thinner than the support radius and higher than the pool.
 const POSTS: &str = "rfm 1
 solid posts = any i in 0..25: any j in 0..20: cylinder(0.02, 0.8).move([0.06 + 0.12*i, 0.075 + 0.15*j, 0])
 ";
 
-/// What walls and contact take of a step: the same state steps on with the obstacle, without it, and without it in a box
-/// whose walls are far away, in turns.
+/// Share of walls and contact in a step. One state steps on with the obstacle, without it, and without it in
+/// a box whose walls are far away, in turns.
 fn walls(particles: usize) {
     println!(
         "\nWalls and contact: a pool 0.5 m deep in the box [0, 3]³, wcsph in f32, one thread, ms per step.\n"
@@ -214,7 +217,7 @@ fn walls(particles: usize) {
         let new = |fluid: &Particles, domain, obstacles| {
             Simulation::new(parameters.clone(), fluid.clone(), domain, obstacles).unwrap()
         };
-        // the lattice has given way, and the fluid leans on the obstacle
+        // These steps let the lattice give way, so that the fluid leans on the obstacle.
         let mut settled = new(&fluid, BOX, vec![obstacle()]);
         (0..SETTLED).for_each(|_| settled.step().unwrap());
         let state = settled.particles();
@@ -224,11 +227,11 @@ fn walls(particles: usize) {
             let cases = [(BOX, vec![obstacle()]), (BOX, vec![]), (BOX.grown(100.0), vec![])];
             for ((domain, obstacles), times) in cases.into_iter().zip(&mut times) {
                 let mut simulation = new(state, domain, obstacles);
-                simulation.step().unwrap(); // the first fills the buffers
+                simulation.step().unwrap(); // The first step fills the buffers.
                 times.push(seconds_per_step(&mut simulation, steps));
             }
         }
-        // each turn's quotients: a machine that slows down in between slows all three
+        // Quotients are taken turn by turn, because a machine that slows down in between slows all three.
         let part = |without: usize| {
             let parts = times[0].iter().zip(&times[without]).map(|(all, rest)| 100.0 * (1.0 - rest / all));
             middle(parts.collect()).0
@@ -260,7 +263,7 @@ fn obstacle(text: &str, solid: &str, reach: f64) -> Arc<dyn Walls> {
     program.solid_with(solid, Engine::Auto).unwrap().walls(BOX, reach).into()
 }
 
-/// From the text of a pawn to the first contact with it.
+/// Measures the time from the text of a pawn to the first contact with it.
 fn set_up(reach: f64) {
     let times = (0..3 * REPETITIONS).map(|_| {
         let started = processor();

@@ -1,12 +1,13 @@
-//! Columns: particles in the order of upright columns as wide as the support radius, and of thin slices within each.
+//! Bins that sort particles by upright columns as wide as the support radius, and by thin slices within each.
 //!
-//! Columns follow a Hilbert curve over the ground, so that neighbours in space are neighbours in memory; within a column
-//! particles lie from bottom to top, slice by slice. What is near a few particles of one column is then one contiguous
-//! range in each of the nine columns around it, found by two look-ups, and as tight as a slice is thin.
+//! Columns follow a Hilbert curve over the ground, so that neighbours in space are neighbours in memory.
+//! Within a column, particles lie from bottom to top, slice by slice. The candidates near a few particles of
+//! one column form one contiguous range in each of the nine columns around it. Two look-ups find such a
+//! range, which fits as tightly as a slice is thin.
 //!
-//! Invariant: after [`Columns::sort`] and a permutation by [`Columns::order`], slice s of the column of rank r holds the
-//! particles `starts[r·slices + s] .. starts[r·slices + s + 1]`; particles of one slice keep their previous order, so the
-//! result depends on nothing but the input.
+//! Invariant: after [`Columns::sort`] and a permutation by [`Columns::order`], slice s of the column of rank
+//! r holds the particles `starts[r·slices + s] .. starts[r·slices + s + 1]`. Particles of one slice keep
+//! their previous order, so the result depends only on the input.
 
 use std::ops::Range;
 
@@ -15,13 +16,14 @@ use smallvec::SmallVec;
 
 use super::super::particles::Vectors;
 
-/// Slices per support radius: a range reaches at most one slice too far at either end.
+/// Slices per support radius. A range reaches at most one slice too far at either end.
 const SLICES: f64 = 8.0;
 
-/// More cells than this per particle would cost more to clear than they save.
+/// Upper bound on cells per particle. More cells would cost more to clear than they save.
 const CELLS_PER_PARTICLE: usize = 16;
 
-/// Particles that share what is gathered around them, at most. Many share one gathering, few need little room around.
+/// Maximum number of particles that share one gathering of their surroundings. A large block gathers less
+/// often; a small one needs less room around it.
 pub(in super::super) const BLOCK: usize = 64;
 
 /// Consecutive particles of one column.
@@ -29,7 +31,7 @@ pub(in super::super) const BLOCK: usize = 64;
 pub(in super::super) struct Block {
     pub first: u32,
     pub len: u32,
-    /// Column along x and y.
+    /// Index of the column along x and y.
     column: [u32; 2],
 }
 
@@ -39,30 +41,30 @@ impl Block {
     }
 }
 
-/// First and past the last particle of each column around one; some may be empty.
+/// First and one past the last particle in each of the columns around a block; ranges may be empty.
 pub(in super::super) type Ranges = SmallVec<[(u32, u32); 9]>;
 
 /// Bins over the bounding box of the particles.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct Columns {
     origin: DVec3,
-    /// Of a column, m.
+    /// Width of a column, m.
     width: f64,
-    /// Of a slice, m.
+    /// Thickness of a slice, m.
     thickness: f64,
-    /// Columns along x and y, slices along z.
+    /// Number of columns along x and y, and of slices along z.
     counts: [usize; 3],
-    /// Place of each column along the curve, x fastest.
+    /// Rank of each column along the curve; x varies fastest.
     rank: Vec<u32>,
     starts: Vec<u32>,
-    /// Cell of each particle in the old order.
+    /// Cell of each particle, in the old order.
     cell_of: Vec<u32>,
     order: Vec<u32>,
     blocks: Vec<Block>,
 }
 
 impl Columns {
-    /// Bins finite positions for searches within `radius`; where particles are sparse, columns are wider.
+    /// Bins finite positions for searches within `radius`. Columns are wider where particles are sparse.
     pub fn sort(&mut self, position: &Vectors, radius: f64) {
         self.lay_out(position, radius);
         let mut cell_of = std::mem::take(&mut self.cell_of);
@@ -75,7 +77,7 @@ impl Columns {
 
         self.starts.clear();
         self.starts.resize(self.counts.iter().product::<usize>() + 2, 0);
-        // counted two places on, so that filling `order` leaves the starts in place
+        // Counts go two places further on, so that filling `order` leaves the starts in place.
         for &cell in &self.cell_of {
             self.starts[cell as usize + 2] += 1;
         }
@@ -103,14 +105,14 @@ impl Columns {
             + size_of::<Block>() * self.blocks.capacity()
     }
 
-    /// All particles, in their new order, a column's cut into pieces.
+    /// Blocks that hold all particles in their new order; each column is cut into pieces.
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
 
-    /// A range of particles for each column around a block's; together they hold every particle within `radius` of a
-    /// particle of the block with z from `low` to `high`. For a smaller extent no range is added that was not there for
-    /// the larger, and none moves out of it.
+    /// Returns a range of particles for each column around that of a block. Together they hold every particle
+    /// within `radius` of a particle of the block with z from `low` to `high`. Shrinking the extent adds no
+    /// range, and every range stays inside that of the larger extent.
     pub fn ranges_around(&self, block: &Block, (low, high): (f64, f64), radius: f64) -> Ranges {
         let (first, last) = (self.slice(low - radius), self.slice(high + radius));
         let [nx, ny, slices] = self.counts;
@@ -132,7 +134,7 @@ impl Columns {
             for x in 0..nx {
                 let column = self.rank[x + nx * y] as usize * slices;
                 let (mut first, end) = (self.starts[column], self.starts[column + slices]);
-                // pieces of equal size rather than full ones and a small rest
+                // Pieces of equal size are better than full ones and a small rest.
                 let mut pieces = (end - first).div_ceil(BLOCK as u32);
                 while pieces > 0 {
                     let len = (end - first).div_ceil(pieces);
@@ -145,21 +147,22 @@ impl Columns {
         self.blocks.sort_unstable_by_key(|block| block.first);
     }
 
-    /// Chooses origin, widths and counts; columns grow where particles are too sparse for fine ones.
+    /// Chooses origin, widths and counts. Columns grow where particles are too sparse for fine ones.
     fn lay_out(&mut self, position: &Vectors, radius: f64) {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in position.iter() {
             (min, max) = (min.min(p), max.max(p));
         }
         let limit = (CELLS_PER_PARTICLE * position.len()).max(4096) as f64;
-        // rounding may add this to a distance: columns are wider by so much
+        // Columns are wider by the error that rounding may add to a distance.
         let slack = 1e-9 * radius + 8.0 * f64::EPSILON * min.abs().max(max.abs()).max_element();
         self.width = radius + slack;
         self.thickness = self.width / SLICES;
         let old = self.counts;
         loop {
             let size = DVec3::new(self.width, self.width, self.thickness);
-            // on multiples of the width, so that the layout stays while the fluid moves little
+            // The origin lies on multiples of the width, so that the layout stays while the fluid moves
+            // little.
             let origin = (min / size).floor() * size;
             let counts = ((max - origin) / size).floor() + 1.0;
             if counts.element_product() <= limit {
@@ -187,20 +190,21 @@ impl Columns {
         }
     }
 
-    /// Column of a coordinate along x or y, clamped to the grid. Monotone in `x`.
+    /// Column of a coordinate along x or y, clamped to the grid. The result is monotone in `x`.
     fn column(&self, axis: usize, x: f64) -> usize {
-        // a negative quotient casts to 0; there are fewer columns than u32 counts
+        // A negative quotient casts to 0, and `u32` can count all columns.
         (((x - self.origin[axis]) / self.width) as u32 as usize).min(self.counts[axis] - 1)
     }
 
-    /// Slice of a height, likewise.
+    /// Slice of a height, clamped to the grid. The result is monotone in `z`.
     fn slice(&self, z: f64) -> usize {
         (((z - self.origin.z) / self.thickness) as u32 as usize).min(self.counts[2] - 1)
     }
 }
 
-/// Distance along the Hilbert curve of a square of a power of two (Hilbert 1891), below 2³² for sides up to 2¹⁶; farther
-/// columns fall together, which costs nothing but order.
+/// Distance along the Hilbert curve (Hilbert 1891) of a square whose side is a power of two. Distances are
+/// below 2³² for sides up to 2¹⁶. Columns farther out share distances, which only makes their order less
+/// local.
 fn hilbert(side: u32, mut x: u32, mut y: u32) -> u32 {
     let mut distance = 0u32;
     let mut s = side / 2;

@@ -1,21 +1,24 @@
 //! Sums over neighbours, many particles at a time.
 //!
-//! A register holds several particles that lie close together: consecutive ones of one column. Whatever is near any of
-//! them goes past, one at a time, and is added to all: kernels of finite support give zero to those that are too far.
-//! No list of neighbours exists, hence none is kept from step to step. A method that sums many times over the same places
-//! may have found once what is near each register ([`Near`]: a third of a list of neighbours, shared by 16 particles).
+//! A register holds several particles that lie close together: consecutive ones of one column. Each particle
+//! near any of them is added in turn to all of them; kernels of finite support give zero to those that are
+//! too far. No list of neighbours exists, so none is kept from step to step. A method that sums many times
+//! over the same places may find once what is near each register. The result, [`Near`], takes a third of a
+//! list of neighbours and is shared by 16 particles.
 //!
 //! ```text
 //! Columns::sort ─▶ blocks ─▶ gather what is around a block ─▶ registers of particles ─▶ what is near each
 //!                                                             ─▶ PairPass::add ─▶ PairPass::finish
 //! ```
 //!
-//! Positions are taken relative to the block before they are rounded to the precision of the pair arithmetic, so that
-//! single precision has its full digits for the distances that matter, wherever the scene lies. A pass sums in that
-//! precision over the neighbours of one particle; everything that lasts longer than a step is in double precision.
+//! Positions are taken relative to the block before they are rounded to the precision of the pair arithmetic.
+//! Single precision thus has its full digits for the distances that matter, wherever the scene lies. A pass
+//! sums in that precision over the neighbours of one particle; everything that lasts longer than a step is in
+//! double precision.
 //!
-//! Invariants: particle i gathers from its neighbours in the order of the columns and writes only its own results: the
-//! same bits for any number of threads. A particle is among its own neighbours, with the distance zero.
+//! Invariants: particle i gathers from its neighbours in the order of the columns and writes only its own
+//! results, which gives equal bits for any number of threads. A particle is among its own neighbours, at
+//! distance zero.
 
 mod columns;
 mod near;
@@ -33,8 +36,9 @@ use columns::{BLOCK, Block};
 pub(super) use near::Near;
 use near::{OfBlock, Reach};
 
-/// Compiles an expression for three widths of registers (512, 256 and 128 bits on x86-64) and runs the widest that the
-/// processor has. Each width of each pass is code of its own: the levels in between are not worth theirs.
+/// Compiles an expression for three widths of registers (512, 256 and 128 bits on x86-64) and runs the widest
+/// that the processor has. Each width of each pass is code of its own, and the levels in between are not
+/// worth theirs.
 macro_rules! at_level {
     ($level:expr, $simd:ident => $run:expr) => {{
         let level: Level = $level;
@@ -53,7 +57,7 @@ macro_rules! at_level {
     }};
 }
 
-/// A precision for sums over neighbours.
+/// Precision for sums over neighbours.
 pub(super) trait Real: SimdFloatElement + Default + Copy + Send + Sync + 'static {
     fn of(x: f64) -> Self;
     fn wide(self) -> f64;
@@ -84,11 +88,11 @@ macro_rules! real {
 real!(f32);
 real!(f64);
 
-/// What is summed over neighbours: `IN` numbers are read of each particle besides its position, `SUMS` are summed, and
-/// `OUT` are made of them.
+/// Quantity that is summed over neighbours. A pass reads `IN` numbers of each particle besides its position,
+/// forms `SUMS` sums and makes `OUT` results from them.
 pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>: Copy + Sync {
-    /// Adds what one neighbour gives to several particles. `d` points from the neighbour to them, r2 = |d|². To be
-    /// `#[inline(always)]`, and zero from the support radius on.
+    /// Adds the contribution of one neighbour to several particles. `d` points from the neighbour to them,
+    /// and r2 = |d|². Implementations must be `#[inline(always)]` and add zero from the support radius on.
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
         d: [V; 3],
@@ -102,22 +106,23 @@ pub(super) trait PairPass<const IN: usize, const SUMS: usize, const OUT: usize>:
     fn finish(&self, i: usize, sums: [f64; SUMS]) -> [f64; OUT];
 }
 
-/// So many blocks are one task: small enough to balance, large enough to forget.
+/// Number of blocks in one task: small enough to balance the load, large enough to make its overhead
+/// negligible.
 const TASK: usize = 4;
 
 /// Numbers in the widest register.
 const MOST_LANES: usize = 16;
 
-/// Where the particles are, and how they are sorted.
+/// Positions of the particles, and how they are sorted.
 #[derive(Clone, Copy)]
 pub(super) struct Cloud<'a> {
     pub level: Level,
     pub columns: &'a Columns,
-    /// In the order of the columns.
+    /// Positions in the order of the columns.
     pub position: &'a Vectors,
     /// Support radius, m.
     pub radius: f64,
-    /// What is near each particle, if it was found before; of the same places and the same precision.
+    /// Particles near each register, if they were found before for these places and this precision.
     pub near: Option<&'a Near>,
 }
 
@@ -127,11 +132,11 @@ pub(super) struct Surroundings<T> {
     values: Vec<Vec<T>>,
     /// First particle and first copy of each range.
     ranges: SmallVec<[(usize, usize); 9]>,
-    /// How many copies there are; the vectors may be longer.
+    /// Number of copies; the vectors may be longer.
     count: usize,
-    /// The copy of the block's first particle.
+    /// Index of the copy of the block's first particle.
     own: usize,
-    /// The copies that are near each register.
+    /// Copies that are near each register.
     near: OfBlock,
     /// [`BLOCK`] places for each sum, one for each particle.
     sums: Vec<f64>,
@@ -142,14 +147,15 @@ struct Task<'a> {
     /// Number of the first block among all.
     number: usize,
     blocks: &'a [Block],
-    /// The first particle.
+    /// Index of the first particle.
     first: usize,
     /// Results of these particles, one slice for each number that a pass makes.
     out: SmallVec<[&'a mut [f64]; 8]>,
 }
 
 impl<'a> Task<'a> {
-    /// Halves the blocks among the threads. This is compiled once for all passes: hence the function behind a pointer.
+    /// Halves the blocks among the threads. `one` is behind a pointer so that this is compiled once for all
+    /// passes.
     fn run(self, one: &(dyn Fn(Task<'_>) + Sync)) {
         if self.blocks.len() <= TASK {
             return one(self);
@@ -171,7 +177,8 @@ impl<'a> Task<'a> {
 }
 
 impl Cloud<'_> {
-    /// Runs a pass over all pairs nearer than the radius; `fields` and `out` are in the order of the particles.
+    /// Runs a pass over all pairs nearer than the radius. `fields` and `out` are in the order of the
+    /// particles.
     pub fn sum<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
         &self,
         pass: &P,
@@ -199,7 +206,7 @@ impl Cloud<'_> {
         });
     }
 
-    /// Finds what is near each particle, for passes to come: worth it from three of them on.
+    /// Finds what is near each register for later passes, which is worthwhile from three passes on.
     pub fn find_near<T: Real>(&self, near: &mut Near) {
         let blocks = self.columns.blocks();
         near.of_blocks.resize_with(blocks.len(), OfBlock::default);
@@ -230,7 +237,7 @@ impl Cloud<'_> {
             count += end - start;
         }
         around.count = count;
-        // the last register of the block may reach beyond what was copied
+        // The last register of the block may reach beyond the copies.
         let room = count + MOST_LANES;
         for values in &mut around.values[..columns] {
             if values.len() < room {
@@ -296,8 +303,8 @@ fn copy_ranges<T: Real, S: Simd>(
     }
 }
 
-/// Sums over the neighbours of a block's particles into `around.sums`. This alone is compiled for each pass, precision
-/// and width.
+/// Sums over the neighbours of a block's particles into `around.sums`. Only this function is compiled for
+/// each pass, precision and width.
 fn add_up<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
     level: Level,
     pass: &P,
@@ -323,9 +330,11 @@ fn add_up_registers<T, S, P, const IN: usize, const SUMS: usize, const OUT: usiz
     S: Simd,
     P: PairPass<IN, SUMS, OUT>,
 {
-    // Loops over the few fields are written out: what a closure holds would not be compiled for the wide registers.
+    // Loops over the few fields are written out, because the body of a closure would not be compiled for wide
+    // registers.
     let lanes = T::Native::<S>::LEN;
-    // a copy of its own: what the pass's numbers come to is then found before the loop over neighbours, not in it
+    // A local copy lets the compiler compute values derived from the pass before the loop over neighbours,
+    // not in it.
     let pass = *pass;
     let zero = T::Native::<S>::splat(simd, T::default());
     if around.sums.len() < SUMS * BLOCK {
@@ -372,7 +381,7 @@ fn add_up_registers<T, S, P, const IN: usize, const SUMS: usize, const OUT: usiz
     }
 }
 
-/// Makes results of a block's sums. `out` begins with particle `first`.
+/// Makes results from a block's sums. `out` begins with particle `first`.
 fn finish<P, const IN: usize, const SUMS: usize, const OUT: usize>(
     pass: &P,
     block: &Block,
@@ -390,7 +399,7 @@ fn finish<P, const IN: usize, const SUMS: usize, const OUT: usize>(
     }
 }
 
-/// The places of a register's particles, of which the first is this copy.
+/// Places of a register's particles; `copy` is the index of the first.
 #[inline(always)]
 fn places_of<T: Real, S: Simd>(simd: S, around: &Surroundings<T>, copy: usize) -> [T::Native<S>; 3] {
     let mut here = [T::Native::<S>::splat(simd, T::default()); 3];
@@ -400,7 +409,7 @@ fn places_of<T: Real, S: Simd>(simd: S, around: &Surroundings<T>, copy: usize) -
     here
 }
 
-/// Least and greatest.
+/// Least and greatest value.
 #[inline(always)]
 fn extent(z: &[f64]) -> (f64, f64) {
     z.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)))

@@ -1,20 +1,20 @@
-//! What is near a register's particles, of all that is gathered around their block.
+//! Selection of the gathered copies that are near a register's particles.
 
 use fearless_simd::{Simd, SimdFloat, SimdMask};
 
 use super::Real;
 
-/// The places within the radius of the box around a register's particles: of the copies, whose ranges are boxes too, about a
-/// third lies beyond them.
+/// Places within the radius of the box around a register's particles. The ranges of copies are boxes too, and
+/// about a third of the copies lies outside them.
 pub(super) struct Reach<V> {
     centre: [V; 3],
     half: [V; 3],
-    /// The radius squared, and a little more than rounding can make of it.
+    /// Square of the radius, plus a little more than rounding can add to it.
     squared: V,
 }
 
 impl<V> Reach<V> {
-    /// Of the first `lanes` particles.
+    /// Returns the reach of the first `lanes` particles.
     #[inline(always)]
     pub fn around<T: Real, S: Simd>(simd: S, here: &[V; 3], lanes: usize, radius: f64) -> Self
     where
@@ -33,7 +33,7 @@ impl<V> Reach<V> {
         Self { centre, half, squared: V::splat(simd, T::of(radius * radius * 1.0001)) }
     }
 
-    /// Appends those from `start` to `end` that are within it.
+    /// Appends the copies from `start` to `end` that are within reach.
     #[inline(always)]
     pub fn collect<T: Real, S: Simd>(
         &self,
@@ -66,7 +66,7 @@ impl<V> Reach<V> {
     }
 }
 
-/// What is near the registers of each block, kept for several passes over the same places.
+/// Copies near the registers of each block, kept for several passes over the same places.
 #[derive(Default)]
 pub(in crate::sph) struct Near {
     pub(super) of_blocks: Vec<OfBlock>,
@@ -74,9 +74,9 @@ pub(in crate::sph) struct Near {
 
 #[derive(Default)]
 pub(super) struct OfBlock {
-    /// Numbers of copies, register after register.
+    /// Indices of the copies, register after register.
     pub copies: Vec<u32>,
-    /// Past the last copy of each register.
+    /// End of each register's copies in `copies`, one past the last.
     pub ends: Vec<u32>,
 }
 
@@ -86,7 +86,7 @@ impl OfBlock {
         self.ends.clear();
     }
 
-    /// Of the register of this number.
+    /// Copies near the register with this number.
     #[inline(always)]
     pub fn register(&self, number: usize) -> &[u32] {
         let begin = number.checked_sub(1).map_or(0, |before| self.ends[before]);

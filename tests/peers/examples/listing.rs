@@ -1,8 +1,10 @@
-//! What the machine code of single points consists of, as evidence for where time goes: `cargo run --release --example listing`.
+//! Content of the machine code for single points, as evidence for where time goes.
 //!
-//! For each program: nodes of its graph, instructions, divisions and roots, loads from and stores to the stack
-//! (constants that found no register, and values that lost theirs), selects. With the argument `asm`, the code of the
-//! pawn's textbook program for f64 as well.
+//! Run it by `cargo run --release --example listing`.
+//!
+//! The table gives for each program the nodes of its graph, instructions, divisions and roots, loads from and
+//! stores to the stack (constants that found no register, and values that lost theirs), and selects. The
+//! argument `asm` also prints the code of the pawn's textbook program for `f64`.
 
 #[allow(dead_code)]
 #[path = "../src/scenes.rs"]
@@ -61,7 +63,7 @@ fn assembly(solid: &Solid, kind: ProgramKind, form: Form, precision: Precision) 
 
 fn print(what: &str, solid: &Solid, kind: ProgramKind, form: Form, precision: Precision) {
     let text = assembly(solid, kind, form, precision);
-    // the program is the longest block
+    // The program is the longest block.
     let longest = text.split("\nblock").max_by_key(|block| block.len()).unwrap_or_default();
     let lines: Vec<&str> = longest.lines().skip(1).map(str::trim).collect();
     let count = |test: &dyn Fn(&str) -> bool| lines.iter().filter(|line| test(line)).count();

@@ -1,4 +1,4 @@
-//! What the product promises about its speed, each promise beside what this run found.
+//! Promises of the product about its speed, each beside the figure that this run found.
 
 use crate::compile::Time;
 use crate::groups::{MAP_CONTACT, MAP_SIGN};
@@ -8,7 +8,7 @@ use crate::measure::Group;
 pub struct Bar {
     pub work: &'static str,
     pub says: String,
-    /// Nothing where the product cannot do it.
+    /// `None` if the product cannot do it.
     pub found: Option<f64>,
     pub bar: Limit,
 }
@@ -29,7 +29,7 @@ impl Bar {
     }
 }
 
-/// All that was measured.
+/// All measured results.
 pub struct Found {
     pub groups: Vec<Group>,
     pub decided: Vec<(String, f64)>,
@@ -58,14 +58,14 @@ impl Found {
         self.ulps.iter().find(|(row, ..)| row == name).map(|(_, value, weight)| (*value, *weight))
     }
 
-    /// Signs that our sign programs got wrong, in all groups.
+    /// Number of signs that our sign programs got wrong, in all groups.
     fn wrong_signs(&self) -> f64 {
         let rows = self.groups.iter().flat_map(|group| &group.rows);
         let ours = rows.filter(|row| row.name.starts_with("ours sign"));
         ours.filter_map(|row| row.errors.wrong_signs).map(|(wrong, _)| wrong as f64).sum()
     }
 
-    /// Gradients of ours in the stable form that are not numbers, corners and edges included.
+    /// Number of our gradients in the stable form that are not numbers, corners and edges included.
     fn nan_gradients(&self) -> f64 {
         let rows = self.groups.iter().flat_map(|group| &group.rows);
         let ours = rows.filter(|row| row.name.starts_with("ours") && row.name.contains("stable"));
@@ -73,7 +73,7 @@ impl Found {
             as f64
     }
 
-    /// The table of promises.
+    /// Table of promises.
     pub fn bars(&self) -> Vec<Bar> {
         use Limit::{AtLeast, AtMost};
         let mut list = Vec::new();

@@ -12,20 +12,20 @@ use crate::fidget as peer;
 use crate::measure::Points;
 use crate::ours;
 
-/// How long something took, in milliseconds: ours, and Fidget's if it has the like.
+/// Duration of a task in milliseconds: ours, and Fidget's if it has a counterpart.
 pub struct Time {
     pub what: String,
     pub ours: f64,
     pub fidget: Option<f64>,
 }
 
-/// Computes something that nobody needs.
+/// Keeps an unused result from being optimised away.
 fn keep<T>(answer: T) {
     black_box(answer);
 }
 
-/// Both in turn; the fastest of each, because a text is read on a thread of its own, and on a busy machine the start
-/// of a thread may have to wait for longer than the whole work takes.
+/// Times both sides in turn and keeps the fastest of each. A text is read on a thread of its own, and on a
+/// busy machine the start of a thread may have to wait for longer than the whole work takes.
 fn time(what: &str, turns: usize, mut ours: impl FnMut(), mut fidget: Option<&mut dyn FnMut()>) -> Time {
     let mut times = [Vec::new(), Vec::new()];
     let clock = |work: &mut dyn FnMut()| {
@@ -43,7 +43,7 @@ fn time(what: &str, turns: usize, mut ours: impl FnMut(), mut fidget: Option<&mu
     Time { what: what.into(), ours, fidget: fidget.map(|_| theirs) }
 }
 
-/// The times of one obstacle, each from the very beginning to one answer.
+/// Times for one obstacle, each from the very beginning to one answer.
 pub fn times(title: &str, turns: usize, text: &str, name: &str, tree: &dyn Fn() -> Tree) -> Vec<Time> {
     let points = Points::random(8, 3.0, 3);
     let centre = DVec3::splat(1.5);

@@ -1,4 +1,4 @@
-//! The obstacles in Fidget's own expressions, and its evaluators behind the common face.
+//! The obstacles in Fidget's own expressions, and its evaluators behind the common interface.
 
 use std::hint::black_box;
 
@@ -12,7 +12,7 @@ use fidget::var::{Var, VarMap};
 use crate::measure::{Points, Work};
 use crate::scenes::{Ball, Order, Sphere, fold};
 
-/// How *and* and *or* are computed.
+/// Formulas for *and* and *or*.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Joins {
     R0,
@@ -84,7 +84,7 @@ pub fn union(spheres: &[Sphere], order: Order, j: Joins) -> Tree {
     fold(&leaves, order, &|u, v| j.or(u, v))
 }
 
-/// Balls, each as r² − d² or, with a root more but of slope 1, as r − d.
+/// Balls, each as r² − d², or as r − d, which costs one more root but has slope 1.
 pub fn balls(balls: &[Ball], j: Joins, as_distance: bool) -> Tree {
     let (x, y, z) = Tree::axes();
     let square = |axis: &Tree, at: f64| (axis.clone() - at as f32).square();
@@ -97,7 +97,7 @@ pub fn balls(balls: &[Ball], j: Joins, as_distance: bool) -> Tree {
     fold(&leaves, Order::Balanced, &|u, v| j.or(u, v))
 }
 
-/// Columns in the order in which a tape takes its variables.
+/// Arranges columns in the order in which a tape takes its variables.
 fn arrange<T>(vars: &VarMap, columns: [T; 3]) -> Vec<T> {
     let mut list: Vec<(usize, T)> = [Var::X, Var::Y, Var::Z]
         .into_iter()
@@ -116,7 +116,7 @@ fn grad_answer(g: Grad) -> [f64; 4] {
     [g.v, g.dx, g.dy, g.dz].map(f64::from)
 }
 
-/// ω of all points by its machine code, without the wrapper that copies the columns.
+/// Evaluates ω at all points by Fidget's machine code, without the wrapper that copies the columns.
 pub fn raw(shape: &JitShape) -> Work {
     let tape = shape.inner().float_slice_tape(Default::default());
     let mut eval = JitFunction::new_float_slice_eval();
@@ -130,7 +130,7 @@ pub fn raw(shape: &JitShape) -> Work {
     })
 }
 
-/// ω of all points as its documentation says to ask for it.
+/// Evaluates ω at all points in the way that Fidget's documentation recommends.
 pub fn shape_api(shape: &JitShape) -> Work {
     let tape = shape.ez_float_slice_tape();
     let mut eval = JitShape::new_float_slice_eval();
@@ -152,7 +152,8 @@ fn grad_columns(points: &Points) -> [Vec<Grad>; 3] {
     })
 }
 
-/// ω and ∇ω of all points by its machine code; columns with their derivatives are made beforehand.
+/// Evaluates ω and ∇ω at all points by Fidget's machine code. Columns with their derivatives are made
+/// beforehand.
 pub fn raw_grad(shape: &JitShape) -> Work {
     let tape = shape.inner().grad_slice_tape(Default::default());
     let mut eval = JitFunction::new_grad_slice_eval();
@@ -171,7 +172,7 @@ pub fn raw_grad(shape: &JitShape) -> Work {
     })
 }
 
-/// ω at one point after the other.
+/// Evaluates ω at one point after the other.
 pub fn point(shape: &JitShape) -> Work {
     let tape = shape.ez_point_tape();
     let mut eval = JitShape::new_point_eval();
@@ -187,7 +188,8 @@ pub fn point(shape: &JitShape) -> Work {
     })
 }
 
-/// ω and ∇ω at one point after the other: it has no program for one point, so columns of length 1.
+/// Evaluates ω and ∇ω at one point after the other. Fidget has no gradient program for one point, so columns
+/// have length 1.
 pub fn point_grad(shape: &JitShape) -> Work {
     let tape = shape.ez_grad_slice_tape();
     let mut eval = JitShape::new_grad_slice_eval();
@@ -208,7 +210,7 @@ pub fn point_grad(shape: &JitShape) -> Work {
     })
 }
 
-/// The range over a box, lower and upper end.
+/// Returns the range over a box: lower and upper end.
 pub fn range(shape: &JitShape) -> impl FnMut([[f64; 2]; 3]) -> [f64; 2] + 'static {
     let tape = shape.ez_interval_tape();
     let mut eval = JitShape::new_interval_eval();

@@ -1,10 +1,11 @@
-//! A dam break by rfm and by salva3d, each on one thread, in turns: what a step costs.
+//! Cost of a step in a dam break by rfm and by salva3d, each on one thread, in turns.
 //!
-//! A column of water 1 m × 3 m × 1.5 m in the box [0, 3]³, as in `tests/bench/sph.rs`, the same lattice for both, a support
-//! radius of two spacings (salva3d's own) and steps of one fixed length. salva3d keeps its water in by one layer of
-//! particles on the floor and the four walls; rfm needs none. Both solve for the pressure (DFSPH) to 0.1 %.
+//! A column of water of 1 m × 3 m × 1.5 m stands in the box [0, 3]³, just like in `tests/bench/sph.rs`. Both
+//! solvers share the lattice, a support radius of two spacings (salva3d's own) and steps of one fixed length.
+//! salva3d keeps its water in by one layer of particles on the floor and the four walls; rfm needs none. Both
+//! solve for the pressure (DFSPH) to 0.1 %.
 //!
-//! Times are of the processor, all threads of the process together.
+//! Times are processor times of all threads of the process together.
 
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
@@ -23,10 +24,10 @@ const SUPPORT: f64 = 2.0;
 /// Mean compression that both accept.
 const TOLERANCE: f64 = 1e-3;
 
-/// A step is this part of the time in which what falls from the column's top passes one spacing.
+/// Time step as a fraction of the time that water fallen from the column's top needs to pass one spacing.
 const COURANT: f64 = 0.4;
 
-/// Turns of which the median counts, and seconds that one of rfm's lasts at least.
+/// Number of turns whose median counts, and least duration in seconds of one of rfm's turns.
 const TURNS: usize = 5;
 const TURN: f64 = 0.3;
 
@@ -38,7 +39,7 @@ struct Row {
     pairs: Box<dyn Fn() -> f64>,
     particles: usize,
     others: usize,
-    /// Of a step, s, turn by turn.
+    /// Time of a step in each turn, s.
     times: Vec<f64>,
 }
 
@@ -74,7 +75,7 @@ fn wcsph() -> Method {
     Method::Wcsph(Wcsph { sound_speed: Some(sound_speed), ..Wcsph::default() })
 }
 
-/// With steps of one length, or those that sound allows if it is infinite.
+/// Sets up rfm with steps of length `dt`, or of the length that the sound speed allows if `dt` is infinite.
 fn ours(name: &'static str, spacing: f64, dt: f64, method: Method, precision: Precision) -> Row {
     let parameters = Parameters {
         rest_density: 1000.0,
@@ -106,7 +107,7 @@ fn ours(name: &'static str, spacing: f64, dt: f64, method: Method, precision: Pr
 fn salva(spacing: f64, dt: f64) -> Row {
     let parameters = DfsphParameters {
         max_density_error: TOLERANCE as f32,
-        // a percentage per step
+        // This error is a percentage per step.
         max_divergence_error: 100.0 * TOLERANCE as f32,
         ..DfsphParameters::default()
     };
@@ -137,7 +138,7 @@ fn salva(spacing: f64, dt: f64) -> Row {
     }
 }
 
-/// The middles of the cells of a column of cubes, as rfm puts them.
+/// Middles of the cells of a column of cubes, where rfm puts its particles.
 fn lattice(spacing: f64) -> Vec<Vector<f32>> {
     let parameters =
         Parameters { rest_density: 1000.0, particle_mass: 1000.0 * spacing.powi(3), ..Parameters::default() };
@@ -145,7 +146,7 @@ fn lattice(spacing: f64) -> Vec<Vector<f32>> {
     fluid.position.iter().map(|p| Vector::new(p.x as f32, p.y as f32, p.z as f32)).collect()
 }
 
-/// One layer, half a spacing behind the floor and the four walls.
+/// One layer of particles, half a spacing behind the floor and the four walls.
 fn walls(spacing: f64) -> Vec<Vector<f32>> {
     let side = (3.0 / spacing).round() as i32;
     let at = |k: i32| ((f64::from(k) + 0.5) * spacing) as f32;
@@ -160,7 +161,7 @@ fn walls(spacing: f64) -> Vec<Vector<f32>> {
     walls
 }
 
-/// Ordered pairs within a distance, by a grid of that size.
+/// Number of ordered pairs within a distance, found by a grid of that size.
 fn neighbours(points: &[Vector<f32>], reach: f32) -> f64 {
     let cell = |p: &Vector<f32>| [p.x, p.y, p.z].map(|c| (c / reach).floor() as i32);
     let mut cells: std::collections::HashMap<[i32; 3], Vec<usize>> = std::collections::HashMap::new();
@@ -181,7 +182,7 @@ fn neighbours(points: &[Vector<f32>], reach: f32) -> f64 {
     (pairs - points.len()) as f64
 }
 
-/// Lets all work in turns of equally many steps each as the first needs for a turn.
+/// Runs all solvers in turns. Each takes as many steps per turn as the first needs to fill one.
 fn measure(rows: &mut [Row]) {
     for row in rows.iter_mut() {
         (0..3).for_each(|_| (row.step)());

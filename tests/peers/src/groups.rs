@@ -1,4 +1,4 @@
-//! What is measured: each group is one question about one obstacle, and all who can answer it.
+//! The measured questions: each group asks one question about one obstacle of all who can answer it.
 
 use fidget::jit::JitShape;
 use rfm::codegen::Form;
@@ -10,14 +10,14 @@ use crate::measure::{Asks, Group, Points, Row};
 use crate::ours::{self, Precision};
 use crate::scenes::{self, Order, Random, SIDE};
 
-/// Depth of the cells whose ranges are taken: 32³ of them fill the box.
+/// Number of cells along a side of the box: ranges are taken over cells of which 32³ fill it.
 const CELLS: usize = 32;
 
 const HAND_F32: &str = "hand textbook 128-bit f32";
 const HAND_F64: &str = "hand textbook 128-bit f64";
 const RAW: &str = "Fidget raw f32";
 
-/// From how far away the contact is asked for: a centimetre, as in the notes on distance errors.
+/// Distance within which contact is asked for: a centimetre, just like in the notes on distance errors.
 const REACH: f64 = 0.01;
 
 pub const MAP_SIGN: &str = "ours sign by cell map f64";
@@ -27,7 +27,7 @@ fn hand_of<T: Precision>() -> &'static str {
     if T::NAME == "f32" { HAND_F32 } else { HAND_F64 }
 }
 
-/// An obstacle as both sides write it.
+/// An obstacle in the notation of both sides.
 pub struct Obstacle {
     pub title: String,
     pub text: String,
@@ -35,12 +35,12 @@ pub struct Obstacle {
     pub tree: Box<dyn Fn(Joins) -> fidget::context::Tree>,
     /// Points at edges and corners.
     pub corners: Vec<[f64; 3]>,
-    /// Points whose 120-digit truth is computed.
+    /// Number of points whose 120-digit truth is computed.
     pub checked: usize,
     pub hand: Hand,
 }
 
-/// Who wrote it by hand.
+/// Formula written by hand for an obstacle, if any.
 pub enum Hand {
     Pawn,
     Spheres(Vec<scenes::Sphere>, Order),
@@ -50,7 +50,7 @@ pub enum Hand {
 pub fn obstacles() -> Vec<Obstacle> {
     let rim = |r: f64, z: f64| [[1.5 + r, 1.5, z], [1.5 - r, 1.5, z], [1.5, 1.5 + r, z], [1.5, 1.5 - r, z]];
     let of = |i: usize| [0.0, 1.5, 3.0][i % 3];
-    // all points of a 3×3×3 lattice on the cube with at least two coordinates on its faces
+    // These are all points of a 3×3×3 lattice on the cube with at least two coordinates on its faces.
     let on_edges = |p: &[f64; 3]| p.iter().filter(|&&c| c != 1.5).count() >= 2;
     let edges: Vec<[f64; 3]> = (0..27).map(|i| [of(i), of(i / 3), of(i / 9)]).filter(on_edges).collect();
     let named = |name: &'static str, text: &str, tree: fn(Joins) -> _, corners| Obstacle {
@@ -88,13 +88,13 @@ pub fn obstacles() -> Vec<Obstacle> {
 }
 
 impl Obstacle {
-    /// How many leaves it has, about.
+    /// Approximate number of leaves.
     pub fn primitives(&self) -> usize {
         if self.name == "union" { self.text.matches("(x -").count() } else { 5 }
     }
 
     pub fn points(&self) -> Points {
-        // of very many primitives fewer points, or the contact alone would take minutes
+        // Obstacles with very many primitives get fewer points, or the contact alone would take minutes.
         let n = if self.primitives() > 1000 { 256 } else { crate::measure::BATCH };
         Points::random(n, SIDE, 1)
     }
@@ -216,7 +216,7 @@ impl Obstacle {
     }
 }
 
-/// The pawn, one point after the other.
+/// Values of the pawn at one point after the other.
 pub fn points_of_the_pawn(pawn: &Obstacle) -> Group {
     let mut group = Group::new("pawn: one point at a time");
     let [stable, textbook] = [Form::Stable, Form::Textbook].map(|form| ours::solid(&pawn.text, "pawn", form));
@@ -264,7 +264,7 @@ pub fn one_node() -> Group {
     group
 }
 
-/// Largest errors of one node in ulp: who, of the value, of a weight.
+/// Largest errors of one node in ulp: the name of the row, the error of the value, the error of a weight.
 pub fn ulps(group: &mut Group) -> Vec<(String, f64, f64)> {
     let solid = ours::solid(scenes::AND, "both", Form::Stable);
     let points = Points::operands(2000);

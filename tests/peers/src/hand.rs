@@ -1,7 +1,8 @@
-//! What a person would write by hand: the ceiling that generated code is measured against.
+//! Code that a person would write by hand: the ceiling that generated code is measured against.
 //!
-//! Each formula is written once, over [`Vector`], and compiled as explicit 128-bit intrinsics (SSE4.1), 256-bit
-//! intrinsics (AVX, where the processor has it) and as a plain loop over numbers, which rustc may vectorise.
+//! Each formula is written once, over [`Vector`]. It is compiled with explicit 128-bit intrinsics (SSE4.1),
+//! with 256-bit intrinsics (AVX, if the processor has it) and as a plain loop over numbers, which rustc may
+//! vectorise.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
@@ -15,16 +16,16 @@ pub trait Vector:
     type Lane: Copy;
     const LANES: usize;
     /// # Safety
-    /// `LANES` numbers can be read there.
+    /// `from` must be valid for reading `LANES` numbers.
     unsafe fn load(from: *const Self::Lane) -> Self;
     /// # Safety
-    /// `LANES` numbers can be written there.
+    /// `to` must be valid for writing `LANES` numbers.
     unsafe fn store(self, to: *mut Self::Lane);
     fn splat(x: f64) -> Self;
     fn sqrt(self) -> Self;
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
-    /// `yes` where self > 0, otherwise `no`.
+    /// Selects `yes` where self > 0, otherwise `no`.
     fn if_positive(self, yes: Self, no: Self) -> Self;
 }
 
@@ -37,7 +38,8 @@ macro_rules! vector {
         vector!(@op $name, Sub, sub, $sub);
         vector!(@op $name, Mul, mul, $mul);
         vector!(@op $name, Div, div, $div);
-        // SAFETY of all of them: only `run` below makes these types, behind a check of the processor.
+        // SAFETY: only `run` below makes these types, behind a check of the processor. This holds for all
+        // methods.
         #[allow(clippy::missing_safety_doc)]
         impl Vector for $name {
             type Lane = $lane;
@@ -196,7 +198,7 @@ macro_rules! number {
 number!(f32);
 number!(f64);
 
-/// One formula for a vector of points: x, y, z → ω, ∂x, ∂y, ∂z (those that it gives; the rest is left as it was).
+/// One formula for a vector of points: x, y, z → ω, ∂x, ∂y, ∂z. Outputs that it does not give stay unchanged.
 pub trait Formula {
     const OUTPUTS: usize;
     /// Whether it is one long chain of dependent operations.
@@ -206,7 +208,7 @@ pub trait Formula {
     fn at<V: Vector>(&self, p: [V; 3]) -> [V; 4];
 }
 
-/// The leaves of the pawn: cylinder, layer, waist, collar, head.
+/// Leaves of the pawn: cylinder, layer, waist, collar, head.
 #[inline(always)]
 fn leaves<V: Vector>([x, y, z]: [V; 3]) -> [V; 5] {
     let k = V::splat;
@@ -222,7 +224,7 @@ fn leaves<V: Vector>([x, y, z]: [V; 3]) -> [V; 5] {
     ]
 }
 
-// Functions, not closures: only what is always inlined gets the instructions of the caller.
+// These are functions, not closures, because only what is always inlined gets the instructions of the caller.
 
 #[inline(always)]
 fn and<V: Vector>(u: V, v: V) -> V {
@@ -250,7 +252,7 @@ fn stable_or<V: Vector>(u: V, v: V) -> V {
     (V::splat(0.0) - sum).if_positive(max + max * (max / (magnitude + h)), sum + h)
 }
 
-/// The root of the sum of squares, and its reciprocal for the weights: one division for each node.
+/// Root of the sum of squares, and its reciprocal for the weights. Each node thus takes one division.
 #[inline(always)]
 fn hypot<V: Vector>(u: V, v: V) -> (V, V) {
     let h = (u * u + v * v).sqrt();
@@ -269,7 +271,8 @@ impl Formula for Textbook {
     }
 }
 
-/// ω of the pawn in the half-angle form of `rfm::ir::r0`: the same operations, blended by SSE4.1.
+/// ω of the pawn in the half-angle form of `rfm::ir::r0`. It uses the operations of that form, blended by
+/// SSE4.1.
 pub struct Stable;
 
 impl Formula for Stable {
@@ -281,7 +284,7 @@ impl Formula for Stable {
     }
 }
 
-/// ω and ∇ω of the pawn by the chain rule from the root down; 0/0 at edges, as everybody's textbook form.
+/// ω and ∇ω of the pawn by the chain rule from the root down. Like any textbook form, it gives 0/0 at edges.
 pub struct TextbookGradient;
 
 impl Formula for TextbookGradient {
@@ -311,7 +314,7 @@ impl Formula for TextbookGradient {
     }
 }
 
-/// ω of a union of spheres: from the left, or as a balanced tree of 2ⁿ of them.
+/// ω of a union of spheres, folded from the left or as a balanced tree of 2ⁿ of them.
 pub struct Spheres {
     pub list: Vec<Sphere>,
     pub order: Order,
@@ -356,7 +359,8 @@ impl Formula for Spheres {
     }
 }
 
-/// Four vectors side by side: a fold is one long chain, and the processor can work on several such chains at once.
+/// Four vectors side by side. A fold is one long chain, and the processor can work on several such chains at
+/// once.
 #[derive(Clone, Copy)]
 pub struct Four<V>([V; 4]);
 
@@ -426,7 +430,7 @@ impl<V: Vector> Vector for Four<V> {
     }
 }
 
-/// How many lanes at once.
+/// Width of the vectors.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Width {
     Plain,
@@ -501,19 +505,19 @@ pub fn run<T: Precision, F: Formula>(width: Width, formula: &F, points: [&[T]; 3
     assert!(width.is_here());
     match width {
         Width::Plain => each::<T::Plain, F>(formula, points, out),
-        // SAFETY: the processor was asked.
+        // SAFETY: the processor has been asked for this width.
         Width::Bits128 => unsafe { bits128(formula, points, out) },
         Width::Bits256 => unsafe { bits256(formula, points, out) },
     }
 }
 
-/// ω of the pawn at one point, called as a function of its own.
+/// Evaluates ω of the pawn at one point, called as a function of its own.
 #[inline(never)]
 pub fn pawn_at(x: f64, y: f64, z: f64) -> f64 {
     Textbook.at([x, y, z])[0]
 }
 
-/// ω and ∇ω of the pawn at one point, called as a function of its own.
+/// Evaluates ω and ∇ω of the pawn at one point, called as a function of its own.
 #[inline(never)]
 pub fn pawn_grad_at(x: f64, y: f64, z: f64) -> [f64; 4] {
     TextbookGradient.at([x, y, z])

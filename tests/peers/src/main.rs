@@ -1,7 +1,8 @@
 //! Compares rfm with Fidget and with hand-written loops, in one run, on one thread.
 //!
-//! `cargo run --release --manifest-path tests/peers/Cargo.toml [-- --json FILE] [--only TEXT]`, with `--meshes` the
-//! meshers instead of the evaluators, with `--flows` the fluid solvers; what it prints is explained in `README.md` beside it.
+//! Run it by `cargo run --release --manifest-path tests/peers/Cargo.toml [-- --json FILE] [--only TEXT]`. The
+//! option `--meshes` compares the meshers instead of the evaluators, and `--flows` the fluid solvers.
+//! `README.md` in `tests/peers` explains the output.
 
 mod bars;
 mod compile;
@@ -20,7 +21,8 @@ use std::process::ExitCode;
 use bars::Found;
 use groups::Obstacle;
 
-/// Above this many primitives, gradients are left out: nobody asks for them there, and compiling takes long.
+/// Number of primitives above which gradients are left out: nobody asks for them there, and compiling takes
+/// long.
 const GRADIENTS_UP_TO: usize = 500;
 
 fn main() -> ExitCode {
@@ -64,7 +66,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Measures all obstacles whose title contains a text, and prints each as soon as it is done.
+/// Measures all obstacles whose title contains a text, and prints each when it is done.
 fn measure(only: &str) -> Found {
     let mut found = Found { groups: Vec::new(), decided: Vec::new(), ulps: Vec::new(), compile: Vec::new() };
     let keep = |found: &mut Found, group: measure::Group| {

@@ -1,4 +1,4 @@
-//! Times and errors: all rows of a group take turns, so that a busy machine slows each of them alike.
+//! Times and errors. All rows of a group take turns, so that a busy machine slows each of them alike.
 
 use std::time::{Duration, Instant};
 
@@ -10,21 +10,21 @@ use crate::scenes::Random;
 
 /// Points of one call.
 pub const BATCH: usize = 4096;
-/// What a row repeats its call for, in each turn.
+/// Time for which a row repeats its call in each turn.
 const SLICE: Duration = Duration::from_micros(400);
-/// What all turns of a group may take together.
+/// Time that all turns of a group may take together.
 const GROUP: Duration = Duration::from_millis(2500);
 
-/// The same points in both precisions.
+/// A set of points in both precisions.
 pub struct Points {
-    /// Of these points, so that what was derived from them can be kept.
+    /// Identity of this set, by which values derived from it can be kept.
     pub id: usize,
     pub double: [Vec<f64>; 3],
     pub single: [Vec<f32>; 3],
 }
 
 impl Points {
-    /// Points as f32 holds them, so that both precisions are asked the same question.
+    /// Rounds points to `f32`, so that both precisions are asked one question.
     pub fn new(list: &[[f64; 3]]) -> Self {
         static NEXT: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
         let single = [0, 1, 2].map(|axis| list.iter().map(|p| p[axis] as f32).collect::<Vec<_>>());
@@ -32,15 +32,15 @@ impl Points {
         Self { id: NEXT.fetch_add(1, std::sync::atomic::Ordering::Relaxed), double, single }
     }
 
-    /// All over a box that begins at the origin.
+    /// Random points all over a box that begins at the origin.
     pub fn random(n: usize, side: f64, seed: u64) -> Self {
         let mut random = Random(seed);
         let list: Vec<_> = (0..n).map(|_| [0, 1, 2].map(|_| side * random.next())).collect();
         Self::new(&list)
     }
 
-    /// Pairs of operands of all magnitudes between 2⁻²⁰ and 2²⁰, and of both signs: their weights are
-    /// numbers that f32 has.
+    /// Pairs of operands of all magnitudes between 2⁻²⁰ and 2²⁰ and of both signs. Their weights are within
+    /// the range of `f32`.
     pub fn operands(n: usize) -> Self {
         let mut random = Random(7);
         let mut number = || {
@@ -65,19 +65,19 @@ impl Points {
     }
 }
 
-/// Answers a question at all points; keeps the answers if it is asked to: ω, or ω and ∇ω.
+/// Answers a question at all points, and keeps the answers on request: ω, or ω and ∇ω.
 pub type Work = Box<dyn FnMut(&Points, Option<&mut Vec<[f64; 4]>>)>;
 
-/// What is asked; decides which errors make sense.
+/// Kind of question, which decides which errors make sense.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Asks {
     Value,
     Gradient,
     /// Only the sign of the answer is meant.
     Sign,
-    /// Only the sign is compared: positive outside.
+    /// Only the sign is compared, and it is positive outside.
     Distance,
-    /// Not a question about points.
+    /// The question is not about points.
     Other,
 }
 
@@ -95,16 +95,16 @@ pub struct Row {
     pub errors: Errors,
 }
 
-/// How far the answers are from the truth.
+/// Deviations of the answers from the truth.
 #[derive(Clone, Default)]
 pub struct Errors {
-    /// |found − true| / |true|, the largest; of a gradient its length counts.
+    /// Largest value of |found − true| / |true|. For a gradient, |·| is the length.
     pub relative: Option<f64>,
-    /// Answers that are not a number, among all random points.
+    /// Number of answers that are not a number, among all random points.
     pub nan: usize,
-    /// … and among corners and edges.
+    /// Number of answers that are not a number, among all corners and edges, and the number of those points.
     pub nan_at_corners: Option<(usize, usize)>,
-    /// Answers with the wrong sign, among the random points whose truth was computed.
+    /// Number of answers with the wrong sign, and the number of random points whose truth was computed.
     pub wrong_signs: Option<(usize, usize)>,
 }
 
@@ -119,7 +119,7 @@ impl Row {
     }
 }
 
-/// Rows that answer the same question.
+/// Rows that answer one question.
 pub struct Group {
     pub title: String,
     pub rows: Vec<Row>,
@@ -139,7 +139,7 @@ impl Group {
         self.rows.iter().find(|row| row.name == name)
     }
 
-    /// The median over all turns of the quotient of two rows' times in the same turn.
+    /// Median over all turns of the quotient of two rows' times in a turn.
     pub fn ratio(&self, of: &str, to: &str) -> Option<f64> {
         let (a, b) = (&self.find(of)?.times, &self.find(to)?.times);
         Some(median(a.iter().zip(b).map(|(a, b)| a / b).collect()))
@@ -212,8 +212,9 @@ impl Group {
         }
     }
 
-    /// The largest error of a single component, in units of 2 × the rounding unit of its precision (that is, of
-    /// one unit in the last place at most): for single nodes, whose weights are judged one by one.
+    /// Largest relative error of a single component, in units of twice the rounding unit of its precision; a
+    /// unit in the last place is at most this large. It serves for single nodes, whose weights are judged one
+    /// by one.
     pub fn worst_component(
         &mut self,
         name: &str,
@@ -234,7 +235,7 @@ impl Group {
     }
 }
 
-/// The largest; infinite if one is not a number.
+/// Largest error; infinite if one is not a number.
 fn worst(errors: impl Iterator<Item = f64>) -> f64 {
     errors.map(|e| if e.is_nan() { f64::INFINITY } else { e }).fold(0.0, f64::max)
 }

@@ -1,8 +1,8 @@
-//! The meshers, each on one thread, in turns: how long, and how far the mesh is from the surface.
+//! Comparison of meshers, each on one thread, in turns: their time, and how far the mesh is from the surface.
 //!
-//! All work in one box that is a little larger than [0, 3]³, so that no face of an obstacle lies in a plane of the
-//! grid. Meshes are measured by `rfm::mesh::Reference`, which knows nothing of who made them; volumes are compared with
-//! quadrature of the profiles where that is known.
+//! All work in one box that is a little larger than [0, 3]³, so that no face of an obstacle lies in a plane
+//! of the grid. `rfm::mesh::Reference` measures the meshes without knowing who made them. Volumes are
+//! compared with quadrature of the profiles if that is known.
 
 use std::time::{Duration, Instant};
 
@@ -26,25 +26,26 @@ use rfm::{Engine, Program};
 use crate::fidget::{self as peer, Joins};
 use crate::scenes;
 
-/// The box: its corner and its side.
+/// Lowest coordinate of the box, and its side.
 const CORNER: f64 = -0.07;
 const SIDE: f64 = 3.12;
 
-/// No further turn begins once a scene has taken this long.
+/// Time for a scene after which no further turn begins.
 const PATIENCE: Duration = Duration::from_secs(4);
 const TURNS: usize = 15;
 
-/// An obstacle as everybody writes it.
+/// An obstacle in everybody's notation.
 struct Scene {
     name: &'static str,
     text: String,
-    /// As Fidget takes it, under the names of its forms.
+    /// Expressions for Fidget, under the names of their forms.
     trees: Vec<(&'static str, fidget::context::Tree)>,
-    /// ω in `f32` as a person would write it.
+    /// ω in `f32`, written the way a person would.
     hand: Option<fn([f32; 3]) -> f32>,
     volume: Option<f64>,
     cells: &'static [usize],
-    /// Cells of the mesh whose vertices stand for the surface are half as large as these; none if finding them takes minutes.
+    /// Number of cells along a side. The reference mesh, whose vertices stand for the surface, has cells half
+    /// as large; `None` if finding them takes minutes.
     measured_in: Option<usize>,
 }
 
@@ -96,7 +97,7 @@ fn scenes() -> Vec<Scene> {
         Scene {
             name: "500 balls",
             text: scenes::balls_text(&balls),
-            // joined by R0 they take Fidget minutes: only its best forms
+            // Joined by R₀ they take Fidget minutes, so only its best forms are here.
             trees: vec![
                 ("Fidget, min/max of r² − d²", peer::balls(&balls, Joins::MinMax, false)),
                 ("Fidget, min/max of r − d", peer::balls(&balls, Joins::MinMax, true)),
@@ -119,7 +120,7 @@ fn measure(scene: &Scene, cells: usize) {
     let ours = |dual: bool| {
         let (solid, here) = (&solid, &here);
         move || {
-            // what is prepared for the box (programs, cell map) is part of the work
+            // The work includes what is prepared for the box (programs, cell map).
             let surface = solid.surface(bounds);
             let mesher = if dual { dual_contouring } else { marching_cubes };
             mesher(&*surface, here, &|_| ()).unwrap_or_else(|e| panic!("{e}"))
@@ -157,7 +158,7 @@ fn measure(scene: &Scene, cells: usize) {
     print(scene, cells, &rows, reference.as_ref());
 }
 
-/// Seconds that this thread has run, waiting left out; nothing where the system does not tell.
+/// Seconds that this thread has run, without waiting; `None` if the system does not report it.
 fn processor_time() -> Option<f64> {
     let line = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     line.split(' ').next()?.parse::<f64>().ok().map(|nanoseconds| 1e-9 * nanoseconds)
@@ -178,7 +179,7 @@ fn print(scene: &Scene, cells: usize, rows: &[Row<'_>], reference: Option<&Refer
         let metres = |of: fn(&Quality) -> f64| quality.as_ref().map(|quality| format!("{:.1e}", of(quality)));
         let [hausdorff, rms, error] = [metres(Quality::hausdorff), metres(|q| q.to_surface.rms), error]
             .map(|figure| figure.unwrap_or_else(|| "–".into()));
-        // turn by turn: what else the machine does disturbs both
+        // Quotients are taken turn by turn, because other work of the machine disturbs both.
         let ratio =
             crate::measure::median(row.times.iter().zip(&rows[0].times).map(|(t, o)| t / o).collect());
         println!(
@@ -191,7 +192,7 @@ fn print(scene: &Scene, cells: usize, rows: &[Row<'_>], reference: Option<&Refer
     }
 }
 
-/// Fidget's octree of 2ⁿ cells along a side; it wants the inside negative.
+/// Fidget's octree of 2ⁿ cells along a side. It wants the inside negative.
 fn fidget_mesh(shape: &JitShape, cells: usize) -> Mesh {
     let (half, middle) = (0.5 * SIDE as f32, (CORNER + 0.5 * SIDE) as f32);
     let to_world = Matrix4::new_translation(&Vector3::repeat(middle)) * Matrix4::new_scaling(half);
@@ -247,7 +248,7 @@ fn by_surface_nets(hand: fn([f32; 3]) -> f32, cells: usize) -> Mesh {
     outward(positions, buffer.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect())
 }
 
-/// Triangles in the order that makes the volume positive: crates differ in what they call the front.
+/// Orders triangles so that the volume is positive, because crates differ in what they call the front.
 fn outward(positions: Vec<DVec3>, mut triangles: Vec<[u32; 3]>) -> Mesh {
     let corner = |v: u32| positions[v as usize];
     let six_volumes: f64 = triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c)))).sum();

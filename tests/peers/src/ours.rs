@@ -1,4 +1,4 @@
-//! Our own programs behind the common face.
+//! Our own programs behind the common interface.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::hand;
 use crate::measure::{BATCH, Points, Work};
 use crate::scenes::SIDE;
 
-/// Both precisions of everybody.
+/// Precision that everybody supports.
 pub trait Precision: Lane + hand::Precision + Into<f64> {
     const NAME: &'static str;
     fn columns(points: &Points) -> [&[Self]; 3];
@@ -33,12 +33,12 @@ impl Precision for f64 {
     }
 }
 
-/// A solid of a text, in a form of R₀; an error instead of the interpreter if there is no machine code.
+/// Compiles a solid of a text in a form of R₀. It panics if there is no machine code, rather than interpret.
 pub fn solid(text: &str, name: &str, form: Form) -> Solid {
     compiled(text, name, form, Engine::Jit)
 }
 
-/// The same without any program: each is compiled when it is first asked.
+/// Reads a solid of a text without any program; each is compiled when it is first asked.
 pub fn solid_lazily(text: &str, name: &str, form: Form) -> Solid {
     compiled(text, name, form, Engine::Auto)
 }
@@ -50,7 +50,7 @@ fn compiled(text: &str, name: &str, form: Form, engine: Engine) -> Solid {
     Solid::with_form(name, &module.graph, named.node, engine, form).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Output columns, and the answers taken out of them.
+/// Allocates output columns, has `fill` write them, and takes the answers out of them.
 fn columns<T: Precision, const N: usize>(mut fill: impl FnMut([&[T]; 3], [&mut [T]; N]) + 'static) -> Work {
     let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); BATCH]);
     Box::new(move |points, keep| {
@@ -84,7 +84,7 @@ pub fn contact<T: Precision>(solid: &Solid) -> Work {
     columns::<T, 5>(move |points, out| solid.contact_many(points, out))
 }
 
-/// The box [0, 3]³ with its cells, for contacts within a reach.
+/// Cells of the box [0, 3]³, for contacts within a reach.
 pub fn cell_map(solid: &Solid, reach: f64) -> Arc<CellMap> {
     let domain = Aabb::new(DVec3::ZERO, DVec3::splat(SIDE));
     Arc::new(CellMap::with_reach(solid, domain, reach).expect("a union can be taken apart"))
@@ -100,7 +100,7 @@ pub fn map_contact(map: &Arc<CellMap>) -> Work {
     columns::<f64, 5>(move |[x, y, z], out| map.contact_many(rfm::field::Points::new(x, y, z), out))
 }
 
-/// ω at one point after the other through a function of three loose numbers.
+/// Evaluates ω at one point after the other through a function of three loose numbers.
 pub fn each(one: impl Fn(f64, f64, f64) -> f64 + 'static) -> Work {
     Box::new(move |points, mut keep| {
         let [x, y, z] = &points.double;
@@ -113,12 +113,13 @@ pub fn each(one: impl Fn(f64, f64, f64) -> f64 + 'static) -> Work {
     })
 }
 
-/// ω and ∇ω at one point after the other.
+/// Evaluates ω and ∇ω at one point after the other.
 pub fn each_grad(one: impl Fn(f64, f64, f64) -> [f64; 4] + 'static) -> Work {
     Box::new(move |points, mut keep| {
         let [x, y, z] = &points.double;
         for i in 0..x.len() {
-            // number by number: the whole array would be written and read back in other sizes, which stalls
+            // Each number is kept alone: the whole array would be written and read back in other sizes, which
+            // stalls.
             let answer = one(x[i], y[i], z[i]).map(black_box);
             if let Some(keep) = keep.as_deref_mut() {
                 keep.push(answer);
@@ -140,11 +141,11 @@ pub fn point_grad(solid: &Solid) -> Work {
     })
 }
 
-/// A hand-written formula at all points.
+/// Evaluates a hand-written formula at all points.
 pub fn by_hand<T: Precision, F: hand::Formula + 'static>(width: hand::Width, formula: F) -> Work {
     let mut out: [Vec<T>; 4] = std::array::from_fn(|_| vec![T::default(); BATCH]);
     Box::new(move |points, keep| {
-        // whole vectors only: the few corners are asked with their last point repeated
+        // Only whole vectors are evaluated, so the few corners are asked with their last point repeated.
         let n = points.len();
         let rest = n.next_multiple_of(32);
         if n == rest {
@@ -165,7 +166,7 @@ pub fn by_hand<T: Precision, F: hand::Formula + 'static>(width: hand::Width, for
     })
 }
 
-/// The range over a box, lower and upper end: of ω, or of its min/max twin.
+/// Returns the range over a box, lower and upper end, of ω or of its min/max twin.
 pub fn range(solid: &Solid, twin: bool) -> impl FnMut([[f64; 2]; 3]) -> [f64; 2] + 'static {
     let solid = solid.clone();
     let field = twin.then(|| solid.twin());

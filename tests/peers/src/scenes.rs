@@ -1,18 +1,18 @@
-//! The obstacles that everybody evaluates, as texts for rfm; Fidget's own writing of them is in `fidget.rs`.
+//! Obstacles that everybody evaluates, written for rfm; `fidget.rs` has them in Fidget's notation.
 
 use std::fmt::Write;
 
 /// Side of the box [0, 3]³ that all scenes stand in.
 pub const SIDE: f64 = 3.0;
 
-/// r2 − |p − centre|²
+/// Sphere with ω = r2 − |p − centre|².
 #[derive(Clone)]
 pub struct Sphere {
     pub centre: [f64; 3],
     pub r2: f64,
 }
 
-/// The order in which a union of many is taken; R₀ is not associative in value.
+/// Order in which a union of many is taken; R₀ is not associative in value.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Order {
     Left,
@@ -22,10 +22,10 @@ pub enum Order {
 pub const PAWN: &str = include_str!("../../../examples/pawn.rfm");
 pub const BISHOP: &str = include_str!("../../../examples/bishop.rfm");
 pub const CUBE: &str = include_str!("../../../examples/cube.rfm");
-/// One node, of which both operands are given.
+/// One node whose two operands are given.
 pub const AND: &str = "rfm 1\nsolid both = x and y\n";
 
-/// Numbers in [0, 1) that are always the same.
+/// Reproducible sequence of numbers in [0, 1).
 pub struct Random(pub u64);
 
 impl Random {
@@ -35,12 +35,12 @@ impl Random {
     }
 }
 
-/// Spheres all over the box, together about as voluminous whatever their number. All numbers are multiples of
-/// 2⁻¹⁶ below 4, so that f32 holds them and a decimal text gives them exactly.
+/// Spheres all over the box, with about equal total volume whatever their number. All numbers are multiples
+/// of 2⁻¹⁶ below 4, so that `f32` holds them and a decimal text gives them exactly.
 pub fn spheres(n: usize) -> Vec<Sphere> {
     let mut random = Random(n as u64);
     let mut grid = |scale: f64| (random.next() * scale * 65536.0).round() / 65536.0;
-    let size = (n as f64).powf(-2.0 / 3.0); // of r²
+    let size = (n as f64).powf(-2.0 / 3.0); // Size of r².
     (0..n)
         .map(|_| Sphere {
             centre: [grid(SIDE), grid(SIDE), grid(SIDE)],
@@ -61,7 +61,7 @@ pub fn fold<T: Clone>(list: &[T], order: Order, join: &impl Fn(T, T) -> T) -> T 
     }
 }
 
-/// A file with the union of spheres as its solid `union`.
+/// Writes a file with the union of spheres as its solid `union`.
 pub fn union_text(spheres: &[Sphere], order: Order) -> String {
     let leaf = |s: &Sphere| {
         let [a, b, c] = s.centre;
@@ -72,7 +72,8 @@ pub fn union_text(spheres: &[Sphere], order: Order) -> String {
         write!(text, "{part}{}", leaf(sphere)).expect("a string takes everything");
     };
     match order {
-        // name by name: a chain of `or` is one operation, which is evaluated as a balanced tree
+        // Each step has a name, because a chain of `or` is one operation, which is evaluated as a balanced
+        // tree.
         Order::Left => {
             let last = spheres.len() - 1;
             for (i, sphere) in spheres.iter().enumerate() {
@@ -91,7 +92,7 @@ pub fn union_text(spheres: &[Sphere], order: Order) -> String {
     text
 }
 
-/// A ball of which the radius itself is given.
+/// Ball whose radius itself is given.
 #[derive(Clone)]
 pub struct Ball {
     pub centre: [f64; 3],
@@ -109,7 +110,7 @@ pub fn balls(n: usize) -> Vec<Ball> {
         .collect()
 }
 
-/// A file with the union of balls as its solid `balls`.
+/// Writes a file with the union of balls as its solid `balls`.
 pub fn balls_text(balls: &[Ball]) -> String {
     let leaf = |Ball { centre: [x, y, z], radius }: &Ball| format!("ball([{x}, {y}, {z}], {radius})");
     let list: Vec<String> = balls.iter().map(leaf).collect();

@@ -1,11 +1,11 @@
-//! The tables as plain text, and all of it as JSON.
+//! Tables in plain text, and all results in JSON.
 
 use serde_json::{Value, json};
 
 use crate::bars::{Bar, Found, Limit};
 use crate::measure::{Asks, Group, Row};
 
-/// Columns as wide as their widest cell; the first `left` of them begin at the left.
+/// Sets columns as wide as their widest cell; the first `left` of them are aligned to the left.
 fn columns(rows: &[Vec<String>], left: usize) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
@@ -104,7 +104,7 @@ pub fn print_bars(bars: &[Bar]) {
     println!("{}", columns(&rows, 2));
 }
 
-/// Everything, for other programs.
+/// Gives all results to other programs.
 pub fn json(found: &Found, bars: &[Bar]) -> Value {
     let row = |group: &Group, row: &Row| {
         json!({
@@ -112,7 +112,7 @@ pub fn json(found: &Found, bars: &[Bar]) -> Value {
             "ns": row.median(),
             "to_hand": ratio(group, row, 0),
             "to_fidget": ratio(group, row, 1),
-            // JSON has no infinity: such an error is null
+            // JSON has no infinity, so such an error is null.
             "relative_error": row.errors.relative,
             "nan": row.errors.nan,
             "nan_at_corners": row.errors.nan_at_corners,
