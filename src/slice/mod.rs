@@ -26,8 +26,7 @@ use std::io;
 pub use self::png::rasterise;
 pub(crate) use self::svg::escaped;
 use self::{
-    colour::{Rgb, Scale, UNDEFINED},
-    isolines::Outline,
+    colour::{Scale, UNDEFINED},
     svg::svg,
 };
 pub use self::{

@@ -22,10 +22,11 @@
 
 mod columns;
 mod near;
+mod real;
 
 use std::cell::RefCell;
 
-use fearless_simd::{Level, Simd, SimdBase, SimdFloat, SimdFloatElement};
+use fearless_simd::{Level, Simd, SimdBase, SimdFloat};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
@@ -35,6 +36,7 @@ pub(super) use columns::Columns;
 use columns::{BLOCK, Block};
 pub(super) use near::Near;
 use near::{OfBlock, Reach};
+pub(super) use real::Real;
 
 /// Compiles an expression for three widths of registers (512, 256 and 128 bits on x86-64) and runs the widest
 /// that the processor has. Each width of each pass is code of its own, and the levels in between are not
@@ -57,27 +59,15 @@ macro_rules! at_level {
     }};
 }
 
-/// Precision for sums over neighbours.
-pub(super) trait Real: SimdFloatElement + Default + Copy + Send + Sync + 'static {
-    fn of(x: f64) -> Self;
-    fn wide(self) -> f64;
+/// A precision with working memory of its own.
+pub(super) trait Kept: Real {
     /// Lends this thread's working memory, which stays for the next use.
     fn with_surroundings<R>(use_it: impl FnOnce(&mut Surroundings<Self>) -> R) -> R;
 }
 
-macro_rules! real {
+macro_rules! kept {
     ($real:ty) => {
-        impl Real for $real {
-            #[inline(always)]
-            fn of(x: f64) -> Self {
-                x as $real
-            }
-
-            #[inline(always)]
-            fn wide(self) -> f64 {
-                self.into()
-            }
-
+        impl Kept for $real {
             fn with_surroundings<R>(use_it: impl FnOnce(&mut Surroundings<Self>) -> R) -> R {
                 thread_local!(static KEPT: RefCell<Surroundings<$real>> = RefCell::default());
                 KEPT.with_borrow_mut(use_it)
@@ -85,8 +75,8 @@ macro_rules! real {
         }
     };
 }
-real!(f32);
-real!(f64);
+kept!(f32);
+kept!(f64);
 
 /// Quantity that is summed over neighbours. A pass reads `IN` numbers of each particle besides its position,
 /// forms `SUMS` sums and makes `OUT` results from them.
@@ -185,7 +175,7 @@ impl Cloud<'_> {
         fields: [&[f64]; IN],
         out: [&mut [f64]; OUT],
     ) where
-        T: Real,
+        T: Kept,
         P: PairPass<IN, SUMS, OUT>,
     {
         let all = Task { number: 0, blocks: self.columns.blocks(), first: 0, out: out.into_iter().collect() };
@@ -207,7 +197,7 @@ impl Cloud<'_> {
     }
 
     /// Finds what is near each register for later passes, which is worthwhile from three passes on.
-    pub fn find_near<T: Real>(&self, near: &mut Near) {
+    pub fn find_near<T: Kept>(&self, near: &mut Near) {
         let blocks = self.columns.blocks();
         near.of_blocks.resize_with(blocks.len(), OfBlock::default);
         blocks.par_iter().zip(&mut near.of_blocks).with_min_len(TASK).for_each(|(block, of_block)| {
@@ -219,7 +209,7 @@ impl Cloud<'_> {
     }
 
     /// Copies what is around a block.
-    fn gather<T: Real>(&self, fields: &[&[f64]], block: &Block, around: &mut Surroundings<T>) {
+    fn gather<T: Kept>(&self, fields: &[&[f64]], block: &Block, around: &mut Surroundings<T>) {
         let particles = block.particles();
         let centre = self.position.get(particles.start + particles.len() / 2);
         let columns = 3 + fields.len();
@@ -253,13 +243,13 @@ impl Cloud<'_> {
     }
 
     /// Finds the copies that are near each register of a block.
-    fn collect_near<T: Real>(&self, block: &Block, around: &Surroundings<T>, near: &mut OfBlock) {
+    fn collect_near<T: Kept>(&self, block: &Block, around: &Surroundings<T>, near: &mut OfBlock) {
         near.clear();
         at_level!(self.level, simd => self.collect_near_registers(simd, block, around, near));
     }
 
     #[inline(always)]
-    fn collect_near_registers<T: Real, S: Simd>(
+    fn collect_near_registers<T: Kept, S: Simd>(
         &self,
         simd: S,
         block: &Block,
@@ -288,7 +278,7 @@ impl Cloud<'_> {
 
 /// Copies ranges of numbers, less an origin.
 #[inline(always)]
-fn copy_ranges<T: Real, S: Simd>(
+fn copy_ranges<T: Kept, S: Simd>(
     _: S,
     source: &[f64],
     origin: f64,
@@ -312,7 +302,7 @@ fn add_up<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
     near: &OfBlock,
     around: &mut Surroundings<T>,
 ) where
-    T: Real,
+    T: Kept,
     P: PairPass<IN, SUMS, OUT>,
 {
     at_level!(level, simd => add_up_registers(simd, pass, block.len as usize, near, around));
@@ -326,7 +316,7 @@ fn add_up_registers<T, S, P, const IN: usize, const SUMS: usize, const OUT: usiz
     near: &OfBlock,
     around: &mut Surroundings<T>,
 ) where
-    T: Real,
+    T: Kept,
     S: Simd,
     P: PairPass<IN, SUMS, OUT>,
 {
@@ -401,7 +391,7 @@ fn finish<P, const IN: usize, const SUMS: usize, const OUT: usize>(
 
 /// Places of a register's particles; `copy` is the index of the first.
 #[inline(always)]
-fn places_of<T: Real, S: Simd>(simd: S, around: &Surroundings<T>, copy: usize) -> [T::Native<S>; 3] {
+fn places_of<T: Kept, S: Simd>(simd: S, around: &Surroundings<T>, copy: usize) -> [T::Native<S>; 3] {
     let mut here = [T::Native::<S>::splat(simd, T::default()); 3];
     for k in 0..3 {
         here[k] = T::Native::<S>::from_slice(simd, &around.values[k][copy..copy + T::Native::<S>::LEN]);

@@ -2,7 +2,7 @@
 
 use fearless_simd::{Simd, SimdFloat, SimdMask};
 
-use super::Real;
+use super::real::Real;
 
 /// Places within the radius of the box around a register's particles. The ranges of copies are boxes too, and
 /// about a third of the copies lies outside them.
