@@ -25,10 +25,7 @@ use std::io;
 
 pub use self::png::rasterise;
 pub(crate) use self::svg::escaped;
-use self::{
-    colour::{Scale, UNDEFINED},
-    svg::svg,
-};
+use self::svg::svg;
 pub use self::{
     error::SliceError,
     isolines::{Polyline, isolines},

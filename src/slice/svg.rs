@@ -9,7 +9,7 @@ use glam::DVec2;
 
 use super::{
     axes::{self, INK, PlotFrame},
-    colour::{Rgb, Scale},
+    colour::{Rgb, Scale, UNDEFINED},
     isolines::{Outline, outlines},
     labels::{LevelLabel, Placer},
     paths,
@@ -153,7 +153,7 @@ fn undefined_cells(out: &mut String, samples: &Samples, frame: &PlotFrame) {
             column += run.max(1);
         }
     }
-    let [r, g, b] = super::UNDEFINED;
+    let [r, g, b] = UNDEFINED;
     let _ = writeln!(
         out,
         r##"<pattern id="undefined" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="6" height="6" fill="rgb({r},{g},{b})"/><rect width="1.2" height="6" fill="#8c8c8c"/></pattern>

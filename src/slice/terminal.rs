@@ -4,7 +4,11 @@
 
 use std::io::{self, Write};
 
-use super::{Plane, Samples, Scale, SliceError, UNDEFINED, Window, sample::sample_grid};
+use super::{
+    Plane, SliceError, Window,
+    colour::{Scale, UNDEFINED},
+    sample::{Samples, sample_grid},
+};
 use crate::field::Field;
 
 /// Characters from near the surface to far from it, on each side. `=` is where the sign changes.
