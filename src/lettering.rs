@@ -56,16 +56,17 @@ fn paths(svg: &str, text: Node<'_, '_>) -> String {
     let size = inherited("font-size").and_then(|size| size.parse().ok()).unwrap_or(DEFAULT_SIZE);
     let scale = size / f64::from(FONT.face.units_per_em());
 
-    let mut parts = Vec::new();
+    let words = |part: Node<'_, '_>| -> String {
+        part.descendants().filter(Node::is_text).filter_map(|node| node.text()).collect()
+    };
+    let parts: Vec<_> = text.children().map(|part| (part, FONT.glyphs(&words(part)))).collect();
+    let mut starts = Vec::new();
     let mut width = 0.0;
-    for part in text.children() {
-        width += number(part, "dx").unwrap_or(0.0);
-        let words: String =
-            part.descendants().filter_map(|node| node.text().filter(|_| node.is_text())).collect();
-        let start = width;
-        let glyphs = FONT.glyphs(&words);
-        width += scale * FONT.width(&glyphs);
-        parts.push((part, start, glyphs));
+    for (i, (part, glyphs)) in parts.iter().enumerate() {
+        width += number(*part, "dx").unwrap_or(0.0);
+        starts.push(width);
+        let next = parts.get(i + 1).and_then(|(_, glyphs)| glyphs.first());
+        width += scale * FONT.width(glyphs, next);
     }
     let before = match inherited("text-anchor") {
         Some("middle") => 0.5 * width,
@@ -73,11 +74,11 @@ fn paths(svg: &str, text: Node<'_, '_>) -> String {
         _ => 0.0,
     };
     let [x, y] = ["x", "y"].map(|name| number(text, name).unwrap_or(0.0));
-    let path = |(part, start, glyphs): (Node<'_, '_>, f64, Vec<GlyphId>)| {
-        let outline = FONT.outline(&glyphs, [x - before + start, y], scale);
-        format!(r#"<path{} d="{outline}"/>"#, style(svg, part))
+    let path = |((part, glyphs), start): (&(Node<'_, '_>, Vec<GlyphId>), f64)| {
+        let outline = FONT.outline(glyphs, [x - before + start, y], scale);
+        format!(r#"<path{} d="{outline}"/>"#, style(svg, *part))
     };
-    parts.into_iter().map(path).collect()
+    parts.iter().zip(starts).map(path).collect()
 }
 
 /// Built-in font with its rules for adjacent glyphs.
@@ -131,8 +132,9 @@ impl Font {
         f64::from(own) + kerning.map(f64::from).sum::<f64>()
     }
 
-    fn width(&self, glyphs: &[GlyphId]) -> f64 {
-        (0..glyphs.len()).map(|i| self.advance(glyphs[i], glyphs.get(i + 1))).sum()
+    /// Of glyphs before another, in units of the font.
+    fn width(&self, glyphs: &[GlyphId], next: Option<&GlyphId>) -> f64 {
+        (0..glyphs.len()).map(|i| self.advance(glyphs[i], glyphs.get(i + 1).or(next))).sum()
     }
 
     /// Returns the data of an SVG path.
@@ -253,7 +255,7 @@ mod tests {
 
     #[test]
     fn pairs_are_kerned_and_ligatures_joined() {
-        let width = |words: &str| FONT.width(&FONT.glyphs(words));
+        let width = |words: &str| FONT.width(&FONT.glyphs(words), None);
         assert!(width("AV") < width("A") + width("V"));
         assert_eq!(width("10"), width("1") + width("0"));
         assert_eq!(FONT.glyphs("fi fl").len(), 3);
