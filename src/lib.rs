@@ -19,7 +19,7 @@
 //! |---|---|
 //! | [`Program`], [`Solid`], [`solid`] | a file, compiled; ω, ∇ω, signs, contacts, ranges, paths, cell maps |
 //! | [`field`] | the traits [`Field`] and [`field::Walls`], which closures may implement as well |
-//! | [`mesh`], [`slice`], [`render`], [`fluid_surface`] | meshes, plots, pictures, surfaces of fluids |
+//! | [`mesh`], [`mod@slice`], [`render`], [`fluid_surface`] | meshes, plots, pictures, surfaces of fluids |
 //! | [`Experiment`], [`experiment`], [`sph`] | scenes, and the fluid solver without them |
 //! | [`diagnostic`] | messages with their places in a file |
 //! | [`geom`], [`interval`], [`precision`], [`quantity`] | boxes, guaranteed ranges, number types, units |
