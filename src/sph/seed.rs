@@ -419,7 +419,7 @@ mod tests {
         for x in [1.0, 1.5, 1.51, 1.7, 9.0] {
             particles.push(DVec3::new(x, 1.0, 1.0), DVec3::ZERO);
         }
-        let carved = carve(&mut particles, &scenes::BOX, &[obstacle.clone()], 0.05).unwrap();
+        let carved = carve(&mut particles, &scenes::BOX, std::slice::from_ref(&obstacle), 0.05).unwrap();
         assert_eq!(carved, Carved { inside: 2, too_close: 1, outside_box: 1, kept: 1 });
         assert_eq!((particles.position.get(0).x, particles.id[0]), (1.7, 0));
         let nothing = carve(&mut particles, &scenes::BOX, &[obstacle], 0.5);

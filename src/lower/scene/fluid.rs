@@ -113,18 +113,21 @@ impl<'a> Lowering<'a> {
             let all = Method::all().into_iter().flat_map(names);
             return of_every_method.iter().copied().chain(all).collect();
         };
-        let mut known: Vec<&'static str> = of_every_method.iter().copied().chain(names(method)).collect();
+        let known: Vec<&'static str> = of_every_method.iter().copied().chain(names(method)).collect();
         for entry in entries {
             let key = entry.key();
             let methods = Method::with_key(block, &key.text);
             let is_foreign = !known.contains(&key.text.as_str()) && !methods.is_empty();
             if is_foreign {
                 let message = format!("`{}` is not a key of the method {}", key.text, method.name());
-                let help =
-                    format!("{} has it: leave it out, or write `method: {}`", methods.join(", "), methods[0]);
+                let has = if methods.len() == 1 { "has" } else { "have" };
+                let help = format!(
+                    "{} {has} it: leave it out, or write `method: {}`",
+                    methods.join(" and "),
+                    methods[0]
+                );
+                // the same place is not reported again as an unknown key
                 self.report(Diagnostic::error(Code::SCENE_KEY, key.span, message).help(help));
-                // it was reported: known from here on, so that it is not reported twice
-                known.extend(Method::all().into_iter().flat_map(names).filter(|name| *name == key.text));
             }
         }
         known

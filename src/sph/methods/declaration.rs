@@ -40,6 +40,9 @@ pub struct Key<M: 'static> {
     pub value: Value<M>,
 }
 
+/// States what a word of a key means in the numbers of a method.
+pub type Setter<M> = fn(&mut M);
+
 /// What a key may hold.
 pub enum Value<M: 'static> {
     /// A number with a unit.
@@ -65,7 +68,7 @@ pub enum Value<M: 'static> {
         set: fn(&mut M, u32),
     },
     /// One of a few words, each with the function that sets it. The first is the default.
-    Word(&'static [(&'static str, fn(&mut M))]),
+    Word(&'static [(&'static str, Setter<M>)]),
 }
 
 /// The defaults of a fluid in a method, for keys that its scene does not state.
