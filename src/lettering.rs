@@ -132,7 +132,7 @@ impl Font {
         f64::from(own) + kerning.map(f64::from).sum::<f64>()
     }
 
-    /// Of glyphs before another, in units of the font.
+    /// Width of glyphs that stand before `next`, in units of the font.
     fn width(&self, glyphs: &[GlyphId], next: Option<&GlyphId>) -> f64 {
         (0..glyphs.len()).map(|i| self.advance(glyphs[i], glyphs.get(i + 1).or(next))).sum()
     }

@@ -45,7 +45,6 @@ pub struct Experiment {
     scene: Scene,
     parameters: Parameters,
     time_step: TimeStep,
-    typical_speed: f64,
     bodies: Vec<Body>,
     fluid: Solid,
     warnings: Vec<Diagnostic>,
@@ -81,7 +80,7 @@ impl Experiment {
         })?;
         let bodies = bodies::compile(&program, &scene, &parameters, engine)?;
         let warnings = too_long.into_iter().collect();
-        Ok(Self { program, scene, parameters, time_step, typical_speed, bodies, fluid, warnings })
+        Ok(Self { program, scene, parameters, time_step, bodies, fluid, warnings })
     }
 
     /// The program that the scene belongs to.
@@ -111,7 +110,7 @@ impl Experiment {
 
     /// A speed that the fluid can reach by its velocity at the start and a fall through the box, m/s.
     pub fn typical_speed(&self) -> f64 {
-        self.typical_speed
+        self.parameters.expected_speed
     }
 
     /// The outside of the container, if the scene has one, and the obstacles.
@@ -269,7 +268,11 @@ fn vector_field(program: &Program, nodes: &[Node; 3]) -> Arc<VectorField> {
 fn no_fluid(program: &Program, error: &SeedError, span: Span) -> Error {
     let code = match error {
         SeedError::NothingLeft(_) => Code::OBSTACLE_FILLS_BOX,
-        _ => Code::SCENE_NO_ROOM,
+        SeedError::DoesNotFit { .. }
+        | SeedError::NoCount
+        | SeedError::Jitter(_)
+        | SeedError::TooLarge { .. }
+        | SeedError::Undefined { .. } => Code::SCENE_NO_ROOM,
     };
     refuse(program, Diagnostic::error(code, span, error.to_string()))
 }

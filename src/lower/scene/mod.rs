@@ -22,7 +22,7 @@ use crate::sph::{Fill, Method, Slip};
 /// The acceleration of the whole fluid by gravity, m/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Gravity {
-    /// The same at all places and times.
+    /// Gravity that is equal at all places and times.
     Still(DVec3),
     /// Formulas of t alone, as for a container that turns.
     Turning([Node; 3]),

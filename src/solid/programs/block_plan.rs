@@ -33,7 +33,7 @@ pub enum BlockStep<P = ColumnPlace> {
         op: Operation,
         /// How R₀ is evaluated.
         form: Form,
-        /// The same one twice for an operation on one number.
+        /// An operation on one number has its operand here twice.
         operands: [P; 2],
         value: P,
         /// Derivatives by the operands, where they are asked for.
