@@ -300,7 +300,8 @@ impl Program {
 ///
 /// # Errors
 /// [`InvalidData`](std::io::ErrorKind::InvalidData) if the bytes are not UTF-8; the message says where.
-pub(crate) fn text_of(bytes: Vec<u8>) -> std::io::Result<String> {
+#[doc(hidden)]
+pub fn text_of(bytes: Vec<u8>) -> std::io::Result<String> {
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let message = format!("it is not a UTF-8 text (byte {at} does not belong to a character)");

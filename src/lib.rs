@@ -24,9 +24,9 @@
 //! | [`diagnostic`] | messages with their places in a file |
 //! | [`geom`], [`interval`], [`precision`], [`quantity`] | boxes, guaranteed ranges, number types, units |
 //!
-//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) and the commands (`cli`) are
-//! not part of the interface: they are reachable for this package's own tests and benches, and change without
-//! notice.
+//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) are not part of the interface: they are
+//! reachable for this package's own program, tests and benches, and change without notice. The commands (`cli`) belong
+//! to the program `rfm` and not to this library.
 
 #![warn(missing_docs)]
 
@@ -47,8 +47,6 @@ pub mod sph;
 
 mod lettering;
 
-#[doc(hidden)]
-pub mod cli;
 #[doc(hidden)]
 pub mod codegen;
 #[doc(hidden)]

@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::mesh::{ascii_help, output_help};
-use crate::geom::Aabb;
-use crate::mesh::Format;
-use crate::precision::Precision;
-use crate::quantity::{Dimension, parse_unit};
-use crate::slice::{Axis, Plane};
-use crate::sph::Method;
+use super::mesh::{ascii_help, format_name, output_help};
 use glam::DVec3;
+use rfm::geom::Aabb;
+use rfm::mesh::Format;
+use rfm::precision::Precision;
+use rfm::quantity::{Dimension, parse_unit};
+use rfm::slice::{Axis, Plane};
+use rfm::sph::Method;
 
 /// Obstacles written as R-functions, compiled to machine code: check, mesh, simulate.
 ///
@@ -64,7 +64,7 @@ pub(super) enum Engine {
     Interp,
 }
 
-impl From<Engine> for crate::Engine {
+impl From<Engine> for rfm::Engine {
     fn from(engine: Engine) -> Self {
         match engine {
             Engine::Auto => Self::Auto,
@@ -146,7 +146,7 @@ pub(super) struct Eval {
     #[arg(long, value_enum, value_delimiter = ',', default_value = "value,gradient")]
     pub what: Vec<What>,
     /// Width of all arithmetic [default: f64, or what the solid's tolerance allows for ω]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = precision())]
     pub precision: Option<Precision>,
 }
 
@@ -163,16 +163,6 @@ pub(super) enum What {
     Distance,
     /// Outward unit normal −∇ω/|∇ω|
     Normal,
-}
-
-impl ValueEnum for Precision {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::F32, Self::F64]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()))
-    }
 }
 
 #[derive(Debug, Args)]
@@ -235,7 +225,7 @@ pub(super) struct Mesh {
     #[arg(long, help_heading = "Fluid", value_name = "A..B", value_parser = frames, requires = "fluid")]
     pub frames: Option<Frames>,
     /// The format of the files [default: vtp, with a collection for ParaView]
-    #[arg(long, help_heading = "Fluid", value_enum, requires = "fluid")]
+    #[arg(long, help_heading = "Fluid", value_parser = format_name(), requires = "fluid")]
     pub format: Option<Format>,
 }
 
@@ -338,6 +328,13 @@ pub(super) struct Flow {
 }
 
 /// A method of the solver by its name.
+fn precision() -> impl TypedValueParser<Value = Precision> {
+    let precisions = [Precision::F32, Precision::F64];
+    let unknown = "clap lets only the names of precisions through";
+    PossibleValuesParser::new(precisions.map(Precision::name))
+        .try_map(move |name| precisions.into_iter().find(|p| p.name() == name).ok_or(unknown))
+}
+
 fn flow_method() -> impl TypedValueParser<Value = Method> {
     let names = Method::all().into_iter().map(|method| {
         let info = method.info();

@@ -10,15 +10,15 @@ use serde::Serialize;
 use super::args::{Check, Deny, Shared};
 use super::failure::{Failure, complain, note};
 use super::{choose, input, output};
-use crate::diagnostic::{Code, Diagnostic, Diagnostics, Source};
-use crate::field::Field;
-use crate::geom::Aabb;
-use crate::ir::Magnitudes;
-use crate::lower::NamedSolid;
-use crate::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
-use crate::slice::{self, Plane, Window};
-use crate::solid::{Bounds, ProgramKind};
-use crate::{Precision, Program, Solid};
+use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
+use rfm::field::Field;
+use rfm::geom::Aabb;
+use rfm::ir::Magnitudes;
+use rfm::lower::NamedSolid;
+use rfm::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
+use rfm::slice::{self, Plane, Window};
+use rfm::solid::{Bounds, ProgramKind};
+use rfm::{Precision, Program, Solid};
 
 /// Cells along the longest side of the meshes that volumes are measured on. The second mesh is for the
 /// volumes' error.

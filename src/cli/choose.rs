@@ -5,10 +5,10 @@ use std::path::Path;
 use super::args::Shared;
 use super::failure::{Failure, note};
 use super::input;
-use crate::diagnostic::{Diagnostics, nearest};
-use crate::lower::{NamedSolid, Scene};
-use crate::solid::Chosen;
-use crate::{Error, Program, Solid};
+use rfm::diagnostic::{Diagnostics, nearest};
+use rfm::lower::{NamedSolid, Scene};
+use rfm::solid::Chosen;
+use rfm::{Error, Program, Solid};
 
 /// The parts of `FILE` or `FILE:NAME`. If a file has the whole text as its name, it is that file.
 pub(super) fn subject(text: &str) -> (&Path, Option<&str>) {

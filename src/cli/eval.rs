@@ -8,9 +8,9 @@ use glam::DVec3;
 use super::args::{Eval, Shared, What};
 use super::failure::Failure;
 use super::{choose, input, output};
-use crate::ir::Unary;
-use crate::solid::Chosen;
-use crate::{Field, Precision, Solid};
+use rfm::ir::Unary;
+use rfm::solid::Chosen;
+use rfm::{Field, Precision, Solid};
 
 /// Points that are evaluated at a time, so that memory stays small for any number of points.
 const CHUNK: usize = 4096;

@@ -7,17 +7,17 @@ use glam::DVec3;
 use super::args::{Explain, Shared, Stage};
 use super::run::{experiment, start};
 use super::{Failure, choose, input};
-use crate::codegen::{CodegenError, Listing, Request, Shape, target_description};
-use crate::diagnostic::{Span, explain};
-use crate::geom::Aabb;
-use crate::interval::Interval;
-use crate::ir::{Node, dump};
-use crate::lower::{NamedSolid, Scene};
-use crate::simplify::{Exactness, MOST_PLACES, simplify};
-use crate::solid::{Bounds, ProgramKind, Remainder};
-use crate::sph::methods_reference;
-use crate::syntax;
-use crate::{Precision, Program, Solid};
+use rfm::codegen::{CodegenError, Listing, Request, Shape, target_description};
+use rfm::diagnostic::{Span, explain};
+use rfm::geom::Aabb;
+use rfm::interval::Interval;
+use rfm::ir::{Node, dump};
+use rfm::lower::{NamedSolid, Scene};
+use rfm::simplify::{Exactness, MOST_PLACES, simplify};
+use rfm::solid::{Bounds, ProgramKind, Remainder};
+use rfm::sph::methods_reference;
+use rfm::syntax;
+use rfm::{Precision, Program, Solid};
 
 pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
     if shared.json {

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use super::args::Shared;
 use super::failure::{Failure, note};
-use crate::Program;
-use crate::compile::text_of;
-use crate::diagnostic::{Code, Diagnostics, Source, Style, render};
-use crate::lower::Options;
+use rfm::Program;
+use rfm::compile::text_of;
+use rfm::diagnostic::{Code, Diagnostics, Source, Style, render};
+use rfm::lower::Options;
 
 /// The text of a file, with the name that messages give it.
 pub(super) fn read(path: &Path) -> Result<Source, Failure> {
@@ -49,7 +49,7 @@ pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> 
 
 /// The failure of a file with errors, or of flags that set what the file does not allow.
 pub(super) fn failure(diagnostics: &Diagnostics) -> Failure {
-    let errors = || diagnostics.list.iter().filter(|d| d.severity == crate::diagnostic::Severity::Error);
+    let errors = || diagnostics.list.iter().filter(|d| d.severity == rfm::diagnostic::Severity::Error);
     if errors().all(|d| d.code == Code::OVERRIDE) {
         return Failure::usage("the params given with -D do not fit the file");
     }

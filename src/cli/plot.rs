@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::failure::Failure;
 use super::output;
-use crate::slice;
+use rfm::slice;
 
 pub(super) const WIDTH: f64 = 760.0;
 pub(super) const HEIGHT: f64 = 520.0;

@@ -36,7 +36,7 @@ pub use bounds::magnitude::Magnitudes;
 pub use bounds::range::RangeEvaluator;
 pub(crate) use bounds::range::{Affine, RangeRule, Region};
 pub(crate) use derived::contact::{contact, wall_velocity};
-pub(crate) use derived::gradient::gradient;
+pub use derived::gradient::gradient;
 pub use derived::gradient::gradient_and_rate;
 pub(crate) use derived::hoisted::{Hoisted, Uniforms, hoisted};
 pub use derived::localised::localised;

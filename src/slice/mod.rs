@@ -24,7 +24,8 @@ pub mod terminal;
 use std::io;
 
 pub use self::png::rasterise;
-pub(crate) use self::svg::escaped;
+#[doc(hidden)]
+pub use self::svg::escaped;
 use self::svg::svg;
 pub use self::{
     error::SliceError,

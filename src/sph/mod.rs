@@ -85,6 +85,7 @@ pub use scales::{Scales, Slip};
 pub use seed::{Carved, Fill, FluidBlock, FluidShape, SeedError, carve, make_room};
 pub use simulation::Simulation;
 pub use stats::Stats;
-pub(crate) use vtp::short_time;
+#[doc(hidden)]
+pub use vtp::short_time;
 pub use vtp::{write_pvd, write_vtp};
 pub use walls::{Contact, Obstacle, Undefined, WallKernel, first_contact, push_out};

@@ -13,9 +13,9 @@ use super::super::args::{Frames, Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
 use super::super::{output, progress};
 use super::format;
-use crate::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
-use crate::mesh::{WriteMesh, is_closed_manifold, shells, vtp};
-use crate::sph;
+use rfm::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
+use rfm::mesh::{WriteMesh, is_closed_manifold, shells, vtp};
+use rfm::sph;
 
 /// The JSON document. Lengths are in metres, volumes in cubic metres.
 #[derive(Debug, Serialize)]

@@ -2,20 +2,17 @@
 
 use std::path::Path;
 
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::super::failure::Failure;
-use crate::mesh::{FORMATS, Format, WriteMesh};
+use rfm::mesh::{FORMATS, Format, WriteMesh};
 
-impl ValueEnum for Format {
-    fn value_variants<'a>() -> &'a [Self] {
-        FORMATS
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.ending).help(self.purpose))
-    }
+/// The parser of a format's name, which is the ending of its files.
+pub(in crate::cli) fn format_name() -> impl TypedValueParser<Value = Format> {
+    let names = FORMATS.iter().map(|format| PossibleValue::new(format.ending).help(format.purpose));
+    let unknown = "clap lets only the names of formats through";
+    PossibleValuesParser::new(names)
+        .try_map(move |name| FORMATS.iter().find(|format| format.ending == name).copied().ok_or(unknown))
 }
 
 /// The format that a path's ending names.

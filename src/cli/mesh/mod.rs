@@ -11,15 +11,15 @@ use std::time::Instant;
 use super::args::{Mesh as Options, MeshMethod, Shared};
 use super::failure::{Failure, note};
 use super::{choose, input, output, progress};
-use crate::Solid;
-use crate::field::Field;
-use crate::geom::Aabb;
-use crate::mesh::{
+pub(super) use format::{ascii_help, format_name, output_help};
+use rfm::Solid;
+use rfm::field::Field;
+use rfm::geom::Aabb;
+use rfm::mesh::{
     self, Grid, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh, dual_contouring,
     marching_cubes,
 };
-use crate::solid::{Bounds, Depth};
-pub(super) use format::{ascii_help, output_help};
+use rfm::solid::{Bounds, Depth};
 use simplified::{Simplified, simplified};
 use summary::MeshSummary;
 

@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use super::super::args::Tolerance;
 use super::super::failure::note;
-use crate::field::Field;
-use crate::geom::Aabb;
-use crate::mesh::{Mesh, Quality, Reference, simplify};
+use rfm::field::Field;
+use rfm::geom::Aabb;
+use rfm::mesh::{Mesh, Quality, Reference, simplify};
 
 /// What was found about a simplified mesh.
 pub(super) struct Simplified {

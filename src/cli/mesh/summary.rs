@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::simplified::Simplified;
-use crate::mesh::{Quality, Report};
+use rfm::mesh::{Quality, Report};
 
 /// The JSON document. Lengths are in metres, areas in m², volumes in m³.
 #[derive(Serialize)]

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::super::Failure;
 use super::super::plot::{self, LogAxis};
 use super::flow_run::FlowRun;
-use crate::experiment::Deviation;
-use crate::sph::Method;
+use rfm::experiment::Deviation;
+use rfm::sph::Method;
 
 /// Colours of the methods, in the order of their list; a longer list begins anew.
 const COLOURS: [&str; 6] = ["#2f855a", "#1b6ca8", "#c05621", "#6b46c1", "#b83280", "#4a5568"];

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::experiment::Deviation;
-use crate::sph::Simulation;
+use rfm::experiment::Deviation;
+use rfm::sph::Simulation;
 
 /// One run of a scene, as a row of the report.
 #[derive(Debug, Clone, Serialize)]

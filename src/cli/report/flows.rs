@@ -15,10 +15,10 @@ use super::super::args::{Flow, Shared};
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
 use super::flow_run::FlowRun;
-use crate::experiment::{Deviation, Deviations};
-use crate::lower::{Scene, Truth};
-use crate::sph::{Method, Simulation};
-use crate::{Error, Experiment, Program};
+use rfm::experiment::{Deviation, Deviations};
+use rfm::lower::{Scene, Truth};
+use rfm::sph::{Method, Simulation};
+use rfm::{Error, Experiment, Program};
 
 /// The param of a file that sets the resolution of its scene.
 const SIZE: &str = "particles";

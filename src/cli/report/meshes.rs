@@ -11,9 +11,9 @@ use super::super::args::MeshMethod;
 use super::super::failure::Failure;
 use super::super::plot::{self, LogAxis};
 use super::super::progress;
-use crate::Solid;
-use crate::mesh::{self, Grid, Quality, Resolution};
-use crate::solid::Depth;
+use rfm::Solid;
+use rfm::mesh::{self, Grid, Quality, Resolution};
+use rfm::solid::Depth;
 
 /// Resolutions for each method. Each is twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;

@@ -19,13 +19,13 @@ use serde::Serialize;
 use super::args::{Report, Shared};
 use super::failure::Failure;
 use super::{choose, input, output, progress};
-use crate::codegen::target_description;
-use crate::geom::Aabb;
-use crate::lower::Scene;
-use crate::{Program, Solid};
 use meshes::MeshFigures;
 use points::SamplePoints;
 use programs::{ExactValues, ProgramFigures};
+use rfm::codegen::target_description;
+use rfm::geom::Aabb;
+use rfm::lower::Scene;
+use rfm::{Program, Solid};
 
 #[derive(Serialize)]
 struct Document<'a> {

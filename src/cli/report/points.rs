@@ -4,8 +4,8 @@ use glam::DVec3;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use crate::geom::Aabb;
-use crate::{Precision, Solid};
+use rfm::geom::Aabb;
+use rfm::{Precision, Solid};
 
 /// Points of a timed batch: enough to fill the pipelines, and few enough to stay in the nearest cache.
 const TIMED: usize = 4096;

@@ -8,12 +8,12 @@ use serde::Serialize;
 
 use super::super::failure::Failure;
 use super::points::SamplePoints;
-use crate::codegen::Form;
-use crate::geom::Aabb;
-use crate::ir::exact::{self, Exact};
-use crate::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Node};
-use crate::solid::{Lane, ProgramKind};
-use crate::{Engine, Precision, Program, Solid};
+use rfm::codegen::Form;
+use rfm::geom::Aabb;
+use rfm::ir::exact::{self, Exact};
+use rfm::ir::{self, Arithmetic, ErrorAnalysis, FloatType, Graph, Inputs, Node};
+use rfm::solid::{Lane, ProgramKind};
+use rfm::{Engine, Precision, Program, Solid};
 
 /// A point nearer to the surface than this many rounding errors of its coordinates has no sign to compare.
 const ROUNDING: f64 = 8.0;

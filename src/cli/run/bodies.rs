@@ -2,9 +2,9 @@
 
 use super::super::args::Run;
 use super::super::{Failure, note};
-use crate::geom::Aabb;
-use crate::mesh::{Grid, Mesh, Resolution, marching_cubes};
-use crate::{Experiment, Solid};
+use rfm::geom::Aabb;
+use rfm::mesh::{Grid, Mesh, Resolution, marching_cubes};
+use rfm::{Experiment, Solid};
 
 /// The solids of a scene.
 pub(super) struct Bodies {

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use super::super::{Failure, note, output};
 use super::pace::Every;
-use crate::Experiment;
-use crate::ir;
-use crate::lower::Scene;
-use crate::sph::{Checkpoint, CheckpointError, Parameters, Simulation};
+use rfm::Experiment;
+use rfm::ir;
+use rfm::lower::Scene;
+use rfm::sph::{Checkpoint, CheckpointError, Parameters, Simulation};
 
 /// Number of checkpoints that are kept. The second serves if the last is found damaged.
 const KEPT: usize = 2;

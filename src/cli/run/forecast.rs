@@ -8,8 +8,8 @@ use super::super::args::Shared;
 use super::super::{Failure, output};
 use super::goal::Goal;
 use super::summary::pass_names;
-use crate::Experiment;
-use crate::sph::Simulation;
+use rfm::Experiment;
+use rfm::sph::Simulation;
 
 /// The output of `--dry-run`.
 #[derive(Debug, Serialize)]

@@ -11,11 +11,11 @@ use super::super::args::Run;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
 use super::{checkpoints, probes};
-use crate::Experiment;
-use crate::geom::Aabb;
-use crate::mesh::{self, Mesh};
-use crate::render;
-use crate::sph::{self, Checkpoint, Simulation};
+use rfm::Experiment;
+use rfm::geom::Aabb;
+use rfm::mesh::{self, Mesh};
+use rfm::render;
+use rfm::sph::{self, Checkpoint, Simulation};
 
 /// Name of the frames' times in a checkpoint.
 const TIMES: &str = "frames";

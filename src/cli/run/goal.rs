@@ -2,8 +2,8 @@
 
 use super::super::Failure;
 use super::super::args::Run;
-use crate::Experiment;
-use crate::sph::Simulation;
+use rfm::Experiment;
+use rfm::sph::Simulation;
 
 /// The end of a run.
 #[derive(Clone, Copy)]

@@ -20,12 +20,12 @@ use std::time::Instant;
 
 use super::args::{Run, Shared};
 use super::{Failure, choose, input, note, output, progress};
-use crate::sph::{Simulation, StepError, short_time};
-use crate::{Error, Experiment, Program};
 use checkpoints::Checkpoints;
 use frames::Frames;
 use goal::{Goal, Pace};
 use probes::Probes;
+use rfm::sph::{Simulation, StepError, short_time};
+use rfm::{Error, Experiment, Program};
 use summary::Summary;
 use watch::{WATCH, Watch};
 

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, RIGHT, TOP, WIDTH};
 use super::super::{Failure, output};
 use super::pace::Every;
-use crate::lower::{Measured, Scene};
-use crate::slice;
-use crate::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
+use rfm::lower::{Measured, Scene};
+use rfm::slice;
+use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
 
 const FOLDER: &str = "probes";
 

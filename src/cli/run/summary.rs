@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::frames::Frames;
 use super::probes::Probes;
 use super::watch::Watch;
-use crate::experiment::Deviation;
-use crate::sph::{Pass, Simulation};
+use rfm::experiment::Deviation;
+use rfm::sph::{Pass, Simulation};
 
 /// The content of `summary.json` and the output of `--json`. Figures that judge the run are the worst of all
 /// saved instants.

@@ -3,9 +3,9 @@
 
 use std::time::Duration;
 
-use crate::Experiment;
-use crate::experiment::Deviations;
-use crate::sph::{Checkpoint, Simulation, Stats};
+use rfm::Experiment;
+use rfm::experiment::Deviations;
+use rfm::sph::{Checkpoint, Simulation, Stats};
 
 /// Name of the memory of [`Watch`] in a checkpoint.
 pub(super) const WATCH: &str = "watch";
