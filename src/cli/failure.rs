@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::process::ExitCode;
 
+use rfm::diagnostic::Code;
+
 /// Why a command stopped. Its message is printed once, by [`Failure::report`].
 #[derive(Debug)]
 pub(super) enum Failure {
@@ -55,6 +57,12 @@ impl From<std::io::Error> for Failure {
 pub(super) fn complain(message: &str) {
     let red = anstyle::AnsiColor::Red.on_default().bold();
     anstream::eprintln!("{red}error{red:#}: {message}");
+}
+
+/// Prints a warning with its code.
+pub(super) fn warn(code: Code, message: impl Display) {
+    let yellow = anstyle::AnsiColor::Yellow.on_default().bold();
+    anstream::eprintln!("{yellow}warning[{}]{yellow:#}: {message}", code.0);
 }
 
 /// Prints a remark that is no finding. It goes to standard error and is never part of the data.

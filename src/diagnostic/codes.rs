@@ -152,6 +152,18 @@ run starts.";
 LONG_STEP = "W0503":
 "The time step is longer than what is stable when particles fall through the whole box. The run may still go well if
 they never become so fast; without `dt` a stable step is derived.";
+ENERGY_GREW = "W0511":
+"The run's energy rose by more than 1 % above what it had at the start and gravity's work since then. No fluid does
+that: the method made energy of its errors. What moves faster or higher than it could is wrong from then on. More particles,
+more `artificial_viscosity` (wcsph), or the other method may help; `energy_excess` in the summary has the largest value, and
+the probe `audit` shows when it arose. A run whose energy doubles stops.";
+VOLUME_CHANGED = "W0512":
+"The places of the particles take up 2 % more or less room than at the start. Where particles crowd, the fluid has lost
+volume: levels are too low and what hits them comes too late. `volume_change` in the summary has the largest value.";
+COMPRESSED = "W0513":
+"By the places of its particles the fluid is compressed, on average, more than ten times as much as the method is to allow.
+Look at `compression_p99` in the summary as well: large values mean that particles crowd in a few places, most often at
+walls that the flow hits.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -11,8 +11,9 @@ use crate::geom::Aabb;
 use crate::quantity::{Bound, Dimension};
 use crate::syntax::ast::{Entry, Expr, ExprKind};
 
-const MEASURED: [&str; 6] = ["height", "pressure", "velocity", "force", "flux", "energy"];
-const PROBE_KEYS: [&str; 8] = ["height", "pressure", "velocity", "force", "flux", "energy", "about", "every"];
+const MEASURED: [&str; 7] = ["height", "pressure", "velocity", "force", "flux", "energy", "audit"];
+const PROBE_KEYS: [&str; 9] =
+    ["height", "pressure", "velocity", "force", "flux", "energy", "audit", "about", "every"];
 const FLUX_KEYS: [&str; 2] = ["point", "normal"];
 
 /// What the probes of a scene may refer to.
@@ -94,6 +95,9 @@ impl<'a> Lowering<'a> {
                 let body = self.one_of(value, "force", &around.bodies, "obstacle of this scene");
                 let about = self.vector_key(block, "about", Dimension::LENGTH, DVec3::ZERO);
                 Some(Measured::Force { body: body?, about: about? })
+            }
+            "audit" => {
+                self.one_of(value, "audit", &[around.fluid], "fluid of this scene").map(|_| Measured::Audit)
             }
             _ => {
                 self.one_of(value, "energy", &[around.fluid], "fluid of this scene").map(|_| Measured::Energy)

@@ -19,7 +19,7 @@ use super::particles::{Particles, Vectors};
 const MAGIC: [u8; 8] = *b"rfm run\n";
 
 /// Version of the layout above and of the meaning of the columns.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Names of the columns that hold components of vectors.
 pub(super) const VECTORS: [&str; 9] = [
@@ -294,7 +294,7 @@ mod tests {
         let pawn = scenes::pawn();
         let [paper, wcsph, dfsph] = methods();
         let of_paper = scenes::drop_on(&pawn, paper, 50).checkpoint();
-        for (parameters, column) in [(wcsph, "density rate"), (dfsph, "specific pressure")] {
+        for (parameters, column) in [(wcsph, "places"), (dfsph, "specific pressure")] {
             let resumed = Simulation::resume(parameters, &of_paper, scenes::BOX, Vec::new());
             let error = SetupError::Checkpoint(CheckpointError::Column(column.into()));
             assert_eq!(resumed.err(), Some(error));
@@ -336,7 +336,7 @@ mod tests {
             let error = Checkpoint::read(&changed).unwrap_err();
             let expected = match at {
                 0..8 => CheckpointError::Foreign,
-                8..12 => CheckpointError::Version(1 ^ (1 << (8 * (at - 8) + at % 8))),
+                8..12 => CheckpointError::Version(VERSION ^ (1 << (8 * (at - 8) + at % 8))),
                 _ => CheckpointError::Damaged,
             };
             assert_eq!(error, expected, "byte {at}");

@@ -27,6 +27,9 @@ pub(super) const CHUNK: usize = 2048;
 /// or forces by 10¹².
 const SHORTEST: f64 = 1e-6;
 
+/// Name of the greatest speed of sound in a checkpoint.
+const SOUND: &str = "speed of sound";
+
 /// The state of a simulation and the stages that all methods share.
 pub(super) struct Core {
     pub parameters: Parameters,
@@ -43,6 +46,9 @@ pub(super) struct Core {
     pub time: f64,
     /// The greatest speed at the beginning of the present step, m/s.
     pub speed: f64,
+    /// The greatest speed of sound in the fluid as it is compressed now, m/s; 0 if the method has none that
+    /// grows with compression.
+    pub sound: f64,
     /// Impulses of particles on obstacles, if a probe asks for them.
     pub contacts: Option<Contacts>,
     /// The longest step that was allowed so far, s.
@@ -79,6 +85,7 @@ impl Core {
             steps: 0,
             time: 0.0,
             speed,
+            sound: 0.0,
             contacts: None,
             longest_dt: 0.0,
             level: Level::new(),
@@ -256,6 +263,8 @@ impl Core {
     /// The longest step that this state allows, s, for a greatest speed that is known, m/s.
     fn stable_dt_at(&self, speed: f64) -> f64 {
         let limit = self.parameters.stable_dt(speed);
+        let limit =
+            if self.sound > 0.0 { limit.min(self.parameters.sound_dt(self.sound, speed)) } else { limit };
         limit.min(self.parameters.present_force_dt(longest(&self.acceleration)))
     }
 
@@ -290,6 +299,7 @@ impl Core {
         }
         checkpoint.set("density", particles.density.clone());
         checkpoint.set("pressure", particles.pressure.clone());
+        checkpoint.set(SOUND, vec![self.sound]);
         if let Some(contacts) = &self.contacts {
             checkpoint.set("contacts", contacts.totals().as_flattened().to_vec());
         }
@@ -302,6 +312,9 @@ impl Core {
         let components = self.acceleration.components_mut();
         for (name, column) in VECTORS[6..].iter().zip(components) {
             *column = checkpoint.of_particles(name)?;
+        }
+        if let [sound] = checkpoint.get(SOUND)? {
+            self.sound = *sound;
         }
         (self.steps, self.time) = (checkpoint.steps, checkpoint.time);
         Ok(())
@@ -326,10 +339,22 @@ impl Core {
     }
 
     fn stalled(&self, dt: f64) -> StepError {
+        let (id, speed) = self.fastest();
+        StepError::Stalled { step: self.steps, dt, id, speed }
+    }
+
+    /// The error of a state whose energy has doubled.
+    pub fn energy_doubled(&self, excess: f64) -> StepError {
+        let (id, speed) = self.fastest();
+        StepError::EnergyDoubled { step: self.steps, excess, id, speed }
+    }
+
+    /// Number and speed, m/s, of the fastest particle.
+    fn fastest(&self) -> (u32, f64) {
         let Particles { velocity, id, .. } = &self.particles;
         let speed = |i: &usize| velocity.get(*i).length();
         let fastest = (0..velocity.len()).max_by(|a, b| speed(a).total_cmp(&speed(b))).unwrap_or(0);
-        StepError::Stalled { step: self.steps, dt, id: id[fastest], speed: speed(&fastest) }
+        (id[fastest], speed(&fastest))
     }
 
     fn non_finite(&self, index: usize, quantity: Quantity, dt: f64) -> StepError {

@@ -127,6 +127,17 @@ pub enum StepError {
         /// The most likely reason.
         cause: Cause,
     },
+    /// The energy of the fluid has doubled without work. See [`Audit`](super::Audit).
+    EnergyDoubled {
+        /// Number of the step.
+        step: u64,
+        /// The excess of the energy over that at the start and gravity's work, as a part of that at the start.
+        excess: f64,
+        /// The number, at seeding, of the fastest particle.
+        id: u32,
+        /// The speed of this particle, m/s.
+        speed: f64,
+    },
     /// The state allows only steps so short that the run would never end, because a particle has become too
     /// fast.
     Stalled {
@@ -145,6 +156,14 @@ impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (step, id, quantity, cause) = match self {
             Self::NonFinite { step, id, quantity, cause } => (step, id, quantity, cause),
+            Self::EnergyDoubled { step, excess, id, speed } => {
+                return write!(
+                    f,
+                    "step {step}: without any work the energy is {:.0} % above that at the start, which no fluid does; \
+                     particle {id} is the fastest, with {speed:.2e} m/s",
+                    100.0 * excess
+                );
+            }
             Self::Stalled { step, dt, id, speed } => {
                 return write!(
                     f,

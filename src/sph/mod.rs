@@ -38,6 +38,7 @@
 //! - After a step every particle is finite, in the box, and in the fluid (ω < 0), or the step was an error.
 //! - A step allocates nothing once the buffers have grown to the size of the flow.
 
+mod audit;
 mod checkpoint;
 mod contacts;
 mod core;
@@ -73,6 +74,7 @@ pub type VectorField = dyn Fn(glam::DVec3, f64) -> glam::DVec3 + Send + Sync;
 pub type VectorOfTime = dyn Fn(f64) -> glam::DVec3 + Send + Sync;
 
 pub use crate::precision::Precision;
+pub use audit::{Audit, Compression, Finding};
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use error::{Cause, ParameterError, Quantity, SetupError, StepError};
 pub use kernel::Kernels;

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::error::ParameterError;
 use super::kernel::Kernels;
-use super::methods::Method;
+use super::methods::{COURANT, Method};
 use super::scales::{Scales, Slip};
 use crate::precision::Precision;
 use crate::quantity::Bound;
@@ -170,6 +170,11 @@ impl Parameters {
     /// The longest step, s, for an acceleration a, m/s²: a multiple of √(h/a), with the support radius h.
     pub fn force_dt(&self, acceleration: f64) -> f64 {
         self.method.numerics().force_factor() * (self.support_radius / acceleration).sqrt()
+    }
+
+    /// The longest step, s, for a speed of sound and a greatest speed, m/s.
+    pub(super) fn sound_dt(&self, sound: f64, max_speed: f64) -> f64 {
+        COURANT * self.support_radius / (sound + max_speed)
     }
 
     /// The longest step, s, for the present acceleration of the particles, pressure included, m/s².

@@ -13,6 +13,7 @@ use crate::geom::Aabb;
 
 use super::{
     VectorField, VectorOfTime,
+    audit::{Audit, Finding},
     checkpoint::Checkpoint,
     contacts::Contacts,
     core::{Core, first_non_finite},
@@ -34,7 +35,11 @@ const CLEARANCE: f64 = 1e-6;
 pub struct Simulation {
     core: Core,
     scheme: Box<dyn Scheme>,
+    audit: Audit,
 }
+
+/// Name of the audit's memory in a checkpoint.
+const AUDIT: &str = "audit";
 
 impl Simulation {
     /// Checks the input and finds the densities and forces of the first instant.
@@ -76,7 +81,8 @@ impl Simulation {
         let mut core = Core::new(parameters, boundary, particles);
         (core.steps, core.time) = (steps, time);
         let scheme = start(&mut core, instant.is_none());
-        Ok(Self { core, scheme })
+        let audit = Audit::start(&core, scheme.densities(&core));
+        Ok(Self { core, scheme, audit })
     }
 
     /// A simulation that goes on from a checkpoint. With the same parameters, box and obstacles, every later
@@ -96,6 +102,9 @@ impl Simulation {
         let mut simulation = Self::at(parameters, particles, domain, obstacles, instant)?;
         let restored = simulation.core.restore(checkpoint);
         restored.and_then(|()| simulation.scheme.restore(checkpoint)).map_err(SetupError::Checkpoint)?;
+        if let Ok(memory) = checkpoint.get(AUDIT) {
+            simulation.audit.take_up(memory);
+        }
         Ok(simulation)
     }
 
@@ -103,14 +112,15 @@ impl Simulation {
     pub fn checkpoint(&self) -> Checkpoint {
         let mut checkpoint = self.core.checkpoint();
         self.scheme.save(&mut checkpoint);
+        checkpoint.set(AUDIT, self.audit.memory());
         checkpoint
     }
 
     /// Advances by one time step.
     ///
     /// # Errors
-    /// [`StepError`] if a value is not finite any more, or steps have become too short. Nothing is clamped to
-    /// hide it.
+    /// [`StepError`] if a value is not finite any more, steps have become too short, or the energy has doubled
+    /// without work. Nothing is clamped to hide it.
     pub fn step(&mut self) -> Result<(), StepError> {
         self.step_at_most(f64::INFINITY)
     }
@@ -131,7 +141,27 @@ impl Simulation {
         let counted = |steps: u64| steps as f64 * dt;
         self.core.time =
             if self.core.time == counted(before) { counted(before + 1) } else { self.core.time + dt };
-        Ok(())
+        self.audit.look(&self.core, self.scheme.densities(&self.core), dt)
+    }
+
+    /// The greatest speed after the last step, m/s.
+    pub fn speed(&self) -> f64 {
+        self.audit.speed()
+    }
+
+    /// What the energy, the volume and the densities of this simulation have shown since its start.
+    pub fn audit(&self) -> &Audit {
+        &self.audit
+    }
+
+    /// What a user must know about the simulation so far, each finding with a sentence.
+    pub fn findings(&self) -> Vec<(Finding, String)> {
+        self.audit.findings(self.core.parameters.method.numerics().kept_compression())
+    }
+
+    /// The findings that this function has not returned before.
+    pub fn news(&mut self) -> Vec<(Finding, String)> {
+        self.audit.news(self.core.parameters.method.numerics().kept_compression())
     }
 
     /// The parameters. Gravity is that of the present step.
@@ -189,6 +219,7 @@ impl Simulation {
     pub fn set_turning_gravity(&mut self, gravity: Arc<VectorOfTime>) {
         self.core.parameters.gravity = gravity(self.core.time);
         self.core.turning_gravity = Some(gravity);
+        self.begin_audit();
     }
 
     /// Adds to gravity an acceleration that depends on the place and the time, m/s².
@@ -196,6 +227,14 @@ impl Simulation {
         self.core.gravity_field = Some(field);
         if self.core.steps == 0 {
             self.core.pull();
+        }
+        self.begin_audit();
+    }
+
+    /// Begins the audit anew if what acts on the fluid is set before its first step.
+    fn begin_audit(&mut self) {
+        if self.core.steps == 0 {
+            self.audit = Audit::start(&self.core, self.scheme.densities(&self.core));
         }
     }
 
@@ -242,7 +281,7 @@ impl Simulation {
 
     /// Samples a probe now: one figure for each of its [columns](Probe::columns).
     pub fn sample(&self, gauge: &mut Gauge) -> Vec<f64> {
-        gauge.sample(&self.core)
+        gauge.sample(&self.core, &self.audit)
     }
 
     /// The longest step, s, that this state allows: the least of the parameters' limits at the present

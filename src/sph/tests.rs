@@ -326,3 +326,49 @@ fn kept_tension_makes_a_pair_coincide_and_clamping_does_not() {
     assert!((nearest(NegativePressure::Clamp) - 0.05).abs() < 1e-12);
     assert!(nearest(NegativePressure::Keep) < 0.02);
 }
+
+/// The greatest energy of one particle between two walls within a second, over that at its start.
+fn energy_between_walls(method: Method, speed: f64, obstacles: bool) -> f64 {
+    let spacing = 0.04;
+    let parameters = Parameters {
+        rest_density: 1000.0,
+        particle_mass: 1000.0 * spacing * spacing * spacing,
+        support_radius: 2.6 * spacing,
+        viscosity: 0.0,
+        surface_tension: 0.0,
+        gravity: DVec3::ZERO,
+        wall_restitution: 0.0,
+        adaptive: true,
+        time_step: 0.1,
+        expected_speed: 4.0,
+        method,
+        ..Parameters::default()
+    };
+    let (walls, bodies) = if obstacles {
+        let body = |x: f64, normal: DVec3| Obstacle {
+            restitution: 0.0,
+            ..Obstacle::at_rest(scenes::half_space(DVec3::new(x, 0.0, 0.0), normal), 0.005)
+        };
+        (1.0, vec![body(0.9, DVec3::X), body(1.1, -DVec3::X)])
+    } else {
+        (0.1, Vec::new())
+    };
+    let domain = Aabb::new(DVec3::new(1.0 - walls, 0.0, 0.0), DVec3::new(1.0 + walls, 2.0, 2.0));
+    let start = one(DVec3::ONE, DVec3::new(speed, 0.1 * speed, 0.0));
+    let mut simulation = Simulation::new(parameters, start, domain, bodies).unwrap();
+    simulation.advance(1.0, |_| std::ops::ControlFlow::Continue(())).unwrap();
+    simulation.audit().energy_excess().unwrap()
+}
+
+#[test]
+fn walls_give_a_particle_no_energy() {
+    let weakly = Wcsph { sound_speed: Some(40.0), ..Wcsph::default() };
+    for method in [Method::from(weakly), Dfsph::default().into(), Method::default()] {
+        for speed in [1.0, 4.0, 7.0, 12.0, 40.0, 100.0] {
+            for obstacles in [false, true] {
+                let excess = energy_between_walls(method, speed, obstacles);
+                assert!(excess < 1e-3, "{} {speed} m/s, obstacles: {obstacles}: {excess}", method.name());
+            }
+        }
+    }
+}

@@ -59,7 +59,7 @@ fn falls_well(name: &str) {
     }
     assert_eq!(summary["particles"], 400);
     assert!(summary["max_penetration"].as_f64().unwrap() <= 1e-9, "{summary}");
-    assert!(summary["energy_growth"].as_f64().unwrap() < 1e-3, "{summary}");
+    assert!(summary["energy_excess"].as_f64().unwrap() < 1e-3, "{summary}");
     assert_eq!(summary["finished"], true);
     let frames = summary["frames"].as_u64().unwrap() as usize;
     assert!(frames >= 5, "{summary}");

@@ -5,6 +5,7 @@
 
 mod bodies;
 mod checkpoints;
+mod findings;
 mod forecast;
 mod frames;
 mod goal;
@@ -84,8 +85,12 @@ fn conclude(
         output::json(&summary)?;
     }
     match stopped {
-        None if !shared.json => summary::print(&summary, frames, probes),
-        None => {}
+        None => {
+            if !shared.json {
+                summary::print(&summary, frames, probes);
+            }
+            findings::repeat(simulation);
+        }
         Some(Stop::Interrupted) => {
             note(format!("interrupted after {} steps; {}", simulation.steps(), recording.kept()));
             return Err(Failure::Interrupted);
@@ -161,11 +166,12 @@ impl Recording<'_> {
                 bar.finish_and_clear();
                 return Ok(Err(Stop::Numerical(error)));
             }
+            bar.suspend(|| findings::tell_news(simulation));
             bar.set_position(goal.done(simulation));
             let stop = interrupted.load(Ordering::Relaxed);
             let in_turn = pace.frame_is_due(simulation);
             self.record(simulation, in_turn, stop || goal.is_reached(simulation))?;
-            let speed = self.watch.now.max_speed;
+            let speed = simulation.speed();
             let mut message = format!("t = {:.3} s, {speed:.2} m/s", simulation.time());
             if let Some(iterations) = simulation.iterations() {
                 message += &format!(", {iterations} iterations");

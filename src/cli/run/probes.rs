@@ -160,6 +160,7 @@ fn probe(measured: &Measured) -> Probe {
         Measured::Force { body, about } => Probe::Force { obstacle: body, about },
         Measured::Flux { point, normal } => Probe::Flux { point, normal },
         Measured::Energy => Probe::Energy,
+        Measured::Audit => Probe::Audit,
     }
 }
 

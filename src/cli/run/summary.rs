@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::findings;
 use super::frames::Frames;
 use super::probes::Probes;
 use super::watch::Watch;
@@ -33,10 +34,21 @@ pub(super) struct Summary {
     kinetic_energy: f64,
     potential_energy: f64,
     energy_at_start: f64,
-    /// The largest energy of a saved instant over the one at the start, minus 1; 0 if the energy only fell,
-    /// null if a fluid that had none at the start has some.
-    energy_growth: Option<f64>,
+    /// The greatest excess of the energy over that at the start and gravity's work, as a part of the energy at
+    /// the start, after any step; null if it cannot be judged.
+    energy_excess: Option<f64>,
+    /// The largest change of the fluid's volume by the places of its particles, as a part of it.
+    volume_change: f64,
+    /// The largest mean compression by the places of the particles, as a part of the rest density.
+    compression_mean: f64,
+    /// The largest compression that one particle in a hundred exceeds.
+    compression_p99: f64,
+    /// The largest compression of a particle.
+    compression_max: f64,
+    /// The greatest speed after any step, m/s.
     max_speed: f64,
+    /// The codes of what the audit of the run has found.
+    findings: Vec<&'static str>,
     /// Relative L2 deviation of the pressure from the scene's `truth`, over all saved instants.
     #[serde(skip_serializing_if = "Option::is_none")]
     pressure_error: Option<f64>,
@@ -57,6 +69,7 @@ impl Summary {
     pub fn of(watch: &Watch, scene: &str, simulation: &Simulation, frames: usize, finished: bool) -> Self {
         let steps = simulation.steps();
         let deviation = watch.deviations.total();
+        let (audit, compression) = (simulation.audit(), simulation.audit().compression());
         Self {
             schema: 1,
             scene: scene.to_string(),
@@ -77,8 +90,17 @@ impl Summary {
             kinetic_energy: watch.now.kinetic_energy,
             potential_energy: watch.now.potential_energy,
             energy_at_start: watch.energy_at_start,
-            energy_growth: growth(watch.energy_at_start, watch.most_energy),
-            max_speed: watch.worst.max_speed,
+            energy_excess: audit.energy_excess(),
+            volume_change: audit.volume_change(),
+            compression_mean: compression.mean,
+            compression_p99: compression.p99,
+            compression_max: compression.largest,
+            max_speed: audit.max_speed(),
+            findings: simulation
+                .findings()
+                .into_iter()
+                .map(|(finding, _)| findings::code(finding).0)
+                .collect(),
             pressure_error: deviation.pressure,
             velocity_error: deviation.velocity,
             front_error: deviation.front,
@@ -113,10 +135,20 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         summary.non_finite
     );
     say!(
-        "energy: {:.2} J at the start, {:.2} J at the end; largest compression {:.1} %",
+        "energy: {:.2} J at the start, {:.2} J at the end; {}",
         summary.energy_at_start,
         summary.kinetic_energy + summary.potential_energy,
-        100.0 * summary.max_density_error
+        match summary.energy_excess {
+            Some(excess) => format!("never more than {:.2e} of it above what gravity gave", excess),
+            None => "not judged".to_string(),
+        }
+    );
+    say!(
+        "compression by places: mean {:.2} %, one in a hundred above {:.1} %; volume {:+.2} %; at most {:.2} m/s",
+        100.0 * summary.compression_mean,
+        100.0 * summary.compression_p99,
+        100.0 * summary.volume_change,
+        summary.max_speed
     );
     let errors = [summary.pressure_error, summary.velocity_error, summary.front_error];
     for (what, error) in Deviation::NAMES.into_iter().zip(errors) {
@@ -131,9 +163,4 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
 /// Names of the passes that a simulation runs.
 pub(super) fn pass_names(simulation: &Simulation) -> Vec<&'static str> {
     simulation.passes().into_iter().map(Pass::name).collect()
-}
-
-/// How far `most` exceeds `start`, as a part of `start`.
-fn growth(start: f64, most: f64) -> Option<f64> {
-    if most <= start { Some(0.0) } else { Some(most / start - 1.0).filter(|part| part.is_finite()) }
 }

@@ -16,7 +16,6 @@ pub(super) struct Watch {
     pub spent: Duration,
     pub carved: usize,
     pub energy_at_start: f64,
-    pub most_energy: f64,
     /// Figures of the last saved instant.
     pub now: Stats,
     /// The worst of each figure over all saved instants.
@@ -35,7 +34,6 @@ impl Watch {
             spent: Duration::ZERO,
             carved,
             energy_at_start: energy,
-            most_energy: energy,
             neighbours: (stats.neighbours_per_particle, 1),
             deviations: Deviations::default(),
             now: stats.clone(),
@@ -49,12 +47,11 @@ impl Watch {
 
     /// The figures as numbers, for a checkpoint.
     pub fn memory(&self) -> Vec<f64> {
-        let Self { spent, carved, energy_at_start, most_energy, neighbours, worst, .. } = self;
+        let Self { spent, carved, energy_at_start, neighbours, worst, .. } = self;
         let mut memory = vec![
             spent.as_secs_f64(),
             *carved as f64,
             *energy_at_start,
-            *most_energy,
             neighbours.0,
             neighbours.1 as f64,
             worst.max_penetration,
@@ -62,7 +59,6 @@ impl Watch {
             worst.lost as f64,
             worst.non_finite as f64,
             worst.max_density_error,
-            worst.max_speed,
         ];
         memory.extend(self.deviations.memory());
         memory
@@ -70,29 +66,14 @@ impl Watch {
 
     /// Restores the figures from a memory. A memory of another length is ignored.
     fn take_up(&mut self, memory: &[f64]) {
-        let Ok(
-            [
-                spent,
-                carved,
-                start,
-                most,
-                sum,
-                looks,
-                depth,
-                inside,
-                lost,
-                non_finite,
-                density,
-                speed,
-                deviations @ ..,
-            ],
-        ) = <[f64; 19]>::try_from(memory)
+        let Ok([spent, carved, start, sum, looks, depth, inside, lost, non_finite, density, deviations @ ..]) =
+            <[f64; 17]>::try_from(memory)
         else {
             return;
         };
         self.spent = Duration::try_from_secs_f64(spent).unwrap_or_default();
         self.carved = carved as usize;
-        (self.energy_at_start, self.most_energy) = (start, most);
+        self.energy_at_start = start;
         self.neighbours = (sum, looks as usize);
         self.deviations = Deviations::remembered(deviations);
         self.worst = Stats {
@@ -101,7 +82,6 @@ impl Watch {
             lost: lost as usize,
             non_finite: non_finite as usize,
             max_density_error: density,
-            max_speed: speed,
             ..self.worst.clone()
         };
     }
@@ -110,7 +90,6 @@ impl Watch {
     pub fn look(&mut self, experiment: &Experiment, simulation: &Simulation) {
         self.deviations.look(experiment, simulation);
         let now = simulation.stats();
-        self.most_energy = self.most_energy.max(now.kinetic_energy + now.potential_energy);
         self.neighbours.0 += now.neighbours_per_particle;
         self.neighbours.1 += 1;
         let worst = &mut self.worst;
@@ -119,7 +98,6 @@ impl Watch {
         worst.lost = worst.lost.max(now.lost);
         worst.non_finite = worst.non_finite.max(now.non_finite);
         worst.max_density_error = worst.max_density_error.max(now.max_density_error);
-        worst.max_speed = worst.max_speed.max(now.max_speed);
         self.now = now;
     }
 }

@@ -230,6 +230,8 @@ pub enum Measured {
     },
     /// Kinetic, potential and elastic energy of the fluid and their sum, J.
     Energy,
+    /// Excess of the fluid's energy, change of its volume, its compression, and the greatest speed, m/s.
+    Audit,
 }
 
 /// The largest |computed ω − exact ω| that is accepted; positive.

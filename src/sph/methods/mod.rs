@@ -26,7 +26,7 @@ pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read};
 
-pub(super) use numerics::Numerics;
+pub(super) use numerics::{COURANT, Numerics};
 pub(super) use scheme::Scheme;
 pub(super) use start::start;
 

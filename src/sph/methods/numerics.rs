@@ -10,14 +10,14 @@ use crate::sph::walls::{Wall, WallKernel};
 /// value for weakly compressible fluids, cautious for the paper's. A drop of 3000 particles on the pawn has,
 /// at 0.5 s and 1 s, 1037.8 and 300.6 J with steps of 0.5 ms; 1037.6 and 297.6 J with 2 ms; 1037.0 and 297.2
 /// J with 4 ms; 1034.3 and 290.3 J with 10 ms. The bound at the fastest instant is 3.2 ms.
-const COURANT: f64 = 0.25;
+pub(in crate::sph) const COURANT: f64 = 0.25;
 
 /// Factor of √(h/a) in the limit for an acceleration a: a particle that is accelerated from rest moves 1/32
 /// of h in such a step.
 const FORCE_FACTOR: f64 = 0.25;
 
 /// What the solver needs to know of a method's numbers.
-pub(in crate::sph) trait Numerics {
+pub(in crate::sph) trait Numerics: Sync {
     /// Checks what the bounds of single keys do not cover.
     ///
     /// # Errors
@@ -66,7 +66,8 @@ pub(in crate::sph) trait Numerics {
 
     /// How walls enter the sums of the method.
     fn wall(&self, scales: &Scales) -> Wall {
-        Wall { kernel: WallKernel::WendlandC2, h: scales.support_radius, layer: None }
+        let h = scales.support_radius;
+        Wall { kernel: WallKernel::WendlandC2, h, layer: None, spacing: scales.spacing() / h }
     }
 
     /// The density, kg/m³, of a particle that starts under a pressure, Pa; `None` if all start at the rest
@@ -83,4 +84,15 @@ pub(in crate::sph) trait Numerics {
 
     /// Energy that compression has stored in a kilogram of fluid of this density, J/kg.
     fn elastic_energy(&self, scales: &Scales, density: f64) -> f64;
+
+    /// The sum of [`Numerics::elastic_energy`] over several densities, J/kg.
+    fn elastic_energies(&self, scales: &Scales, densities: &[f64]) -> f64 {
+        densities.iter().map(|&density| self.elastic_energy(scales, density)).sum()
+    }
+
+    /// The mean compression, as a part of the rest density, within which the method is to keep the fluid;
+    /// `None` if it promises none.
+    fn kept_compression(&self) -> Option<f64> {
+        None
+    }
 }

@@ -23,6 +23,9 @@ pub(in crate::sph) trait Scheme: Send + Sync {
         Ok(())
     }
 
+    /// The densities that the places of the particles say, kg/m³, for the present positions.
+    fn densities<'a>(&'a self, core: &'a Core) -> &'a [f64];
+
     /// Iterations of the last step's solver; `None` for methods without one.
     fn iterations(&self) -> Option<u32> {
         None

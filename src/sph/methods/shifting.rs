@@ -27,8 +27,8 @@ const SURFACE: [f64; 2] = [0.85, 0.95];
 const RETURN: f64 = 0.3;
 
 /// The rate at which densities return, at the present speeds, 1/s.
-pub(super) fn return_rate(strength: f64, core: &Core) -> f64 {
-    if strength > 0.0 { RETURN * core.speed / core.parameters.support_radius } else { 0.0 }
+pub(super) fn return_rate(core: &Core) -> f64 {
+    RETURN * core.speed / core.parameters.support_radius
 }
 
 /// How far a particle belongs to the fluid's depth, 0 to 1, from its G: one in the depth, a half at a flat

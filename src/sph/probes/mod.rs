@@ -15,6 +15,7 @@ use glam::{DMat3, DVec3};
 use crate::geom::Aabb;
 
 use super::{
+    audit::Audit,
     core::Core,
     kernel::{Kernels, Wendland},
     stats::energies,
@@ -71,9 +72,13 @@ pub enum Probe {
         normal: DVec3,
     },
     /// Kinetic, potential and elastic energy and their sum, J. Potential energy is measured from the box's
-    /// lowest corner along gravity. Elastic energy is ∫ p/ρ² dρ from the rest density, zero for an
-    /// incompressible fluid.
+    /// lowest corner along gravity. Elastic energy is the work of pressure from the rest density on, zero for
+    /// an incompressible fluid.
     Energy,
+    /// The present figures of the [audit](super::Audit): excess of energy, change of volume, and compression by
+    /// the places of the particles, as parts, and the greatest speed, m/s. Densities are looked at every few
+    /// steps.
+    Audit,
 }
 
 impl Probe {
@@ -93,6 +98,14 @@ impl Probe {
             ],
             Self::Flux { .. } => &[("flux", "kg/s")],
             Self::Energy => &[("kinetic", "J"), ("potential", "J"), ("elastic", "J"), ("total", "J")],
+            Self::Audit => &[
+                ("energy excess", "1"),
+                ("volume change", "1"),
+                ("compression mean", "1"),
+                ("compression p99", "1"),
+                ("compression max", "1"),
+                ("max speed", "m/s"),
+            ],
         }
     }
 }
@@ -122,8 +135,9 @@ impl Gauge {
         Self { probe, last: memory.try_into().unwrap_or([0.0; 7]) }
     }
 
-    pub(super) fn sample(&mut self, core: &Core) -> Vec<f64> {
+    pub(super) fn sample(&mut self, core: &Core, audit: &Audit) -> Vec<f64> {
         match self.probe {
+            Probe::Audit => audit.sample(),
             Probe::Height { x, y } => vec![height(core, x, y)],
             Probe::Pressure { at } => vec![Neighbourhood::around(core, at).pressure()],
             Probe::Velocity { at } => Neighbourhood::around(core, at).velocity().to_array().into(),

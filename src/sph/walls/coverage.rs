@@ -34,6 +34,8 @@ const MOST_CURVED: f64 = 0.4;
 pub(in crate::sph) struct Coverage<F = ()> {
     /// λ = ∫ W, 0 to 1.
     pub part: f64,
+    /// λ by layers a spacing apart, see [`OfFace::filled`].
+    pub filled: f64,
     /// ∇λ = ∫ ∇W, 1/m; it points out of the fluid.
     pub gradient: DVec3,
     /// K − λ·1 = Σ d·(A/h)·n⊗n over the faces.
@@ -53,9 +55,10 @@ impl<F: Friction> Coverage<F> {
             return Self::default();
         }
         let curvature = (face.mean_curvature * h).clamp(-MOST_CURVED, MOST_CURVED);
-        let OfFace { part, area, spread } = wall.of_face(delta, curvature);
+        let OfFace { part, area, spread, filled } = wall.of_face(delta, curvature);
         Self {
             part,
+            filled,
             gradient: -area / h * face.normal,
             spread: spread * Symmetric::square(face.normal),
             sweep: 0.0,
@@ -120,8 +123,8 @@ impl<F: Friction> Coverage<F> {
 
     /// The coverage without its friction.
     pub fn without_friction(self) -> Coverage {
-        let Self { part, gradient, spread, sweep, friction: _ } = self;
-        Coverage { part, gradient, spread, sweep, friction: () }
+        let Self { part, filled, gradient, spread, sweep, friction: _ } = self;
+        Coverage { part, filled, gradient, spread, sweep, friction: () }
     }
 
     /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
@@ -143,6 +146,8 @@ impl<F: Friction> Coverage<F> {
     fn joined(&self, other: &Self, part: f64, da: f64, db: f64) -> Self {
         Self {
             part: part.clamp(0.0, 1.0),
+            filled: (part + da * (self.filled - self.part) + db * (other.filled - other.part))
+                .clamp(0.0, 1.0),
             gradient: da * self.gradient + db * other.gradient,
             spread: da * self.spread + db * other.spread,
             sweep: da * self.sweep + db * other.sweep,
@@ -181,7 +186,7 @@ mod tests {
     type Coverage = super::Coverage<WallDrag>;
 
     const H: f64 = 0.3;
-    const WALL: Wall = Wall { kernel: WallKernel::WendlandC2, h: H, layer: None };
+    const WALL: Wall = Wall { kernel: WallKernel::WendlandC2, h: H, layer: None, spacing: 1.0 / 2.6 };
 
     fn face(distance: f64, normal: DVec3) -> Part {
         Part::Face(Face { distance, normal: normal.normalize(), mean_curvature: 0.0 })
@@ -252,7 +257,7 @@ mod tests {
             let slab = Coverage::of_faces(&wall, &Faces::from_slice(&[Part::All(2), near, far]));
             // all but the rounding of a + 1 − 1
             assert!((slab.part - alone.part).abs() < 1e-15, "{slab:?} {alone:?}");
-            assert_eq!(Coverage { part: alone.part, ..slab }, alone);
+            assert_eq!(Coverage { part: alone.part, filled: alone.filled, ..slab }, alone);
         }
     }
 

@@ -129,6 +129,8 @@ pub(in crate::sph) struct Wall {
     pub h: f64,
     /// τ: the thickness of the wall's layers over h; `None` for a continuous wall.
     pub layer: Option<f64>,
+    /// The spacing of the fluid over h, by which walls fill the kernels of particles, see [`OfFace::filled`].
+    pub spacing: f64,
 }
 
 /// What one face takes of a kernel.
@@ -140,6 +142,9 @@ pub(in crate::sph) struct OfFace {
     pub area: f64,
     /// ∫ y·∂W/∂y along the normal, minus λ: δ·A for a plane.
     pub spread: f64,
+    /// λ by layers a spacing apart: what a wall adds to the sum over a lattice of particles, of which the
+    /// first layer is half a spacing away.
+    pub filled: f64,
 }
 
 impl Wall {
@@ -147,12 +152,12 @@ impl Wall {
     #[inline]
     pub fn of_face(&self, delta: f64, curvature: f64) -> OfFace {
         if delta <= -1.0 {
-            return OfFace { part: 1.0, area: 0.0, spread: 0.0 };
+            return OfFace { part: 1.0, area: 0.0, spread: 0.0, filled: 1.0 };
         }
+        let whole = || self.continuous(delta, curvature);
         let Some(layer) = self.layer else {
-            let area = self.kernel.slope(delta) * (1.0 - curvature * delta);
-            let part = self.kernel.covered_by_curved(delta, curvature);
-            return OfFace { part: part.clamp(0.0, 1.0), area, spread: delta * area };
+            let whole = whole();
+            return OfFace { filled: self.filled_by(delta, whole.part), ..whole };
         };
         let layered = self.of_layers(layer, delta, curvature);
         if delta >= 0.0 {
@@ -160,13 +165,38 @@ impl Wall {
         }
         // behind a face the sum over all layers is one up to half a hundredth, depending on where they lie:
         // the deeper the particle is, the more of the wall counts as continuous
-        let whole = Wall { layer: None, ..*self }.of_face(delta, curvature);
+        let whole = whole();
         let mix = |layered: f64, whole: f64| layered + delta * (layered - whole);
+        let part = mix(layered.part, whole.part);
         OfFace {
-            part: mix(layered.part, whole.part),
+            part,
             area: mix(layered.area, whole.area),
             spread: mix(layered.spread, whole.spread),
+            filled: part,
         }
+    }
+
+    /// The part of a continuous face.
+    #[inline]
+    fn continuous(&self, delta: f64, curvature: f64) -> OfFace {
+        let area = self.kernel.slope(delta) * (1.0 - curvature * delta);
+        let part = self.kernel.covered_by_curved(delta, curvature).clamp(0.0, 1.0);
+        OfFace { part, area, spread: delta * area, filled: part }
+    }
+
+    /// λ of a plane by layers a spacing apart, or `part` behind the face.
+    #[inline]
+    fn filled_by(&self, delta: f64, part: f64) -> f64 {
+        if delta < 0.0 {
+            return part;
+        }
+        let mut slopes = 0.0;
+        let mut at = delta + 0.5 * self.spacing;
+        while at < 1.0 {
+            slopes += self.kernel.slope(at);
+            at += self.spacing;
+        }
+        (self.spacing * slopes).min(1.0)
     }
 
     /// The part of a face by the midpoint rule over the wall's layers, for δ > −1.
@@ -187,7 +217,8 @@ impl Wall {
         let part = layer * (slopes - curvature * moments);
         let area = layer * (steeps + curvature * (slopes - spreads));
         let spread = layer * (spreads - slopes) * (1.0 - curvature * delta);
-        OfFace { part: part.clamp(0.0, 1.0), area, spread }
+        let part = part.clamp(0.0, 1.0);
+        OfFace { part, area, spread, filled: part }
     }
 }
 
@@ -280,7 +311,7 @@ mod tests {
     fn layers_are_planes_of_the_kernel() {
         let kernel = WallKernel::WendlandC2;
         let (layer, h) = (1.0 / 2.2, 1.0);
-        let wall = Wall { kernel, h, layer: Some(layer) };
+        let wall = Wall { kernel, h, layer: Some(layer), spacing: layer };
         for delta in [0.0, 0.1, 0.5 * layer, 0.4, 1.5 * layer, 0.95] {
             // each layer is a plane of the wall's thickness: its weight by discs
             let planes = (0..12).map(|k| delta + (f64::from(k) + 0.5) * layer);
@@ -288,7 +319,7 @@ mod tests {
                 let disc = |z: f64| integral(0.0, 1.0, 400, |r| 2.0 * PI * r * of(z, (r * r + z * z).sqrt()));
                 planes.clone().map(|z| layer * disc(z)).sum()
             };
-            let OfFace { part, area, spread } = wall.of_face(delta, 0.0);
+            let OfFace { part, area, spread, .. } = wall.of_face(delta, 0.0);
             let covered = sum(&|_, q| weight(kernel, q));
             assert!((part - covered.clamp(0.0, 1.0)).abs() < 1e-8, "{delta}: {part} {covered}");
             // −∂W/∂z = 20·21/2π·z·(1 − q)³
@@ -302,7 +333,8 @@ mod tests {
 
     #[test]
     fn a_particle_deep_behind_a_face_is_wholly_covered() {
-        let wall = Wall { kernel: WallKernel::WendlandC2, h: 1.0, layer: Some(1.0 / 2.2) };
+        let wall =
+            Wall { kernel: WallKernel::WendlandC2, h: 1.0, layer: Some(1.0 / 2.2), spacing: 1.0 / 2.2 };
         for delta in [-1.0, -1.3, -5.0, -1e30, f64::NEG_INFINITY] {
             let OfFace { part, area, .. } = wall.of_face(delta, 0.0);
             assert_eq!((part, area), (1.0, 0.0), "{delta}");
@@ -331,7 +363,7 @@ mod tests {
             };
             for (layer, tolerance) in [(0, 0.006), (1, 0.003)] {
                 let delta = (f64::from(layer) + 0.5) / ratio;
-                let of = |layer| Wall { kernel, h: 1.0, layer }.of_face(delta, 0.0).part;
+                let of = |layer| Wall { kernel, h: 1.0, layer, spacing: 0.4 }.of_face(delta, 0.0).part;
                 let (layered, continuous, lattice) = (of(Some(1.0 / ratio)), of(None), behind(layer));
                 assert!((layered - lattice).abs() < tolerance, "{ratio} {layer}: {layered} {lattice}");
                 assert!((layered - lattice).abs() < 0.5 * (continuous - lattice).abs(), "{continuous}");
@@ -344,7 +376,7 @@ mod tests {
     fn many_layers_come_to_the_integral() {
         for kernel in WallKernel::ALL {
             for (delta, curvature) in [(-0.4, 0.0), (0.0, 0.3), (0.2, -0.3), (0.7, 0.4)] {
-                let of = |layer| Wall { kernel, h: 1.0, layer }.of_face(delta, curvature);
+                let of = |layer| Wall { kernel, h: 1.0, layer, spacing: 0.4 }.of_face(delta, curvature);
                 let (many, whole) = (of(Some(1e-3)), of(None));
                 // the midpoint rule's error, a 24th of τ² times a slope
                 assert!((many.part - whole.part).abs() < 1e-5, "{kernel:?} {delta}: {many:?} {whole:?}");

@@ -130,10 +130,15 @@ impl Numerics for Dfsph {
     /// `wcsph` grows noise at the walls.)
     fn wall(&self, scales: &Scales) -> Wall {
         let h = scales.support_radius;
-        Wall { kernel: WallKernel::WendlandC2, h, layer: Some(scales.spacing() / h) }
+        let spacing = scales.spacing() / h;
+        Wall { kernel: WallKernel::WendlandC2, h, layer: Some(spacing), spacing }
     }
 
     fn elastic_energy(&self, _scales: &Scales, _density: f64) -> f64 {
         0.0
+    }
+
+    fn kept_compression(&self) -> Option<f64> {
+        Some(self.tolerance)
     }
 }

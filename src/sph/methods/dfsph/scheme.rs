@@ -130,6 +130,10 @@ impl Scheme for DivergenceFree {
         Ok(())
     }
 
+    fn densities<'a>(&'a self, core: &'a Core) -> &'a [f64] {
+        &core.particles.density
+    }
+
     fn bytes(&self) -> usize {
         let columns = [&self.specific, &self.factor, &self.spread, &self.rate, &self.free, &self.last];
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()

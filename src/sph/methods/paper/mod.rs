@@ -130,7 +130,8 @@ impl Numerics for Paper {
     }
 
     fn wall(&self, scales: &Scales) -> Wall {
-        Wall { kernel: WallKernel::Poly6, h: scales.support_radius, layer: None }
+        let h = scales.support_radius;
+        Wall { kernel: WallKernel::Poly6, h, layer: None, spacing: scales.spacing() / h }
     }
 
     /// The energy k(ln x + 1/x − 1) with x = ρ/ρ₀.

@@ -48,6 +48,10 @@ impl Scheme for PaperScheme {
         Ok(dt)
     }
 
+    fn densities<'a>(&'a self, core: &'a Core) -> &'a [f64] {
+        &core.particles.density
+    }
+
     fn bytes(&self) -> usize {
         8 * self.volume.capacity()
     }

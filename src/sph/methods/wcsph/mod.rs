@@ -186,7 +186,16 @@ impl Declaration for Wcsph {
         (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
         (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
-    const SAVES: &'static [&'static str] = &["density rate", "crowding x", "crowding y", "crowding z"];
+    const SAVES: &'static [&'static str] = &[
+        "places",
+        "density rate",
+        "earlier density rate",
+        "density drift",
+        "last step",
+        "crowding x",
+        "crowding y",
+        "crowding z",
+    ];
 }
 
 impl Numerics for Wcsph {
@@ -212,12 +221,13 @@ impl Numerics for Wcsph {
         true
     }
 
-    /// The energy c²/7·((x⁶ − 1)/6 + 1/x − 1) with x = ρ/ρ₀.
+    /// The energy ∫ p/ρ₀² dρ = c²/7·((x⁸ − 1)/8 − (x − 1)) with x = ρ/ρ₀, whose gradient is the acceleration by
+    /// pressure. It differs from ∫ p/ρ² dρ by twice the compression.
     fn elastic_energy(&self, scales: &Scales, density: f64) -> f64 {
         let x = density / scales.rest_density;
         if x < 1.0 && self.negative_pressure == NegativePressure::Clamp {
             return 0.0;
         }
-        self.sound_speed(scales).powi(2) / 7.0 * ((x.powi(6) - 1.0) / 6.0 + 1.0 / x - 1.0)
+        self.sound_speed(scales).powi(2) / 7.0 * ((x.powi(8) - 1.0) / 8.0 - (x - 1.0))
     }
 }

@@ -1,0 +1,592 @@
+//! The audit of a simulation: what its energy, its volume and its densities say about whether it can be
+//! believed. It runs in every simulation and changes nothing in it.
+//!
+//! Energy is compared with the work of gravity after every step: E = ½Σmv² + Σm·e(ρ) − W, where the work of
+//! uniform gravity is W = M·g·Δ(centre of mass), and that of a field of gravity is the integral of its power.
+//! Viscosity, contacts and diffusion only take from E, so all that it gains is an error of the method. The
+//! energy that a surface under tension has at the start may become motion, so it is allowed for.
+//!
+//! Densities are those that the particles' places say, Σ m·W and the part of the walls, and not those that a
+//! method carries along. A density below that at rest belongs to the surface and counts as that at rest.
+//!
+//! Invariant: sums run in a fixed order, so the same state gives the same bits for any number of threads.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::core::{CHUNK, Core};
+use super::error::StepError;
+use super::params::Parameters;
+
+/// The least energy at the start that is judged, in units of Σm·(expected speed)².
+const LEAST_ENERGY: f64 = 1e-9;
+
+/// Number of steps from one look at the densities to the next.
+const LOOK: u64 = 8;
+
+/// Greatest excess of energy, as a part of the reference, that is no finding.
+const MOST_EXCESS: f64 = 0.01;
+
+/// An excess of energy, as a part of the reference, that ends a run.
+const RUINOUS_EXCESS: f64 = 1.0;
+
+/// Greatest change of the volume, as a part of it, that is no finding.
+const MOST_VOLUME_CHANGE: f64 = 0.02;
+
+/// Greatest mean compression that is no finding, in units of what the method is to keep.
+const MOST_COMPRESSION: f64 = 10.0;
+
+/// Width of a class of compressions, as a part of the rest density.
+const CLASS: f64 = 5e-4;
+
+/// Number of classes; the last one also holds all that is compressed more.
+const CLASSES: usize = 2048;
+
+/// Why the energy of a run is not judged.
+pub const MOVING_WALLS: &str = "moving walls do work on the fluid, which is not measured";
+
+/// Why the energy of a run is not judged.
+pub const NO_ENERGY: &str = "the fluid has no energy at the start to compare with";
+
+/// What the audit of a simulation has found so far. All figures are the worst since the start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Audit {
+    /// Why the energy is not judged; `None` if it is.
+    unjudged: Option<&'static str>,
+    /// The energy that excesses are compared with, J: that at the start, from the box's lowest corner.
+    reference: f64,
+    /// Kinetic and elastic energy at the start, J.
+    at_start: f64,
+    /// Work of gravity since the start, J.
+    work: f64,
+    /// The power of a field of gravity at the last step, W.
+    power: f64,
+    /// Sum of the places at the last step, m.
+    places: DVec3,
+    excess: f64,
+    /// Mean of ρ₀/max(ρ, ρ₀) at the start.
+    volume_at_start: f64,
+    /// The change of the volume that is largest by its amount.
+    volume_change: f64,
+    compression: Compression,
+    max_speed: f64,
+    /// The figures of the last look.
+    now: Instant,
+    /// Which findings have been told, in the order of [`Finding::ALL`].
+    told: [bool; 3],
+}
+
+/// The figures of one look.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Instant {
+    excess: f64,
+    volume_change: f64,
+    compression: Compression,
+    speed: f64,
+}
+
+/// How far densities exceed that at rest, by the places of the particles, as parts of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Compression {
+    /// The mean over all particles.
+    pub mean: f64,
+    /// The value that one particle in a hundred exceeds.
+    pub p99: f64,
+    /// The largest value.
+    pub largest: f64,
+}
+
+impl Compression {
+    /// The compression by densities, kg/m³, and the mean of ρ₀/max(ρ, ρ₀).
+    fn of(densities: &[f64], rest_density: f64) -> (Self, f64) {
+        let parts: Vec<(f64, f64, f64)> = densities
+            .par_chunks(CHUNK)
+            .map(|densities| {
+                let (mut sum, mut volume, mut largest) = (0.0, 0.0, 0.0f64);
+                for rho in densities {
+                    let x = (rho / rest_density).max(1.0);
+                    sum += x - 1.0;
+                    volume += 1.0 / x;
+                    largest = largest.max(x - 1.0);
+                }
+                (sum, volume, largest)
+            })
+            .collect();
+        let (sum, volume, largest) =
+            parts.into_iter().fold((0.0, 0.0, 0.0f64), |a, b| (a.0 + b.0, a.1 + b.1, a.2.max(b.2)));
+        let mut classes = [0u32; CLASSES];
+        for rho in densities {
+            let class = (rho / rest_density - 1.0).max(0.0) / CLASS;
+            classes[(class as usize).min(CLASSES - 1)] += 1;
+        }
+        let n = densities.len() as f64;
+        let mut above = 0.01 * n;
+        let class = classes.iter().rposition(|&count| {
+            above -= f64::from(count);
+            above < 0.0
+        });
+        // the upper end of the class, but no more than there is
+        let p99 = class.map_or(0.0, |class| (CLASS * (class + 1) as f64).min(largest));
+        // all of the first class counts as uncompressed
+        let p99 = if class == Some(0) { 0.0 } else { p99 };
+        (Self { mean: sum / n, p99, largest }, volume / n)
+    }
+
+    /// The worse of each figure.
+    fn worst(self, other: Self) -> Self {
+        Self {
+            mean: self.mean.max(other.mean),
+            p99: self.p99.max(other.p99),
+            largest: self.largest.max(other.largest),
+        }
+    }
+}
+
+/// Something about a run that its user must know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Finding {
+    /// The energy exceeds that at the start by more than gravity's work.
+    Energy,
+    /// The fluid lost volume.
+    Volume,
+    /// The fluid is compressed far more than the method is to allow.
+    Compression,
+}
+
+impl Finding {
+    const ALL: [Self; 3] = [Self::Energy, Self::Volume, Self::Compression];
+}
+
+/// A sum over all particles at one instant.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    squares: f64,
+    places: DVec3,
+    elastic: f64,
+    power: f64,
+    fastest: f64,
+}
+
+impl Sums {
+    fn of(core: &Core) -> Self {
+        let (method, scales) = (core.parameters.method.numerics(), core.parameters.scales());
+        let position = core.particles.position.components().map(|c| c.par_chunks(CHUNK));
+        let velocity = core.particles.velocity.components().map(|c| c.par_chunks(CHUNK));
+        let [x, y, z] = position;
+        let [u, v, w] = velocity;
+        let density = core.particles.density.par_chunks(CHUNK);
+        let sums: Vec<Self> = x
+            .zip(y)
+            .zip(z)
+            .zip(u.zip(v).zip(w))
+            .zip(density)
+            .map(|((((x, y), z), ((u, v), w)), density)| {
+                let mut sums = Self::default();
+                for k in 0..x.len() {
+                    let square = u[k] * u[k] + v[k] * v[k] + w[k] * w[k];
+                    sums.squares += square;
+                    sums.fastest = sums.fastest.max(square);
+                    sums.places += DVec3::new(x[k], y[k], z[k]);
+                }
+                sums.elastic = method.elastic_energies(&scales, density);
+                if let Some(field) = &core.gravity_field {
+                    for k in 0..x.len() {
+                        let pull = field(DVec3::new(x[k], y[k], z[k]), core.time);
+                        sums.power += pull.dot(DVec3::new(u[k], v[k], w[k]));
+                    }
+                }
+                sums
+            })
+            .collect();
+        let add = |a: Self, b: Self| Self {
+            squares: a.squares + b.squares,
+            places: a.places + b.places,
+            elastic: a.elastic + b.elastic,
+            power: a.power + b.power,
+            fastest: a.fastest.max(b.fastest),
+        };
+        let sum = sums.into_iter().fold(Self::default(), add);
+        Self { fastest: sum.fastest.sqrt(), ..sum }
+    }
+}
+
+impl Audit {
+    /// The audit of a simulation at its start. `densities` are those that the particles' places say, kg/m³.
+    pub(super) fn start(core: &Core, densities: &[f64]) -> Self {
+        let sums = Sums::of(core);
+        let Core { parameters, boundary, particles, .. } = core;
+        let mass = parameters.particle_mass;
+        let (g, n) = (parameters.gravity, particles.len() as f64);
+        let floor = boundary.domain.corners().map(|c| -g.dot(c)).into_iter().fold(f64::INFINITY, f64::min);
+        let at_start = mass * (0.5 * sums.squares + sums.elastic) + surface_energy(parameters, densities);
+        // a field of gravity has no lowest corner; a fall by the support radius is its scale
+        let of_field = core.gravity_field.as_ref().map_or(0.0, |field| {
+            particles.position.iter().map(|x| field(x, core.time).length()).sum::<f64>()
+                * parameters.support_radius
+        });
+        let reference = at_start + mass * (-g.dot(sums.places) - n * floor + of_field);
+        let moves = |o: &super::Obstacle| o.moving.is_some() || o.surface_velocity.is_some();
+        let unjudged = match () {
+            () if boundary.obstacles.iter().any(moves) => Some(MOVING_WALLS),
+            () if reference <= LEAST_ENERGY * n * mass * parameters.expected_speed.powi(2) => Some(NO_ENERGY),
+            () => None,
+        };
+        let (compression, volume) = Compression::of(densities, parameters.rest_density);
+        Self {
+            unjudged,
+            reference,
+            at_start,
+            work: 0.0,
+            power: mass * sums.power,
+            places: sums.places,
+            excess: 0.0,
+            volume_at_start: volume,
+            volume_change: 0.0,
+            compression,
+            max_speed: sums.fastest,
+            now: Instant { compression, speed: sums.fastest, ..Instant::default() },
+            told: [false; 3],
+        }
+    }
+
+    /// Takes the figures of the state after a step of the length `dt`, s. `densities` are those that the
+    /// particles' places say, kg/m³.
+    ///
+    /// # Errors
+    /// [`StepError::EnergyDoubled`] if the energy has doubled without work.
+    pub(super) fn look(&mut self, core: &Core, densities: &[f64], dt: f64) -> Result<(), StepError> {
+        let sums = Sums::of(core);
+        let parameters = &core.parameters;
+        let mass = parameters.particle_mass;
+        let power = mass * sums.power;
+        self.work +=
+            mass * parameters.gravity.dot(sums.places - self.places) + 0.5 * dt * (self.power + power);
+        (self.places, self.power) = (sums.places, power);
+        (self.now.speed, self.max_speed) = (sums.fastest, self.max_speed.max(sums.fastest));
+        if self.unjudged.is_none() {
+            let energy = mass * (0.5 * sums.squares + sums.elastic);
+            // gravity that turns may bring in more than there was
+            self.reference = self.reference.max(self.at_start + self.work);
+            let excess = (energy - self.at_start - self.work) / self.reference;
+            (self.now.excess, self.excess) = (excess, self.excess.max(excess));
+            if excess > RUINOUS_EXCESS {
+                return Err(core.energy_doubled(excess));
+            }
+        }
+        if core.steps.is_multiple_of(LOOK) {
+            let (compression, volume) = Compression::of(densities, parameters.rest_density);
+            self.compression = self.compression.worst(compression);
+            let change = volume / self.volume_at_start - 1.0;
+            (self.now.compression, self.now.volume_change) = (compression, change);
+            if change.abs() > self.volume_change.abs() {
+                self.volume_change = change;
+            }
+        }
+        Ok(())
+    }
+
+    /// The greatest excess of the energy over that at the start and gravity's work, as a part of that at the
+    /// start; `None` if it is not judged, see [`Audit::unjudged`].
+    pub fn energy_excess(&self) -> Option<f64> {
+        self.unjudged.is_none().then_some(self.excess)
+    }
+
+    /// Why the energy is not judged; `None` if it is.
+    pub fn unjudged(&self) -> Option<&'static str> {
+        self.unjudged
+    }
+
+    /// The greatest change of the fluid's volume, as a part of that at the start; below zero if it shrinks.
+    /// Where there is less fluid than at rest, the volume is that at rest: a splash is no gain.
+    pub fn volume_change(&self) -> f64 {
+        self.volume_change
+    }
+
+    /// The worst compression by the places of the particles. Each figure is the worst of its own instant.
+    pub fn compression(&self) -> Compression {
+        self.compression
+    }
+
+    /// The greatest speed of a particle after any step, m/s.
+    pub fn max_speed(&self) -> f64 {
+        self.max_speed
+    }
+
+    /// The greatest speed of a particle after the last step, m/s.
+    pub(super) fn speed(&self) -> f64 {
+        self.now.speed
+    }
+
+    /// The present figures of the columns of [`Probe::Audit`](super::Probe::Audit). The excess is NaN if it is not judged.
+    pub(super) fn sample(&self) -> Vec<f64> {
+        let Instant { excess, volume_change, compression: Compression { mean, p99, largest }, speed } =
+            self.now;
+        let excess = if self.unjudged.is_none() { excess } else { f64::NAN };
+        vec![excess, volume_change, mean, p99, largest, speed]
+    }
+
+    /// What a user must know about the run so far, each finding with a sentence. `kept` is the compression
+    /// that the method is to keep, if it promises any.
+    pub fn findings(&self, kept: Option<f64>) -> Vec<(Finding, String)> {
+        let percent = |x: f64| 100.0 * x;
+        let energy = self.energy_excess().filter(|excess| *excess > MOST_EXCESS).map(|excess| {
+            format!("the energy was {:.1} % above that at the start and gravity's work", percent(excess))
+        });
+        let change = self.volume_change;
+        let volume = (change.abs() > MOST_VOLUME_CHANGE).then(|| {
+            let verb = if change < 0.0 { "shrank" } else { "grew" };
+            format!("the fluid's volume {verb} by {:.1} %", percent(change.abs()))
+        });
+        let Compression { mean, p99, .. } = self.compression;
+        let compression = kept.filter(|kept| mean > MOST_COMPRESSION * kept).map(|kept| {
+            format!(
+                "the fluid was compressed by {:.2} % on average, and by more than {:.1} % at one particle in a \
+                 hundred; the method is to keep it within {:.2} %",
+                percent(mean),
+                percent(p99),
+                percent(kept)
+            )
+        });
+        Finding::ALL
+            .into_iter()
+            .zip([energy, volume, compression])
+            .filter_map(|(f, t)| Some((f, t?)))
+            .collect()
+    }
+
+    /// The findings that were not told before; they count as told from now on.
+    pub fn news(&mut self, kept: Option<f64>) -> Vec<(Finding, String)> {
+        let found = self.findings(kept);
+        found
+            .into_iter()
+            .filter(|(finding, _)| !std::mem::replace(&mut self.told[*finding as usize], true))
+            .collect()
+    }
+
+    /// The audit as numbers, for a checkpoint.
+    pub(super) fn memory(&self) -> Vec<f64> {
+        let Compression { mean, p99, largest } = self.compression;
+        let DVec3 { x, y, z } = self.places;
+        let told = self.told.map(|told| f64::from(u8::from(told)));
+        let numbers = [
+            self.reference,
+            self.at_start,
+            self.work,
+            self.power,
+            x,
+            y,
+            z,
+            self.excess,
+            self.volume_at_start,
+            self.volume_change,
+            mean,
+            p99,
+            largest,
+            self.max_speed,
+        ];
+        numbers.into_iter().chain(told).collect()
+    }
+
+    /// Takes up the audit of a checkpoint. A memory of another length is ignored.
+    pub(super) fn take_up(&mut self, memory: &[f64]) {
+        let Ok(
+            [
+                reference,
+                at_start,
+                work,
+                power,
+                x,
+                y,
+                z,
+                excess,
+                volume_at_start,
+                volume_change,
+                mean,
+                p99,
+                largest,
+                max_speed,
+                told @ ..,
+            ],
+        ) = <[f64; 17]>::try_from(memory)
+        else {
+            return;
+        };
+        *self = Self {
+            unjudged: self.unjudged,
+            reference,
+            at_start,
+            work,
+            power,
+            places: DVec3::new(x, y, z),
+            excess,
+            volume_at_start,
+            volume_change,
+            compression: Compression { mean, p99, largest },
+            max_speed,
+            now: self.now,
+            told: told.map(|told| told != 0.0),
+        };
+    }
+}
+
+/// Energy of the surface under tension, J: the tension times an area. Each particle below a flat surface lacks
+/// a part of its density; a surface lacks as much as a wall in its place would have.
+fn surface_energy(parameters: &Parameters, densities: &[f64]) -> f64 {
+    if parameters.surface_tension == 0.0 {
+        return 0.0;
+    }
+    let lacking: f64 = densities.iter().map(|rho| (1.0 - rho / parameters.rest_density).max(0.0)).sum();
+    let wall = parameters.method.numerics().wall(&parameters.scales());
+    let spacing = parameters.spacing();
+    let layers = (wall.h / spacing).ceil() as u32;
+    let of_column: f64 =
+        (0..layers).map(|k| wall.kernel.covered((f64::from(k) + 0.5) * spacing / wall.h)).sum();
+    parameters.surface_tension * spacing.powi(2) * lacking / of_column
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Aabb;
+    use crate::sph::{Dfsph, FluidBlock, Method, Simulation, Wcsph, scenes};
+
+    const TANK: Aabb = Aabb::new(DVec3::ZERO, DVec3::new(1.2, 0.2, 1.4));
+
+    fn parameters(method: Method, spacing: f64) -> Parameters {
+        Parameters {
+            rest_density: 1000.0,
+            particle_mass: 1000.0 * spacing.powi(3),
+            support_radius: if matches!(method, Method::Dfsph(_)) { 2.2 } else { 2.6 } * spacing,
+            viscosity: 1e-3,
+            surface_tension: 0.0,
+            wall_restitution: 0.0,
+            adaptive: true,
+            time_step: 0.1,
+            expected_speed: 4.0,
+            method,
+            ..Parameters::default()
+        }
+    }
+
+    /// A column of water in a closed tank, that falls over.
+    fn column(method: Method, spacing: f64) -> Simulation {
+        let parameters = parameters(method, spacing);
+        let mut fluid = crate::sph::Particles::default();
+        let count = |length: f64| (length / spacing).round() as usize;
+        for (i, j, k) in (0..count(0.4))
+            .flat_map(|i| (0..count(0.2)).flat_map(move |j| (0..count(0.8)).map(move |k| (i, j, k))))
+        {
+            fluid.push(spacing * (DVec3::new(i as f64, j as f64, k as f64) + 0.5), DVec3::ZERO);
+        }
+        Simulation::new(parameters, fluid, TANK, Vec::new()).unwrap()
+    }
+
+    #[test]
+    fn classes_give_mean_and_percentile() {
+        // a hundred and one densities from 0 to 10 % above rest, and as many below it
+        let densities: Vec<f64> =
+            (0..=100).map(|k| 1000.0 + f64::from(k)).chain((0..101).map(|_| 700.0)).collect();
+        let (Compression { mean, p99, largest }, volume) = Compression::of(&densities, 1000.0);
+        assert!((mean - 0.025).abs() < 1e-12, "{mean}");
+        assert!((largest - 0.1).abs() < 1e-12);
+        // 202 particles, so two lie above it: 0.099 and 0.1
+        // the upper end of its class
+        assert!((p99 - 0.098).abs() < 1.01 * CLASS, "{p99}");
+        let exact: f64 = densities.iter().map(|rho| 1000.0 / rho.max(1000.0)).sum::<f64>() / 202.0;
+        assert!((volume - exact).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_splash_in_a_closed_tank_makes_no_energy() {
+        for method in [Method::from(Wcsph::default()), Method::default()] {
+            let mut simulation = column(method, 0.05);
+            simulation.advance(2.0, |_| std::ops::ControlFlow::Continue(())).unwrap();
+            let audit = simulation.audit();
+            let excess = audit.energy_excess().unwrap();
+            assert!(excess < 1e-4, "{}: {excess}", method.name());
+            // Torricelli's speed of the whole height, twice over
+            assert!(audit.max_speed() < 2.0 * (2.0 * 9.81 * 0.8f64).sqrt(), "{}", audit.max_speed());
+        }
+    }
+
+    #[test]
+    fn water_in_the_tank_keeps_its_volume() {
+        let mut simulation = column(Wcsph::default().into(), 0.05);
+        simulation.advance(2.0, |_| std::ops::ControlFlow::Continue(())).unwrap();
+        let change = simulation.audit().volume_change();
+        assert!(change.abs() < 0.01, "{change}");
+        assert_eq!(simulation.findings(), []);
+    }
+
+    #[test]
+    fn energy_from_nowhere_is_found_and_stops_a_run() {
+        let mut simulation = column(Wcsph::default().into(), 0.1);
+        simulation.step().unwrap();
+        assert!(simulation.news().is_empty());
+        let faster = |simulation: &mut Simulation, speed: f64| {
+            let mut checkpoint = simulation.checkpoint();
+            let mut column = checkpoint.get("velocity y").unwrap().to_vec();
+            column.iter_mut().for_each(|v| *v += speed);
+            checkpoint.set("velocity y", column);
+            *simulation =
+                Simulation::resume(simulation.parameters().clone(), &checkpoint, TANK, Vec::new()).unwrap();
+        };
+        faster(&mut simulation, 0.5);
+        simulation.step().unwrap();
+        let excess = simulation.audit().energy_excess().unwrap();
+        // ½v² over the potential energy of the column, g·0.4 m, less a little for the pressure
+        assert!((excess - 0.125 / (9.81 * 0.4)).abs() < 5e-3, "{excess}");
+        let told = simulation.news();
+        assert!(matches!(told[..], [(Finding::Energy, _)]), "{told:?}");
+        assert!(simulation.news().is_empty(), "told once");
+        faster(&mut simulation, 4.0);
+        assert!(matches!(simulation.step(), Err(StepError::EnergyDoubled { .. })));
+    }
+
+    #[test]
+    fn crowded_places_are_found_whatever_density_is_carried() {
+        // particles that nothing pushes apart
+        let dust = crate::sph::Paper { stiffness: 0.0, ..crate::sph::Paper::default() };
+        let mut simulation = column(dust.into(), 0.1);
+        let mut checkpoint = simulation.checkpoint();
+        for name in ["position x", "position y", "position z"] {
+            let column = checkpoint.get(name).unwrap().iter().map(|x| 0.9 * x).collect();
+            checkpoint.set(name, column);
+        }
+        simulation =
+            Simulation::resume(simulation.parameters().clone(), &checkpoint, TANK, Vec::new()).unwrap();
+        while simulation.steps() < LOOK {
+            simulation.step().unwrap();
+        }
+        assert!(simulation.audit().volume_change() < -0.05, "{}", simulation.audit().volume_change());
+        assert!(simulation.audit().compression().p99 > 0.1);
+    }
+
+    #[test]
+    fn the_energy_of_a_surface_is_its_tension_times_its_area() {
+        let parameters = Parameters {
+            surface_tension: 1.0,
+            gravity: DVec3::ZERO,
+            ..parameters(Dfsph::default().into(), 0.05)
+        };
+        let count = 4000;
+        let space = Aabb::new(DVec3::splat(-9.0), DVec3::splat(9.0));
+        let drop = FluidBlock::drop(DVec3::ZERO, count).seed(&parameters, space).unwrap();
+        let radius = (count as f64 * 0.05f64.powi(3) * 0.75 / std::f64::consts::PI).cbrt();
+        let simulation = Simulation::new(parameters.clone(), drop, space, Vec::new()).unwrap();
+        let found = surface_energy(&parameters, &simulation.particles().density);
+        let exact = 4.0 * std::f64::consts::PI * radius * radius;
+        // a lattice's ball has steps
+        assert!((found / exact - 1.0).abs() < 0.15, "{found} {exact}");
+    }
+
+    #[test]
+    fn a_fluid_without_energy_is_not_judged() {
+        let simulation = scenes::free(
+            Parameters { gravity: DVec3::ZERO, ..parameters(Wcsph::default().into(), 0.1) },
+            &[(DVec3::ZERO, DVec3::ZERO)],
+        );
+        assert_eq!(simulation.audit().unjudged(), Some(NO_ENERGY));
+        assert_eq!(simulation.audit().energy_excess(), None);
+    }
+}
