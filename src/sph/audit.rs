@@ -42,10 +42,10 @@ const CLASS: f64 = 5e-4;
 /// Number of classes; the last one also holds all that is compressed more.
 const CLASSES: usize = 2048;
 
-/// Why the energy of a run is not judged.
+/// Why the energy is not judged where obstacles or their surfaces move.
 pub const MOVING_WALLS: &str = "moving walls do work on the fluid, which is not measured";
 
-/// Why the energy of a run is not judged.
+/// Why the energy is not judged of a fluid at rest without gravity.
 pub const NO_ENERGY: &str = "the fluid has no energy at the start to compare with";
 
 /// What the audit of a simulation has found so far. All figures are the worst since the start.
@@ -317,7 +317,8 @@ impl Audit {
         self.now.speed
     }
 
-    /// The present figures of the columns of [`Probe::Audit`](super::Probe::Audit). The excess is NaN if it is not judged.
+    /// The present figures of the columns of [`Probe::Audit`](super::Probe::Audit). The excess is NaN if it is
+    /// not judged.
     pub(super) fn sample(&self) -> Vec<f64> {
         let Instant { excess, volume_change, compression: Compression { mean, p99, largest }, speed } =
             self.now;

@@ -1,5 +1,5 @@
-//! The scheme of a weakly compressible fluid: the density follows from the motion (equation of continuity),
-//! and the pressure from the density (Tait).
+//! The scheme of a weakly compressible fluid: the density follows from how the particles move, and the pressure
+//! from the density (Tait).
 //!
 //! ```text
 //! ρ_i = Q_i + o_i,  Q_i = Σ m W + 2ρ₀ λ,  do_i/dt = δ·h·c Σ 2(ρ_j − ρ_i − ρᴴ_ji) V r_ji·∇W/r² + (what places say)
@@ -7,7 +7,7 @@
 //! p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1)
 //! ```
 //!
-//! Energy: the acceleration by pressure is the gradient of the elastic energy Σ m·e(ρ), e = ∫ p/ρ₀² dρ, by the
+//! Energy: but for the factor at walls below, the acceleration by pressure is the gradient of the elastic energy Σ m·e(ρ), e = ∫ p/ρ₀² dρ, by the
 //! places, because a density changes with the places as Q does. What viscosity and diffusion do only takes
 //! energy away. So nothing is gained but the errors of finite steps. These have a sign: the pressure at a new
 //! place is that of a density which is extrapolated from the last two rates, and the density is then made
@@ -23,8 +23,8 @@
 //! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
 //! Viscosity: laminar (Morris et al. 1997) or artificial (Monaghan 1992).
 //!
-//! With `gradients: differences` the depth of the fluid has gradients by differences instead, divided by what the sum makes of the gradient of a position,
-//! G = −⅓ Σ V r·∇W + ⅓ tr K (0.98 on a lattice at h = 2.6 spacings). A pressure that is linear in space has
+//! With `gradients: differences` the depth of the fluid has gradients by differences instead, divided by what
+//! the sum makes of the gradient of a position, G = −⅓ Σ V r·∇W + ⅓ tr K (0.98 on a lattice at h = 2.6 spacings). A pressure that is linear in space has
 //! its exact gradient, however far above zero it lies. Such forces do not push particles apart; shifting
 //! keeps the particles evenly distributed instead ([`super::super::shifting`]). At a free surface and in
 //! spray, where G is small, pressures act as sums p_i + p_j there too. Densities then follow the equation of
