@@ -17,7 +17,7 @@ use super::{
     pairs::{Cloud, Columns, Near, PairPass, Real},
     params::Parameters,
     particles::{Particles, Vectors},
-    walls::{Boundary, Coverage, Friction, MARKED, UNKNOWN, Wall},
+    walls::{Boundary, Coverage, Fault, Friction, MARKED, Trouble, UNKNOWN, Undefined, Wall},
 };
 
 /// Number of particles that one task of a parallel loop handles.
@@ -124,11 +124,15 @@ impl Core {
             &mut self.clear,
             self.contacts.as_ref(),
         );
-        met.map_err(|fault| StepError::NonFinite {
-            step: self.steps,
-            id: id[fault.index],
-            quantity: Quantity::Omega,
-            cause: Cause::FieldUndefined { at: fault.at },
+        met.map_err(|Fault { index, trouble }| {
+            let (step, id) = (self.steps, id[index]);
+            match trouble {
+                Trouble::NoRoom { at } => StepError::NoRoom { step, id, at },
+                Trouble::Undefined(Undefined { at }) => {
+                    let (quantity, cause) = (Quantity::Omega, Cause::FieldUndefined { at });
+                    StepError::NonFinite { step, id, quantity, cause }
+                }
+            }
         })?;
         std::mem::swap(position, &mut self.spare);
         self.near_is_known = false;

@@ -127,6 +127,15 @@ pub enum StepError {
         /// The most likely reason.
         cause: Cause,
     },
+    /// Walls that move leave no room for a particle: they close on it, or pass over it in one step.
+    NoRoom {
+        /// Number of the step.
+        step: u64,
+        /// The particle's number at seeding.
+        id: u32,
+        /// Where the particle is, m.
+        at: DVec3,
+    },
     /// The energy of the fluid has doubled without work. See [`Audit`](super::Audit).
     EnergyDoubled {
         /// Number of the step.
@@ -156,6 +165,13 @@ impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (step, id, quantity, cause) = match self {
             Self::NonFinite { step, id, quantity, cause } => (step, id, quantity, cause),
+            Self::NoRoom { step, id, at } => {
+                return write!(
+                    f,
+                    "step {step}: moving walls leave no room for particle {id} at {at}: they close on the fluid, or \
+                     pass over it in one step; end the motion earlier, leave a gap, or make `dt` shorter"
+                );
+            }
             Self::EnergyDoubled { step, excess, id, speed } => {
                 return write!(
                     f,

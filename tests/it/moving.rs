@@ -517,3 +517,79 @@ fn the_command_line_looks_at_the_time_that_is_asked_for() {
     assert!(text.contains("moves: time enters ω by"), "{text}");
     assert_eq!(rfm(root(), &["eval", file, "-s", "piston", "--at", "0,0,0", "--time", "nan"]).code, 2);
 }
+
+/// A run of a scene that is given as text: its simulation at the end, or the error that ended it.
+fn run(text: &str) -> Result<rfm::sph::Simulation, rfm::sph::StepError> {
+    let program = Program::from_source("moving.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let scene = &program.module().scenes[0];
+    let experiment =
+        rfm::Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
+    simulation.advance(scene.run.until, |_| std::ops::ControlFlow::Continue(()))?;
+    Ok(simulation)
+}
+
+/// A piston comes along x, at 0.5 m/s, and a ball is in its way to the right wall, `gap` away from it.
+fn piston(method: &str, gap: f64, until: f64) -> String {
+    format!(
+        "rfm 1\n\
+         solid piston = box([-1, -1, -1], [0.1, 2, 2]).move([0.5*t, 0, 0])\n\
+         solid stone = ball([0.7, 0.2, 0.2], 0.15)\n\
+         scene pressed {{\n\
+         box {{ max: [0.85 + {gap}, 0.4, 0.8] }}\n\
+         obstacle piston\n\
+         obstacle stone\n\
+         fluid water {{ shape: box([0.2, 0.05, 0.05], [0.5, 0.35, 0.35]), density: 1000, spacing: 0.05 }}\n\
+         method: {method}\n\
+         run {{ until: {until} s, save_every: {until} s }}\n\
+         }}\n"
+    )
+}
+
+#[test]
+fn a_piston_that_passes_a_stone_leaves_nothing_inside() {
+    for method in ["paper", "wcsph", "dfsph"] {
+        // at its end the piston has pushed halfway over the stone; above it there is room
+        let simulation = run(&piston(method, 0.0, 1.2)).unwrap_or_else(|e| panic!("{method}: {e}"));
+        let stats = simulation.stats();
+        assert_eq!((stats.inside, stats.lost), (0, 0), "{method}");
+    }
+}
+
+#[test]
+fn walls_that_leave_no_room_end_the_run_and_say_so() {
+    // the piston goes on to the right wall, and nothing is left of the box
+    for method in ["paper", "wcsph", "dfsph"] {
+        let error = run(&piston(method, 0.0, 2.0)).err().unwrap_or_else(|| panic!("{method}"));
+        assert!(matches!(error, rfm::sph::StepError::NoRoom { .. }), "{method}: {error}");
+        assert!(error.to_string().contains("no room for particle"), "{error}");
+    }
+}
+
+#[test]
+fn a_body_that_passes_over_the_fluid_in_one_step_leaves_nothing_inside() {
+    let scene = |speed: f64, dt: f64| {
+        format!(
+            "rfm 1\n\
+             solid block = box([-1, 0, 0], [-0.2, 1, 0.6]).move([{speed}*t, 0, 0])\n\
+             scene hit {{\n\
+             box {{ max: [1, 1, 1] }}\n\
+             obstacle block\n\
+             fluid water {{ shape: box([0.2, 0.2, 0], [0.5, 0.5, 0.3]), density: 1000, spacing: 0.05 }}\n\
+             method: paper\n\
+             dt: {dt}\n\
+             run {{ until: {}, save_every: {} }}\n\
+             }}\n",
+            1.0 / speed,
+            1.0 / speed
+        )
+    };
+    for (speed, dt) in [(1.0, 1e-3), (1e2, 1e-3), (1e4, 1e-4), (1.0, 1.0)] {
+        match run(&scene(speed, dt)) {
+            Ok(simulation) => assert_eq!(simulation.stats().inside, 0, "{speed} {dt}"),
+            Err(error) => {
+                assert!(matches!(error, rfm::sph::StepError::NoRoom { .. }), "{speed} {dt}: {error}");
+            }
+        }
+    }
+}

@@ -66,8 +66,7 @@ pub(in crate::sph) trait Numerics: Sync {
 
     /// How walls enter the sums of the method.
     fn wall(&self, scales: &Scales) -> Wall {
-        let h = scales.support_radius;
-        Wall { kernel: WallKernel::WendlandC2, h, layer: None, spacing: scales.spacing() / h }
+        Wall::new(WallKernel::WendlandC2, scales.support_radius, scales.spacing())
     }
 
     /// The density, kg/m³, of a particle that starts under a pressure, Pa; `None` if all start at the rest

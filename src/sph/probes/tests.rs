@@ -214,12 +214,13 @@ fn a_block_carries_the_water_on_it() {
         core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
         let [x, y, z, torque_x, torque_y, torque_z] =
             force::pressure_on(&core, 0, DVec3::new(WIDTH, 0.0, 0.0));
-        // the sum over the lattice's layers stands for an integral
-        assert!((z / weight + 1.0).abs() < 0.01, "{z} {weight}");
+        // the sum over the lattice's layers stands for an integral; `dfsph` has moved the first of them away from
+        // the wall, by a hundredth of the spacing
+        assert!((z / weight + 1.0).abs() < 0.015, "{z} {weight}");
         assert!(x == 0.0 && y == 0.0 && torque_z.abs() < 1e-9 * weight, "{x} {y} {torque_z}");
         // the weight acts at the middle, half the width away from the corner along x and y
         let arm = 0.5 * WIDTH * weight;
-        assert!((torque_x / arm + 1.0).abs() < 0.01 && (torque_y / arm + 1.0).abs() < 0.01, "{torque_x}");
+        assert!((torque_x / arm + 1.0).abs() < 0.015 && (torque_y / arm + 1.0).abs() < 0.015, "{torque_x}");
     }
 }
 

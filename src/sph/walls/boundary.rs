@@ -12,8 +12,8 @@
 //! This stage acts on positions and velocities only. [`Coverage`] has what walls add to density and pressure.
 //!
 //! Invariant: every particle leaves this stage finite, in the box, and with ω < 0 for every obstacle. If the
-//! wedge between a wall and an obstacle has no such place near the target, the particle stays at the last
-//! such place.
+//! wedge between a wall and an obstacle at rest has no such place near the target, the particle stays at the
+//! last such place. Where moving walls leave no room there is an error.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ use crate::{
 use crate::sph::{VectorField, contacts::Contacts, particles::Vectors, scales::Slip};
 
 use super::{
-    contact::{Contact, Undefined, first_contact, push_out, push_out_to, reflect, turn_back},
+    contact::{Contact, Trouble, Undefined, first_contact, push_out, reflect, turn_back},
     coverage::Coverage,
     friction::Friction,
     kernel::Wall,
@@ -109,11 +109,11 @@ pub(in crate::sph) struct Boundary {
     pub clearance: f64,
 }
 
-/// A particle at which a field had no value, by its index and place.
+/// A particle that could not be put anywhere, by its index.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::sph) struct Fault {
     pub index: usize,
-    pub at: DVec3,
+    pub trouble: Trouble,
 }
 
 impl Boundary {
@@ -133,6 +133,11 @@ impl Boundary {
         }
     }
 
+    /// How far, m, a particle that a moving wall overtakes is moved at most.
+    pub(super) fn reach(&self) -> f64 {
+        REACH * self.clearance
+    }
+
     /// The fields of all obstacles during the present step.
     pub fn fields(&self) -> impl Iterator<Item = &dyn Walls> {
         (0..self.obstacles.len()).map(|k| self.field(k))
@@ -143,7 +148,8 @@ impl Boundary {
     /// its least distance from all obstacles, m, or [`UNKNOWN`]; it is empty if there are no obstacles.
     ///
     /// # Errors
-    /// The first particle, in the order of the arrays, at which a field is undefined.
+    /// The first particle, in the order of the arrays, at which a field is undefined or for which walls leave no
+    /// room.
     pub fn collide(
         &self,
         position: &Vectors,
@@ -255,7 +261,7 @@ impl Boundary {
         let swept = block.swept();
         // if an obstacle moves, a ball that is free now may not be free in the next step
         let at_rest = self.obstacles.iter().all(|obstacle| obstacle.moving.is_none());
-        let most = REACH * self.clearance;
+        let most = self.reach();
         if self.fields().all(|field| field.range(&swept).hi < 0.0) {
             if at_rest && self.fields().all(|field| field.is_far(&swept, most)) {
                 block.clear.fill(SURELY * most);
@@ -280,33 +286,14 @@ impl Boundary {
                         contacts.add(block.first + k, obstacle, change, at);
                     }
                 })
-                .and_then(|(at, velocity)| self.leave_moving(at, velocity))
-                .map_err(|undefined| block.fault(k, undefined))?;
+                .map_err(Trouble::from)
+                .and_then(|(at, velocity)| self.leave_moving(from, at, velocity))
+                .map_err(|trouble| block.fault(k, trouble))?;
             // a point of a path may lie a rounding error beyond both of its ends
             block.put(k, at.clamp(self.domain.min, self.domain.max), velocity);
             block.clear[k] = UNKNOWN;
         }
         Ok(())
-    }
-
-    /// Moves a particle out of a wall that has reached the place where the particle stopped earlier in the
-    /// step.
-    fn leave_moving(&self, mut at: DVec3, mut velocity: DVec3) -> Result<(DVec3, DVec3), Undefined> {
-        for (k, obstacle) in self.obstacles.iter().enumerate().filter(|(_, o)| o.moving.is_some()) {
-            let field = self.field(k);
-            if field.omega(at) < 0.0 {
-                continue;
-            }
-            // the nearest way out may lead through a wall of the box
-            let in_box = |p: DVec3| self.domain.contains(p);
-            let found = push_out_to(field, at, REACH * self.clearance, self.clearance, in_box)?;
-            if let Some(lifted) = found {
-                let wall = field.wall_velocity(lifted.point);
-                at = lifted.point;
-                velocity = wall + reflect(velocity - wall, lifted.normal, obstacle.restitution);
-            }
-        }
-        Ok((at, velocity))
     }
 
     /// Clamps a particle to the box. The part of its velocity that points out of a crossed wall is reflected,
@@ -480,7 +467,7 @@ impl Block<'_> {
         }
     }
 
-    fn fault(&self, k: usize, undefined: Undefined) -> Fault {
-        Fault { index: self.first + k, at: undefined.at }
+    fn fault(&self, k: usize, trouble: Trouble) -> Fault {
+        Fault { index: self.first + k, trouble }
     }
 }

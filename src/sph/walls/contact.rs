@@ -44,6 +44,24 @@ pub struct Undefined {
     pub at: DVec3,
 }
 
+/// Why a particle cannot be put anywhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::sph) enum Trouble {
+    /// A field has no value at a point.
+    Undefined(Undefined),
+    /// All places near a point lie in obstacles, or behind them.
+    NoRoom {
+        /// The point, m.
+        at: DVec3,
+    },
+}
+
+impl From<Undefined> for Trouble {
+    fn from(undefined: Undefined) -> Self {
+        Self::Undefined(undefined)
+    }
+}
+
 /// First contact of a path that begins in the fluid; `None` if there is none. The contact's point is
 /// `clearance`, m, before the surface, measured along its normal.
 ///

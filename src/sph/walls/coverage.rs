@@ -42,8 +42,21 @@ pub(in crate::sph) struct Coverage<F = ()> {
     pub spread: Symmetric,
     /// ∇λ·v for walls that move with the velocity v, 1/s.
     pub sweep: f64,
+    /// The barrier B and its gradient, see [`OfFace::barrier`]; zero for a continuous wall.
+    pub barrier: Barrier,
     /// Friction with a viscous fluid.
     pub friction: F,
+}
+
+/// What walls add to the density of a fluid that must not be compressed, see [`OfFace::barrier`].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::sph) struct Barrier {
+    /// B, as a part of the rest density.
+    pub part: f64,
+    /// ∇B, 1/m; it points out of the fluid.
+    pub gradient: DVec3,
+    /// ∇B·v for walls that move with the velocity v, 1/s.
+    pub sweep: f64,
 }
 
 impl<F: Friction> Coverage<F> {
@@ -55,13 +68,14 @@ impl<F: Friction> Coverage<F> {
             return Self::default();
         }
         let curvature = (face.mean_curvature * h).clamp(-MOST_CURVED, MOST_CURVED);
-        let OfFace { part, area, spread, filled } = wall.of_face(delta, curvature);
+        let OfFace { part, area, spread, filled, barrier, barrier_area } = wall.of_face(delta, curvature);
         Self {
             part,
             filled,
             gradient: -area / h * face.normal,
             spread: spread * Symmetric::square(face.normal),
             sweep: 0.0,
+            barrier: Barrier { part: barrier, gradient: -barrier_area / h * face.normal, sweep: 0.0 },
             friction: F::of_face(face, area / h, h),
         }
     }
@@ -69,6 +83,7 @@ impl<F: Friction> Coverage<F> {
     /// Lets all of these walls move with one velocity, m/s.
     pub fn set_in_motion(&mut self, velocity: DVec3) {
         self.sweep = self.gradient.dot(velocity);
+        self.barrier.sweep = self.barrier.gradient.dot(velocity);
         self.friction.take_along(velocity);
     }
 
@@ -123,8 +138,8 @@ impl<F: Friction> Coverage<F> {
 
     /// The coverage without its friction.
     pub fn without_friction(self) -> Coverage {
-        let Self { part, filled, gradient, spread, sweep, friction: _ } = self;
-        Coverage { part, filled, gradient, spread, sweep, friction: () }
+        let Self { part, filled, gradient, spread, sweep, barrier, friction: _ } = self;
+        Coverage { part, filled, gradient, spread, sweep, barrier, friction: () }
     }
 
     /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
@@ -151,7 +166,19 @@ impl<F: Friction> Coverage<F> {
             gradient: da * self.gradient + db * other.gradient,
             spread: da * self.spread + db * other.spread,
             sweep: da * self.sweep + db * other.sweep,
+            barrier: self.barrier.joined(&other.barrier, part, [da, db], [self.part, other.part]),
             friction: self.friction.joined(&other.friction, da, db),
+        }
+    }
+}
+
+impl Barrier {
+    /// The barrier of two walls, whose λ combine to `part` with the derivatives by both λ.
+    fn joined(&self, other: &Self, part: f64, [da, db]: [f64; 2], [a, b]: [f64; 2]) -> Self {
+        Self {
+            part: (part + da * (self.part - a) + db * (other.part - b)).max(0.0),
+            gradient: da * self.gradient + db * other.gradient,
+            sweep: da * self.sweep + db * other.sweep,
         }
     }
 }
@@ -186,7 +213,8 @@ mod tests {
     type Coverage = super::Coverage<WallDrag>;
 
     const H: f64 = 0.3;
-    const WALL: Wall = Wall { kernel: WallKernel::WendlandC2, h: H, layer: None, spacing: 1.0 / 2.6 };
+    const WALL: Wall =
+        Wall { kernel: WallKernel::WendlandC2, h: H, layer: None, spacing: 1.0 / 2.6, at_rest: 0.0 };
 
     fn face(distance: f64, normal: DVec3) -> Part {
         Part::Face(Face { distance, normal: normal.normalize(), mean_curvature: 0.0 })
@@ -249,7 +277,7 @@ mod tests {
 
     #[test]
     fn faces_far_behind_change_nothing() {
-        let wall = Wall { layer: Some(1.0 / 2.2), ..WALL };
+        let wall = Wall::in_layers(WallKernel::WendlandC2, H, H / 2.2);
         let near = face(0.1 * H, DVec3::X);
         let alone = Coverage::of_faces(&wall, &Faces::from_slice(&[near]));
         // a slab's other side, and its rim
@@ -257,7 +285,8 @@ mod tests {
             let slab = Coverage::of_faces(&wall, &Faces::from_slice(&[Part::All(2), near, far]));
             // all but the rounding of a + 1 − 1
             assert!((slab.part - alone.part).abs() < 1e-15, "{slab:?} {alone:?}");
-            assert_eq!(Coverage { part: alone.part, filled: alone.filled, ..slab }, alone);
+            let same = Coverage { part: alone.part, filled: alone.filled, barrier: alone.barrier, ..slab };
+            assert_eq!(same, alone);
         }
     }
 

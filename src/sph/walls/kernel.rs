@@ -131,6 +131,8 @@ pub(in crate::sph) struct Wall {
     pub layer: Option<f64>,
     /// The spacing of the fluid over h, by which walls fill the kernels of particles, see [`OfFace::filled`].
     pub spacing: f64,
+    /// λ at half a spacing from a wall in layers, where a fluid rests.
+    pub at_rest: f64,
 }
 
 /// What one face takes of a kernel.
@@ -145,14 +147,44 @@ pub(in crate::sph) struct OfFace {
     /// λ by layers a spacing apart: what a wall adds to the sum over a lattice of particles, of which the
     /// first layer is half a spacing away.
     pub filled: f64,
+    /// B, what a wall adds to the density of a fluid that must not be compressed; zero for a continuous wall. It
+    /// is λ, and nearer than half a spacing, where a fluid at rest touches the wall, λ counts twice: the wall
+    /// mirrors the fluid. Between, over a width of [`BEND`], it bends. (With λ alone the fluid creeps into the
+    /// walls, and a level of ten layers sinks by 3 %. With a kink instead of the bend water at rest never
+    /// comes to rest.)
+    pub barrier: f64,
+    /// −h·dB/dd.
+    pub barrier_area: f64,
 }
 
+/// Half the width, in λ, of the bend of a barrier.
+const BEND: f64 = 0.02;
+
 impl Wall {
+    /// A continuous wall, for a fluid with this spacing, m.
+    pub fn new(kernel: WallKernel, h: f64, spacing: f64) -> Self {
+        Self { kernel, h, layer: None, spacing: spacing / h, at_rest: 0.0 }
+    }
+
+    /// A wall in layers that are a spacing, m, thick.
+    pub fn in_layers(kernel: WallKernel, h: f64, spacing: f64) -> Self {
+        let mut wall = Self { layer: Some(spacing / h), ..Self::new(kernel, h, spacing) };
+        wall.at_rest = wall.filled_by(0.5 * wall.spacing, 0.0);
+        wall
+    }
+
     /// The part of a face at the distance δ = d/h with the mean curvature H·h.
     #[inline]
     pub fn of_face(&self, delta: f64, curvature: f64) -> OfFace {
         if delta <= -1.0 {
-            return OfFace { part: 1.0, area: 0.0, spread: 0.0, filled: 1.0 };
+            return OfFace {
+                part: 1.0,
+                area: 0.0,
+                spread: 0.0,
+                filled: 1.0,
+                barrier: 1.0,
+                barrier_area: 0.0,
+            };
         }
         let whole = || self.continuous(delta, curvature);
         let Some(layer) = self.layer else {
@@ -161,19 +193,15 @@ impl Wall {
         };
         let layered = self.of_layers(layer, delta, curvature);
         if delta >= 0.0 {
-            return layered;
+            return self.with_barrier(layered);
         }
         // behind a face the sum over all layers is one up to half a hundredth, depending on where they lie:
         // the deeper the particle is, the more of the wall counts as continuous
         let whole = whole();
         let mix = |layered: f64, whole: f64| layered + delta * (layered - whole);
         let part = mix(layered.part, whole.part);
-        OfFace {
-            part,
-            area: mix(layered.area, whole.area),
-            spread: mix(layered.spread, whole.spread),
-            filled: part,
-        }
+        let (area, spread) = (mix(layered.area, whole.area), mix(layered.spread, whole.spread));
+        self.with_barrier(OfFace { part, area, spread, filled: part, ..layered })
     }
 
     /// The part of a continuous face.
@@ -181,7 +209,7 @@ impl Wall {
     fn continuous(&self, delta: f64, curvature: f64) -> OfFace {
         let area = self.kernel.slope(delta) * (1.0 - curvature * delta);
         let part = self.kernel.covered_by_curved(delta, curvature).clamp(0.0, 1.0);
-        OfFace { part, area, spread: delta * area, filled: part }
+        OfFace { part, area, spread: delta * area, filled: part, barrier: 0.0, barrier_area: 0.0 }
     }
 
     /// λ of a plane by layers a spacing apart, or `part` behind the face.
@@ -218,7 +246,19 @@ impl Wall {
         let area = layer * (steeps + curvature * (slopes - spreads));
         let spread = layer * (spreads - slopes) * (1.0 - curvature * delta);
         let part = part.clamp(0.0, 1.0);
-        OfFace { part, area, spread, filled: part }
+        OfFace { part, area, spread, filled: part, barrier: 0.0, barrier_area: 0.0 }
+    }
+
+    /// The part of a face with its barrier.
+    #[inline]
+    fn with_barrier(&self, of_face: OfFace) -> OfFace {
+        let beyond = of_face.part - self.at_rest;
+        let (more, slope) = match () {
+            () if beyond > BEND => (beyond, 1.0),
+            () if beyond < -BEND => (0.0, 0.0),
+            () => ((beyond + BEND).powi(2) / (4.0 * BEND), (beyond + BEND) / (2.0 * BEND)),
+        };
+        OfFace { barrier: of_face.part + more, barrier_area: (1.0 + slope) * of_face.area, ..of_face }
     }
 }
 
@@ -311,7 +351,7 @@ mod tests {
     fn layers_are_planes_of_the_kernel() {
         let kernel = WallKernel::WendlandC2;
         let (layer, h) = (1.0 / 2.2, 1.0);
-        let wall = Wall { kernel, h, layer: Some(layer), spacing: layer };
+        let wall = Wall::in_layers(kernel, h, layer * h);
         for delta in [0.0, 0.1, 0.5 * layer, 0.4, 1.5 * layer, 0.95] {
             // each layer is a plane of the wall's thickness: its weight by discs
             let planes = (0..12).map(|k| delta + (f64::from(k) + 0.5) * layer);
@@ -333,8 +373,7 @@ mod tests {
 
     #[test]
     fn a_particle_deep_behind_a_face_is_wholly_covered() {
-        let wall =
-            Wall { kernel: WallKernel::WendlandC2, h: 1.0, layer: Some(1.0 / 2.2), spacing: 1.0 / 2.2 };
+        let wall = Wall::in_layers(WallKernel::WendlandC2, 1.0, 1.0 / 2.2);
         for delta in [-1.0, -1.3, -5.0, -1e30, f64::NEG_INFINITY] {
             let OfFace { part, area, .. } = wall.of_face(delta, 0.0);
             assert_eq!((part, area), (1.0, 0.0), "{delta}");
@@ -363,7 +402,7 @@ mod tests {
             };
             for (layer, tolerance) in [(0, 0.006), (1, 0.003)] {
                 let delta = (f64::from(layer) + 0.5) / ratio;
-                let of = |layer| Wall { kernel, h: 1.0, layer, spacing: 0.4 }.of_face(delta, 0.0).part;
+                let of = |layer| Wall { layer, ..Wall::in_layers(kernel, 1.0, 0.4) }.of_face(delta, 0.0).part;
                 let (layered, continuous, lattice) = (of(Some(1.0 / ratio)), of(None), behind(layer));
                 assert!((layered - lattice).abs() < tolerance, "{ratio} {layer}: {layered} {lattice}");
                 assert!((layered - lattice).abs() < 0.5 * (continuous - lattice).abs(), "{continuous}");
@@ -376,7 +415,8 @@ mod tests {
     fn many_layers_come_to_the_integral() {
         for kernel in WallKernel::ALL {
             for (delta, curvature) in [(-0.4, 0.0), (0.0, 0.3), (0.2, -0.3), (0.7, 0.4)] {
-                let of = |layer| Wall { kernel, h: 1.0, layer, spacing: 0.4 }.of_face(delta, curvature);
+                let of =
+                    |layer| Wall { layer, ..Wall::in_layers(kernel, 1.0, 0.4) }.of_face(delta, curvature);
                 let (many, whole) = (of(Some(1e-3)), of(None));
                 // the midpoint rule's error, a 24th of τ² times a slope
                 assert!((many.part - whole.part).abs() < 1e-5, "{kernel:?} {delta}: {many:?} {whole:?}");
@@ -430,5 +470,24 @@ mod tests {
                 assert!(plane > 0.08 * ratio, "{kernel:?} {ratio}: {plane:e}");
             }
         }
+    }
+
+    #[test]
+    fn a_barrier_is_continuous_and_has_its_own_slope() {
+        let wall = Wall::in_layers(WallKernel::WendlandC2, 1.0, 1.0 / 2.2);
+        let step = 1e-6;
+        for k in 1..=99 {
+            let delta = 0.01 * f64::from(k);
+            let [before, now, after] = [-step, 0.0, step].map(|d| wall.of_face(delta + d, 0.0));
+            let slope = (before.barrier - after.barrier) / (2.0 * step);
+            assert!((slope - now.barrier_area).abs() < 1e-5, "{delta}: {slope} {}", now.barrier_area);
+            assert!(now.barrier >= now.part);
+        }
+        // where a fluid rests it is λ, up to the bend; on the wall a mirrored layer is added
+        let at_rest = wall.of_face(0.5 / 2.2, 0.0);
+        assert!((at_rest.barrier - at_rest.part - 0.25 * BEND).abs() < 1e-12);
+        let on_wall = wall.of_face(0.0, 0.0);
+        assert!((on_wall.barrier - 2.0 * on_wall.part + at_rest.part).abs() < 1e-12);
+        assert_eq!(Wall::new(WallKernel::WendlandC2, 1.0, 0.4).of_face(0.1, 0.0).barrier, 0.0);
     }
 }

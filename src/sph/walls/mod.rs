@@ -11,9 +11,11 @@ mod coverage;
 mod friction;
 mod kernel;
 mod symmetric;
+mod way_out;
 
 pub use boundary::Obstacle;
-pub(super) use boundary::{Boundary, MARKED, UNKNOWN};
+pub(super) use boundary::{Boundary, Fault, MARKED, UNKNOWN};
+pub(super) use contact::Trouble;
 pub use contact::{Contact, Undefined, first_contact, push_out};
 pub(super) use coverage::Coverage;
 pub(super) use friction::{Friction, WallDrag};

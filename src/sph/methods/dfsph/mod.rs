@@ -2,6 +2,7 @@
 
 mod passes;
 mod scheme;
+mod solver;
 mod walls;
 
 pub(super) use scheme::DivergenceFree;
@@ -33,6 +34,9 @@ pub struct Dfsph {
     pub tolerance: f64,
     /// Most iterations of the solver in one step. Default 100.
     pub most_iterations: u32,
+    /// α of the artificial viscosity (Monaghan 1992), for a speed of sound of ten times the greatest expected
+    /// speed. Default 0.04; zero: the term is not computed.
+    pub artificial_viscosity: f64,
     /// How strongly particles drift to where there are fewer of them. Default 0: no drift. 1 halves the
     /// deviation of a fluid at rest, and makes that of a shear flow two to three times as large.
     pub shifting: f64,
@@ -40,7 +44,7 @@ pub struct Dfsph {
 
 impl Default for Dfsph {
     fn default() -> Self {
-        Self { tolerance: 1e-4, most_iterations: 100, shifting: 0.0 }
+        Self { tolerance: 1e-4, most_iterations: 100, artificial_viscosity: 0.04, shifting: 0.0 }
     }
 }
 
@@ -82,6 +86,18 @@ impl Declaration for Dfsph {
             },
         },
         Key {
+            name: "artificial_viscosity",
+            block: KeyBlock::Fluid,
+            about: "α of the artificial viscosity, which damps noise and waves",
+            value: Value::Number {
+                dimension: Dimension::NONE,
+                bound: Bound::NotNegative,
+                get: |dfsph| Some(dfsph.artificial_viscosity),
+                set: |dfsph, alpha| dfsph.artificial_viscosity = alpha,
+                derived: "",
+            },
+        },
+        Key {
             name: "shifting",
             block: KeyBlock::Fluid,
             about: "how strongly particles drift to where there are fewer of them",
@@ -100,12 +116,22 @@ impl Declaration for Dfsph {
         (Pass::Pressure, |_, _| Some("the method solves for the pressure")),
         (Pass::PressureSolver, |_, _| None),
         (Pass::Viscosity, |_, scales| Pass::without_viscosity(scales)),
+        (Pass::ArtificialViscosity, |dfsph, _| {
+            (dfsph.artificial_viscosity == 0.0).then_some("the artificial viscosity is zero")
+        }),
         (Pass::Shifting, |dfsph, _| (dfsph.shifting == 0.0).then_some("the shifting is zero")),
         (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
         (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
-    const SAVES: &'static [&'static str] =
-        &["specific pressure", "stiffness", "crowding x", "crowding y", "crowding z"];
+    const SAVES: &'static [&'static str] = &[
+        "specific pressure",
+        "displacing pressure",
+        "debt",
+        "stiffness",
+        "crowding x",
+        "crowding y",
+        "crowding z",
+    ];
 }
 
 impl Numerics for Dfsph {
@@ -129,9 +155,7 @@ impl Numerics for Dfsph {
     /// at rest. (Differences of pressure are steady only at a continuous wall; with layers a standing wave of
     /// `wcsph` grows noise at the walls.)
     fn wall(&self, scales: &Scales) -> Wall {
-        let h = scales.support_radius;
-        let spacing = scales.spacing() / h;
-        Wall { kernel: WallKernel::WendlandC2, h, layer: Some(spacing), spacing }
+        Wall::in_layers(WallKernel::WendlandC2, scales.support_radius, scales.spacing())
     }
 
     fn elastic_energy(&self, _scales: &Scales, _density: f64) -> f64 {

@@ -47,14 +47,25 @@ impl Constants {
     }
 }
 
-/// Finds the density ρ, the diagonal of the solver's system, the direction in which particles crowd, and G.
+/// How a linear system takes walls into account.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Continuation {
+    /// A pressure that is linear in space goes on behind the wall, and a velocity is mirrored there, by λ and M:
+    /// right for forces.
+    Linear,
+    /// As the barrier B adds to the density, and no more: right for places.
+    Barrier,
+}
+
+/// Finds the density ρ with the barriers of the walls, the diagonals of both systems, the direction in which
+/// particles crowd, G, and the density that the places say.
 #[derive(Clone, Copy)]
 pub(super) struct Densities<'a> {
     pub constants: Constants,
     pub walls: &'a Walls,
 }
 
-impl PairPass<0, 6, 6> for Densities<'_> {
+impl PairPass<0, 6, 8> for Densities<'_> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
@@ -76,33 +87,38 @@ impl PairPass<0, 6, 6> for Densities<'_> {
         sums[5] = f.mul_add(r2, sums[5]);
     }
 
-    fn finish(&self, i: usize, [weight, x, y, z, mut squares, spread]: [f64; 6]) -> [f64; 6] {
+    fn finish(&self, i: usize, [weight, x, y, z, squares, spread]: [f64; 6]) -> [f64; 8] {
         let Constants { mass_weight, mass_steepness, rest_density, .. } = self.constants;
-        let mut density = mass_weight * weight;
+        let [mut density, mut filled] = [mass_weight * weight; 2];
         let slope = -mass_steepness * DVec3::new(x, y, z);
+        let squares = mass_steepness.powi(2) * squares;
         let mut crowding = slope / rest_density;
         let mut spread = mass_steepness / rest_density * spread / 3.0;
-        let mut own = slope;
+        let mut factors = [slope.length_squared() + squares; 2];
         if let Some((wall, completion)) = self.walls.near(i) {
-            density += rest_density * wall.part;
+            filled += rest_density * wall.filled;
+            density += rest_density * wall.barrier.part;
             crowding += wall.gradient;
             spread += wall.share();
             // the walls of the neighbours complete their sums about as much as those of the particle itself
-            squares *= completion.determinant().max(1.0).cbrt().powi(2);
-            own = *completion * (slope + 2.0 * rest_density * wall.gradient);
+            let others = squares * completion.determinant().max(1.0).cbrt().powi(2);
+            let own = *completion * (slope + 2.0 * rest_density * wall.gradient);
+            let barrier = slope + rest_density * wall.barrier.gradient;
+            factors = [own.length_squared() + others, barrier.length_squared() + squares];
         }
-        let factor = own.length_squared() + mass_steepness.powi(2) * squares;
         let crowding = depth(spread) * crowding;
-        [density, factor, crowding.x, crowding.y, crowding.z, spread]
+        let [linear, barrier] = factors;
+        [density, linear, barrier, crowding.x, crowding.y, crowding.z, spread, filled]
     }
 }
 
-/// Finds the acceleration a(s) by pressure.
+/// Finds the acceleration a(s) by pressure, or a displacement.
 #[derive(Clone, Copy)]
 pub(super) struct Push<'a> {
     pub constants: Constants,
     pub walls: &'a Walls,
     pub pressure: &'a [f64],
+    pub continuation: Continuation,
 }
 
 impl PairPass<1, 3, 3> for Push<'_> {
@@ -124,12 +140,13 @@ impl PairPass<1, 3, 3> for Push<'_> {
 
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
         let push = self.constants.mass_steepness * DVec3::from_array(sums);
-        let push = match self.walls.near(i) {
-            None => push,
-            Some((wall, completion)) => {
-                let wall_push = -2.0 * self.constants.rest_density * self.pressure[i] * wall.gradient;
-                *completion * (push + wall_push)
-            }
+        let Some((wall, completion)) = self.walls.near(i) else {
+            return push.to_array();
+        };
+        let pressure = self.constants.rest_density * self.pressure[i];
+        let push = match self.continuation {
+            Continuation::Linear => *completion * (push - 2.0 * pressure * wall.gradient),
+            Continuation::Barrier => push - pressure * wall.barrier.gradient,
         };
         push.to_array()
     }
@@ -140,8 +157,10 @@ impl PairPass<1, 3, 3> for Push<'_> {
 pub(super) struct Squeeze<'a> {
     pub constants: Constants,
     pub walls: &'a Walls,
-    /// M·v of each particle.
-    pub completed: &'a Vectors,
+    /// Velocities or displacements; where they continue linearly, M·v.
+    pub velocity: &'a Vectors,
+    pub continuation: Continuation,
+    /// Whether the motion of walls counts: it belongs to a velocity, and not to an acceleration by pressure.
     pub with_walls: bool,
 }
 
@@ -164,16 +183,19 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
 
     fn finish(&self, i: usize, [sum]: [f64; 1]) -> [f64; 1] {
         let rate = -self.constants.mass_steepness * sum;
-        let mirrored = |(wall, _): (&WallsNear, &DMat3)| {
-            // the walls' motion belongs to a velocity, not to an acceleration by pressure
-            let sweep = if self.with_walls { wall.sweep } else { 0.0 };
-            2.0 * self.constants.rest_density * (wall.gradient.dot(self.completed.get(i)) - sweep)
+        let of_walls = |(wall, _): (&WallsNear, &DMat3)| {
+            let (gradient, sweep) = match self.continuation {
+                Continuation::Linear => (2.0 * wall.gradient, 2.0 * wall.sweep),
+                Continuation::Barrier => (wall.barrier.gradient, wall.barrier.sweep),
+            };
+            gradient.dot(self.velocity.get(i)) - if self.with_walls { sweep } else { 0.0 }
         };
-        [rate + self.walls.near(i).map_or(0.0, mirrored)]
+        [rate + self.constants.rest_density * self.walls.near(i).map_or(0.0, of_walls)]
     }
 }
 
-/// Finds the acceleration by laminar viscosity (Morris et al. 1997) and gravity.
+/// Finds the acceleration by laminar viscosity (Morris et al. 1997), by artificial viscosity (Monaghan 1992)
+/// and by gravity.
 #[derive(Clone, Copy)]
 pub(super) struct Drag<'a> {
     pub constants: Constants,
@@ -181,32 +203,40 @@ pub(super) struct Drag<'a> {
     pub velocity: &'a Vectors,
     /// Kinematic viscosity ν, m²/s.
     pub kinematic: f64,
+    /// The factor α·h/2·c of the artificial viscosity, m²/s.
+    pub artificial: f64,
     pub gravity: DVec3,
 }
 
-impl PairPass<3, 3, 3> for Drag<'_> {
+impl PairPass<3, 6, 3> for Drag<'_> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
-        _: [V; 3],
+        d: [V; 3],
         r2: V,
         own: &[V; 3],
         other: [V; 3],
-        sums: &mut [V; 3],
+        sums: &mut [V; 6],
     ) {
         let s = self.constants.kernel.nearness(r2);
         let f = s * s * s;
+        let relative = [other[0] - own[0], other[1] - own[1], other[2] - own[2]];
+        let arriving = relative[2].mul_add(d[2], relative[1].mul_add(d[1], relative[0] * d[0]));
+        let least = V::Element::of(0.01 * (0.5 * self.constants.kernel.h).powi(2));
+        let push = f * arriving * (r2 + least).approximate_recip();
         for k in 0..3 {
-            sums[k] = f.mul_add(other[k] - own[k], sums[k]);
+            sums[k] = f.mul_add(relative[k], sums[k]);
+            sums[3 + k] = push.mul_add(d[k], sums[3 + k]);
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
+    fn finish(&self, i: usize, [x, y, z, u, v, w]: [f64; 6]) -> [f64; 3] {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
-        let mut drag = 2.0 * self.kinematic * mass_steepness / rest_density * DVec3::from_array(sums);
+        let steepness = mass_steepness / rest_density;
+        let mut drag = 2.0 * self.kinematic * steepness * DVec3::new(x, y, z);
         if let Some((wall, _)) = self.walls.near(i) {
             drag = wall.friction.complete(drag, self.velocity.get(i), self.kinematic);
         }
-        (drag + self.gravity).to_array()
+        (drag + self.artificial * steepness * DVec3::new(u, v, w) + self.gravity).to_array()
     }
 }

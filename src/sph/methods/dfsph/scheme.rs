@@ -1,35 +1,46 @@
-//! The scheme of a divergence-free fluid, after Bender & Koschier (2017). The pressure that keeps the density
-//! is found by iteration.
+//! The scheme of a divergence-free fluid, after Bender & Koschier (2017). The pressures that keep the density
+//! are found by iteration.
 //!
 //! ```text
 //! v ← v + dt·(g + viscosity)
-//! v ← v + dt·a(s)      s ≥ 0 so that dρ/dt ≤ (ρ₀ − ρ)/τ
-//! x ← x + dt·v
+//! v ← v + dt·a(s)          s ≥ 0 so that dρ/dt ≤ −D/τ, or ≤ (ρ₀ − ρ)/τ where ρ < ρ₀
+//! D ← D + dt·(what of dρ/dt the solver left)
+//! x ← x + dt·v + b(s′)     s′ ≥ 0 so that ρ ≤ ρ₀ at the new place
 //! ```
 //!
-//! with s = p/ρ², a(s)_i = −M_i[Σ m (s_i + s_j) ∇W + 2ρ₀ s_i ∇λ] and dρ_i/dt = Σ m (M_i v_i − M_j v_j)·∇W +
-//! 2ρ₀ (M_i v_i)·∇λ.
+//! with s = p/ρ². Their second solver makes the density right by changing velocities, and each small error of a
+//! density becomes a speed: a fluid at rest simmers, and its pressure with it. Here it changes places, and the
+//! displacement is not part of the velocity.
 //!
-//! One solve does the work of their two. It demands a velocity free of divergence and, besides, that a
-//! density that is off returns within a relaxation time τ (Baumgarte 1972). If a density had to be right
-//! after a single step, as in their second solver, each of its small errors would become a speed: a fluid at
-//! rest would simmer, and its pressure with it.
+//! Then the density no longer tells the pressure what an unfinished solve has left, and a column could sink for
+//! ever within the tolerance while displacements lift it (a breaking dam gained 8 % of its energy so). So each
+//! particle remembers what was left as a debt D of density, and the pressure pays it back within τ
+//! (Baumgarte 1972). The tolerance of this solve is that of the density over τ. A part of what displacements take
+//! away is added to the debt, see [`OWED`].
 //!
-//! Walls enter by λ, ∇λ and M = (1 − K)⁻¹: a pressure that is linear in space continues behind the wall. The
-//! rate of density is the adjoint of that: a velocity that is linear in space continues behind the wall and
-//! is mirrored at it. So the system to be solved is symmetric and has no negative eigenvalue for any vessel,
-//! and its solution adds no energy. (Measured on a still column: with λ and ∇λ alone the pressure of the
-//! first layer comes out 2.2 times too high; with the mirrored pressure but not the mirrored velocity the
-//! column boils.)
+//! The two systems treat walls differently.
+//!
+//! Forces: a(s)_i = −M_i[Σ m (s_i + s_j) ∇W + 2ρ₀ s_i ∇λ] and dρ_i/dt = Σ m (M_i v_i − M_j v_j)·∇W +
+//! 2ρ₀ (M_i v_i)·∇λ with M = (1 − K)⁻¹: a pressure that is linear in space continues behind the wall, and a
+//! velocity is mirrored there. So the system is symmetric and has no negative eigenvalue for any vessel, and its
+//! solution adds no energy. (Measured on a still column: with λ and ∇λ alone the pressure of the first layer
+//! comes out 2.2 times too high, and in a narrow vessel all of it by 20 %.)
+//!
+//! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is λ where a
+//! fluid at rest touches the wall, and b(s′) by its exact derivative. So what the solve makes right is right when
+//! the density is found next, up to the square of the displacement. (With the system of forces a breaking dam
+//! keeps three times the tolerance.)
+//!
+//! Artificial viscosity (Monaghan 1992) takes the noise of the particles' disorder, which nothing else would
+//! take from a fluid without viscosity. It acts along the lines between particles, and conserves momentum and
+//! angular momentum.
 //!
 //! The reported pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
-//! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over the relaxation
-//! time τ, because the divergence of velocity that one step leaves is a pressure in the next: in a fluid at
-//! rest single steps differ by a tenth, and only their sum is its weight.
+//! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over many steps at rest,
+//! because the divergence of velocity that one step leaves is a pressure in the next.
 //!
 //! Invariant: the densities are those of the present positions.
 
-use rayon::prelude::*;
 use smallvec::{SmallVec, smallvec};
 
 use super::super::{
@@ -37,67 +48,62 @@ use super::super::{
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
-use super::passes::{Constants, Densities, Drag, Push, Squeeze};
+use super::passes::{Constants, Continuation, Densities, Drag};
+use super::solver::{Errors, Goal, Solver};
 use super::walls::Walls;
 use super::{ADVECTION, Dfsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
-    core::{CHUNK, Core, add_scaled},
+    core::{Core, add_scaled},
     error::StepError,
     params::Parameters,
     particles::{Particles, Vectors},
 };
 
-/// Factor by which walls and disorder make the system stiffer than the even fluid of [`stiffness`].
-const STIFFNESS: f64 = 1.5;
+/// The time in which a debt is paid back, in steps.
+const RELAXATION_STEPS: f64 = 8.0;
 
-/// A particle whose factor is below this part of that in a full neighbourhood has no neighbours, and no
-/// pressure is solved for.
-const LONELY: f64 = 1e-3;
+/// Part of a density that displacements take away which becomes a debt. Without it a column of forty layers, ten
+/// wide, sinks at 0.3 m/s with a velocity in which the system of forces sees no divergence, and displacements
+/// cannot hold it. With all of it a fluid at rest gains 5 % of its energy.
+const OWED: f64 = 0.3;
 
-/// The relaxation time, in steps: the first where the fastest particle moves as far in a step as it may, the
-/// second at least where nothing moves. Moving fluid loses its density step by step (with ten everywhere a
-/// breaking dam is 0.5 % too dense in the mean, with four 0.3 %). At rest each correction is noise of the
-/// pressure.
-const RELAXATION_STEPS: [f64; 2] = [4.0, 10.0];
+/// The time over which pressures are averaged, in steps where the fastest particle moves as far in a step as it
+/// may, and in units of √(h/g) at rest.
+const AVERAGED_STEPS: f64 = 8.0;
+const AVERAGED_FALLS: f64 = 2.0;
 
-/// The least relaxation time at rest, in units of √(h/g), however short the steps are: the error of a whole
-/// column returns at once, and with ten steps a column of eighty layers bursts at its start.
-const RELAXATION_FALLS: f64 = 2.0;
+/// The most steps of an average, for a gravity close to zero.
+const MOST_AVERAGED_STEPS: f64 = 100.0;
 
-/// The most steps of a relaxation time, for a gravity close to zero. Where a column would burst, steps are so
-/// short that a relaxation time has some sixty of them.
-const MOST_RELAXATION_STEPS: f64 = 100.0;
+/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
+/// a weakly compressible fluid, so that the same α damps alike.
+const NOMINAL_SOUND: f64 = 10.0;
 
-/// The scheme. It keeps the solver's answer between steps; the rest is working memory.
+/// The scheme. It keeps the solvers' answers between steps; the rest is working memory.
 pub struct DivergenceFree {
     numbers: Dfsph,
-    /// Specific pressure s = p/ρ².
-    specific: Vec<f64>,
-    /// The diagonal of the system: how much a unit of p/ρ² lowers the particle's own dρ/dt in a second, (1 −
-    /// K)⁻¹(…)·(…) + Σ m²|∇W|².
-    factor: Vec<f64>,
+    /// Finds pressures that change velocities; its answer is p/ρ².
+    forces: Solver,
+    /// Finds pressures that displace particles.
+    places: Solver,
+    /// The density, kg/m³, that each particle would have gained by what the solver of forces left.
+    debt: Vec<f64>,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
     spread: Vec<f64>,
-    /// Rate of density dρ/dt.
-    rate: Vec<f64>,
-    /// Rate of density without pressure, plus the rate at which a density that is off returns.
-    free: Vec<f64>,
-    /// Acceleration a(s) by pressure.
-    push: Vectors,
-    /// Σ V ∇W + ∇λ, 1/m: the direction in which particles crowd; zero at the surface.
+    /// Σ V ∇W + ∇λ, 1/m; zero at the surface.
     crowding: Vectors,
+    /// What a solver shall take away: a rate of density, or an excess of density.
+    free: Vec<f64>,
     tension: Tension,
-    /// M·v of each particle.
-    completed: Vectors,
+    /// Displacements of this step that are not part of the velocity, m.
+    displacement: Vectors,
+    /// Velocities with what displaces besides, m/s.
+    drift: Vectors,
+    /// Densities with the barriers of the walls, kg/m³: what must not exceed that at rest.
+    loaded: Vec<f64>,
     walls: Walls,
-    /// The last guess, without the momentum that was added to it.
-    last: Vec<f64>,
-    /// Greatest eigenvalue of the system over its diagonal: the inverse of a step that cannot overshoot.
-    stiffness: f64,
-    /// Sums of the errors and of the momentum's work, chunk by chunk.
-    errors: Vec<[f64; 2]>,
-    /// Iterations of the last step's solver.
+    /// Iterations of the last step's solvers.
     iterations: u32,
 }
 
@@ -107,8 +113,9 @@ impl Scheme for DivergenceFree {
         self.find_other_accelerations(core);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);
+        self.find_displacements(core, dt);
         core.move_obstacles(dt);
-        core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
+        core.drift(dt, Some((&self.displacement, 1.0 / dt)))?;
         self.settle(core, &mut []);
         core.check_finite(dt)?;
         Ok(dt)
@@ -116,15 +123,19 @@ impl Scheme for DivergenceFree {
 
     /// Saves the answers of the last step. All else follows from the positions.
     fn save(&self, checkpoint: &mut Checkpoint) {
-        checkpoint.set("specific pressure", self.specific.clone());
-        checkpoint.set("stiffness", vec![self.stiffness]);
+        checkpoint.set("specific pressure", self.forces.s.clone());
+        checkpoint.set("displacing pressure", self.places.s.clone());
+        checkpoint.set("debt", self.debt.clone());
+        checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         save_crowding(&self.crowding, checkpoint);
     }
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.specific = checkpoint.of_particles("specific pressure")?;
-        if let [stiffness] = checkpoint.get("stiffness")? {
-            self.stiffness = *stiffness;
+        self.forces.s = checkpoint.of_particles("specific pressure")?;
+        self.places.s = checkpoint.of_particles("displacing pressure")?;
+        self.debt = checkpoint.of_particles("debt")?;
+        if let [forces, places] = checkpoint.get("stiffness")? {
+            (self.forces.stiffness, self.places.stiffness) = (*forces, *places);
         }
         self.crowding = restore_crowding(checkpoint)?;
         Ok(())
@@ -135,12 +146,13 @@ impl Scheme for DivergenceFree {
     }
 
     fn bytes(&self) -> usize {
-        let columns = [&self.specific, &self.factor, &self.spread, &self.rate, &self.free, &self.last];
+        let columns = [&self.debt, &self.spread, &self.free, &self.loaded];
+        let vectors = [&self.crowding, &self.displacement, &self.drift];
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
-            + self.push.bytes()
-            + self.crowding.bytes()
+            + vectors.map(Vectors::bytes).iter().sum::<usize>()
+            + self.forces.bytes()
+            + self.places.bytes()
             + self.tension.bytes()
-            + self.completed.bytes()
             + self.walls.bytes()
     }
 
@@ -157,22 +169,19 @@ impl DivergenceFree {
         core.particles.pressure.resize(n, 0.0);
         let mut scheme = Self {
             numbers,
-            specific: vec![0.0; n],
-            factor: vec![0.0; n],
+            forces: Solver::new(Continuation::Linear, &core.parameters, n),
+            places: Solver::new(Continuation::Barrier, &core.parameters, n),
+            debt: vec![0.0; n],
             spread: vec![0.0; n],
-            rate: vec![0.0; n],
-            free: vec![0.0; n],
-            push: Vectors::default(),
             crowding: Vectors::default(),
+            free: Vec::new(),
             tension: Tension::default(),
-            completed: Vectors::default(),
+            displacement: Vectors::default(),
+            drift: Vectors::default(),
+            loaded: vec![0.0; n],
             walls: Walls::default(),
-            last: Vec::new(),
-            stiffness: STIFFNESS * stiffness(core.parameters.support_radius / core.parameters.spacing()),
-            errors: Vec::new(),
             iterations: 0,
         };
-        scheme.push.resize(n);
         scheme.settle(core, &mut []);
         if is_new {
             scheme.relax(core);
@@ -185,46 +194,44 @@ impl DivergenceFree {
     fn relax(&mut self, core: &mut Core) {
         /// Most rounds; the compression that is left then is small.
         const ROUNDS: usize = 40;
-        let dt = core.parameters.force_dt(core.parameters.gravity.length().max(1e-3));
-        let gravity = std::mem::take(&mut core.parameters.gravity);
         let mut velocity = core.particles.velocity.clone();
         let speed = std::mem::take(&mut core.speed);
         for _ in 0..ROUNDS {
             let rest = core.parameters.rest_density;
-            let worst =
-                core.particles.density.iter().fold(0.0, |worst: f64, rho| worst.max(rho / rest - 1.0));
+            let worst = self.loaded.iter().fold(0.0, |worst: f64, rho| worst.max(rho / rest - 1.0));
             if worst < 2.0 * self.numbers.tolerance {
                 break;
             }
             core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
-            self.keep_density(core, dt);
+            self.find_displacements(core, 1.0);
             // the first step will report a place at which an obstacle has no value
-            if core.drift(dt, None).is_err() {
+            if core.drift(1.0, Some((&self.displacement, 1.0))).is_err() {
                 break;
             }
             let [x, y, z] = velocity.components_mut();
             self.settle(core, &mut [x, y, z]);
-            self.specific.fill(0.0);
         }
         (core.particles.velocity, core.speed) = (velocity, speed);
-        core.parameters.gravity = gravity;
         core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
         core.particles.pressure.fill(0.0);
     }
 
     /// Finds the order, walls, densities and factors for the present positions.
     fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
-        let mut columns: SmallVec<[&mut Vec<f64>; 4]> = smallvec![&mut self.specific];
+        let mut columns: SmallVec<[&mut Vec<f64>; 8]> =
+            smallvec![&mut self.forces.s, &mut self.places.s, &mut self.debt];
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
         core.find_near();
         self.walls.find(core);
         let mut density = std::mem::take(&mut core.particles.density);
         let pass = Densities { constants: Constants::of(&core.parameters), walls: &self.walls };
+        self.spread.resize(density.len(), 0.0);
         self.crowding.resize(density.len());
         let Vectors { x, y, z } = &mut self.crowding;
-        self.spread.resize(density.len(), 0.0);
-        core.sum(&pass, [], [&mut density, &mut self.factor, x, y, z, &mut self.spread]);
+        let [linear, barrier] = [&mut self.forces.factor, &mut self.places.factor];
+        self.loaded.resize(density.len(), 0.0);
+        core.sum(&pass, [], [&mut self.loaded, linear, barrier, x, y, z, &mut self.spread, &mut density]);
         core.particles.density = density;
     }
 
@@ -233,13 +240,20 @@ impl DivergenceFree {
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let g = core.parameters.gravity;
         let Vectors { x, y, z } = &mut acceleration;
-        if core.parameters.viscosity > 0.0 {
+        let parameters = &core.parameters;
+        let artificial = self.numbers.artificial_viscosity
+            * 0.5
+            * parameters.support_radius
+            * NOMINAL_SOUND
+            * parameters.expected_speed;
+        if parameters.viscosity > 0.0 || artificial > 0.0 {
             let Vectors { x: vx, y: vy, z: vz } = &core.particles.velocity;
             let pass = Drag {
                 constants: Constants::of(&core.parameters),
                 walls: &self.walls,
                 velocity: &core.particles.velocity,
                 kinematic: core.parameters.viscosity / core.parameters.rest_density,
+                artificial,
                 gravity: g,
             };
             core.sum(&pass, [&vx[..], vy, vz], [&mut x[..], y, z]);
@@ -253,161 +267,82 @@ impl DivergenceFree {
         self.tension.act(core);
     }
 
-    /// Changes velocities by pressure so that nothing is compressed, and what is too dense expands.
+    /// Changes velocities by pressure so that nothing is compressed beyond the rest density.
     fn keep_density(&mut self, core: &mut Core, dt: f64) {
         let rest = core.parameters.rest_density;
-        let mut pressure = std::mem::take(&mut self.specific);
-        let relaxation = relaxation_time(&core.parameters, core.speed, dt);
+        let relaxation = RELAXATION_STEPS * dt;
         // the compression to come without pressure; each iteration finds what s takes away
-        self.find_rate_of(core, &core.particles.velocity, true);
-        let mut free = std::mem::take(&mut self.free);
-        for ((free, rate), rho) in free.iter_mut().zip(&self.rate).zip(&core.particles.density) {
-            *free = (rho - rest) / relaxation + rate;
+        self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, true);
+        let wanted = |rho: f64, debt: f64| ((rho - rest).min(0.0) + debt) / relaxation;
+        self.free.clear();
+        let densities = &self.loaded;
+        self.free.extend(
+            self.forces
+                .rate
+                .iter()
+                .zip(densities)
+                .zip(&self.debt)
+                .map(|((rate, rho), debt)| rate + wanted(*rho, *debt)),
+        );
+        let goal = Goal {
+            tolerance: self.numbers.tolerance * rest / relaxation,
+            most_iterations: self.numbers.most_iterations,
+        };
+        self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal);
+        for ((free, rate), debt) in self.free.iter().zip(&self.forces.rate).zip(&mut self.debt) {
+            let left = free + dt * rate;
+            *debt = (*debt + dt * (left - *debt / relaxation)).max(0.0);
         }
-        self.iterations = self.solve(core, &mut pressure, &free, dt, self.numbers.tolerance * rest / dt);
-        self.free = free;
-        add_scaled(&mut core.particles.velocity, &self.push, dt);
-        add_scaled(&mut core.acceleration, &self.push, 1.0);
+        add_scaled(&mut core.particles.velocity, &self.forces.push, dt);
+        add_scaled(&mut core.acceleration, &self.forces.push, 1.0);
         let Particles { pressure: p, density, .. } = &mut core.particles;
-        // until the relaxation time has passed, the mean is taken since the start
-        let share = (dt / relaxation.min(core.time + dt)).min(1.0);
-        for (((p, s), rho), g) in p.iter_mut().zip(&pressure).zip(density).zip(&self.spread) {
+        // until the averaging time has passed, the mean is taken since the start
+        let averaged = averaging_time(&core.parameters, core.speed, dt);
+        let share = (dt / averaged.min(core.time + dt)).min(1.0);
+        for (((p, s), rho), g) in p.iter_mut().zip(&self.forces.s).zip(density).zip(&self.spread) {
             *p += share * ((1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho - *p);
         }
-        self.specific = pressure;
     }
 
-    /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0 and is not
-    /// positive elsewhere, with a mean error of at most `tolerance`. Leaves a(s) in `push`, and returns the
-    /// number of iterations.
-    ///
-    /// The method is projected gradients with momentum (Nesterov 1983), scaled by the diagonal, and restarted
-    /// when the momentum leads uphill (O'Donoghue & Candès 2015). It takes some √κ iterations where Jacobi's
-    /// method needs κ.
-    fn solve(&mut self, core: &Core, pressure: &mut [f64], free: &[f64], dt: f64, tolerance: f64) -> u32 {
-        let least = LONELY * Constants::of(&core.parameters).full_factor;
-        let n = pressure.len() as f64;
-        self.last.clear();
-        self.last.extend_from_slice(pressure);
-        let (mut iteration, mut momentum, mut best) = (0, 0.0, f64::INFINITY);
-        loop {
-            self.find_push(core, pressure);
-            let push = std::mem::take(&mut self.push);
-            self.find_rate_of(core, &push, false);
-            self.push = push;
-            let [error, uphill] = self.find_errors(pressure, free, dt, least);
-            let mean = error / n;
-            let done = (mean <= tolerance && iteration > 0) || iteration >= self.numbers.most_iterations;
-            if done || !mean.is_finite() {
-                break;
-            }
-            let too_long = mean > 2.0 * best;
-            if too_long {
-                // steps are too long for this neighbourhood
-                self.stiffness *= 1.3;
-            }
-            best = if too_long { mean } else { best.min(mean) };
-            let begin_anew = too_long || uphill > 0.0;
-            let beta = if begin_anew { 0.0 } else { momentum / (momentum + 3.0) };
-            momentum = if begin_anew { 0.0 } else { momentum + 1.0 };
-            self.guess_again(pressure, free, dt, least, beta);
-            iteration += 1;
+    /// Finds the displacements of a step of the length dt: by shifting, and those that keep densities at the
+    /// new places from exceeding that at rest.
+    fn find_displacements(&mut self, core: &Core, dt: f64) {
+        self.drift.clone_from(&core.particles.velocity);
+        if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
+            add_scaled(&mut self.drift, crowding, factor);
         }
-        iteration
-    }
-
-    /// The sum of the errors at a guess, and a second sum that is above zero if momentum leads uphill from
-    /// it.
-    fn find_errors(&mut self, pressure: &[f64], free: &[f64], dt: f64, least: f64) -> [f64; 2] {
-        let scale = 1.0 / (dt * self.stiffness);
-        self.rate
-            .par_chunks(CHUNK)
-            .zip(free.par_chunks(CHUNK))
-            .zip(self.factor.par_chunks(CHUNK))
-            .zip(pressure.par_chunks(CHUNK))
-            .zip(self.last.par_chunks(CHUNK))
-            .map(|((((rate, free), factor), s), last)| {
-                let mut sums = [0.0; 2];
-                for k in 0..rate.len() {
-                    if factor[k] > least {
-                        let error = free[k] + dt * rate[k];
-                        let next = projected(scale, s[k], error, factor[k]);
-                        // no pressure can end an expansion, so it is no error
-                        sums[0] += if s[k] > 0.0 { error.abs() } else { error.max(0.0) };
-                        sums[1] += factor[k] * (s[k] - next) * (next - last[k]);
-                    }
-                }
-                sums
-            })
-            .collect_into_vec(&mut self.errors);
-        self.errors.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
-    }
-
-    /// Takes a step along the gradient, and repeats the part `beta` of the last step.
-    fn guess_again(&mut self, pressure: &mut [f64], free: &[f64], dt: f64, least: f64, beta: f64) {
-        let scale = 1.0 / (dt * self.stiffness);
-        pressure
-            .par_chunks_mut(CHUNK)
-            .zip(self.last.par_chunks_mut(CHUNK))
-            .zip(self.rate.par_chunks(CHUNK))
-            .zip(free.par_chunks(CHUNK))
-            .zip(self.factor.par_chunks(CHUNK))
-            .for_each(|((((s, last), rate), free), factor)| {
-                for k in 0..s.len() {
-                    if factor[k] > least {
-                        let error = free[k] + dt * rate[k];
-                        let next = projected(scale, s[k], error, factor[k]);
-                        s[k] = (next + beta * (next - last[k])).max(0.0);
-                        last[k] = next;
-                    } else {
-                        (s[k], last[k]) = (0.0, 0.0);
-                    }
-                }
-            });
-    }
-
-    /// Finds the acceleration a(s) by pressure.
-    fn find_push(&mut self, core: &Core, pressure: &[f64]) {
-        let pass = Push { constants: Constants::of(&core.parameters), walls: &self.walls, pressure };
-        let Vectors { x, y, z } = &mut self.push;
-        core.sum(&pass, [pressure], [&mut x[..], y, z]);
-    }
-
-    /// Finds the dρ/dt of a velocity, with the motion of the walls, or of an acceleration in a second,
-    /// without it.
-    fn find_rate_of(&mut self, core: &Core, velocity: &Vectors, with_walls: bool) {
-        self.walls.complete(velocity, &mut self.completed);
-        let pass = Squeeze {
-            constants: Constants::of(&core.parameters),
-            walls: &self.walls,
-            completed: &self.completed,
-            with_walls,
-        };
-        let Vectors { x, y, z } = &self.completed;
-        core.sum(&pass, [&x[..], y, z], [&mut self.rate]);
+        self.places.find_rate_of(core, &self.walls, &self.drift, true);
+        let rest = core.parameters.rest_density;
+        self.free.clear();
+        let densities = &self.loaded;
+        self.free.extend(self.places.rate.iter().zip(densities).map(|(rate, rho)| rho - rest + dt * rate));
+        let goal =
+            Goal { tolerance: self.numbers.tolerance * rest, most_iterations: self.numbers.most_iterations };
+        for (debt, excess) in self.debt.iter_mut().zip(&self.free) {
+            *debt += OWED * excess.max(0.0);
+        }
+        let mut errors = Errors::default();
+        self.free.iter().for_each(|excess| errors.count(excess.max(0.0), goal));
+        if errors.reach(goal, self.free.len()) {
+            self.displacement.resize(self.free.len());
+            self.displacement.components_mut().into_iter().for_each(|column| column.fill(0.0));
+        } else {
+            self.places.s.fill(0.0);
+            self.iterations += self.places.solve(core, &self.walls, &self.free, 1.0, goal);
+            self.displacement.clone_from(&self.places.push);
+        }
+        if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
+            add_scaled(&mut self.displacement, crowding, factor * dt);
+        }
     }
 }
 
-/// The relaxation time, s, in which a density that is off returns, after a step of the length `dt` with this
-/// greatest speed. Reported pressures are averaged over the same time.
-fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
-    let [moving, at_rest] = RELAXATION_STEPS;
+/// The time, s, over which pressures are averaged, after a step of the length `dt` with this greatest speed.
+fn averaging_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
     let fall = (parameters.support_radius / parameters.gravity.length()).sqrt();
-    let falls =
-        if fall.is_finite() { (RELAXATION_FALLS * fall).min(MOST_RELAXATION_STEPS * dt) } else { 0.0 };
-    let slow = falls.max(at_rest * dt);
+    let falls = if fall.is_finite() { (AVERAGED_FALLS * fall).min(MOST_AVERAGED_STEPS * dt) } else { 0.0 };
+    let moving = AVERAGED_STEPS * dt;
+    let slow = falls.max(moving);
     let courant = (dt * speed / (ADVECTION * parameters.spacing())).min(1.0);
-    slow + (moving * dt - slow) * courant
-}
-
-/// The guess after a step along the gradient, not below zero.
-#[inline]
-fn projected(scale: f64, s: f64, error: f64, factor: f64) -> f64 {
-    (s + scale * error / factor).max(0.0)
-}
-
-/// Greatest eigenvalue over diagonal in an even fluid with `ratio` spacings per support radius. It belongs to
-/// waves of pressure of the length 1.65 h, by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
-fn stiffness(ratio: f64) -> f64 {
-    1.775 * (0.5 * ratio).powi(3)
+    slow + (moving - slow) * courant
 }

@@ -130,8 +130,7 @@ impl Numerics for Paper {
     }
 
     fn wall(&self, scales: &Scales) -> Wall {
-        let h = scales.support_radius;
-        Wall { kernel: WallKernel::Poly6, h, layer: None, spacing: scales.spacing() / h }
+        Wall::new(WallKernel::Poly6, scales.support_radius, scales.spacing())
     }
 
     /// The energy k(ln x + 1/x − 1) with x = ρ/ρ₀.

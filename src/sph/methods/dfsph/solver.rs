@@ -1,0 +1,246 @@
+//! The solver of a linear system for s ≥ 0, of which there are two: one for velocities and one for places.
+
+use rayon::prelude::*;
+
+use super::passes::{Constants, Continuation, Push, Squeeze};
+use super::walls::Walls;
+use crate::sph::{
+    core::{CHUNK, Core},
+    params::Parameters,
+    particles::Vectors,
+};
+
+/// Factor by which walls and disorder make the system stiffer than the even fluid of [`stiffness`].
+const STIFFNESS: f64 = 1.5;
+
+/// Part of an increased stiffness that the next solve keeps.
+const FORGET: f64 = 0.97;
+
+/// A particle whose diagonal is below this part of that in a full neighbourhood has no neighbours, and no
+/// pressure is solved for.
+const LONELY: f64 = 1e-3;
+
+/// One system, its last answer, and working memory.
+pub(super) struct Solver {
+    continuation: Continuation,
+    /// The answer s: p/ρ² where it changes velocities.
+    pub s: Vec<f64>,
+    /// The diagonal of the system: how much a unit of s lowers the particle's own dρ/dt in a second.
+    pub factor: Vec<f64>,
+    /// a(s), the acceleration or displacement that belongs to the answer.
+    pub push: Vectors,
+    /// Rate of density dρ/dt of the last velocity that was asked for.
+    pub rate: Vec<f64>,
+    /// M·v, where velocities continue linearly.
+    completed: Vectors,
+    /// The last guess, without the momentum that was added to it.
+    last: Vec<f64>,
+    /// Greatest eigenvalue of the system over its diagonal: the inverse of a step that cannot overshoot.
+    pub stiffness: f64,
+    /// Sums of the errors and of the momentum's work, chunk by chunk.
+    errors: Vec<(Errors, f64)>,
+}
+
+/// What a solve must reach.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Goal {
+    /// Mean error that is accepted. One particle in two hundred may be off by more than ten times as much.
+    pub tolerance: f64,
+    /// Most iterations.
+    pub most_iterations: u32,
+}
+
+/// An error this many times the accepted mean is large.
+const LARGE: f64 = 10.0;
+
+/// Part of the particles whose errors may be large.
+const FEW: f64 = 0.005;
+
+/// Errors of many particles.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Errors {
+    sum: f64,
+    large: usize,
+}
+
+impl Errors {
+    /// Counts one particle's error.
+    #[inline]
+    pub fn count(&mut self, error: f64, goal: Goal) {
+        self.sum += error;
+        self.large += usize::from(error > LARGE * goal.tolerance);
+    }
+
+    /// Whether the errors of n particles reach the goal.
+    pub fn reach(&self, goal: Goal, n: usize) -> bool {
+        self.sum <= goal.tolerance * n as f64 && self.large as f64 <= FEW * n as f64
+    }
+}
+
+impl Solver {
+    /// The solver for n particles, which knows no answer yet.
+    pub fn new(continuation: Continuation, parameters: &Parameters, n: usize) -> Self {
+        let mut solver = Self {
+            continuation,
+            s: vec![0.0; n],
+            factor: vec![0.0; n],
+            push: Vectors::default(),
+            rate: vec![0.0; n],
+            completed: Vectors::default(),
+            last: Vec::new(),
+            stiffness: least_stiffness(parameters),
+            errors: Vec::new(),
+        };
+        solver.push.resize(n);
+        solver
+    }
+
+    /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0 and is not
+    /// positive elsewhere, beginning with the last answer. Leaves a(s) in `push` and its rate in `rate`, and
+    /// returns the number of iterations.
+    ///
+    /// The method is projected gradients with momentum (Nesterov 1983), scaled by the diagonal, and restarted
+    /// when the momentum leads uphill (O'Donoghue & Candès 2015). It takes some √κ iterations where Jacobi's
+    /// method needs κ.
+    pub fn solve(&mut self, core: &Core, walls: &Walls, free: &[f64], dt: f64, goal: Goal) -> u32 {
+        // what one neighbourhood needed is forgotten again
+        self.stiffness = (FORGET * self.stiffness).max(least_stiffness(&core.parameters));
+        let least = LONELY * Constants::of(&core.parameters).full_factor;
+        let n = self.s.len();
+        self.last.clone_from(&self.s);
+        let (mut iteration, mut momentum, mut best) = (0, 0.0, f64::INFINITY);
+        loop {
+            self.find_push(core, walls);
+            let push = std::mem::take(&mut self.push);
+            self.find_rate_of(core, walls, &push, false);
+            self.push = push;
+            let (errors, uphill) = self.find_errors(free, dt, least, goal);
+            let mean = errors.sum / n as f64;
+            let done = (errors.reach(goal, n) && iteration > 0) || iteration >= goal.most_iterations;
+            if done || !mean.is_finite() {
+                break;
+            }
+            let too_long = mean > 2.0 * best;
+            if too_long {
+                // steps are too long for this neighbourhood
+                self.stiffness *= 1.3;
+            }
+            best = if too_long { mean } else { best.min(mean) };
+            let begin_anew = too_long || uphill > 0.0;
+            let beta = if begin_anew { 0.0 } else { momentum / (momentum + 3.0) };
+            momentum = if begin_anew { 0.0 } else { momentum + 1.0 };
+            self.guess_again(free, dt, least, beta);
+            iteration += 1;
+        }
+        iteration
+    }
+
+    /// The errors at a guess, and a sum that is above zero if momentum leads uphill from it.
+    fn find_errors(&mut self, free: &[f64], dt: f64, least: f64, goal: Goal) -> (Errors, f64) {
+        let scale = 1.0 / (dt * self.stiffness);
+        self.rate
+            .par_chunks(CHUNK)
+            .zip(free.par_chunks(CHUNK))
+            .zip(self.factor.par_chunks(CHUNK))
+            .zip(self.s.par_chunks(CHUNK))
+            .zip(self.last.par_chunks(CHUNK))
+            .map(|((((rate, free), factor), s), last)| {
+                let (mut errors, mut uphill) = (Errors::default(), 0.0);
+                for k in 0..rate.len() {
+                    if factor[k] > least {
+                        let error = free[k] + dt * rate[k];
+                        let next = projected(scale, s[k], error, factor[k]);
+                        // no pressure can end an expansion, so it is no error
+                        errors.count(if s[k] > 0.0 { error.abs() } else { error.max(0.0) }, goal);
+                        uphill += factor[k] * (s[k] - next) * (next - last[k]);
+                    }
+                }
+                (errors, uphill)
+            })
+            .collect_into_vec(&mut self.errors);
+        self.errors.iter().fold((Errors::default(), 0.0), |(all, up), (errors, uphill)| {
+            (Errors { sum: all.sum + errors.sum, large: all.large + errors.large }, up + uphill)
+        })
+    }
+
+    /// Takes a step along the gradient, and repeats the part `beta` of the last step.
+    fn guess_again(&mut self, free: &[f64], dt: f64, least: f64, beta: f64) {
+        let scale = 1.0 / (dt * self.stiffness);
+        self.s
+            .par_chunks_mut(CHUNK)
+            .zip(self.last.par_chunks_mut(CHUNK))
+            .zip(self.rate.par_chunks(CHUNK))
+            .zip(free.par_chunks(CHUNK))
+            .zip(self.factor.par_chunks(CHUNK))
+            .for_each(|((((s, last), rate), free), factor)| {
+                for k in 0..s.len() {
+                    if factor[k] > least {
+                        let error = free[k] + dt * rate[k];
+                        let next = projected(scale, s[k], error, factor[k]);
+                        s[k] = (next + beta * (next - last[k])).max(0.0);
+                        last[k] = next;
+                    } else {
+                        (s[k], last[k]) = (0.0, 0.0);
+                    }
+                }
+            });
+    }
+
+    /// Finds a(s).
+    fn find_push(&mut self, core: &Core, walls: &Walls) {
+        let pass = Push {
+            constants: Constants::of(&core.parameters),
+            walls,
+            pressure: &self.s,
+            continuation: self.continuation,
+        };
+        let Vectors { x, y, z } = &mut self.push;
+        core.sum(&pass, [&self.s], [&mut x[..], y, z]);
+    }
+
+    /// Finds the dρ/dt of a velocity, with the motion of the walls, or of an acceleration in a second,
+    /// without it.
+    pub fn find_rate_of(&mut self, core: &Core, walls: &Walls, velocity: &Vectors, with_walls: bool) {
+        let velocity = match self.continuation {
+            Continuation::Barrier => velocity,
+            Continuation::Linear => {
+                walls.complete(velocity, &mut self.completed);
+                &self.completed
+            }
+        };
+        let pass = Squeeze {
+            constants: Constants::of(&core.parameters),
+            walls,
+            velocity,
+            continuation: self.continuation,
+            with_walls,
+        };
+        let Vectors { x, y, z } = velocity;
+        core.sum(&pass, [&x[..], y, z], [&mut self.rate]);
+    }
+
+    /// Memory of this solver, bytes.
+    pub fn bytes(&self) -> usize {
+        let columns = [&self.s, &self.factor, &self.rate, &self.last];
+        columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
+            + self.push.bytes()
+            + self.completed.bytes()
+    }
+}
+
+/// The guess after a step along the gradient, not below zero.
+#[inline]
+fn projected(scale: f64, s: f64, error: f64, factor: f64) -> f64 {
+    (s + scale * error / factor).max(0.0)
+}
+
+/// The stiffness with which a solve begins.
+fn least_stiffness(parameters: &Parameters) -> f64 {
+    STIFFNESS * stiffness(parameters.support_radius / parameters.spacing())
+}
+
+/// Greatest eigenvalue over diagonal in an even fluid with `ratio` spacings per support radius. It belongs to
+/// waves of pressure of the length 1.65 h, by quadrature of (∫ ∇W sin kx)²·ρ/m / ∫|∇W|².
+fn stiffness(ratio: f64) -> f64 {
+    1.775 * (0.5 * ratio).powi(3)
+}

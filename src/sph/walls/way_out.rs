@@ -1,0 +1,121 @@
+//! The way out for particles over which walls have moved.
+//!
+//! A particle that a moving wall meets on its path is put before it. But a path ends at the latest after a few
+//! contacts, and then a wall that moves on may reach the place where the particle stopped, or press it into
+//! another wall. So at the end of a step all obstacles are looked at together: the particle goes to a place
+//! near it that is outside all of them, without passing an obstacle at rest. If there is none, fluid has
+//! nowhere to go, and the run ends: a particle that stays inside would be wrong without a word.
+
+use glam::DVec3;
+
+use crate::field::Path;
+
+use super::{
+    boundary::Boundary,
+    contact::{Trouble, Undefined, first_contact, push_out_to, reflect},
+};
+
+/// Most walls that push a particle on, one after the other.
+const ROUNDS: usize = 8;
+
+/// Number of distances at which a place is looked for all around, the longest a support radius.
+const DISTANCES: i32 = 13;
+
+impl Boundary {
+    /// Moves a particle out of all obstacles at the end of a step in which it came from `from` to `at`, and
+    /// gives it the velocity that their walls leave it.
+    pub(super) fn leave_moving(
+        &self,
+        from: DVec3,
+        at: DVec3,
+        mut velocity: DVec3,
+    ) -> Result<(DVec3, DVec3), Trouble> {
+        if self.obstacles.iter().all(|obstacle| obstacle.moving.is_none()) || self.first_around(at)?.is_none()
+        {
+            return Ok((at, velocity));
+        }
+        let out = match self.one_after_the_other(from, at)? {
+            Some(out) => out,
+            None => self.all_around(from, at)?.ok_or(Trouble::NoRoom { at })?,
+        };
+        for (k, obstacle) in self.obstacles.iter().enumerate() {
+            let field = self.field(k);
+            if field.omega(at) < 0.0 {
+                continue;
+            }
+            let wall = if obstacle.moving.is_some() { field.wall_velocity(out) } else { DVec3::ZERO };
+            let normal = (-field.omega_grad(out).1).try_normalize().unwrap_or((out - at).normalize_or_zero());
+            velocity = wall + reflect(velocity - wall, normal, obstacle.restitution);
+        }
+        Ok((out, velocity))
+    }
+
+    /// The first obstacle that a point lies in.
+    fn first_around(&self, at: DVec3) -> Result<Option<usize>, Undefined> {
+        for (k, field) in self.fields().enumerate() {
+            let omega = field.omega(at);
+            if omega.is_nan() {
+                return Err(Undefined { at });
+            }
+            if omega >= 0.0 {
+                return Ok(Some(k));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether a point is in the box and no obstacle at rest lies on the straight way to it.
+    fn is_within_reach(&self, from: DVec3, to: DVec3) -> Result<bool, Undefined> {
+        for (k, obstacle) in self.obstacles.iter().enumerate().filter(|(_, o)| o.moving.is_none()) {
+            let path = Path::new(from, to, obstacle.resolution);
+            if first_contact(self.field(k), &path, self.clearance)?.is_some() {
+                return Ok(false);
+            }
+        }
+        Ok(self.domain.contains(to))
+    }
+
+    /// Leaves one obstacle by the nearest way, then the next.
+    fn one_after_the_other(&self, from: DVec3, at: DVec3) -> Result<Option<DVec3>, Undefined> {
+        let mut here = at;
+        for _ in 0..ROUNDS {
+            let Some(k) = self.first_around(here)? else {
+                let near = here.distance(at) <= self.reach();
+                return Ok((near && self.is_within_reach(from, here)?).then_some(here));
+            };
+            // the nearest way out may lead through a wall of the box
+            let in_box = |p: DVec3| self.domain.contains(p);
+            match push_out_to(self.field(k), here, self.reach(), self.clearance, in_box)? {
+                Some(lifted) => here = lifted.point,
+                None => break,
+            }
+        }
+        Ok(None)
+    }
+
+    /// The nearest of some places all around.
+    fn all_around(&self, from: DVec3, at: DVec3) -> Result<Option<DVec3>, Undefined> {
+        for k in 0..DISTANCES {
+            let distance = self.reach() * 2.0f64.powf(0.5 * f64::from(k + 1 - DISTANCES));
+            for direction in directions() {
+                let place = at + distance * direction;
+                if self.domain.contains(place)
+                    && self.first_around(place)?.is_none()
+                    && self.is_within_reach(from, place)?
+                {
+                    return Ok(Some(place));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Unit vectors to the sides, edges and corners of a cube.
+fn directions() -> impl Iterator<Item = DVec3> {
+    let steps = [0.0, 1.0, -1.0];
+    let all = steps.into_iter().flat_map(move |z| {
+        steps.into_iter().flat_map(move |x| steps.into_iter().map(move |y| DVec3::new(x, y, z)))
+    });
+    all.filter_map(DVec3::try_normalize)
+}
