@@ -1,5 +1,6 @@
 //! `rfm check`: messages about files, the solids with their bounds and volumes, and slices.
 
+use crate::cli::output::Shown;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -418,7 +419,7 @@ fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Re
     let picture = picture(field, solid.name(), plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
     if !shared.json {
-        say!("slice {plane} of {} written to {}", solid.name(), path.display());
+        say!("slice {plane} of {} written to {}", solid.name(), path.shown());
     }
     Ok(())
 }

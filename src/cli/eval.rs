@@ -1,5 +1,6 @@
 //! `rfm eval`: ω and related values at points, as CSV with 17 significant digits.
 
+use crate::cli::output::Shown;
 use std::io::{self, BufRead, BufWriter, Read, Write};
 use std::path::Path;
 
@@ -32,7 +33,7 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
     let mut writer = Table::new(solid, chosen, options, shared.json)?;
     writer.rows(&options.at)?;
     if let Some(path) = &options.points {
-        let name = if path == stdin { "<stdin>".to_string() } else { path.display().to_string() };
+        let name = if path == stdin { "<stdin>".to_string() } else { path.shown().to_string() };
         let reader: Box<dyn Read> = if path == stdin {
             Box::new(io::stdin().lock())
         } else {

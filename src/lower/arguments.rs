@@ -5,7 +5,7 @@ use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
-use crate::syntax::ast::{Argument, Function, Name};
+use crate::syntax::ast::{Argument, ExprKind, Function, Name};
 
 impl<'a> Lowering<'a> {
     pub fn call(&mut self, name: &Name, arguments: &[Argument], span: Span) -> Value {
@@ -22,6 +22,11 @@ impl<'a> Lowering<'a> {
             }
             _ if builtins::exists(&name.text) => self.call_builtin(name, arguments, span),
             _ => {
+                if self.names.defined_later(&name.text).is_none()
+                    && let Some(foreign) = self.foreign_function(name, arguments)
+                {
+                    return self.fail(foreign);
+                }
                 let mut candidates = self.names.candidates(true);
                 candidates.extend(builtins::names().map(String::from));
                 let message = format!("unknown function or shape `{}`", name.text);
@@ -46,6 +51,9 @@ impl<'a> Lowering<'a> {
     ) -> Value {
         let name = &function.name.text;
         if !self.may_call(name, source, span) {
+            return Value::Failed;
+        }
+        if source == SourceId::Prelude && name == "box" && self.box_of_one_corner(arguments, span) {
             return Value::Failed;
         }
         let Some(mut bound) = self.bind(function, arguments, span) else { return Value::Failed };
@@ -75,7 +83,10 @@ impl<'a> Lowering<'a> {
         let name = &function.name.text;
         let mut bound: Vec<Local> = Vec::new();
         let mut fits = true;
+        let standard = self.names.is_standard(name);
         for (position, argument) in arguments.iter().enumerate() {
+            // no parameter of a standard solid is an angle
+            fits &= !standard || self.no_angle(&argument.value);
             let value = self.expr(&argument.value);
             let parameter = match self.parameter(function, position, argument) {
                 Parameter::Known(parameter) => parameter,
@@ -137,21 +148,75 @@ impl<'a> Lowering<'a> {
         let message =
             format!("`{}` takes at most {most} argument{plural}, found {found}", function.name.text);
         let at = self.user_span(first.value.span);
-        self.report(Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many"));
+        let diagnostic = Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many");
+        let signature = signature(function);
+        self.report(diagnostic.help(match example(&function.name.text) {
+            Some(example) if self.names.is_standard(&function.name.text) => {
+                format!("its parameters are {signature}: write for example `{example}`")
+            }
+            _ => format!("its parameters are {signature}"),
+        }));
     }
 
     fn report_missing(&mut self, function: &Function, parameter: &str, span: Span) {
         let name = &function.name.text;
         let message = format!("`{name}` needs a value for `{parameter}`");
-        let written = |has_default: bool| if has_default { " = …" } else { "" };
-        let signature: Vec<String> =
-            function.parameters.iter().map(|p| p.name.text.clone() + written(p.default.is_some())).collect();
         let at = self.user_span(span);
-        self.report(
-            Diagnostic::error(Code::ARGUMENTS, at, message)
-                .help(format!("its parameters are {name}({})", signature.join(", "))),
-        );
+        let help = format!("its parameters are {}", signature(function));
+        self.report(Diagnostic::error(Code::ARGUMENTS, at, message).help(help));
     }
+
+    /// `box([1, 1, 1])`: a box has two corners, and the size alone does not say where it is.
+    pub fn box_of_one_corner(&mut self, arguments: &[Argument], span: Span) -> bool {
+        let [Argument { name: None, value }] = arguments else { return false };
+        let ExprKind::Vector(parts) = &value.kind else {
+            let written = self.written(value).unwrap_or("1").to_string();
+            let diagnostic =
+                Diagnostic::error(Code::ARGUMENTS, self.user_span(span), "`box` needs two corners")
+                    .help(format!("write `box([0, 0, 0], [{written}, {written}, {written}])`"));
+            // a name may stand for a vector
+            let is_corner = matches!(self.expr(value), Value::Vector(_) | Value::Failed);
+            if !is_corner {
+                self.report(diagnostic);
+            }
+            return !is_corner;
+        };
+        let too_far = parts.iter().any(|part| matches!(part.kind, ExprKind::Number(n) if n >= 1.0));
+        if too_far {
+            let size = self.written(value).unwrap_or("[1, 1, 1]");
+            let help = format!("`box(min, max)` goes from corner to corner: write `box([0, 0, 0], {size})`");
+            self.report(
+                Diagnostic::error(Code::ARGUMENTS, self.user_span(span), "`box` needs two corners")
+                    .help(help),
+            );
+        }
+        too_far
+    }
+}
+
+/// How a function is called: its name with its parameters.
+fn signature(function: &Function) -> String {
+    let written = |has_default: bool| if has_default { " = …" } else { "" };
+    let parameters: Vec<String> =
+        function.parameters.iter().map(|p| p.name.text.clone() + written(p.default.is_some())).collect();
+    format!("{}({})", function.name.text, parameters.join(", "))
+}
+
+/// A call of a standard solid that works as it stands.
+fn example(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "sphere" => "sphere(1, [0, 0, 2])",
+        "ball" => "ball([0, 0, 2], 1)",
+        "ellipsoid" => "ellipsoid(1, 2, 3)",
+        "box" => "box([0, 0, 0], [1, 2, 3])",
+        "cylinder" => "cylinder(0.5, 2)",
+        "cone" => "cone(0.5, 2)",
+        "capsule" => "capsule(0.5, 2)",
+        "torus" => "torus(1, 0.25)",
+        "layer" => "layer(z, 0, 1)",
+        "half_space" => "half_space([0, 0, 1], [0, 0, 2])",
+        _ => return None,
+    })
 }
 
 /// What an argument is for.

@@ -5,9 +5,11 @@
 
 pub mod ast;
 mod build;
+pub mod foreign;
 mod grammar;
 mod parse;
 mod print;
+mod slips;
 
 pub use ast::Ast;
 pub use grammar::EDITION;

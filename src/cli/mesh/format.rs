@@ -1,5 +1,6 @@
 //! The formats of meshes on the command line: choices, help and messages, all from the table of the library.
 
+use crate::cli::output::Shown;
 use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -22,7 +23,7 @@ pub(super) fn of_path(path: &Path) -> Result<Format, Failure> {
     found.copied().ok_or_else(|| {
         Failure::usage(format!(
             "cannot tell the mesh format of `{}`: the ending must be {}",
-            path.display(),
+            path.shown(),
             one_of(FORMATS)
         ))
     })

@@ -6,6 +6,7 @@ mod format;
 mod simplified;
 mod summary;
 
+use crate::cli::output::Shown;
 use std::time::Instant;
 
 use super::args::{Mesh as Options, MeshMethod, Shared};
@@ -86,7 +87,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     summary.print();
     if let Some(path) = &options.output {
-        say!("written to {}", path.display());
+        say!("written to {}", path.shown());
     }
     Ok(())
 }
@@ -94,7 +95,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
 /// The writer that the options ask for; `None` if only figures are wanted.
 fn writer(shared: &Shared, options: &Options) -> Result<Option<WriteMesh>, Failure> {
     if options.file.is_dir() {
-        let folder = options.file.display();
+        let folder = options.file.shown();
         return Err(Failure::usage(format!(
             "`{folder}` is a folder: give a file, or mesh the fluid of a run with `rfm mesh {folder} --fluid`"
         )));

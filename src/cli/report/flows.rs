@@ -3,6 +3,7 @@
 //! A scene with a `truth`, the methods and the sizes give rows, which are printed as a table or JSON and
 //! drawn as a picture. A run that fails is a row that says so.
 
+use crate::cli::output::Shown;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -80,7 +81,7 @@ pub(super) fn run(
         let threads = rayon::current_num_threads();
         output::json(&Document { schema: 1, scene: &scene.name, threads, instants, rows: &rows })?;
     } else if let Some(path) = picture {
-        println!("plot written to {}", path.display());
+        println!("plot written to {}", path.shown());
     }
     match failures(&rows) {
         None => Ok(()),

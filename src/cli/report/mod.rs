@@ -13,6 +13,7 @@ mod plot;
 mod points;
 mod programs;
 
+use crate::cli::output::Shown;
 use anstream::println;
 use serde::Serialize;
 
@@ -87,7 +88,7 @@ fn solid(shared: &Shared, options: &Report, program: &Program, solid: &Solid) ->
     print(solid, &points, over, &rows);
     meshes::print(&meshes);
     for path in options.output.iter().chain(&options.mesh_plot) {
-        println!("plot written to {}", path.display());
+        println!("plot written to {}", path.shown());
     }
     Ok(())
 }

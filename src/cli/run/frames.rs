@@ -3,6 +3,7 @@
 //!
 //! Invariant: after every frame the collections list exactly the frames that are complete.
 
+use crate::cli::output::Shown;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -261,7 +262,7 @@ fn obstacle_name(number: usize) -> String {
 
 fn create(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.display())))
+        .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.shown())))
 }
 
 /// Removes the files of an earlier run, which would mix with those of this one, and no other files.
@@ -298,5 +299,5 @@ fn remove_numbered(folder: &Path, prefix: &str, suffix: &str, first: usize) -> R
 }
 
 fn not_cleared(folder: &Path, error: &std::io::Error) -> Failure {
-    Failure::usage(format!("cannot clear `{}`: {error}", folder.display()))
+    Failure::usage(format!("cannot clear `{}`: {error}", folder.shown()))
 }

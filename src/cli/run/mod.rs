@@ -14,6 +14,7 @@ mod probes;
 mod summary;
 mod watch;
 
+use crate::cli::output::Shown;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -218,7 +219,7 @@ impl Recording<'_> {
     fn kept(&self) -> String {
         let frames = format!("the frames up to {} s are kept", short_time(self.frames.last_time()));
         match self.checkpoints.last() {
-            Some(path) => format!("{frames}; --resume goes on from `{}`", path.display()),
+            Some(path) => format!("{frames}; --resume goes on from `{}`", path.shown()),
             None => format!("{frames}; there is no checkpoint yet"),
         }
     }

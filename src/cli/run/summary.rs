@@ -1,5 +1,6 @@
 //! The summary of a run at its end.
 
+use crate::cli::output::Shown;
 use serde::Serialize;
 
 use super::findings;
@@ -157,7 +158,7 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         }
     }
     let probes = if probes.count() > 0 { format!(", {} probes", probes.count()) } else { String::new() };
-    say!("written to {}: {}{probes}", frames.folder().display(), frames.describe());
+    say!("written to {}: {}{probes}", frames.folder().shown(), frames.describe());
 }
 
 /// Names of the passes that a simulation runs.

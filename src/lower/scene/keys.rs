@@ -188,6 +188,22 @@ impl<'a> Lowering<'a> {
         None
     }
 
+    /// Reports a name that stands for a number with a unit of another kind.
+    fn dimension_fits(&mut self, name: &str, expected: Dimension, key: &str, expr: &Expr) -> bool {
+        let Some(found) = self.dimensions.get(name).filter(|found| **found != expected) else { return true };
+        let [found, expected] = [found.unit(), expected.unit()];
+        let message = match found {
+            Some(found) => format!("`{name}` is in {found}, which does not fit `{key}`"),
+            None => format!("the unit of `{name}` does not fit `{key}`"),
+        };
+        let diagnostic = Diagnostic::error(Code::UNIT_MISMATCH, expr.span, message);
+        self.report(match expected {
+            Some(unit) => diagnostic.help(format!("`{key}` is in {unit}")),
+            None => diagnostic.help(format!("`{key}` has no unit")),
+        });
+        false
+    }
+
     /// Evaluates a constant in SI units. A unit, where one is written, must fit.
     pub(in crate::lower) fn quantity_expr(
         &mut self,
@@ -207,8 +223,9 @@ impl<'a> Lowering<'a> {
                     self.report(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
                     return None;
                 }
-                Some(value * parsed.factor)
+                self.may_be_number(*value, expr).then_some(value * parsed.factor)
             }
+            ExprKind::Name(name) if !self.dimension_fits(name, expected, key, expr) => None,
             ExprKind::Negate(inner) => self.quantity_expr(inner, expected, key).map(|v| -v),
             _ => {
                 let value = self.expr(expr);

@@ -235,7 +235,7 @@ impl<'a> Lowering<'a> {
             self.missing(&block, "solid", "write `solid: pawn` with the name of a solid");
             return None;
         };
-        let shape = self.field(value)?;
+        let shape = self.shape(value)?;
         let name = match &value.kind {
             ExprKind::Name(name) => name.clone(),
             _ => "obstacle".into(),
@@ -244,7 +244,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn run(&mut self, block: &Block<'_>) -> Option<Run> {
-        let defaults = Run { dt: None, until: 5.0, save_every: 0.05, checkpoint_every: None };
+        let defaults = Run { dt: None, dt_span: None, until: 5.0, save_every: 0.05, checkpoint_every: None };
         let Some((_, entries, span)) = block.blocks("run").next() else { return Some(defaults) };
         let block = self.block(entries, "a run", span, &RUN_KEYS, &[]);
         let mut optional = |key| match block.setting(key) {
@@ -260,6 +260,52 @@ impl<'a> Lowering<'a> {
             Some(defaults.save_every),
             Bound::Positive,
         );
-        Some(Run { dt: dt?, until: until?, save_every: save?, checkpoint_every: checkpoint_every? })
+        let run = Run {
+            dt: dt?,
+            dt_span: block.setting("dt").map(|(_, value)| value.span),
+            until: until?,
+            save_every: save?,
+            checkpoint_every: checkpoint_every?,
+        };
+        let stated =
+            block.setting("save_every").or(block.setting("until")).map_or(span, |(_, value)| value.span);
+        self.frames_fit(&run, stated).then_some(run)
+    }
+
+    /// Reports frames that would fill a disk, and warns of frames so rare that there are none.
+    fn frames_fit(&mut self, run: &Run, at: Span) -> bool {
+        /// Files of frames have six digits.
+        const MOST: f64 = 999_999.0;
+        const MANY: f64 = 20_000.0;
+        let (until, every) = (run.until, run.save_every);
+        let frames = until / every;
+        let fewer = format!("write for example `save_every: {}`", seconds_as_written(until / 100.0));
+        if frames > MOST {
+            let message = format!(
+                "{until} s with a frame every {every} s are {frames:.3e} frames; at most {MOST} are saved"
+            );
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(fewer));
+            return false;
+        }
+        if frames > MANY {
+            let message = format!("{until} s with a frame every {every} s are {frames:.0} frames");
+            self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
+        } else if every > until {
+            let message = format!(
+                "a frame every {every} s in a run of {until} s: only its start and its end are saved"
+            );
+            self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
+        }
+        true
+    }
+}
+
+/// A time as a file writes it, with two digits: `50 ms`, `0.2 s`.
+fn seconds_as_written(time: f64) -> String {
+    let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
+    if time < 0.1 && time > 1e-5 {
+        format!("{} ms", rounded(1e3 * time))
+    } else {
+        format!("{} s", rounded(time))
     }
 }
