@@ -14,7 +14,7 @@ use glam::DVec3;
 use rfm::geom::Aabb;
 use rfm::mesh::Format;
 use rfm::precision::Precision;
-use rfm::slice::{Axis, Plane};
+use rfm::slice::Plane;
 use rfm::sph::Method;
 
 /// Obstacles written as R-functions, compiled to machine code: check, mesh, simulate.

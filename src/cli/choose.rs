@@ -1,11 +1,11 @@
 //! The solid or the scene of a file that a command line means.
 
-use crate::cli::output::Shown;
 use std::path::Path;
 
 use super::args::Shared;
 use super::failure::{Failure, note};
 use super::input;
+use crate::cli::output::Shown;
 use rfm::diagnostic::{Diagnostics, nearest};
 use rfm::lower::{NamedSolid, Scene};
 use rfm::solid::Chosen;

@@ -1,6 +1,5 @@
 //! `rfm eval`: ω and related values at points, as CSV with 17 significant digits.
 
-use crate::cli::output::Shown;
 use std::io::{self, BufRead, BufWriter, Read, Write};
 use std::path::Path;
 
@@ -9,6 +8,7 @@ use glam::DVec3;
 use super::args::{Eval, Shared, What};
 use super::failure::Failure;
 use super::{choose, input, output};
+use crate::cli::output::Shown;
 use rfm::ir::Unary;
 use rfm::solid::Chosen;
 use rfm::{Field, Precision, Solid};

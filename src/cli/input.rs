@@ -1,12 +1,12 @@
 //! Reads the file of a command from a path or from standard input, with params from flags. Messages go to
 //! standard error.
 
-use crate::cli::output::Shown;
 use std::io::{IsTerminal, Read};
 use std::path::Path;
 
 use super::args::Shared;
 use super::failure::{Failure, note};
+use crate::cli::output::Shown;
 use rfm::Program;
 use rfm::compile::text_of;
 use rfm::diagnostic::{Code, Diagnostics, Source, Style, render};

@@ -21,6 +21,7 @@ mod plot;
 mod progress;
 mod report;
 mod run;
+mod section;
 mod values;
 
 use std::ffi::OsString;
@@ -48,7 +49,18 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
+    outlive_size_limits();
     command(arguments).map_or_else(Failure::report, |()| ExitCode::SUCCESS)
+}
+
+/// Lets a write beyond the limit for the size of a file fail as one to a full disk does. Without this the system ends the
+/// process.
+fn outlive_size_limits() {
+    #[cfg(unix)]
+    {
+        // if it cannot be registered, the process ends there as it would have
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default());
+    }
 }
 
 fn command(arguments: args::Arguments) -> Result<(), Failure> {

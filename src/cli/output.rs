@@ -11,6 +11,9 @@ use rfm::diagnostic::{is_hidden, printable, printable_line};
 
 use super::failure::{Failure, complain};
 
+/// Beginning of the names of temporary files.
+pub(super) const TEMPORARY: &str = ".rfm-";
+
 /// Writes a file through a callback. If anything fails, a file that was there before is unchanged.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
     let failed = |error: io::Error| {
@@ -31,7 +34,7 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
             format!("cannot write `{}`: the folder `{}` does not exist", path.shown(), folder.shown());
         return Err(Failure::usage(message));
     }
-    let temporary = tempfile::Builder::new().prefix(".rfm-").tempfile_in(folder).map_err(failed)?;
+    let temporary = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder).map_err(failed)?;
     let mut writer = BufWriter::new(temporary);
     fill(&mut writer).map_err(failed)?;
     let temporary = writer.into_inner().map_err(|e| failed(e.into_error()))?;

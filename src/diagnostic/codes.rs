@@ -165,6 +165,9 @@ SHAPES_AS_NUMBERS = "W0411":
 `a or b`, cut by `a and b`, and taken away by `a \\ b`. Where the values are meant, give one of them a name with `let`.";
 DIVISION_BY_ZERO = "W0412":
 "A divisor is zero wherever it is evaluated, so the value is infinite or no number at all.";
+NO_SECTION = "W0413":
+"The plane of a slice does not meet the solid, or its section is thinner than a pixel: the picture shows the outside only.
+The message says between which coordinates the solid lies.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";
@@ -174,6 +177,9 @@ less of it than the shape says. Make the box larger, move the shape, or cut the 
 FRAMES = "W0505":
 "Frames are saved so rarely that none lies between the start and the end of the run, or so often that they fill a disk.
 `save_every` is the simulated time between two of them, `until` that of the whole run.";
+TOO_MUCH = "W0506":
+"The run needs more memory or room on the disk than there is now. Fewer particles, a longer `save_every`, or
+--no-frames make it smaller.";
 LONG_STEP = "W0503":
 "The time step is longer than what is stable when particles fall through the whole box. The run may still go well if
 they never become so fast; without `dt` a stable step is derived.";

@@ -22,7 +22,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::compile::Error;
-use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
+use crate::diagnostic::{Code, Diagnostic, Diagnostics};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Fluid, Gravity, Scene};

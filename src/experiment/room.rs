@@ -165,8 +165,18 @@ impl Experiment {
             let wet = self.fluid.omega(at) > 0.0 && self.bodies.iter().all(|body| body.solid.omega(at) < 0.0);
             fluid += f64::from(u8::from(wet));
         }
-        let room = region.volume() * fluid / all / self.parameters.spacing().powi(3);
-        Ok(self.scene.fluid.particles.map_or(room, |wanted| room.min(wanted as f64)))
+        let cell = self.parameters.spacing().powi(3);
+        let (sites, room) = (region.volume() / cell, region.volume() * fluid / all / cell);
+        if sites > MAX_SITES {
+            return Err(self.no_fluid(&SeedError::TooLarge { sites }));
+        }
+        let Some(wanted) = self.scene.fluid.particles else { return Ok(room) };
+        // few particles are counted when they are placed
+        let is_certain = room > 1000.0 && wanted as f64 > 1.1 * room;
+        if is_certain {
+            return Err(self.no_fluid(&SeedError::DoesNotFit { wanted, room: room as usize }));
+        }
+        Ok(room.min(wanted as f64))
     }
 
     /// The same scene with larger particles, as many as are wanted: what it costs tells what the scene costs.

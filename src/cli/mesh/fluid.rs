@@ -3,7 +3,6 @@
 //!
 //! The list of frames is read and checked before the first file is written. Each file is whole or not there.
 
-use crate::cli::output::Shown;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -14,6 +13,7 @@ use super::super::args::{Frames, Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
 use super::super::{output, progress};
 use super::format;
+use crate::cli::output::Shown;
 use rfm::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
 use rfm::mesh::{WriteMesh, is_closed_manifold, shells, vtp};
 use rfm::sph;

@@ -1,11 +1,11 @@
 //! The formats of meshes on the command line: choices, help and messages, all from the table of the library.
 
-use crate::cli::output::Shown;
 use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::super::failure::Failure;
+use crate::cli::output::Shown;
 use rfm::mesh::{FORMATS, Format, WriteMesh};
 
 /// The parser of a format's name, which is the ending of its files.

@@ -6,23 +6,23 @@ mod format;
 mod simplified;
 mod summary;
 
-use crate::cli::output::Shown;
 use std::time::Instant;
 
 use super::args::{Mesh as Options, MeshMethod, Shared};
-use super::failure::{Failure, note};
+use super::failure::{Failure, complain, note};
 use super::{choose, input, output, progress};
+use crate::cli::output::Shown;
 pub(super) use format::{ascii_help, format_name, output_help};
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::mesh::{
-    self, Grid, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh, dual_contouring,
-    marching_cubes,
+    self, Grid, GridError, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh,
+    dual_contouring, marching_cubes,
 };
 use rfm::solid::{Bounds, Depth};
 use simplified::{Simplified, simplified};
-use summary::MeshSummary;
+use summary::{MeshSummary, Times};
 
 impl MeshMethod {
     /// The name on the command line and in JSON.
@@ -56,6 +56,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let grid = grid(&solid, options)?;
 
+    let mut times = Times::default();
     let started = Instant::now();
     // it has the same zero set as ω, is cheaper, and gives the normal of one face at creases
     let surface = solid.surface(grid.as_ref().map_or(Aabb::EMPTY, |grid| *grid.bounds()));
@@ -63,25 +64,33 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         None => Mesh::default(),
         Some(grid) => meshed(&solid, &*surface, grid, options)?,
     };
-    let milliseconds = started.elapsed().as_secs_f64() * 1e3;
+    times.meshing = milliseconds(started);
+    let started = Instant::now();
     let (quality, simplified) = match &grid {
         Some(grid) if options.quality || options.simplify.is_some() => {
             measured(&mut mesh, &solid, &*surface, grid, options)?
         }
         _ => (None, None),
     };
+    times.measuring = milliseconds(started);
+    let started = Instant::now();
     let report = mesh::check(&mesh, &*surface);
     let thin = match &grid {
         None => ThinCells::NONE,
         Some(grid) => mesh::thin_cells(&*surface, grid).map_err(Failure::usage)?,
     };
+    times.checking = milliseconds(started);
     remark(&solid, &mesh, &thin, options);
-
+    if mesh.triangles.is_empty() {
+        return nothing_to_write(shared, options, (&solid, &report, &times));
+    }
     if let (Some(path), Some(write)) = (&options.output, write) {
+        let started = Instant::now();
         output::write(path, |out| write(&mesh, out))?;
+        times.writing = milliseconds(started);
     }
     let names = (solid.name(), options.method.name());
-    let summary = MeshSummary::new(names, &report, thin.count, quality, simplified.as_ref(), milliseconds);
+    let summary = MeshSummary::new(names, &report, thin.count, quality, simplified.as_ref(), times);
     if shared.json {
         return output::json(&summary);
     }
@@ -90,6 +99,28 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         say!("written to {}", path.shown());
     }
     Ok(())
+}
+
+/// Ends the command for a mesh without triangles: there is no file of it.
+fn nothing_to_write(
+    shared: &Shared,
+    options: &Options,
+    (solid, report, times): (&Solid, &mesh::Report, &Times),
+) -> Result<(), Failure> {
+    if shared.json {
+        let names = (solid.name(), options.method.name());
+        output::json(&MeshSummary::new(names, report, 0, None, None, *times))?;
+    }
+    if let Some(path) = &options.output {
+        complain(&format!("the mesh is empty: `{}` is not written", path.shown()));
+    } else {
+        complain("the mesh is empty");
+    }
+    Err(Failure::Findings)
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }
 
 /// The writer that the options ask for; `None` if only figures are wanted.
@@ -103,7 +134,7 @@ fn writer(shared: &Shared, options: &Options) -> Result<Option<WriteMesh>, Failu
     match &options.output {
         Some(path) => format::writer(format::of_path(path)?, options.ascii).map(Some),
         None if options.ascii => Err(format::no_text()),
-        None if shared.json => Ok(None),
+        None if shared.json || options.quality => Ok(None),
         None => Err(format::no_output()),
     }
 }
@@ -122,7 +153,27 @@ fn grid(solid: &Solid, options: &Options) -> Result<Option<Grid>, Failure> {
             )));
         }
     };
-    grid.transpose().map_err(Failure::usage)
+    grid.transpose().map_err(|error| Failure::usage(refused(&error, options)))
+}
+
+/// Why there is no grid, in the words of the flags.
+fn refused(error: &GridError, options: &Options) -> String {
+    let most = Grid::MAX_CELLS;
+    match (error, options.cell) {
+        (GridError::TooManyCells(_), None) => {
+            format!("--cells {} is too fine: at most {most} cells along a side are possible", options.cells)
+        }
+        (GridError::TooManyCells(found), Some(cell)) => {
+            format!("--cell {cell} makes {found} cells along one side: at most {most} are possible")
+        }
+        (GridError::TooFewCells(_), _) => {
+            format!("--cells {} is too coarse: at least {} are needed", options.cells, Grid::MIN_CELLS)
+        }
+        (GridError::BadSpacing(_), Some(cell)) => {
+            format!("--cell {cell} is not a positive length that these coordinates can resolve")
+        }
+        _ => error.to_string(),
+    }
 }
 
 /// The mesh of a surface, without slivers if that is asked for.

@@ -13,13 +13,13 @@ mod plot;
 mod points;
 mod programs;
 
-use crate::cli::output::Shown;
 use anstream::println;
 use serde::Serialize;
 
 use super::args::{Report, Shared};
 use super::failure::Failure;
 use super::{choose, input, output, progress};
+use crate::cli::output::Shown;
 use meshes::MeshFigures;
 use points::SamplePoints;
 use programs::{ExactValues, ProgramFigures};

@@ -11,7 +11,7 @@ pub(super) struct Bodies {
     solids: Vec<Solid>,
     domain: Aabb,
     /// Number of mesh cells along the longest side of each solid.
-    cells: usize,
+    pub(super) cells: usize,
 }
 
 impl Bodies {

@@ -2,11 +2,11 @@
 //!
 //! Invariant: an older checkpoint is removed only after a newer one is complete.
 
-use crate::cli::output::Shown;
 use std::path::{Path, PathBuf};
 
 use super::super::{Failure, note, output};
 use super::pace::Every;
+use crate::cli::output::Shown;
 use rfm::Experiment;
 use rfm::ir;
 use rfm::lower::Scene;
@@ -102,6 +102,11 @@ pub(super) fn latest(run_folder: &Path, fingerprint: &[u8; 32]) -> Result<Checkp
         return Err(Failure::usage(format!("there is no checkpoint in `{folder}` to go on from")));
     }
     Err(Failure::usage(faults.join("\n")))
+}
+
+/// Whether a folder has a checkpoint.
+pub(super) fn exist(run_folder: &Path) -> bool {
+    !list(&run_folder.join(FOLDER)).is_empty()
 }
 
 /// Removes all checkpoints of a folder, and nothing else.

@@ -3,7 +3,6 @@
 //! Invariant: however a run ends, a file holds its header and the lines of all samples before that. At most
 //! one line is cut off, which `--resume` removes.
 
-use crate::cli::output::Shown;
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
@@ -12,6 +11,7 @@ use std::path::{Path, PathBuf};
 use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, RIGHT, TOP, WIDTH};
 use super::super::{Failure, output};
 use super::pace::Every;
+use crate::cli::output::Shown;
 use rfm::lower::{Measured, Scene};
 use rfm::slice;
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};

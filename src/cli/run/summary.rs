@@ -1,12 +1,12 @@
 //! The summary of a run at its end.
 
-use crate::cli::output::Shown;
 use serde::Serialize;
 
 use super::findings;
 use super::frames::Frames;
 use super::probes::Probes;
 use super::watch::Watch;
+use crate::cli::output::Shown;
 use rfm::experiment::Deviation;
 use rfm::sph::{Pass, Simulation};
 
