@@ -76,12 +76,9 @@ fn meets(solid: &Solid, plane: Plane, window: Window) -> bool {
         Bounds::Empty => "it is empty".to_string(),
         Bounds::Unbounded => "another plane or --window may show it".to_string(),
         Bounds::Within(bounds) => {
-            format!(
-                "it lies between {0} = {1} and {0} = {2}",
-                plane.axis.name(),
-                bounds.min[axis],
-                bounds.max[axis]
-            )
+            // rounded, so that bounds which are proven and not exact look as they are meant
+            let [low, high] = [bounds.min[axis], bounds.max[axis]].map(|at| (1e5 * at).round() / 1e5 + 0.0);
+            format!("it lies between {0} = {low} and {0} = {high}", plane.axis.name())
         }
     };
     let corners = [window.min, window.max].map(|corner| plane.point(corner));

@@ -49,9 +49,7 @@ fn measured(text: &str, dimension: Dimension, what: &str, units: &str) -> Result
     let (value, found) =
         parse_quantity(text).map_err(|reason| format!("{reason}; expected {what}, as in {units}"))?;
     match found {
-        Some(found) if found != dimension => {
-            Err(format!("`{}` is not {what}; units are {units}", text.trim()))
-        }
+        Some(found) if found != dimension => Err(format!("`{}` is not {what}, as in {units}", text.trim())),
         _ => Ok(value),
     }
 }

@@ -114,6 +114,10 @@ SCENE_KEY = "E0301":
       method: paper
       run      { dt: 2 ms, until: 5 s, save_every: 0.05 s, checkpoint_every: 0.5 s }
       probe gauge { height: [1, 0.5], every: 10 ms }
+      probe depth { pressure: [1, 0.5, 0.1] }         # velocity: [1, 0.5, 0.1]
+      probe load  { force: post, about: [1, 1, 0] }   # force, and torque about a point
+      probe drain { flux { point: [1, 0, 0], normal: [1, 0, 0] } }
+      probe sum   { energy: water }                   # or audit: water
       tolerance: 1e-6
     }
 

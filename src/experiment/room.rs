@@ -37,7 +37,7 @@ impl Experiment {
         let within = bounds.intersection(&domain);
         if within.is_empty() || within.size().min_element() <= 0.0 {
             let message = "the shape of the fluid lies outside the box".to_string();
-            let reach = format!("it lies between {:.3} and {:.3}", bounds.min, bounds.max);
+            let reach = format!("it lies between {} and {}", place(bounds.min), place(bounds.max));
             return Err(refuse(&self.program, no_room(message).at(reach)));
         }
         Ok(bounds)
@@ -52,16 +52,20 @@ impl Experiment {
         let diagnostic = match error {
             SeedError::DoesNotFit { room: 0, .. } => self.too_coarse(),
             SeedError::DoesNotFit { wanted, room } => {
-                let fits = spacing * (*room as f64 / *wanted as f64).cbrt();
                 let message = format!(
                     "{wanted} particles do not fit: with {} between them the shape has room for {room}",
                     length(spacing)
                 );
-                no_room(at, message).help(format!(
-                    "{}write `spacing: {}` in the fluid, or `particles: {room}`",
-                    self.why_so_large(),
-                    length(0.97 * fits)
-                ))
+                no_room(at, message).help(if *wanted as f64 > 0.2 * MAX_SITES {
+                    format!("so many particles are too many in any case: leave `particles` out, or write `particles: {room}`")
+                } else {
+                    let fits = spacing * (*room as f64 / *wanted as f64).cbrt();
+                    format!(
+                        "{}write `spacing: {}` in the fluid, or `particles: {room}`",
+                        self.why_so_large(),
+                        length(0.95 * fits)
+                    )
+                })
             }
             SeedError::TooLarge { sites } if sites.is_finite() => {
                 let message = format!(
@@ -77,6 +81,7 @@ impl Experiment {
             }
             SeedError::NothingLeft(_) => {
                 Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, error.to_string())
+                    .help("move the shape of the fluid out of the obstacles")
             }
             SeedError::NoCount
             | SeedError::Jitter(_)
@@ -134,7 +139,7 @@ impl Experiment {
                 "about {:.0} % of the fluid's shape lies outside the box, and is left out",
                 100.0 * part
             );
-            let at = format!("it lies between {:.3} and {:.3}", bounds.min, bounds.max);
+            let at = format!("it lies between {} and {}", place(bounds.min), place(bounds.max));
             Diagnostic::warning(Code::FLUID_OUTSIDE_BOX, self.scene.fluid.shape_span, message)
                 .at(at)
                 .label(self.scene.domain_span, format!("the box goes from {} to {}", domain.min, domain.max))
@@ -174,7 +179,10 @@ impl Experiment {
         // few particles are counted when they are placed
         let is_certain = room > 1000.0 && wanted as f64 > 1.1 * room;
         if is_certain {
-            return Err(self.no_fluid(&SeedError::DoesNotFit { wanted, room: room as usize }));
+            // rounded down to what fits for certain
+            let unit = 10f64.powf((0.95 * room).log10().floor() - 1.0);
+            let room = (unit * (0.95 * room / unit).floor()) as usize;
+            return Err(self.no_fluid(&SeedError::DoesNotFit { wanted, room }));
         }
         Ok(room.min(wanted as f64))
     }
@@ -205,6 +213,11 @@ fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
         let (i, j, k) = (index % nx, index / nx % ny, index / (nx * ny));
         min + cell * (DVec3::new(i as f64, j as f64, k as f64) + 0.5)
     })
+}
+
+/// A place with three digits behind the point, and no sign before zero.
+fn place(at: DVec3) -> DVec3 {
+    (1e3 * at).round() / 1e3 + 0.0
 }
 
 /// A length as a file writes it, with three digits: `2.5 mm`, `0.12 m`.

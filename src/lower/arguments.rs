@@ -68,7 +68,7 @@ impl<'a> Lowering<'a> {
                 None => {
                     let value =
                         parameter.default.as_ref().map_or(Value::Failed, |default| self.expr(default));
-                    Local { name: parameter.name.text.clone(), value, span }
+                    Local { name: parameter.name.text.clone(), value, span, bare: false }
                 }
             };
             self.scope.locals.push(local);
@@ -111,8 +111,10 @@ impl<'a> Lowering<'a> {
             } else {
                 self.user_span(span)
             };
-            bound.push(Local { name: parameter, value, span: at });
+            let bare = self.is_bare(&argument.value);
+            bound.push(Local { name: parameter, value, span: at, bare });
         }
+        fits &= !standard || self.kinds_of_arguments_fit(function, arguments, &bound);
         for parameter in &function.parameters {
             let given = bound.iter().any(|local| local.name == parameter.name.text);
             if !given && parameter.default.is_none() && fits {
@@ -121,6 +123,47 @@ impl<'a> Lowering<'a> {
             }
         }
         fits.then_some(bound)
+    }
+
+    /// Reports a number given to a standard solid where it takes a vector, and the other way round.
+    fn kinds_of_arguments_fit(
+        &mut self,
+        function: &Function,
+        arguments: &[Argument],
+        bound: &[Local],
+    ) -> bool {
+        const VECTORS: [&str; 5] = ["centre", "min", "max", "normal", "point"];
+        let name = &function.name.text;
+        for local in bound {
+            let wanted = VECTORS.contains(&local.name.as_str());
+            let (what, found) = match (&local.value, wanted) {
+                (Value::Number(_), true) => ("a vector `[a, b, c]`", "a number"),
+                (Value::Vector(_), false) => ("a number", "a vector"),
+                _ => continue,
+            };
+            let message = format!("`{}` of `{name}` is {what}, found {found}", local.name);
+            let numbers: Option<Vec<&str>> = arguments
+                .iter()
+                .map(|a| self.written(&a.value).filter(|text| text.chars().all(|c| c.is_ascii_digit())))
+                .collect();
+            let vector =
+                arguments.first().and_then(|a| self.written(&a.value)).filter(|text| text.starts_with('['));
+            let help = match (name.as_str(), numbers.as_deref(), vector) {
+                ("sphere", Some([whole, part]), _) => {
+                    format!("decimals are written with a point: write `sphere({whole}.{part})`")
+                }
+                ("sphere", _, Some(centre)) => format!("write `ball({centre}, 1)` or `sphere(1, {centre})`"),
+                _ => match example(name) {
+                    Some(call) => {
+                        format!("its parameters are {}: write for example `{call}`", signature(function))
+                    }
+                    None => format!("its parameters are {}", signature(function)),
+                },
+            };
+            self.report(Diagnostic::error(Code::WRONG_TYPE, local.span, message).help(help));
+            return false;
+        }
+        true
     }
 
     /// The parameter that an argument is for; a name that the function does not know is reported.

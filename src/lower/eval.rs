@@ -405,7 +405,12 @@ impl Lowering<'_> {
         let mut index = start;
         while index < end {
             let value = Value::Number(self.constant(index));
-            self.scope.locals.push(Local { name: variable.text.clone(), value, span: variable.span });
+            self.scope.locals.push(Local {
+                name: variable.text.clone(),
+                value,
+                span: variable.span,
+                bare: true,
+            });
             let member = self.field(body);
             self.scope.locals.pop();
             match member {

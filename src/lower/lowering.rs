@@ -61,6 +61,8 @@ pub(super) struct Local {
     pub value: Value,
     /// The place of the argument that it was bound to.
     pub span: Span,
+    /// Whether the value has neither a unit nor π in it.
+    pub bare: bool,
 }
 
 /// A function that is being called.

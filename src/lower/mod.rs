@@ -189,16 +189,21 @@ impl<'a> Lowering<'a> {
         let Some((unit, text)) = &param.unit else { return true };
         let name = &param.name;
         let Some(dimension) = options.dimensions.get(name) else {
-            if unit.factor != 1.0 && param.value != 0.0 {
+            // a range tells which unit is meant
+            if unit.factor != 1.0 && param.value != 0.0 && param.range.is_none() {
                 let si = unit.dimension.unit().unwrap_or("in SI units");
                 let message = format!(
                     "-D {name}={0} means {0} {si}, and the file writes `{name}` in {text}",
                     param.value
                 );
                 self.report(
-                    Diagnostic::warning(Code::BARE_OVERRIDE, param.span, message)
-                        .at("declared here")
-                        .help(format!("write -D {name}=\"{} {text}\"", param.value)),
+                    Diagnostic::warning(Code::BARE_OVERRIDE, param.span, message).at("declared here").help(
+                        format!(
+                            "write -D {name}=\"{}\", or -D {name}=\"{} {text}\" if that is meant",
+                            param.shown(param.value),
+                            param.value
+                        ),
+                    ),
                 );
             }
             return true;
@@ -231,14 +236,26 @@ impl<'a> Lowering<'a> {
         } else if let Some((low, high)) = given.range
             && !(low <= value && value <= high)
         {
-            let [low, high] = [low, high].map(|end| given.shown(end));
+            let [first, last] = [low, high].map(|end| given.shown(end));
             let diagnostic = if overridden {
                 let message =
-                    format!("-D sets `{}` to {shown}, outside its range {low} .. {high}", param.name.text);
-                Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here")
+                    format!("-D sets `{}` to {shown}, outside its range {first} .. {last}", param.name.text);
+                let diagnostic =
+                    Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here");
+                match given
+                    .unit
+                    .as_ref()
+                    .filter(|(unit, _)| low <= value * unit.factor && value * unit.factor <= high)
+                {
+                    Some((_, unit)) => diagnostic.help(format!(
+                        "numbers without a unit are in SI units: write -D {}=\"{value} {unit}\"",
+                        param.name.text
+                    )),
+                    None => diagnostic,
+                }
             } else {
                 let message =
-                    format!("`{}` = {shown} lies outside its range {low} .. {high}", param.name.text);
+                    format!("`{}` = {shown} lies outside its range {first} .. {last}", param.name.text);
                 Diagnostic::error(Code::OUT_OF_RANGE, param.value.span, message)
             };
             self.report(diagnostic);

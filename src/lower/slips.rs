@@ -68,11 +68,11 @@ impl Lowering<'_> {
         if !(self.is_shape(left) && self.is_shape(right)) {
             return;
         }
-        let (sign, verb, word) = match op {
-            Binary::Sub => ("-", "subtracts", "\\"),
-            Binary::Add => ("+", "adds", "or"),
-            Binary::Mul => ("*", "multiplies", "and"),
-            Binary::Div => ("/", "divides", "\\"),
+        let (sign, verb, word, purpose) = match op {
+            Binary::Sub => ("-", "subtracts", "\\", "to take the second away from the first"),
+            Binary::Add => ("+", "adds", "or", "to join them"),
+            Binary::Mul => ("*", "multiplies", "and", "for what both of them hold"),
+            Binary::Div => ("/", "divides", "\\", "to take the second away from the first"),
             _ => return,
         };
         let written = match (self.written(left), self.written(right)) {
@@ -82,7 +82,7 @@ impl Lowering<'_> {
         let message = format!("`{sign}` {verb} the values of two shapes; it does not join or cut them");
         self.report(
             Diagnostic::warning(Code::SHAPES_AS_NUMBERS, left.span.to(right.span), message)
-                .help(format!("is this meant? write `{written}`")),
+                .help(format!("{purpose}, write `{written}`")),
         );
     }
 
@@ -116,13 +116,11 @@ impl Lowering<'_> {
         }
         let message = format!("{angle} rad is {:.1} turns", (angle / std::f64::consts::TAU).abs());
         let warning = Diagnostic::warning(Code::LARGE_ANGLE, expr.span, message);
-        let help = match self.written(expr) {
-            Some(written) if written.parse::<f64>().is_ok() => {
-                format!("are degrees meant? write `{written} deg`, or `{written} rad` for radians")
-            }
-            Some(written) => format!("are degrees meant? write `({written})*1 deg`, or `*1 rad` for radians"),
-            None => "are degrees meant? write `*1 deg` behind it, or `*1 rad` for radians".to_string(),
+        let (deg, rad) = match self.written(expr) {
+            Some(written) => (with_unit(written, "deg"), with_unit(written, "rad")),
+            None => ("… deg".into(), "… rad".into()),
         };
+        let help = format!("are degrees meant? write `{deg}`, or `{rad}` for radians");
         self.report(warning.help(help));
     }
 
@@ -131,8 +129,8 @@ impl Lowering<'_> {
         match &expr.kind {
             ExprKind::Quantity { .. } | ExprKind::Call { .. } | ExprKind::Text(_) => false,
             ExprKind::Name(name) => {
-                let is_local = self.scope.locals.iter().any(|local| local.name == *name);
-                !is_local && self.bare.contains(name)
+                let local = self.scope.locals.iter().rev().find(|local| local.name == *name);
+                local.map_or(self.bare.contains(name), |local| local.bare)
             }
             _ => expr.children().into_iter().all(|part| self.is_bare(part)),
         }
@@ -190,5 +188,16 @@ impl Lowering<'_> {
             ("mirror", _) => ".mirror([1, 0, 0])".into(),
             _ => format!(".{method}(45 deg)"),
         }
+    }
+}
+
+/// A value with an angle's unit behind it: behind its last number if that is its last factor.
+fn with_unit(written: &str, unit: &str) -> String {
+    let is_product = written.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '*' | '.' | '-'));
+    let last = written.rsplit(['*', '-']).next().unwrap_or_default();
+    match (is_product, last.parse::<f64>()) {
+        (true, Ok(_)) => format!("{written} {unit}"),
+        (true, Err(_)) => format!("{written}*1 {unit}"),
+        (false, _) => format!("({written})*1 {unit}"),
     }
 }

@@ -45,6 +45,9 @@ pub(super) fn item(word: &str) -> Option<&'static str> {
         | "vec2" | "vec3" | "local" | "auto" => {
             "write `let name = …`, or `param name = …` for a number that `-D name=…` may set"
         }
+        "cube" | "cuboid" | "block" => {
+            "a solid has a name, and a box two corners: write `solid part = box([0, 0, 0], [1, 1, 1])`"
+        }
         "object" | "shape" | "body" | "part" | "model" | "obstacle" | "mesh" => "write `solid name = …`",
         "isosurface" | "blob" | "merge" | "csg" => {
             "write `solid name = …` with an inequality, as in `x² + y² <= 1 and 0 <= z <= 1`"
@@ -165,6 +168,34 @@ pub fn quantity(number: &str, word: &str) -> Option<String> {
     // without the last digits, which the product does not have
     let rounded: f64 = format!("{product:.12e}").parse().ok()?;
     Some(format!("{rounded} {unit}"))
+}
+
+/// The key of a scene that has another name elsewhere; `None` if none is known.
+pub fn key(word: &str) -> Option<&'static str> {
+    Some(match word {
+        "size" | "corner" | "upper" | "high" => "max",
+        "lower" | "low" | "origin" => "min",
+        "rho" | "rho0" | "rest_density" | "dichte" => "density",
+        "mu" | "nu" | "visc" | "dynamic_viscosity" => "viscosity",
+        "sigma" | "tension" => "surface_tension",
+        "dx" | "dp" | "resolution" | "particle_spacing" | "radius" | "particle_radius" => "spacing",
+        "h" | "smoothing_length" | "kernel_radius" => "support_radius",
+        "n" | "count" | "number" | "num_particles" => "particles",
+        "g" | "acceleration" => "gravity",
+        "c" | "c0" | "speed_of_sound" => "sound_speed",
+        "end" | "end_time" | "t_end" | "tmax" | "duration" | "time" | "stop" => "until",
+        "timestep" | "time_step" | "step" => "dt",
+        "output" | "save" | "interval" | "output_interval" | "frames" | "fps" | "write_every" => "save_every",
+        "domain" | "bounds" | "tank" => "box",
+        "vessel" | "bowl" | "boundary" => "container",
+        "rigid" | "body" | "object" | "solid" | "obstacles" => "obstacle",
+        "liquid" | "water" | "fluids" => "fluid",
+        "kernel" | "scheme" | "sph" => "method",
+        "shape" | "name" => "solid",
+        "region" | "geometry" | "block" => "shape",
+        "sensor" | "gauge" | "measure" => "probe",
+        _ => return None,
+    })
 }
 
 /// A number that GLSL or C writes with a letter behind it, as `1.5f`.

@@ -19,6 +19,9 @@ pub(super) struct Slip<'t> {
 impl<'t> Slip<'t> {
     /// The message for this slip; `None` if it is not one of those known here.
     pub fn explained(&self) -> Option<Diagnostic> {
+        if let Some(diagnostic) = self.unit_taken_for_a_key() {
+            return Some(diagnostic);
+        }
         if self.found.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_') {
             return self.word();
         }
@@ -115,7 +118,7 @@ impl<'t> Slip<'t> {
             "a mesh cannot be read: describe the shape by standard solids and inequalities, \
              as in `solid part = box([0, 0, 0], [1, 1, 1]) \\ cylinder(0.2, 1)`"
         } else {
-            "copy the definitions into this file, or join the files before: `cat parts.rfm scene.rfm | rfm check -`"
+            "copy the definitions into this file, above the place where they are used"
         })
     }
 
@@ -173,6 +176,26 @@ impl<'t> Slip<'t> {
             .suggest(word, UNITS.into_iter().filter(|_| word.chars().count() > 1))
     }
 
+    /// `viscosity: 1 cP }`: what follows the number is no unit, so the grammar takes it for the next key.
+    fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line().trim_end();
+        let word = last_word(line);
+        let before = line[..line.len() - word.len()].trim_end();
+        if !self.in_braces() || !number_ends(before) || self.found == ":" {
+            return None;
+        }
+        let written = foreign::quantity(last_number(before), word)?;
+        let line_start = self.at - self.on_its_line().len();
+        let start = line_start + line.len() - word.len();
+        let span = Span::new(self.span.source, start, start + word.len());
+        let message = format!("unknown unit `{word}` after a number");
+        Some(
+            Diagnostic::error(Code::UNKNOWN_UNIT, span, message)
+                .at("not a unit")
+                .help(format!("write `{written}`")),
+        )
+    }
+
     /// `translate([1, 0, 0]) sphere(1)`
     fn transform_in_front(&self) -> Option<Diagnostic> {
         let before = self.on_its_line().trim_end();
@@ -196,7 +219,10 @@ impl<'t> Slip<'t> {
         let declared = rest.starts_with('%') && self.on_its_line().trim().is_empty();
         (begins || within || (other && self.on_its_line().trim().is_empty()) || declared).then(|| {
             let found = if within { "/*" } else { rest.get(..2).unwrap_or(self.found) };
-            self.syntax(format!("`{}` does not begin a comment", found.trim_end()))
+            let start = if within { self.at - 1 } else { self.at };
+            let span = Span::new(self.span.source, start, start + found.trim_end().len());
+            let message = format!("`{}` does not begin a comment", found.trim_end());
+            Diagnostic::error(Code::SYNTAX, span, message)
                 .help("a comment begins with `#` and ends with its line")
         })
     }
@@ -232,10 +258,14 @@ impl<'t> Slip<'t> {
         if before.ends_with([':', '+', '-', '*', '/', '^']) {
             return Some(self.unexpected().help("a definition is written `let a = 1`, and never changed"));
         }
-        Some(
-            Diagnostic::error(Code::EQUALITY, self.span, "`=` does not compare")
-                .help("write `<=` or `>=`: each makes the part of space on one side of a surface"),
-        )
+        let (left, right) = (last_word(before), first_part(value.lines().next().unwrap_or_default()));
+        let compared = |sign: &str| match fits(&[left, right]) {
+            true => format!("`{left} {sign} {right}`"),
+            false => format!("`a {sign} b`"),
+        };
+        let (below, above) = (compared("<="), compared(">="));
+        let help = format!("write {below} or {above}: each is the part of space on one side of a surface");
+        Some(Diagnostic::error(Code::EQUALITY, self.span, "`=` does not compare").help(help))
     }
 
     /// `0..=5`
@@ -247,6 +277,18 @@ impl<'t> Slip<'t> {
             None => format!("{start}..{end} + 1"),
         };
         self.unexpected().at("a range ends before its second number").help(format!("write `{one_more}`"))
+    }
+
+    /// `solid s { sphere(1) }`
+    fn solid_in_braces(&self) -> Option<Diagnostic> {
+        let heads = self.before().trim_end_matches('=').trim_end();
+        let name = last_word(heads);
+        if last_word(heads.strip_suffix(name)?.trim_end()) != "solid" {
+            return None;
+        }
+        let inner = self.after().split('}').next().unwrap_or_default().trim();
+        let shape = if fits(&[inner]) && !inner.contains([';', '{']) { inner } else { "sphere(1)" };
+        Some(self.unexpected().help(format!("a solid has no braces: write `solid {name} = {shape}`")))
     }
 
     /// A character that has no meaning where it stands.
@@ -272,6 +314,7 @@ impl<'t> Slip<'t> {
                 let key = last_word(before.trim_end_matches(':').trim_end());
                 return Some(self.syntax("a block has no `:`").help(format!("write `{key} {{ … }}`")));
             }
+            "{" if self.solid_in_braces().is_some() => return self.solid_in_braces(),
             "{" if before.ends_with(')') || !self.in_braces() => {
                 "shapes are joined by `or`, `and` and `\\`: write `solid part = sphere(1) \\ sphere(0.5)`"
             }

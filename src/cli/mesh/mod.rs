@@ -228,6 +228,7 @@ fn why_empty(solid: &Solid, options: &Options) -> &'static str {
     match (solid.bounds(), options.domain) {
         (Bounds::Empty, _) => "ω is nowhere positive, so the solid is empty",
         (_, Some(domain)) if solid.range(&domain).lo > 0.0 => "the box lies inside it",
+        (_, Some(domain)) if solid.range(&domain).hi < 0.0 => "the box lies outside it",
         _ => "no grid point lies inside it; try more cells",
     }
 }

@@ -18,7 +18,15 @@ const PARTS: [&str; 5] = ["", "frames", "pictures", "checkpoints", "probes"];
 
 /// The right to write into a folder, until it is dropped.
 pub(super) struct Hold {
+    path: PathBuf,
     _lock: File,
+}
+
+impl Drop for Hold {
+    fn drop(&mut self) {
+        // it is still locked, so nobody else has it; a file that stays behind is unlocked and harms nobody
+        let _ = std::fs::remove_file(&self.path);
+    }
 }
 
 /// The folder for a run's files. The default is beside the file, `pawn.rfm` → `pawn.out`; for standard input
@@ -85,7 +93,7 @@ impl Hold {
         for part in PARTS {
             remove_temporaries(&folder.join(part));
         }
-        Ok(Self { _lock: lock })
+        Ok(Self { path, _lock: lock })
     }
 }
 

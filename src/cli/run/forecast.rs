@@ -89,7 +89,7 @@ pub(super) fn dry_run(
         time_step_reason: experiment.time_step().reason,
         steps,
         passes: pass_names(&simulation),
-        bytes: scale * simulation.bytes() as f64,
+        bytes: memory(&simulation, scale),
         bytes_free: free_memory(),
         frames,
         disk_bytes: disk,
@@ -199,10 +199,28 @@ fn size(bytes: f64) -> String {
     }
 }
 
+/// Bytes that the process will take: the state and the copy of it that becomes a checkpoint, beside what the program takes
+/// for itself.
+fn memory(simulation: &Simulation, scale: f64) -> f64 {
+    let state = simulation.bytes() as f64;
+    let own = own_memory().map_or(0.0, |bytes| (bytes - state).max(0.0));
+    own + scale * (state + frames::checkpoint_bytes(simulation))
+}
+
+/// Bytes of memory that this process takes now; `None` where the system does not tell.
+fn own_memory() -> Option<f64> {
+    kilobytes("/proc/self/status", "VmRSS:")
+}
+
 /// Bytes of memory that programs may still take; `None` where the system does not tell.
 fn free_memory() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    kilobytes("/proc/meminfo", "MemAvailable:")
+}
+
+/// The figure of a line of a file that gives kilobytes, in bytes.
+fn kilobytes(file: &str, name: &str) -> Option<f64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     let kilobytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(1024.0 * kilobytes)
 }

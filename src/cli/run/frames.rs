@@ -215,7 +215,7 @@ impl FrameCost {
         let started = Instant::now();
         let mut bodies = Bodies::new(options, experiment);
         bodies.cells = Self::CELLS.min(options.mesh_cells);
-        let mesh = bodies.mesh_at_start()?;
+        let mesh = bodies.mesh_at(0.0)?;
         let finer = (options.mesh_cells as f64 / bodies.cells as f64).powi(2);
         let (mut seconds, mut bytes) = (0.0, 0.0);
         if bodies.move_about() {

@@ -123,7 +123,8 @@ impl<'a> Lowering<'a> {
         };
         let block = self.block(entries, "a box", span, &BOX_KEYS, &[]);
         let min = self.vector_key(&block, "min", Dimension::LENGTH, DVec3::ZERO);
-        if block.setting("max").is_none() {
+        let is_misspelt = entries.iter().any(|entry| !BOX_KEYS.contains(&entry.key().text.as_str()));
+        if block.setting("max").is_none() && !is_misspelt {
             self.missing(&block, "max", "write `max: [3, 3, 3]`");
         }
         let max = self.vector_key(&block, "max", Dimension::LENGTH, DVec3::ONE);
@@ -277,23 +278,22 @@ impl<'a> Lowering<'a> {
         /// Files of frames have six digits.
         const MOST: f64 = 999_999.0;
         const MANY: f64 = 20_000.0;
-        let (until, every) = (run.until, run.save_every);
-        let frames = until / every;
-        let fewer = format!("write for example `save_every: {}`", seconds_as_written(until / 100.0));
+        let frames = run.until / run.save_every;
+        let [until, every] = [run.until, run.save_every].map(seconds_as_written);
+        let fewer = format!("write for example `save_every: {}`", seconds_as_written(run.until / 100.0));
         if frames > MOST {
             let message = format!(
-                "{until} s with a frame every {every} s are {frames:.3e} frames; at most {MOST} are saved"
+                "{until} with a frame every {every} are {frames:.3e} frames; at most {MOST} are saved"
             );
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(fewer));
             return false;
         }
         if frames > MANY {
-            let message = format!("{until} s with a frame every {every} s are {frames:.0} frames");
+            let message = format!("{until} with a frame every {every} are {frames:.0} frames");
             self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
-        } else if every > until {
-            let message = format!(
-                "a frame every {every} s in a run of {until} s: only its start and its end are saved"
-            );
+        } else if run.save_every > run.until {
+            let message =
+                format!("a frame every {every} in a run of {until}: only its start and its end are saved");
             self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
         }
         true
