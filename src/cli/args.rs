@@ -8,7 +8,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::mesh::{ascii_help, format_name, output_help};
 use super::values::{
-    Definition, aabb, count, definition, frames, length, plane, point, seconds, threads, tolerance, window,
+    Definition, Frames, Tolerance, aabb, count, definition, frames, length, plane, point, seconds, threads,
+    tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -229,24 +230,6 @@ pub(super) struct Mesh {
     /// The format of the files [default: vtp, with a collection for ParaView]
     #[arg(long, help_heading = "Fluid", value_parser = format_name(), requires = "fluid")]
     pub format: Option<Format>,
-}
-
-/// How far a simplified mesh may be from the surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Tolerance {
-    /// A length, m.
-    Length(f64),
-    /// A part of the diagonal of the mesh's bounds.
-    OfDiagonal(f64),
-}
-
-/// A range of frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Frames {
-    /// The first frame.
-    pub first: usize,
-    /// The first frame that is left out; `None`: all frames from `first` on.
-    pub end: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -27,6 +27,10 @@ pub(super) struct Progress {
 /// The progress of work over `length` steps, with a text that the caller keeps up to date.
 pub(super) fn bar(length: u64, what: &'static str) -> Progress {
     let bar = std::io::stderr().is_terminal().then(|| ProgressBar::new(length));
+    progress(length, what, bar)
+}
+
+fn progress(length: u64, what: &'static str, bar: Option<ProgressBar>) -> Progress {
     if let Some(bar) = &bar {
         let template = "{prefix:>10} {wide_bar:.cyan/blue} {percent:>3} %  {msg}  {elapsed} < {eta}";
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -78,17 +82,21 @@ impl Progress {
         }
     }
 
-    /// Prints a line if one more tenth is done. Tenths of the first seconds are not printed.
+    /// Prints a line if one more tenth is done.
     fn tell(&self, position: u64) {
-        let tenths = (10 * position).checked_div(self.length).unwrap_or(0).min(9);
         let spent = self.started.elapsed();
-        if spent < FIRST_LINE || self.tenths.fetch_max(tenths, Ordering::Relaxed) >= tenths {
-            return;
-        }
+        let Some(tenths) = self.tenths_to_tell(position, spent) else { return };
         let left = spent.as_secs_f64() * (self.length as f64 / position as f64 - 1.0);
         let message = self.message.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let message = if message.is_empty() { String::new() } else { format!(", {message}") };
         anstream::eprintln!("{}: {} %{message}, about {} left", self.what, 10 * tenths, duration(left));
+    }
+
+    /// The tenths that are done, if they were not told before. Those of the first seconds are not told.
+    fn tenths_to_tell(&self, position: u64, spent: Duration) -> Option<u64> {
+        let tenths = (10 * u128::from(position)).checked_div(self.length.into()).unwrap_or(0).min(9) as u64;
+        let is_new = spent >= FIRST_LINE && self.tenths.fetch_max(tenths, Ordering::Relaxed) < tenths;
+        is_new.then_some(tenths)
     }
 }
 
@@ -118,6 +126,17 @@ pub(super) fn spinner(what: &'static str) -> ProgressBar {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_tenth_is_told_once() {
+        let progress = progress(1000, "running", None);
+        let told = |position, seconds| progress.tenths_to_tell(position, Duration::from_secs(seconds));
+        assert_eq!([told(50, 1), told(150, 2), told(180, 4), told(190, 5)], [None, None, Some(1), None]);
+        assert_eq!(
+            [told(450, 6), told(449, 7), told(1000, 9), told(1000, 9)],
+            [Some(4), None, Some(9), None]
+        );
+    }
 
     #[test]
     fn durations_have_the_unit_of_their_size() {

@@ -2,11 +2,28 @@
 
 use std::num::NonZeroUsize;
 
-use super::args::{Frames, Tolerance};
 use glam::DVec3;
 use rfm::geom::Aabb;
 use rfm::quantity::{Dimension, parse_quantity};
 use rfm::slice::{Axis, Plane};
+
+/// How far a simplified mesh may be from the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Tolerance {
+    /// A length, m.
+    Length(f64),
+    /// A part of the diagonal of the mesh's bounds.
+    OfDiagonal(f64),
+}
+
+/// A range of frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Frames {
+    /// The first frame.
+    pub first: usize,
+    /// The first frame that is left out; `None`: all frames from `first` on.
+    pub end: Option<usize>,
+}
 
 /// A param that the command line sets.
 #[derive(Debug, Clone, PartialEq)]

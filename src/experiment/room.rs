@@ -127,14 +127,14 @@ impl Experiment {
         if bounds.intersection(&grown) == *bounds {
             return None;
         }
-        let (mut inside, mut outside) = (0.0, 0.0);
-        for at in samples(bounds) {
-            if self.fluid.omega(at) > 0.0 {
-                *if grown.contains(at) { &mut inside } else { &mut outside } += 1.0;
-            }
+        let (mut all, mut outside, mut far) = (0.0, 0.0, 0.0);
+        for at in samples(bounds).filter(|at| self.fluid.omega(*at) > 0.0) {
+            all += 1.0;
+            outside += f64::from(u8::from(!domain.contains(at)));
+            far += f64::from(u8::from(!grown.contains(at)));
         }
-        let part = outside / (inside + outside);
-        (part > PART_OUTSIDE).then(|| {
+        let part = outside / all;
+        (far / all > PART_OUTSIDE).then(|| {
             let message = format!(
                 "about {:.0} % of the fluid's shape lies outside the box, and is left out",
                 100.0 * part

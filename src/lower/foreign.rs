@@ -83,7 +83,7 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
     };
     let chain = |op: &str| match a {
         [] | [_] => format!("a {op} b"),
-        [only @ ..] => only.iter().map(operand).collect::<Vec<_>>().join(&format!(" {op} ")),
+        all => all.iter().map(operand).collect::<Vec<_>>().join(&format!(" {op} ")),
     };
     match name {
         "union" | "unite" | "merge" | "fuse" | "join" | "combine" | "opUnion" | "add" | "sdUnion" => {

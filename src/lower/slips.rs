@@ -55,7 +55,9 @@ impl Lowering<'_> {
 
     /// Warns of a division by a constant zero.
     pub fn warn_of_zero(&mut self, divisor: Node, expr: &Expr) {
-        if self.module.graph.constant_value(divisor) == Some(0.0) && expr.span.source == SourceId::File {
+        let is_zero = self.module.graph.constant_value(divisor) == Some(0.0);
+        // elsewhere a value that is not finite is an error of its own
+        if is_zero && self.in_shape && expr.span.source == SourceId::File {
             self.report(
                 Diagnostic::warning(Code::DIVISION_BY_ZERO, expr.span, "the divisor is zero")
                     .help("is another divisor meant? what depends on this value is infinite or no number"),

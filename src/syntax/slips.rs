@@ -258,7 +258,7 @@ impl<'t> Slip<'t> {
         if before.ends_with([':', '+', '-', '*', '/', '^']) {
             return Some(self.unexpected().help("a definition is written `let a = 1`, and never changed"));
         }
-        let (left, right) = (last_word(before), first_part(value.lines().next().unwrap_or_default()));
+        let (left, right) = (last_part(before), first_part(value.lines().next().unwrap_or_default()));
         let compared = |sign: &str| match fits(&[left, right]) {
             true => format!("`{left} {sign} {right}`"),
             false => format!("`a {sign} b`"),
@@ -366,6 +366,27 @@ fn first_part(line: &str) -> &str {
         }
     }
     line.trim()
+}
+
+/// The last operand of a text: what stands behind a bracket that is still open, a sign or a word that joins.
+fn last_part(text: &str) -> &str {
+    let mut depth = 0_i32;
+    let mut start = 0;
+    for (at, c) in text.char_indices() {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ => {}
+        }
+        let opens = depth > 0 && matches!(c, '(' | '[');
+        if opens || matches!(c, '=' | ':' | ',' | '&' | '|' | '\\' | '<' | '>') {
+            start = at + c.len_utf8();
+        }
+        if [" and ", " or ", " not "].iter().any(|word| text[..at].ends_with(word)) {
+            start = at;
+        }
+    }
+    text[start..].trim()
 }
 
 /// The text between a bracket at the beginning and the one that closes it.

@@ -9,8 +9,9 @@ use std::time::Instant;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::super::args::{Frames, Mesh as Options, Shared};
+use super::super::args::{Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
+use super::super::values::Frames;
 use super::super::{output, progress};
 use super::format;
 use crate::cli::output::Shown;

@@ -153,27 +153,33 @@ fn grid(solid: &Solid, options: &Options) -> Result<Option<Grid>, Failure> {
             )));
         }
     };
-    grid.transpose().map_err(|error| Failure::usage(refused(&error, options)))
+    grid.transpose().map_err(|error| match options.cell {
+        None => no_grid(&error, "--cells", options.cells),
+        Some(cell) => match error {
+            GridError::TooManyCells(found) => Failure::usage(format!(
+                "--cell {cell} makes {found} cells along one side: at most {} are possible",
+                Grid::MAX_CELLS
+            )),
+            GridError::BadSpacing(_) => Failure::usage(format!(
+                "--cell {cell} is not a positive length that these coordinates can resolve"
+            )),
+            GridError::TooFewCells(_) | GridError::BadBox(_) => Failure::usage(error),
+        },
+    })
 }
 
-/// Why there is no grid, in the words of the flags.
-fn refused(error: &GridError, options: &Options) -> String {
-    let most = Grid::MAX_CELLS;
-    match (error, options.cell) {
-        (GridError::TooManyCells(_), None) => {
-            format!("--cells {} is too fine: at most {most} cells along a side are possible", options.cells)
+/// Why there is no grid of so many cells along the longest side, in the words of the flag that asks for them.
+pub(super) fn no_grid(error: &GridError, flag: &str, cells: usize) -> Failure {
+    Failure::usage(match error {
+        GridError::TooManyCells(_) => {
+            format!("{flag} {cells} is too fine: at most {} cells along a side are possible", Grid::MAX_CELLS)
         }
-        (GridError::TooManyCells(found), Some(cell)) => {
-            format!("--cell {cell} makes {found} cells along one side: at most {most} are possible")
+        GridError::TooFewCells(_) => {
+            format!("{flag} {cells} is too coarse: at least {} are needed", Grid::MIN_CELLS)
         }
-        (GridError::TooFewCells(_), _) => {
-            format!("--cells {} is too coarse: at least {} are needed", options.cells, Grid::MIN_CELLS)
-        }
-        (GridError::BadSpacing(_), Some(cell)) => {
-            format!("--cell {cell} is not a positive length that these coordinates can resolve")
-        }
-        _ => error.to_string(),
-    }
+        GridError::BadSpacing(_) => format!("{flag} {cells} is too fine for these coordinates"),
+        GridError::BadBox(_) => error.to_string(),
+    })
 }
 
 /// The mesh of a surface, without slivers if that is asked for.

@@ -168,14 +168,15 @@ impl Recording<'_> {
             self.watch.spent += started.elapsed();
             if let Err(error) = result {
                 bar.finish_and_clear();
-                return Ok(Err(Stop::Numerical(error)));
+                let crushed = NoRoom::of(self.experiment, simulation, true);
+                return Ok(Err(crushed.map_or(Stop::Numerical(error), Stop::NoRoom)));
             }
             bar.suspend(|| findings::tell_news(simulation));
             bar.set_position(goal.done(simulation));
             let stop = interrupted.load(Ordering::Relaxed);
             let in_turn = pace.frame_is_due(simulation);
             self.record(simulation, in_turn, stop || goal.is_reached(simulation))?;
-            if in_turn && let Some(crushed) = NoRoom::of(self.experiment, simulation) {
+            if in_turn && let Some(crushed) = NoRoom::of(self.experiment, simulation, false) {
                 bar.finish_and_clear();
                 return Ok(Err(Stop::NoRoom(crushed)));
             }
