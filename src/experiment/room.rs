@@ -57,7 +57,10 @@ impl Experiment {
                     length(spacing)
                 );
                 no_room(at, message).help(if *wanted as f64 > 0.2 * MAX_SITES {
-                    format!("so many particles are too many in any case: leave `particles` out, or write `particles: {room}`")
+                    format!(
+                        "{}so many particles are too many in any case: leave `particles` out, or write `particles: {room}`",
+                        self.why_so_large()
+                    )
                 } else {
                     let fits = spacing * (*room as f64 / *wanted as f64).cbrt();
                     format!(

@@ -80,35 +80,8 @@ impl Lowering<'_> {
                 self.negate(&value, span)
             }
             ExprKind::Compare { first, rest } => self.compare(first, rest, span),
-            ExprKind::Sum { first, rest } => {
-                let mut value = self.expr(first);
-                for (op, operand) in rest {
-                    let right = self.expr(operand);
-                    let op = match op {
-                        AddOp::Add => Binary::Add,
-                        AddOp::Subtract => Binary::Sub,
-                    };
-                    self.warn_of_shapes(op, first, operand);
-                    value = self.sum(op, &value, &right, first.span.to(operand.span));
-                }
-                value
-            }
-            ExprKind::Product { first, rest } => {
-                let mut value = self.expr(first);
-                for (op, operand) in rest {
-                    let right = self.expr(operand);
-                    let op = match op {
-                        MulOp::Multiply => Binary::Mul,
-                        MulOp::Divide => Binary::Div,
-                    };
-                    self.warn_of_shapes(op, first, operand);
-                    if let (Binary::Div, Value::Number(divisor)) = (op, &right) {
-                        self.warn_of_zero(*divisor, operand);
-                    }
-                    value = self.product(op, &value, &right, first.span.to(operand.span));
-                }
-                value
-            }
+            ExprKind::Sum { first, rest } => self.sums(first, rest),
+            ExprKind::Product { first, rest } => self.products(first, rest),
             ExprKind::Power { base, exponent } => self.power(base, exponent, span),
             ExprKind::Call { function, arguments } => self.call(function, arguments, span),
             ExprKind::Component { vector, axis } => {
@@ -122,6 +95,39 @@ impl Lowering<'_> {
                 self.fold(*op, variable, (start, end), body, span)
             }
         }
+    }
+
+    /// `a + b - c`
+    fn sums(&mut self, first: &Expr, rest: &[(AddOp, Expr)]) -> Value {
+        let mut value = self.expr(first);
+        for (op, operand) in rest {
+            let right = self.expr(operand);
+            let op = match op {
+                AddOp::Add => Binary::Add,
+                AddOp::Subtract => Binary::Sub,
+            };
+            self.warn_of_shapes(op, first, operand);
+            value = self.sum(op, &value, &right, first.span.to(operand.span));
+        }
+        value
+    }
+
+    /// `a*b/c`
+    fn products(&mut self, first: &Expr, rest: &[(MulOp, Expr)]) -> Value {
+        let mut value = self.expr(first);
+        for (op, operand) in rest {
+            let right = self.expr(operand);
+            let op = match op {
+                MulOp::Multiply => Binary::Mul,
+                MulOp::Divide => Binary::Div,
+            };
+            self.warn_of_shapes(op, first, operand);
+            if let (Binary::Div, Value::Number(divisor)) = (op, &right) {
+                self.warn_of_zero(*divisor, operand);
+            }
+            value = self.product(op, &value, &right, first.span.to(operand.span));
+        }
+        value
     }
 
     fn quantity(&mut self, value: f64, unit: &Name) -> Value {

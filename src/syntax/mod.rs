@@ -10,6 +10,7 @@ mod grammar;
 mod parse;
 mod print;
 mod slips;
+mod words;
 
 pub use ast::Ast;
 pub use grammar::EDITION;

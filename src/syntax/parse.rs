@@ -7,6 +7,7 @@ use super::ast::Ast;
 use super::build;
 use super::grammar::{Grammar, Rule};
 use super::slips::Slip;
+use super::words::{ITEM_WORDS, KEYWORDS, token_at};
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 
 /// Brackets nested deeper than this are refused. The limit is beyond what a person writes and well inside the
@@ -16,11 +17,6 @@ const DEEPEST_NESTING: usize = 200;
 /// Stack of the parsing thread, in bytes: the same limit on every platform, and enough for
 /// [`DEEPEST_NESTING`] in debug builds.
 const STACK_BYTES: usize = 32 << 20;
-
-pub(super) const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"];
-
-pub(super) const KEYWORDS: [&str; 12] =
-    ["param", "let", "fn", "solid", "scene", "import", "and", "or", "not", "any", "all", "in"];
 
 /// Parses a text. Items that fit the grammar are returned even if others do not; the messages tell which do
 /// not.
@@ -131,21 +127,6 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     };
     let diagnostic = Diagnostic::error(Code::SYNTAX, span, format!("unexpected {what}"));
     if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) }
-}
-
-/// The word, number or single character at a place in the text.
-pub(super) fn token_at(text: &str, at: usize, end: usize) -> &str {
-    let rest = &text[at..end.max(at)];
-    let Some(first) = rest.chars().next() else { return "" };
-    let wordy = |c: char| c.is_alphanumeric() || c == '_';
-    if wordy(first) {
-        let length = rest.find(|c: char| !wordy(c)).unwrap_or(rest.len());
-        return &rest[..length];
-    }
-    if first.is_whitespace() || first.is_control() {
-        return "";
-    }
-    &rest[..first.len_utf8()]
 }
 
 /// Rule names in the words of the language, each only once.

@@ -2,7 +2,7 @@
 //! another language.
 
 use super::foreign;
-use super::parse::{ITEM_WORDS, KEYWORDS, token_at};
+use super::words::{ITEM_WORDS, KEYWORDS, token_at};
 use crate::diagnostic::{Code, Diagnostic, Span, nearest};
 
 /// A place in the text where the grammar went no further.

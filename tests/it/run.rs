@@ -295,13 +295,12 @@ fn two_runs_never_share_a_folder() {
 fn a_fluid_without_room_ends_its_run() {
     let folder = tempfile::tempdir().unwrap();
     let press = "rfm 1
-solid press = box([-1, -1, 0], [2, 2, 3]).move([0, 0, 0.6 - 3*t])
+solid press = box([-1, -1, 0], [2, 2, 3]).move([0, 0, 0.6 - 0.3*t])
 scene crush {
   box { max: [1, 1, 1] }
-  fluid { shape: box([0, 0, 0], [1, 1, 0.4]), spacing: 0.1, density: 1000 }
+  fluid { shape: box([0, 0, 0], [1, 1, 0.4]), mass: 2, support_radius: 0.3, density: 1000 }
   obstacle { solid: press }
-  method: dfsph
-  run { until: 0.3 s, save_every: 10 ms }
+  run { until: 3 s, save_every: 50 ms }
 }
 ";
     std::fs::write(folder.path().join("drop.rfm"), press).unwrap();

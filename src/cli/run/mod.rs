@@ -29,6 +29,7 @@ use folder::Hold;
 use frames::Frames;
 use goal::{Goal, Pace};
 use probes::Probes;
+use rfm::lower::Scene;
 use rfm::sph::{Simulation, short_time};
 use rfm::{Error, Experiment, Program};
 use stop::{NoRoom, Stop};
@@ -54,6 +55,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         None => start(&experiment)?,
     };
     let goal = Goal::of(options, &experiment)?;
+    frames_fit(options, goal, &experiment)?;
     let _held = held.map_or_else(|| Hold::take(&folder), Ok)?;
     let mut recording = Recording {
         frames: Frames::new(options, &experiment, resumed.as_ref())?,
@@ -73,6 +75,20 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         Err(other) => return Err(other),
     };
     conclude(shared, &folder, &recording, &simulation, stopped)
+}
+
+/// Refuses more frames than there are names for.
+fn frames_fit(options: &Run, goal: Goal, experiment: &Experiment) -> Result<(), Failure> {
+    let frames = goal.frames(experiment, experiment.parameters().time_step);
+    if options.no_frames || frames <= Scene::MOST_FRAMES {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "a run to so late an end has {frames} frames, one every {} s; at most {} are saved: choose an earlier end, a longer \
+         `save_every` in the scene, or --no-frames",
+        experiment.scene().run.save_every,
+        Scene::MOST_FRAMES
+    )))
 }
 
 /// Writes the summary and the plots, and says how the run ended.

@@ -77,6 +77,11 @@ pub struct Scene {
     pub tolerance: Option<Tolerance>,
 }
 
+impl Scene {
+    /// The most frames of a run: the names of their files have six digits.
+    pub const MOST_FRAMES: u64 = 999_999;
+}
+
 /// How a wall acts on a particle that hits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounce {

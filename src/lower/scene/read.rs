@@ -275,15 +275,14 @@ impl<'a> Lowering<'a> {
 
     /// Reports frames that would fill a disk, and warns of frames so rare that there are none.
     fn frames_fit(&mut self, run: &Run, at: Span) -> bool {
-        /// Files of frames have six digits.
-        const MOST: f64 = 999_999.0;
         const MANY: f64 = 20_000.0;
         let frames = run.until / run.save_every;
         let [until, every] = [run.until, run.save_every].map(seconds_as_written);
         let fewer = format!("write for example `save_every: {}`", seconds_as_written(run.until / 100.0));
-        if frames > MOST {
+        if frames > Scene::MOST_FRAMES as f64 {
             let message = format!(
-                "{until} with a frame every {every} are {frames:.3e} frames; at most {MOST} are saved"
+                "{until} with a frame every {every} are {frames:.3e} frames; at most {} are saved",
+                Scene::MOST_FRAMES
             );
             self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(fewer));
             return false;
