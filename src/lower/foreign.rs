@@ -76,14 +76,9 @@ fn written(what: &str, call: &str) -> Option<Words> {
 
 /// Shapes that are joined, as a function of all of them or as a method of the first.
 fn joined(name: &str, a: &[&str]) -> Option<Words> {
-    let operand = |text: &&str| {
-        let simple = !text.contains([' ', '\\', '|', '&', '<', '>'])
-            || (text.ends_with(')') && !text.contains(" or "));
-        if simple { (*text).to_string() } else { format!("({text})") }
-    };
     let chain = |op: &str| match a {
         [] | [_] => format!("a {op} b"),
-        all => all.iter().map(operand).collect::<Vec<_>>().join(&format!(" {op} ")),
+        all => all.iter().map(|text| foreign::operand(text)).collect::<Vec<_>>().join(&format!(" {op} ")),
     };
     match name {
         "union" | "unite" | "merge" | "fuse" | "join" | "combine" | "opUnion" | "add" | "sdUnion" => {
@@ -94,11 +89,14 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
             written("`\\` here, which is without", &chain("\\"))
         }
         "xor" | "symmetric_difference" | "opXor" => match a {
-            [a, b] => written("not an operation here", &format!("({a} or {b}) \\ ({a} and {b})")),
+            [a, b] => {
+                let [a, b] = [a, b].map(|text| foreign::operand(text));
+                written("not an operation here", &format!("({a} or {b}) \\ ({a} and {b})"))
+            }
             _ => written("not an operation here", "(a or b) \\ (a and b)"),
         },
         "complement" | "inverse" | "invert" | "negate" => match a {
-            [only] => written("`not` here", &format!("not {}", operand(only))),
+            [only] => written("`not` here", &format!("not {}", foreign::operand(only))),
             _ => written("`not` here", "not a"),
         },
         "smooth_union" | "smin" | "opSmoothUnion" | "blend" | "smax" | "fillet" | "chamfer" | "round"

@@ -117,6 +117,20 @@ pub fn in_degrees(angle: &str) -> String {
     if angle.parse::<f64>().is_ok() { format!("{angle} deg") } else { angle.to_string() }
 }
 
+/// An expression as the operand of `and`, `or` or `\`: in brackets, unless it is one name or one call.
+pub fn operand(text: &str) -> String {
+    let mut depth = 0_i32;
+    let is_one = text.chars().all(|c| {
+        depth += match c {
+            '(' | '[' => 1,
+            ')' | ']' => -1,
+            _ => 0,
+        };
+        depth > 0 || c.is_alphanumeric() || matches!(c, ')' | ']' | '_' | '.')
+    });
+    if is_one { text.to_string() } else { format!("({text})") }
+}
+
 /// A quantity with a unit of this language for one with a unit that it does not have.
 pub fn quantity(number: &str, word: &str) -> Option<String> {
     let (factor, unit) = match word {
@@ -201,4 +215,31 @@ pub fn key(word: &str) -> Option<&'static str> {
 /// A number that GLSL or C writes with a letter behind it, as `1.5f`.
 pub fn is_letter_of_type(word: &str) -> bool {
     ["f", "F", "u", "U", "lf", "LF"].contains(&word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn operands_keep_their_meaning() {
+        for (text, expected) in [
+            ("a", "a"),
+            ("sphere(1, [0, 0, 2]).move([1, 0, 0])", "sphere(1, [0, 0, 2]).move([1, 0, 0])"),
+            ("x <= 0 and box()", "(x <= 0 and box())"),
+            ("sphere(1) or box()", "(sphere(1) or box())"),
+            ("-x", "(-x)"),
+        ] {
+            assert_eq!(operand(text), expected);
+        }
+    }
+
+    #[test]
+    fn turns_of_other_languages() {
+        assert_eq!(turned("[0, 90, 45]"), ".rotate_y(90 deg).rotate_z(45 deg)");
+        assert_eq!(turned("45"), ".rotate_z(45 deg)");
+        assert_eq!(turned("30 deg"), ".rotate_z(30 deg)");
+        assert_eq!(quantity("2", "turns").as_deref(), Some("720 deg"));
+        assert_eq!(quantity("0.1", "bar").as_deref(), Some("10 kPa"));
+    }
 }

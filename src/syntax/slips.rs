@@ -100,7 +100,10 @@ impl<'t> Slip<'t> {
             return None;
         }
         let written = match bracketed(self.after()).map(parts) {
-            Some(parts) if parts.len() > 1 && fits(&parts) => parts.join(&format!(" {word} ")),
+            Some(parts) if parts.len() > 1 && fits(&parts) => {
+                let operands: Vec<String> = parts.into_iter().map(foreign::operand).collect();
+                operands.join(&format!(" {word} "))
+            }
             _ => format!("a {word} b"),
         };
         Some(
