@@ -63,13 +63,13 @@ pub(super) fn dry_run(
     let estimate = experiment.estimated_particles().map_err(refused)?;
     let estimated = estimate > 1.5 * MEASURED;
     let smaller;
-    let measured = if estimated {
-        smaller = coarser(shared, experiment).map_err(refused)?;
-        &smaller
+    let (measured, mut simulation) = if estimated {
+        let found = coarser(shared, experiment)?;
+        smaller = found.0;
+        (&smaller, found.1)
     } else {
-        experiment
+        (experiment, start(experiment)?.0)
     };
-    let mut simulation = if estimated { started(measured)? } else { start(measured)?.0 };
     let per_step = seconds_per_step(&mut simulation)?;
     let (stats, parameters) = (simulation.stats(), experiment.parameters());
     let particles = if estimated { estimate.round() as usize } else { stats.particles };
@@ -106,26 +106,22 @@ pub(super) fn dry_run(
     Ok(())
 }
 
-/// The scene with few large particles. With particles too large for what the scene has of gaps nothing may be left, so
-/// more of them are tried.
-fn coarser(shared: &Shared, experiment: &Experiment) -> Result<Experiment, Error> {
-    let mut last = None;
-    for factor in [1.0, 4.0, 16.0] {
-        let smaller = experiment.coarser(factor * MEASURED, shared.engine.into())?;
-        match smaller.start() {
-            Ok(_) => return Ok(smaller),
-            Err(error) => last = Some(error),
-        }
-    }
-    last.map_or_else(|| experiment.coarser(MEASURED, shared.engine.into()), Err)
-}
-
-/// A simulation of the scene with larger particles. Of its warnings, those that count particles would mislead.
-fn started(smaller: &Experiment) -> Result<Simulation, Failure> {
-    let mut start = smaller.start().map_err(refused)?;
+/// The scene with few large particles, started. With particles too large for what the scene has of gaps nothing may be
+/// left, so more of them are tried.
+fn coarser(shared: &Shared, experiment: &Experiment) -> Result<(Experiment, Simulation), Failure> {
+    let started = |particles: f64| {
+        let smaller = experiment.coarser(particles, shared.engine.into())?;
+        let start = smaller.start()?;
+        Ok((smaller, start))
+    };
+    let found: Result<_, Error> = started(MEASURED)
+        .or_else(|_: Error| started(4.0 * MEASURED))
+        .or_else(|_: Error| started(16.0 * MEASURED));
+    let (smaller, mut start) = found.map_err(refused)?;
+    // warnings that count particles would mislead
     start.warnings.list.retain(|warning| warning.code != Code::FLUID_IN_OBSTACLE);
     input::show(&start.warnings);
-    Ok(start.simulation)
+    Ok((smaller, start.simulation))
 }
 
 fn seconds_per_step(simulation: &mut Simulation) -> Result<f64, Failure> {
