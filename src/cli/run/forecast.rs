@@ -19,8 +19,11 @@ use rfm::diagnostic::Code;
 use rfm::sph::Simulation;
 use rfm::{Error, Experiment};
 
-/// Most particles of a simulation that is started to be measured.
-const MEASURED: f64 = 6000.0;
+/// Most particles of a simulation that is started to be measured, and least if they have very many neighbours.
+const MEASURED: (f64, f64) = (6000.0, 500.0);
+
+/// So many neighbours of a particle are usual. With more of them fewer particles are measured.
+const USUAL_NEIGHBOURS: f64 = 500.0;
 
 /// Number of steps before the clock starts: buffers grow in them, and solvers have no answer yet to start from.
 const FIRST: u32 = 2;
@@ -61,10 +64,11 @@ pub(super) fn dry_run(
     goal: Goal,
 ) -> Result<(), Failure> {
     let estimate = experiment.estimated_particles().map_err(refused)?;
-    let estimated = estimate > 1.5 * MEASURED;
+    let most = most_measured(experiment);
+    let estimated = estimate > 1.5 * most;
     let smaller;
     let (measured, mut simulation) = if estimated {
-        let found = coarser(shared, experiment)?;
+        let found = coarser(shared, experiment, most)?;
         smaller = found.0;
         (&smaller, found.1)
     } else {
@@ -74,6 +78,9 @@ pub(super) fn dry_run(
     let (stats, parameters) = (simulation.stats(), experiment.parameters());
     let particles = if estimated { estimate.round() as usize } else { stats.particles };
     let scale = particles as f64 / stats.particles as f64;
+    let reach = within_reach(experiment);
+    let crowding = reach.min(particles as f64) / reach.min(stats.particles as f64);
+    let per_step = scale * crowding * per_step;
     let time_step = time_step(experiment, measured, &simulation);
     let steps = goal.steps(time_step);
     let frames = if options.no_frames { 0 } else { 1 + goal.frames(experiment, time_step) };
@@ -94,9 +101,9 @@ pub(super) fn dry_run(
         frames,
         disk_bytes: disk,
         disk_bytes_free: free_disk(&folder::of(options)),
-        milliseconds_per_step: scale * per_step * 1e3,
+        milliseconds_per_step: per_step * 1e3,
         milliseconds_per_frame: cost.seconds * 1e3,
-        seconds: scale * per_step * steps as f64 + cost.seconds * frames as f64,
+        seconds: per_step * steps as f64 + cost.seconds * frames as f64,
     };
     warn_of_too_much(&forecast);
     if shared.json {
@@ -108,20 +115,31 @@ pub(super) fn dry_run(
 
 /// The scene with few large particles, started. With particles too large for what the scene has of gaps nothing may be
 /// left, so more of them are tried.
-fn coarser(shared: &Shared, experiment: &Experiment) -> Result<(Experiment, Simulation), Failure> {
+fn coarser(shared: &Shared, experiment: &Experiment, most: f64) -> Result<(Experiment, Simulation), Failure> {
     let started = |particles: f64| {
         let smaller = experiment.coarser(particles, shared.engine.into())?;
         let start = smaller.start()?;
         Ok((smaller, start))
     };
-    let found: Result<_, Error> = started(MEASURED)
-        .or_else(|_: Error| started(4.0 * MEASURED))
-        .or_else(|_: Error| started(16.0 * MEASURED));
+    let found: Result<_, Error> =
+        started(most).or_else(|_: Error| started(4.0 * most)).or_else(|_: Error| started(16.0 * most));
     let (smaller, mut start) = found.map_err(refused)?;
     // warnings that count particles would mislead
     start.warnings.list.retain(|warning| warning.code != Code::FLUID_IN_OBSTACLE);
     input::show(&start.warnings);
     Ok((smaller, start.simulation))
+}
+
+/// Particles of the rest spacing within the support radius of one.
+fn within_reach(experiment: &Experiment) -> f64 {
+    let parameters = experiment.parameters();
+    4.0 / 3.0 * std::f64::consts::PI * (parameters.support_radius / parameters.spacing()).powi(3)
+}
+
+/// The most particles that are measured: a step costs what its pairs cost.
+fn most_measured(experiment: &Experiment) -> f64 {
+    let (most, least) = MEASURED;
+    (most * (USUAL_NEIGHBOURS / within_reach(experiment)).sqrt().min(1.0)).max(least)
 }
 
 fn seconds_per_step(simulation: &mut Simulation) -> Result<f64, Failure> {
