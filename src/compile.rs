@@ -147,13 +147,18 @@ impl Program {
         Ok(Self { sources, ast, syntax_messages, options, module: Arc::new(module), warnings: list })
     }
 
-    /// Checks the same file again with another value for one of its params.
+    /// Checks the same file again with another value, in SI units, for one of its params.
     ///
     /// # Errors
     /// [`Error::Diagnostics`] if the file declares no such param, or if the value makes it wrong.
     pub fn with(&self, param: &str, value: f64) -> Result<Self, Error> {
         let mut options = self.options.clone();
         options.overrides.insert(param.to_string(), value);
+        // a program gives numbers in SI units, whatever the file writes
+        let declared = self.module.params.iter().find(|declared| declared.name == param);
+        if let Some((unit, _)) = declared.and_then(|declared| declared.unit.as_ref()) {
+            options.dimensions.insert(param.to_string(), unit.dimension);
+        }
         self.lowered_again(options)
     }
 

@@ -130,6 +130,39 @@ pub struct Unit {
     pub dimension: Dimension,
 }
 
+/// A value in SI units as a text in another unit, without the last digits, which the conversion leaves undetermined.
+pub fn in_unit(value: f64, unit: Unit, text: &str) -> String {
+    let converted = value / unit.factor;
+    let rounded: f64 = format!("{converted:.12e}").parse().unwrap_or(converted);
+    format!("{rounded} {text}")
+}
+
+/// Reads a number with or without a unit, as in `10 deg`, `8mm` or `0.5`. The dimension is `None` if there is no unit.
+///
+/// # Errors
+/// What is wrong with the text, in words.
+pub fn parse_quantity(text: &str) -> Result<(f64, Option<Dimension>), String> {
+    let text = text.trim();
+    let is_exponent = |at: usize, c: char| {
+        matches!(c, 'e' | 'E')
+            && text[at + 1..].trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_digit())
+    };
+    let begins_unit = |(at, c): &(usize, char)| (c.is_alphabetic() || *c == '°') && !is_exponent(*at, *c);
+    let digits = text.find(|c: char| c.is_ascii_digit()).unwrap_or(text.len());
+    let split = text
+        .char_indices()
+        .skip_while(|(at, _)| *at < digits)
+        .find(begins_unit)
+        .map_or(text.len(), |(at, _)| at);
+    let (number, unit) = (text[..split].trim(), &text[split..]);
+    let number: f64 = number.parse().map_err(|_| format!("`{text}` is not a number"))?;
+    if unit.is_empty() {
+        return Ok((number, None));
+    }
+    let unit = parse_unit(unit).ok_or_else(|| format!("`{unit}` is not a unit"))?;
+    Ok((number * unit.factor, Some(unit.dimension)))
+}
+
 /// Reads a unit in the notation of the grammar: `kg/m^3`, `Pa·s`, `deg/s`. A `/` divides by the next unit
 /// only. `None` if a part of the text is not a known unit.
 pub fn parse_unit(text: &str) -> Option<Unit> {
@@ -212,5 +245,33 @@ mod tests {
         check("m/s^2", 1.0, Dimension::ACCELERATION);
         check("mm", 1e-3, Dimension::LENGTH);
         assert_eq!(parse_unit("furlong"), None);
+    }
+
+    #[test]
+    fn numbers_with_units() {
+        let check = |text: &str, value: f64, dimension| {
+            let (found, unit) = parse_quantity(text).unwrap();
+            assert!((found - value).abs() <= 1e-15 * value.abs(), "{text}: {found}");
+            assert_eq!(unit, dimension, "{text}");
+        };
+        check("0.5", 0.5, None);
+        check(" -1e-3 ", -1e-3, None);
+        check("8mm", 8e-3, Some(Dimension::LENGTH));
+        check("2e-1 cm", 2e-3, Some(Dimension::LENGTH));
+        check("180 deg", std::f64::consts::PI, Some(Dimension::ANGLE));
+        check("180°", std::f64::consts::PI, Some(Dimension::ANGLE));
+        check("500 ms", 0.5, Some(Dimension::TIME));
+        assert!(parse_quantity("inf").unwrap().0.is_infinite());
+        for text in ["", "mm", "wide", "1,5", "8 furlong", "8 mm long", "--8"] {
+            assert!(parse_quantity(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn values_are_shown_in_the_unit_that_they_were_written_in() {
+        let unit = |text| parse_unit(text).unwrap();
+        assert_eq!(in_unit(0.0008, unit("mm"), "mm"), "0.8 mm");
+        assert_eq!(in_unit(45.0 * (std::f64::consts::PI / 180.0), unit("deg"), "deg"), "45 deg");
+        assert_eq!(in_unit(f64::INFINITY, unit("mm"), "mm"), "inf mm");
     }
 }

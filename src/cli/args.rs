@@ -7,12 +7,15 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::mesh::{ascii_help, format_name, output_help};
+use super::values::{
+    Definition, Frames, Tolerance, aabb, count, definition, frames, length, plane, point, seconds, threads,
+    tolerance, window,
+};
 use glam::DVec3;
 use rfm::geom::Aabb;
 use rfm::mesh::Format;
 use rfm::precision::Precision;
-use rfm::quantity::{Dimension, parse_unit};
-use rfm::slice::{Axis, Plane};
+use rfm::slice::Plane;
 use rfm::sph::Method;
 
 /// Obstacles written as R-functions, compiled to machine code: check, mesh, simulate.
@@ -37,9 +40,9 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Args)]
 pub(super) struct Shared {
-    /// Set a param of the file; may be repeated
+    /// Set a param of the file, with a unit or in SI units (-D d=8mm, -D alpha="10 deg"); may be repeated
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = definition, global = true)]
-    pub define: Vec<(String, f64)>,
+    pub define: Vec<Definition>,
     /// Threads to use [default: all processors]; results do not depend on it
     #[arg(long, value_name = "N", value_parser = threads, global = true)]
     pub threads: Option<NonZeroUsize>,
@@ -113,8 +116,8 @@ pub(super) struct Check {
     /// Check again whenever a file changes
     #[arg(long)]
     pub watch: bool,
-    /// Time at which moving solids are evaluated, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
+    /// Time at which moving solids are evaluated, in seconds or with a unit
+    #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// Treat a kind of message as an error
     #[arg(long, value_enum, value_name = "KIND")]
@@ -139,8 +142,8 @@ pub(super) struct Eval {
     /// A CSV file of points with the header x,y,z; `-` is standard input
     #[arg(long, value_name = "FILE")]
     pub points: Option<PathBuf>,
-    /// Time at which moving solids are evaluated, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
+    /// Time at which moving solids are evaluated, in seconds or with a unit
+    #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// Columns to print
     #[arg(long, value_enum, value_delimiter = ',', default_value = "value,gradient")]
@@ -185,8 +188,8 @@ pub(super) struct Mesh {
     /// Mesh this box instead of the solid's own bounds; the mesh is closed at its border
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = aabb, allow_hyphen_values = true)]
     pub domain: Option<Aabb>,
-    /// Time at which moving solids are evaluated, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
+    /// Time at which moving solids are evaluated, in seconds or with a unit
+    #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
     /// How the surface is found
     #[arg(long, value_enum, default_value_t = MeshMethod::Dc)]
@@ -229,24 +232,6 @@ pub(super) struct Mesh {
     pub format: Option<Format>,
 }
 
-/// How far a simplified mesh may be from the surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Tolerance {
-    /// A length, m.
-    Length(f64),
-    /// A part of the diagonal of the mesh's bounds.
-    OfDiagonal(f64),
-}
-
-/// A range of frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Frames {
-    /// The first frame.
-    pub first: usize,
-    /// The first frame that is left out; `None`: all frames from `first` on.
-    pub end: Option<usize>,
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum MeshMethod {
     /// Marching cubes with vertices on the exact surface: a third of the time at as many cells, but edges are
@@ -269,12 +254,15 @@ pub(super) struct Run {
     /// Stop after this many steps, counted from the run's beginning
     #[arg(long, value_name = "N", conflicts_with = "until")]
     pub steps: Option<u64>,
-    /// Stop at this simulated time, seconds
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// Stop at this simulated time, in seconds or with a unit: 500ms
+    #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true)]
     pub until: Option<f64>,
     /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed
     #[arg(long)]
     pub resume: bool,
+    /// Replace the run that the folder holds
+    #[arg(long, conflicts_with = "resume")]
+    pub force: bool,
     /// Print what would be run, and run nothing
     #[arg(long, conflicts_with = "resume")]
     pub dry_run: bool,
@@ -369,115 +357,6 @@ pub(super) enum Stage {
     Asm,
 }
 
-fn definition(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
-    let value = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
-    Ok((name.trim().to_string(), value))
-}
-
-/// Most threads. A larger number is a typing error, and starting the threads would take minutes.
-const MOST_THREADS: usize = 1024;
-
-fn threads(text: &str) -> Result<NonZeroUsize, String> {
-    let number = text.trim().parse().ok().filter(|n: &NonZeroUsize| n.get() <= MOST_THREADS);
-    number.ok_or_else(|| format!("expected a whole number from 1 to {MOST_THREADS}"))
-}
-
-fn count(text: &str) -> Result<usize, String> {
-    let number = text.trim().parse().ok().filter(|&n: &usize| n > 0);
-    number.ok_or_else(|| "expected a whole number above 0".to_string())
-}
-
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let parts: Vec<&str> = text.split(',').collect();
-    let values: Result<Vec<f64>, String> = parts
-        .iter()
-        .map(|part| part.trim().parse().map_err(|_| format!("`{part}` is not a number")))
-        .collect();
-    values?.try_into().map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let value: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
-    if value.is_finite() { Ok(value) } else { Err("the time must be finite".into()) }
-}
-
-/// A number of metres, or a number with a unit of length.
-fn length(text: &str) -> Result<f64, String> {
-    let text = text.trim();
-    let unit = text.find(|c: char| c.is_alphabetic() && !matches!(c, 'e' | 'E')).unwrap_or(text.len());
-    let (number, unit) = text.split_at(unit);
-    let number: f64 = number.trim().parse().map_err(|_| format!("`{text}` is not a length"))?;
-    match unit {
-        "" => Ok(number),
-        unit => parse_unit(unit)
-            .filter(|unit| unit.dimension == Dimension::LENGTH)
-            .map(|unit| number * unit.factor)
-            .ok_or_else(|| format!("`{unit}` is not a unit of length; expected m, cm, mm, um or km")),
-    }
-}
-
-/// A length, or a percentage.
-fn tolerance(text: &str) -> Result<Tolerance, String> {
-    let found = match text.trim().strip_suffix('%') {
-        None => length(text).map(|length| (length, Tolerance::Length(length))),
-        Some(number) => number
-            .trim()
-            .parse::<f64>()
-            .map(|percent| (percent, Tolerance::OfDiagonal(percent / 100.0)))
-            .map_err(|_| format!("`{text}` is neither a length nor a percentage")),
-    };
-    match found? {
-        (size, tolerance) if size.is_finite() && size > 0.0 => Ok(tolerance),
-        _ => Err("expected a length or a percentage above 0".into()),
-    }
-}
-
-/// `A..B`, `A..`, `..B`, or one number.
-fn frames(text: &str) -> Result<Frames, String> {
-    let whole = |text: &str| {
-        text.trim()
-            .parse::<usize>()
-            .map_err(|_| format!("`{text}` is not the number of a frame; expected A..B"))
-    };
-    let Some((first, end)) = text.split_once("..") else {
-        let first = whole(text)?;
-        return Ok(Frames { first, end: first.checked_add(1) });
-    };
-    Ok(Frames {
-        first: if first.trim().is_empty() { 0 } else { whole(first)? },
-        end: if end.trim().is_empty() { None } else { Some(whole(end)?) },
-    })
-}
-
-fn point(text: &str) -> Result<DVec3, String> {
-    numbers::<3>(text).map(DVec3::from_array)
-}
-
-fn window(text: &str) -> Result<[f64; 4], String> {
-    numbers::<4>(text)
-}
-
-fn aabb(text: &str) -> Result<Aabb, String> {
-    let [x0, y0, z0, x1, y1, z1] = numbers::<6>(text)?;
-    Ok(Aabb::new(DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1)))
-}
-
-fn plane(text: &str) -> Result<Plane, String> {
-    let (axis, value) = text.split_once('=').ok_or("expected x=…, y=… or z=…")?;
-    let axis = match axis.trim() {
-        "x" => Axis::X,
-        "y" => Axis::Y,
-        "z" => Axis::Z,
-        other => return Err(format!("`{other}` is not an axis; expected x, y or z")),
-    };
-    let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
-    if !value.is_finite() {
-        return Err("the plane must be at a finite place".into());
-    }
-    Ok(Plane::new(axis, value))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -486,39 +365,5 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn lengths_have_units_or_are_metres() {
-        for (text, expected) in
-            [("0.5", 0.5), ("2 mm", 2e-3), ("2e-1cm", 2e-3), ("-1m", -1.0), ("1E3um", 1e-3)]
-        {
-            let found = length(text).unwrap();
-            assert!((found - expected).abs() < 1e-15, "{text}: {found}");
-        }
-        for text in ["", "mm", "2 kg", "2 furlong", "1,5"] {
-            assert!(length(text).is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn tolerances_are_lengths_or_percentages() {
-        assert_eq!(tolerance("2mm"), Ok(Tolerance::Length(2e-3)));
-        assert_eq!(tolerance("0.5 %"), Ok(Tolerance::OfDiagonal(5e-3)));
-        for text in ["0", "-1mm", "%", "0%", "nan", "inf%", "1e400", "few"] {
-            assert!(tolerance(text).is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn ranges_of_frames() {
-        let range = |first, end| Ok(Frames { first, end });
-        assert_eq!(frames("3..5"), range(3, Some(5)));
-        assert_eq!(
-            (frames("3.."), frames("..5"), frames("..")),
-            (range(3, None), range(0, Some(5)), range(0, None))
-        );
-        assert_eq!(frames("7"), range(7, Some(8)));
-        assert!(frames("a..b").is_err() && frames("-1..2").is_err() && frames("").is_err());
     }
 }

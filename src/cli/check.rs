@@ -1,22 +1,19 @@
 //! `rfm check`: messages about files, the solids with their bounds and volumes, and slices.
 
-use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::io::IsTerminal;
+use std::path::Path;
 use std::time::{Duration, SystemTime};
 
-use glam::DVec2;
 use serde::Serialize;
 
 use super::args::{Check, Deny, Shared};
 use super::failure::{Failure, complain, note};
-use super::{choose, input, output};
+use super::{choose, input, output, section};
+use crate::cli::output::Shown;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
-use rfm::field::Field;
-use rfm::geom::Aabb;
 use rfm::ir::Magnitudes;
 use rfm::lower::NamedSolid;
 use rfm::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
-use rfm::slice::{self, Plane, Window};
 use rfm::solid::{Bounds, ProgramKind};
 use rfm::{Precision, Program, Solid};
 
@@ -161,7 +158,8 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
                 }
                 document.solids.extend(facts);
                 if let Some(plane) = options.slice {
-                    plot(shared, options, &program, plane)?;
+                    let meets = section::plot(shared, options, &program, plane)?;
+                    document.ok &= meets || options.deny.is_none();
                 }
             }
         }
@@ -337,11 +335,18 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
 fn print(file: &str, program: &Program, facts: &[Facts]) {
     let module = program.module();
     let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
-    say!("{file}: {}, {}", count(module.solids.len(), "solid"), count(module.scenes.len(), "scene"));
+    say!(
+        "{}: {}, {}",
+        Path::new(file).shown(),
+        count(module.solids.len(), "solid"),
+        count(module.scenes.len(), "scene")
+    );
     for param in &module.params {
-        let range = param.range.map_or(String::new(), |(low, high)| format!(" in {low} .. {high}"));
-        let doc = param.doc.as_ref().map_or(String::new(), |doc| format!("   {doc}"));
-        say!("  param {} = {}{range}{doc}", param.name, param.value);
+        let shown = |value| param.shown(value);
+        let range = param.range.map(|(low, high)| format!(" in {} .. {}", shown(low), shown(high)));
+        let doc = param.doc.as_ref().map(|doc| format!("   {doc}"));
+        let (range, doc) = (range.unwrap_or_default(), doc.unwrap_or_default());
+        say!("  param {} = {}{range}{doc}", param.name, shown(param.value));
     }
     for solid in facts {
         say!("  solid {}", solid.name);
@@ -352,11 +357,8 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             say!("    empty");
         }
         if let Some(bounds) = &solid.bounds {
-            // rounded first, so that zero has no sign
-            let round = |x: f64| (1e4 * x).round() / 1e4 + 0.0;
-            let corner =
-                |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", round(c[0]), round(c[1]), round(c[2]));
-            say!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
+            let [min, max] = corners(bounds);
+            say!("    bounds      {min} … {max}");
             if solid.volume.is_none() {
                 say!(
                     "    volume      not found: too thin for {} cells along its longest side",
@@ -367,10 +369,10 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             say!("    bounds      none found");
         }
         if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-            say!("    volume      {volume:.6} ± {error:.1e}");
+            say!("    volume      {} ± {error:.1e}", significant(volume));
         }
         if let (Some(area), Some(components), false) = (solid.area, solid.components, solid.empty) {
-            say!("    area        {area:.6}");
+            say!("    area        {}", significant(area));
             say!("    components  {components}");
         }
         if let (Some(name), Some(bound), Some(tolerance)) =
@@ -389,66 +391,20 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
     }
 }
 
-fn plot(shared: &Shared, options: &Check, program: &Program, plane: Plane) -> Result<(), Failure> {
-    let solid = choose::solid(shared, program, options.solid.as_deref())?.at(options.time);
-    let window = match options.window {
-        Some([u0, v0, u1, v1]) => Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)),
-        None => plane.window(&around(&solid)?),
-    };
-    // if no program keeps the tolerance, which was reported, the solid's own ω is drawn
-    let chosen = program.within_tolerance(&solid).and_then(Result::ok);
-    let field: &dyn Field = chosen.as_ref().map_or(&solid as &dyn Field, |chosen| chosen);
-    if options.term {
-        // drawn to memory first, so that a reader who leaves early is no error of the drawing
-        let mut drawing = Vec::new();
-        let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        slice::terminal::draw(field, solid.name(), plane, window, 78, colour, &mut drawing)
-            .map_err(Failure::usage)?;
-        let mut out = anstream::stdout();
-        out.write_all(&drawing)?;
-        out.flush()?;
-        if options.output.is_none() {
-            return Ok(());
-        }
+/// A figure with six digits: in full where that is readable, otherwise with an exponent.
+fn significant(figure: f64) -> String {
+    match figure.abs() {
+        size if (1e-2..1e7).contains(&size) || size == 0.0 => format!("{figure:.6}"),
+        _ => format!("{figure:.5e}"),
     }
-    let path = match &options.output {
-        Some(path) => path.clone(),
-        None => PathBuf::from(format!("{}.{}.svg", solid.name(), plane.to_string().replace(' ', ""))),
-    };
-    let picture = picture(field, solid.name(), plane, window, &path)?;
-    output::write(&path, |out| out.write_all(&picture))?;
-    if !shared.json {
-        say!("slice {plane} of {} written to {}", solid.name(), path.display());
-    }
-    Ok(())
 }
 
-fn picture(
-    field: &dyn Field,
-    name: &str,
-    plane: Plane,
-    window: Window,
-    path: &Path,
-) -> Result<Vec<u8>, Failure> {
-    let mut bytes = Vec::new();
-    let samples = slice::DEFAULT_SAMPLES;
-    match output::Picture::of(path)? {
-        output::Picture::Svg => slice::write_svg(field, name, plane, window, samples, &mut bytes),
-        output::Picture::Png => slice::write_png(field, name, plane, window, samples, 2.0, &mut bytes),
-    }
-    .map_err(Failure::usage)?;
-    Ok(bytes)
-}
-
-/// The solid's bounds with a margin.
-fn around(solid: &Solid) -> Result<Aabb, Failure> {
-    match solid.bounds() {
-        Bounds::Within(bounds) => Ok(bounds.grown(0.15 * bounds.size().max_element())),
-        Bounds::Empty => {
-            Err(Failure::usage("the solid is empty: say what to plot with --window U0,V0,U1,V1"))
-        }
-        Bounds::Unbounded => {
-            Err(Failure::usage("the solid has no bounds: say what to plot with --window U0,V0,U1,V1"))
-        }
-    }
+/// The corners of a box, with as many digits behind the point as the box is small.
+fn corners(bounds: &Box3) -> [String; 2] {
+    let size = (0..3).map(|i| bounds.max[i] - bounds.min[i]).fold(f64::MIN_POSITIVE, f64::max);
+    let digits = (3.0 - size.log10().floor()).clamp(4.0, 12.0) as usize;
+    // rounded first, so that zero has no sign
+    let unit = 10f64.powi(digits as i32);
+    let shown = |x: f64| format!("{:.digits$}", (unit * x).round() / unit + 0.0);
+    [bounds.min, bounds.max].map(|corner| format!("({})", corner.map(shown).join(", ")))
 }

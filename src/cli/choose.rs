@@ -5,6 +5,7 @@ use std::path::Path;
 use super::args::Shared;
 use super::failure::{Failure, note};
 use super::input;
+use crate::cli::output::Shown;
 use rfm::diagnostic::{Diagnostics, nearest};
 use rfm::lower::{NamedSolid, Scene};
 use rfm::solid::Chosen;
@@ -25,7 +26,7 @@ pub(super) fn no_such(path: &Path, program: &Program, name: &str) -> Failure {
     let scenes = module.scenes.iter().map(|s| s.name.as_str());
     let near = nearest(name, solids.chain(scenes));
     let hint = near.map_or(String::new(), |n| format!("; did you mean `{n}`?"));
-    Failure::usage(format!("`{}` has no solid or scene `{name}`{hint}", path.display()))
+    Failure::usage(format!("`{}` has no solid or scene `{name}`{hint}", path.shown()))
 }
 
 /// The solid of a name. Without a name it is the only solid, or the first obstacle of the only scene.

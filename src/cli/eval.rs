@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::args::{Eval, Shared, What};
 use super::failure::Failure;
 use super::{choose, input, output};
+use crate::cli::output::Shown;
 use rfm::ir::Unary;
 use rfm::solid::Chosen;
 use rfm::{Field, Precision, Solid};
@@ -32,7 +33,7 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
     let mut writer = Table::new(solid, chosen, options, shared.json)?;
     writer.rows(&options.at)?;
     if let Some(path) = &options.points {
-        let name = if path == stdin { "<stdin>".to_string() } else { path.display().to_string() };
+        let name = if path == stdin { "<stdin>".to_string() } else { path.shown().to_string() };
         let reader: Box<dyn Read> = if path == stdin {
             Box::new(io::stdin().lock())
         } else {

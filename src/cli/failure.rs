@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::process::ExitCode;
 
-use rfm::diagnostic::Code;
+use rfm::diagnostic::{Code, printable};
 
 /// Why a command stopped. Its message is printed once, by [`Failure::report`].
 #[derive(Debug)]
@@ -56,17 +56,17 @@ impl From<std::io::Error> for Failure {
 /// Prints an error.
 pub(super) fn complain(message: &str) {
     let red = anstyle::AnsiColor::Red.on_default().bold();
-    anstream::eprintln!("{red}error{red:#}: {message}");
+    anstream::eprintln!("{red}error{red:#}: {}", printable(message));
 }
 
 /// Prints a warning with its code.
 pub(super) fn warn(code: Code, message: impl Display) {
     let yellow = anstyle::AnsiColor::Yellow.on_default().bold();
-    anstream::eprintln!("{yellow}warning[{}]{yellow:#}: {message}", code.0);
+    anstream::eprintln!("{yellow}warning[{}]{yellow:#}: {}", code.0, printable(&message.to_string()));
 }
 
 /// Prints a remark that is no finding. It goes to standard error and is never part of the data.
 pub(super) fn note(message: impl Display) {
     let blue = anstyle::AnsiColor::Blue.on_default().bold();
-    anstream::eprintln!("{blue}note{blue:#}: {message}");
+    anstream::eprintln!("{blue}note{blue:#}: {}", printable(&message.to_string()));
 }

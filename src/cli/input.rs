@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::args::Shared;
 use super::failure::{Failure, note};
+use crate::cli::output::Shown;
 use rfm::Program;
 use rfm::compile::text_of;
 use rfm::diagnostic::{Code, Diagnostics, Source, Style, render};
@@ -22,14 +23,17 @@ pub(super) fn read(path: &Path) -> Result<Source, Failure> {
         std::fs::File::open(path).and_then(|file| file.take(limit).read_to_end(&mut bytes))
     };
     let text = result.and_then(|_| text_of(bytes));
-    let text = text.map_err(|error| Failure::usage(format!("cannot read `{name}`: {error}")))?;
+    let text =
+        text.map_err(|error| Failure::usage(format!("cannot read `{}`: {error}", Path::new(&name).shown())))?;
     Ok(Source::file(name, text))
 }
 
 /// Checks a source with the params of the command line.
 pub(super) fn check(shared: &Shared, source: Source) -> Result<Program, Diagnostics> {
-    let overrides = shared.define.iter().cloned().collect();
-    let options = Options { overrides, max_nodes: shared.max_nodes, method: None };
+    let overrides = shared.define.iter().map(|given| (given.name.clone(), given.value)).collect();
+    let dimensions =
+        shared.define.iter().filter_map(|given| Some((given.name.clone(), given.dimension?))).collect();
+    let options = Options { overrides, dimensions, max_nodes: shared.max_nodes, method: None };
     Program::check(source, options)
 }
 

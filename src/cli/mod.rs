@@ -21,25 +21,46 @@ mod plot;
 mod progress;
 mod report;
 mod run;
+mod section;
+mod values;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Parser;
+use rfm::diagnostic::{is_hidden, printable};
 
 use failure::{Failure, note};
 
 /// Runs the program with the arguments of a process, the program's name first, and gives its exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let hidden = arguments.iter().any(|argument| argument.to_string_lossy().contains(is_hidden));
     let arguments = match args::Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
+            if hidden {
+                // the message repeats what was written, and its own colours could not be told from it
+                anstream::eprint!("{}", printable(&error.render().to_string()));
+                return ExitCode::from(2);
+            }
             // clap reports help and version as errors; printing them fails only if nobody reads
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
+    outlive_size_limits();
     command(arguments).map_or_else(Failure::report, |()| ExitCode::SUCCESS)
+}
+
+/// Lets a write beyond the limit for the size of a file fail as one to a full disk does. Without this the system ends the
+/// process.
+fn outlive_size_limits() {
+    #[cfg(unix)]
+    {
+        // if it cannot be registered, the process ends there as it would have
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default());
+    }
 }
 
 fn command(arguments: args::Arguments) -> Result<(), Failure> {

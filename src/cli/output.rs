@@ -1,12 +1,18 @@
 //! Output: files, and lines and documents on standard output. A file is written under a temporary name beside
 //! its target and then renamed, so it is whole or not there.
 
+use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use serde::Serialize;
 
+use rfm::diagnostic::{is_hidden, printable, printable_line};
+
 use super::failure::{Failure, complain};
+
+/// Beginning of the names of temporary files.
+pub(super) const TEMPORARY: &str = ".rfm-";
 
 /// Writes a file through a callback. If anything fails, a file that was there before is unchanged.
 pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
@@ -14,10 +20,10 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
         // an error may carry the temporary name, which means nothing to the user
         let text = error.to_string();
         let reason = text.split(" at path ").next().unwrap_or_default();
-        Failure::usage(format!("cannot write `{}`: {reason}", path.display()))
+        Failure::usage(format!("cannot write `{}`: {reason}", path.shown()))
     };
     if path.is_dir() {
-        return Err(Failure::usage(format!("cannot write `{}`: it is a folder", path.display())));
+        return Err(Failure::usage(format!("cannot write `{}`: it is a folder", path.shown())));
     }
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -25,16 +31,27 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     };
     if !folder.exists() {
         let message =
-            format!("cannot write `{}`: the folder `{}` does not exist", path.display(), folder.display());
+            format!("cannot write `{}`: the folder `{}` does not exist", path.shown(), folder.shown());
         return Err(Failure::usage(message));
     }
-    let temporary = tempfile::Builder::new().prefix(".rfm-").tempfile_in(folder).map_err(failed)?;
+    let temporary = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder).map_err(failed)?;
     let mut writer = BufWriter::new(temporary);
     fill(&mut writer).map_err(failed)?;
     let temporary = writer.into_inner().map_err(|e| failed(e.into_error()))?;
     readable_by_others(temporary.as_file()).map_err(failed)?;
     temporary.persist(path).map_err(|e| failed(e.error))?;
     Ok(())
+}
+
+/// A path as a message shows it: on one line, and without characters that a terminal would obey.
+pub(super) trait Shown {
+    fn shown(&self) -> String;
+}
+
+impl Shown for Path {
+    fn shown(&self) -> String {
+        printable_line(&self.display().to_string()).into_owned()
+    }
 }
 
 /// The formats of pictures.
@@ -53,7 +70,7 @@ impl Picture {
             "png" => Ok(Self::Png),
             _ => Err(Failure::Usage(format!(
                 "cannot tell the picture format of `{}`: the ending must be .svg or .png",
-                path.display()
+                path.shown()
             ))),
         }
     }
@@ -73,7 +90,8 @@ fn readable_by_others(_: &std::fs::File) -> io::Result<()> {
 
 /// Prints one line on standard output. If nobody reads any more the process ends quietly, as other tools do.
 pub(super) fn line(words: std::fmt::Arguments<'_>) {
-    if let Err(error) = writeln!(anstream::stdout(), "{words}") {
+    let words = words.to_string();
+    if let Err(error) = writeln!(anstream::stdout(), "{}", printable(&words)) {
         if error.kind() == io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }
@@ -84,8 +102,38 @@ pub(super) fn line(words: std::fmt::Arguments<'_>) {
 
 /// Prints one JSON document on standard output.
 pub(super) fn json(document: &impl Serialize) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, document).map_err(io::Error::from)?;
-    writeln!(out)?;
+    let text = serde_json::to_string_pretty(document).map_err(io::Error::from)?;
+    writeln!(io::stdout().lock(), "{}", escaped(&text))?;
     Ok(())
+}
+
+/// JSON in which hidden characters, which stand only in its texts, are escaped.
+fn escaped(json: &str) -> Cow<'_, str> {
+    if !json.contains(is_hidden) {
+        return json.into();
+    }
+    let mut out = String::new();
+    for c in json.chars() {
+        if is_hidden(c) {
+            let mut units = [0; 2];
+            out.extend(c.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")));
+        } else {
+            out.push(c);
+        }
+    }
+    out.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_keeps_its_meaning_without_hidden_characters() {
+        let text = "a\u{9b}\u{202e}\u{e0041}ω";
+        let json = serde_json::to_string(text).unwrap();
+        let shown = escaped(&json);
+        assert!(!shown.contains(is_hidden), "{shown}");
+        assert_eq!(serde_json::from_str::<String>(&shown).unwrap(), text);
+    }
 }

@@ -28,6 +28,11 @@ edition that this program does not know. Install a newer rfm, or write `rfm 1` i
 VERSION_MISSING = "W0002":
 "The file does not start with `rfm 1`. It is read as edition 1, but a later rfm could read it differently.
 Write `rfm 1` as the first line.";
+EMPTY_FILE = "E0003":
+"The file has no item: it is empty, or all of it is a comment. A file defines solids, and scenes with a fluid.
+
+    rfm 1
+    solid ball = sphere(1)";
 SYNTAX = "E0101":
 "The text does not fit the grammar at the marked place. Items start with one of the words `param`, `let`, `fn`,
 `solid`, `scene`; an item ends where the next one begins.
@@ -42,8 +47,8 @@ TOO_LONG = "E0103":
 "The file is longer than the 256 MiB that are read at most.";
 UNKNOWN_UNIT = "E0104":
 "A word right after a number on the same line is read as its unit, and this one is not known. Lengths: m cm mm
-um km; time: s ms us min h; mass: kg g; force, pressure, energy: N Pa kPa J; angle: deg rad; combined with `/`,
-`·` and `^`: `kg/m^3`, `Pa·s`, `m/s^2`, `deg/s`.";
+um km; time: s ms us min h; mass: kg g; force: N kN; pressure: Pa kPa MPa; energy: J kJ; angle: deg rad; rate: Hz rpm;
+combined with `/`, `·` and `^`: `kg/m^3`, `Pa·s`, `m/s^2`, `deg/s`.";
 EQUALITY = "E0105":
 "`a == b` would be a surface of zero thickness: no point is inside it, so it can neither be meshed nor hit.
 Write a thin layer instead, `-t <= a - b <= t`, or `a <= b` for the half of space on one side.";
@@ -83,6 +88,9 @@ the range that the declaration states.";
 UNIT_MISMATCH = "E0212":
 "The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
 only lengths and angles are meaningful.";
+BARE_OVERRIDE = "W0214":
+"The file writes the value of this param in a unit such as mm, and -D gives a number without one. Numbers without a unit
+are in SI units everywhere, so `-D d=8` is 8 m. Write the unit: `-D d=8mm`, or `-D d=8m` if metres are meant.";
 ATTRIBUTE = "E0213":
 "An attribute stands before a solid and says what is wanted of it beside its shape. There is one: `@tolerance(1e-6)`,
 the largest |computed ω − exact ω| that is accepted, over the box of the scene that uses the solid or, without a scene,
@@ -106,6 +114,10 @@ SCENE_KEY = "E0301":
       method: paper
       run      { dt: 2 ms, until: 5 s, save_every: 0.05 s, checkpoint_every: 0.5 s }
       probe gauge { height: [1, 0.5], every: 10 ms }
+      probe depth { pressure: [1, 0.5, 0.1] }         # velocity: [1, 0.5, 0.1]
+      probe load  { force: post, about: [1, 1, 0] }   # force, and torque about a point
+      probe drain { flux { point: [1, 0, 0], normal: [1, 0, 0] } }
+      probe sum   { energy: water }                   # or audit: water
       tolerance: 1e-6
     }
 
@@ -146,9 +158,32 @@ THIN_PARTS = "W0408":
 "Parts of the solid, or gaps in it, are thinner than the cells of the grid that it was measured on, and pass between
 its nodes: they are missing from its volume, and from a mesh with as many cells. The box tells where. Such cells are
 found by the ranges of ω over an eighth of a cell, so surfaces that only touch, as in `a and not a`, count as well.";
+LARGE_ANGLE = "W0409":
+"Angles are radians unless a unit says otherwise, and this one is more than a whole turn. Write `45 deg` for degrees, or
+`45 rad` if radians are meant.";
+CONSTANT_SOLID = "W0410":
+"The solid does not depend on x, y or z: it is all of space if its value is positive, and empty otherwise. A solid is an
+inequality such as `x² + y² <= 1 and 0 <= z <= 1`, or a standard solid such as `sphere(1)`.";
+SHAPES_AS_NUMBERS = "W0411":
+"`+`, `-`, `*` and `/` work on the values of ω, and the result is rarely a shape that someone means. Shapes are joined by
+`a or b`, cut by `a and b`, and taken away by `a \\ b`. Where the values are meant, give one of them a name with `let`.";
+DIVISION_BY_ZERO = "W0412":
+"A divisor is zero wherever it is evaluated, so the value is infinite or no number at all.";
+NO_SECTION = "W0413":
+"The plane of a slice does not meet the solid, or its section is thinner than a pixel: the picture shows the outside only.
+The message says between which coordinates the solid lies.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";
+FLUID_OUTSIDE_BOX = "W0504":
+"Part of the fluid's shape lies outside the scene's box. The fluid is filled into the part within the box, so there is
+less of it than the shape says. Make the box larger, move the shape, or cut the shape where the box ends.";
+FRAMES = "W0505":
+"Frames are saved so rarely that none lies between the start and the end of the run, or so often that they fill a disk.
+`save_every` is the simulated time between two of them, `until` that of the whole run.";
+TOO_MUCH = "W0506":
+"The run needs more memory or room on the disk than there is now. Fewer particles, a longer `save_every`, or
+--no-frames make it smaller.";
 LONG_STEP = "W0503":
 "The time step is longer than what is stable when particles fall through the whole box. The run may still go well if
 they never become so fast; without `dt` a stable step is derived.";

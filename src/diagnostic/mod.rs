@@ -4,6 +4,7 @@
 //! Messages are in lower case without a full stop. They say what was found and what would be accepted.
 
 mod codes;
+mod printable;
 mod render;
 mod source;
 
@@ -11,6 +12,7 @@ use std::fmt;
 use std::sync::Arc;
 
 pub use codes::{Code, explain};
+pub use printable::{is_hidden, printable, printable_line};
 pub use render::{Style, render};
 pub use source::{Position, Source, SourceId, Span};
 

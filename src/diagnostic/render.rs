@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Renderer, Snippet, renderer::DecorStyle};
 
-use super::{Diagnostic, Diagnostics, Label, Severity, Source, Span};
+use super::{Diagnostic, Diagnostics, Label, Severity, Source, Span, is_hidden, printable, printable_line};
 
 /// How messages are decorated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ fn groups<'a>(diagnostic: &'a Diagnostic, sources: &'a [Source]) -> Vec<Group<'a
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
     };
-    let message = shortened(&diagnostic.message);
+    let message = printable(&shortened(&diagnostic.message)).into_owned();
     let mut group = Group::with_title(level.primary_title(message).id(diagnostic.code.0));
     for source in sources {
         let labels: Vec<_> = std::iter::once((AnnotationKind::Primary, &diagnostic.primary))
@@ -55,7 +55,7 @@ fn groups<'a>(diagnostic: &'a Diagnostic, sources: &'a [Source]) -> Vec<Group<'a
         }
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(help.as_str()));
+        group = group.element(Level::HELP.message(printable(help)));
     }
     vec![group]
 }
@@ -83,20 +83,28 @@ fn snippet<'a>(source: &'a Source, labels: &[(AnnotationKind, &'a Label)]) -> Sn
     if end - last > LONGEST_QUOTED_LINE {
         end = floor_boundary(text, last + LONGEST_QUOTED_LINE / 2);
     }
-    let mut snippet = Snippet::source(&text[start..end])
+    let mut snippet = Snippet::source(quoted(&text[start..end]))
         .line_start(source.position(start).line)
-        .path(source.name.as_ref())
+        .path(printable_line(&source.name))
         .fold(true);
     for (kind, label) in labels {
         let range = clamp(text, label.span);
-        let annotation = kind.span(range.start - start..range.end.min(end) - start);
+        let shown = |byte: usize| quoted(&text[start..byte]).len();
+        let annotation = kind.span(shown(range.start)..shown(range.end.min(end)));
         snippet = snippet.annotation(if label.text.is_empty() {
             annotation
         } else {
-            annotation.label(label.text.as_str())
+            annotation.label(printable(&label.text))
         });
     }
     snippet
+}
+
+/// A part of a source with a sign in place of each character that a terminal would hide or obey. The renderer has signs
+/// of its own for the ASCII ones.
+fn quoted(text: &str) -> Cow<'_, str> {
+    let hidden = |c: char| is_hidden(c) && !c.is_ascii();
+    if text.contains(hidden) { text.replace(hidden, "\u{fffd}").into() } else { text.into() }
 }
 
 /// The bytes of a span, moved onto character boundaries inside the text.

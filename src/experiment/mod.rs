@@ -15,20 +15,20 @@
 mod bodies;
 mod deviation;
 mod parameters;
+mod room;
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use crate::compile::Error;
-use crate::diagnostic::{Code, Diagnostic, Diagnostics, Span};
+use crate::diagnostic::{Code, Diagnostic, Diagnostics};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Fluid, Gravity, Scene};
-use crate::solid::Bounds;
 use crate::sph::{
-    Checkpoint, FluidBlock, FluidShape, Obstacle, Parameters, Particles, SeedError, SetupError, Simulation,
-    VectorField, carve, make_room,
+    Checkpoint, FluidBlock, FluidShape, Obstacle, Parameters, Particles, SetupError, Simulation, VectorField,
+    carve, make_room,
 };
 use crate::{Engine, Program, Solid};
 
@@ -68,7 +68,10 @@ impl Experiment {
     /// [`Error::UnknownName`] if the file has no scene of this name, [`Error::Codegen`] if the engine is not
     /// available, [`Error::Diagnostics`] if the fluid's parameters do not fit together.
     pub fn new(program: &Program, scene: &str, engine: Engine) -> Result<Self, Error> {
-        let (program, scene) = (program.clone(), program.scene(scene)?.clone());
+        Self::of_scene(program.clone(), program.scene(scene)?.clone(), engine)
+    }
+
+    fn of_scene(program: Program, scene: Scene, engine: Engine) -> Result<Self, Error> {
         let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
         let typical_speed = parameters::typical_speed(&program, &scene);
         let mut parameters = parameters::of_scene(&program, &scene, typical_speed);
@@ -140,7 +143,9 @@ impl Experiment {
             refuse(&self.program, no_room)
         })?;
         self.set_gravity(&mut simulation);
-        Ok(Start { simulation, carved, warnings: self.diagnostics(warning.into_iter().collect()) })
+        let outside = self.reach().ok().and_then(|bounds| self.outside(&bounds));
+        let warnings = self.diagnostics(outside.into_iter().chain(warning).collect());
+        Ok(Start { simulation, carved, warnings })
     }
 
     /// Starts a simulation at a checkpoint.
@@ -174,15 +179,7 @@ impl Experiment {
     /// Particles at rest that fill the shape of the fluid.
     fn seed(&self) -> Result<Particles, Error> {
         let fluid = &self.scene.fluid;
-        let bounds = match self.fluid.bounds() {
-            Bounds::Within(bounds) => *bounds,
-            Bounds::Unbounded => self.scene.domain,
-            Bounds::Empty => {
-                let message = "the shape of the fluid is empty";
-                let empty = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message);
-                return Err(refuse(&self.program, empty));
-            }
-        };
+        let bounds = self.reach()?;
         let block = FluidBlock {
             shape: FluidShape::Field { field: &self.fluid, bounds, fill: fluid.fill },
             count: fluid.particles,
@@ -191,8 +188,7 @@ impl Experiment {
             jitter: fluid.jitter,
             seed: fluid.seed,
         };
-        let span = fluid.particles_span.unwrap_or(fluid.shape_span);
-        block.seed(&self.parameters, self.scene.domain).map_err(|e| no_fluid(&self.program, &e, span))
+        block.seed(&self.parameters, self.scene.domain).map_err(|e| self.no_fluid(&e))
     }
 
     /// Gives each particle its velocity at the start, by the formulas of the scene.
@@ -217,8 +213,7 @@ impl Experiment {
             make_room(particles, domain, obstacles, clearance);
             clearance *= 0.5;
         }
-        let carved =
-            carve(particles, domain, obstacles, clearance).map_err(|e| no_fluid(&self.program, &e, span))?;
+        let carved = carve(particles, domain, obstacles, clearance).map_err(|e| self.no_fluid(&e))?;
         let lost = carved.inside + carved.too_close + carved.outside_box;
         let message = || {
             format!(
@@ -263,18 +258,6 @@ fn vector_field(program: &Program, nodes: &[Node; 3]) -> Arc<VectorField> {
         formulas.eval_given(Given { time, ..Given::point(p.to_array()) }, &mut vector);
         DVec3::from_array(vector)
     })
-}
-
-fn no_fluid(program: &Program, error: &SeedError, span: Span) -> Error {
-    let code = match error {
-        SeedError::NothingLeft(_) => Code::OBSTACLE_FILLS_BOX,
-        SeedError::DoesNotFit { .. }
-        | SeedError::NoCount
-        | SeedError::Jitter(_)
-        | SeedError::TooLarge { .. }
-        | SeedError::Undefined { .. } => Code::SCENE_NO_ROOM,
-    };
-    refuse(program, Diagnostic::error(code, span, error.to_string()))
 }
 
 fn refuse(program: &Program, diagnostic: Diagnostic) -> Error {

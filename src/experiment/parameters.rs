@@ -57,7 +57,9 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
                     "the time step of {dt} s is longer than the {stable:.2e} s that are stable up to {speed:.1} m/s, \
                      the speed of a fall through the box"
                 );
-                Diagnostic::warning(Code::LONG_STEP, scene.span, message)
+                let at = scene.run.dt_span.unwrap_or(scene.span);
+                let help = format!("leave `dt` out, or write `dt: {}`", time_as_written(0.9 * stable));
+                Diagnostic::warning(Code::LONG_STEP, at, message).help(help)
             });
             (TimeStep { seconds: dt, reason: "stated by the scene" }, too_long)
         }
@@ -71,6 +73,16 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
             let reason = "derived: stable for a fall through the box";
             (TimeStep { seconds: save_every / steps, reason }, None)
         }
+    }
+}
+
+/// A time with two digits, as a file writes it.
+fn time_as_written(seconds: f64) -> String {
+    let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
+    if (1e-6..0.1).contains(&seconds) {
+        format!("{} ms", rounded(1e3 * seconds))
+    } else {
+        format!("{} s", rounded(seconds))
     }
 }
 

@@ -5,7 +5,7 @@ use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
-use crate::syntax::ast::{Argument, Function, Name};
+use crate::syntax::ast::{Argument, ExprKind, Function, Name};
 
 impl<'a> Lowering<'a> {
     pub fn call(&mut self, name: &Name, arguments: &[Argument], span: Span) -> Value {
@@ -22,6 +22,11 @@ impl<'a> Lowering<'a> {
             }
             _ if builtins::exists(&name.text) => self.call_builtin(name, arguments, span),
             _ => {
+                if self.names.defined_later(&name.text).is_none()
+                    && let Some(foreign) = self.foreign_function(name, arguments)
+                {
+                    return self.fail(foreign);
+                }
                 let mut candidates = self.names.candidates(true);
                 candidates.extend(builtins::names().map(String::from));
                 let message = format!("unknown function or shape `{}`", name.text);
@@ -48,6 +53,9 @@ impl<'a> Lowering<'a> {
         if !self.may_call(name, source, span) {
             return Value::Failed;
         }
+        if source == SourceId::Prelude && name == "box" && self.box_of_one_corner(arguments, span) {
+            return Value::Failed;
+        }
         let Some(mut bound) = self.bind(function, arguments, span) else { return Value::Failed };
         let call = Call { function: name.clone(), source, span };
         let mut calls = self.scope.calls.clone();
@@ -60,7 +68,7 @@ impl<'a> Lowering<'a> {
                 None => {
                     let value =
                         parameter.default.as_ref().map_or(Value::Failed, |default| self.expr(default));
-                    Local { name: parameter.name.text.clone(), value, span }
+                    Local { name: parameter.name.text.clone(), value, span, bare: false }
                 }
             };
             self.scope.locals.push(local);
@@ -75,7 +83,10 @@ impl<'a> Lowering<'a> {
         let name = &function.name.text;
         let mut bound: Vec<Local> = Vec::new();
         let mut fits = true;
+        let standard = self.names.is_standard(name);
         for (position, argument) in arguments.iter().enumerate() {
+            // no parameter of a standard solid is an angle
+            fits &= !standard || self.no_angle(&argument.value);
             let value = self.expr(&argument.value);
             let parameter = match self.parameter(function, position, argument) {
                 Parameter::Known(parameter) => parameter,
@@ -100,8 +111,10 @@ impl<'a> Lowering<'a> {
             } else {
                 self.user_span(span)
             };
-            bound.push(Local { name: parameter, value, span: at });
+            let bare = self.is_bare(&argument.value);
+            bound.push(Local { name: parameter, value, span: at, bare });
         }
+        fits &= !standard || self.kinds_of_arguments_fit(function, arguments, &bound);
         for parameter in &function.parameters {
             let given = bound.iter().any(|local| local.name == parameter.name.text);
             if !given && parameter.default.is_none() && fits {
@@ -110,6 +123,47 @@ impl<'a> Lowering<'a> {
             }
         }
         fits.then_some(bound)
+    }
+
+    /// Reports a number given to a standard solid where it takes a vector, and the other way round.
+    fn kinds_of_arguments_fit(
+        &mut self,
+        function: &Function,
+        arguments: &[Argument],
+        bound: &[Local],
+    ) -> bool {
+        const VECTORS: [&str; 5] = ["centre", "min", "max", "normal", "point"];
+        let name = &function.name.text;
+        for local in bound {
+            let wanted = VECTORS.contains(&local.name.as_str());
+            let (what, found) = match (&local.value, wanted) {
+                (Value::Number(_), true) => ("a vector `[a, b, c]`", "a number"),
+                (Value::Vector(_), false) => ("a number", "a vector"),
+                _ => continue,
+            };
+            let message = format!("`{}` of `{name}` is {what}, found {found}", local.name);
+            let numbers: Option<Vec<&str>> = arguments
+                .iter()
+                .map(|a| self.written(&a.value).filter(|text| text.chars().all(|c| c.is_ascii_digit())))
+                .collect();
+            let vector =
+                arguments.first().and_then(|a| self.written(&a.value)).filter(|text| text.starts_with('['));
+            let help = match (name.as_str(), numbers.as_deref(), vector) {
+                ("sphere", Some([whole, part]), _) => {
+                    format!("decimals are written with a point: write `sphere({whole}.{part})`")
+                }
+                ("sphere", _, Some(centre)) => format!("write `ball({centre}, 1)` or `sphere(1, {centre})`"),
+                _ => match example(name) {
+                    Some(call) => {
+                        format!("its parameters are {}: write for example `{call}`", signature(function))
+                    }
+                    None => format!("its parameters are {}", signature(function)),
+                },
+            };
+            self.report(Diagnostic::error(Code::WRONG_TYPE, local.span, message).help(help));
+            return false;
+        }
+        true
     }
 
     /// The parameter that an argument is for; a name that the function does not know is reported.
@@ -137,21 +191,75 @@ impl<'a> Lowering<'a> {
         let message =
             format!("`{}` takes at most {most} argument{plural}, found {found}", function.name.text);
         let at = self.user_span(first.value.span);
-        self.report(Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many"));
+        let diagnostic = Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many");
+        let signature = signature(function);
+        self.report(diagnostic.help(match example(&function.name.text) {
+            Some(example) if self.names.is_standard(&function.name.text) => {
+                format!("its parameters are {signature}: write for example `{example}`")
+            }
+            _ => format!("its parameters are {signature}"),
+        }));
     }
 
     fn report_missing(&mut self, function: &Function, parameter: &str, span: Span) {
         let name = &function.name.text;
         let message = format!("`{name}` needs a value for `{parameter}`");
-        let written = |has_default: bool| if has_default { " = …" } else { "" };
-        let signature: Vec<String> =
-            function.parameters.iter().map(|p| p.name.text.clone() + written(p.default.is_some())).collect();
         let at = self.user_span(span);
-        self.report(
-            Diagnostic::error(Code::ARGUMENTS, at, message)
-                .help(format!("its parameters are {name}({})", signature.join(", "))),
-        );
+        let help = format!("its parameters are {}", signature(function));
+        self.report(Diagnostic::error(Code::ARGUMENTS, at, message).help(help));
     }
+
+    /// `box([1, 1, 1])`: a box has two corners, and the size alone does not say where it is.
+    pub fn box_of_one_corner(&mut self, arguments: &[Argument], span: Span) -> bool {
+        let [Argument { name: None, value }] = arguments else { return false };
+        let ExprKind::Vector(parts) = &value.kind else {
+            let written = self.written(value).unwrap_or("1").to_string();
+            let diagnostic =
+                Diagnostic::error(Code::ARGUMENTS, self.user_span(span), "`box` needs two corners")
+                    .help(format!("write `box([0, 0, 0], [{written}, {written}, {written}])`"));
+            // a name may stand for a vector
+            let is_corner = matches!(self.expr(value), Value::Vector(_) | Value::Failed);
+            if !is_corner {
+                self.report(diagnostic);
+            }
+            return !is_corner;
+        };
+        let too_far = parts.iter().any(|part| matches!(part.kind, ExprKind::Number(n) if n >= 1.0));
+        if too_far {
+            let size = self.written(value).unwrap_or("[1, 1, 1]");
+            let help = format!("`box(min, max)` goes from corner to corner: write `box([0, 0, 0], {size})`");
+            self.report(
+                Diagnostic::error(Code::ARGUMENTS, self.user_span(span), "`box` needs two corners")
+                    .help(help),
+            );
+        }
+        too_far
+    }
+}
+
+/// How a function is called: its name with its parameters.
+fn signature(function: &Function) -> String {
+    let written = |has_default: bool| if has_default { " = …" } else { "" };
+    let parameters: Vec<String> =
+        function.parameters.iter().map(|p| p.name.text.clone() + written(p.default.is_some())).collect();
+    format!("{}({})", function.name.text, parameters.join(", "))
+}
+
+/// A call of a standard solid that works as it stands.
+fn example(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "sphere" => "sphere(1, [0, 0, 2])",
+        "ball" => "ball([0, 0, 2], 1)",
+        "ellipsoid" => "ellipsoid(1, 2, 3)",
+        "box" => "box([0, 0, 0], [1, 2, 3])",
+        "cylinder" => "cylinder(0.5, 2)",
+        "cone" => "cone(0.5, 2)",
+        "capsule" => "capsule(0.5, 2)",
+        "torus" => "torus(1, 0.25)",
+        "layer" => "layer(z, 0, 1)",
+        "half_space" => "half_space([0, 0, 1], [0, 0, 2])",
+        _ => return None,
+    })
 }
 
 /// What an argument is for.

@@ -1,6 +1,7 @@
 //! Expressions → values.
 
 use super::builtins;
+use super::foreign;
 use super::lowering::{Local, Lowering};
 use super::names::Kind;
 use super::value::Value;
@@ -63,8 +64,13 @@ impl Lowering<'_> {
     fn evaluate(&mut self, expr: &Expr) -> Value {
         let span = expr.span;
         match &expr.kind {
-            ExprKind::Number(value) => Value::Number(self.constant(*value)),
-            ExprKind::Quantity { value, unit } => self.quantity(*value, unit),
+            ExprKind::Number(value) if self.may_be_number(*value, expr) => {
+                Value::Number(self.constant(*value))
+            }
+            ExprKind::Quantity { value, unit } if self.may_be_number(*value, expr) => {
+                self.quantity(*value, unit)
+            }
+            ExprKind::Number(_) | ExprKind::Quantity { .. } => Value::Failed,
             ExprKind::Text(text) => Value::Text(text.clone()),
             ExprKind::Name(name) => self.name(name, span),
             ExprKind::Vector(parts) => self.vector(parts, span),
@@ -74,30 +80,8 @@ impl Lowering<'_> {
                 self.negate(&value, span)
             }
             ExprKind::Compare { first, rest } => self.compare(first, rest, span),
-            ExprKind::Sum { first, rest } => {
-                let mut value = self.expr(first);
-                for (op, operand) in rest {
-                    let right = self.expr(operand);
-                    let op = match op {
-                        AddOp::Add => Binary::Add,
-                        AddOp::Subtract => Binary::Sub,
-                    };
-                    value = self.sum(op, &value, &right, first.span.to(operand.span));
-                }
-                value
-            }
-            ExprKind::Product { first, rest } => {
-                let mut value = self.expr(first);
-                for (op, operand) in rest {
-                    let right = self.expr(operand);
-                    let op = match op {
-                        MulOp::Multiply => Binary::Mul,
-                        MulOp::Divide => Binary::Div,
-                    };
-                    value = self.product(op, &value, &right, first.span.to(operand.span));
-                }
-                value
-            }
+            ExprKind::Sum { first, rest } => self.sums(first, rest),
+            ExprKind::Product { first, rest } => self.products(first, rest),
             ExprKind::Power { base, exponent } => self.power(base, exponent, span),
             ExprKind::Call { function, arguments } => self.call(function, arguments, span),
             ExprKind::Component { vector, axis } => {
@@ -113,12 +97,45 @@ impl Lowering<'_> {
         }
     }
 
+    /// `a + b - c`
+    fn sums(&mut self, first: &Expr, rest: &[(AddOp, Expr)]) -> Value {
+        let mut value = self.expr(first);
+        for (op, operand) in rest {
+            let right = self.expr(operand);
+            let op = match op {
+                AddOp::Add => Binary::Add,
+                AddOp::Subtract => Binary::Sub,
+            };
+            self.warn_of_shapes(op, first, operand);
+            value = self.sum(op, &value, &right, first.span.to(operand.span));
+        }
+        value
+    }
+
+    /// `a*b/c`
+    fn products(&mut self, first: &Expr, rest: &[(MulOp, Expr)]) -> Value {
+        let mut value = self.expr(first);
+        for (op, operand) in rest {
+            let right = self.expr(operand);
+            let op = match op {
+                MulOp::Multiply => Binary::Mul,
+                MulOp::Divide => Binary::Div,
+            };
+            self.warn_of_shapes(op, first, operand);
+            if let (Binary::Div, Value::Number(divisor)) = (op, &right) {
+                self.warn_of_zero(*divisor, operand);
+            }
+            value = self.product(op, &value, &right, first.span.to(operand.span));
+        }
+        value
+    }
+
     fn quantity(&mut self, value: f64, unit: &Name) -> Value {
         let Some(parsed) = parse_unit(&unit.text) else {
             let message = format!("unknown unit `{}`", unit.text);
             return self.fail(Diagnostic::error(Code::UNKNOWN_UNIT, unit.span, message));
         };
-        if ![Dimension::LENGTH, Dimension::ANGLE].contains(&parsed.dimension) {
+        if self.in_shape && ![Dimension::LENGTH, Dimension::ANGLE].contains(&parsed.dimension) {
             let message = format!("`{}` is not a length or an angle", unit.text);
             return self.fail(
                 Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(
@@ -175,12 +192,13 @@ impl Lowering<'_> {
                     candidates.iter().chain(&locals).map(String::as_str).chain(["x", "y", "z", "t", "pi"]);
                 let diagnostic =
                     Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"));
-                let diagnostic = match self.names.defined_later(name) {
-                    Some(later) => diagnostic
+                let diagnostic = match (self.names.defined_later(name), foreign::value(name)) {
+                    (Some(later), _) => diagnostic
                         .at("not defined above")
                         .label(later, "defined here")
                         .help("a name means what was defined above it: move this line down, or that one up"),
-                    None => diagnostic.at("not defined above").suggest(name, all),
+                    (None, Some(help)) => diagnostic.at("not defined above").help(help),
+                    (None, None) => diagnostic.at("not defined above").suggest(name, all),
                 };
                 self.fail(diagnostic)
             }
@@ -188,6 +206,9 @@ impl Lowering<'_> {
     }
 
     fn vector(&mut self, parts: &[Expr], span: Span) -> Value {
+        if !parts.iter().all(|part| self.no_angle(part)) {
+            return Value::Failed;
+        }
         let nodes: Vec<Option<Node>> = parts.iter().map(|part| self.field(part)).collect();
         match nodes[..] {
             [Some(a), Some(b), Some(c)] => Value::Vector([a, b, c]),
@@ -390,7 +411,12 @@ impl Lowering<'_> {
         let mut index = start;
         while index < end {
             let value = Value::Number(self.constant(index));
-            self.scope.locals.push(Local { name: variable.text.clone(), value, span: variable.span });
+            self.scope.locals.push(Local {
+                name: variable.text.clone(),
+                value,
+                span: variable.span,
+                bare: true,
+            });
             let member = self.field(body);
             self.scope.locals.pop();
             match member {

@@ -1,13 +1,16 @@
 //! The state of a lowering: the module so far, what was reported, and where an expression is evaluated.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 use super::module::Module;
 use super::names::Names;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
+use crate::quantity::Dimension;
 use crate::sph::Method;
+use crate::syntax::ast::Expr;
 
 /// Calls nested deeper than this are refused: functions cannot recurse, so only a chain of them gets here.
 const DEEPEST_CALL: usize = 64;
@@ -22,6 +25,14 @@ pub(super) struct Lowering<'a> {
     pub diagnostics: Vec<Diagnostic>,
     pub names: Names<'a>,
     pub scope: Scope,
+    /// The text of the file.
+    pub text: Arc<str>,
+    /// Whether the value of a solid is being evaluated, where only lengths and angles have units.
+    pub in_shape: bool,
+    /// Dimensions of the params and names that are defined as one number with a unit.
+    pub dimensions: HashMap<String, Dimension>,
+    /// Params and names whose value has neither a unit nor π in it.
+    pub bare: HashSet<String>,
     /// The method that all scenes get, whatever they state.
     pub method: Option<Method>,
     max_nodes: usize,
@@ -50,6 +61,8 @@ pub(super) struct Local {
     pub value: Value,
     /// The place of the argument that it was bound to.
     pub span: Span,
+    /// Whether the value has neither a unit nor π in it.
+    pub bare: bool,
 }
 
 /// A function that is being called.
@@ -61,12 +74,16 @@ pub(super) struct Call {
 }
 
 impl Lowering<'_> {
-    pub fn new(max_nodes: usize) -> Self {
+    pub fn new(text: Arc<str>, max_nodes: usize) -> Self {
         Self {
             module: Module::default(),
             diagnostics: Vec::new(),
             names: Names::default(),
             scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
+            text,
+            in_shape: false,
+            dimensions: HashMap::new(),
+            bare: HashSet::new(),
             method: None,
             max_nodes,
             budget_reported: false,
@@ -88,6 +105,16 @@ impl Lowering<'_> {
     pub fn fail(&mut self, diagnostic: Diagnostic) -> Value {
         self.report(diagnostic);
         Value::Failed
+    }
+
+    /// What the user wrote for an expression, if a message can repeat it: it stands in the file, on one line, and is
+    /// short.
+    pub fn written(&self, expr: &Expr) -> Option<&str> {
+        const LONGEST: usize = 60;
+        let text = self.text.get(expr.span.range()).filter(|_| expr.span.source == SourceId::File)?;
+        let fits =
+            !text.is_empty() && text.len() <= LONGEST && !text.contains(|c: char| c.is_control() || c == '`');
+        fits.then_some(text)
     }
 
     /// The span in the user's file that an expression belongs to: its own, or that of the call that led into

@@ -9,11 +9,13 @@
 mod arguments;
 mod builtins;
 mod eval;
+mod foreign;
 mod lowering;
 mod module;
 mod names;
 mod probes;
 mod scene;
+mod slips;
 mod transforms;
 mod value;
 
@@ -26,9 +28,10 @@ pub use scene::{
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
+use crate::quantity::{Dimension, Unit, in_unit, parse_unit};
 use crate::sph::Method;
 use crate::syntax::Ast;
-use crate::syntax::ast::{Argument, Attribute, Definition, Function, Item, Name, Param};
+use crate::syntax::ast::{Argument, Attribute, Definition, Expr, ExprKind, Function, Item, Name, Param};
 use lowering::Lowering;
 use names::{Kind, RESERVED};
 use value::Value;
@@ -36,8 +39,10 @@ use value::Value;
 /// Limits and overrides of a lowering.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Values for params, as `-D name=value` gives them.
+    /// Values for params in SI units, as `-D name=value` gives them.
     pub overrides: BTreeMap<String, f64>,
+    /// Dimensions of those overrides that were given with a unit.
+    pub dimensions: BTreeMap<String, Dimension>,
     /// Most operations to which a file may unroll.
     pub max_nodes: usize,
     /// The method of every scene, in place of the one that it states. Defaults that depend on the method
@@ -47,7 +52,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { overrides: BTreeMap::new(), max_nodes: 1_000_000, method: None }
+        Self { overrides: BTreeMap::new(), dimensions: BTreeMap::new(), max_nodes: 1_000_000, method: None }
     }
 }
 
@@ -89,7 +94,7 @@ pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
 }
 
 fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
-    let mut lowering = Lowering::new(options.max_nodes);
+    let mut lowering = Lowering::new(ast.text.clone(), options.max_nodes);
     lowering.method = options.method;
     for item in &prelude().items {
         lowering.item(item, options);
@@ -146,44 +151,111 @@ impl<'a> Lowering<'a> {
             Some((Some(low), Some(high))) => Some((low, high)),
             _ => None,
         };
+        self.remember_units(&param.name, &param.value);
         let overridden = options.overrides.get(&param.name.text).copied();
         let Some(value) = overridden.or(value) else {
             self.names.define(self.scope.source, &param.name, Kind::Value(Value::Failed));
             return;
         };
-        let fits = self.param_fits(param, value, range, overridden.is_some());
-        let value_now = if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
-        self.names.define(self.scope.source, &param.name, Kind::Value(value_now));
-        self.module.params.push(ParamValue {
+        let unit = unit_of(&param.value).map(|(unit, text)| (unit, text.to_string()));
+        let given = ParamValue {
             name: param.name.text.clone(),
             value,
             range,
+            unit,
             doc: param.doc.clone(),
             span: param.name.span,
-        });
+        };
+        let fits = (overridden.is_none() || self.override_fits(&given, options))
+            && self.param_fits(param, &given, overridden.is_some());
+        let value_now = if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
+        self.names.define(self.scope.source, &param.name, Kind::Value(value_now));
+        self.module.params.push(given);
+    }
+
+    /// Remembers which names stand for a number with a unit, and which for one without.
+    fn remember_units(&mut self, name: &Name, value: &Expr) {
+        if let Some((unit, _)) = unit_of(value) {
+            self.dimensions.insert(name.text.clone(), unit.dimension);
+        }
+        if self.is_bare(value) {
+            self.bare.insert(name.text.clone());
+        }
+    }
+
+    /// Whether the unit of an override fits the one in which the file writes the param. If not, this is reported; a
+    /// number without a unit is accepted with a warning.
+    fn override_fits(&mut self, param: &ParamValue, options: &Options) -> bool {
+        let Some((unit, text)) = &param.unit else { return true };
+        let name = &param.name;
+        let Some(dimension) = options.dimensions.get(name) else {
+            // a range tells which unit is meant
+            if unit.factor != 1.0 && param.value != 0.0 && param.range.is_none() {
+                let si = unit.dimension.unit().unwrap_or("in SI units");
+                let message = format!(
+                    "-D {name}={0} means {0} {si}, and the file writes `{name}` in {text}",
+                    param.value
+                );
+                self.report(
+                    Diagnostic::warning(Code::BARE_OVERRIDE, param.span, message).at("declared here").help(
+                        format!(
+                            "write -D {name}=\"{}\", or -D {name}=\"{} {text}\" if that is meant",
+                            param.shown(param.value),
+                            param.value
+                        ),
+                    ),
+                );
+            }
+            return true;
+        };
+        if *dimension == unit.dimension {
+            return true;
+        }
+        let message = format!("the unit that -D gives `{name}` does not fit: the file writes it in {text}");
+        self.report(
+            Diagnostic::error(Code::OVERRIDE, param.span, message)
+                .at("declared here")
+                .help(format!("write -D {name}=\"{}\"", in_unit(unit.factor, *unit, text))),
+        );
+        false
     }
 
     /// Whether a param's value is a finite number within its range. If not, this is reported.
-    fn param_fits(&mut self, param: &Param, value: f64, range: Option<(f64, f64)>, overridden: bool) -> bool {
-        if let Some((low, high)) = range
+    fn param_fits(&mut self, param: &Param, given: &ParamValue, overridden: bool) -> bool {
+        let (value, shown) = (given.value, given.shown(given.value));
+        if let Some((low, high)) = given.range
             && low > high
             && let Some((first, last)) = &param.range
         {
+            let [low, high] = [low, high].map(|end| given.shown(end));
             let message = format!("the range {low} .. {high} holds no number");
             self.report(
                 Diagnostic::error(Code::OUT_OF_RANGE, first.span.to(last.span), message)
                     .help(format!("write `{high} .. {low}`")),
             );
-        } else if let Some((low, high)) = range
+        } else if let Some((low, high)) = given.range
             && !(low <= value && value <= high)
         {
+            let [first, last] = [low, high].map(|end| given.shown(end));
             let diagnostic = if overridden {
                 let message =
-                    format!("-D sets `{}` to {value}, outside its range {low} .. {high}", param.name.text);
-                Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here")
+                    format!("-D sets `{}` to {shown}, outside its range {first} .. {last}", param.name.text);
+                let diagnostic =
+                    Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here");
+                match given
+                    .unit
+                    .as_ref()
+                    .filter(|(unit, _)| low <= value * unit.factor && value * unit.factor <= high)
+                {
+                    Some((_, unit)) => diagnostic.help(format!(
+                        "numbers without a unit are in SI units: write -D {}=\"{value} {unit}\"",
+                        param.name.text
+                    )),
+                    None => diagnostic,
+                }
             } else {
                 let message =
-                    format!("`{}` = {value} lies outside its range {low} .. {high}", param.name.text);
+                    format!("`{}` = {shown} lies outside its range {first} .. {last}", param.name.text);
                 Diagnostic::error(Code::OUT_OF_RANGE, param.value.span, message)
             };
             self.report(diagnostic);
@@ -204,13 +276,14 @@ impl<'a> Lowering<'a> {
     fn definition(&mut self, definition: &'a Definition) {
         let value = self.expr(&definition.value);
         if self.may_define(&definition.name) {
+            self.remember_units(&definition.name, &definition.value);
             self.names.define(self.scope.source, &definition.name, Kind::Value(value));
         }
     }
 
     fn solid(&mut self, definition: &'a Definition) {
         let tolerance = self.attributes(&definition.attributes);
-        let node = self.field(&definition.value);
+        let node = self.shape(&definition.value);
         if !self.may_define(&definition.name) {
             return;
         }
@@ -218,6 +291,7 @@ impl<'a> Lowering<'a> {
         self.names.define(self.scope.source, &definition.name, Kind::Solid(value));
         if let Some(node) = node {
             let name = definition.name.text.clone();
+            self.warn_of_constant(&name, node, &definition.value);
             self.module.solids.push(NamedSolid { name, node, tolerance, span: definition.name.span });
         }
     }
@@ -336,5 +410,14 @@ impl<'a> Lowering<'a> {
             };
             self.report(diagnostic);
         }
+    }
+}
+
+/// The unit of an expression that is one number with a unit, and how it was written.
+fn unit_of(expr: &Expr) -> Option<(Unit, &str)> {
+    match &expr.kind {
+        ExprKind::Quantity { unit, .. } => Some((parse_unit(&unit.text)?, &unit.text)),
+        ExprKind::Negate(inner) => unit_of(inner),
+        _ => None,
     }
 }

@@ -3,6 +3,7 @@
 use super::scene::{Scene, Tolerance};
 use crate::diagnostic::Span;
 use crate::ir::{Graph, Node};
+use crate::quantity::{Unit, in_unit};
 
 /// What a file defines, after lowering.
 #[derive(Debug, Clone, Default)]
@@ -22,14 +23,26 @@ pub struct Module {
 pub struct ParamValue {
     /// Name of the param.
     pub name: String,
-    /// Value, from the file or from an override.
+    /// Value in SI units, from the file or from an override.
     pub value: f64,
-    /// Least and greatest value, if the file states them.
+    /// Least and greatest value in SI units, if the file states them.
     pub range: Option<(f64, f64)>,
+    /// The unit in which the file writes the value, and its text there, if it has one.
+    pub unit: Option<(Unit, String)>,
     /// The text that the file has behind the param, if any.
     pub doc: Option<String>,
     /// Place of the name in its definition.
     pub span: Span,
+}
+
+impl ParamValue {
+    /// A value of this param as a text, in the unit that the file uses for it.
+    pub fn shown(&self, value: f64) -> String {
+        match &self.unit {
+            Some((unit, text)) => in_unit(value, *unit, text),
+            None => value.to_string(),
+        }
+    }
 }
 
 /// A `solid` of a file.

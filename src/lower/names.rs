@@ -81,6 +81,11 @@ impl<'a> Names<'a> {
         self.prelude.get(name)
     }
 
+    /// Whether a name means a standard solid, which no item of the file shadows.
+    pub fn is_standard(&self, name: &str) -> bool {
+        !self.file.contains_key(name) && self.prelude.contains_key(name)
+    }
+
     /// Names that can be written in the file, functions or values.
     pub fn candidates(&self, functions: bool) -> Vec<String> {
         let fits = |g: &Global<'_>| match g.kind {

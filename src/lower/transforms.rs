@@ -79,6 +79,9 @@ impl Lowering<'_> {
         let shape = self.field(receiver);
         let known = METHODS.into_iter().find(|(name, _)| *name == method.text);
         let Some((_, transform)) = known else {
+            if let Some(foreign) = self.foreign_method(receiver, method, arguments) {
+                return self.fail(foreign);
+            }
             let names = METHODS.map(|(name, _)| name);
             let message = format!("shapes have no method `{}`", method.text);
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message)
@@ -94,20 +97,54 @@ impl Lowering<'_> {
                 Some(name) => parameters.iter().position(|p| *p == name.text),
             };
             let Some(slot) = slot else {
-                return self.fail(self.wrong_arguments(method, parameters, span));
+                return self.fail(self.wrong_arguments(method, parameters, arguments, span));
             };
-            values[slot] = Some((self.expr(&argument.value), argument.value.span));
+            let value = self.expr(&argument.value);
+            if parameters[slot] == "angle" {
+                if !self.no_length(&argument.value) {
+                    return Value::Failed;
+                }
+                if let Value::Number(node) = &value
+                    && let Some(angle) = self.module.graph.constant_value(*node)
+                {
+                    self.warn_of_large_angle(angle, &argument.value);
+                }
+            }
+            values[slot] = Some((value, argument.value.span));
         }
         let Some(values) = values.into_iter().collect::<Option<Vec<_>>>() else {
-            return self.fail(self.wrong_arguments(method, parameters, span));
+            return self.fail(self.wrong_arguments(method, parameters, arguments, span));
         };
+        if !self.kinds_fit(transform, &values) {
+            return self.fail(self.wrong_arguments(method, parameters, arguments, span));
+        }
         let Some(shape) = shape else { return Value::Failed };
         self.transformed(shape, transform, &values, span).map_or(Value::Failed, Value::Number)
     }
 
-    fn wrong_arguments(&self, method: &Name, parameters: &[&str], span: Span) -> Diagnostic {
+    /// Whether the arguments are vectors and numbers where the method takes these. A value that failed fits.
+    fn kinds_fit(&self, transform: Transform, values: &[(Value, Span)]) -> bool {
+        let is_number = |value: &Value| matches!(value, Value::Number(_) | Value::Failed);
+        let is_vector = |value: &Value| matches!(value, Value::Vector(_) | Value::Failed);
+        match (transform, values) {
+            (Transform::Move | Transform::Mirror, [(by, _)]) => is_vector(by),
+            (Transform::RotateAbout(_), [(angle, _)]) => is_number(angle),
+            (Transform::Rotate, [(axis, _), (angle, _)]) => is_vector(axis) && is_number(angle),
+            _ => true,
+        }
+    }
+
+    fn wrong_arguments(
+        &self,
+        method: &Name,
+        parameters: &[&str],
+        arguments: &[Argument],
+        span: Span,
+    ) -> Diagnostic {
         let message = format!("the arguments of `.{}` are ({})", method.text, parameters.join(", "));
-        Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message)
+        let arguments: Vec<&Expr> = arguments.iter().map(|argument| &argument.value).collect();
+        let help = format!("write `{}`", self.call_that_works(&method.text, &arguments));
+        Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message).help(help)
     }
 
     fn transformed(

@@ -17,7 +17,7 @@ use crate::{field::Field, geom::Aabb};
 use super::{params::Parameters, particles::Particles, walls::Obstacle};
 
 /// More lattice sites than this are a mistake in the scene, not a fluid.
-const MAX_SITES: f64 = 5e7;
+pub const MAX_SITES: f64 = 5e7;
 
 /// Which part of a field's shape is filled if it has room for more particles than are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,5 +1,7 @@
 //! The syntax tree: what was written, with its spans. Nothing is concluded here.
 
+use std::sync::Arc;
+
 use crate::diagnostic::Span;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -11,6 +13,8 @@ pub struct Name {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ast {
     pub items: Vec<Item>,
+    /// The text that the spans point into, so that a message can repeat what was written.
+    pub text: Arc<str>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

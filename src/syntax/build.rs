@@ -49,7 +49,7 @@ pub(super) fn file(source: &Source, pairs: Pairs<'_, Rule>, diagnostics: &mut Ve
         }
         None => {}
     }
-    Ast { items }
+    Ast { items, text: source.text.clone() }
 }
 
 /// The items of a piece of a file. The piece begins `offset` bytes into the file.

@@ -5,9 +5,12 @@
 
 pub mod ast;
 mod build;
+pub mod foreign;
 mod grammar;
 mod parse;
 mod print;
+mod slips;
+mod words;
 
 pub use ast::Ast;
 pub use grammar::EDITION;

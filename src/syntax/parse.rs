@@ -6,7 +6,9 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 use super::ast::Ast;
 use super::build;
 use super::grammar::{Grammar, Rule};
-use crate::diagnostic::{Code, Diagnostic, Source, Span, nearest};
+use super::slips::Slip;
+use super::words::{ITEM_WORDS, KEYWORDS, token_at};
+use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
 
 /// Brackets nested deeper than this are refused. The limit is beyond what a person writes and well inside the
 /// stack.
@@ -15,11 +17,6 @@ const DEEPEST_NESTING: usize = 200;
 /// Stack of the parsing thread, in bytes: the same limit on every platform, and enough for
 /// [`DEEPEST_NESTING`] in debug builds.
 const STACK_BYTES: usize = 32 << 20;
-
-const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"];
-
-const KEYWORDS: [&str; 12] =
-    ["param", "let", "fn", "solid", "scene", "import", "and", "or", "not", "any", "all", "in"];
 
 /// Parses a text. Items that fit the grammar are returned even if others do not; the messages tell which do
 /// not.
@@ -59,13 +56,20 @@ fn parse_here(source: &Source, scan: &Scan) -> (Ast, Vec<Diagnostic>) {
         Ok(pairs) => build::file(source, pairs, &mut diagnostics),
         Err(_) => recover(source, scan, &mut diagnostics),
     };
+    let broken = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    if ast.items.is_empty() && !broken && source.id == SourceId::File {
+        let start = Span::new(source.id, 0, 0);
+        let empty = Diagnostic::error(Code::EMPTY_FILE, start, "the file defines nothing")
+            .help("write for example `solid ball = sphere(1)`; `rfm --help` has more");
+        diagnostics = vec![empty];
+    }
     (ast, diagnostics)
 }
 
 /// Parses item by item, so that one mistake does not hide the next.
 fn recover(source: &Source, scan: &Scan, diagnostics: &mut Vec<Diagnostic>) -> Ast {
     let text = &source.text;
-    let mut ast = Ast::default();
+    let mut ast = Ast { text: source.text.clone(), ..Ast::default() };
     let mut starts = vec![0];
     starts.extend(scan.items.iter().copied().filter(|&at| at > 0));
     starts.push(text.len());
@@ -103,7 +107,8 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
         let message = format!("`{found}` is a word of the language and cannot be a name");
         return Diagnostic::error(Code::SYNTAX, span, message).help("choose another name");
     }
-    if let Some(diagnostic) = familiar_slip(source, at, found, span) {
+    let slip = Slip { text: &source.text, start, at, found, span };
+    if let Some(diagnostic) = slip.explained() {
         return diagnostic;
     }
     let strange = source.text[at..end.max(at)].chars().next().filter(|c| c.is_control() && found.is_empty());
@@ -122,84 +127,6 @@ fn syntax_error(source: &Source, start: usize, end: usize, error: &Error<Rule>) 
     };
     let diagnostic = Diagnostic::error(Code::SYNTAX, span, format!("unexpected {what}"));
     if expected.is_empty() { diagnostic } else { diagnostic.at(format!("expected {expected}")) }
-}
-
-/// Mistakes that deserve better words than a list of what the grammar would accept.
-fn familiar_slip(source: &Source, at: usize, found: &str, span: Span) -> Option<Diagnostic> {
-    let before = source.text[..at].trim_end_matches([' ', '\t']);
-    let is_word = found.chars().next().is_some_and(char::is_alphabetic);
-    let called = source.text[at + found.len()..].starts_with('(');
-    if is_word && !called && before.ends_with(|c: char| c.is_ascii_digit()) && number_ends(before) {
-        const UNITS: [&str; 14] =
-            ["m", "mm", "cm", "km", "s", "ms", "min", "kg", "g", "N", "Pa", "J", "deg", "rad"];
-        let number = &before[before.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len()..];
-        let unknown =
-            Diagnostic::error(Code::UNKNOWN_UNIT, span, format!("unknown unit `{found}` after a number"))
-                .at("not a unit")
-                .help(format!("a word after a number is its unit; to multiply, write `{number}*{found}`"));
-        return Some(unknown.suggest(found, UNITS.into_iter().filter(|_| found.chars().count() > 1)));
-    }
-    if found == "import" {
-        return Some(
-            Diagnostic::error(Code::SYNTAX, span, "`import` is not part of this version")
-                .help("copy the definitions into this file"),
-        );
-    }
-    let line_start = source.text[..at].rfind('\n').map_or(0, |n| n + 1);
-    if is_word && source.text[line_start..at].trim().is_empty() {
-        if let Some(word) = nearest(found, ITEM_WORDS) {
-            return Some(
-                Diagnostic::error(Code::SYNTAX, span, format!("unexpected `{found}`"))
-                    .help(format!("did you mean `{word}`?")),
-            );
-        }
-        return Some(
-            Diagnostic::error(Code::SYNTAX, span, format!("unexpected `{found}`"))
-                .at("expected an item or the rest of the one above")
-                .help("items start with `param`, `let`, `fn`, `solid` or `scene`"),
-        );
-    }
-    let after = &source.text[at + found.len()..];
-    let syntax = |message: &str| Diagnostic::error(Code::SYNTAX, span, message);
-    match found {
-        "=" if !ITEM_WORDS.iter().any(|word| before.ends_with(word)) => Some(
-            Diagnostic::error(Code::EQUALITY, span, "`=` does not compare")
-                .help("write `<=` or `>=`: each makes the part of space on one side of a surface"),
-        ),
-        "*" if before.ends_with('*') => Some(syntax("unexpected `*`").help("a power is written `x^2`")),
-        "," if before.ends_with(|c: char| c.is_ascii_digit())
-            && number_ends(before)
-            && after.starts_with(|c: char| c.is_ascii_digit()) =>
-        {
-            Some(syntax("unexpected `,`").help("decimals are written with a point: `0.5`"))
-        }
-        ";" => Some(syntax("unexpected `;`").help("leave it out: an item ends where the next one begins")),
-        "\"" => Some(syntax("the text is not closed").help("a text ends with `\"` on its own line")),
-        _ => None,
-    }
-}
-
-/// Whether the text ends in a number rather than in a name such as `r2`.
-fn number_ends(text: &str) -> bool {
-    let start = text
-        .rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
-        .map_or(0, |at| at + text[at..].chars().next().map_or(1, char::len_utf8));
-    text[start..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
-}
-
-/// The word, number or single character at a place in the text.
-fn token_at(text: &str, at: usize, end: usize) -> &str {
-    let rest = &text[at..end.max(at)];
-    let Some(first) = rest.chars().next() else { return "" };
-    let wordy = |c: char| c.is_alphanumeric() || c == '_';
-    if wordy(first) {
-        let length = rest.find(|c: char| !wordy(c)).unwrap_or(rest.len());
-        return &rest[..length];
-    }
-    if first.is_whitespace() || first.is_control() {
-        return "";
-    }
-    &rest[..first.len_utf8()]
 }
 
 /// Rule names in the words of the language, each only once.

@@ -25,9 +25,10 @@ fn not_a_text() {
     check(b"rfm 1\nsolid s = sphere(\xff)", 2, "byte 23 ");
     check(b"rfm 1\nsolid s = sphere(1)\0\n", 1, "unexpected character U+0000");
     check([0; 5000], 1, "unexpected character U+0000");
-    check("", 0, "W0002");
-    check("\n\n  # only a comment", 0, "W0002");
-    check("rfm 1", 0, "");
+    check("", 1, "E0003");
+    check("\n\n  # only a comment", 1, "E0003");
+    check("rfm 1", 1, "E0003");
+    check("rfm 1\nparam a = 1\nlet _b = a", 0, "");
 }
 
 #[test]

@@ -458,8 +458,8 @@ fn odd_solids_are_meshed_or_refused() {
         let arguments = [&["mesh", "-", "--cells", "20", "--json"], flags].concat();
         rfm_reading(root(), &arguments, format!("rfm 1\nsolid s = {text}").as_bytes())
     };
-    let empty = mesh("sphere(1) and sphere(1).move([3, 0, 0])", &[]).expect(0);
-    assert_eq!(empty.json()["triangles"], 0);
+    let empty = mesh("sphere(1) and sphere(1).move([3, 0, 0])", &[]).expect(1);
+    assert_eq!((&empty.json()["triangles"], &empty.json()["manifold"]), (&0.into(), &false.into()));
     assert!(empty.stderr.contains("empty"), "{}", empty.stderr);
     let unbounded = mesh("x^2 + y^2 <= 1", &[]).expect(2);
     assert!(unbounded.stderr.contains("--box"), "{}", unbounded.stderr);
@@ -467,7 +467,7 @@ fn odd_solids_are_meshed_or_refused() {
     assert_eq!((cut["closed"].as_bool(), cut["components"].as_u64()), (Some(true), Some(1)));
     let full = mesh("1", &["--box", "0,0,0,1,1,1"]).expect(0).json();
     assert_eq!(full["closed"], true);
-    assert_eq!(mesh("x and not x", &["--box", "-1,-1,-1,1,1,1"]).expect(0).json()["triangles"], 0);
+    assert_eq!(mesh("x and not x", &["--box", "-1,-1,-1,1,1,1"]).expect(1).json()["triangles"], 0);
 }
 
 const RUN_KEYS: [&str; 14] = [
@@ -569,9 +569,11 @@ fn a_run_leaves_nothing_of_the_one_before() {
     std::fs::write(here.join("out/frames/notes.txt"), "kept").unwrap();
     // what is refused changes nothing
     let before = [files(&here.join("out")), files(&here.join("out/frames"))];
-    run(&["--mesh-cells", "0"]).expect(2);
+    run(&["--force", "--mesh-cells", "0"]).expect(2);
+    let refused = run(&["--steps", "1"]).expect(2).stderr;
+    assert!(refused.contains("holds a run already (scene drop, 0.010 s, 3 frames)"), "{refused}");
     assert_eq!([files(&here.join("out")), files(&here.join("out/frames"))], before);
-    run(&["--no-frames", "--steps", "1"]).expect(0);
+    run(&["--force", "--no-frames", "--steps", "1"]).expect(0);
     assert_eq!(files(&here.join("out")), ["checkpoints", "frames", "pictures", "summary.json"]);
     assert_eq!(files(&here.join("out/frames")), ["notes.txt"]);
     assert!(files(&here.join("out/pictures")).is_empty());

@@ -31,6 +31,60 @@ fn every_rfm_block_checks_without_a_word() {
     assert!(blocks >= 5, "{blocks}");
 }
 
+/// The commands that a document shows, in its order and each once.
+fn commands(document: &str) -> Vec<String> {
+    let text = text(document);
+    let mut commands: Vec<String> = Vec::new();
+    let in_line = text.split('`').filter(|part| part.starts_with("rfm "));
+    let in_blocks = text.split("```sh\n").skip(1).flat_map(|part| part.split("```").next().unwrap().lines());
+    for command in in_blocks.filter(|line| line.starts_with("rfm ")).chain(in_line) {
+        let command = command.split(" #").next().unwrap().trim();
+        // words in capitals stand for what the reader has
+        let is_pattern = command
+            .split([' ', ':'])
+            .any(|word| word.len() > 2 && word.chars().all(|c| c.is_ascii_uppercase()));
+        let is_command = !command.contains('\n') && command.split(' ').count() > 2;
+        if is_command && !is_pattern && !commands.iter().any(|known| known == command) {
+            commands.push(command.to_string());
+        }
+    }
+    commands
+}
+
+/// The examples in a folder, with few particles: what is tested is that the commands are right, not that they are slow.
+fn small_examples(folder: &std::path::Path) {
+    std::fs::create_dir_all(folder.join("examples/validation")).unwrap();
+    for part in ["examples", "examples/validation"] {
+        for entry in std::fs::read_dir(root().join(part)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|ending| ending == "rfm") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let text = text
+                    .replace("particles: particles", "particles: particles/50")
+                    .replace("mass: 200/particles", "mass: 10000/particles")
+                    .replace("(10000/particles)^(1/3)", "(500000/particles)^(1/3)")
+                    .replace("until: 5 s", "until: 0.5 s")
+                    .replace("until: 2 s", "until: 1.6 s");
+                std::fs::write(folder.join(part).join(path.file_name().unwrap()), text).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn every_command_of_the_first_page_works_as_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    small_examples(folder.path());
+    let commands = commands("README.md");
+    assert!(commands.len() >= 18, "{commands:#?}");
+    for command in commands {
+        let arguments: Vec<&str> = command.split(' ').skip(1).collect();
+        let outcome = rfm(folder.path(), &arguments);
+        assert_eq!(outcome.code, 0, "{command}\n{}{}", outcome.stdout, outcome.stderr);
+        assert!(!outcome.stdout.is_empty(), "{command} prints nothing");
+    }
+}
+
 #[test]
 fn every_local_link_leads_to_a_file() {
     for document in DOCUMENTS {

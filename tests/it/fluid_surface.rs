@@ -138,7 +138,7 @@ fn what_is_no_run_is_refused_with_advice() {
     refused(&["mesh", "drop.out", "--fluid", "--quality"], "--quality");
     refused(&["mesh", "drop.out", "--fluid", "--frames", "2..9"], "from 0 to 2");
     refused(&["mesh", "drop.out", "--fluid", "--radius", "0"], "above 0");
-    refused(&["mesh", "drop.out", "--fluid", "--radius", "3kg"], "unit of length");
+    refused(&["mesh", "drop.out", "--fluid", "--radius", "3kg"], "`3kg` is not a length");
     refused(&["mesh", "drop.out", "--fluid", "--cell", "1um"], "use ");
     refused(&["mesh", "drop.out", "--fluid", "--format", "glb", "--ascii"], "--ascii");
     refused(&["mesh", "drop.out", "--fluid", "-o", "drop.rfm"], "cannot make the folder");

@@ -15,6 +15,7 @@ mod fluid_surface;
 mod hard_cases;
 mod mesh_properties;
 mod meshes;
+mod mistakes;
 mod moving;
 mod numbers;
 mod pipeline;

@@ -9,10 +9,12 @@ use std::time::Instant;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::super::args::{Frames, Mesh as Options, Shared};
+use super::super::args::{Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
+use super::super::values::Frames;
 use super::super::{output, progress};
 use super::format;
+use crate::cli::output::Shown;
 use rfm::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
 use rfm::mesh::{WriteMesh, is_closed_manifold, shells, vtp};
 use rfm::sph;
@@ -98,13 +100,13 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         return output::json(&summary);
     }
     print(&summary);
-    say!("written to {}", job.target.display());
+    say!("written to {}", job.target.shown());
     Ok(())
 }
 
 /// The frames of a run, from its `particles.pvd`.
 fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
-    let shown = folder.display();
+    let shown = folder.shown();
     if !folder.exists() {
         return Err(Failure::usage(format!(
             "there is no folder `{shown}`: --fluid meshes what `rfm run FILE -o {shown}` leaves there"
@@ -114,7 +116,7 @@ fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
         let run = folder.with_extension("out");
         return Err(Failure::usage(format!(
             "`{shown}` is a file: --fluid meshes the folder of a run; try `rfm run {shown}`, then `rfm mesh {} --fluid`",
-            run.display()
+            run.shown()
         )));
     }
     let path = folder.join("particles.pvd");
@@ -123,7 +125,7 @@ fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
             "there are no frames in `{shown}`: `rfm run` lists them in particles.pvd, unless it is told --no-frames"
         )));
     }
-    let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.display()));
+    let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
     let text = std::fs::read_to_string(&path).map_err(|error| failed(error.to_string()))?;
     let entries = read_collection(&text).map_err(|error| failed(error.to_string()))?;
     if entries.is_empty() {
@@ -138,7 +140,7 @@ fn check_frames(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<(), Fa
         let file = folder.join(&entry.file);
         if !file.is_file() {
             let lost =
-                format!("the frame `{}` is missing; `rfm run` writes it again, or choose", file.display());
+                format!("the frame `{}` is missing; `rfm run` writes it again, or choose", file.shown());
             return Err(Failure::usage(format!("{lost} others with --frames A..B")));
         }
     }
@@ -176,7 +178,7 @@ impl ParticleScale {
                 return Err(Failure::usage(format!(
                     "`{}` does not tell how large the particles are: {why}\ngive half their spacing with --radius, \
                      for example --radius 13.6mm",
-                    path.display()
+                    path.shown()
                 )));
             }
         };
@@ -231,7 +233,7 @@ impl Job<'_> {
         let path = self.folder.join(&entry.file);
         let failed = |error: String| {
             let rest = "`rfm run` writes it again, or leave it out with --frames A..B";
-            Failure::usage(format!("cannot mesh the frame `{}`: {error}\n{rest}", path.display()))
+            Failure::usage(format!("cannot mesh the frame `{}`: {error}\n{rest}", path.shown()))
         };
         let bytes = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
         let points = read_points(&bytes).map_err(|error| failed(error.to_string()))?;
@@ -263,14 +265,14 @@ impl Job<'_> {
 
 fn create(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::usage(format!("cannot make the folder `{}`: {error}", folder.display())))
+        .map_err(|error| Failure::usage(format!("cannot make the folder `{}`: {error}", folder.shown())))
 }
 
 /// The failure of a frame, which also says what is there already.
 fn with_kept(failure: Failure, kept: usize, target: &Path) -> Failure {
     match failure {
         Failure::Usage(message) if kept > 0 => {
-            Failure::Usage(format!("{message}\nthe {kept} surfaces before it are in `{}`", target.display()))
+            Failure::Usage(format!("{message}\nthe {kept} surfaces before it are in `{}`", target.shown()))
         }
         other => other,
     }

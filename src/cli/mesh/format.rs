@@ -5,6 +5,7 @@ use std::path::Path;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::super::failure::Failure;
+use crate::cli::output::Shown;
 use rfm::mesh::{FORMATS, Format, WriteMesh};
 
 /// The parser of a format's name, which is the ending of its files.
@@ -22,7 +23,7 @@ pub(super) fn of_path(path: &Path) -> Result<Format, Failure> {
     found.copied().ok_or_else(|| {
         Failure::usage(format!(
             "cannot tell the mesh format of `{}`: the ending must be {}",
-            path.display(),
+            path.shown(),
             one_of(FORMATS)
         ))
     })

@@ -9,19 +9,20 @@ mod summary;
 use std::time::Instant;
 
 use super::args::{Mesh as Options, MeshMethod, Shared};
-use super::failure::{Failure, note};
+use super::failure::{Failure, complain, note};
 use super::{choose, input, output, progress};
+use crate::cli::output::Shown;
 pub(super) use format::{ascii_help, format_name, output_help};
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::mesh::{
-    self, Grid, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh, dual_contouring,
-    marching_cubes,
+    self, Grid, GridError, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh,
+    dual_contouring, marching_cubes,
 };
 use rfm::solid::{Bounds, Depth};
 use simplified::{Simplified, simplified};
-use summary::MeshSummary;
+use summary::{MeshSummary, Times};
 
 impl MeshMethod {
     /// The name on the command line and in JSON.
@@ -55,6 +56,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let grid = grid(&solid, options)?;
 
+    let mut times = Times::default();
     let started = Instant::now();
     // it has the same zero set as ω, is cheaper, and gives the normal of one face at creases
     let surface = solid.surface(grid.as_ref().map_or(Aabb::EMPTY, |grid| *grid.bounds()));
@@ -62,39 +64,69 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         None => Mesh::default(),
         Some(grid) => meshed(&solid, &*surface, grid, options)?,
     };
-    let milliseconds = started.elapsed().as_secs_f64() * 1e3;
+    times.meshing = milliseconds(started);
+    let started = Instant::now();
     let (quality, simplified) = match &grid {
         Some(grid) if options.quality || options.simplify.is_some() => {
             measured(&mut mesh, &solid, &*surface, grid, options)?
         }
         _ => (None, None),
     };
+    times.measuring = milliseconds(started);
+    let started = Instant::now();
     let report = mesh::check(&mesh, &*surface);
     let thin = match &grid {
         None => ThinCells::NONE,
         Some(grid) => mesh::thin_cells(&*surface, grid).map_err(Failure::usage)?,
     };
+    times.checking = milliseconds(started);
     remark(&solid, &mesh, &thin, options);
-
+    if mesh.triangles.is_empty() {
+        return nothing_to_write(shared, options, (&solid, &report, &times));
+    }
     if let (Some(path), Some(write)) = (&options.output, write) {
+        let started = Instant::now();
         output::write(path, |out| write(&mesh, out))?;
+        times.writing = milliseconds(started);
     }
     let names = (solid.name(), options.method.name());
-    let summary = MeshSummary::new(names, &report, thin.count, quality, simplified.as_ref(), milliseconds);
+    let summary = MeshSummary::new(names, &report, thin.count, quality, simplified.as_ref(), times);
     if shared.json {
         return output::json(&summary);
     }
     summary.print();
     if let Some(path) = &options.output {
-        say!("written to {}", path.display());
+        say!("written to {}", path.shown());
     }
     Ok(())
+}
+
+/// Ends the command for a mesh without triangles: there is no file of it.
+fn nothing_to_write(
+    shared: &Shared,
+    options: &Options,
+    (solid, report, times): (&Solid, &mesh::Report, &Times),
+) -> Result<(), Failure> {
+    if shared.json {
+        let names = (solid.name(), options.method.name());
+        output::json(&MeshSummary::new(names, report, 0, None, None, *times))?;
+    }
+    if let Some(path) = &options.output {
+        complain(&format!("the mesh is empty: `{}` is not written", path.shown()));
+    } else {
+        complain("the mesh is empty");
+    }
+    Err(Failure::Findings)
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }
 
 /// The writer that the options ask for; `None` if only figures are wanted.
 fn writer(shared: &Shared, options: &Options) -> Result<Option<WriteMesh>, Failure> {
     if options.file.is_dir() {
-        let folder = options.file.display();
+        let folder = options.file.shown();
         return Err(Failure::usage(format!(
             "`{folder}` is a folder: give a file, or mesh the fluid of a run with `rfm mesh {folder} --fluid`"
         )));
@@ -102,7 +134,7 @@ fn writer(shared: &Shared, options: &Options) -> Result<Option<WriteMesh>, Failu
     match &options.output {
         Some(path) => format::writer(format::of_path(path)?, options.ascii).map(Some),
         None if options.ascii => Err(format::no_text()),
-        None if shared.json => Ok(None),
+        None if shared.json || options.quality => Ok(None),
         None => Err(format::no_output()),
     }
 }
@@ -121,7 +153,33 @@ fn grid(solid: &Solid, options: &Options) -> Result<Option<Grid>, Failure> {
             )));
         }
     };
-    grid.transpose().map_err(Failure::usage)
+    grid.transpose().map_err(|error| match options.cell {
+        None => no_grid(&error, "--cells", options.cells),
+        Some(cell) => match error {
+            GridError::TooManyCells(found) => Failure::usage(format!(
+                "--cell {cell} makes {found} cells along one side: at most {} are possible",
+                Grid::MAX_CELLS
+            )),
+            GridError::BadSpacing(_) => Failure::usage(format!(
+                "--cell {cell} is not a positive length that these coordinates can resolve"
+            )),
+            GridError::TooFewCells(_) | GridError::BadBox(_) => Failure::usage(error),
+        },
+    })
+}
+
+/// Why there is no grid of so many cells along the longest side, in the words of the flag that asks for them.
+pub(super) fn no_grid(error: &GridError, flag: &str, cells: usize) -> Failure {
+    Failure::usage(match error {
+        GridError::TooManyCells(_) => {
+            format!("{flag} {cells} is too fine: at most {} cells along a side are possible", Grid::MAX_CELLS)
+        }
+        GridError::TooFewCells(_) => {
+            format!("{flag} {cells} is too coarse: at least {} are needed", Grid::MIN_CELLS)
+        }
+        GridError::BadSpacing(_) => format!("{flag} {cells} is too fine for these coordinates"),
+        GridError::BadBox(_) => error.to_string(),
+    })
 }
 
 /// The mesh of a surface, without slivers if that is asked for.
@@ -176,6 +234,7 @@ fn why_empty(solid: &Solid, options: &Options) -> &'static str {
     match (solid.bounds(), options.domain) {
         (Bounds::Empty, _) => "ω is nowhere positive, so the solid is empty",
         (_, Some(domain)) if solid.range(&domain).lo > 0.0 => "the box lies inside it",
+        (_, Some(domain)) if solid.range(&domain).hi < 0.0 => "the box lies outside it",
         _ => "no grid point lies inside it; try more cells",
     }
 }

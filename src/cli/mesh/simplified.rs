@@ -3,8 +3,8 @@
 
 use std::time::Instant;
 
-use super::super::args::Tolerance;
 use super::super::failure::note;
+use super::super::values::Tolerance;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, Quality, Reference, simplify};

@@ -5,6 +5,23 @@ use serde::Serialize;
 use super::simplified::Simplified;
 use rfm::mesh::{Quality, Report};
 
+/// Where the time of a mesh went, in milliseconds.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Times {
+    pub meshing: f64,
+    /// Simplifying and measuring.
+    pub measuring: f64,
+    /// Checking whether the mesh is closed, and looking for what the grid has missed.
+    pub checking: f64,
+    pub writing: f64,
+}
+
+impl Times {
+    fn total(&self) -> f64 {
+        self.meshing + self.measuring + self.checking + self.writing
+    }
+}
+
 /// The JSON document. Lengths are in metres, areas in m², volumes in m³.
 #[derive(Serialize)]
 pub(super) struct MeshSummary {
@@ -22,7 +39,9 @@ pub(super) struct MeshSummary {
     rms_distance: f64,
     thin_cells: usize,
     evaluations: u64,
+    /// The time of the whole: to mesh, to simplify and measure, to check, and to write.
     milliseconds: f64,
+    meshing_milliseconds: f64,
     method: &'static str,
     /// Only with `--quality`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,7 +75,7 @@ impl From<&Simplified> for SimplifiedFigures {
 }
 
 impl MeshSummary {
-    /// The figures of a mesh that `method` made in some milliseconds, with `thin_cells` cells that hide
+    /// The figures of a mesh that `method` made, with `thin_cells` cells that hide
     /// a surface.
     pub fn new(
         (solid, method): (&str, &'static str),
@@ -64,15 +83,16 @@ impl MeshSummary {
         thin_cells: usize,
         quality: Option<Quality>,
         simplified: Option<&Simplified>,
-        milliseconds: f64,
+        times: Times,
     ) -> Self {
         Self {
             schema: 1,
             solid: solid.to_string(),
             vertices: report.vertices,
             triangles: report.triangles,
-            closed: report.closed,
-            manifold: report.manifold,
+            // a mesh without triangles has no hole, and is no surface either
+            closed: report.closed && report.triangles > 0,
+            manifold: report.manifold && report.triangles > 0,
             components: report.components,
             euler: report.euler,
             volume: report.volume,
@@ -81,7 +101,8 @@ impl MeshSummary {
             rms_distance: report.rms_distance,
             thin_cells,
             evaluations: report.evaluations,
-            milliseconds,
+            milliseconds: times.total(),
+            meshing_milliseconds: times.meshing,
             method,
             quality,
             simplified: simplified.map(SimplifiedFigures::from),
@@ -92,10 +113,11 @@ impl MeshSummary {
     pub fn print(&self) {
         let yes = |b: bool| if b { "yes" } else { "NO" };
         say!(
-            "{} vertices, {} triangles in {:.1} ms ({} evaluations of ω)",
+            "{} vertices, {} triangles in {:.1} ms, {:.1} ms of them to mesh ({} evaluations of ω)",
             self.vertices,
             self.triangles,
             self.milliseconds,
+            self.meshing_milliseconds,
             self.evaluations
         );
         say!(

@@ -8,13 +8,13 @@ use std::path::Path;
 use std::time::Instant;
 
 use anstream::println;
-use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::super::args::{Flow, Shared};
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
 use super::flow_run::FlowRun;
+use crate::cli::output::Shown;
 use rfm::experiment::{Deviation, Deviations};
 use rfm::lower::{Scene, Truth};
 use rfm::sph::{Method, Simulation};
@@ -80,7 +80,7 @@ pub(super) fn run(
         let threads = rayon::current_num_threads();
         output::json(&Document { schema: 1, scene: &scene.name, threads, instants, rows: &rows })?;
     } else if let Some(path) = picture {
-        println!("plot written to {}", path.display());
+        println!("plot written to {}", path.shown());
     }
     match failures(&rows) {
         None => Ok(()),
@@ -125,7 +125,7 @@ struct Study<'a> {
     shared: &'a Shared,
     scene: &'a str,
     instants: usize,
-    bar: ProgressBar,
+    bar: progress::Progress,
 }
 
 impl Study<'_> {
@@ -220,7 +220,7 @@ fn work(size: Option<usize>) -> f64 {
     (size.unwrap_or(1000) as f64).powf(4.0 / 3.0)
 }
 
-fn bar(sizes: &[Option<usize>], methods: usize) -> ProgressBar {
+fn bar(sizes: &[Option<usize>], methods: usize) -> progress::Progress {
     let once: u64 = sizes.iter().map(|&size| work(size) as u64).sum();
     progress::bar(once * methods as u64, "running")
 }

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::super::args::MeshMethod;
 use super::super::failure::Failure;
+use super::super::mesh::no_grid;
 use super::super::plot::{self, LogAxis};
 use super::super::progress;
 use rfm::Solid;
@@ -50,7 +51,8 @@ pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, 
     for method in [MeshMethod::Mc, MeshMethod::Dc] {
         for halvings in (0..RESOLUTIONS).rev() {
             let cells = (finest >> halvings).max(Grid::MIN_CELLS);
-            let grid = Grid::around(&bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
+            let grid = Grid::around(&bounds, Resolution::Cells(cells))
+                .map_err(|error| no_grid(&error, "--mesh-cells", finest))?;
             let mut row = row(solid, method, cells, &grid)?;
             if let Some(coarser) = rows.last().filter(|r| r.method == row.method && 2 * r.cells == cells) {
                 row.order = order(coarser.quality.hausdorff(), row.quality.hausdorff());

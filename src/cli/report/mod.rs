@@ -19,6 +19,7 @@ use serde::Serialize;
 use super::args::{Report, Shared};
 use super::failure::Failure;
 use super::{choose, input, output, progress};
+use crate::cli::output::Shown;
 use meshes::MeshFigures;
 use points::SamplePoints;
 use programs::{ExactValues, ProgramFigures};
@@ -87,7 +88,7 @@ fn solid(shared: &Shared, options: &Report, program: &Program, solid: &Solid) ->
     print(solid, &points, over, &rows);
     meshes::print(&meshes);
     for path in options.output.iter().chain(&options.mesh_plot) {
-        println!("plot written to {}", path.display());
+        println!("plot written to {}", path.shown());
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The obstacles of a run as meshes: one mesh if all stand still, one for every frame if any of them moves.
 
 use super::super::args::Run;
+use super::super::mesh::no_grid;
 use super::super::{Failure, note};
 use rfm::geom::Aabb;
 use rfm::mesh::{Grid, Mesh, Resolution, marching_cubes};
@@ -11,7 +12,7 @@ pub(super) struct Bodies {
     solids: Vec<Solid>,
     domain: Aabb,
     /// Number of mesh cells along the longest side of each solid.
-    cells: usize,
+    pub(super) cells: usize,
 }
 
 impl Bodies {
@@ -60,7 +61,7 @@ impl Bodies {
         } else {
             Grid::filling(&over, Resolution::Cells(self.cells))
         };
-        let grid = grid.map_err(Failure::usage)?;
+        let grid = grid.map_err(|error| no_grid(&error, "--mesh-cells", self.cells))?;
         let surface = solid.surface(*grid.bounds());
         marching_cubes(&*surface, &grid, &|_| {}).map_err(Failure::usage)
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::{Failure, note, output};
 use super::pace::Every;
+use crate::cli::output::Shown;
 use rfm::Experiment;
 use rfm::ir;
 use rfm::lower::Scene;
@@ -51,9 +52,8 @@ impl Checkpoints {
         simulation: &Simulation,
         more: impl FnOnce(&mut Checkpoint),
     ) -> Result<(), Failure> {
-        std::fs::create_dir_all(&self.folder).map_err(|e| {
-            Failure::usage(format!("cannot make the folder `{}`: {e}", self.folder.display()))
-        })?;
+        std::fs::create_dir_all(&self.folder)
+            .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", self.folder.shown())))?;
         let mut checkpoint = simulation.checkpoint();
         checkpoint.fingerprint = self.fingerprint;
         more(&mut checkpoint);
@@ -85,7 +85,7 @@ pub(super) fn latest(run_folder: &Path, fingerprint: &[u8; 32]) -> Result<Checkp
                 return Err(Failure::usage(format!(
                     "cannot go on from `{}`: it belongs to another scene, or this one was changed since; only the \
                      `run` block and probes may change (without --resume the run begins anew)",
-                    path.display()
+                    path.shown()
                 )));
             }
             Ok(checkpoint) => {
@@ -94,14 +94,19 @@ pub(super) fn latest(run_folder: &Path, fingerprint: &[u8; 32]) -> Result<Checkp
                 }
                 return Ok(checkpoint);
             }
-            Err(error) => faults.push(format!("cannot use `{}`: {error}", path.display())),
+            Err(error) => faults.push(format!("cannot use `{}`: {error}", path.shown())),
         }
     }
     if faults.is_empty() {
-        let folder = folder.display();
+        let folder = folder.shown();
         return Err(Failure::usage(format!("there is no checkpoint in `{folder}` to go on from")));
     }
     Err(Failure::usage(faults.join("\n")))
+}
+
+/// Whether a folder has a checkpoint.
+pub(super) fn exist(run_folder: &Path) -> bool {
+    !list(&run_folder.join(FOLDER)).is_empty()
 }
 
 /// Removes all checkpoints of a folder, and nothing else.

@@ -1,21 +1,43 @@
-//! `rfm run --dry-run`: what a run would cost.
+//! `rfm run --dry-run`: what a run would cost, in less than a second.
+//!
+//! A large scene is not seeded: a few steps of the same scene with larger particles are measured, and scaled up.
 
+use std::path::Path;
 use std::time::Instant;
 
 use serde::Serialize;
 
-use super::super::args::Shared;
-use super::super::{Failure, output};
+use super::super::args::{Run, Shared};
+use super::super::failure::warn;
+use super::super::progress::duration;
+use super::super::{Failure, input, output};
+use super::frames::{self, FrameCost};
 use super::goal::Goal;
 use super::summary::pass_names;
-use rfm::Experiment;
+use super::{folder, refused, start};
+use rfm::diagnostic::Code;
 use rfm::sph::Simulation;
+use rfm::{Error, Experiment};
+
+/// Most particles of a simulation that is started to be measured, and least if they have very many neighbours.
+const MEASURED: (f64, f64) = (6000.0, 500.0);
+
+/// So many neighbours of a particle are usual. With more of them fewer particles are measured.
+const USUAL_NEIGHBOURS: f64 = 500.0;
+
+/// Number of steps before the clock starts: buffers grow in them, and solvers have no answer yet to start from.
+const FIRST: u32 = 2;
+
+/// Most steps that are timed, and the seconds after which no further step begins.
+const TRIAL: (u32, f64) = (20, 0.3);
 
 /// The output of `--dry-run`.
 #[derive(Debug, Serialize)]
 struct Forecast {
     schema: u32,
     particles: usize,
+    /// Whether the particles were estimated from the volume of the fluid and not placed.
+    estimated: bool,
     spacing: f64,
     neighbours_per_particle: f64,
     time_step: f64,
@@ -23,69 +45,210 @@ struct Forecast {
     steps: u64,
     passes: Vec<&'static str>,
     bytes: f64,
+    /// Memory that is free now; null where the system does not tell.
+    bytes_free: Option<f64>,
+    frames: u64,
+    disk_bytes: f64,
+    /// Room on the disk of the folder; null where the system does not tell.
+    disk_bytes_free: Option<f64>,
     milliseconds_per_step: f64,
+    milliseconds_per_frame: f64,
     seconds: f64,
 }
 
 /// Runs a few steps, and prints what all of them would cost.
 pub(super) fn dry_run(
     shared: &Shared,
-    simulation: &mut Simulation,
+    options: &Run,
     experiment: &Experiment,
     goal: Goal,
 ) -> Result<(), Failure> {
-    /// Number of steps before the clock starts: buffers grow in them, and solvers have no answer yet to start
-    /// from.
-    const FIRST: u32 = 2;
-    /// Most steps that are timed, and the seconds after which no further step begins.
-    const TRIAL: (u32, f64) = (20, 1.0);
+    let estimate = experiment.estimated_particles().map_err(refused)?;
+    let most = most_measured(experiment);
+    let estimated = estimate > 1.5 * most;
+    let smaller;
+    let (measured, mut simulation) = if estimated {
+        let found = coarser(shared, experiment, most)?;
+        smaller = found.0;
+        (&smaller, found.1)
+    } else {
+        (experiment, start(experiment)?.0)
+    };
+    let per_step = seconds_per_step(&mut simulation)?;
+    let (stats, parameters) = (simulation.stats(), experiment.parameters());
+    let particles = if estimated { estimate.round() as usize } else { stats.particles };
+    let scale = particles as f64 / stats.particles as f64;
+    let reach = within_reach(experiment);
+    let crowding = reach.min(particles as f64) / reach.min(stats.particles as f64);
+    let per_step = scale * crowding * per_step;
+    let time_step = time_step(experiment, measured, &simulation);
+    let steps = goal.steps(time_step);
+    let frames = if options.no_frames { 0 } else { 1 + goal.frames(experiment, time_step) };
+    let cost = FrameCost::measured(options, measured, &simulation)?.scaled(scale);
+    let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(&simulation);
+    let forecast = Forecast {
+        schema: 1,
+        particles,
+        estimated,
+        spacing: parameters.spacing(),
+        neighbours_per_particle: stats.neighbours_per_particle,
+        time_step,
+        time_step_reason: experiment.time_step().reason,
+        steps,
+        passes: pass_names(&simulation),
+        bytes: memory(&simulation, scale),
+        bytes_free: free_memory(),
+        frames,
+        disk_bytes: disk,
+        disk_bytes_free: free_disk(&folder::of(options)),
+        milliseconds_per_step: per_step * 1e3,
+        milliseconds_per_frame: cost.seconds * 1e3,
+        seconds: per_step * steps as f64 + cost.seconds * frames as f64,
+    };
+    warn_of_too_much(&forecast);
+    if shared.json {
+        return output::json(&forecast);
+    }
+    print(&forecast);
+    Ok(())
+}
+
+/// The scene with few large particles, started. With particles too large for what the scene has of gaps nothing may be
+/// left, so more of them are tried.
+fn coarser(shared: &Shared, experiment: &Experiment, most: f64) -> Result<(Experiment, Simulation), Failure> {
+    let started = |particles: f64| {
+        let smaller = experiment.coarser(particles, shared.engine.into())?;
+        let start = smaller.start()?;
+        Ok((smaller, start))
+    };
+    let found: Result<_, Error> =
+        started(most).or_else(|_: Error| started(4.0 * most)).or_else(|_: Error| started(16.0 * most));
+    let (smaller, mut start) = found.map_err(refused)?;
+    // warnings that count particles would mislead
+    start.warnings.list.retain(|warning| warning.code != Code::FLUID_IN_OBSTACLE);
+    input::show(&start.warnings);
+    Ok((smaller, start.simulation))
+}
+
+/// Particles of the rest spacing within the support radius of one.
+fn within_reach(experiment: &Experiment) -> f64 {
     let parameters = experiment.parameters();
+    4.0 / 3.0 * std::f64::consts::PI * (parameters.support_radius / parameters.spacing()).powi(3)
+}
+
+/// The most particles that are measured: a step costs what its pairs cost.
+fn most_measured(experiment: &Experiment) -> f64 {
+    let (most, least) = MEASURED;
+    (most * (USUAL_NEIGHBOURS / within_reach(experiment)).sqrt().min(1.0)).max(least)
+}
+
+fn seconds_per_step(simulation: &mut Simulation) -> Result<f64, Failure> {
     let mut step = || simulation.step().map_err(|e| Failure::Numerical(e.to_string()));
     for _ in 0..FIRST {
         step()?;
     }
     let started = Instant::now();
     let mut trial = 0;
-    while trial < TRIAL.0 && started.elapsed().as_secs_f64() < TRIAL.1 {
+    while trial == 0 || (trial < TRIAL.0 && started.elapsed().as_secs_f64() < TRIAL.1) {
         step()?;
         trial += 1;
     }
-    let per_step = started.elapsed().as_secs_f64() / f64::from(trial);
-    // the fluid will become faster than it is at the start
-    let time_step = if parameters.adaptive {
-        parameters.stable_dt(experiment.typical_speed()).min(simulation.stable_dt())
-    } else {
-        parameters.time_step
-    };
-    let steps = goal.steps(time_step);
-    let stats = simulation.stats();
-    let forecast = Forecast {
-        schema: 1,
-        particles: stats.particles,
-        spacing: parameters.spacing(),
-        neighbours_per_particle: stats.neighbours_per_particle,
-        time_step,
-        time_step_reason: experiment.time_step().reason,
-        steps,
-        passes: pass_names(simulation),
-        bytes: simulation.bytes() as f64,
-        milliseconds_per_step: per_step * 1e3,
-        seconds: per_step * steps as f64,
-    };
-    if shared.json {
-        return output::json(&forecast);
+    Ok(started.elapsed().as_secs_f64() / f64::from(trial))
+}
+
+/// The length of a step, s: the fluid will become faster than it is at the start.
+fn time_step(experiment: &Experiment, measured: &Experiment, simulation: &Simulation) -> f64 {
+    let parameters = experiment.parameters();
+    if !parameters.adaptive {
+        return parameters.time_step;
     }
-    say!("particles     {}", forecast.particles);
-    say!("spacing       {:.4} m", forecast.spacing);
+    let expected = parameters.stable_dt(experiment.typical_speed());
+    let coarse = measured.parameters().stable_dt(measured.typical_speed());
+    expected * (simulation.stable_dt() / coarse).min(1.0)
+}
+
+fn warn_of_too_much(forecast: &Forecast) {
+    let Forecast { bytes, bytes_free, disk_bytes, disk_bytes_free, .. } = forecast;
+    if let Some(free) = bytes_free.filter(|free| bytes > free) {
+        let [needed, free] = [*bytes, free].map(size);
+        warn(Code::TOO_MUCH, format!("the run needs about {needed} of memory, and {free} are free"));
+    }
+    if let Some(free) = disk_bytes_free.filter(|free| disk_bytes > free) {
+        let [needed, free] = [*disk_bytes, free].map(size);
+        warn(Code::TOO_MUCH, format!("the run writes about {needed}, and {free} of the disk are free"));
+    }
+}
+
+fn print(forecast: &Forecast) {
+    let about = if forecast.estimated { "about " } else { "" };
+    let free = |free: Option<f64>| free.map_or(String::new(), |free| format!(", {} free", size(free)));
+    say!("particles     {about}{}", forecast.particles);
+    say!("spacing       {:.3e} m", forecast.spacing);
     say!("neighbours    {:.1} per particle", forecast.neighbours_per_particle);
     say!("time step     {:.3e} s ({})", forecast.time_step, forecast.time_step_reason);
-    say!("steps         {steps}");
+    say!("steps         {}", forecast.steps);
     say!("passes        {}", forecast.passes.join(", "));
-    say!("memory        about {:.0} MiB", forecast.bytes / f64::from(1 << 20));
+    say!("memory        about {}{}", size(forecast.bytes), free(forecast.bytes_free));
     say!(
-        "time          about {:.0} s ({:.2} ms per step, without frames)",
-        forecast.seconds,
-        forecast.milliseconds_per_step
+        "disk          about {} for {} frames{}",
+        size(forecast.disk_bytes),
+        forecast.frames,
+        free(forecast.disk_bytes_free)
     );
-    Ok(())
+    say!(
+        "time          about {} ({:.3} ms per step, {:.0} ms per frame)",
+        duration(forecast.seconds),
+        forecast.milliseconds_per_step,
+        forecast.milliseconds_per_frame
+    );
+}
+
+/// A number of bytes as a person says it.
+fn size(bytes: f64) -> String {
+    match bytes {
+        b if b < 1e6 => format!("{:.1} kB", b / 1e3),
+        b if b < 1e9 => format!("{:.1} MB", b / 1e6),
+        b if b < 1e12 => format!("{:.1} GB", b / 1e9),
+        b => format!("{:.1} TB", b / 1e12),
+    }
+}
+
+/// Bytes that the process will take: the state and the copy of it that becomes a checkpoint, beside what the program takes
+/// for itself.
+fn memory(simulation: &Simulation, scale: f64) -> f64 {
+    let state = simulation.bytes() as f64;
+    let own = own_memory().map_or(0.0, |bytes| (bytes - state).max(0.0));
+    own + scale * (state + frames::checkpoint_bytes(simulation))
+}
+
+/// Bytes of memory that this process takes now; `None` where the system does not tell.
+fn own_memory() -> Option<f64> {
+    kilobytes("/proc/self/status", "VmRSS:")
+}
+
+/// Bytes of memory that programs may still take; `None` where the system does not tell.
+fn free_memory() -> Option<f64> {
+    kilobytes("/proc/meminfo", "MemAvailable:")
+}
+
+/// The figure of a line of a file that gives kilobytes, in bytes.
+fn kilobytes(file: &str, name: &str) -> Option<f64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    let kilobytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(1024.0 * kilobytes)
+}
+
+/// Bytes that are free on the disk of a folder, or of the nearest folder above it that exists.
+#[cfg(unix)]
+fn free_disk(folder: &Path) -> Option<f64> {
+    let absolute = std::path::absolute(folder).ok()?;
+    let there = absolute.ancestors().find(|folder| folder.exists())?;
+    let found = rustix::fs::statvfs(there).ok()?;
+    Some(found.f_bavail as f64 * found.f_frsize as f64)
+}
+
+#[cfg(not(unix))]
+fn free_disk(_: &Path) -> Option<f64> {
+    None
 }

@@ -4,13 +4,15 @@
 //! Invariant: after every frame the collections list exactly the frames that are complete.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use glam::DVec3;
 
 use super::super::args::Run;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
-use super::{checkpoints, probes};
+use super::{checkpoints, folder, probes};
+use crate::cli::output::Shown;
 use rfm::Experiment;
 use rfm::geom::Aabb;
 use rfm::mesh::{self, Mesh};
@@ -51,7 +53,7 @@ impl Frames {
         experiment: &Experiment,
         resumed: Option<&Checkpoint>,
     ) -> Result<Self, Failure> {
-        let folder = folder(options);
+        let folder = folder::of(options);
         let write_frames = !options.no_frames;
         // all that can fail comes before the first change to the folder
         let bodies = Bodies::new(options, experiment);
@@ -184,6 +186,72 @@ impl Frames {
     }
 }
 
+/// What one frame costs.
+pub(super) struct FrameCost {
+    pub seconds: f64,
+    pub bytes: f64,
+    /// The parts of both that grow with the number of particles.
+    per_particle: (f64, f64),
+}
+
+impl FrameCost {
+    /// Cells of the meshes that are measured. The work of a mesh grows with the square of their number.
+    const CELLS: usize = 24;
+
+    /// Measures a frame without writing it.
+    pub fn measured(
+        options: &Run,
+        experiment: &Experiment,
+        simulation: &Simulation,
+    ) -> Result<Self, Failure> {
+        if options.no_frames {
+            return Ok(Self { seconds: 0.0, bytes: 0.0, per_particle: (0.0, 0.0) });
+        }
+        let mut out = Vec::new();
+        let started = Instant::now();
+        sph::write_vtp(&mut out, simulation.particles())?;
+        let per_particle = (started.elapsed().as_secs_f64(), out.len() as f64);
+        out.clear();
+        let started = Instant::now();
+        let mut bodies = Bodies::new(options, experiment);
+        bodies.cells = Self::CELLS.min(options.mesh_cells);
+        let mesh = bodies.mesh_at(0.0)?;
+        let finer = (options.mesh_cells as f64 / bodies.cells as f64).powi(2);
+        let (mut seconds, mut bytes) = (0.0, 0.0);
+        if bodies.move_about() {
+            mesh::vtp::write(&mesh, &mut out)?;
+            seconds += finer * started.elapsed().as_secs_f64();
+            bytes += finer * out.len() as f64;
+            out.clear();
+        }
+        if !options.no_pictures {
+            let mut pictures = Pictures::new(experiment, &mesh)?;
+            let started = Instant::now();
+            if bodies.move_about() {
+                pictures.show(&mesh)?;
+            }
+            pictures.image(simulation).write_png(&mut out)?;
+            seconds += started.elapsed().as_secs_f64();
+            bytes += out.len() as f64;
+        }
+        Ok(Self { seconds, bytes, per_particle })
+    }
+
+    /// The cost of a frame with so many times as many particles.
+    pub fn scaled(self, scale: f64) -> Self {
+        let (seconds, bytes) = self.per_particle;
+        Self { seconds: self.seconds + scale * seconds, bytes: self.bytes + scale * bytes, ..self }
+    }
+}
+
+/// Size of a checkpoint.
+pub(super) fn checkpoint_bytes(simulation: &Simulation) -> f64 {
+    let mut out = Vec::new();
+    // writing to memory cannot fail
+    let _ = simulation.checkpoint().write(&mut out);
+    out.len() as f64
+}
+
 impl Pictures {
     /// The speed that is drawn red, as a part of the speed of a fall through the whole box: obstacles stop
     /// most particles long before.
@@ -209,19 +277,23 @@ impl Pictures {
     }
 
     fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
+        let image = self.image(simulation);
+        output::write(path, |mut out| image.write_png(&mut out))?;
+        self.count += 1;
+        Ok(())
+    }
+
+    fn image(&self, simulation: &Simulation) -> render::Image {
         let particles = simulation.particles();
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
-        let image = self.scene.frame(
+        self.scene.frame(
             &render::ParticlesView {
                 positions: particles.position.points(),
                 speeds: &speeds,
                 radius: self.radius,
             },
             &render::Caption { time: simulation.time(), step: simulation.steps() },
-        );
-        output::write(path, |mut out| image.write_png(&mut out))?;
-        self.count += 1;
-        Ok(())
+        )
     }
 }
 
@@ -235,16 +307,6 @@ fn drawn(domain: &Aabb, title: &str, fastest: f64, obstacle: &Mesh) -> Result<re
     };
     let legend = render::Legend { title, fastest };
     render::Backdrop::new(camera, domain, &mesh, &legend).map_err(Failure::usage)
-}
-
-/// The folder for a run's files. The default is beside the file, `pawn.rfm` → `pawn.out`; for standard input
-/// it is `rfm.out`.
-pub(super) fn folder(options: &Run) -> PathBuf {
-    match &options.output {
-        Some(folder) => folder.clone(),
-        None if options.file == Path::new("-") => PathBuf::from("rfm.out"),
-        None => options.file.with_extension("out"),
-    }
 }
 
 /// Beginnings of the names of frames.
@@ -261,7 +323,7 @@ fn obstacle_name(number: usize) -> String {
 
 fn create(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.display())))
+        .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.shown())))
 }
 
 /// Removes the files of an earlier run, which would mix with those of this one, and no other files.
@@ -298,5 +360,5 @@ fn remove_numbered(folder: &Path, prefix: &str, suffix: &str, first: usize) -> R
 }
 
 fn not_cleared(folder: &Path, error: &std::io::Error) -> Failure {
-    Failure::usage(format!("cannot clear `{}`: {error}", folder.display()))
+    Failure::usage(format!("cannot clear `{}`: {error}", folder.shown()))
 }

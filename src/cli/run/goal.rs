@@ -63,6 +63,15 @@ impl Goal {
         }
     }
 
+    /// Number of frames after the first, if each step has this length, s.
+    pub fn frames(self, experiment: &Experiment, dt: f64) -> u64 {
+        let end = match self {
+            Self::Steps(steps) => steps as f64 * dt,
+            Self::Time(end) => end,
+        };
+        (end / experiment.scene().run.save_every).ceil() as u64
+    }
+
     /// Number of steps if each has this length, s.
     pub fn steps(self, dt: f64) -> u64 {
         match self {

@@ -6,11 +6,13 @@
 mod bodies;
 mod checkpoints;
 mod findings;
+mod folder;
 mod forecast;
 mod frames;
 mod goal;
 mod pace;
 mod probes;
+mod stop;
 mod summary;
 mod watch;
 
@@ -21,12 +23,16 @@ use std::time::Instant;
 
 use super::args::{Run, Shared};
 use super::{Failure, choose, input, note, output, progress};
+use crate::cli::output::Shown;
 use checkpoints::Checkpoints;
+use folder::Hold;
 use frames::Frames;
 use goal::{Goal, Pace};
 use probes::Probes;
-use rfm::sph::{Simulation, StepError, short_time};
+use rfm::lower::Scene;
+use rfm::sph::{Simulation, short_time};
 use rfm::{Error, Experiment, Program};
+use stop::{NoRoom, Stop};
 use summary::Summary;
 use watch::{WATCH, Watch};
 
@@ -35,16 +41,22 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let scene = choose::scene(&program, options.scene.as_deref())?;
     let experiment = experiment(shared, &program, &scene.name)?;
     let fingerprint = checkpoints::fingerprint(&experiment);
-    let folder = frames::folder(options);
+    let folder = folder::of(options);
+    if options.dry_run {
+        let goal = Goal::of(options, &experiment)?;
+        return forecast::dry_run(shared, options, &experiment, goal);
+    }
+    folder::may_be_written(&folder, options)?;
+    // a folder that is not there yet is made only after all that can fail
+    let held = folder.exists().then(|| Hold::take(&folder)).transpose()?;
     let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint)).transpose()?;
     let (mut simulation, carved) = match &resumed {
         Some(checkpoint) => (experiment.resume(checkpoint).map_err(Failure::usage)?, 0),
         None => start(&experiment)?,
     };
     let goal = Goal::of(options, &experiment)?;
-    if options.dry_run {
-        return forecast::dry_run(shared, &mut simulation, &experiment, goal);
-    }
+    frames_fit(options, goal, &experiment)?;
+    let _held = held.map_or_else(|| Hold::take(&folder), Ok)?;
     let mut recording = Recording {
         frames: Frames::new(options, &experiment, resumed.as_ref())?,
         probes: Probes::start(&folder, experiment.scene(), &mut simulation, resumed.as_ref())?,
@@ -63,6 +75,20 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         Err(other) => return Err(other),
     };
     conclude(shared, &folder, &recording, &simulation, stopped)
+}
+
+/// Refuses more frames than there are names for.
+fn frames_fit(options: &Run, goal: Goal, experiment: &Experiment) -> Result<(), Failure> {
+    let frames = goal.frames(experiment, experiment.parameters().time_step);
+    if options.no_frames || frames <= Scene::MOST_FRAMES {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "a run to so late an end has {frames} frames, one every {} s; at most {} are saved: choose an earlier end, a longer \
+         `save_every` in the scene, or --no-frames",
+        experiment.scene().run.save_every,
+        Scene::MOST_FRAMES
+    )))
 }
 
 /// Writes the summary and the plots, and says how the run ended.
@@ -91,12 +117,12 @@ fn conclude(
             }
             findings::repeat(simulation);
         }
-        Some(Stop::Interrupted) => {
+        Some(stop) => {
+            if let Some(reason) = stop.reason(experiment) {
+                return Err(Failure::Numerical(format!("{reason}\n{}", recording.kept())));
+            }
             note(format!("interrupted after {} steps; {}", simulation.steps(), recording.kept()));
             return Err(Failure::Interrupted);
-        }
-        Some(Stop::Numerical(error)) => {
-            return Err(Failure::Numerical(format!("{error}\n{}", recording.kept())));
         }
     }
     Ok(())
@@ -137,12 +163,6 @@ struct Recording<'a> {
     watch: Watch,
 }
 
-/// Why a run ended before its end.
-enum Stop {
-    Interrupted,
-    Numerical(StepError),
-}
-
 impl Recording<'_> {
     /// Takes steps until the goal is reached, the user interrupts, or a step fails.
     fn go_on(
@@ -164,13 +184,18 @@ impl Recording<'_> {
             self.watch.spent += started.elapsed();
             if let Err(error) = result {
                 bar.finish_and_clear();
-                return Ok(Err(Stop::Numerical(error)));
+                let crushed = NoRoom::of(self.experiment, simulation, true);
+                return Ok(Err(crushed.map_or(Stop::Numerical(error), Stop::NoRoom)));
             }
             bar.suspend(|| findings::tell_news(simulation));
             bar.set_position(goal.done(simulation));
             let stop = interrupted.load(Ordering::Relaxed);
             let in_turn = pace.frame_is_due(simulation);
             self.record(simulation, in_turn, stop || goal.is_reached(simulation))?;
+            if in_turn && let Some(crushed) = NoRoom::of(self.experiment, simulation, false) {
+                bar.finish_and_clear();
+                return Ok(Err(Stop::NoRoom(crushed)));
+            }
             let speed = simulation.speed();
             let mut message = format!("t = {:.3} s, {speed:.2} m/s", simulation.time());
             if let Some(iterations) = simulation.iterations() {
@@ -218,7 +243,7 @@ impl Recording<'_> {
     fn kept(&self) -> String {
         let frames = format!("the frames up to {} s are kept", short_time(self.frames.last_time()));
         match self.checkpoints.last() {
-            Some(path) => format!("{frames}; --resume goes on from `{}`", path.display()),
+            Some(path) => format!("{frames}; --resume goes on from `{}`", path.shown()),
             None => format!("{frames}; there is no checkpoint yet"),
         }
     }

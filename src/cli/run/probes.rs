@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, RIGHT, TOP, WIDTH};
 use super::super::{Failure, output};
 use super::pace::Every;
+use crate::cli::output::Shown;
 use rfm::lower::{Measured, Scene};
 use rfm::slice;
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
@@ -47,7 +48,7 @@ impl Probes {
         let folder = run_folder.join(FOLDER);
         if !scene.probes.is_empty() {
             std::fs::create_dir_all(&folder)
-                .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.display())))?;
+                .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.shown())))?;
         }
         let mut recorders = Vec::new();
         for stated in &scene.probes {
@@ -103,7 +104,7 @@ impl Probes {
     pub fn plot(&self) -> Result<(), Failure> {
         for recorder in &self.0 {
             let text = std::fs::read_to_string(&recorder.path)
-                .map_err(|e| Failure::usage(format!("cannot read `{}`: {e}", recorder.path.display())))?;
+                .map_err(|e| Failure::usage(format!("cannot read `{}`: {e}", recorder.path.shown())))?;
             for ending in ["svg", "png"] {
                 let path = recorder.path.with_extension(ending);
                 let picture = plot::end(drawn(&recorder.name, &recorder.gauge.probe, &text), &path)?;
@@ -177,7 +178,7 @@ fn lines_until(path: &Path, header: &str, end: f64) -> String {
 }
 
 fn not_written(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::usage(format!("cannot write `{}`: {error}", path.display()))
+    Failure::usage(format!("cannot write `{}`: {error}", path.shown()))
 }
 
 /// A plot with a line for each column over time. A line is interrupted where a value is missing.

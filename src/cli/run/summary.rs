@@ -6,6 +6,7 @@ use super::findings;
 use super::frames::Frames;
 use super::probes::Probes;
 use super::watch::Watch;
+use crate::cli::output::Shown;
 use rfm::experiment::Deviation;
 use rfm::sph::{Pass, Simulation};
 
@@ -157,7 +158,7 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         }
     }
     let probes = if probes.count() > 0 { format!(", {} probes", probes.count()) } else { String::new() };
-    say!("written to {}: {}{probes}", frames.folder().display(), frames.describe());
+    say!("written to {}: {}{probes}", frames.folder().shown(), frames.describe());
 }
 
 /// Names of the passes that a simulation runs.

@@ -3,7 +3,7 @@
 
 use super::super::lowering::Lowering;
 use super::{Block, Fluid, Solver};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::Node;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
@@ -40,6 +40,7 @@ pub(super) struct FluidAndMethod {
 struct Resolution {
     density: f64,
     mass: f64,
+    size_span: Option<Span>,
     support_radius: f64,
 }
 
@@ -136,7 +137,7 @@ impl<'a> Lowering<'a> {
     fn fluid(&mut self, block: &Block<'a>, method: &Method) -> Option<Fluid> {
         let defaults = method.fluid();
         let shape = match block.setting("shape") {
-            Some((_, value)) => self.field(value).map(|node| (node, value.span)),
+            Some((_, value)) => self.shape(value).map(|node| (node, value.span)),
             None => {
                 self.missing(block, "shape", "write `shape: ball([1.5, 1.5, 2], 0.4)` or any other solid");
                 None
@@ -154,7 +155,7 @@ impl<'a> Lowering<'a> {
         let particles = self.count_key(block, "particles", 1);
         let seed = self.count_key(block, "seed", 0);
         let (shape, shape_span) = shape?;
-        let Resolution { density, mass, support_radius } = resolution?;
+        let Resolution { density, mass, size_span, support_radius } = resolution?;
         Some(Fluid {
             name: block.label.map_or_else(|| "fluid".into(), |label| label.text.clone()),
             shape,
@@ -164,6 +165,7 @@ impl<'a> Lowering<'a> {
             particles_span: block.setting("particles").map(|(_, value)| value.span),
             density,
             mass,
+            size_span,
             viscosity: viscosity?,
             surface_tension: tension?,
             support_radius,
@@ -193,7 +195,8 @@ impl<'a> Lowering<'a> {
         let own = method.fluid().support.radius((mass / density).cbrt());
         let support_radius =
             self.number_key(block, "support_radius", Dimension::LENGTH, Some(own), Bound::Positive)?;
-        Some(Resolution { density, mass, support_radius })
+        let size_span = both.1.or(both.0).map(|(_, value)| value.span);
+        Some(Resolution { density, mass, size_span, support_radius })
     }
 
     /// Reads the velocity at the start, which may depend on the place.

@@ -8,6 +8,7 @@ use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::Node;
 use crate::quantity::{Bound, Dimension, parse_unit};
 use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
+use crate::syntax::foreign;
 
 /// Keys that open a block; all others have a value.
 const BLOCKS: [&str; 9] =
@@ -54,11 +55,15 @@ impl<'a> Lowering<'a> {
                 let diagnostic = Diagnostic::error(Code::SCENE_KEY, key.span, message)
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
-                self.report(diagnostic);
+                let elsewhere = foreign::key(&key.text).filter(|own| known.contains(own));
+                self.report(match elsewhere {
+                    Some(own) => diagnostic.help(format!("`{}` is called `{own}` here", key.text)),
+                    None => diagnostic,
+                });
             } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
                 let (is, form) = match entry {
                     Entry::Block { .. } => ("has a value", format!("{}: …", key.text)),
-                    Entry::Setting { .. } => ("is a block", format!("{} {{ … }}", key.text)),
+                    Entry::Setting { .. } => ("is a block", block_form(&key.text)),
                 };
                 let message = format!("`{}` {is}", key.text);
                 self.report(
@@ -83,6 +88,7 @@ impl<'a> Lowering<'a> {
             ExprKind::Vector(parts) if parts.len() == 3 => parts,
             _ => {
                 let found = self.expr(value);
+                self.no_scalar(&found, value, key)?;
                 return self.as_vector(&found, value.span);
             }
         };
@@ -102,6 +108,16 @@ impl<'a> Lowering<'a> {
             });
         }
         nodes.try_into().ok()
+    }
+
+    /// Reports a number where a vector is asked for.
+    fn no_scalar(&mut self, found: &Value, value: &Expr, key: &str) -> Option<()> {
+        let Value::Number(_) = found else { return Some(()) };
+        let message = format!("`{key}` is a vector `[a, b, c]`, found a number");
+        let diagnostic = Diagnostic::error(Code::WRONG_TYPE, value.span, message);
+        let written = self.written(value).unwrap_or("1").to_string();
+        self.report(diagnostic.help(format!("write `{key}: [0, 0, {written}]`")));
+        None
     }
 
     /// Reads one of a few words. The first is the default; `None` if the word is unknown, which is reported.
@@ -164,6 +180,7 @@ impl<'a> Lowering<'a> {
             DVec3::new(parts[0]?, parts[1]?, parts[2]?)
         } else {
             let found = self.expr(value);
+            self.no_scalar(&found, value, key)?;
             DVec3::from_array(self.constant_vector(&found, value.span, &format!("`{key}`"))?)
         };
         if vector.is_finite() {
@@ -188,6 +205,22 @@ impl<'a> Lowering<'a> {
         None
     }
 
+    /// Reports a name that stands for a number with a unit of another kind.
+    fn dimension_fits(&mut self, name: &str, expected: Dimension, key: &str, expr: &Expr) -> bool {
+        let Some(found) = self.dimensions.get(name).filter(|found| **found != expected) else { return true };
+        let [found, expected] = [found.unit(), expected.unit()];
+        let message = match found {
+            Some(found) => format!("`{name}` is in {found}, which does not fit `{key}`"),
+            None => format!("the unit of `{name}` does not fit `{key}`"),
+        };
+        let diagnostic = Diagnostic::error(Code::UNIT_MISMATCH, expr.span, message);
+        self.report(match expected {
+            Some(unit) => diagnostic.help(format!("`{key}` is in {unit}")),
+            None => diagnostic.help(format!("`{key}` has no unit")),
+        });
+        false
+    }
+
     /// Evaluates a constant in SI units. A unit, where one is written, must fit.
     pub(in crate::lower) fn quantity_expr(
         &mut self,
@@ -207,8 +240,9 @@ impl<'a> Lowering<'a> {
                     self.report(Diagnostic::error(Code::UNIT_MISMATCH, unit.span, message).help(help));
                     return None;
                 }
-                Some(value * parsed.factor)
+                self.may_be_number(*value, expr).then_some(value * parsed.factor)
             }
+            ExprKind::Name(name) if !self.dimension_fits(name, expected, key, expr) => None,
             ExprKind::Negate(inner) => self.quantity_expr(inner, expected, key).map(|v| -v),
             _ => {
                 let value = self.expr(expr);
@@ -220,6 +254,16 @@ impl<'a> Lowering<'a> {
                 self.as_constant(node, expr.span, &format!("`{key}`"))
             }
         }
+    }
+}
+
+/// How a block is written.
+fn block_form(key: &str) -> String {
+    match key {
+        "flux" => "flux { point: [0.5, 0.5, 0.5], normal: [1, 0, 0] }".into(),
+        "box" => "box { min: [0, 0, 0], max: [1, 1, 1] }".into(),
+        "run" => "run { until: 2 s }".into(),
+        key => format!("{key} {{ … }}"),
     }
 }
 

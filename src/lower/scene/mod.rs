@@ -77,6 +77,11 @@ pub struct Scene {
     pub tolerance: Option<Tolerance>,
 }
 
+impl Scene {
+    /// The most frames of a run: the names of their files have six digits.
+    pub const MOST_FRAMES: u64 = 999_999;
+}
+
 /// How a wall acts on a particle that hits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounce {
@@ -151,6 +156,8 @@ pub struct Fluid {
     pub density: f64,
     /// Mass of one particle, kg.
     pub mass: f64,
+    /// Place of the key that states how large a particle is, `mass` or `spacing`; `None`: the mass is the default.
+    pub size_span: Option<Span>,
     /// Dynamic viscosity, Pa·s.
     pub viscosity: f64,
     /// Surface tension, N/m.
@@ -183,6 +190,8 @@ pub struct Obstacle {
 pub struct Run {
     /// Fixed time step, s; `None`: it follows from the fluid and the method.
     pub dt: Option<f64>,
+    /// Place of the time step in the text, if it is stated.
+    pub dt_span: Option<Span>,
     /// End of the simulated time, s.
     pub until: f64,
     /// Time between saved frames, s.

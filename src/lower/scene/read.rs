@@ -123,7 +123,8 @@ impl<'a> Lowering<'a> {
         };
         let block = self.block(entries, "a box", span, &BOX_KEYS, &[]);
         let min = self.vector_key(&block, "min", Dimension::LENGTH, DVec3::ZERO);
-        if block.setting("max").is_none() {
+        let is_misspelt = entries.iter().any(|entry| !BOX_KEYS.contains(&entry.key().text.as_str()));
+        if block.setting("max").is_none() && !is_misspelt {
             self.missing(&block, "max", "write `max: [3, 3, 3]`");
         }
         let max = self.vector_key(&block, "max", Dimension::LENGTH, DVec3::ONE);
@@ -235,7 +236,7 @@ impl<'a> Lowering<'a> {
             self.missing(&block, "solid", "write `solid: pawn` with the name of a solid");
             return None;
         };
-        let shape = self.field(value)?;
+        let shape = self.shape(value)?;
         let name = match &value.kind {
             ExprKind::Name(name) => name.clone(),
             _ => "obstacle".into(),
@@ -244,7 +245,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn run(&mut self, block: &Block<'_>) -> Option<Run> {
-        let defaults = Run { dt: None, until: 5.0, save_every: 0.05, checkpoint_every: None };
+        let defaults = Run { dt: None, dt_span: None, until: 5.0, save_every: 0.05, checkpoint_every: None };
         let Some((_, entries, span)) = block.blocks("run").next() else { return Some(defaults) };
         let block = self.block(entries, "a run", span, &RUN_KEYS, &[]);
         let mut optional = |key| match block.setting(key) {
@@ -260,6 +261,50 @@ impl<'a> Lowering<'a> {
             Some(defaults.save_every),
             Bound::Positive,
         );
-        Some(Run { dt: dt?, until: until?, save_every: save?, checkpoint_every: checkpoint_every? })
+        let run = Run {
+            dt: dt?,
+            dt_span: block.setting("dt").map(|(_, value)| value.span),
+            until: until?,
+            save_every: save?,
+            checkpoint_every: checkpoint_every?,
+        };
+        let stated =
+            block.setting("save_every").or(block.setting("until")).map_or(span, |(_, value)| value.span);
+        self.frames_fit(&run, stated).then_some(run)
+    }
+
+    /// Reports frames that would fill a disk, and warns of frames so rare that there are none.
+    fn frames_fit(&mut self, run: &Run, at: Span) -> bool {
+        const MANY: f64 = 20_000.0;
+        let frames = run.until / run.save_every;
+        let [until, every] = [run.until, run.save_every].map(seconds_as_written);
+        let fewer = format!("write for example `save_every: {}`", seconds_as_written(run.until / 100.0));
+        if frames > Scene::MOST_FRAMES as f64 {
+            let message = format!(
+                "{until} with a frame every {every} are {frames:.3e} frames; at most {} are saved",
+                Scene::MOST_FRAMES
+            );
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(fewer));
+            return false;
+        }
+        if frames > MANY {
+            let message = format!("{until} with a frame every {every} are {frames:.0} frames");
+            self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
+        } else if run.save_every > run.until {
+            let message =
+                format!("a frame every {every} in a run of {until}: only its start and its end are saved");
+            self.report(Diagnostic::warning(Code::FRAMES, at, message).help(fewer));
+        }
+        true
+    }
+}
+
+/// A time as a file writes it, with two digits: `50 ms`, `0.2 s`.
+fn seconds_as_written(time: f64) -> String {
+    let rounded = |value: f64| format!("{value:.1e}").parse().unwrap_or(value);
+    if time < 0.1 && time > 1e-5 {
+        format!("{} ms", rounded(1e3 * time))
+    } else {
+        format!("{} s", rounded(time))
     }
 }

@@ -1,0 +1,107 @@
+//! The folder of a run: who may write into it.
+//!
+//! Invariant: two runs never write into one folder at the same time, and no run is replaced unless that is asked for.
+
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use super::super::args::Run;
+use super::super::output::{Shown, TEMPORARY};
+use super::super::{Failure, note};
+use super::checkpoints;
+
+/// Name of the file that a run locks in its folder. The system unlocks it when the process ends, however it ends.
+const LOCK: &str = ".rfm.lock";
+
+/// Folders within that of a run.
+const PARTS: [&str; 5] = ["", "frames", "pictures", "checkpoints", "probes"];
+
+/// The right to write into a folder, until it is dropped.
+pub(super) struct Hold {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Drop for Hold {
+    fn drop(&mut self) {
+        // it is still locked, so nobody else has it; a file that stays behind is unlocked and harms nobody
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// The folder for a run's files. The default is beside the file, `pawn.rfm` → `pawn.out`; for standard input
+/// it is `rfm.out`.
+pub(super) fn of(options: &Run) -> PathBuf {
+    match &options.output {
+        Some(folder) => folder.clone(),
+        None if options.file == Path::new("-") => PathBuf::from("rfm.out"),
+        None => options.file.with_extension("out"),
+    }
+}
+
+/// Refuses a folder that holds a run which is neither to be replaced nor to be continued.
+pub(super) fn may_be_written(folder: &Path, options: &Run) -> Result<(), Failure> {
+    if options.resume || options.force {
+        return Ok(());
+    }
+    let Some(content) = run_in(folder) else { return Ok(()) };
+    let shown = folder.shown();
+    let go_on = if checkpoints::exist(folder) { "go on from it with --resume, " } else { "" };
+    Err(Failure::usage(format!(
+        "`{shown}` holds a run already ({content}): {go_on}replace it with --force, or write elsewhere with -o DIR"
+    )))
+}
+
+/// What a folder has of a run, in words; `None` if there is nothing that a new run would remove.
+fn run_in(folder: &Path) -> Option<String> {
+    let frames = std::fs::read_dir(folder.join("frames")).map_or(0, |entries| {
+        entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with("particles_")).count()
+    });
+    let text = std::fs::read_to_string(folder.join("summary.json")).unwrap_or_default();
+    let summary: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    let is_summary = summary.get("simulated_seconds").is_some();
+    if !is_summary && frames == 0 && !checkpoints::exist(folder) {
+        return None;
+    }
+    let frames = format!("{frames} frame{}", if frames == 1 { "" } else { "s" });
+    Some(match (summary["scene"].as_str(), summary["simulated_seconds"].as_f64()) {
+        (Some(scene), Some(time)) => format!("scene {scene}, {time:.3} s, {frames}"),
+        _ => format!("not finished, {frames}"),
+    })
+}
+
+impl Hold {
+    /// Makes the folder if it is not there, and locks it. Removes the temporary files of a run that was killed.
+    pub fn take(folder: &Path) -> Result<Self, Failure> {
+        std::fs::create_dir_all(folder)
+            .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.shown())))?;
+        let path = folder.join(LOCK);
+        let open = File::options().create(true).truncate(false).write(true).open(&path);
+        let lock = open
+            .map_err(|e| Failure::usage(format!("cannot write into the folder `{}`: {e}", folder.shown())))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(Failure::usage(format!(
+                    "another run is writing into `{}`: wait for its end, or write elsewhere with -o DIR",
+                    folder.shown()
+                )));
+            }
+            // some network folders cannot be locked
+            Err(TryLockError::Error(e)) => note(format!("`{}` cannot be locked: {e}", folder.shown())),
+        }
+        for part in PARTS {
+            remove_temporaries(&folder.join(part));
+        }
+        Ok(Self { path, _lock: lock })
+    }
+}
+
+/// Removes files that a killed run was writing. One that cannot be removed harms nobody.
+fn remove_temporaries(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The values of flags: numbers with units, places, ranges.
+
+use std::num::NonZeroUsize;
+
+use glam::DVec3;
+use rfm::geom::Aabb;
+use rfm::quantity::{Dimension, parse_quantity};
+use rfm::slice::{Axis, Plane};
+
+/// How far a simplified mesh may be from the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Tolerance {
+    /// A length, m.
+    Length(f64),
+    /// A part of the diagonal of the mesh's bounds.
+    OfDiagonal(f64),
+}
+
+/// A range of frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Frames {
+    /// The first frame.
+    pub first: usize,
+    /// The first frame that is left out; `None`: all frames from `first` on.
+    pub end: Option<usize>,
+}
+
+/// A param that the command line sets.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Definition {
+    pub name: String,
+    /// The value in SI units.
+    pub value: f64,
+    /// The dimension of the value; `None` if it was given without a unit.
+    pub dimension: Option<Dimension>,
+}
+
+/// `NAME=VALUE`, the value with or without a unit.
+pub(super) fn definition(text: &str) -> Result<Definition, String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    let (value, dimension) = parse_quantity(value)?;
+    Ok(Definition { name: name.trim().to_string(), value, dimension })
+}
+
+/// Most threads. A larger number is a typing error, and starting the threads would take minutes.
+const MOST_THREADS: usize = 1024;
+
+pub(super) fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let number = text.trim().parse().ok().filter(|n: &NonZeroUsize| n.get() <= MOST_THREADS);
+    number.ok_or_else(|| format!("expected a whole number from 1 to {MOST_THREADS}"))
+}
+
+pub(super) fn count(text: &str) -> Result<usize, String> {
+    let number = text.trim().parse().ok().filter(|&n: &usize| n > 0);
+    number.ok_or_else(|| "expected a whole number above 0".to_string())
+}
+
+/// Coordinates in metres or with units, separated by commas.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let values: Result<Vec<f64>, String> = text.split(',').map(length).collect();
+    values?.try_into().map_err(|v: Vec<f64>| format!("expected {N} numbers, found {}", v.len()))
+}
+
+/// A number in SI units, or with a unit of the dimension. `what` names what is read.
+fn measured(text: &str, dimension: Dimension, what: &str, units: &str) -> Result<f64, String> {
+    let (value, found) =
+        parse_quantity(text).map_err(|reason| format!("{reason}; expected {what}, as in {units}"))?;
+    match found {
+        Some(found) if found != dimension => Err(format!("`{}` is not {what}, as in {units}", text.trim())),
+        _ => Ok(value),
+    }
+}
+
+/// A number of seconds, or a time with a unit.
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    let value = measured(text, Dimension::TIME, "a time", "0.5, 500ms or 2min")?;
+    if value.is_finite() { Ok(value) } else { Err("the time must be finite".into()) }
+}
+
+/// A number of metres, or a length with a unit.
+pub(super) fn length(text: &str) -> Result<f64, String> {
+    measured(text, Dimension::LENGTH, "a length", "0.5, 8mm or 2cm")
+}
+
+/// A length, or a percentage.
+pub(super) fn tolerance(text: &str) -> Result<Tolerance, String> {
+    let found = match text.trim().strip_suffix('%') {
+        None => length(text).map(|length| (length, Tolerance::Length(length))),
+        Some(number) => number
+            .trim()
+            .parse::<f64>()
+            .map(|percent| (percent, Tolerance::OfDiagonal(percent / 100.0)))
+            .map_err(|_| format!("`{text}` is neither a length nor a percentage")),
+    };
+    match found? {
+        (size, tolerance) if size.is_finite() && size > 0.0 => Ok(tolerance),
+        _ => Err("expected a length or a percentage above 0".into()),
+    }
+}
+
+/// `A..B`, `A..`, `..B`, or one number.
+pub(super) fn frames(text: &str) -> Result<Frames, String> {
+    let whole = |text: &str| {
+        text.trim()
+            .parse::<usize>()
+            .map_err(|_| format!("`{text}` is not the number of a frame; expected A..B"))
+    };
+    let Some((first, end)) = text.split_once("..") else {
+        let first = whole(text)?;
+        return Ok(Frames { first, end: first.checked_add(1) });
+    };
+    Ok(Frames {
+        first: if first.trim().is_empty() { 0 } else { whole(first)? },
+        end: if end.trim().is_empty() { None } else { Some(whole(end)?) },
+    })
+}
+
+pub(super) fn point(text: &str) -> Result<DVec3, String> {
+    numbers::<3>(text).map(DVec3::from_array)
+}
+
+pub(super) fn window(text: &str) -> Result<[f64; 4], String> {
+    numbers::<4>(text)
+}
+
+pub(super) fn aabb(text: &str) -> Result<Aabb, String> {
+    let [x0, y0, z0, x1, y1, z1] = numbers::<6>(text)?;
+    Ok(Aabb::new(DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1)))
+}
+
+pub(super) fn plane(text: &str) -> Result<Plane, String> {
+    let (axis, value) = text.split_once('=').ok_or("expected x=…, y=… or z=…")?;
+    let axis = match axis.trim() {
+        "x" => Axis::X,
+        "y" => Axis::Y,
+        "z" => Axis::Z,
+        other => return Err(format!("`{other}` is not an axis; expected x, y or z")),
+    };
+    let value = length(value)?;
+    if !value.is_finite() {
+        return Err("the plane must be at a finite place".into());
+    }
+    Ok(Plane::new(axis, value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_units_or_are_metres() {
+        for (text, expected) in
+            [("0.5", 0.5), ("2 mm", 2e-3), ("2e-1cm", 2e-3), ("-1m", -1.0), ("1E3um", 1e-3)]
+        {
+            let found = length(text).unwrap();
+            assert!((found - expected).abs() < 1e-15, "{text}: {found}");
+        }
+        for text in ["", "mm", "2 kg", "2 furlong", "1,5"] {
+            assert!(length(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn every_number_takes_a_unit() {
+        let found = definition("alpha = 10 deg").unwrap();
+        assert_eq!((found.name.as_str(), found.dimension), ("alpha", Some(Dimension::ANGLE)));
+        assert!((found.value - 10f64.to_radians()).abs() < 1e-15);
+        assert_eq!(definition("n=3").unwrap().dimension, None);
+        assert_eq!(seconds("500ms"), Ok(0.5));
+        assert_eq!(point("1cm,2mm,0.5"), Ok(DVec3::new(0.01, 0.002, 0.5)));
+        assert_eq!(plane("z=5mm").unwrap(), Plane::new(Axis::Z, 0.005));
+        for text in ["500 kg", "soon", "inf", ""] {
+            assert!(seconds(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn tolerances_are_lengths_or_percentages() {
+        assert_eq!(tolerance("2mm"), Ok(Tolerance::Length(2e-3)));
+        assert_eq!(tolerance("0.5 %"), Ok(Tolerance::OfDiagonal(5e-3)));
+        for text in ["0", "-1mm", "%", "0%", "nan", "inf%", "1e400", "few"] {
+            assert!(tolerance(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn ranges_of_frames() {
+        let range = |first, end| Ok(Frames { first, end });
+        assert_eq!(frames("3..5"), range(3, Some(5)));
+        assert_eq!(
+            (frames("3.."), frames("..5"), frames("..")),
+            (range(3, None), range(0, Some(5)), range(0, None))
+        );
+        assert_eq!(frames("7"), range(7, Some(8)));
+        assert!(frames("a..b").is_err() && frames("-1..2").is_err() && frames("").is_err());
+    }
+}

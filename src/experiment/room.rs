@@ -1,0 +1,234 @@
+//! How much room a scene has for its fluid, and what is said when that is too little.
+
+use glam::DVec3;
+
+use super::{Experiment, refuse};
+use crate::compile::Error;
+use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::geom::Aabb;
+use crate::lower::Scene;
+use crate::solid::Bounds;
+use crate::sph::{MAX_SITES, SeedError};
+
+/// Points along the longest side of a box whose volume is estimated by sampling.
+const SAMPLES: f64 = 40.0;
+
+/// The least part of a fluid outside the box that is worth a warning: less is an edge between samples.
+const PART_OUTSIDE: f64 = 0.02;
+
+impl Experiment {
+    /// The box in which the shape of the fluid lies, m.
+    pub(super) fn reach(&self) -> Result<Aabb, Error> {
+        let (fluid, domain) = (&self.scene.fluid, self.scene.domain);
+        let no_room = |message: String| {
+            let diagnostic = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message);
+            diagnostic
+                .label(self.scene.domain_span, format!("the box goes from {} to {}", domain.min, domain.max))
+        };
+        let bounds = match self.fluid.bounds() {
+            Bounds::Within(bounds) => *bounds,
+            Bounds::Unbounded => domain,
+            Bounds::Empty => {
+                let message = "the shape of the fluid is empty";
+                let empty = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message);
+                return Err(refuse(&self.program, empty));
+            }
+        };
+        let within = bounds.intersection(&domain);
+        if within.is_empty() || within.size().min_element() <= 0.0 {
+            let message = "the shape of the fluid lies outside the box".to_string();
+            let reach = format!("it lies between {} and {}", place(bounds.min), place(bounds.max));
+            return Err(refuse(&self.program, no_room(message).at(reach)));
+        }
+        Ok(bounds)
+    }
+
+    /// The message for a fluid that cannot be placed.
+    pub(super) fn no_fluid(&self, error: &SeedError) -> Error {
+        let fluid = &self.scene.fluid;
+        let spacing = self.parameters.spacing();
+        let at = fluid.particles_span.unwrap_or(fluid.shape_span);
+        let no_room = |span: Span, message: String| Diagnostic::error(Code::SCENE_NO_ROOM, span, message);
+        let diagnostic = match error {
+            SeedError::DoesNotFit { room: 0, .. } => self.too_coarse(),
+            SeedError::DoesNotFit { wanted, room } => {
+                let message = format!(
+                    "{wanted} particles do not fit: with {} between them the shape has room for {room}",
+                    length(spacing)
+                );
+                no_room(at, message).help(if *wanted as f64 > 0.2 * MAX_SITES {
+                    format!(
+                        "{}so many particles are too many in any case: leave `particles` out, or write `particles: {room}`",
+                        self.why_so_large()
+                    )
+                } else {
+                    let fits = spacing * (*room as f64 / *wanted as f64).cbrt();
+                    format!(
+                        "{}write `spacing: {}` in the fluid, or `particles: {room}`",
+                        self.why_so_large(),
+                        length(0.95 * fits)
+                    )
+                })
+            }
+            SeedError::TooLarge { sites } if sites.is_finite() => {
+                let message = format!(
+                    "with {} between particles the shape would hold {sites:.1e} of them; at most {MAX_SITES:.0e} are possible",
+                    length(spacing)
+                );
+                let fits = spacing * (sites / (0.5 * MAX_SITES)).cbrt();
+                let span = fluid.size_span.unwrap_or(fluid.shape_span);
+                no_room(span, message).help(format!("write for example `spacing: {}`", length(fits)))
+            }
+            SeedError::NothingLeft(carved) if carved.inside + carved.too_close + carved.outside_box == 0 => {
+                self.too_coarse()
+            }
+            SeedError::NothingLeft(_) => {
+                Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, error.to_string())
+                    .help("move the shape of the fluid out of the obstacles")
+            }
+            SeedError::NoCount
+            | SeedError::Jitter(_)
+            | SeedError::TooLarge { .. }
+            | SeedError::Undefined { .. } => no_room(at, error.to_string()),
+        };
+        refuse(&self.program, diagnostic)
+    }
+
+    /// The message for a shape in which not one particle fits.
+    fn too_coarse(&self) -> Diagnostic {
+        let fluid = &self.scene.fluid;
+        let spacing = self.parameters.spacing();
+        let size = self.reach().map_or(DVec3::ZERO, |bounds| bounds.intersection(&self.scene.domain).size());
+        let message = format!(
+            "not one particle fits: they are {} apart, and the shape is only {} thick",
+            length(spacing),
+            length(size.min_element())
+        );
+        let span = fluid.size_span.unwrap_or(fluid.shape_span);
+        Diagnostic::error(Code::SCENE_NO_ROOM, span, message).help(format!(
+            "{}write for example `spacing: {}`",
+            self.why_so_large(),
+            length(size.min_element() / 10.0)
+        ))
+    }
+
+    /// Where the spacing comes from if the scene states neither a mass nor a spacing.
+    fn why_so_large(&self) -> String {
+        let fluid = &self.scene.fluid;
+        match fluid.size_span {
+            Some(_) => String::new(),
+            None => format!("the spacing follows from the default `mass: {} kg`; ", fluid.mass),
+        }
+    }
+
+    /// A warning if part of the fluid's shape lies outside the box.
+    pub(super) fn outside(&self, bounds: &Aabb) -> Option<Diagnostic> {
+        let Bounds::Within(_) = self.fluid.bounds() else { return None };
+        let domain = self.scene.domain;
+        // the lattice begins half a spacing from the faces
+        let grown = domain.grown(0.5 * self.parameters.spacing());
+        if bounds.intersection(&grown) == *bounds {
+            return None;
+        }
+        let (mut all, mut outside, mut far) = (0.0, 0.0, 0.0);
+        for at in samples(bounds).filter(|at| self.fluid.omega(*at) > 0.0) {
+            all += 1.0;
+            outside += f64::from(u8::from(!domain.contains(at)));
+            far += f64::from(u8::from(!grown.contains(at)));
+        }
+        let part = outside / all;
+        (far / all > PART_OUTSIDE).then(|| {
+            let message = format!(
+                "about {:.0} % of the fluid's shape lies outside the box, and is left out",
+                100.0 * part
+            );
+            let at = format!("it lies between {} and {}", place(bounds.min), place(bounds.max));
+            Diagnostic::warning(Code::FLUID_OUTSIDE_BOX, self.scene.fluid.shape_span, message)
+                .at(at)
+                .label(self.scene.domain_span, format!("the box goes from {} to {}", domain.min, domain.max))
+        })
+    }
+
+    /// The part of the box, m³, that no body takes at a time, s, found by samples.
+    pub fn free_volume(&self, time: f64) -> f64 {
+        let bodies: Vec<_> = self.bodies.iter().map(|body| body.solid.at(time)).collect();
+        let domain = self.scene.domain;
+        let (mut free, mut all) = (0.0, 0.0);
+        for at in samples(&domain) {
+            all += 1.0;
+            free += f64::from(u8::from(bodies.iter().all(|body| body.omega(at) < 0.0)));
+        }
+        domain.volume() * free / all
+    }
+
+    /// How many particles the scene has at its start, found by samples and without placing any of them.
+    ///
+    /// # Errors
+    /// [`Error::Diagnostics`] if the fluid's shape lies outside the box.
+    pub fn estimated_particles(&self) -> Result<f64, Error> {
+        let region = self.reach()?.intersection(&self.scene.domain);
+        let (mut fluid, mut all) = (0.0, 0.0);
+        for at in samples(&region) {
+            all += 1.0;
+            let wet = self.fluid.omega(at) > 0.0 && self.bodies.iter().all(|body| body.solid.omega(at) < 0.0);
+            fluid += f64::from(u8::from(wet));
+        }
+        let cell = self.parameters.spacing().powi(3);
+        let (sites, room) = (region.volume() / cell, region.volume() * fluid / all / cell);
+        if sites > MAX_SITES {
+            return Err(self.no_fluid(&SeedError::TooLarge { sites }));
+        }
+        let Some(wanted) = self.scene.fluid.particles else { return Ok(room) };
+        // few particles are counted when they are placed
+        let is_certain = room > 1000.0 && wanted as f64 > 1.1 * room;
+        if is_certain {
+            // rounded down to what fits for certain
+            let unit = 10f64.powf((0.95 * room).log10().floor() - 1.0);
+            let room = (unit * (0.95 * room / unit).floor()) as usize;
+            return Err(self.no_fluid(&SeedError::DoesNotFit { wanted, room }));
+        }
+        Ok(room.min(wanted as f64))
+    }
+
+    /// The same scene with larger particles, as many as are wanted: what it costs tells what the scene costs.
+    ///
+    /// # Errors
+    /// Those of [`Experiment::new`].
+    pub fn coarser(&self, particles: f64, engine: crate::Engine) -> Result<Self, Error> {
+        let factor = (self.estimated_particles()? / particles).max(1.0);
+        let mut scene: Scene = self.scene.clone();
+        scene.fluid.mass *= factor;
+        scene.fluid.support_radius *= factor.cbrt();
+        scene.fluid.particles =
+            scene.fluid.particles.map(|wanted| ((wanted as f64 / factor) as usize).max(1));
+        Self::of_scene(self.program.clone(), scene, engine)
+    }
+}
+
+/// Points in the middles of equal cells that fill a box.
+fn samples(region: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
+    let size = region.size();
+    let side = size.max_element() / SAMPLES;
+    let counts = (size / side).ceil().max(DVec3::ONE);
+    let [nx, ny, nz] = counts.to_array().map(|n| n as u64);
+    let (min, cell) = (region.min, size / counts);
+    (0..nx * ny * nz).map(move |index| {
+        let (i, j, k) = (index % nx, index / nx % ny, index / (nx * ny));
+        min + cell * (DVec3::new(i as f64, j as f64, k as f64) + 0.5)
+    })
+}
+
+/// A place with three digits behind the point, and no sign before zero.
+fn place(at: DVec3) -> DVec3 {
+    (1e3 * at).round() / 1e3 + 0.0
+}
+
+/// A length as a file writes it, with three digits: `2.5 mm`, `0.12 m`.
+fn length(metres: f64) -> String {
+    let rounded = |value: f64| format!("{value:.2e}").parse().unwrap_or(value);
+    match metres {
+        m if m >= 0.1 => format!("{} m", rounded(m)),
+        m if m >= 1e-4 => format!("{} mm", rounded(1e3 * m)),
+        m => format!("{} um", rounded(1e6 * m)),
+    }
+}

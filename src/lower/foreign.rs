@@ -1,0 +1,256 @@
+//! Functions, values and methods of OpenSCAD, POV-Ray, GLSL and Python: how to write here what they do there.
+
+use super::lowering::Lowering;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::syntax::ast::{Argument, Expr, Name};
+use crate::syntax::foreign;
+
+impl Lowering<'_> {
+    /// The message for a call of a function that other languages have; `None` if the name is not known from there.
+    pub fn foreign_function(&self, name: &Name, arguments: &[Argument]) -> Option<Diagnostic> {
+        let written: Option<Vec<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
+        let written = written.filter(|parts| parts.iter().map(|p| p.len()).sum::<usize>() <= 100);
+        let Words { what, help } = function(&name.text, &written.unwrap_or_default())?;
+        let message = format!("unknown function or shape `{}`", name.text);
+        Some(Diagnostic::error(Code::UNKNOWN_NAME, name.span, message).at(what).help(help))
+    }
+
+    /// The message for a method that other tools have; `None` if the name is not known from there.
+    pub fn foreign_method(
+        &self,
+        receiver: &Expr,
+        method: &Name,
+        arguments: &[Argument],
+    ) -> Option<Diagnostic> {
+        let mut written = vec![self.written(receiver).unwrap_or("a")];
+        written.extend(arguments.iter().map(|a| self.written(&a.value).unwrap_or("b")));
+        let message = format!("shapes have no method `{}`", method.text);
+        let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message);
+        if let Some(known) = foreign::method(&method.text) {
+            let call = foreign::method_call(&method.text, &written[1..].join(", "))?;
+            return Some(diagnostic.at(format!("`.{known}` here")).help(format!("write `{call}`")));
+        }
+        let Words { what, help } = joined(&method.text, &written)?;
+        Some(diagnostic.at(what).help(help))
+    }
+}
+
+/// The help for a value that other languages have; `None` if the name is not known from there.
+pub(super) fn value(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "PI" | "M_PI" | "Pi" | "π" => "write `pi`",
+        "tau" | "TAU" | "M_TAU" | "τ" => "write `2*pi`",
+        "e" | "E" | "M_E" => "write `exp(1)`",
+        "X" => "write `x`",
+        "Y" => "write `y`",
+        "Z" => "write `z`",
+        "r" | "R" => "write `sqrt(x^2 + y^2)`, or define it: `let r = sqrt(x^2 + y^2)` above",
+        "theta" | "phi" => "write `atan2(y, x)`",
+        "T" | "time" | "now" => "write `t`, the time in seconds",
+        "dt" => "the time is `t`; the length of steps is a key of `run { dt: 1 ms }` in a scene",
+        "true" | "True" | "false" | "False" | "None" | "nil" | "null" | "undef" => {
+            "there are no logical values: a field is positive where a shape is"
+        }
+        "inf" | "Inf" | "infinity" | "Infinity" | "INFINITY" | "nan" | "NaN" => {
+            "numbers are finite: a half-space such as `x <= 1` has no end either"
+        }
+        "p" | "P" | "pos" | "position" | "uv" => "write `[x, y, z]`",
+        "if" | "then" | "else" => foreign::CONDITION,
+        _ => return None,
+    })
+}
+
+/// What a word is called here, and how its call is written.
+struct Words {
+    what: String,
+    help: String,
+}
+
+fn words(what: &str, help: &str) -> Option<Words> {
+    Some(Words { what: what.into(), help: help.into() })
+}
+
+fn written(what: &str, call: &str) -> Option<Words> {
+    Some(Words { what: what.into(), help: format!("write `{call}`") })
+}
+
+/// Shapes that are joined, as a function of all of them or as a method of the first.
+fn joined(name: &str, a: &[&str]) -> Option<Words> {
+    let chain = |op: &str| match a {
+        [] | [_] => format!("a {op} b"),
+        all => all.iter().map(|text| foreign::operand(text)).collect::<Vec<_>>().join(&format!(" {op} ")),
+    };
+    match name {
+        "union" | "unite" | "merge" | "fuse" | "join" | "combine" | "opUnion" | "add" | "sdUnion" => {
+            written("`or` here", &chain("or"))
+        }
+        "intersection" | "intersect" | "common" | "opIntersection" => written("`and` here", &chain("and")),
+        "difference" | "subtract" | "cut" | "opSubtraction" | "diff" | "minus" | "remove" | "without" => {
+            written("`\\` here, which is without", &chain("\\"))
+        }
+        "xor" | "symmetric_difference" | "opXor" => match a {
+            [a, b] => {
+                let [a, b] = [a, b].map(|text| foreign::operand(text));
+                written("not an operation here", &format!("({a} or {b}) \\ ({a} and {b})"))
+            }
+            _ => written("not an operation here", "(a or b) \\ (a and b)"),
+        },
+        "complement" | "inverse" | "invert" | "negate" => match a {
+            [only] => written("`not` here", &format!("not {}", foreign::operand(only))),
+            _ => written("`not` here", "not a"),
+        },
+        "smooth_union" | "smin" | "opSmoothUnion" | "blend" | "smax" | "fillet" | "chamfer" | "round"
+        | "rounding" => words(
+            "edges cannot be rounded by a function here",
+            "write the rounded part as a shape: a `torus`, a `capsule` or a `sphere` joined by `or`",
+        ),
+        "hull" | "minkowski" | "offset" | "shell" | "dilate" | "erode" | "onion" | "thicken" | "elongate" => {
+            words(
+                "there is no such operation here",
+                "write the shape by inequalities; a hollow ball is `sphere(1) \\ sphere(0.9)`, a rod with round ends `capsule(0.1, 1)`",
+            )
+        }
+        "repeat" | "array" | "pattern" | "for_each" | "polar_array" | "duplicate" => {
+            written("`any` here", "any i in 0..6: sphere(0.3).move([i, 0, 0])")
+        }
+        "color" | "colour" | "material" | "texture" | "pigment" => {
+            words("shapes have no colour", "leave it out")
+        }
+        _ => None,
+    }
+}
+
+fn function(name: &str, a: &[&str]) -> Option<Words> {
+    joined(name, a).or_else(|| transformed(name, a)).or_else(|| solid(name, a)).or_else(|| number(name, a))
+}
+
+/// `translate([1, 0, 0], shape)`: methods that stand in front of a shape elsewhere.
+fn transformed(name: &str, a: &[&str]) -> Option<Words> {
+    let method = foreign::method(name)?;
+    let what = format!("a method here: `shape.{method}(…)`");
+    let call = match a {
+        [] => None,
+        [shape, how] if how.starts_with('[') || method.starts_with("rotate_") => Some((*shape, *how)),
+        [how, shape] => Some((*shape, *how)),
+        [how] => Some(("sphere(1)", *how)),
+        [_, _, ..] => None,
+    };
+    let example = match call {
+        Some((shape, how)) => format!("{shape}{}", foreign::method_call(name, how)?),
+        None => format!(
+            "sphere(1){}",
+            foreign::method_call(name, if method == "scale" { "2" } else { "[1, 0, 0]" })?
+        ),
+    };
+    Some(Words { what, help: format!("write `{example}`") })
+}
+
+/// Standard solids of other tools.
+fn solid(name: &str, a: &[&str]) -> Option<Words> {
+    let size = a.first().filter(|text| text.starts_with('['));
+    match name {
+        "cube" | "cuboid" | "Box" | "block" | "brick" | "rect" | "square" | "aabb" => match (a, size) {
+            (_, Some(size)) => written("`box(min, max)` here", &format!("box([0, 0, 0], {size})")),
+            ([side], None) => {
+                written("`box(min, max)` here", &format!("box([0, 0, 0], [{side}, {side}, {side}])"))
+            }
+            ([x, y, z], None) => written("`box(min, max)` here", &format!("box([0, 0, 0], [{x}, {y}, {z}])")),
+            _ => written("`box(min, max)` here", "box([0, 0, 0], [1, 1, 1])"),
+        },
+        "sdBox" | "box3" => written("`box(min, max)` here", "box([-1, -1, -1], [1, 1, 1])"),
+        "sdSphere" | "spheroid" | "f_sphere" | "orb" => written("`sphere(r)` here", "sphere(1)"),
+        "disk" | "disc" | "circle" | "tube" | "pipe" | "rod" | "sdCylinder" | "frustum" => written(
+            "`cylinder(r, h)` here",
+            if name == "pipe" || name == "tube" {
+                "cylinder(0.5, 1) \\ cylinder(0.4, 1)"
+            } else {
+                "cylinder(0.5, 1)"
+            },
+        ),
+        "plane" | "halfspace" | "half_plane" | "sdPlane" => {
+            written("`half_space(normal, point)` here", "half_space([0, 0, 1], [0, 0, 0])")
+        }
+        "slab" => written("`layer(e, low, high)` here", "layer(z, 0, 1)"),
+        "donut" | "doughnut" | "ring" | "sdTorus" => written("`torus(R, r)` here", "torus(1, 0.25)"),
+        "pill" | "sdCapsule" | "sphylinder" => written("`capsule(r, h)` here", "capsule(0.2, 1)"),
+        "pyramid" | "prism" | "wedge" | "tetrahedron" | "octahedron" | "polyhedron" | "hexagon"
+        | "polygon" => words(
+            "planes joined by `and` here",
+            "write `(all i in 0..6: half_space([1, 0, 0], [1, 0, 0]).rotate_z(i*60 deg)) and 0 <= z <= 1`",
+        ),
+        "linear_extrude" | "extrude" => {
+            words("a layer here", "write the outline and a layer: `x² + y² <= 1 and 0 <= z <= 2`")
+        }
+        "rotate_extrude" | "revolve" | "lathe" | "sor" => words(
+            "a function of the radius here",
+            "write the outline in `let r = sqrt(x^2 + y^2)` and z: `(r - 1)^2 + z^2 <= 0.1`",
+        ),
+        "text" | "surface" | "heightfield" | "height_field" | "import" | "mesh" | "load" | "stl" => words(
+            "nothing can be read from other files",
+            "describe the shape by standard solids and inequalities",
+        ),
+        _ => None,
+    }
+}
+
+/// Functions of numbers and vectors.
+fn number(name: &str, a: &[&str]) -> Option<Words> {
+    let first = a.first().copied().unwrap_or("a");
+    let call = |name: &str| format!("{name}({})", if a.is_empty() { "a, b".into() } else { a.join(", ") });
+    match name {
+        "log" | "loge" => written("`ln` here", &format!("ln({first})")),
+        "log10" | "lg" => written("`ln` here", &format!("ln({first})/ln(10)")),
+        "log2" => written("`ln` here", &format!("ln({first})/ln(2)")),
+        "exp2" => written("`^` here", &format!("2^({first})")),
+        "mod" | "fmod" | "rem" => words("there is no remainder", foreign::REMAINDER),
+        "fract" | "frac" | "floor" | "ceil" | "trunc" | "int" => {
+            words("fields have no steps", foreign::REMAINDER)
+        }
+        "if" | "select" | "ifelse" | "where" | "cond" | "step" | "smoothstep" => {
+            words("there are no conditions", foreign::CONDITION)
+        }
+        "min3" | "min2" | "min4" | "fmin" | "Min" | "minimum" => written("`min` here", &call("min")),
+        "max3" | "max2" | "max4" | "fmax" | "Max" | "maximum" => written("`max` here", &call("max")),
+        "mix" | "lerp" => match a {
+            [a, b, t] => written("a formula here", &format!("({a}) + (({b}) - ({a}))*({t})")),
+            _ => written("a formula here", "a + (b - a)*t"),
+        },
+        "norm" | "magnitude" | "mag" | "len" | "vlength" | "distance" => match a {
+            [a, b] => written("`length` here", &format!("length({a} - {b})")),
+            _ => written("`length` here", &format!("length({first})")),
+        },
+        "sqr" | "square" | "sq" | "pow2" => written("`^2` here", &format!("({first})^2")),
+        "cbrt" => written("`^` here", &format!("({first})^(1/3)")),
+        "fabs" | "Abs" => written("`abs` here", &format!("abs({first})")),
+        "arcsin" => written("`asin` here", &format!("asin({first})")),
+        "arccos" => written("`acos` here", &format!("acos({first})")),
+        "arctan" => written("`atan` here", &format!("atan({first})")),
+        "arctan2" => written("`atan2` here", &call("atan2")),
+        "sinh" => written("a formula here", &format!("(exp({first}) - exp(-({first})))/2")),
+        "cosh" => written("a formula here", &format!("(exp({first}) + exp(-({first})))/2")),
+        "sec" => written("a formula here", &format!("1/cos({first})")),
+        "cot" => written("a formula here", &format!("1/tan({first})")),
+        "sgn" | "signum" => written("`sign` here", &format!("sign({first})")),
+        "rand" | "random" | "noise" | "rands" | "snoise" | "perlin" => {
+            words("nothing is random", "add waves: `0.05*sin(20*x)*sin(20*y)`")
+        }
+        "radians" | "deg2rad" | "deg" => written("a unit here", &format!("{first} deg")),
+        "degrees" | "rad2deg" => written("a unit here", &format!("({first})*180/pi")),
+        "vec3" | "vec" | "vector" | "Vector" | "DVec3" | "float3" | "point" | "array" | "vec2" | "vec4" => {
+            match a {
+                [x, y, z] => written("`[a, b, c]` here", &format!("[{x}, {y}, {z}]")),
+                [one] => written("`[a, b, c]` here", &format!("[{one}, {one}, {one}]")),
+                _ => written("`[a, b, c]` here", "[1, 0, 0]"),
+            }
+        }
+        "range" | "linspace" => written("a fold here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
+        "sum" | "total" => {
+            words("there is no sum over a range", "join shapes by `any i in 0..6: …`, or write the sum out")
+        }
+        "gradient" | "grad" | "derivative" | "diff" => words(
+            "∇ω is found for you",
+            "`rfm eval FILE --at 0,0,0 --what gradient` prints it; `normalise(e)` divides by it",
+        ),
+        _ => None,
+    }
+}

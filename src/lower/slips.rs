@@ -1,0 +1,205 @@
+//! What is accepted by the rules of the language and still is rarely meant: degrees written as radians, ω subtracted
+//! from ω, solids without a surface. The messages ask.
+
+use super::lowering::Lowering;
+use super::names::Kind;
+use crate::diagnostic::{Code, Diagnostic, SourceId};
+use crate::ir::{Binary, Node};
+use crate::quantity::{Dimension, parse_unit};
+use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::foreign;
+
+impl Lowering<'_> {
+    /// The field of a solid, in which only lengths and angles have units.
+    pub fn shape(&mut self, expr: &Expr) -> Option<Node> {
+        let outer = std::mem::replace(&mut self.in_shape, true);
+        let node = self.field(expr);
+        self.in_shape = outer;
+        node
+    }
+
+    /// Reports a number that no `f64` can hold.
+    pub fn may_be_number(&mut self, value: f64, expr: &Expr) -> bool {
+        let written = self.written(expr).unwrap_or_default();
+        let mantissa = written.split(['e', 'E']).next().unwrap_or_default();
+        let vanishes = value == 0.0 && mantissa.contains(|c: char| ('1'..='9').contains(&c));
+        if value.is_finite() && !vanishes {
+            return true;
+        }
+        let message = if vanishes {
+            format!("`{written}` is too small for a number: it would be 0")
+        } else {
+            "the number is too large: it would be infinite".to_string()
+        };
+        self.report(
+            Diagnostic::error(Code::OUT_OF_RANGE, expr.span, message)
+                .help("numbers have a magnitude from 5e-324 to 1.8e308"),
+        );
+        false
+    }
+
+    /// Warns of a solid that has no surface because its ω is a constant.
+    pub fn warn_of_constant(&mut self, name: &str, node: Node, value: &Expr) {
+        let Some(constant) = self.module.graph.constant_value(node) else { return };
+        let holds = if constant > 0.0 { "holds all of space" } else { "is empty" };
+        let message = format!("solid `{name}` is the constant {constant}: it {holds}");
+        let warning = Diagnostic::warning(Code::CONSTANT_SOLID, value.span, message);
+        let help = match self.written(value) {
+            Some(size) if constant > 0.0 => {
+                format!("is a size meant? write `sphere({size})`, or an inequality such as `z <= {size}`")
+            }
+            _ => "write a standard solid such as `sphere(1)`, or an inequality such as `z <= 1`".to_string(),
+        };
+        self.report(warning.help(help));
+    }
+
+    /// Warns of a division by a constant zero.
+    pub fn warn_of_zero(&mut self, divisor: Node, expr: &Expr) {
+        let is_zero = self.module.graph.constant_value(divisor) == Some(0.0);
+        // elsewhere a value that is not finite is an error of its own
+        if is_zero && self.in_shape && expr.span.source == SourceId::File {
+            self.report(
+                Diagnostic::warning(Code::DIVISION_BY_ZERO, expr.span, "the divisor is zero")
+                    .help("is another divisor meant? what depends on this value is infinite or no number"),
+            );
+        }
+    }
+
+    /// Warns of an operation of arithmetic on two shapes, as in `sphere(1) - sphere(0.5)`.
+    pub fn warn_of_shapes(&mut self, op: Binary, left: &Expr, right: &Expr) {
+        if !(self.is_shape(left) && self.is_shape(right)) {
+            return;
+        }
+        let (sign, verb, word, purpose) = match op {
+            Binary::Sub => ("-", "subtracts", "\\", "to take the second away from the first"),
+            Binary::Add => ("+", "adds", "or", "to join them"),
+            Binary::Mul => ("*", "multiplies", "and", "for what both of them hold"),
+            Binary::Div => ("/", "divides", "\\", "to take the second away from the first"),
+            _ => return,
+        };
+        let written = match (self.written(left), self.written(right)) {
+            (Some(a), Some(b)) => format!("{a} {word} {b}"),
+            _ => format!("a {word} b"),
+        };
+        let message = format!("`{sign}` {verb} the values of two shapes; it does not join or cut them");
+        self.report(
+            Diagnostic::warning(Code::SHAPES_AS_NUMBERS, left.span.to(right.span), message)
+                .help(format!("{purpose}, write `{written}`")),
+        );
+    }
+
+    /// Whether an expression is written as a shape: a standard solid, a moved one, a solid's name, or shapes joined.
+    fn is_shape(&mut self, expr: &Expr) -> bool {
+        if expr.span.source != SourceId::File {
+            return false;
+        }
+        match &expr.kind {
+            ExprKind::Call { function, .. } => {
+                let is_layer = function.text == "layer";
+                let global = self.names.get(self.scope.source, &function.text);
+                !is_layer && global.is_some_and(|g| g.source == SourceId::Prelude)
+            }
+            ExprKind::Name(name) => {
+                let is_local = self.scope.locals.iter().any(|local| local.name == *name);
+                let global = self.names.get(self.scope.source, name);
+                !is_local && global.is_some_and(|g| matches!(g.kind, Kind::Solid(_)))
+            }
+            ExprKind::Method { .. } | ExprKind::Logic { .. } | ExprKind::Not(_) | ExprKind::Fold { .. } => {
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Warns of an angle above a whole turn that has no unit, as in `.rotate_z(45)`.
+    pub fn warn_of_large_angle(&mut self, angle: f64, expr: &Expr) {
+        if angle.abs() <= std::f64::consts::TAU || expr.span.source != SourceId::File || !self.is_bare(expr) {
+            return;
+        }
+        let message = format!("{angle} rad is {:.1} turns", (angle / std::f64::consts::TAU).abs());
+        let warning = Diagnostic::warning(Code::LARGE_ANGLE, expr.span, message);
+        let (deg, rad) = match self.written(expr) {
+            Some(written) => (with_unit(written, "deg"), with_unit(written, "rad")),
+            None => ("… deg".into(), "… rad".into()),
+        };
+        let help = format!("are degrees meant? write `{deg}`, or `{rad}` for radians");
+        self.report(warning.help(help));
+    }
+
+    /// Whether a value is made of numbers without units and without π.
+    pub fn is_bare(&self, expr: &Expr) -> bool {
+        match &expr.kind {
+            ExprKind::Quantity { .. } | ExprKind::Call { .. } | ExprKind::Text(_) => false,
+            ExprKind::Name(name) => {
+                let local = self.scope.locals.iter().rev().find(|local| local.name == *name);
+                local.map_or(self.bare.contains(name), |local| local.bare)
+            }
+            _ => expr.children().into_iter().all(|part| self.is_bare(part)),
+        }
+    }
+
+    /// Reports an angle where lengths are asked for, as in `ball([1 deg, 0, 0], 1)`.
+    pub fn no_angle(&mut self, expr: &Expr) -> bool {
+        let inner = match &expr.kind {
+            ExprKind::Negate(inner) => inner,
+            _ => expr,
+        };
+        let ExprKind::Quantity { unit, .. } = &inner.kind else { return true };
+        let is_angle = parse_unit(&unit.text).is_some_and(|unit| unit.dimension == Dimension::ANGLE);
+        if is_angle && expr.span.source == SourceId::File {
+            self.report(
+                Diagnostic::error(Code::UNIT_MISMATCH, unit.span, "an angle is not a length").help(
+                    "write a length such as `1`, `2 cm` or `5 mm`; angles belong to `.rotate_z(45 deg)`",
+                ),
+            );
+        }
+        !is_angle
+    }
+
+    /// Reports a length where an angle is asked for, as in `.rotate_z(5 mm)`.
+    pub fn no_length(&mut self, expr: &Expr) -> bool {
+        let ExprKind::Quantity { unit, .. } = &expr.kind else { return true };
+        let is_length = parse_unit(&unit.text).is_some_and(|unit| unit.dimension == Dimension::LENGTH);
+        if is_length {
+            self.report(
+                Diagnostic::error(Code::UNIT_MISMATCH, unit.span, "a length is not an angle")
+                    .help("write an angle such as `45 deg` or `0.8 rad`"),
+            );
+        }
+        !is_length
+    }
+
+    /// How the arguments of a method are written, for a call that has them wrong.
+    pub fn call_that_works(&self, method: &str, arguments: &[&Expr]) -> String {
+        let written: Option<Vec<&str>> = arguments.iter().map(|argument| self.written(argument)).collect();
+        let written = written.unwrap_or_default();
+        let is_vector = |text: &str| text.starts_with('[');
+        match (method, &written[..]) {
+            ("move" | "scale" | "mirror", [a, b, c]) => format!(".{method}([{a}, {b}, {c}])"),
+            ("move" | "mirror", [a, b]) if !is_vector(a) => format!(".{method}([{a}, {b}, 0])"),
+            ("rotate", [one]) => foreign::turned(one),
+            ("rotate", [angle, axis]) if is_vector(axis) && !is_vector(angle) => {
+                format!(".rotate({axis}, {})", foreign::in_degrees(angle))
+            }
+            ("rotate", [x, y, z]) if ![x, y, z].into_iter().any(|text| is_vector(text)) => {
+                foreign::turned(&format!("[{x}, {y}, {z}]"))
+            }
+            ("move", _) => ".move([1, 0, 0])".into(),
+            ("rotate", _) => ".rotate([0, 0, 1], 45 deg)".into(),
+            ("scale", _) => ".scale(2)` or `.scale([1, 1, 2])".into(),
+            ("mirror", _) => ".mirror([1, 0, 0])".into(),
+            _ => format!(".{method}(45 deg)"),
+        }
+    }
+}
+
+/// A value with an angle's unit behind it: behind its last number if that is its last factor.
+fn with_unit(written: &str, unit: &str) -> String {
+    let is_product = written.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '*' | '.' | '-'));
+    let last = written.rsplit(['*', '-']).next().unwrap_or_default();
+    match (is_product, last.parse::<f64>()) {
+        (true, Ok(_)) => format!("{written} {unit}"),
+        (true, Err(_)) => format!("{written}*1 {unit}"),
+        (false, _) => format!("({written})*1 {unit}"),
+    }
+}

@@ -1,0 +1,443 @@
+//! Mistakes that deserve better words than a list of what the grammar would accept: most of them are the habits of
+//! another language.
+
+use super::foreign;
+use super::words::{ITEM_WORDS, KEYWORDS, token_at};
+use crate::diagnostic::{Code, Diagnostic, Span, nearest};
+
+/// A place in the text where the grammar went no further.
+pub(super) struct Slip<'t> {
+    pub text: &'t str,
+    /// The first byte of the item that the place belongs to.
+    pub start: usize,
+    pub at: usize,
+    /// The word, number or character at the place; empty at the end of the item.
+    pub found: &'t str,
+    pub span: Span,
+}
+
+impl<'t> Slip<'t> {
+    /// The message for this slip; `None` if it is not one of those known here.
+    pub fn explained(&self) -> Option<Diagnostic> {
+        if let Some(diagnostic) = self.unit_taken_for_a_key() {
+            return Some(diagnostic);
+        }
+        if self.found.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_') {
+            return self.word();
+        }
+        self.comment().or_else(|| self.equals()).or_else(|| self.mark())
+    }
+
+    /// The text of the item in front of the place, without white space at its end.
+    fn before(&self) -> &'t str {
+        self.text[self.start.min(self.at)..self.at].trim_end()
+    }
+
+    /// The text behind what was found.
+    fn after(&self) -> &'t str {
+        &self.text[self.at + self.found.len()..]
+    }
+
+    fn on_its_line(&self) -> &'t str {
+        let line_start = self.text[..self.at].rfind('\n').map_or(0, |n| n + 1);
+        &self.text[line_start..self.at]
+    }
+
+    fn syntax(&self, message: impl Into<String>) -> Diagnostic {
+        Diagnostic::error(Code::SYNTAX, self.span, message)
+    }
+
+    fn unexpected(&self) -> Diagnostic {
+        self.syntax(format!("unexpected `{}`", self.found))
+    }
+
+    fn in_braces(&self) -> bool {
+        let opened = self.before().matches('{').count();
+        opened > self.before().matches('}').count()
+    }
+
+    /// A word where none may stand.
+    fn word(&self) -> Option<Diagnostic> {
+        let called = self.after().starts_with('(');
+        if KEYWORDS.contains(&self.found) && called && !self.ends_an_operand() {
+            return self.operator_as_a_function();
+        }
+        if self.found == "import" {
+            return Some(self.import());
+        }
+        if self.on_its_line().trim().is_empty() {
+            return Some(self.first_word());
+        }
+        if let Some(help) = foreign::operator(self.found).filter(|_| self.ends_an_operand()) {
+            return Some(self.syntax(format!("there is no operator `{}`", self.found)).help(help));
+        }
+        let line = self.on_its_line().trim_end();
+        if !called && line.ends_with(|c: char| c.is_ascii_digit() || c == '.') && number_ends(line) {
+            return Some(self.unit(last_number(line)));
+        }
+        if last_word(line) == "for" {
+            return Some(
+                self.unexpected().at("`for` is written `any` here").help("write `any i in 0..6: …`"),
+            );
+        }
+        if called && line.ends_with(')') {
+            return self.transform_in_front();
+        }
+        None
+    }
+
+    /// Whether the text in front of the place ends an operand, so that an operator may follow.
+    fn ends_an_operand(&self) -> bool {
+        self.before()
+            .ends_with(|c: char| c.is_alphanumeric() || matches!(c, ')' | ']' | '_' | '²' | '³' | '°'))
+            && !KEYWORDS.contains(&last_word(self.before()))
+    }
+
+    /// `and(a, b)`
+    fn operator_as_a_function(&self) -> Option<Diagnostic> {
+        let word = self.found;
+        if !["and", "or"].contains(&word) {
+            return None;
+        }
+        let written = match bracketed(self.after()).map(parts) {
+            Some(parts) if parts.len() > 1 && fits(&parts) => {
+                let operands: Vec<String> = parts.into_iter().map(foreign::operand).collect();
+                operands.join(&format!(" {word} "))
+            }
+            _ => format!("a {word} b"),
+        };
+        Some(
+            self.unexpected()
+                .at(format!("`{word}` stands between its operands"))
+                .help(format!("write `{written}`")),
+        )
+    }
+
+    fn import(&self) -> Diagnostic {
+        let message = "`import` is not part of this version";
+        let mesh = [".stl", ".obj", ".ply", ".step", ".stp", ".3mf", ".glb"];
+        let line = self.after().lines().next().unwrap_or_default().to_lowercase();
+        self.syntax(message).help(if mesh.iter().any(|ending| line.contains(ending)) {
+            "a mesh cannot be read: describe the shape by standard solids and inequalities, \
+             as in `solid part = box([0, 0, 0], [1, 1, 1]) \\ cylinder(0.2, 1)`"
+        } else {
+            "copy the definitions into this file, above the place where they are used"
+        })
+    }
+
+    /// A word that begins a line but no item.
+    fn first_word(&self) -> Diagnostic {
+        let word = self.found;
+        let after = self.after().trim_start_matches([' ', '\t']);
+        if let Some(help) = foreign::item(word) {
+            return self.unexpected().help(help);
+        }
+        if !after.starts_with('(')
+            && let Some(item) = nearest(word, ITEM_WORDS)
+        {
+            return self.unexpected().help(format!("did you mean `{item}`?"));
+        }
+        if after.starts_with('=') && !after.starts_with("==") {
+            let line = after[1..].lines().next().unwrap_or_default().trim().trim_end_matches(';');
+            return self.unexpected().at("expected an item").help(format!(
+                "a definition begins with `let`, `param` or `solid`: write `let {word} = {line}`"
+            ));
+        }
+        if let Some(arguments) = bracketed(after) {
+            let call = format!("{word}({arguments})");
+            let call = if fits(&[&call]) { call } else { format!("{word}(…)") };
+            return self
+                .unexpected()
+                .at("expected an item")
+                .help(format!("a shape needs a name: write `solid part = {call}`"));
+        }
+        self.unexpected()
+            .at("expected an item or the rest of the one above")
+            .help("items start with `param`, `let`, `fn`, `solid` or `scene`")
+    }
+
+    /// A word after a number that is no unit.
+    fn unit(&self, number: &str) -> Diagnostic {
+        const UNITS: [&str; 14] =
+            ["m", "mm", "cm", "km", "s", "ms", "min", "kg", "g", "N", "Pa", "J", "deg", "rad"];
+        let word = self.found;
+        let unknown =
+            Diagnostic::error(Code::UNKNOWN_UNIT, self.span, format!("unknown unit `{word}` after a number"))
+                .at("not a unit");
+        if foreign::is_letter_of_type(word) {
+            return unknown.help(format!("numbers have no type: write `{number}`"));
+        }
+        if let Some(written) = foreign::quantity(number, word) {
+            return unknown.help(format!("write `{written}`"));
+        }
+        if word.starts_with('_') {
+            let digits: String = word.chars().filter(|c| *c != '_').collect();
+            return unknown.help(format!("digits are not grouped: write `{number}{digits}`"));
+        }
+        unknown
+            .help(format!("a word after a number is its unit; to multiply, write `{number}*{word}`"))
+            .suggest(word, UNITS.into_iter().filter(|_| word.chars().count() > 1))
+    }
+
+    /// `viscosity: 1 cP }`: what follows the number is no unit, so the grammar takes it for the next key.
+    fn unit_taken_for_a_key(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line().trim_end();
+        let word = last_word(line);
+        let before = line[..line.len() - word.len()].trim_end();
+        if !self.in_braces() || !number_ends(before) || self.found == ":" {
+            return None;
+        }
+        let written = foreign::quantity(last_number(before), word)?;
+        let line_start = self.at - self.on_its_line().len();
+        let start = line_start + line.len() - word.len();
+        let span = Span::new(self.span.source, start, start + word.len());
+        let message = format!("unknown unit `{word}` after a number");
+        Some(
+            Diagnostic::error(Code::UNKNOWN_UNIT, span, message)
+                .at("not a unit")
+                .help(format!("write `{written}`")),
+        )
+    }
+
+    /// `translate([1, 0, 0]) sphere(1)`
+    fn transform_in_front(&self) -> Option<Diagnostic> {
+        let before = self.on_its_line().trim_end();
+        let open = opening(before)?;
+        let name = last_word(&before[..open]);
+        let method = foreign::method(name)?;
+        let shape = format!("{}({})", self.found, bracketed(self.after())?);
+        let arguments = &before[open + 1..before.len() - 1];
+        let written = match (fits(&[&shape, arguments]), foreign::method_call(name, arguments)) {
+            (true, Some(call)) => format!("{shape}{call}"),
+            _ => format!("shape.{method}(…)"),
+        };
+        Some(self.unexpected().at("a method stands behind its shape").help(format!("write `{written}`")))
+    }
+
+    fn comment(&self) -> Option<Diagnostic> {
+        let rest = &self.text[self.at..];
+        let begins = rest.starts_with("/*") || rest.starts_with("*/");
+        let within = self.text[..self.at].ends_with('/') && rest.starts_with('*');
+        let other = rest.starts_with("--") || rest.starts_with("(*") || rest.starts_with("<!--");
+        let declared = rest.starts_with('%') && self.on_its_line().trim().is_empty();
+        (begins || within || (other && self.on_its_line().trim().is_empty()) || declared).then(|| {
+            let found = if within { "/*" } else { rest.get(..2).unwrap_or(self.found) };
+            let start = if within { self.at - 1 } else { self.at };
+            let span = Span::new(self.span.source, start, start + found.trim_end().len());
+            let message = format!("`{}` does not begin a comment", found.trim_end());
+            Diagnostic::error(Code::SYNTAX, span, message)
+                .help("a comment begins with `#` and ends with its line")
+        })
+    }
+
+    /// `=` where something else is meant.
+    fn equals(&self) -> Option<Diagnostic> {
+        if self.found != "=" {
+            return None;
+        }
+        let before = self.before();
+        if ITEM_WORDS.contains(&last_word(before)) {
+            return None;
+        }
+        if let Some(start) = before.strip_suffix("..") {
+            return Some(self.closed_range(last_number_or_word(start)));
+        }
+        let value = self.after().trim_start();
+        let key = last_word(before);
+        let heads = before.trim_end_matches(key).trim_end();
+        let begins_scene = last_word(heads) == "scene";
+        if value.starts_with('{') && (self.in_braces() || begins_scene) {
+            let kind = if begins_scene { "scene " } else { "" };
+            return Some(self.syntax("a block has no `=`").help(format!("write `{kind}{key} {{ … }}`")));
+        }
+        if self.in_braces() && !key.is_empty() && !heads.ends_with(['(', '=', '<', '>', '+', '*']) {
+            let line = value.lines().next().unwrap_or_default();
+            let value = first_part(line);
+            let value = if value.is_empty() || !fits(&[value]) { "…" } else { value };
+            return Some(
+                self.syntax("a key and its value are joined by `:`").help(format!("write `{key}: {value}`")),
+            );
+        }
+        if before.ends_with([':', '+', '-', '*', '/', '^']) {
+            return Some(self.unexpected().help("a definition is written `let a = 1`, and never changed"));
+        }
+        let (left, right) = (last_part(before), first_part(value.lines().next().unwrap_or_default()));
+        let compared = |sign: &str| match fits(&[left, right]) {
+            true => format!("`{left} {sign} {right}`"),
+            false => format!("`a {sign} b`"),
+        };
+        let (below, above) = (compared("<="), compared(">="));
+        let help = format!("write {below} or {above}: each is the part of space on one side of a surface");
+        Some(Diagnostic::error(Code::EQUALITY, self.span, "`=` does not compare").help(help))
+    }
+
+    /// `0..=5`
+    fn closed_range(&self, start: &str) -> Diagnostic {
+        let end = last_number_or_word(&self.after()[..token_end(self.after())]);
+        let one_more = match end.parse::<u64>().ok().and_then(|end| end.checked_add(1)) {
+            Some(end) => format!("{start}..{end}"),
+            None if end.is_empty() => "0..6".to_string(),
+            None => format!("{start}..{end} + 1"),
+        };
+        self.unexpected().at("a range ends before its second number").help(format!("write `{one_more}`"))
+    }
+
+    /// `solid s { sphere(1) }`
+    fn solid_in_braces(&self) -> Option<Diagnostic> {
+        let heads = self.before().trim_end_matches('=').trim_end();
+        let name = last_word(heads);
+        if last_word(heads.strip_suffix(name)?.trim_end()) != "solid" {
+            return None;
+        }
+        let inner = self.after().split('}').next().unwrap_or_default().trim();
+        let shape = if fits(&[inner]) && !inner.contains([';', '{']) { inner } else { "sphere(1)" };
+        Some(self.unexpected().help(format!("a solid has no braces: write `solid {name} = {shape}`")))
+    }
+
+    /// A character that has no meaning where it stands.
+    fn mark(&self) -> Option<Diagnostic> {
+        let (before, after) = (self.before(), self.after());
+        let help = match self.found {
+            "*" if before.ends_with('*') => "a power is written `x^2`",
+            "," if number_ends(before) && after.starts_with(|c: char| c.is_ascii_digit()) => {
+                "decimals are written with a point: `0.5`"
+            }
+            ";" => "leave it out: an item ends where the next one begins",
+            "\"" => {
+                return Some(
+                    self.syntax("the text is not closed").help("a text ends with `\"` on its own line"),
+                );
+            }
+            "'" | "“" | "”" | "„" | "«" | "‘" => "a text stands in double quotes: `\"…\"`",
+            "%" if number_ends(before) => "a percentage is written as a number: `0.1` for 10 %",
+            "%" => foreign::REMAINDER,
+            "?" => foreign::CONDITION,
+            "<" if before.ends_with(['(', ',', '=', '{', ':']) => "a vector is written `[0, 0, 0]`",
+            "{" if before.ends_with(':') && self.in_braces() => {
+                let key = last_word(before.trim_end_matches(':').trim_end());
+                return Some(self.syntax("a block has no `:`").help(format!("write `{key} {{ … }}`")));
+            }
+            "{" if self.solid_in_braces().is_some() => return self.solid_in_braces(),
+            "{" if before.ends_with(')') || !self.in_braces() => {
+                "shapes are joined by `or`, `and` and `\\`: write `solid part = sphere(1) \\ sphere(0.5)`"
+            }
+            ":" if before.ends_with(')') && before.contains("range(") => {
+                "a range is written with dots: `any i in 0..6: …`"
+            }
+            _ => return None,
+        };
+        Some(self.unexpected().help(help))
+    }
+}
+
+/// Whether the text ends in a number rather than in a name such as `r2`.
+fn number_ends(text: &str) -> bool {
+    let start = text
+        .rfind(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
+        .map_or(0, |at| at + text[at..].chars().next().map_or(1, char::len_utf8));
+    text[start..].starts_with(|c: char| c.is_ascii_digit() || c == '.')
+}
+
+fn last_number(text: &str) -> &str {
+    &text[text.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len()..]
+}
+
+fn last_word(text: &str) -> &str {
+    &text[text.trim_end_matches(|c: char| c.is_alphanumeric() || c == '_').len()..]
+}
+
+fn last_number_or_word(text: &str) -> &str {
+    last_word(text.trim_end())
+}
+
+/// Where the number or word ends that a text begins with, white space before it included.
+fn token_end(text: &str) -> usize {
+    let blank = text.len() - text.trim_start().len();
+    blank + token_at(text, blank, text.len()).len()
+}
+
+/// The first value of a line: up to a comma or a bracket that closes what was open before.
+fn first_part(line: &str) -> &str {
+    let mut depth = 0_i32;
+    for (at, c) in line.char_indices() {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' if depth == 0 => return line[..at].trim(),
+            ')' | ']' | '}' => depth -= 1,
+            ',' | ';' | '#' if depth == 0 => return line[..at].trim(),
+            _ => {}
+        }
+    }
+    line.trim()
+}
+
+/// The last operand of a text: what stands behind a bracket that is still open, a sign or a word that joins.
+fn last_part(text: &str) -> &str {
+    let mut depth = 0_i32;
+    let mut start = 0;
+    for (at, c) in text.char_indices() {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ => {}
+        }
+        let opens = depth > 0 && matches!(c, '(' | '[');
+        if opens || matches!(c, '=' | ':' | ',' | '&' | '|' | '\\' | '<' | '>') {
+            start = at + c.len_utf8();
+        }
+        if [" and ", " or ", " not "].iter().any(|word| text[..at].ends_with(word)) {
+            start = at;
+        }
+    }
+    text[start..].trim()
+}
+
+/// The text between a bracket at the beginning and the one that closes it.
+fn bracketed(text: &str) -> Option<&str> {
+    let inner = text.strip_prefix('(')?;
+    let mut depth = 0_i32;
+    for (at, c) in inner.char_indices() {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' if depth == 0 => return Some(&inner[..at]),
+            ')' | ']' => depth -= 1,
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Where the bracket opens that closes at the end of a text.
+fn opening(text: &str) -> Option<usize> {
+    let mut depth = 0_i32;
+    for (at, c) in text.char_indices().rev() {
+        match c {
+            ')' => depth += 1,
+            '(' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return Some(at);
+        }
+    }
+    None
+}
+
+/// The parts of a list of arguments.
+fn parts(arguments: &str) -> Vec<&str> {
+    let mut rest = arguments;
+    let mut parts = Vec::new();
+    while !rest.trim().is_empty() {
+        let part = first_part(rest);
+        parts.push(part);
+        let end = rest.find(part).map_or(rest.len(), |at| at + part.len());
+        rest = rest[end..].trim_start().get(1..).unwrap_or_default();
+    }
+    parts
+}
+
+/// Whether what the user wrote is short enough to be repeated in a message.
+fn fits(parts: &[&str]) -> bool {
+    let length: usize = parts.iter().map(|part| part.len()).sum();
+    length <= 100 && parts.iter().all(|part| !part.is_empty() && !part.contains(['\n', '`', '\u{1b}']))
+}

@@ -1,0 +1,430 @@
+//! Small mistakes by theme, many to a snapshot: each is read as the person who made it. What a message tells to write
+//! is accepted as it stands.
+
+use rfm::diagnostic::{Diagnostics, Source};
+use rfm::lower::Options;
+use rfm::{Engine, Experiment, Program};
+
+use crate::tool::{rfm, root, snapshot};
+
+/// Words of OpenSCAD, POV-Ray, GLSL and Python.
+const WORDS: &[&str] = &[
+    "solid s = union(sphere(1), box())",
+    "solid s = difference(sphere(1), sphere(0.5))",
+    "solid s = difference(sphere(1), x <= 0 or y <= 0)",
+    "solid s = difference(sphere(1), x <= 0 and box())",
+    "solid s = intersection(sphere(1), box())",
+    "solid s = union()",
+    "solid s = xor(sphere(1), box())",
+    "solid s = sphere(1) xor box()",
+    "solid s = sphere(1) union box()",
+    "solid s = sphere(1) minus box()",
+    "solid s = sphere(1).union(box())",
+    "solid s = sphere(1).cut(box())",
+    "solid s = complement(sphere(1))",
+    "solid s = cube([1, 2, 3])",
+    "solid s = cube(2)",
+    "solid s = translate([1, 0, 0], sphere(1))",
+    "solid s = translate([1, 0, 0]) sphere(1)",
+    "solid s = rotate([0, 0, 45]) box()",
+    "solid s = translate(sphere(1), [1, 0, 0])",
+    "solid s = sphere(1).translate([1, 0, 0])",
+    "solid s = box().rotateZ(45)",
+    "solid s = box().translate(1, 2, 3)",
+    "solid s = scale(2, sphere(1))",
+    "solid s = plane(0, 0, 1)",
+    "solid s = donut(1, 0.2)",
+    "solid s = linear_extrude(2)",
+    "solid s = hull(sphere(1), box())",
+    "solid s = smooth_union(sphere(1), box())",
+    "solid s = log(x) <= 1",
+    "solid s = log10(1 + x^2) <= 1",
+    "solid s = mod(x, 1) <= 0.5",
+    "solid s = x % 2 <= 1",
+    "solid s = 5 mod 2 <= x",
+    "solid s = floor(x) <= 1",
+    "solid s = min3(x, y, z) <= 1",
+    "solid s = fmax(x, y) <= 1",
+    "solid s = norm([x, y, z]) <= 1",
+    "solid s = mix(x, y, 0.5) <= 1",
+    "solid s = sphere(1).move(vec3(1, 0, 0))",
+    "solid s = if(x <= 0, sphere(1), box())",
+    "solid s = x <= 0 ? sphere(1) : box()",
+    "solid s = sphere(1) if x <= 0 else box()",
+    "solid s = or(sphere(1), box())",
+    "solid s = and(sphere(1), box(), z <= 0)",
+    "solid s = and(sphere(1) or box(), z <= 0)",
+    "solid s = sphere(PI)",
+    "solid s = r <= 1",
+    "solid s = box().rotate_z(radians(30))",
+    "solid s = random() <= x",
+    "union() { sphere(1); box(); }",
+    "difference() {\n  sphere(1);\n}",
+    "solid s = union() { sphere(1) box() }",
+    "module part() { }",
+    "def part(r): return r",
+    "function f(x) = x",
+    "let n = 6\nfor i in 0..n: sphere(1)",
+    "solid s = for i in 0..6: sphere(i)",
+    "solid s = any i in range(6): sphere(1)",
+    "sphere(1)",
+    "cube(1);",
+    "r = 0.5",
+    "float r = 0.5;",
+    "var r = 0.5",
+    "import \"part.stl\"",
+    "import \"parts.rfm\"",
+    "include <parts.scad>",
+    "return sphere(1)",
+];
+
+/// Signs that mean something elsewhere.
+const SIGNS: &[&str] = &[
+    "/* a ball */\nsolid s = sphere(1)",
+    "solid s = sphere(1) /* a ball */ and box()",
+    "-- a ball\nsolid s = sphere(1)",
+    "solid s = any i in 0..=5: sphere(0.3).move([i, 0, 0])",
+    "param n = 5\nsolid s = any i in 0..=n: sphere(0.3).move([i, 0, 0])",
+    "solid s = x = 1",
+    "solid s = sphere(1);",
+    "solid s = x ** 2 <= 1",
+    "solid s = sphere(<0, 0, 0>, 1)",
+    "solid s = sphere(0,5)",
+    "solid s = sphere(1_000)",
+    "solid s = sphere(1.5f)",
+    "solid s = sphere(10%)",
+    "solid s = sphere(5 inches)",
+    "solid s = sphere(1 metre)",
+    "solid s = box().rotate_z(30 degrees)",
+    "param a = 1 'the radius'\nsolid s = sphere(a)",
+    "param a = 1 “the radius”\nsolid s = sphere(a)",
+    "solid s { sphere(1) }",
+    "solid s = { sphere(1) }",
+    "solid s = sphere(1e999999)",
+    "solid s = sphere(1e-999999)",
+    "solid s = sphere(1)\u{200b}",
+    "solid s\u{202e} = sphere(1)",
+    "param a = 1 \"\u{1b}[31mred\u{9b}0m\u{202e}\"\nsolid s = sphere(b)",
+];
+
+/// Arguments, angles, lengths, and what is rarely meant.
+const VALUES: &[&str] = &[
+    "solid s = box([1, 1, 1])",
+    "solid s = box(2)",
+    "solid s = box(1, 1, 1)",
+    "solid s = box([0, 0, 0], [1, 1, 0])",
+    "solid s = sphere(1, 2, 3)",
+    "solid s = sphere([0, 0, 0], 1)",
+    "solid s = cylinder(h = 1, radius = 2)",
+    "solid s = ball(1)",
+    "solid s = sphere(1).move(1, 0, 0)",
+    "solid s = sphere(1).move(1)",
+    "solid s = sphere(1).move(x = 1)",
+    "solid s = box().rotate(45)",
+    "solid s = box().rotate([0, 0, 45])",
+    "solid s = box().rotate(45 deg, [0, 0, 1])",
+    "solid s = box().rotate_z([0, 0, 1])",
+    "solid s = box().scale(1, 2, 3)",
+    "solid s = box().mirror(1, 0, 0)",
+    "solid s = box().rotate_z(45)",
+    "solid s = box().rotate_x(-90)",
+    "param turn = 45\nsolid s = box().rotate_z(turn)",
+    "solid s = any i in 0..6: box().rotate_z(i*60)",
+    "solid s = box().rotate([0, 0, 1], 90)",
+    "solid s = ball([1 deg, 0, 0], 1)",
+    "solid s = sphere(30 deg)",
+    "solid s = sphere(1).move([0, 0, -90 deg])",
+    "solid s = box().rotate_z(5 mm)",
+    "solid s = sphere(1 kg)",
+    "solid s = 5",
+    "solid s = -1",
+    "solid s = 1/0 - x",
+    "solid s = sphere(1) - sphere(0.5)",
+    "solid a = sphere(1)\nsolid s = a + box()",
+    "solid s = sphere(1)*box()",
+    "solid s = sphere(1)/box()",
+    "param d = 8 mm in 1 cm .. 2 cm\nsolid s = sphere(d)",
+    "param a = 45 deg in 90 deg .. 0 deg\nsolid s = box().rotate_z(a)",
+    "",
+    "# nothing but a remark",
+];
+
+/// The scene that a line of [`SCENES`] changes: a line replaces the one with its key, or is added.
+const SCENE: [(&str, &str); 5] = [
+    ("box", "box { max: [1, 1, 1] }"),
+    ("fluid", "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm }"),
+    ("obstacle", "obstacle { solid: post }"),
+    ("method", "method: wcsph"),
+    ("run", "run { until: 1 s }"),
+];
+
+const SCENES: &[&str] = &[
+    "fluid { shape: ball([5, 5, 5], 0.2) }",
+    "fluid { shape: ball([0.5, 0.5, 1], 0.2), spacing: 5 cm }",
+    "fluid { shape: box([-1, 0, 0.5], [1, 1, 2]), spacing: 5 cm }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 1 mm) }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), particles: 1e9 }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), particles: 500, spacing: 5 cm }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 0.1 mm }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), particles: 2e9 }",
+    "fluid { shape: ball([0.5, 0.5, 0.1], 0.1), spacing: 2 cm }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), density = 1000 }",
+    "fluid = { shape: ball([0.5, 0.5, 0.7], 0.2) }",
+    "fluid: { shape: ball([0.5, 0.5, 0.7], 0.2) }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), density: 1000 g }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), densty: 1000 }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), viscosity: 1 cP }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: width }",
+    "box { min: [0, 0, 0], max: [1, 1, 0] }",
+    "box { size: [1, 1, 1] }",
+    "gravity: -9.81",
+    "gravity = [0, 0, -9.81]",
+    "obstacle { solid: pots }",
+    "method: sph",
+    "run { dt: 10 }",
+    "run { until: 1 s, save_every: 2 s }",
+    "run { until: 1 s, save_every: 1e-9 s }",
+    "run { until: 1 s, save_every: 10 us }",
+    "run { until: 5 mm }",
+    "run { end: 1 s }",
+    "probe g { height: [0.5, 0.5, 0] }",
+    "probe g { flux: [0.5, 0.5, 0.5] }",
+    "probe g { energy: air }",
+];
+
+fn program(text: &str) -> Result<Program, Diagnostics> {
+    let text =
+        if text.is_empty() || text.starts_with('#') { text.to_string() } else { format!("rfm 1\n{text}\n") };
+    Program::check(Source::file("s.rfm", text), Options::default())
+}
+
+/// The messages about a text, and about the start of its scene if it has one.
+fn messages(text: &str) -> Diagnostics {
+    let program = match program(text) {
+        Ok(program) => program,
+        Err(diagnostics) => return diagnostics,
+    };
+    let mut all = program.warnings();
+    if let Some(scene) = program.module().scenes.first() {
+        let found = Experiment::new(&program, &scene.name, Engine::Interpreter).and_then(|experiment| {
+            all.list.extend(experiment.warnings().list);
+            experiment.estimated_particles()?;
+            Ok(experiment.start()?.warnings)
+        });
+        match found {
+            Ok(warnings) => all.list.extend(warnings.list),
+            Err(rfm::Error::Diagnostics(errors)) => all.list.extend(errors.list),
+            Err(other) => panic!("{text}: {other}"),
+        }
+    }
+    all
+}
+
+/// What a message tells to write, between backticks behind the word `write`.
+fn told(help: &str) -> Vec<&str> {
+    let mut told = Vec::new();
+    for part in help.split("write ").skip(1) {
+        let part = part.strip_prefix("for example ").unwrap_or(part);
+        if let Some((code, _)) = part.strip_prefix('`').and_then(|rest| rest.split_once('`')) {
+            told.push(code);
+        }
+    }
+    told.retain(|code| !code.contains('…') && !code.contains("name"));
+    told
+}
+
+/// Whether a text is accepted somewhere in a file: as an item, a value, a method of a shape, or an entry of a scene.
+fn is_accepted(code: &str) -> bool {
+    let known = "param n = 6\nparam turn = 45\nparam i = 1\nlet o = [0, 0, 0]\nlet e = x\nsolid a = sphere(1)\nsolid b = box()\nsolid shape = sphere(2)\n";
+    let scene = |entries: &str| {
+        let text = format!(
+            "{known}solid post = a\nscene q {{\n  box {{ max: [1, 1, 1] }}\n  fluid {{ shape: ball([0.5, 0.5, 0.5], 0.2) }}\n}}\n"
+        );
+        let first = entries.split([':', ' ']).next().unwrap_or_default();
+        match first {
+            "box" => text.replace("box { max: [1, 1, 1] }", entries),
+            "fluid" => text.replace("fluid { shape: ball([0.5, 0.5, 0.5], 0.2) }", entries),
+            "gravity" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
+            "max" => text.replace("max: [1, 1, 1]", entries),
+            "dt" | "until" | "save_every" => {
+                text.replace("  fluid", &format!("  run {{ {entries} }}\n  fluid"))
+            }
+            "height" | "pressure" | "flux" => {
+                text.replace("  fluid", &format!("  probe p {{ {entries} }}\n  fluid"))
+            }
+            _ => text.replace("0.2) }", &format!("0.2), {entries} }}")),
+        }
+    };
+    let tried = [
+        format!("{known}{code}"),
+        format!("{known}solid s = {code}"),
+        format!("{known}let l = any i in {code}: e + i"),
+        format!("{known}let l = [{code}, 0, 0]"),
+        format!("{known}solid s = box().rotate_z({code})"),
+        format!("{known}let l = {code}"),
+        format!("{known}solid s = sphere(1){code}"),
+        format!("{known}param p = 1 in {code}"),
+        scene(code),
+    ];
+    tried.iter().any(|text| program(text).is_ok())
+}
+
+/// One snapshot of a theme, and a look at everything that its messages tell to write.
+fn read(theme: &str, texts: impl IntoIterator<Item = (String, String)>) {
+    let (mut all, mut refused) = (String::new(), String::new());
+    for (title, text) in texts {
+        let found = messages(&text);
+        assert!(!found.list.is_empty(), "no message about: {title}");
+        let rendered = found.to_string();
+        assert!(!rendered.contains(rfm::diagnostic::is_hidden), "{title}: hidden characters in\n{rendered}");
+        let shown: String = title.chars().filter(|c| !rfm::diagnostic::is_hidden(*c)).collect();
+        all += &format!("──── {shown}\n{rendered}\n");
+        for diagnostic in &found.list {
+            for code in told(diagnostic.help.as_deref().unwrap_or_default()) {
+                if !is_accepted(code) {
+                    refused += &format!("not accepted: `{code}`, as told in\n{rendered}");
+                }
+            }
+        }
+    }
+    snapshot("mistakes", theme, &all);
+    assert!(refused.is_empty(), "{refused}");
+}
+
+fn alone(texts: &[&str]) -> Vec<(String, String)> {
+    texts.iter().map(|text| (text.to_string(), text.to_string())).collect()
+}
+
+#[test]
+fn words_of_other_languages() {
+    read("words", alone(WORDS));
+}
+
+#[test]
+fn signs_of_other_languages() {
+    read("signs", alone(SIGNS));
+}
+
+#[test]
+fn arguments_angles_and_what_is_rarely_meant() {
+    read("values", alone(VALUES));
+}
+
+#[test]
+fn scenes_with_one_mistake() {
+    let scene = |changed: &str| {
+        let key = changed.split([':', ' ']).next().unwrap_or_default();
+        let mut lines: Vec<&str> =
+            SCENE.iter().map(|(name, line)| if *name == key { changed } else { *line }).collect();
+        if !SCENE.iter().any(|(name, _)| *name == key) {
+            lines.push(changed);
+        }
+        format!(
+            "param width = 2 kg\nlet _width = width\nsolid post = cylinder(0.1, 0.3).move([0.5, 0.5, 0])\nscene drop {{\n  {}\n}}",
+            lines.join("\n  ")
+        )
+    };
+    read("scenes", SCENES.iter().map(|line| (line.to_string(), scene(line))));
+}
+
+const POST: &str = "rfm 1
+param d = 8 mm in 1 mm .. 5 cm \"width of the post\"
+param alpha = 10 deg
+param rate = 30 rpm
+solid post = cylinder(d, 0.3).move([0.5, 0.5, 0]).rotate_z(alpha*0)
+solid nothing = post and z <= -1
+scene drop {
+  box { max: [1, 1, 1] }
+  fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 cm, velocity: [0, 0, -rate] }
+  obstacle { solid: post }
+  run { until: 20 ms, save_every: 10 ms }
+}
+";
+
+/// Commands with one mistake, and their exit codes.
+const COMMANDS: &[(&[&str], i32)] = &[
+    (&["check", "post.rfm"], 0),
+    (&["check", "post.rfm", "-D", "d=9mm", "-D", "alpha=20 deg", "-D", "rate=60rpm"], 0),
+    (&["check", "post.rfm", "-D", "d=0.009"], 0),
+    (&["check", "post.rfm", "-D", "d=8"], 2),
+    (&["check", "post.rfm", "-D", "d=8 kg"], 2),
+    (&["check", "post.rfm", "-D", "d=8 furlong"], 2),
+    (&["check", "post.rfm", "-D", "d=80 mm"], 2),
+    (&["check", "post.rfm", "-D", "alpha=ten"], 2),
+    (&["check", "tiny.rfm"], 0),
+    (&["check", "empty.rfm"], 1),
+    (&["check", "post.rfm", "-s", "post", "--slice", "z=5", "-o", "s.svg"], 0),
+    (&["check", "post.rfm", "-s", "post", "--slice", "z=5", "-o", "s.svg", "--deny", "warnings"], 1),
+    (&["check", "post.rfm", "-s", "post", "--slice", "z=10 kg", "-o", "s.svg"], 2),
+    (&["check", "post.rfm", "-s", "post", "--slice", "z=50mm", "-o", "s.svg"], 0),
+    (&["mesh", "post.rfm", "-s", "post", "--cells", "100000", "-o", "p.stl"], 2),
+    (&["mesh", "post.rfm", "-s", "post", "--cells", "1", "-o", "p.stl"], 2),
+    (&["mesh", "post.rfm", "-s", "post", "--cell", "1nm", "-o", "p.stl"], 2),
+    (&["mesh", "post.rfm", "-s", "post", "--cell", "10 deg", "-o", "p.stl"], 2),
+    (&["mesh", "post.rfm", "-s", "nothing", "-o", "p.stl"], 1),
+    (&["mesh", "post.rfm", "-s", "post", "--box", "2,2,2,3,3,3", "-o", "p.stl"], 1),
+    (&["mesh", "post.rfm", "-s", "nothing", "--json"], 1),
+    (&["run", "post.rfm", "--until", "5 kg"], 2),
+    (&["run", "post.rfm", "--until", "soon"], 2),
+    (&["run", "post.rfm", "--until", "10ms", "--no-pictures"], 0),
+    (&["run", "post.rfm", "--until", "20ms", "--no-pictures"], 2),
+    (&["run", "post.rfm", "--until", "20ms", "--no-pictures", "--force", "--resume"], 2),
+    (&["run", "post.rfm", "--until", "0.02 s", "--no-pictures", "--force"], 0),
+    (&["run", "post.rfm", "--until", "0.04 s", "--no-pictures", "--resume"], 0),
+    (&["check", "no\u{1b}[31m\nsuch\u{202e}.rfm"], 2),
+    (&["check", "post.rfm", "--colour\u{9b}31m"], 2),
+    (&["mesh", "post.rfm", "-o", "a\u{202e}b/p.stl"], 2),
+    (&["explain", "\u{1b}]0;title\u{7}"], 2),
+    (&["check", "red.rfm"], 0),
+];
+
+#[test]
+fn commands_with_one_mistake() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("post.rfm", POST);
+    write("tiny.rfm", "rfm 1\nsolid dust = sphere(1 mm)\n");
+    write("empty.rfm", "");
+    write("red.rfm", "rfm 1\nparam r = 1 \"\u{1b}[31mred\u{9b}0m\u{202e}\"\nsolid ball = sphere(r)\n");
+    let mut all = String::new();
+    for (arguments, code) in COMMANDS {
+        let outcome = rfm(folder.path(), arguments).expect(*code);
+        for (what, text) in [("output", &outcome.stdout), ("messages", &outcome.stderr)] {
+            assert!(
+                !text.contains(rfm::diagnostic::is_hidden),
+                "{arguments:?}: hidden characters in the {what}"
+            );
+        }
+        let told: String = outcome.transcript().lines().map(|line| without_times(line) + "\n").collect();
+        let line: String = arguments.join(" ").chars().flat_map(char::escape_debug).collect();
+        all += &format!("──── rfm {line}\n{told}\n");
+    }
+    snapshot("mistakes", "commands", &all);
+}
+
+/// A line with `#` for the figures that differ from run to run.
+fn without_times(line: &str) -> String {
+    let is_timed =
+        ["milliseconds", " ms per step", "evaluations of ω"].iter().any(|word| line.contains(word));
+    if !is_timed {
+        return line.to_string();
+    }
+    let words =
+        line.split(' ').map(|word| if word.contains(|c: char| c.is_ascii_digit()) { "#" } else { word });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn a_file_that_tells_of_a_mistake_is_told_from_the_examples() {
+    // the messages above are about mistakes alone: what the examples do raises none of them
+    for name in ["pawn", "bishop", "cube", "gate", "paddle", "rotating_box"] {
+        let program = Program::from_path(root().join(format!("examples/{name}.rfm"))).unwrap();
+        assert!(program.warnings().list.is_empty(), "{name}: {}", program.warnings());
+        for scene in &program.module().scenes {
+            let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap();
+            let warnings = experiment.start().unwrap().warnings;
+            assert!(warnings.list.is_empty(), "{name}: {warnings}");
+        }
+    }
+}
