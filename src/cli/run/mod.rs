@@ -9,7 +9,6 @@ mod findings;
 mod forecast;
 mod frames;
 mod goal;
-mod pace;
 mod probes;
 mod summary;
 mod watch;
@@ -34,7 +33,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let program = input::program(shared, &options.file)?;
     let scene = choose::scene(&program, options.scene.as_deref())?;
     let experiment = experiment(shared, &program, &scene.name)?;
-    let fingerprint = checkpoints::fingerprint(&experiment);
+    let fingerprint = experiment.fingerprint();
     let folder = frames::folder(options);
     let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint)).transpose()?;
     let (mut simulation, carved) = match &resumed {
