@@ -347,10 +347,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
                 |c: [f64; 3]| format!("({:.4}, {:.4}, {:.4})", round(c[0]), round(c[1]), round(c[2]));
             say!("    bounds      {} … {}", corner(bounds.min), corner(bounds.max));
             if solid.volume.is_none() {
-                say!(
-                    "    volume      not found: too thin for {} cells along its longest side",
-                    VOLUME_CELLS
-                );
+                say!("    volume      not found: too thin for {} cells along its longest side", VOLUME_CELLS);
             }
         } else if !solid.empty {
             say!("    bounds      none found");

@@ -74,7 +74,10 @@ mod tests {
     use crate::field::Closures;
 
     fn ball(radius: f64) -> impl Field {
-        Closures { omega: move |p: DVec3| radius * radius - p.length_squared(), gradient: |p: DVec3| -2.0 * p }
+        Closures {
+            omega: move |p: DVec3| radius * radius - p.length_squared(),
+            gradient: |p: DVec3| -2.0 * p,
+        }
     }
 
     #[test]

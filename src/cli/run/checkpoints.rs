@@ -118,9 +118,8 @@ fn path(folder: &Path, steps: u64) -> PathBuf {
 /// Step numbers of the checkpoints in a folder, ascending.
 fn list(folder: &Path) -> Vec<u64> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut steps: Vec<u64> = entries
-        .filter_map(|entry| Checkpoint::steps_of_file(entry.file_name().to_str()?))
-        .collect();
+    let mut steps: Vec<u64> =
+        entries.filter_map(|entry| Checkpoint::steps_of_file(entry.file_name().to_str()?)).collect();
     steps.sort_unstable();
     steps
 }

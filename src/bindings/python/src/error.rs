@@ -48,14 +48,16 @@ pub fn of_diagnostics(py: Python<'_>, found: &Diagnostics) -> PyErr {
 
 /// A file that could not be read or written: `FileNotFoundError` and its like.
 pub fn not_read(path: &str, error: io::Error) -> PyErr {
-    match error.raw_os_error() {
-        // the constructor of OSError chooses the subclass by the number, and adds the text of the system
-        Some(number) => {
-            let text = error.to_string();
+    let text = error.to_string();
+    match (error.raw_os_error(), error.kind()) {
+        // the constructor of OSError chooses the subclass by the number
+        (Some(number), _) => {
             let text = text.split(" (os error").next().unwrap_or_default().to_string();
             PyOSError::new_err((number, text, path.to_string()))
         }
-        None => refused(format!("cannot use `{path}`: {error}")),
+        // a text that is none
+        (None, io::ErrorKind::InvalidData) => refused(format!("cannot read `{path}`: {text}")),
+        (None, kind) => io::Error::new(kind, format!("cannot use `{path}`: {text}")).into(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Questions about many points: over columns, on one thread or several.
 
+use multiversion::multiversion;
 use numpy::Element;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -7,7 +8,7 @@ use rfm::Solid;
 use rfm::field::{Field, Points as FieldPoints};
 use rfm::solid::{Chosen, Lane};
 
-use crate::memory::{Column, Job};
+use crate::memory::{BLOCK, Column, Job};
 use crate::points::Points;
 use crate::pool::{Threads, pool};
 use crate::results::Target;
@@ -25,11 +26,44 @@ const WORTH_RELEASING: usize = 64;
 pub trait Number: Lane + Element {
     /// ω, by the cheaper program that keeps the tolerance of the file if there is one for this type.
     fn omega(solid: &Solid, chosen: Option<&Chosen>, points: [&[Self]; 3], omega: &mut [Self]);
+
+    /// Sorts the bytes of points, x y z x y z …, into columns.
+    fn deinterleave(points: &[u8], columns: &mut [[Self; BLOCK]; 3]);
 }
+
+macro_rules! deinterleave {
+    ($name:ident, $number:ty) => {
+        /// Sorts points into columns, in the widest registers of the processor.
+        #[multiversion(targets("x86_64+avx2+bmi2", "x86_64+avx512f+avx512vl+avx512bw"))]
+        fn $name(points: &[u8], [x, y, z]: &mut [[$number; BLOCK]; 3]) {
+            const SIZE: usize = size_of::<$number>();
+            let points = points.as_chunks::<{ 3 * SIZE }>().0;
+            for (((point, x), y), z) in points.iter().zip(x).zip(y).zip(z) {
+                let [a, b, c] = [0, 1, 2].map(|axis| <$number>::from_ne_bytes(bytes::<SIZE>(point, axis)));
+                (*x, *y, *z) = (a, b, c);
+            }
+        }
+    };
+}
+
+/// The bytes of one coordinate of a point.
+#[inline(always)]
+fn bytes<const SIZE: usize>(point: &[u8], axis: usize) -> [u8; SIZE] {
+    let mut number = [0; SIZE];
+    number.copy_from_slice(&point[axis * SIZE..][..SIZE]);
+    number
+}
+
+deinterleave!(deinterleave_single, f32);
+deinterleave!(deinterleave_double, f64);
 
 impl Number for f32 {
     fn omega(solid: &Solid, _: Option<&Chosen>, points: [&[Self]; 3], omega: &mut [Self]) {
         solid.omega_many(points, omega);
+    }
+
+    fn deinterleave(points: &[u8], columns: &mut [[Self; BLOCK]; 3]) {
+        deinterleave_single(points, columns);
     }
 }
 
@@ -39,6 +73,10 @@ impl Number for f64 {
             Some(chosen) => chosen.omega_many(FieldPoints::new(points[0], points[1], points[2]), omega),
             None => solid.omega_many(points, omega),
         }
+    }
+
+    fn deinterleave(points: &[u8], columns: &mut [[Self; BLOCK]; 3]) {
+        deinterleave_double(points, columns);
     }
 }
 
@@ -146,7 +184,8 @@ impl<'py> Question<'_, 'py> {
         let normal = Target::<T, 3>::new(self.py, points, for_normal.as_ref())?;
         let normal = normal.apart_from(self.py, points, &distance)?;
         let curvature = Target::<T, 1>::new(self.py, points, for_curvature.as_ref())?;
-        let curvature = curvature.apart_from(self.py, points, &distance)?.apart_from(self.py, points, &normal)?;
+        let curvature =
+            curvature.apart_from(self.py, points, &distance)?.apart_from(self.py, points, &normal)?;
         let ([d], [x, y, z], [c]) = (distance.columns, normal.columns, curvature.columns);
         let solid = self.solid;
         over(self.py, points, [d, x, y, z, c].map(Some), self.threads, |points, out| {

@@ -11,10 +11,11 @@ use numpy::npyffi::{NpyTypes, PY_ARRAY_API, get_type_object, npy_intp};
 use numpy::{Element, PyArray, PyArrayDescrMethods, PyArrayMethods, PyUntypedArrayMethods, ndarray};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use rfm::solid::Lane;
+
+use crate::evaluate::Number;
 
 /// Points that are copied at a time.
-const BLOCK: usize = 256;
+pub const BLOCK: usize = 512;
 
 /// Numbers at equal distances in memory.
 #[derive(Debug)]
@@ -70,13 +71,14 @@ unsafe impl<T: Send, const N: usize> Send for Job<T, N> {}
 // SAFETY: as above
 unsafe impl<T: Sync, const N: usize> Sync for Job<T, N> {}
 
-impl<T: Lane + Element, const N: usize> Job<T, N> {
+impl<T: Number, const N: usize> Job<T, N> {
     /// # Safety
     /// The columns have `count` numbers each, in arrays that outlive the job. Nothing else writes to the
     /// columns of points or uses those of results meanwhile. No column of results shares an address with a
     /// column of points or with another one of results.
     pub unsafe fn new(count: usize, points: [Column<T>; 3], results: [Option<Column<T>>; N]) -> Self {
-        let wanted: Vec<Column<T>> = results.into_iter().flatten().filter(|column| column.is_slice()).collect();
+        let wanted: Vec<Column<T>> =
+            results.into_iter().flatten().filter(|column| column.is_slice()).collect();
         let slices = <[Column<T>; N]>::try_from(wanted).ok();
         let slices = slices.filter(|_| points.iter().all(|column| column.is_slice()));
         let [x, y, z] = points;
@@ -123,9 +125,16 @@ impl<T: Lane + Element, const N: usize> Job<T, N> {
                     *points = self.slice(column, &block);
                 }
             }
-            evaluate(points, computed.each_mut().map(|column| &mut column[..block.len()]));
+            let mut results = computed.each_mut().map(|column| &mut column[..block.len()]);
+            for (result, column) in results.iter_mut().zip(self.results) {
+                if let Some(column) = column.filter(|column| column.is_slice()) {
+                    // SAFETY: `new` promises that the numbers exist and that nothing else uses them
+                    *result = unsafe { std::slice::from_raw_parts_mut(column.at(block.start), block.len()) };
+                }
+            }
+            evaluate(points, results);
             for (column, values) in self.results.iter().zip(&computed) {
-                let Some(column) = column else { continue };
+                let Some(column) = column.filter(|column| !column.is_slice()) else { continue };
                 for (i, value) in block.clone().zip(values) {
                     // SAFETY: `new` promises that the number exists and that nothing else uses it
                     unsafe { column.at(i).write_unaligned(*value) };
@@ -137,12 +146,11 @@ impl<T: Lane + Element, const N: usize> Job<T, N> {
     /// Copies the points of a block that are not slices already.
     fn gather(&self, block: &Range<usize>, gathered: &mut [[T; BLOCK]; 3]) {
         if self.is_interleaved {
-            let [x, y, z] = gathered;
-            let first = self.points[0].at(block.start).cast::<[T; 3]>();
-            for (i, ((x, y), z)) in x.iter_mut().zip(y).zip(z).take(block.len()).enumerate() {
-                // SAFETY: the three coordinates of a point follow one another, and `new` promises that they exist
-                [*x, *y, *z] = unsafe { first.wrapping_add(i).read_unaligned() };
-            }
+            let first = self.points[0].at(block.start).cast::<u8>();
+            // SAFETY: `new` promises that the points exist and that nothing writes to them; bytes need no
+            // alignment
+            let bytes = unsafe { std::slice::from_raw_parts(first, block.len() * size_of::<[T; 3]>()) };
+            T::deinterleave(bytes, gathered);
             return;
         }
         for (column, numbers) in self.points.into_iter().zip(gathered) {

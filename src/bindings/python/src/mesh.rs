@@ -84,6 +84,8 @@ pub fn write_file(
 ) -> PyResult<()> {
     let failed = |error| not_read(&path.display().to_string(), error);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // a folder that does not exist is better found here than behind the name of a temporary file
+    std::fs::metadata(folder).map_err(failed)?;
     let mut temporary = tempfile::Builder::new();
     temporary.prefix(".rfm-");
     #[cfg(unix)]
@@ -156,7 +158,8 @@ impl PyMesh {
     ///     Write .stl as text.
     #[pyo3(signature = (path, *, ascii=false))]
     fn save(&self, py: Python<'_>, path: PathBuf, ascii: bool) -> PyResult<()> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let ending =
+            path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let Some(format) = FORMATS.iter().find(|format| format.ending == ending) else {
             let known: Vec<String> = FORMATS.iter().map(|format| format!(".{}", format.ending)).collect();
             return Err(PyValueError::new_err(format!(

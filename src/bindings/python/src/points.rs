@@ -142,7 +142,8 @@ fn converted_three<'py>(given: [&Bound<'py, PyAny>; 3]) -> PyResult<Given<'py>> 
         arrays.push(array);
     }
     // a number of Python takes the precision of the arrays beside it
-    let deciding = given.iter().zip(&arrays).map(|(given, array)| if is_number(given) { given } else { array });
+    let deciding =
+        given.iter().zip(&arrays).map(|(given, array)| if is_number(given) { given } else { array });
     let name = number_type(&numpy.call_method1("result_type", PyTuple::new(py, deciding)?)?)?;
     let arrays: Vec<_> =
         arrays.iter().map(|array| array.call_method1("astype", (name,))).collect::<PyResult<_>>()?;

@@ -87,7 +87,11 @@ impl<'py, T: Lane + Element, const N: usize> Target<'py, T, N> {
         let count = points.count;
         let meets = self.columns.iter().any(|column| {
             let own = column.extent(count);
-            other.columns.iter().map(|column| column.extent(count)).any(|o| own.start < o.end && o.start < own.end)
+            other
+                .columns
+                .iter()
+                .map(|column| column.extent(count))
+                .any(|o| own.start < o.end && o.start < own.end)
         });
         if !meets {
             return Ok(self);
@@ -106,7 +110,9 @@ fn check<T: Element>(out: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<()> {
     let wanted = T::get_dtype(py);
     if !array.dtype().is_equiv_to(&wanted) {
         let found = array.dtype();
-        return Err(PyTypeError::new_err(format!("out has the type {found}, expected {wanted} as the points have")));
+        return Err(PyTypeError::new_err(format!(
+            "out has the type {found}, expected {wanted} as the points have"
+        )));
     }
     if array.shape() != shape {
         let found = array.shape();
@@ -130,8 +136,12 @@ fn are_apart<T: Lane + Element>(columns: &[Column<T>], points: &Points<'_, T>) -
 /// Whether no two elements of an array share an address.
 fn strides_are_apart(array: &Bound<'_, PyAny>) -> bool {
     let Ok(array) = array.cast::<PyUntypedArray>() else { return false };
-    let mut sides: Vec<(usize, usize)> =
-        array.strides().iter().map(|stride| stride.unsigned_abs()).zip(array.shape().iter().copied()).collect();
+    let mut sides: Vec<(usize, usize)> = array
+        .strides()
+        .iter()
+        .map(|stride| stride.unsigned_abs())
+        .zip(array.shape().iter().copied())
+        .collect();
     sides.retain(|(_, length)| *length > 1);
     sides.sort_unstable();
     let mut occupied = array.dtype().itemsize();

@@ -164,9 +164,9 @@ impl PySimulation {
             Err(TryLockError::WouldBlock) => {
                 Err(PyRuntimeError::new_err("the simulation is taking steps in another thread"))
             }
-            Err(TryLockError::Poisoned(_)) => {
-                Err(PyRuntimeError::new_err("a step of the simulation was interrupted by an error of the program"))
-            }
+            Err(TryLockError::Poisoned(_)) => Err(PyRuntimeError::new_err(
+                "a step of the simulation was interrupted by an error of the program",
+            )),
         }
     }
 
@@ -174,7 +174,8 @@ impl PySimulation {
     fn state_to_change(&self) -> PyResult<MutexGuard<'_, State>> {
         let state = self.state()?;
         if state.lent.is_out() {
-            let message = "views of the particles are in use: delete them, or copy them, before the next step";
+            let message =
+                "views of the particles are in use: delete them, or copy them, before the next step";
             return Err(PyBufferError::new_err(message));
         }
         if let Some(error) = &state.failed {
@@ -184,7 +185,12 @@ impl PySimulation {
     }
 
     /// Takes steps up to a goal, and looks for Ctrl-C on the way.
-    fn go_on(&self, py: Python<'_>, goal: Goal, mut report: impl FnMut(&Simulation) -> PyResult<()>) -> PyResult<()> {
+    fn go_on(
+        &self,
+        py: Python<'_>,
+        goal: Goal,
+        mut report: impl FnMut(&Simulation) -> PyResult<()>,
+    ) -> PyResult<()> {
         let mut state = self.state_to_change()?;
         let state = &mut *state;
         while run(py, self.threads, || state.go_on(goal))?.is_continue() {
@@ -481,7 +487,9 @@ impl PySimulation {
     fn resume(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         let mut state = self.state()?;
         if state.lent.is_out() {
-            return Err(PyBufferError::new_err("views of the particles are in use: delete them, or copy them"));
+            return Err(PyBufferError::new_err(
+                "views of the particles are in use: delete them, or copy them",
+            ));
         }
         let path = if folder.is_dir() { newest(&folder.join(CHECKPOINTS))? } else { folder };
         let bytes = std::fs::read(&path).map_err(|error| not_read(&path.display().to_string(), error))?;
@@ -517,4 +525,3 @@ fn newest(folder: &Path) -> PyResult<PathBuf> {
         None => Err(refused(format!("there is no state in `{}` to go on from", folder.display()))),
     }
 }
-

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec2;
 use rfm::slice::{self, Axis, Plane, Samples, Window};
 use rfm::solid::Chosen;
-use rfm::Solid;
 
 use crate::error::refused;
 use crate::mesh::write_file;
@@ -60,7 +60,9 @@ impl PySlice {
             (None, Some(domain)) => plane.window(&domain),
             (None, None) => {
                 let name = solid.name();
-                return Err(refused(format!("`{name}` has no bounds and the file no scene: state the window")));
+                return Err(refused(format!(
+                    "`{name}` has no bounds and the file no scene: state the window"
+                )));
             }
         };
         let field: &dyn Field = chosen.map_or(solid, |chosen| chosen);
@@ -76,12 +78,18 @@ impl PySlice {
     pub fn svg(&self) -> PyResult<String> {
         let Samples { plane, window, .. } = self.samples;
         let mut svg = Vec::new();
-        slice::write_svg(self.field(), self.solid.name(), plane, window, self.number, &mut svg).map_err(refused)?;
+        slice::write_svg(self.field(), self.solid.name(), plane, window, self.number, &mut svg)
+            .map_err(refused)?;
         String::from_utf8(svg).map_err(refused)
     }
 
     /// The coordinates of columns or of rows, m.
-    fn along<'py>(&self, py: Python<'py>, count: usize, at: impl Fn(usize) -> f64) -> Bound<'py, PyArray1<f64>> {
+    fn along<'py>(
+        &self,
+        py: Python<'py>,
+        count: usize,
+        at: impl Fn(usize) -> f64,
+    ) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, (0..count).map(at))
     }
 }
@@ -134,7 +142,8 @@ impl PySlice {
 
     /// Writes the drawing to a file, .svg or .png.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let ending =
+            path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let picture = match &*ending {
             "svg" => self.svg_document(py)?.into_bytes(),
             "png" => {
@@ -161,4 +170,3 @@ impl PySlice {
         format!("<rfm.Slice of {} in {plane}, {rows} × {columns} samples>", self.solid.name())
     }
 }
-

@@ -45,9 +45,11 @@ pub struct PySolid {
 /// Asks a question about points of either precision, or returns `$one` for a single point.
 macro_rules! ask {
     ($self:ident, $points:expr, $threads:ident, |$p:ident| $one:expr, |$question:ident, $columns:ident| $many:expr) => {{
-        let (points, y, z): (&Bound<'py, PyAny>, Option<&Bound<'py, PyAny>>, Option<&Bound<'py, PyAny>>) = $points;
+        let (points, y, z): (&Bound<'py, PyAny>, Option<&Bound<'py, PyAny>>, Option<&Bound<'py, PyAny>>) =
+            $points;
         let py = points.py();
-        let $question = Question { py, solid: &$self.solid, chosen: $self.chosen.as_ref(), threads: $threads };
+        let $question =
+            Question { py, solid: &$self.solid, chosen: $self.chosen.as_ref(), threads: $threads };
         match Given::read(points, y, z)? {
             Given::One($p) => $one,
             Given::Double($columns) => $many,
@@ -88,7 +90,9 @@ fn several<'py, const N: usize>(out: Option<&Bound<'py, PyAny>>) -> PyResult<[Op
     let Some(out) = out else { return Ok([const { None }; N]) };
     let list: Vec<Bound<'py, PyAny>> = out
         .cast::<PyTuple>()
-        .map_err(|_| PyTypeError::new_err(format!("out is {}, expected a tuple of {N} arrays", out.get_type())))?
+        .map_err(|_| {
+            PyTypeError::new_err(format!("out is {}, expected a tuple of {N} arrays", out.get_type()))
+        })?
         .iter()
         .collect();
     let list: [_; N] = list.try_into().map_err(|list: Vec<_>| {
@@ -468,15 +472,18 @@ impl PySolid {
     ///     Cells along the longest side.
     /// cell : float, m, optional
     ///     Size of a cell instead of their number.
-    /// method : "mc" or "dc"
-    ///     Marching cubes, or dual contouring, which puts vertices on edges and corners too.
+    /// method : "dc" or "mc"
+    ///     Dual contouring, which puts vertices on edges and corners too, or marching cubes, which are three times
+    ///     as fast for as many cells.
     /// box : two corners, m, optional
     ///     What is meshed instead of the solid's bounds; the mesh is closed at its border.
     /// no_slivers : bool
     ///     Contract the shortest edges, so that no triangle is very thin.
     /// threads : int, optional
-    #[pyo3(signature = (cells=128, *, cell=None, method="mc", r#box=None, no_slivers=false, threads=Threads::Auto))]
-    #[pyo3(text_signature = "($self, cells=128, *, cell=None, method='mc', box=None, no_slivers=False, threads=None)")]
+    #[pyo3(signature = (cells=128, *, cell=None, method="dc", r#box=None, no_slivers=false, threads=Threads::Auto))]
+    #[pyo3(
+        text_signature = "($self, cells=128, *, cell=None, method='dc', box=None, no_slivers=False, threads=None)"
+    )]
     #[allow(clippy::too_many_arguments)] // they have names in Python
     fn mesh(
         &self,
@@ -582,7 +589,12 @@ fn unbounded(solid: &Solid) -> String {
 
 /// A solid of a program by its name, at a stretch of time; for pickles.
 #[pyfunction(name = "_solid")]
-pub fn solid_from_pickle(program: &Bound<'_, PyProgram>, name: &str, from: f64, to: f64) -> PyResult<PySolid> {
+pub fn solid_from_pickle(
+    program: &Bound<'_, PyProgram>,
+    name: &str,
+    from: f64,
+    to: f64,
+) -> PyResult<PySolid> {
     let solid = program.get().compiled(program.py(), name)?;
     PySolid::new(program, solid, [from, to])
 }

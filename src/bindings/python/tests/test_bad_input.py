@@ -29,11 +29,11 @@ def test_mistakes_in_a_file_have_places():
     [
         (lambda: rfm.load("no/such.rfm"), FileNotFoundError, "no/such.rfm"),
         (lambda: rfm.load(EXAMPLES), IsADirectoryError, "examples"),
-        (lambda: rfm.load(3), TypeError, ""),
+        (lambda: rfm.load(3), TypeError, None),
         (lambda: rfm.load("rfm 1\nparam a = 1 in 0 .. 2", a=3), rfm.RfmError, "param"),
         (lambda: rfm.load("rfm 1\nparam a = 1", b=3), rfm.RfmError, "no param `b`|`b`"),
         (lambda: rfm.load("rfm 1\nparam a = 1", a="x"), TypeError, "param `a`"),
-        (lambda: rfm.load("rfm 1\nparam a = 1", a=float("nan")), rfm.RfmError, ""),
+        (lambda: rfm.load("rfm 1\nparam a = 1", a=float("nan")), rfm.RfmError, None),
         (lambda: rfm.load("rfm 1\n")["post"], KeyError, "no solid `post`"),
         (lambda: rfm.load("rfm 1\nsolid post = sphere(1)").solid("pst"), rfm.RfmError, "did you mean `post`"),
         (lambda: rfm.load("rfm 1\n").solid(), rfm.RfmError, "solid"),
@@ -69,13 +69,13 @@ READ_ONLY.setflags(write=False)
         ((1.0,), {}, ValueError, r"shape \(\)"),
         ((np.zeros((4, 3)), np.zeros(4)), {}, TypeError, "x, y and z"),
         ((1.0, 2.0), {}, TypeError, "x, y and z"),
-        ((), {}, TypeError, ""),
+        ((), {}, TypeError, None),
         ((np.zeros(4), np.zeros(5), np.zeros(4)), {}, ValueError, "broadcast"),
         (("pawn",), {}, TypeError, "real numbers"),
         (([1j, 0, 0],), {}, TypeError, "complex128, expected real numbers"),
         ((np.zeros((2, 3), dtype="O"),), {}, TypeError, "object, expected real numbers"),
         ((np.zeros((2, 3), dtype="M8[s]"),), {}, TypeError, "real numbers"),
-        (([[1, 2, 3], [1, 2]],), {}, ValueError, ""),
+        (([[1, 2, 3], [1, 2]],), {}, ValueError, None),
         ((None,), {}, TypeError, "real numbers"),
         ((N3,), {"out": np.zeros(3)}, ValueError, r"shape \[3\], expected \[4\]"),
         ((N3,), {"out": np.zeros((4, 1))}, ValueError, "shape"),
@@ -85,7 +85,7 @@ READ_ONLY.setflags(write=False)
         ((1.0, 2.0, 3.0), {"out": np.zeros(1)}, TypeError, "single point"),
         ((N3,), {"threads": 0}, ValueError, "threads is 0"),
         ((N3,), {"threads": -1}, ValueError, "threads is -1"),
-        ((N3,), {"threads": 1.5}, TypeError, ""),
+        ((N3,), {"threads": 1.5}, TypeError, None),
     ],
 )
 def test_bad_points(pawn, arguments, options, error, words):
@@ -147,11 +147,11 @@ def test_bad_boxes_cells_and_planes(pawn):
 
 
 def test_solids_without_bounds_or_inside():
-    program = rfm.load("rfm 1\nsolid all = z <= 0\nsolid none = sphere(1) and x >= 2")
-    everything, nothing = program["all"], program["none"]
+    program = rfm.load("rfm 1\nsolid floor = z <= 0\nsolid none = sphere(1) and x >= 2")
+    everything, nothing = program["floor"], program["none"]
     assert np.isinf(everything.bounds).all() and nothing.bounds is None
     for use in (everything.mesh, everything.volume, lambda: everything.slice(z=0.0)):
-        with pytest.raises(rfm.RfmError, match="all"):
+        with pytest.raises(rfm.RfmError, match="floor"):
             use()
     assert everything._repr_svg_() is None and "none found" in everything._repr_html_()
     assert everything.mesh(16, box=[-1, -1, -1, 1, 1, 1]).closed

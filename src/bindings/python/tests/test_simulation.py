@@ -24,7 +24,7 @@ scene tank {
   run { until: 0.5 s, save_every: 0.02 s }
   probe gauge { height: [0.15, 0.2], every: 10 ms }
   probe push { force: post, every: 20 ms }
-  probe joules { energy, every: 50 ms }
+  probe joules { energy: water, every: 50 ms }
 }
 """
 
@@ -122,7 +122,7 @@ def test_a_resumed_run_has_the_bits_of_one_that_never_stopped(tmp_path):
     straight.step(40)
     first.step(25)
     path = first.save(tmp_path)
-    assert path.endswith("checkpoints/step_0000000025.checkpoint")
+    assert path == tmp_path / "checkpoints" / "step_0000000025.checkpoint"
     second = program.scene()
     second.resume(tmp_path)
     assert second.steps == 25
