@@ -1,14 +1,12 @@
 //! Questions about many points: over columns, on one thread or several.
 
-use multiversion::multiversion;
 use numpy::Element;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use rfm::Solid;
-use rfm::field::{Field, Points as FieldPoints};
-use rfm::solid::{Chosen, Lane};
+use rfm::solid::Chosen;
+use rfm_columns::{Column, Job, Number};
 
-use crate::memory::{BLOCK, Column, Job};
 use crate::points::Points;
 use crate::pool::{Threads, pool};
 use crate::results::Target;
@@ -22,66 +20,8 @@ const WORTH_THREADS: usize = 4 * CHUNK;
 /// Below this many points, Python's lock is kept: to release it takes as long as some points do.
 const WORTH_RELEASING: usize = 64;
 
-/// A number type that points can have.
-pub trait Number: Lane + Element {
-    /// ω, by the cheaper program that keeps the tolerance of the file if there is one for this type.
-    fn omega(solid: &Solid, chosen: Option<&Chosen>, points: [&[Self]; 3], omega: &mut [Self]);
-
-    /// Sorts the bytes of points, x y z x y z …, into columns.
-    fn deinterleave(points: &[u8], columns: &mut [[Self; BLOCK]; 3]);
-}
-
-macro_rules! deinterleave {
-    ($name:ident, $number:ty) => {
-        /// Sorts points into columns, in the widest registers of the processor.
-        #[multiversion(targets("x86_64+avx2+bmi2", "x86_64+avx512f+avx512vl+avx512bw"))]
-        fn $name(points: &[u8], [x, y, z]: &mut [[$number; BLOCK]; 3]) {
-            const SIZE: usize = size_of::<$number>();
-            let points = points.as_chunks::<{ 3 * SIZE }>().0;
-            for (((point, x), y), z) in points.iter().zip(x).zip(y).zip(z) {
-                let [a, b, c] = [0, 1, 2].map(|axis| <$number>::from_ne_bytes(bytes::<SIZE>(point, axis)));
-                (*x, *y, *z) = (a, b, c);
-            }
-        }
-    };
-}
-
-/// The bytes of one coordinate of a point.
-#[inline(always)]
-fn bytes<const SIZE: usize>(point: &[u8], axis: usize) -> [u8; SIZE] {
-    let mut number = [0; SIZE];
-    number.copy_from_slice(&point[axis * SIZE..][..SIZE]);
-    number
-}
-
-deinterleave!(deinterleave_single, f32);
-deinterleave!(deinterleave_double, f64);
-
-impl Number for f32 {
-    fn omega(solid: &Solid, _: Option<&Chosen>, points: [&[Self]; 3], omega: &mut [Self]) {
-        solid.omega_many(points, omega);
-    }
-
-    fn deinterleave(points: &[u8], columns: &mut [[Self; BLOCK]; 3]) {
-        deinterleave_single(points, columns);
-    }
-}
-
-impl Number for f64 {
-    fn omega(solid: &Solid, chosen: Option<&Chosen>, points: [&[Self]; 3], omega: &mut [Self]) {
-        match chosen {
-            Some(chosen) => chosen.omega_many(FieldPoints::new(points[0], points[1], points[2]), omega),
-            None => solid.omega_many(points, omega),
-        }
-    }
-
-    fn deinterleave(points: &[u8], columns: &mut [[Self; BLOCK]; 3]) {
-        deinterleave_double(points, columns);
-    }
-}
-
 /// Calls `evaluate` for all points.
-fn over<T: Number, const N: usize>(
+fn over<T: Number + Element, const N: usize>(
     py: Python<'_>,
     points: &Points<'_, T>,
     results: [Option<Column<T>>; N],
@@ -122,7 +62,11 @@ type Any<'py> = Bound<'py, PyAny>;
 
 impl<'py> Question<'_, 'py> {
     /// ω at points.
-    pub fn omega<T: Number>(&self, points: &Points<'py, T>, out: Option<&Any<'py>>) -> PyResult<Any<'py>> {
+    pub fn omega<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
         let omega = Target::<T, 1>::new(self.py, points, out)?;
         let (solid, chosen) = (self.solid, self.chosen);
         over(self.py, points, omega.columns.map(Some), self.threads, |points, [omega]| {
@@ -132,7 +76,11 @@ impl<'py> Question<'_, 'py> {
     }
 
     /// The sign of the solid at points.
-    pub fn sign<T: Number>(&self, points: &Points<'py, T>, out: Option<&Any<'py>>) -> PyResult<Any<'py>> {
+    pub fn sign<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
         let sign = Target::<T, 1>::new(self.py, points, out)?;
         let solid = self.solid;
         over(self.py, points, sign.columns.map(Some), self.threads, |points, [sign]| {
@@ -142,7 +90,11 @@ impl<'py> Question<'_, 'py> {
     }
 
     /// ∇ω at points.
-    pub fn gradient<T: Number>(&self, points: &Points<'py, T>, out: Option<&Any<'py>>) -> PyResult<Any<'py>> {
+    pub fn gradient<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
         let gradient = Target::<T, 3>::new(self.py, points, out)?;
         let [x, y, z] = gradient.columns.map(Some);
         self.omega_and_gradient_into(points, [None, x, y, z])?;
@@ -150,7 +102,7 @@ impl<'py> Question<'_, 'py> {
     }
 
     /// ω and ∇ω at points.
-    pub fn omega_gradient<T: Number>(
+    pub fn omega_gradient<T: Number + Element>(
         &self,
         points: &Points<'py, T>,
         out: [Option<Any<'py>>; 2],
@@ -164,7 +116,7 @@ impl<'py> Question<'_, 'py> {
         Ok((omega.finished()?, gradient.finished()?))
     }
 
-    fn omega_and_gradient_into<T: Number>(
+    fn omega_and_gradient_into<T: Number + Element>(
         &self,
         points: &Points<'py, T>,
         results: [Option<Column<T>>; 4],
@@ -174,7 +126,7 @@ impl<'py> Question<'_, 'py> {
     }
 
     /// Distance, normal and mean curvature at points.
-    pub fn contact<T: Number>(
+    pub fn contact<T: Number + Element>(
         &self,
         points: &Points<'py, T>,
         out: [Option<Any<'py>>; 3],

@@ -10,8 +10,9 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyInt, PyModule, PyTuple};
 use rfm::glam::DVec3;
 use rfm::solid::Lane;
+use rfm_columns::Column;
 
-use crate::memory::{Column, column, columns};
+use crate::memory::{column, columns};
 
 /// What a caller gave as points.
 pub enum Given<'py> {

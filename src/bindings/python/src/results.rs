@@ -5,8 +5,9 @@ use numpy::{Element, PyArray, PyArrayDescrMethods, PyUntypedArray, PyUntypedArra
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use rfm::solid::Lane;
+use rfm_columns::Column;
 
-use crate::memory::{Column, column, columns, columns_of_new, new_array};
+use crate::memory::{column, columns, columns_of_new, new_array};
 use crate::points::{Points, numpy};
 
 /// An array for one result of `N` numbers at each point: 1 for a value, 3 for a vector.
