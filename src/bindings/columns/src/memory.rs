@@ -80,6 +80,7 @@ impl<T: Number, const N: usize> Job<T, N> {
     /// The columns have `count` numbers each, in memory that outlives the job. Nothing else writes to the columns
     /// of points or uses those of results meanwhile. Parts that [`Job::run`] evaluates at the same time are
     /// disjoint, and then no result lies on a point.
+    // SAFETY: the caller promises what `run` needs
     pub unsafe fn new(count: usize, points: [Column<T>; 3], results: [Option<Column<T>>; N]) -> Self {
         let is_apart = are_apart(count, &points, &results);
         let sliced = results.into_iter().flatten().filter(|column| column.is_slice());

@@ -70,6 +70,7 @@ pub fn new_array<'py, T: Element>(
 ///
 /// # Safety
 /// The slice stays where it is, and nothing writes to it, as long as `owner` is alive.
+// SAFETY: the caller promises what NumPy needs
 pub unsafe fn view<'py, T: Element>(slice: &[T], owner: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let shown = ndarray::ArrayView1::from(slice);
     // SAFETY: the caller promises what NumPy needs

@@ -4,6 +4,7 @@ use numpy::ndarray::{Ix1, Ix2};
 use numpy::{Element, PyArray, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use rfm::solid::Lane;
 use rfm_columns::Column;
 
@@ -98,6 +99,32 @@ impl<'py, T: Lane + Element, const N: usize> Target<'py, T, N> {
             return Ok(self);
         }
         Ok(Self { copied_to: Some(self.array), ..Self::made(py, points)? })
+    }
+}
+
+/// Several arrays of the caller for one result; none if there is no `out`.
+pub fn several<'py, const N: usize>(
+    out: Option<&Bound<'py, PyAny>>,
+) -> PyResult<[Option<Bound<'py, PyAny>>; N]> {
+    let Some(out) = out else { return Ok([const { None }; N]) };
+    let list: Vec<Bound<'py, PyAny>> = out
+        .cast::<PyTuple>()
+        .map_err(|_| {
+            PyTypeError::new_err(format!("out is {}, expected a tuple of {N} arrays", out.get_type()))
+        })?
+        .iter()
+        .collect();
+    let list: [_; N] = list.try_into().map_err(|list: Vec<_>| {
+        PyValueError::new_err(format!("out has {} arrays, expected {N}", list.len()))
+    })?;
+    Ok(list.map(|array| (!array.is_none()).then_some(array)))
+}
+
+/// Refuses arrays for results where there is no array of points.
+pub fn no_out(out: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    match out {
+        None => Ok(()),
+        Some(_) => Err(PyTypeError::new_err("out is for arrays of points, not for a single point")),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The class `Solid`.
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyTuple, PyType};
@@ -17,6 +17,7 @@ use crate::path::first_entry;
 use crate::points::{Given, numpy};
 use crate::pool::{Threads, run};
 use crate::program::PyProgram;
+use crate::results::{no_out, several};
 use crate::slice::PySlice;
 
 /// A compiled obstacle: ω, its gradient, its sign and its surface.
@@ -82,29 +83,6 @@ impl PySolid {
     /// The box that is drawn.
     fn domain(&self) -> Option<Aabb> {
         Python::attach(|py| self.program.bind(py).get().program.domain(&self.solid))
-    }
-}
-
-/// Several arrays of the caller for one result; none if there is no `out`.
-fn several<'py, const N: usize>(out: Option<&Bound<'py, PyAny>>) -> PyResult<[Option<Bound<'py, PyAny>>; N]> {
-    let Some(out) = out else { return Ok([const { None }; N]) };
-    let list: Vec<Bound<'py, PyAny>> = out
-        .cast::<PyTuple>()
-        .map_err(|_| {
-            PyTypeError::new_err(format!("out is {}, expected a tuple of {N} arrays", out.get_type()))
-        })?
-        .iter()
-        .collect();
-    let list: [_; N] = list.try_into().map_err(|list: Vec<_>| {
-        PyValueError::new_err(format!("out has {} arrays, expected {N}", list.len()))
-    })?;
-    Ok(list.map(|array| (!array.is_none()).then_some(array)))
-}
-
-fn no_out(out: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-    match out {
-        None => Ok(()),
-        Some(_) => Err(PyTypeError::new_err("out is for arrays of points, not for a single point")),
     }
 }
 
