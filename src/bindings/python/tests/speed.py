@@ -68,9 +68,10 @@ def main():
             ratio, ours, base = (statistics.median(column) for column in zip(*found))
             print(f"{threads} threads, {dtype}, {name:8} {ours:6.2f} ns, Rust's columns {base:6.2f} ns: {ratio:5.2f} x")
     print(f"one point, Rust           {one:7.1f} ns")
-    print(f"one point, solid(x, y, z) {call("pawn(1.5, 1.4, 0.5)", 2000, pawn=pawn):7.1f} ns")
-    small = np.array([[1.5, 1.4, 0.5]])
-    print(f"array of shape (1, 3)     {call("pawn.omega(small)", 2000, pawn=pawn, small=small):7.1f} ns")
+    ours = call("pawn(1.5, 1.4, 0.5)", 2000, pawn=pawn)
+    print(f"one point, solid(x, y, z) {ours:7.1f} ns")
+    ours = call("pawn.omega(small)", 2000, pawn=pawn, small=np.array([[1.5, 1.4, 0.5]]))
+    print(f"array of shape (1, 3)     {ours:7.1f} ns")
 
 
 if __name__ == "__main__":
