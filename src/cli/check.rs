@@ -13,13 +13,12 @@ use crate::cli::output::Shown;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
 use rfm::ir::Magnitudes;
 use rfm::lower::NamedSolid;
-use rfm::mesh::{self, Grid, Resolution, ThinCells, marching_cubes};
+use rfm::mesh::{self, Grid, Resolution, ThinCells, VolumeError};
 use rfm::solid::{Bounds, ProgramKind};
 use rfm::{Precision, Program, Solid};
 
-/// Cells along the longest side of the meshes that volumes are measured on. The second mesh is for the
-/// volumes' error.
-const VOLUME_CELLS: [usize; 2] = [96, 48];
+/// Cells along the longest side of the mesh that volumes are measured on.
+const VOLUME_CELLS: usize = 96;
 
 #[derive(Serialize)]
 struct Document {
@@ -259,7 +258,7 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
     if thin.count > 0 {
         let message = format!(
             "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
-            named.name, VOLUME_CELLS[0], thin.count, thin.bounds.min, thin.bounds.max
+            named.name, VOLUME_CELLS, thin.count, thin.bounds.min, thin.bounds.max
         );
         let help = "mesh it with more --cells, until `thin_cells` is 0";
         found.push(warning(Code::THIN_PARTS, message).help(help));
@@ -303,30 +302,20 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
         }
     };
     facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
-    let mut reports = Vec::new();
-    let mut thin = ThinCells::NONE;
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    for cells in VOLUME_CELLS {
-        let grid = Grid::around(bounds, Resolution::Cells(cells)).map_err(Failure::usage)?;
-        if cells == VOLUME_CELLS[0] {
-            thin = mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE);
+    let grid = Grid::around(bounds, Resolution::Cells(VOLUME_CELLS)).map_err(Failure::usage)?;
+    let thin = mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE);
+    match mesh::volume(&*surface, bounds, VOLUME_CELLS) {
+        Ok(found) => {
+            facts.volume = Some(found.volume);
+            facts.volume_error = Some(found.error);
+            facts.area = Some(found.area);
+            facts.components = Some(found.solids);
         }
-        match marching_cubes(&*surface, &grid, &|_| {}) {
-            Ok(mesh) => reports.push(mesh::check(&mesh, &*surface)),
-            // a field that is not a number somewhere has no volume
-            Err(_) => return Ok((facts, ThinCells::NONE)),
-        }
-    }
-    if let [fine, coarse] = &reports[..]
-        && fine.triangles > 0
-    {
-        // vertices lie on the surface, so errors fall as h², and a third of the difference leads to the
-        // limit; creases lie unevenly between the cells, so the whole difference is given as the error
-        let difference = fine.volume - coarse.volume;
-        facts.volume = Some(fine.volume + difference / 3.0);
-        facts.volume_error = Some(difference.abs());
-        facts.area = Some(fine.area);
-        facts.components = Some(fine.solids);
+        Err(VolumeError::TooThin) => {}
+        Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
+        // a field that is not a number somewhere has no volume
+        Err(VolumeError::Mesh(_)) => return Ok((facts, ThinCells::NONE)),
     }
     facts.thin_cells = Some(thin.count);
     Ok((facts, thin))
@@ -360,10 +349,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             let [min, max] = corners(bounds);
             say!("    bounds      {min} … {max}");
             if solid.volume.is_none() {
-                say!(
-                    "    volume      not found: too thin for {} cells along its longest side",
-                    VOLUME_CELLS[0]
-                );
+                say!("    volume      not found: too thin for {} cells along its longest side", VOLUME_CELLS);
             }
         } else if !solid.empty {
             say!("    bounds      none found");

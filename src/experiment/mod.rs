@@ -14,7 +14,10 @@
 
 mod bodies;
 mod deviation;
+mod every;
+mod fingerprint;
 mod parameters;
+mod probes;
 mod room;
 
 use std::sync::Arc;
@@ -34,7 +37,9 @@ use crate::{Engine, Program, Solid};
 
 pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
+pub use every::Every;
 pub use parameters::TimeStep;
+pub use probes::{probe_column, probe_of};
 
 /// Least distance of particles from obstacles at the start, over the spacing.
 const CLEARANCE: f64 = 0.5;

@@ -52,6 +52,7 @@ mod signs;
 mod simplify;
 mod slivers;
 mod thin;
+mod volume;
 
 #[cfg(test)]
 mod tests;
@@ -70,6 +71,7 @@ pub use shells::{Shell, shells};
 pub use simplify::simplify;
 pub use slivers::remove_slivers;
 pub use thin::{ThinCells, thin_cells};
+pub use volume::{Volume, VolumeError, volume};
 
 /// A triangle mesh with shared vertices.
 ///

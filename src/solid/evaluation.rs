@@ -117,6 +117,15 @@ impl Solid {
         self.evaluate_many(ProgramKind::Contact, points, out);
     }
 
+    /// Inside (1), on the surface (0) or outside (−1) at many points given by columns, as [`Solid::sign`].
+    ///
+    /// # Panics
+    /// If the columns differ in length.
+    pub fn sign_many<T: Lane>(&self, points: [&[T]; 3], sign: &mut [T]) {
+        self.twin_many(points, sign);
+        sign.iter_mut().for_each(|value| *value = Unary::Sign.eval(*value));
+    }
+
     /// The twin at many points: positive inside, 0 on the surface, negative outside.
     ///
     /// # Panics

@@ -78,6 +78,16 @@ impl fmt::Display for CheckpointError {
 impl error::Error for CheckpointError {}
 
 impl Checkpoint {
+    /// The name of the file for the checkpoint after this many steps.
+    pub fn file_name(steps: u64) -> String {
+        format!("step_{steps:010}.checkpoint")
+    }
+
+    /// The number of steps in the [name of a file](Self::file_name); `None` if it is no checkpoint's name.
+    pub fn steps_of_file(name: &str) -> Option<u64> {
+        name.strip_prefix("step_")?.strip_suffix(".checkpoint")?.parse().ok()
+    }
+
     /// Stores numbers under a name. They replace those that had the name before.
     pub fn set(&mut self, name: &str, values: Vec<f64>) {
         self.columns.retain(|(other, _)| other != name);
@@ -314,6 +324,16 @@ mod tests {
         let mut bytes = Vec::new();
         checkpoint.write(&mut bytes).unwrap();
         (checkpoint, bytes)
+    }
+
+    #[test]
+    fn files_are_named_after_their_steps() {
+        for steps in [0, 7, 12_345_678_901] {
+            assert_eq!(Checkpoint::steps_of_file(&Checkpoint::file_name(steps)), Some(steps));
+        }
+        for foreign in ["step_.checkpoint", "step_12.vtp", "notes.checkpoint"] {
+            assert_eq!(Checkpoint::steps_of_file(foreign), None, "{foreign}");
+        }
     }
 
     #[test]

@@ -137,9 +137,11 @@ fn the_twin_has_the_sign_of_omega() {
         let (x, y, z) = (column(0), column(1), column(2));
         let mut twin = vec![0.0; points.len()];
         jit.twin_many([&x, &y, &z], &mut twin);
+        let mut signs = vec![0.0; points.len()];
+        jit.sign_many([&x, &y, &z], &mut signs);
         for (i, &p) in points.iter().enumerate() {
             let sign = interpreter.sign(p);
-            assert!(same(jit.sign(p), sign), "{jit:?} at {p}");
+            assert!(same(jit.sign(p), sign) && same(signs[i], sign), "{jit:?} at {p}");
             assert!(same(twin[i], Field::omega(&interpreter.twin(), p)), "{jit:?} at {p}");
             assert!(p.is_finite() || sign.is_nan(), "{jit:?} at {p}: {sign}");
             let omega = jit.omega(p);

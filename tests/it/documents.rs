@@ -2,7 +2,7 @@
 
 use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 7] = [
+const DOCUMENTS: [&str; 9] = [
     "README.md",
     "CHANGELOG.md",
     "examples/README.md",
@@ -10,6 +10,8 @@ const DOCUMENTS: [&str; 7] = [
     "tests/bench/README.md",
     "tests/peers/README.md",
     "src/sph/methods/README.md",
+    "src/bindings/python/README.md",
+    "src/bindings/c/README.md",
 ];
 
 fn text(document: &str) -> String {

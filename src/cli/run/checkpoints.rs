@@ -5,12 +5,10 @@
 use std::path::{Path, PathBuf};
 
 use super::super::{Failure, note, output};
-use super::pace::Every;
 use crate::cli::output::Shown;
-use rfm::Experiment;
-use rfm::ir;
+use rfm::experiment::Every;
 use rfm::lower::Scene;
-use rfm::sph::{Checkpoint, CheckpointError, Parameters, Simulation};
+use rfm::sph::{Checkpoint, CheckpointError, Simulation};
 
 /// Number of checkpoints that are kept. The second serves if the last is found damaged.
 const KEPT: usize = 2;
@@ -118,48 +116,15 @@ pub(super) fn remove_all(run_folder: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Fingerprint of all that determines the bits of a state: the fluid, the box, the obstacles and the method's
-/// numbers. The length of steps, the length of the run and what it saves are not part of it, so a run may go
-/// on with others.
-pub(super) fn fingerprint(experiment: &Experiment) -> [u8; 32] {
-    let (program, scene) = (experiment.program(), experiment.scene());
-    let fluid = &scene.fluid;
-    let container = scene.container.iter().map(|c| ("container", c.outside));
-    let obstacles = scene.obstacles.iter().map(|o| ("obstacle", o.shape));
-    let velocity = fluid.velocity.iter().map(|node| ("velocity", *node));
-    let gravity = scene.gravity.formulas().into_iter().flatten().map(|node| ("gravity", *node));
-    let fluid_shape = [("fluid", fluid.shape)].into_iter();
-    let roots: Vec<_> =
-        fluid_shape.chain(container).chain(obstacles).chain(velocity).chain(gravity).collect();
-    let skins: Vec<_> = experiment.bodies().iter().map(|body| &body.skin).collect();
-    // a gravity that turns has one value in the parameters; its formulas are among the roots
-    let parameters = Parameters { time_step: 0.0, adaptive: false, ..experiment.parameters().clone() };
-    // numbers print with all their digits
-    let text = format!(
-        "{}\n{:?}\n{skins:?}\n{parameters:?}\n{:?} {:?} {:?} {}",
-        ir::dump(&program.module().graph, &roots, &[]),
-        scene.domain,
-        fluid.fill,
-        fluid.particles,
-        fluid.jitter,
-        fluid.seed,
-    );
-    blake3::hash(text.as_bytes()).into()
-}
-
 fn path(folder: &Path, steps: u64) -> PathBuf {
-    folder.join(format!("step_{steps:010}.checkpoint"))
+    folder.join(Checkpoint::file_name(steps))
 }
 
 /// Step numbers of the checkpoints in a folder, ascending.
 fn list(folder: &Path) -> Vec<u64> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut steps: Vec<u64> = entries
-        .filter_map(|entry| {
-            let name = entry.file_name();
-            name.to_str()?.strip_prefix("step_")?.strip_suffix(".checkpoint")?.parse().ok()
-        })
-        .collect();
+    let mut steps: Vec<u64> =
+        entries.filter_map(|entry| Checkpoint::steps_of_file(entry.file_name().to_str()?)).collect();
     steps.sort_unstable();
     steps
 }

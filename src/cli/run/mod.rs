@@ -10,7 +10,6 @@ mod folder;
 mod forecast;
 mod frames;
 mod goal;
-mod pace;
 mod probes;
 mod stop;
 mod summary;
@@ -40,7 +39,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let program = input::program(shared, &options.file)?;
     let scene = choose::scene(&program, options.scene.as_deref())?;
     let experiment = experiment(shared, &program, &scene.name)?;
-    let fingerprint = checkpoints::fingerprint(&experiment);
+    let fingerprint = experiment.fingerprint();
     let folder = folder::of(options);
     if options.dry_run {
         let goal = Goal::of(options, &experiment)?;

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, RIGHT, TOP, WIDTH};
 use super::super::{Failure, output};
-use super::pace::Every;
 use crate::cli::output::Shown;
-use rfm::lower::{Measured, Scene};
+use rfm::experiment::{Every, probe_column, probe_of};
+use rfm::lower::Scene;
 use rfm::slice;
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
 
@@ -52,8 +52,8 @@ impl Probes {
         }
         let mut recorders = Vec::new();
         for stated in &scene.probes {
-            let probe = probe(&stated.measured);
-            let memory = resumed.and_then(|checkpoint| checkpoint.get(&column(&stated.name)).ok());
+            let probe = probe_of(&stated.measured);
+            let memory = resumed.and_then(|checkpoint| checkpoint.get(&probe_column(&stated.name)).ok());
             let gauge = match resumed {
                 Some(checkpoint) => simulation.gauge_at(probe, checkpoint, memory.unwrap_or_default()),
                 None => simulation.gauge(probe),
@@ -96,7 +96,7 @@ impl Probes {
     /// Puts into a checkpoint what a probe needs to go on.
     pub fn save(&self, checkpoint: &mut Checkpoint) {
         for recorder in &self.0 {
-            checkpoint.set(&column(&recorder.name), recorder.gauge.memory().to_vec());
+            checkpoint.set(&probe_column(&recorder.name), recorder.gauge.memory().to_vec());
         }
     }
 
@@ -146,23 +146,6 @@ const TIME: &str = "time [s]";
 fn header(probe: &Probe) -> String {
     let columns = probe.columns().iter().map(|(name, unit)| format!(",{name} [{unit}]"));
     std::iter::once(TIME.to_string()).chain(columns).collect()
-}
-
-/// Name of a probe's memory in a checkpoint.
-fn column(name: &str) -> String {
-    format!("probe {name}")
-}
-
-fn probe(measured: &Measured) -> Probe {
-    match *measured {
-        Measured::Height([x, y]) => Probe::Height { x, y },
-        Measured::Pressure(at) => Probe::Pressure { at },
-        Measured::Velocity(at) => Probe::Velocity { at },
-        Measured::Force { body, about } => Probe::Force { obstacle: body, about },
-        Measured::Flux { point, normal } => Probe::Flux { point, normal },
-        Measured::Energy => Probe::Energy,
-        Measured::Audit => Probe::Audit,
-    }
 }
 
 /// The complete lines of a table with times up to `end`; empty if the table has other columns.

@@ -3,7 +3,7 @@
 /// Instants k·period. Each is met by the first step that reaches it. Steps are not fitted to them, so that a
 /// measurement does not change what it measures.
 #[derive(Debug, Clone)]
-pub(super) struct Every {
+pub struct Every {
     /// Time between the instants, s.
     period: f64,
     /// Number k of the next instant, a whole number.

@@ -1,0 +1,583 @@
+/* rfm: obstacles for fluid simulations, written as R-functions and compiled to machine code.
+ *
+ * Made from src/bindings/c/src by src/bindings/c/header; do not edit.
+ *
+ * omega > 0 inside a solid, 0 on its surface, < 0 outside. Lengths are in metres, times in seconds.
+ *
+ * Handles are opaque. A program or a solid may be used by any number of threads at a time; it is freed once, when
+ * nobody uses it any more. A solid does not need its program after it was made. Null handles are no errors of the
+ * program: questions about them give NaN or RFM_BAD_ARGUMENT, and to free them does nothing.
+ *
+ * Functions that may fail return RFM_OK or what went wrong. The parameter `error` may be null; otherwise it gets an
+ * error object, to be freed with rfm_error_free, or null after RFM_OK. No function throws or ends the process.
+ *
+ * Texts are UTF-8 and end with a zero byte. Those that functions return belong to the handle that they came from.
+ *
+ * Columns are given by a pointer to the first number and the distance between two numbers in bytes, so numbers may lie
+ * in records: { &p[0].x, &p[0].y, &p[0].z, sizeof p[0] }. Results may lie in the same records as the points, or
+ * replace them. Functions with columns run on the calling thread; results do not depend on how points are divided.
+ */
+
+#ifndef RFM_H
+#define RFM_H
+
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+// Version of this interface. It changes when a program that was compiled with an older header would break.
+#define RFM_ABI_VERSION 1
+
+// How a function ended.
+typedef enum RfmStatus {
+    // It did what it was asked.
+    RFM_OK = 0,
+    // A pointer is null that must not be, a text is not UTF-8, or a number is out of range.
+    RFM_BAD_ARGUMENT = 1,
+    // A file could not be read.
+    RFM_FILE = 2,
+    // A file has mistakes; the error object lists them.
+    RFM_MISTAKES = 3,
+    // There is no solid of this name.
+    RFM_UNKNOWN_NAME = 4,
+    // No machine code can be made here.
+    RFM_NO_MACHINE_CODE = 5,
+    // A bug of the library. The handles stay usable.
+    RFM_INTERNAL = 6,
+} RfmStatus;
+
+// How serious a message is.
+typedef enum RfmSeverity {
+    // The file is accepted, but something about it is odd.
+    RFM_WARNING = 0,
+    // The file is refused.
+    RFM_ERROR = 1,
+} RfmSeverity;
+
+// What is known about the extent of a solid.
+typedef enum RfmBounds {
+    // The solid is empty; there is no box.
+    RFM_EMPTY = 0,
+    // The solid lies in the box.
+    RFM_WITHIN = 1,
+    // No box was found.
+    RFM_UNBOUNDED = 2,
+} RfmBounds;
+
+// Why a function failed.
+typedef struct RfmError RfmError;
+
+// A checked file.
+typedef struct RfmProgram RfmProgram;
+
+// A compiled obstacle.
+typedef struct RfmSolid RfmSolid;
+
+// Points as columns: the first number of each, and the distance between two, bytes.
+typedef struct RfmPoints {
+    // x coordinates, m.
+    const double *x;
+    // y coordinates, m.
+    const double *y;
+    // z coordinates, m.
+    const double *z;
+    // Distance between two numbers of a column, bytes; 8 if they follow one another.
+    ptrdiff_t stride;
+} RfmPoints;
+
+// Room for numbers. Where `values` is null, they are not wanted.
+typedef struct RfmValues {
+    // The first number.
+    double *values;
+    // Distance between two numbers, bytes.
+    ptrdiff_t stride;
+} RfmValues;
+
+// Room for vectors as columns.
+typedef struct RfmVectors {
+    // x components.
+    double *x;
+    // y components.
+    double *y;
+    // z components.
+    double *z;
+    // Distance between two numbers of a column, bytes.
+    ptrdiff_t stride;
+} RfmVectors;
+
+// Points as columns in single precision: the first number of each, and the distance between two, bytes.
+typedef struct RfmPointsF32 {
+    // x coordinates, m.
+    const float *x;
+    // y coordinates, m.
+    const float *y;
+    // z coordinates, m.
+    const float *z;
+    // Distance between two numbers of a column, bytes; 4 if they follow one another.
+    ptrdiff_t stride;
+} RfmPointsF32;
+
+// Room for numbers in single precision. Where `values` is null, they are not wanted.
+typedef struct RfmValuesF32 {
+    // The first number.
+    float *values;
+    // Distance between two numbers, bytes.
+    ptrdiff_t stride;
+} RfmValuesF32;
+
+// Room for vectors as columns in single precision.
+typedef struct RfmVectorsF32 {
+    // x components.
+    float *x;
+    // y components.
+    float *y;
+    // z components.
+    float *z;
+    // Distance between two numbers of a column, bytes.
+    ptrdiff_t stride;
+} RfmVectorsF32;
+
+// What became of particles.
+typedef struct RfmCollisions {
+    // Particles that were inside, or on the surface, and have been put back.
+    size_t hits;
+    // Particles that are inside without a way out within reach. They were left as they are.
+    size_t stuck;
+    // Particles whose numbers are not finite, or at which the formula has no value. They were left as they are.
+    size_t undefined;
+} RfmCollisions;
+
+// A message about a file. Its texts live as long as the error object.
+typedef struct RfmDiagnostic {
+    // How serious it is.
+    enum RfmSeverity severity;
+    // Its code, such as "E0201", which `rfm explain` explains.
+    const char *code;
+    // What was found.
+    const char *message;
+    // The file as the caller named it.
+    const char *file;
+    // The first line, from 1.
+    size_t line;
+    // The first column in characters, from 1.
+    size_t column;
+    // What would be accepted; null if nothing is known.
+    const char *help;
+} RfmDiagnostic;
+
+// A value for a param of a file.
+typedef struct RfmParam {
+    // Name of the param.
+    const char *name;
+    // Its value.
+    double value;
+} RfmParam;
+
+// The surface as seen from a point: accurate near it, an estimate far away.
+typedef struct RfmContact {
+    // Distance, m, positive outside.
+    double distance;
+    // Outward unit normal of the nearest face; the mean of two at an edge; zero where there is none.
+    double normal[3];
+    // Mean curvature, 1/m, positive where the solid is convex.
+    double curvature;
+} RfmContact;
+
+// Where a path first meets a solid.
+typedef struct RfmEntry {
+    // The part of the path before the entry, 0 to 1.
+    double part;
+    // The place, m.
+    double point[3];
+    // Outward unit normal; the mean of those that meet there.
+    double normal[3];
+    // False where the path only grazes the surface within rounding errors.
+    bool certain;
+} RfmEntry;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// The version of the interface that the library has: `RFM_ABI_VERSION` of its header.
+uint32_t rfm_abi_version(void);
+
+// omega at many points.
+enum RfmStatus rfm_omega_many(const struct RfmSolid *solid,
+                              size_t count,
+                              struct RfmPoints points,
+                              struct RfmValues omega,
+                              struct RfmError **error);
+
+// omega and its gradient at many points, for the price of the gradient.
+enum RfmStatus rfm_gradient_many(const struct RfmSolid *solid,
+                                 size_t count,
+                                 struct RfmPoints points,
+                                 struct RfmValues omega,
+                                 struct RfmVectors gradient,
+                                 struct RfmError **error);
+
+// Whether many points are inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no
+// value.
+enum RfmStatus rfm_sign_many(const struct RfmSolid *solid,
+                             size_t count,
+                             struct RfmPoints points,
+                             struct RfmValues sign,
+                             struct RfmError **error);
+
+// The surface as seen from many points, as `rfm_contact`. Results whose pointers are null are not wanted.
+enum RfmStatus rfm_contact_many(const struct RfmSolid *solid,
+                                size_t count,
+                                struct RfmPoints points,
+                                struct RfmValues distance,
+                                struct RfmVectors normal,
+                                struct RfmValues curvature,
+                                struct RfmError **error);
+
+// `rfm_omega_many` in single precision throughout.
+enum RfmStatus rfm_omega_many_f32(const struct RfmSolid *solid,
+                                  size_t count,
+                                  struct RfmPointsF32 points,
+                                  struct RfmValuesF32 omega,
+                                  struct RfmError **error);
+
+// `rfm_gradient_many` in single precision throughout.
+enum RfmStatus rfm_gradient_many_f32(const struct RfmSolid *solid,
+                                     size_t count,
+                                     struct RfmPointsF32 points,
+                                     struct RfmValuesF32 omega,
+                                     struct RfmVectorsF32 gradient,
+                                     struct RfmError **error);
+
+// `rfm_sign_many` in single precision throughout.
+enum RfmStatus rfm_sign_many_f32(const struct RfmSolid *solid,
+                                 size_t count,
+                                 struct RfmPointsF32 points,
+                                 struct RfmValuesF32 sign,
+                                 struct RfmError **error);
+
+// `rfm_contact_many` in single precision throughout.
+enum RfmStatus rfm_contact_many_f32(const struct RfmSolid *solid,
+                                    size_t count,
+                                    struct RfmPointsF32 points,
+                                    struct RfmValuesF32 distance,
+                                    struct RfmVectorsF32 normal,
+                                    struct RfmValuesF32 curvature,
+                                    struct RfmError **error);
+
+// Puts particles that are inside a solid, or on its surface, back to the nearest place outside, at most `reach`
+// metres away, and reflects their velocities relative to that of the surface: the part `restitution` of the normal
+// speed returns, and the tangential speed loses at most `friction` times the change of the normal speed. Particles
+// that stay outside keep their bits. `collisions` may be null.
+enum RfmStatus rfm_collide(const struct RfmSolid *solid,
+                           size_t count,
+                           struct RfmVectors positions,
+                           struct RfmVectors velocities,
+                           double restitution,
+                           double friction,
+                           double reach,
+                           struct RfmCollisions *collisions,
+                           struct RfmError **error);
+
+// How the function that made the error ended; RFM_OK for null.
+enum RfmStatus rfm_error_status(const struct RfmError *error);
+
+// What happened, as `rfm` prints it. It lives as long as the error object; empty for null.
+const char *rfm_error_message(const struct RfmError *error);
+
+// The number of messages about a file.
+size_t rfm_error_count(const struct RfmError *error);
+
+// Message `index` about a file; false if there are not so many.
+bool rfm_error_diagnostic(const struct RfmError *error, size_t index, struct RfmDiagnostic *diagnostic);
+
+// Frees an error object; does nothing with null.
+void rfm_error_free(struct RfmError *error);
+
+// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none.
+enum RfmStatus rfm_load_file(const char *path,
+                             const struct RfmParam *params,
+                             size_t count,
+                             struct RfmProgram **program,
+                             struct RfmError **error);
+
+// Checks a text, with values for `count` of its params. Messages show `name` in place of a path.
+enum RfmStatus rfm_load_text(const char *text,
+                             const char *name,
+                             const struct RfmParam *params,
+                             size_t count,
+                             struct RfmProgram **program,
+                             struct RfmError **error);
+
+// The number of solids of a program.
+size_t rfm_solid_count(const struct RfmProgram *program);
+
+// The name of solid `index` of a program; null if there are not so many.
+const char *rfm_solid_name(const struct RfmProgram *program, size_t index);
+
+// Frees a program; does nothing with null.
+void rfm_program_free(struct RfmProgram *program);
+
+// Compiles a solid of a program.
+enum RfmStatus rfm_solid(const struct RfmProgram *program,
+                         const char *name,
+                         struct RfmSolid **solid,
+                         struct RfmError **error);
+
+// The solid during a stretch of time, s, as a handle of its own: values are those at the end, ranges and bounds hold
+// for all of it, and paths of `rfm_first_entry` pass from its beginning to its end. Nothing is compiled again. For a
+// single time, both ends are equal.
+enum RfmStatus rfm_solid_between(const struct RfmSolid *solid,
+                                 double from,
+                                 double to,
+                                 struct RfmSolid **then,
+                                 struct RfmError **error);
+
+// Whether time occurs in the formula.
+bool rfm_moves(const struct RfmSolid *solid);
+
+// The smallest known box around a solid: its lowest and its highest corner, m. They are written only if there is
+// one; RFM_UNBOUNDED for null.
+enum RfmBounds rfm_bounds(const struct RfmSolid *solid,
+                          double *low,
+                          double *high);
+
+// The least and the greatest value that omega may have in a box, guaranteed; infinite where nothing is known.
+enum RfmStatus rfm_range(const struct RfmSolid *solid,
+                         const double *low,
+                         const double *high,
+                         double *range,
+                         struct RfmError **error);
+
+// omega at a point; NaN for null, and where the formula has no value. If the file states a tolerance, it is computed
+// by the cheapest program that keeps it.
+double rfm_omega(const struct RfmSolid *solid,
+                 double x,
+                 double y,
+                 double z);
+
+// `rfm_omega` in single precision throughout.
+float rfm_omega_f32(const struct RfmSolid *solid, float x, float y, float z);
+
+// omega at a point, and its gradient, three numbers, which may be null.
+double rfm_gradient(const struct RfmSolid *solid, double x, double y, double z, double *gradient);
+
+// `rfm_gradient` in single precision throughout.
+float rfm_gradient_f32(const struct RfmSolid *solid, float x, float y, float z, float *gradient);
+
+// Whether a point is inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no value.
+double rfm_sign(const struct RfmSolid *solid,
+                double x,
+                double y,
+                double z);
+
+// The surface as seen from a point; all numbers are NaN for null.
+struct RfmContact rfm_contact(const struct RfmSolid *solid, double x, double y, double z);
+
+// The velocity of the surface near a point along its normal, m/s: three numbers, zero for a solid at rest.
+void rfm_wall_velocity(const struct RfmSolid *solid, double x, double y, double z, double *velocity);
+
+// Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
+// is proven that nothing of the path is in the solid, however thin the solid and long the path. `entry` may be null.
+// After an error, or for null, the answer is false as well.
+bool rfm_first_entry(const struct RfmSolid *solid,
+                     const double *from,
+                     const double *to,
+                     struct RfmEntry *entry);
+
+// Frees a solid; does nothing with null.
+void rfm_solid_free(struct RfmSolid *solid);
+
+// How the function that made the error ended; RFM_OK for null.
+enum RfmStatus rfm_error_status(const struct RfmError *error);
+
+// What happened, as `rfm` prints it. It lives as long as the error object; empty for null.
+const char *rfm_error_message(const struct RfmError *error);
+
+// The number of messages about a file.
+size_t rfm_error_count(const struct RfmError *error);
+
+// Message `index` about a file; false if there are not so many.
+bool rfm_error_diagnostic(const struct RfmError *error, size_t index, struct RfmDiagnostic *diagnostic);
+
+// Frees an error object; does nothing with null.
+void rfm_error_free(struct RfmError *error);
+
+// Reads and checks a file, with values for `count` of its params; `params` may be null if there are none.
+enum RfmStatus rfm_load_file(const char *path,
+                             const struct RfmParam *params,
+                             size_t count,
+                             struct RfmProgram **program,
+                             struct RfmError **error);
+
+// Checks a text, with values for `count` of its params. Messages show `name` in place of a path.
+enum RfmStatus rfm_load_text(const char *text,
+                             const char *name,
+                             const struct RfmParam *params,
+                             size_t count,
+                             struct RfmProgram **program,
+                             struct RfmError **error);
+
+// The number of solids of a program.
+size_t rfm_solid_count(const struct RfmProgram *program);
+
+// The name of solid `index` of a program; null if there are not so many.
+const char *rfm_solid_name(const struct RfmProgram *program, size_t index);
+
+// Frees a program; does nothing with null.
+void rfm_program_free(struct RfmProgram *program);
+
+// Compiles a solid of a program.
+enum RfmStatus rfm_solid(const struct RfmProgram *program,
+                         const char *name,
+                         struct RfmSolid **solid,
+                         struct RfmError **error);
+
+// The solid during a stretch of time, s, as a handle of its own: values are those at the end, ranges and bounds hold
+// for all of it, and paths of `rfm_first_entry` pass from its beginning to its end. Nothing is compiled again. For a
+// single time, both ends are equal.
+enum RfmStatus rfm_solid_between(const struct RfmSolid *solid,
+                                 double from,
+                                 double to,
+                                 struct RfmSolid **then,
+                                 struct RfmError **error);
+
+// Whether time occurs in the formula.
+bool rfm_moves(const struct RfmSolid *solid);
+
+// The smallest known box around a solid: its lowest and its highest corner, m. They are written only if there is
+// one; RFM_UNBOUNDED for null.
+enum RfmBounds rfm_bounds(const struct RfmSolid *solid,
+                          double *low,
+                          double *high);
+
+// The least and the greatest value that omega may have in a box, guaranteed; infinite where nothing is known.
+enum RfmStatus rfm_range(const struct RfmSolid *solid,
+                         const double *low,
+                         const double *high,
+                         double *range,
+                         struct RfmError **error);
+
+// omega at a point; NaN for null, and where the formula has no value. If the file states a tolerance, it is computed
+// by the cheapest program that keeps it.
+double rfm_omega(const struct RfmSolid *solid,
+                 double x,
+                 double y,
+                 double z);
+
+// `rfm_omega` in single precision throughout.
+float rfm_omega_f32(const struct RfmSolid *solid, float x, float y, float z);
+
+// omega at a point, and its gradient, three numbers, which may be null.
+double rfm_gradient(const struct RfmSolid *solid, double x, double y, double z, double *gradient);
+
+// `rfm_gradient` in single precision throughout.
+float rfm_gradient_f32(const struct RfmSolid *solid, float x, float y, float z, float *gradient);
+
+// Whether a point is inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no value.
+double rfm_sign(const struct RfmSolid *solid,
+                double x,
+                double y,
+                double z);
+
+// The surface as seen from a point; all numbers are NaN for null.
+struct RfmContact rfm_contact(const struct RfmSolid *solid, double x, double y, double z);
+
+// The velocity of the surface near a point along its normal, m/s: three numbers, zero for a solid at rest.
+void rfm_wall_velocity(const struct RfmSolid *solid, double x, double y, double z, double *velocity);
+
+// Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
+// is proven that nothing of the path is in the solid, however thin the solid and long the path. `entry` may be null.
+// After an error, or for null, the answer is false as well.
+bool rfm_first_entry(const struct RfmSolid *solid,
+                     const double *from,
+                     const double *to,
+                     struct RfmEntry *entry);
+
+// Frees a solid; does nothing with null.
+void rfm_solid_free(struct RfmSolid *solid);
+
+// omega at many points.
+enum RfmStatus rfm_omega_many(const struct RfmSolid *solid,
+                              size_t count,
+                              struct RfmPoints points,
+                              struct RfmValues omega,
+                              struct RfmError **error);
+
+// omega and its gradient at many points, for the price of the gradient.
+enum RfmStatus rfm_gradient_many(const struct RfmSolid *solid,
+                                 size_t count,
+                                 struct RfmPoints points,
+                                 struct RfmValues omega,
+                                 struct RfmVectors gradient,
+                                 struct RfmError **error);
+
+// Whether many points are inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no
+// value.
+enum RfmStatus rfm_sign_many(const struct RfmSolid *solid,
+                             size_t count,
+                             struct RfmPoints points,
+                             struct RfmValues sign,
+                             struct RfmError **error);
+
+// The surface as seen from many points, as `rfm_contact`. Results whose pointers are null are not wanted.
+enum RfmStatus rfm_contact_many(const struct RfmSolid *solid,
+                                size_t count,
+                                struct RfmPoints points,
+                                struct RfmValues distance,
+                                struct RfmVectors normal,
+                                struct RfmValues curvature,
+                                struct RfmError **error);
+
+// `rfm_omega_many` in single precision throughout.
+enum RfmStatus rfm_omega_many_f32(const struct RfmSolid *solid,
+                                  size_t count,
+                                  struct RfmPointsF32 points,
+                                  struct RfmValuesF32 omega,
+                                  struct RfmError **error);
+
+// `rfm_gradient_many` in single precision throughout.
+enum RfmStatus rfm_gradient_many_f32(const struct RfmSolid *solid,
+                                     size_t count,
+                                     struct RfmPointsF32 points,
+                                     struct RfmValuesF32 omega,
+                                     struct RfmVectorsF32 gradient,
+                                     struct RfmError **error);
+
+// `rfm_sign_many` in single precision throughout.
+enum RfmStatus rfm_sign_many_f32(const struct RfmSolid *solid,
+                                 size_t count,
+                                 struct RfmPointsF32 points,
+                                 struct RfmValuesF32 sign,
+                                 struct RfmError **error);
+
+// `rfm_contact_many` in single precision throughout.
+enum RfmStatus rfm_contact_many_f32(const struct RfmSolid *solid,
+                                    size_t count,
+                                    struct RfmPointsF32 points,
+                                    struct RfmValuesF32 distance,
+                                    struct RfmVectorsF32 normal,
+                                    struct RfmValuesF32 curvature,
+                                    struct RfmError **error);
+
+// Puts particles that are inside a solid, or on its surface, back to the nearest place outside, at most `reach`
+// metres away, and reflects their velocities relative to that of the surface: the part `restitution` of the normal
+// speed returns, and the tangential speed loses at most `friction` times the change of the normal speed. Particles
+// that stay outside keep their bits. `collisions` may be null.
+enum RfmStatus rfm_collide(const struct RfmSolid *solid,
+                           size_t count,
+                           struct RfmVectors positions,
+                           struct RfmVectors velocities,
+                           double restitution,
+                           double friction,
+                           double reach,
+                           struct RfmCollisions *collisions,
+                           struct RfmError **error);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* RFM_H */

@@ -1,0 +1,28 @@
+//! The interface for C, C++ and Fortran.
+//!
+//! | file | what it has |
+//! |---|---|
+//! | `error` | statuses and error objects, and how a panic becomes one |
+//! | `program` | files and texts, checked |
+//! | `solid` | solids, and questions about one point |
+//! | `columns` | questions about many points, and collisions |
+//!
+//! `include/rfm.h` is made from these files and says what callers owe. Invariant: no panic leaves a function, and
+//! nothing is kept outside of handles.
+
+// names of constants are those of C
+#![allow(non_camel_case_types)]
+
+mod columns;
+mod error;
+mod program;
+mod solid;
+
+/// Version of this interface. It changes when a program that was compiled with an older header would break.
+pub const RFM_ABI_VERSION: u32 = 1;
+
+/// The version of the interface that the library has: `RFM_ABI_VERSION` of its header.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_abi_version() -> u32 {
+    RFM_ABI_VERSION
+}

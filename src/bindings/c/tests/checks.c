@@ -1,0 +1,207 @@
+/* What the interface for C promises: values, strides, overlaps, errors, and null handles. Prints what is wrong. */
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "rfm.h"
+
+static int failures = 0;
+
+#define CHECK(condition)                                                        \
+    do {                                                                        \
+        if (!(condition)) {                                                     \
+            printf("%s:%d: %s\n", __FILE__, __LINE__, #condition);              \
+            failures++;                                                         \
+        }                                                                       \
+    } while (0)
+
+enum { COUNT = 1500 };
+
+static int same(double a, double b) { return a == b || (isnan(a) && isnan(b)); }
+
+static RfmSolid *load(const char *path, const char *name) {
+    RfmProgram *program = NULL;
+    RfmSolid *solid = NULL;
+    CHECK(rfm_load_file(path, NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_solid(program, name, &solid, NULL) == RFM_OK);
+    rfm_program_free(program);
+    return solid;
+}
+
+/* `pawn.txt` has lines of x, y, z, omega, gradient, sign and distance by `rfm eval`, with 17 digits */
+static void values_are_those_of_the_program(const RfmSolid *pawn, const char *table) {
+    FILE *file = fopen(table, "r");
+    char line[1024];
+    int rows = 0;
+    CHECK(file != NULL);
+    if (file == NULL) return;
+    CHECK(fgets(line, sizeof line, file) != NULL);
+    while (fgets(line, sizeof line, file) != NULL) {
+        double n[9], g[3];
+        char *at = line;
+        for (int k = 0; k < 9; k++) {
+            n[k] = strtod(at, &at);
+            at++;
+        }
+        CHECK(rfm_omega(pawn, n[0], n[1], n[2]) == n[3]);
+        CHECK(rfm_gradient(pawn, n[0], n[1], n[2], g) == n[3]);
+        CHECK(g[0] == n[4] && g[1] == n[5] && g[2] == n[6]);
+        CHECK(rfm_sign(pawn, n[0], n[1], n[2]) == n[7]);
+        CHECK(rfm_contact(pawn, n[0], n[1], n[2]).distance == n[8]);
+        rows++;
+    }
+    CHECK(rows >= 100);
+    fclose(file);
+}
+
+static void columns_of_any_stride_have_the_bits_of_points(const RfmSolid *pawn) {
+    static double x[COUNT], y[COUNT], z[COUNT], w[COUNT], g[3][COUNT], d[COUNT], n[3][COUNT], c[COUNT], s[COUNT];
+    static struct { double x[3], w, g[3]; float f[4]; } p[COUNT];
+    static unsigned char bytes[24 * COUNT + 1];
+    for (int i = 0; i < COUNT; i++) {
+        x[i] = p[i].x[0] = 0.5 + 2.0 * (i * 7 % 1009) / 1009.0;
+        y[i] = p[i].x[1] = 0.5 + 2.0 * (i * 31 % 1009) / 1009.0;
+        z[i] = p[i].x[2] = 1.5 * (i * 101 % 1009) / 1009.0;
+        for (int k = 0; k < 3; k++) {
+            p[i].f[k] = (float)p[i].x[k];
+            memcpy(bytes + 1 + 24 * i + 8 * k, &p[i].x[k], 8);
+        }
+    }
+    x[3] = p[3].x[0] = NAN;
+    memcpy(bytes + 1 + 24 * 3, &x[3], 8);
+    RfmPoints columns = {x, y, z, sizeof(double)};
+    RfmPoints records = {&p[0].x[0], &p[0].x[1], &p[0].x[2], sizeof p[0]};
+    RfmPoints backwards = {&x[COUNT - 1], &y[COUNT - 1], &z[COUNT - 1], -(ptrdiff_t)sizeof(double)};
+    RfmPoints unaligned = {(double *)(void *)(bytes + 1), (double *)(void *)(bytes + 9),
+                           (double *)(void *)(bytes + 17), 24};
+    RfmValues no = {NULL, 0}, values = {w, sizeof(double)}, field = {&p[0].w, sizeof p[0]};
+    RfmVectors gradient = {g[0], g[1], g[2], sizeof(double)};
+    RfmVectors fields = {&p[0].g[0], &p[0].g[1], &p[0].g[2], sizeof p[0]};
+    CHECK(rfm_omega_many(pawn, COUNT, columns, values, NULL) == RFM_OK);
+    CHECK(rfm_omega_many(pawn, COUNT, records, field, NULL) == RFM_OK);
+    for (int i = 0; i < COUNT; i++) CHECK(same(w[i], rfm_omega(pawn, x[i], y[i], z[i])) && same(w[i], p[i].w));
+    CHECK(isnan(w[3]) && !isnan(w[4]));
+    CHECK(rfm_omega_many(pawn, COUNT, backwards, (RfmValues){&d[COUNT - 1], -(ptrdiff_t)sizeof(double)}, NULL) == RFM_OK);
+    CHECK(rfm_omega_many(pawn, COUNT, unaligned, (RfmValues){c, sizeof(double)}, NULL) == RFM_OK);
+    for (int i = 0; i < COUNT; i++) CHECK(same(w[i], d[i]) && same(w[i], c[i]));
+    CHECK(rfm_gradient_many(pawn, COUNT, columns, no, gradient, NULL) == RFM_OK);
+    CHECK(rfm_gradient_many(pawn, COUNT, records, field, fields, NULL) == RFM_OK);
+    for (int i = 0; i < COUNT; i++) {
+        double one[3], omega = rfm_gradient(pawn, x[i], y[i], z[i], one);
+        CHECK(same(p[i].w, omega));
+        for (int k = 0; k < 3; k++) CHECK(same(g[k][i], one[k]) && same(p[i].g[k], one[k]));
+    }
+    CHECK(rfm_sign_many(pawn, COUNT, records, (RfmValues){s, sizeof(double)}, NULL) == RFM_OK);
+    CHECK(rfm_contact_many(pawn, COUNT, columns, (RfmValues){d, sizeof(double)},
+                           (RfmVectors){n[0], n[1], n[2], sizeof(double)}, (RfmValues){c, sizeof(double)}, NULL) == RFM_OK);
+    for (int i = 0; i < COUNT; i++) {
+        RfmContact one = rfm_contact(pawn, x[i], y[i], z[i]);
+        CHECK(same(s[i], rfm_sign(pawn, x[i], y[i], z[i])));
+        CHECK(same(d[i], one.distance) && same(c[i], one.curvature) && same(n[2][i], one.normal[2]));
+    }
+    RfmPointsF32 single = {&p[0].f[0], &p[0].f[1], &p[0].f[2], sizeof p[0]};
+    CHECK(rfm_omega_many_f32(pawn, COUNT, single, (RfmValuesF32){&p[0].f[3], sizeof p[0]}, NULL) == RFM_OK);
+    for (int i = 0; i < COUNT; i++) CHECK(same(p[i].f[3], rfm_omega_f32(pawn, p[i].f[0], p[i].f[1], p[i].f[2])));
+    /* in place */
+    CHECK(rfm_omega_many(pawn, COUNT, columns, (RfmValues){x, sizeof(double)}, NULL) == RFM_OK);
+    for (int i = 0; i < COUNT; i++) CHECK(same(x[i], w[i]));
+}
+
+static void mistakes_become_error_objects(const RfmSolid *pawn) {
+    RfmError *error = NULL;
+    RfmProgram *program = NULL;
+    RfmSolid *solid = NULL;
+    RfmDiagnostic found;
+    double x[4] = {0};
+    CHECK(rfm_load_text("rfm 1\nsolid post = spere(1)", "post.rfm", NULL, 0, &program, &error) == RFM_MISTAKES);
+    CHECK(program == NULL && rfm_error_status(error) == RFM_MISTAKES && rfm_error_count(error) == 1);
+    CHECK(rfm_error_diagnostic(error, 0, &found) && !rfm_error_diagnostic(error, 1, &found));
+    CHECK(found.severity == RFM_ERROR && strcmp(found.code, "E0201") == 0 && found.line == 2 && found.column == 14);
+    CHECK(strcmp(found.file, "post.rfm") == 0 && strcmp(found.help, "did you mean `sphere`?") == 0);
+    CHECK(strstr(rfm_error_message(error), "error[E0201]") != NULL);
+    rfm_error_free(error);
+    CHECK(rfm_load_file("no/such.rfm", NULL, 0, &program, &error) == RFM_FILE);
+    CHECK(strstr(rfm_error_message(error), "no/such.rfm") != NULL && rfm_error_count(error) == 0);
+    rfm_error_free(error);
+    CHECK(rfm_load_text("rfm 1\nsolid a = sphere(1)\n", "a", NULL, 0, &program, &error) == RFM_OK && error == NULL);
+    CHECK(rfm_solid_count(program) == 1 && strcmp(rfm_solid_name(program, 0), "a") == 0);
+    CHECK(rfm_solid_name(program, 1) == NULL);
+    CHECK(rfm_solid(program, "b", &solid, NULL) == RFM_UNKNOWN_NAME && solid == NULL);
+    CHECK(rfm_solid(program, "\xff", &solid, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_solid(program, "a", NULL, NULL) == RFM_BAD_ARGUMENT);
+    rfm_program_free(program);
+    CHECK(rfm_load_text("rfm 1\nparam r = 1", "p", (RfmParam[]){{"q", 2.0}}, 1, &program, NULL) == RFM_MISTAKES);
+    CHECK(rfm_load_text(NULL, "p", NULL, 0, &program, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_load_text("rfm 1", "p", NULL, 3, &program, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_load_text("rfm 1\n@tolerance(1e-30)\nsolid a = sphere(1)", "t", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_solid(program, "a", &solid, NULL) == RFM_MISTAKES);
+    rfm_program_free(program);
+    RfmPoints points = {x, x, x, sizeof(double)};
+    RfmValues values = {x, sizeof(double)};
+    CHECK(rfm_omega_many(NULL, 4, points, values, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_omega_many(pawn, 4, (RfmPoints){x, NULL, x, 8}, values, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_omega_many(pawn, 4, points, (RfmValues){x, 0}, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_omega_many(pawn, SIZE_MAX, points, values, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_omega_many(pawn, 0, (RfmPoints){NULL, NULL, NULL, 0}, (RfmValues){NULL, 0}, NULL) == RFM_OK);
+    CHECK(rfm_solid_between(pawn, NAN, 1.0, &solid, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(isnan(rfm_omega(NULL, 1, 2, 3)) && isnan(rfm_sign(NULL, 1, 2, 3)) && isnan(rfm_contact(NULL, 1, 2, 3).distance));
+    CHECK(!rfm_first_entry(NULL, x, x, NULL) && !rfm_first_entry(pawn, NULL, x, NULL));
+    CHECK(rfm_range(pawn, (double[]){1, 1, 1}, (double[]){0, 0, 0}, x, NULL) == RFM_BAD_ARGUMENT);
+    rfm_solid_free(NULL);
+    rfm_program_free(NULL);
+    rfm_error_free(NULL);
+}
+
+static void collisions_put_back_and_reflect(void) {
+    RfmProgram *program = NULL;
+    RfmSolid *floor = NULL, *then = NULL;
+    RfmCollisions found;
+    /* a floor that rises with 1 m/s */
+    CHECK(rfm_load_text("rfm 1\nsolid floor = z <= t", "floor", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_solid(program, "floor", &floor, NULL) == RFM_OK && rfm_moves(floor));
+    CHECK(rfm_solid_between(floor, 2.0, 2.0, &then, NULL) == RFM_OK);
+    double x[4][3] = {{0, 0, 1.9}, {0, 0, 2.1}, {0, 0, 1.5}, {0, NAN, 1.9}};
+    double v[4][3] = {{3, 0, -1}, {3, 0, -1}, {0, 0, 5}, {0, 0, 0}};
+    RfmVectors places = {&x[0][0], &x[0][1], &x[0][2], sizeof x[0]};
+    RfmVectors velocities = {&v[0][0], &v[0][1], &v[0][2], sizeof v[0]};
+    CHECK(rfm_collide(then, 4, places, velocities, 0.5, 0.25, 0.2, &found, NULL) == RFM_OK);
+    CHECK(found.hits == 1 && found.stuck == 1 && found.undefined == 1);
+    /* approach of 2 m/s to the floor: half returns, friction takes 0.25 of the change of 3 m/s */
+    CHECK(fabs(v[0][2] - 2.0) < 1e-9 && fabs(v[0][0] - 2.25) < 1e-9 && v[0][1] == 0.0);
+    CHECK(x[0][2] > 2.0 && x[0][2] < 2.0 + 1e-9 && rfm_omega(then, x[0][0], x[0][1], x[0][2]) < 0.0);
+    CHECK(x[1][2] == 2.1 && v[1][2] == -1.0 && x[2][2] == 1.5 && v[2][2] == 5.0);
+    CHECK(rfm_collide(then, 4, places, velocities, 1.5, 0.0, 0.2, NULL, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_collide(then, 4, places, velocities, 0.5, -1.0, 0.2, NULL, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_collide(then, 4, places, velocities, 0.5, 0.0, NAN, NULL, NULL) == RFM_BAD_ARGUMENT);
+    double w[3];
+    rfm_wall_velocity(then, 0, 0, 2, w);
+    CHECK(w[0] == 0.0 && w[1] == 0.0 && fabs(w[2] - 1.0) < 1e-12);
+    RfmEntry entry;
+    CHECK(rfm_first_entry(then, (double[]){0, 0, 3}, (double[]){0, 0, 1}, &entry));
+    CHECK(fabs(entry.part - 0.5) < 1e-9 && entry.normal[2] == 1.0 && entry.certain);
+    CHECK(!rfm_first_entry(then, (double[]){0, 0, 3}, (double[]){5, 0, 2.5}, &entry));
+    double range[2], low[3], high[3];
+    CHECK(rfm_range(then, (double[]){0, 0, 0}, (double[]){1, 1, 1}, range, NULL) == RFM_OK && range[0] > 0.0);
+    CHECK(rfm_bounds(then, low, high) == RFM_UNBOUNDED);
+    rfm_solid_free(then);
+    rfm_solid_free(floor);
+    rfm_program_free(program);
+}
+
+int main(int count, char **arguments) {
+    if (count != 3) return 2;
+    RfmSolid *pawn = load(arguments[1], "pawn");
+    double low[3], high[3];
+    CHECK(rfm_abi_version() == RFM_ABI_VERSION);
+    CHECK(rfm_bounds(pawn, low, high) == RFM_WITHIN && fabs(low[0] - 1.0) < 1e-5 && fabs(high[2] - 1.4736) < 1e-3);
+    values_are_those_of_the_program(pawn, arguments[2]);
+    columns_of_any_stride_have_the_bits_of_points(pawn);
+    mistakes_become_error_objects(pawn);
+    collisions_put_back_and_reflect();
+    rfm_solid_free(pawn);
+    printf("%d failures\n", failures);
+    return failures != 0;
+}

@@ -1,0 +1,17 @@
+//! Solids evaluated over the memory of other languages: what the bindings have in common.
+//!
+//! | file | what it has |
+//! |---|---|
+//! | `memory` | columns with any distance between their numbers, and how they are read and written |
+//! | `number` | f32 and f64 |
+//! | `collision` | particles that have entered a solid: put back and reflected |
+
+#![warn(missing_docs)]
+
+mod collision;
+mod memory;
+mod number;
+
+pub use collision::{Bounce, Collision, collide};
+pub use memory::{BLOCK, Column, Job};
+pub use number::Number;

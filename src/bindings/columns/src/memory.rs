@@ -1,0 +1,193 @@
+//! Columns of numbers in memory that another language owns.
+//!
+//! Slices are made only of columns that are whole, aligned and apart from all others; everything else is copied
+//! through blocks on the stack, number by number.
+
+use std::ops::Range;
+
+use crate::number::Number;
+
+/// Points that are copied at a time.
+pub const BLOCK: usize = 512;
+
+/// Numbers at equal distances in memory.
+#[derive(Debug)]
+pub struct Column<T> {
+    start: *mut T,
+    /// Distance between two numbers, bytes.
+    stride: isize,
+}
+
+impl<T> Clone for Column<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Column<T> {}
+
+impl<T> Column<T> {
+    /// A column by its first number and the distance between two numbers, bytes.
+    pub fn new(start: *mut T, stride: isize) -> Self {
+        Self { start, stride }
+    }
+
+    /// Whether the numbers follow one another, aligned, so that they may be seen as a slice.
+    fn is_slice(self) -> bool {
+        self.stride == size_of::<T>() as isize && self.start.is_aligned()
+    }
+
+    fn at(self, i: usize) -> *mut T {
+        self.start.wrapping_byte_offset(i as isize * self.stride)
+    }
+
+    /// The addresses from the first to the last of `count` numbers.
+    pub fn extent(self, count: usize) -> Range<usize> {
+        if count == 0 {
+            return 0..0;
+        }
+        let (first, last) = (self.start.addr(), self.at(count - 1).addr());
+        first.min(last)..first.max(last) + size_of::<T>()
+    }
+}
+
+/// The columns that an evaluation reads and writes: those of points, and those of results. A result without
+/// a column is not wanted.
+pub struct Job<T, const N: usize> {
+    count: usize,
+    points: [Column<T>; 3],
+    results: [Option<Column<T>>; N],
+    /// Whether results lie away from the points and from one another, so that columns may be seen as slices.
+    /// If not, every number is copied.
+    is_apart: bool,
+    /// The results, if they and the points are all slices.
+    slices: Option<[Column<T>; N]>,
+    /// Whether each point is three numbers that follow one another.
+    is_interleaved: bool,
+}
+
+// SAFETY: the pointers lead to memory that the caller of `Job::new` keeps, and threads write to different parts
+// of it
+unsafe impl<T: Send, const N: usize> Send for Job<T, N> {}
+// SAFETY: as above
+unsafe impl<T: Sync, const N: usize> Sync for Job<T, N> {}
+
+impl<T: Number, const N: usize> Job<T, N> {
+    /// A job over `count` points. Results may replace the points that they belong to, or lie between them; what
+    /// they say is undefined if they lie on other points, or on one another.
+    ///
+    /// # Safety
+    /// The columns have `count` numbers each, in memory that outlives the job. Nothing else writes to the columns
+    /// of points or uses those of results meanwhile. Parts that [`Job::run`] evaluates at the same time are
+    /// disjoint, and then no result lies on a point.
+    // SAFETY: the caller promises what `run` needs
+    pub unsafe fn new(count: usize, points: [Column<T>; 3], results: [Option<Column<T>>; N]) -> Self {
+        let is_apart = are_apart(count, &points, &results);
+        let sliced = results.into_iter().flatten().filter(|column| column.is_slice());
+        let slices = <[Column<T>; N]>::try_from(sliced.collect::<Vec<_>>()).ok();
+        let slices = slices.filter(|_| is_apart && points.iter().all(|column| column.is_slice()));
+        let [x, y, z] = points;
+        let is_interleaved = is_apart
+            && x.stride == 3 * size_of::<T>() as isize
+            && points.iter().all(|column| column.stride == x.stride)
+            && y.start == x.start.wrapping_add(1)
+            && z.start == x.start.wrapping_add(2);
+        Self { count, points, results, is_apart, slices, is_interleaved }
+    }
+
+    /// The number of points.
+    #[allow(clippy::len_without_is_empty)] // nobody asks
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Evaluates a part of the points: `evaluate` gets their columns and those of the results.
+    ///
+    /// # Panics
+    /// If there are fewer points.
+    pub fn run(&self, part: Range<usize>, evaluate: &impl Fn([&[T]; 3], [&mut [T]; N])) {
+        assert!(part.start <= part.end && part.end <= self.count, "a part of the points");
+        let Some(results) = self.slices else { return self.run_in_blocks(part, evaluate) };
+        let points = self.points.map(|column| self.slice(column, &part));
+        let results = results.map(|column| {
+            // SAFETY: `new` promises that the numbers exist and that nothing else uses them
+            unsafe { std::slice::from_raw_parts_mut(column.at(part.start), part.len()) }
+        });
+        evaluate(points, results);
+    }
+
+    /// A part of a column of points as a slice.
+    fn slice(&self, column: Column<T>, part: &Range<usize>) -> &[T] {
+        debug_assert!(column.is_slice());
+        // SAFETY: `new` promises that the numbers exist and that nothing writes to them
+        unsafe { std::slice::from_raw_parts(column.at(part.start), part.len()) }
+    }
+
+    fn run_in_blocks(&self, part: Range<usize>, evaluate: &impl Fn([&[T]; 3], [&mut [T]; N])) {
+        let mut gathered = [[T::default(); BLOCK]; 3];
+        let mut computed = [[T::default(); BLOCK]; N];
+        for start in part.clone().step_by(BLOCK) {
+            let block = start..(start + BLOCK).min(part.end);
+            self.gather(&block, &mut gathered);
+            let mut points = gathered.each_ref().map(|column| &column[..block.len()]);
+            for (points, column) in points.iter_mut().zip(self.points) {
+                if self.is_apart && column.is_slice() {
+                    *points = self.slice(column, &block);
+                }
+            }
+            let mut results = computed.each_mut().map(|column| &mut column[..block.len()]);
+            for (result, column) in results.iter_mut().zip(self.results) {
+                if let Some(column) = column.filter(|column| self.is_apart && column.is_slice()) {
+                    // SAFETY: `new` promises that the numbers exist and that nothing else uses them
+                    *result = unsafe { std::slice::from_raw_parts_mut(column.at(block.start), block.len()) };
+                }
+            }
+            evaluate(points, results);
+            for (column, values) in self.results.iter().zip(&computed) {
+                let Some(column) = column.filter(|column| !(self.is_apart && column.is_slice())) else {
+                    continue;
+                };
+                for (i, value) in block.clone().zip(values) {
+                    // SAFETY: `new` promises that the number exists and that nothing else uses it
+                    unsafe { column.at(i).write_unaligned(*value) };
+                }
+            }
+        }
+    }
+
+    /// Copies the points of a block that are not slices already.
+    fn gather(&self, block: &Range<usize>, gathered: &mut [[T; BLOCK]; 3]) {
+        if self.is_interleaved {
+            let first = self.points[0].at(block.start).cast::<u8>();
+            // SAFETY: `new` promises that the points exist and that nothing writes to them; bytes need no
+            // alignment
+            let bytes = unsafe { std::slice::from_raw_parts(first, block.len() * size_of::<[T; 3]>()) };
+            T::deinterleave(bytes, gathered);
+            return;
+        }
+        for (column, numbers) in self.points.into_iter().zip(gathered) {
+            if self.is_apart && column.is_slice() {
+                continue;
+            }
+            for (i, number) in block.clone().zip(numbers) {
+                // SAFETY: `new` promises that the number exists
+                *number = unsafe { column.at(i).read_unaligned() };
+            }
+        }
+    }
+}
+
+/// Whether no result may share an address with a point, and no slice of results with another result.
+fn are_apart<T>(count: usize, points: &[Column<T>; 3], results: &[Option<Column<T>>]) -> bool {
+    let meets = |a: Range<usize>, b: Range<usize>| a.start < b.end && b.start < a.end;
+    let results: Vec<Column<T>> = results.iter().copied().flatten().collect();
+    let on_points = results
+        .iter()
+        .any(|result| points.iter().any(|point| meets(result.extent(count), point.extent(count))));
+    let on_results = results.iter().enumerate().any(|(i, a)| {
+        results[i + 1..]
+            .iter()
+            .any(|b| (a.is_slice() || b.is_slice()) && meets(a.extent(count), b.extent(count)))
+    });
+    !(on_points || on_results)
+}

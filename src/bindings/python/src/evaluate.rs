@@ -1,0 +1,148 @@
+//! Questions about many points: over columns, on one thread or several.
+
+use numpy::Element;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use rfm::Solid;
+use rfm::solid::Chosen;
+use rfm_columns::{Column, Job, Number};
+
+use crate::points::Points;
+use crate::pool::{Threads, pool};
+use crate::results::Target;
+
+/// Points that one thread takes at a time.
+const CHUNK: usize = 8192;
+
+/// From so many points on, several threads are used if the caller states no number.
+const WORTH_THREADS: usize = 4 * CHUNK;
+
+/// Below this many points, Python's lock is kept: to release it takes as long as some points do.
+const WORTH_RELEASING: usize = 64;
+
+/// Calls `evaluate` for all points.
+fn over<T: Number + Element, const N: usize>(
+    py: Python<'_>,
+    points: &Points<'_, T>,
+    results: [Option<Column<T>>; N],
+    threads: Threads,
+    evaluate: impl Fn([&[T]; 3], [&mut [T]; N]) + Sync,
+) -> PyResult<()> {
+    // SAFETY: `points` keeps its arrays, the callers below keep those of the results, and `Target` sees to it
+    // that results share no address with the points or with one another
+    let job = unsafe { Job::new(points.count, points.columns, results) };
+    let count = job.len();
+    if count < WORTH_RELEASING {
+        job.run(0..count, &evaluate);
+    } else if threads.is_one() || count <= CHUNK || (threads == Threads::Auto && count < WORTH_THREADS) {
+        py.detach(|| job.run(0..count, &evaluate));
+    } else {
+        let pool = pool(py, threads)?;
+        py.detach(|| {
+            pool.install(|| {
+                (0..count.div_ceil(CHUNK)).into_par_iter().for_each(|chunk| {
+                    job.run(chunk * CHUNK..((chunk + 1) * CHUNK).min(count), &evaluate);
+                });
+            });
+        });
+    }
+    Ok(())
+}
+
+/// One question to a solid, with the arguments that all questions have.
+pub struct Question<'a, 'py> {
+    pub py: Python<'py>,
+    pub solid: &'a Solid,
+    pub chosen: Option<&'a Chosen>,
+    pub threads: Threads,
+}
+
+/// Something of Python's.
+type Any<'py> = Bound<'py, PyAny>;
+
+impl<'py> Question<'_, 'py> {
+    /// ω at points.
+    pub fn omega<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
+        let omega = Target::<T, 1>::new(self.py, points, out)?;
+        let (solid, chosen) = (self.solid, self.chosen);
+        over(self.py, points, omega.columns.map(Some), self.threads, |points, [omega]| {
+            T::omega(solid, chosen, points, omega);
+        })?;
+        omega.finished()
+    }
+
+    /// The sign of the solid at points.
+    pub fn sign<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
+        let sign = Target::<T, 1>::new(self.py, points, out)?;
+        let solid = self.solid;
+        over(self.py, points, sign.columns.map(Some), self.threads, |points, [sign]| {
+            solid.sign_many(points, sign);
+        })?;
+        sign.finished()
+    }
+
+    /// ∇ω at points.
+    pub fn gradient<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: Option<&Any<'py>>,
+    ) -> PyResult<Any<'py>> {
+        let gradient = Target::<T, 3>::new(self.py, points, out)?;
+        let [x, y, z] = gradient.columns.map(Some);
+        self.omega_and_gradient_into(points, [None, x, y, z])?;
+        gradient.finished()
+    }
+
+    /// ω and ∇ω at points.
+    pub fn omega_gradient<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: [Option<Any<'py>>; 2],
+    ) -> PyResult<(Any<'py>, Any<'py>)> {
+        let [for_omega, for_gradient] = out;
+        let omega = Target::<T, 1>::new(self.py, points, for_omega.as_ref())?;
+        let gradient = Target::<T, 3>::new(self.py, points, for_gradient.as_ref())?;
+        let gradient = gradient.apart_from(self.py, points, &omega)?;
+        let ([w], [x, y, z]) = (omega.columns, gradient.columns);
+        self.omega_and_gradient_into(points, [w, x, y, z].map(Some))?;
+        Ok((omega.finished()?, gradient.finished()?))
+    }
+
+    fn omega_and_gradient_into<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        results: [Option<Column<T>>; 4],
+    ) -> PyResult<()> {
+        let solid = self.solid;
+        over(self.py, points, results, self.threads, |points, out| solid.omega_grad_many(points, out))
+    }
+
+    /// Distance, normal and mean curvature at points.
+    pub fn contact<T: Number + Element>(
+        &self,
+        points: &Points<'py, T>,
+        out: [Option<Any<'py>>; 3],
+    ) -> PyResult<(Any<'py>, Any<'py>, Any<'py>)> {
+        let [for_distance, for_normal, for_curvature] = out;
+        let distance = Target::<T, 1>::new(self.py, points, for_distance.as_ref())?;
+        let normal = Target::<T, 3>::new(self.py, points, for_normal.as_ref())?;
+        let normal = normal.apart_from(self.py, points, &distance)?;
+        let curvature = Target::<T, 1>::new(self.py, points, for_curvature.as_ref())?;
+        let curvature =
+            curvature.apart_from(self.py, points, &distance)?.apart_from(self.py, points, &normal)?;
+        let ([d], [x, y, z], [c]) = (distance.columns, normal.columns, curvature.columns);
+        let solid = self.solid;
+        over(self.py, points, [d, x, y, z, c].map(Some), self.threads, |points, out| {
+            solid.contact_many(points, out);
+        })?;
+        Ok((distance.finished()?, normal.finished()?, curvature.finished()?))
+    }
+}

@@ -1,0 +1,200 @@
+//! The class `Mesh`.
+
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use rfm::field::Field;
+use rfm::glam::DVec3;
+use rfm::mesh::{self, FORMATS, Grid, Mesh, MeshError, Report, dual_contouring, marching_cubes};
+
+use crate::error::{not_read, refused};
+
+/// A way to make a mesh.
+pub type Mesher = fn(&dyn Field, &Grid) -> Result<Mesh, MeshError>;
+
+/// The method of a name.
+pub fn mesher(method: &str) -> PyResult<Mesher> {
+    match method {
+        "mc" => Ok(|field, grid| marching_cubes(field, grid, &|_| {})),
+        "dc" => Ok(|field, grid| dual_contouring(field, grid, &|_| {})),
+        _ => Err(PyValueError::new_err(format!("method is {method:?}, expected 'mc' or 'dc'"))),
+    }
+}
+
+/// A closed triangle mesh of a solid's surface. Its arrays are read-only; copy them to change them.
+#[pyclass(frozen, module = "rfm", name = "Mesh")]
+pub struct PyMesh {
+    mesh: Mesh,
+    report: Report,
+    vertices: PyOnceLock<Py<PyAny>>,
+    normals: PyOnceLock<Py<PyAny>>,
+    triangles: PyOnceLock<Py<PyAny>>,
+}
+
+impl PyMesh {
+    /// The mesh of a field, checked.
+    ///
+    /// # Errors
+    /// `RfmError` if the field cannot be meshed.
+    pub fn new(field: &dyn Field, grid: &Grid, mesher: Mesher, no_slivers: bool) -> PyResult<Self> {
+        let mut found = mesher(field, grid).map_err(refused)?;
+        if no_slivers {
+            mesh::remove_slivers(&mut found);
+        }
+        let report = mesh::check(&found, field);
+        Ok(Self::checked(found, report))
+    }
+
+    /// The mesh of an empty solid.
+    pub fn empty() -> Self {
+        let nowhere = rfm::field::Closures { omega: |_| -1.0, gradient: |_| DVec3::ZERO };
+        let empty = Mesh::default();
+        let report = mesh::check(&empty, &nowhere);
+        Self::checked(empty, report)
+    }
+
+    fn checked(mesh: Mesh, report: Report) -> Self {
+        let [vertices, normals, triangles] = [PyOnceLock::new(), PyOnceLock::new(), PyOnceLock::new()];
+        Self { mesh, report, vertices, normals, triangles }
+    }
+}
+
+/// Vectors as a read-only array of shape (n, 3).
+fn rows(py: Python<'_>, vectors: &[DVec3]) -> PyResult<Py<PyAny>> {
+    let flat = PyArray1::from_iter(py, vectors.iter().flat_map(|vector| vector.to_array()));
+    read_only(flat.reshape([vectors.len(), 3])?.into_any())
+}
+
+fn read_only(array: Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+    array.call_method1("setflags", (false,))?;
+    Ok(array.unbind())
+}
+
+/// Writes a file under another name first, so that it is whole or not there.
+///
+/// # Errors
+/// `OSError`.
+pub fn write_file(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
+) -> PyResult<()> {
+    let failed = |error| not_read(&path.display().to_string(), error);
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // a folder that does not exist is better found here than behind the name of a temporary file
+    std::fs::metadata(folder).map_err(failed)?;
+    let mut temporary = tempfile::Builder::new();
+    temporary.prefix(".rfm-");
+    #[cfg(unix)]
+    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
+    let mut out = BufWriter::new(temporary.tempfile_in(folder).map_err(failed)?);
+    fill(&mut out).map_err(failed)?;
+    let temporary = out.into_inner().map_err(|error| failed(error.into_error()))?;
+    temporary.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+#[pymethods]
+impl PyMesh {
+    /// Places of the vertices: array of shape (n, 3), ``float64``, m.
+    #[getter]
+    fn vertices(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        Ok(self.vertices.get_or_try_init(py, || rows(py, &self.mesh.positions))?.clone_ref(py))
+    }
+
+    /// Outward unit normals of the vertices: array of shape (n, 3), ``float64``.
+    #[getter]
+    fn normals(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        Ok(self.normals.get_or_try_init(py, || rows(py, &self.mesh.normals))?.clone_ref(py))
+    }
+
+    /// Vertices of the triangles: array of shape (m, 3), ``uint32``, counter-clockwise as seen from outside.
+    #[getter]
+    fn triangles(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let made = || {
+            let corners: Vec<Vec<u32>> = self.mesh.triangles.iter().map(|corners| corners.to_vec()).collect();
+            let array = match corners.is_empty() {
+                true => PyArray2::zeros(py, [0, 3], false),
+                false => PyArray2::from_vec2(py, &corners).map_err(refused)?,
+            };
+            read_only(array.into_any())
+        };
+        Ok(self.triangles.get_or_try_init(py, made)?.clone_ref(py))
+    }
+
+    /// Volume that the mesh encloses, m³.
+    #[getter]
+    fn volume(&self) -> f64 {
+        self.report.volume
+    }
+
+    /// Area of the surface, m².
+    #[getter]
+    fn area(&self) -> f64 {
+        self.report.area
+    }
+
+    /// Whether every edge lies in exactly two triangles.
+    #[getter]
+    fn closed(&self) -> bool {
+        self.report.closed
+    }
+
+    /// Largest distance of the mesh's triangles from the surface, m, as far as the formula can tell.
+    #[getter]
+    fn max_distance(&self) -> f64 {
+        self.report.max_distance
+    }
+
+    /// Writes the mesh to a file; the ending chooses the format: .stl .ply .obj .vtp .glb .3mf.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path
+    /// ascii : bool
+    ///     Write .stl as text.
+    #[pyo3(signature = (path, *, ascii=false))]
+    fn save(&self, py: Python<'_>, path: PathBuf, ascii: bool) -> PyResult<()> {
+        let ending =
+            path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let Some(format) = FORMATS.iter().find(|format| format.ending == ending) else {
+            let known: Vec<String> = FORMATS.iter().map(|format| format!(".{}", format.ending)).collect();
+            return Err(PyValueError::new_err(format!(
+                "cannot tell the format of `{}`: the ending must be one of {}",
+                path.display(),
+                known.join(" ")
+            )));
+        };
+        let write = match (ascii, format.write_text) {
+            (false, _) => format.write,
+            (true, Some(write)) => write,
+            (true, None) => return Err(PyValueError::new_err(format!(".{ending} files have no text form"))),
+        };
+        py.detach(|| write_file(&path, |out| write(&self.mesh, out)))
+    }
+
+    /// The mesh as a ``trimesh.Trimesh``. The package ``trimesh`` must be installed.
+    fn to_trimesh<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("rfm._convert")?.call_method1("to_trimesh", (slf,))
+    }
+
+    /// The mesh as a ``pyvista.PolyData`` with the point data ``Normals``. The package ``pyvista`` must be
+    /// installed.
+    fn to_pyvista<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("rfm._convert")?.call_method1("to_pyvista", (slf,))
+    }
+
+    /// The mesh as a ``meshio.Mesh`` with the point data ``normals``. The package ``meshio`` must be installed.
+    fn to_meshio<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("rfm._convert")?.call_method1("to_meshio", (slf,))
+    }
+
+    fn __repr__(&self) -> String {
+        let Report { vertices, triangles, closed, .. } = self.report;
+        let closed = if closed { "closed" } else { "open" };
+        format!("<rfm.Mesh {vertices} vertices, {triangles} triangles, {closed}>")
+    }
+}

@@ -1,0 +1,89 @@
+//! Straight paths, and where they meet a solid.
+
+use numpy::ndarray::Ix2;
+use numpy::{PyArray, PyArray1, PyArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+use rayon::prelude::*;
+use rfm::Solid;
+use rfm::field::Entry;
+use rfm::glam::DVec3;
+
+use crate::points::numpy;
+use crate::pool::{Threads, run};
+
+/// Paths that one thread takes at a time.
+const CHUNK: usize = 64;
+
+/// From so many paths on, several threads are used if the caller states no number.
+const WORTH_THREADS: usize = 1024;
+
+/// The first entries of many paths as the class `Entry`.
+pub fn first_entry<'py>(
+    solid: &Solid,
+    start: &Bound<'py, PyAny>,
+    end: &Bound<'py, PyAny>,
+    threads: Threads,
+) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let py = start.py();
+    let numpy = numpy(py)?;
+    let both = numpy.call_method1("broadcast_arrays", (doubles(start)?, doubles(end)?))?;
+    let mut shape: Vec<usize> = both.get_item(0)?.getattr("shape")?.extract()?;
+    if shape.last() != Some(&3) {
+        return Err(PyValueError::new_err(format!("paths have the shape {shape:?}, expected (…, 3)")));
+    }
+    let (from, to) = (rows(&both.get_item(0)?)?, rows(&both.get_item(1)?)?);
+    let few = threads == Threads::Auto && from.len() < WORTH_THREADS;
+    let met = |(from, to): (&DVec3, &DVec3)| solid.first_entry(*from, *to);
+    let entries: Vec<Option<Entry>> = if few || threads.is_one() {
+        py.detach(|| from.iter().zip(&to).map(met).collect())
+    } else {
+        run(py, threads, || from.par_iter().zip(&to).with_min_len(CHUNK).map(met).collect())?
+    };
+    let normal = |entry: &Entry| entry.normals.mean().unwrap_or(DVec3::ZERO);
+    let part = PyArray1::from_iter(py, entries.iter().map(|e| e.map_or(f64::NAN, |e| e.t)));
+    let point = vectors(py, &entries, |entry| entry.point)?.call_method1("reshape", (&shape,))?;
+    let normal = vectors(py, &entries, normal)?.call_method1("reshape", (&shape,))?;
+    let certain = PyArray1::from_iter(py, entries.iter().map(|e| e.is_some_and(|e| e.certain)));
+    shape.pop();
+    let part = part.call_method1("reshape", (&shape,))?;
+    let certain = certain.call_method1("reshape", (&shape,))?;
+    // a single path gives numbers, as a single point does
+    let (part, certain) = match shape.is_empty() {
+        true => (part.call_method0("item")?, certain.call_method0("item")?),
+        false => (part, certain),
+    };
+    CLASS.import(py, "rfm._records", "Entry")?.call1((part, point, normal, certain))
+}
+
+/// An array of doubles.
+fn doubles<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let array = numpy(given.py())?.call_method1("asarray", (given,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !["f", "i", "u", "b"].contains(&&*kind) {
+        let found = array.getattr("dtype")?;
+        return Err(PyTypeError::new_err(format!("coordinates are {found}, expected real numbers")));
+    }
+    array.call_method1("astype", ("f8",))
+}
+
+/// A copy of the vectors of an array.
+fn rows(array: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
+    let flat = array.call_method1("reshape", ((-1, 3),))?;
+    let flat = flat.cast::<PyArray<f64, Ix2>>().map_err(PyErr::from)?;
+    let rows = flat.readonly();
+    Ok(rows.as_array().rows().into_iter().map(|row| DVec3::new(row[0], row[1], row[2])).collect())
+}
+
+/// One vector of each entry, or NaN, in a flat array.
+fn vectors<'py>(
+    py: Python<'py>,
+    entries: &[Option<Entry>],
+    vector: impl Fn(&Entry) -> DVec3,
+) -> PyResult<Bound<'py, PyAny>> {
+    let numbers = entries.iter().flat_map(|entry| entry.as_ref().map_or(DVec3::NAN, &vector).to_array());
+    Ok(PyArray1::from_iter(py, numbers).into_any())
+}

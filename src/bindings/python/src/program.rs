@@ -1,0 +1,267 @@
+//! `load`, and the class `Program`.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::exceptions::{PyKeyError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyString, PyTuple, PyType};
+use rfm::compile::text_of;
+use rfm::diagnostic::{Source, SourceId};
+use rfm::lower::Options;
+use rfm::{Error, Program, Solid};
+
+use crate::error::{diagnostics, not_read, of_diagnostics, raised};
+use crate::pool::Threads;
+use crate::simulation::PySimulation;
+use crate::solid::PySolid;
+
+/// What messages call a program that was given as a text.
+const TEXT: &str = "<text>";
+
+/// Reads and checks a file, or a text.
+///
+/// Parameters
+/// ----------
+/// path_or_text : str or path
+///     A text, if it is a str that has several lines or begins with ``rfm ``; otherwise the path of a file.
+/// **params : float
+///     Values for params of the file.
+///
+/// Returns
+/// -------
+/// Program
+///
+/// Raises
+/// ------
+/// RfmError
+///     If the file has mistakes. `diagnostics` lists them.
+/// OSError
+///     If the file cannot be read.
+#[pyfunction]
+#[pyo3(signature = (path_or_text, /, **params))]
+pub fn load(
+    py: Python<'_>,
+    path_or_text: &Bound<'_, PyAny>,
+    params: Option<&Bound<'_, PyDict>>,
+) -> PyResult<PyProgram> {
+    let source = match path_or_text.cast::<PyString>() {
+        Ok(text) if is_text(&text.to_cow()?) => Source::file(TEXT, text.to_cow()?.into_owned()),
+        _ => read(&path_or_text.extract::<PathBuf>()?)?,
+    };
+    PyProgram::check(py, source, numbers(params)?)
+}
+
+fn is_text(given: &str) -> bool {
+    given.contains('\n') || given.trim_start().starts_with("rfm ")
+}
+
+fn read(path: &Path) -> PyResult<Source> {
+    let name = path.display().to_string();
+    let text = std::fs::read(path).and_then(text_of).map_err(|error| not_read(&name, error))?;
+    Ok(Source::file(name, text))
+}
+
+/// Params as names with numbers.
+fn numbers(params: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
+    let number = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let name: String = name.extract()?;
+        let value = value
+            .extract::<f64>()
+            .map_err(|_| PyTypeError::new_err(format!("param `{name}` is {value}, expected a number")))?;
+        Ok((name, value))
+    };
+    params.into_iter().flat_map(|params| params.iter()).map(number).collect()
+}
+
+/// A checked file: its solids and its scenes. `load` makes one.
+///
+/// ``program["pawn"]`` is a solid, compiled when it is first asked for. ``in``, ``len`` and iteration are about
+/// the names of solids.
+#[pyclass(frozen, mapping, module = "rfm", name = "Program")]
+pub struct PyProgram {
+    pub program: Program,
+    solids: Mutex<HashMap<String, Solid>>,
+}
+
+impl PyProgram {
+    fn check(py: Python<'_>, source: Source, params: Vec<(String, f64)>) -> PyResult<Self> {
+        let options = Options { overrides: params.into_iter().collect(), ..Options::default() };
+        let program = py.detach(|| Program::check(source, options));
+        program.map(Self::new).map_err(|found| of_diagnostics(py, &found))
+    }
+
+    fn new(program: Program) -> Self {
+        Self { program, solids: Mutex::default() }
+    }
+
+    /// A solid, compiled once.
+    pub fn compiled(&self, py: Python<'_>, name: &str) -> PyResult<Solid> {
+        let solids = || self.solids.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(solid) = solids().get(name) {
+            return Ok(solid.clone());
+        }
+        let solid = py.detach(|| self.program.solid(name)).map_err(|error| raised(py, error))?;
+        Ok(solids().entry(name.to_string()).or_insert(solid).clone())
+    }
+
+    fn source(&self) -> Option<&Source> {
+        self.program.sources().iter().find(|source| source.id == SourceId::File)
+    }
+}
+
+#[pymethods]
+impl PyProgram {
+    /// Names of the solids, in the order of the file.
+    #[getter]
+    fn solids(&self) -> Vec<&str> {
+        self.program.module().solids.iter().map(|solid| &*solid.name).collect()
+    }
+
+    /// Names of the scenes, in the order of the file.
+    #[getter]
+    fn scenes(&self) -> Vec<&str> {
+        self.program.module().scenes.iter().map(|scene| &*scene.name).collect()
+    }
+
+    /// Params by their names, in the order of the file: `Param` has ``value``, ``low``, ``high`` and ``doc``.
+    #[getter]
+    fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let class = CLASS.import(py, "rfm._records", "Param")?;
+        let params = PyDict::new(py);
+        for param in &self.program.module().params {
+            let (low, high) = param.range.unzip();
+            params.set_item(&param.name, class.call1((param.value, low, high, param.doc.as_deref()))?)?;
+        }
+        Ok(params)
+    }
+
+    /// Messages that do not prevent the use of the file: a tuple of `Diagnostic`.
+    #[getter]
+    fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        diagnostics(py, &self.program.warnings())
+    }
+
+    /// Path of the file; None for a text.
+    #[getter]
+    fn path(&self) -> Option<&str> {
+        self.source().map(|source| &*source.name).filter(|name| *name != TEXT)
+    }
+
+    /// Text of the file.
+    #[getter]
+    fn text(&self) -> &str {
+        self.source().map_or("", |source| &source.text)
+    }
+
+    /// A solid by its name; without a name, the only solid of the file.
+    ///
+    /// Raises
+    /// ------
+    /// RfmError
+    ///     If there is no such solid, or if no program keeps the tolerance that the file states for it.
+    #[pyo3(signature = (name=None))]
+    fn solid(slf: &Bound<'_, Self>, name: Option<&str>) -> PyResult<PySolid> {
+        let this = slf.get();
+        let name = match (name, &this.program.module().solids[..]) {
+            (Some(name), _) => name,
+            (None, [only]) => &only.name,
+            (None, several) => {
+                let names: Vec<&str> = several.iter().map(|solid| &*solid.name).collect();
+                let message = format!("name one of the solids of the file: {}", names.join(", "));
+                return Err(crate::error::refused(message));
+            }
+        };
+        PySolid::new(slf, this.compiled(slf.py(), name)?, [0.0, 0.0])
+    }
+
+    fn __getitem__(slf: &Bound<'_, Self>, name: &str) -> PyResult<PySolid> {
+        if !slf.get().__contains__(name) {
+            let known = slf.get().program.module().solids.iter().map(|solid| solid.name.clone()).collect();
+            let unknown = Error::UnknownName { kind: "solid", name: name.into(), known };
+            return Err(PyKeyError::new_err(unknown.to_string()));
+        }
+        Self::solid(slf, Some(name))
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        self.program.module().solids.iter().any(|solid| solid.name == name)
+    }
+
+    fn __len__(&self) -> usize {
+        self.program.module().solids.len()
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(PyTuple::new(py, self.solids())?.try_iter()?.into_any())
+    }
+
+    /// A simulation of a scene at its start; without a name, of the only scene of the file.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str, optional
+    /// threads : int, optional
+    ///     Number of threads, at most that of processors. The results do not depend on it.
+    ///
+    /// Raises
+    /// ------
+    /// RfmError
+    ///     If there is no such scene, or if it cannot be simulated.
+    #[pyo3(signature = (name=None, *, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, name=None, *, threads=None)")]
+    fn scene(slf: &Bound<'_, Self>, name: Option<&str>, threads: Threads) -> PyResult<PySimulation> {
+        let name = match (name, &slf.get().program.module().scenes[..]) {
+            (Some(name), _) => name,
+            (None, [only]) => &only.name,
+            (None, several) => {
+                let names: Vec<&str> = several.iter().map(|scene| &*scene.name).collect();
+                let message = match names[..] {
+                    [] => "the file has no scene".into(),
+                    _ => format!("name one of the scenes of the file: {}", names.join(", ")),
+                };
+                return Err(crate::error::refused(message));
+            }
+        };
+        PySimulation::new(slf, name, threads)
+    }
+
+    /// The same file with other values for params; those that are not named keep theirs.
+    #[pyo3(signature = (**params))]
+    fn with_params(&self, py: Python<'_>, params: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let params = numbers(params)?;
+        let changed = py.detach(|| {
+            params.iter().try_fold(self.program.clone(), |program, (name, value)| program.with(name, *value))
+        });
+        changed.map(Self::new).map_err(|error| raised(py, error))
+    }
+
+    fn __repr__(&self) -> String {
+        let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+        let module = self.program.module();
+        let (solids, scenes) = (count(module.solids.len(), "solid"), count(module.scenes.len(), "scene"));
+        format!("<rfm.Program {}: {solids}, {scenes}>", self.path().unwrap_or(TEXT))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let rebuild = py.import("rfm._rfm")?.getattr("_program")?;
+        let params: Vec<(&str, f64)> =
+            self.program.overrides().iter().map(|(name, value)| (&**name, *value)).collect();
+        let name = self.source().map_or(TEXT, |source| &source.name);
+        Ok((rebuild, (name, self.text(), params).into_pyobject(py)?))
+    }
+}
+
+/// A program from its name, text and params; for pickles.
+#[pyfunction(name = "_program")]
+pub fn program_from_pickle(
+    py: Python<'_>,
+    name: String,
+    text: String,
+    params: Vec<(String, f64)>,
+) -> PyResult<PyProgram> {
+    PyProgram::check(py, Source::file(name, text), params)
+}

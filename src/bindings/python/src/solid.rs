@@ -1,0 +1,578 @@
+//! The class `Solid`.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyTuple, PyType};
+use rfm::field::Field;
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::solid::{Bounds, Chosen};
+use rfm::{Solid, mesh};
+
+use crate::error::{of_diagnostics, refused};
+use crate::evaluate::Question;
+use crate::mesh::PyMesh;
+use crate::path::first_entry;
+use crate::points::{Given, numpy};
+use crate::pool::{Threads, run};
+use crate::program::PyProgram;
+use crate::results::{no_out, several};
+use crate::slice::PySlice;
+
+/// A compiled obstacle: ω, its gradient, its sign and its surface.
+///
+/// ω > 0 inside, 0 on the surface, < 0 outside. A solid comes from a program, `program["pawn"]`. It may be used
+/// by several threads at a time.
+///
+/// Points are given as an array of shape (n, 3), or as three arrays x, y, z; any number of dimensions before the
+/// 3, any strides and anything that NumPy makes such arrays of will do. Coordinates are in metres. In single
+/// precision (``float32``) everything is computed in single precision; all else is computed in ``float64``.
+/// Results have the type of the points. Coordinates that are not finite give NaN, never "outside".
+///
+/// Results go to new arrays, or to ``out``. Python's lock is released meanwhile, so do not change the arrays from
+/// another thread. ``threads`` is the number of threads, at most that of processors; if it is not stated, all are
+/// used from 32768 points on. The results do not depend on it.
+#[pyclass(frozen, module = "rfm", name = "Solid")]
+pub struct PySolid {
+    program: Py<PyProgram>,
+    solid: Solid,
+    /// The stretch of time that it is seen in, s.
+    stretch: [f64; 2],
+    /// The cheaper program that keeps the tolerance of the file.
+    chosen: Option<Chosen>,
+}
+
+/// Asks a question about points of either precision, or returns `$one` for a single point.
+macro_rules! ask {
+    ($self:ident, $points:expr, $threads:ident, |$p:ident| $one:expr, |$question:ident, $columns:ident| $many:expr) => {{
+        let (points, y, z): (&Bound<'py, PyAny>, Option<&Bound<'py, PyAny>>, Option<&Bound<'py, PyAny>>) =
+            $points;
+        let py = points.py();
+        let $question =
+            Question { py, solid: &$self.solid, chosen: $self.chosen.as_ref(), threads: $threads };
+        match Given::read(points, y, z)? {
+            Given::One($p) => $one,
+            Given::Double($columns) => $many,
+            Given::Single($columns) => $many,
+        }
+    }};
+}
+
+impl PySolid {
+    /// A solid of a program by its name, during a stretch of time.
+    pub fn new(program: &Bound<'_, PyProgram>, solid: Solid, [from, to]: [f64; 2]) -> PyResult<Self> {
+        let solid = solid.between(from, to);
+        let file = &program.get().program;
+        let chosen = match file.within_tolerance(&solid) {
+            None => None,
+            Some(Ok(chosen)) => Some(chosen),
+            Some(Err(message)) => {
+                let sources = file.sources().clone();
+                let found = rfm::diagnostic::Diagnostics { list: vec![*message], sources };
+                return Err(of_diagnostics(program.py(), &found));
+            }
+        };
+        Ok(Self { program: program.clone().unbind(), solid, stretch: [from, to], chosen })
+    }
+
+    fn omega_at(&self, p: DVec3) -> f64 {
+        self.chosen.as_ref().map_or_else(|| self.solid.omega(p), |chosen| chosen.omega(p))
+    }
+
+    /// The box that is drawn.
+    fn domain(&self) -> Option<Aabb> {
+        Python::attach(|py| self.program.bind(py).get().program.domain(&self.solid))
+    }
+}
+
+/// A vector as an array of three doubles.
+fn array(py: Python<'_>, vector: DVec3) -> Bound<'_, PyAny> {
+    numpy::PyArray1::from_slice(py, &vector.to_array()).into_any()
+}
+
+/// A box: its lowest and its highest corner, or six numbers.
+///
+/// # Errors
+/// `ValueError` or `TypeError` if it is neither, or empty or not finite.
+pub fn aabb(given: &Bound<'_, PyAny>) -> PyResult<Aabb> {
+    let corners = numpy(given.py())?.call_method1("asarray", (given, "f8"))?.call_method0("ravel")?;
+    let corners: Vec<f64> = corners.extract()?;
+    let &[x0, y0, z0, x1, y1, z1] = &corners[..] else {
+        return Err(PyValueError::new_err("expected a box: its lowest and its highest corner"));
+    };
+    let found = Aabb::new(DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
+    if found.is_empty() || !found.is_finite() {
+        return Err(PyValueError::new_err(format!(
+            "the box from {} to {} is empty or not finite",
+            found.min, found.max
+        )));
+    }
+    Ok(found)
+}
+
+#[pymethods]
+impl PySolid {
+    /// Name that the file gives the solid.
+    #[getter]
+    fn name(&self) -> &str {
+        self.solid.name()
+    }
+
+    /// Program that the solid comes from.
+    #[getter]
+    fn program(&self, py: Python<'_>) -> Py<PyProgram> {
+        self.program.clone_ref(py)
+    }
+
+    /// Time that values are for, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.stretch[1]
+    }
+
+    /// Whether time occurs in the formula.
+    #[getter]
+    fn moves(&self) -> bool {
+        self.solid.moves()
+    }
+
+    /// Whether machine code answers, rather than the slower interpreter with the same results.
+    #[getter]
+    fn is_compiled(&self) -> bool {
+        self.solid.is_compiled()
+    }
+
+    /// ω at points, as `omega`; for a single point, three numbers, a ``float``.
+    #[pyo3(signature = (points, y=None, z=None, /))]
+    fn __call__<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        y: Option<&Bound<'py, PyAny>>,
+        z: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.omega(points, y, z, None, Threads::Auto)
+    }
+
+    /// ω at points.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
+    /// out : array of shape (...), optional
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// Array of shape (...), in the units of the formula; a ``float`` for a single point. If the file states a
+    /// tolerance, doubles are computed by the cheapest program that keeps it.
+    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
+    fn omega<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        y: Option<&Bound<'py, PyAny>>,
+        z: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Threads,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        ask!(
+            self,
+            (points, y, z),
+            threads,
+            |p| {
+                no_out(out)?;
+                Ok(self.omega_at(p).into_pyobject(points.py())?.into_any())
+            },
+            |question, columns| question.omega(&columns, out)
+        )
+    }
+
+    /// ∇ω at points.
+    ///
+    /// Near the surface it points into the solid. At edges and corners it is one finite member of the limits.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
+    /// out : array of shape (..., 3), optional
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// Array of shape (..., 3), in units of ω per metre. If x, y and z came as columns, it consists of columns:
+    /// ``gradient[:, 0]`` is contiguous.
+    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
+    fn gradient<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        y: Option<&Bound<'py, PyAny>>,
+        z: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Threads,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        ask!(
+            self,
+            (points, y, z),
+            threads,
+            |p| {
+                no_out(out)?;
+                Ok(array(points.py(), self.solid.omega_grad(p).1))
+            },
+            |question, columns| question.gradient(&columns, out)
+        )
+    }
+
+    /// ω and ∇ω at points, for the price of the gradient.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
+    /// out : tuple of two arrays, optional
+    ///     For ω of shape (...), and for ∇ω of shape (..., 3); either may be None.
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// Tuple of both, as `omega` and `gradient` return them; a tolerance of the file is not used.
+    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
+    fn omega_gradient<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        y: Option<&Bound<'py, PyAny>>,
+        z: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Threads,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        ask!(
+            self,
+            (points, y, z),
+            threads,
+            |p| {
+                no_out(out)?;
+                let (omega, gradient) = self.solid.omega_grad(p);
+                Ok((omega.into_pyobject(points.py())?.into_any(), array(points.py(), gradient)))
+            },
+            |question, columns| question.omega_gradient(&columns, several(out)?)
+        )
+    }
+
+    /// Whether points are inside (1), on the surface (0) or outside (-1), exactly.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
+    /// out : array of shape (...), optional
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// Array of shape (...) with the type of the points; NaN where the formula has no value.
+    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
+    fn sign<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        y: Option<&Bound<'py, PyAny>>,
+        z: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Threads,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        ask!(
+            self,
+            (points, y, z),
+            threads,
+            |p| {
+                no_out(out)?;
+                Ok(self.solid.sign(p).into_pyobject(points.py())?.into_any())
+            },
+            |question, columns| question.sign(&columns, out)
+        )
+    }
+
+    /// The surface as seen from points: accurate near it, an estimate far away.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array of shape (..., 3), m; or x, y, z : arrays that broadcast together, or numbers
+    /// out : tuple of three arrays, optional
+    ///     For the distance, the normal and the curvature; each may be None.
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// `Contact`: ``distance`` of shape (...), m, positive outside; ``normal`` of shape (..., 3), the outward unit
+    /// normal of the nearest face, the mean of two at an edge, zero where there is none; ``curvature`` of shape
+    /// (...), the mean curvature, 1/m, positive where the solid is convex.
+    #[pyo3(signature = (points, y=None, z=None, /, *, out=None, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, points, y=None, z=None, /, *, out=None, threads=None)")]
+    fn contact<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        y: Option<&Bound<'py, PyAny>>,
+        z: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
+        threads: Threads,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        let py = points.py();
+        let (distance, normal, curvature) = ask!(
+            self,
+            (points, y, z),
+            threads,
+            |p| {
+                no_out(out)?;
+                let found = self.solid.contact(p);
+                (
+                    found.distance.into_pyobject(py)?.into_any(),
+                    array(py, found.normal),
+                    found.mean_curvature.into_pyobject(py)?.into_any(),
+                )
+            },
+            |question, columns| question.contact(&columns, several(out)?)?
+        );
+        CLASS.import(py, "rfm._records", "Contact")?.call1((distance, normal, curvature))
+    }
+
+    /// Where straight paths first meet the solid.
+    ///
+    /// It is proven that nothing before the entry is in the solid, however thin the solid and long the path. For
+    /// a solid `between` two times, time passes evenly along the path.
+    ///
+    /// Parameters
+    /// ----------
+    /// start, end : arrays of shape (..., 3), m, that broadcast together
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// `Entry`, always in double precision: ``part`` of shape (...), the part of the path before the entry, 0 to 1,
+    /// or NaN if there is none; ``point`` of shape (..., 3), m; ``normal`` of shape (..., 3), the outward unit
+    /// normal there, the mean of those that meet; ``certain`` of shape (...), False where the path only grazes the
+    /// surface within rounding errors.
+    #[pyo3(signature = (start, end, *, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, start, end, *, threads=None)")]
+    fn first_entry<'py>(
+        &self,
+        start: &Bound<'py, PyAny>,
+        end: &Bound<'py, PyAny>,
+        threads: Threads,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        first_entry(&self.solid, start, end, threads)
+    }
+
+    /// The smallest known box around the solid: an array of shape (2, 3), m, its lowest and its highest corner.
+    ///
+    /// None if the solid is empty, and infinite if no box could be proven.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let (low, high) = match py.detach(|| *self.solid.bounds()) {
+            Bounds::Within(found) => (found.min, found.max),
+            Bounds::Unbounded => (DVec3::NEG_INFINITY, DVec3::INFINITY),
+            Bounds::Empty => return Ok(None),
+        };
+        let corners = [low, high].map(|corner| corner.to_array().to_vec());
+        Ok(Some(numpy::PyArray2::from_vec2(py, &corners).map_err(refused)?.into_any()))
+    }
+
+    /// The least and the greatest value that ω may have in a box, guaranteed.
+    ///
+    /// Parameters
+    /// ----------
+    /// box : two corners, or six numbers, m
+    ///
+    /// Returns
+    /// -------
+    /// (low, high) : floats; infinite where nothing is known, or where ω may not be a number
+    #[pyo3(signature = (r#box, /))]
+    #[pyo3(text_signature = "($self, box, /)")]
+    fn range(&self, r#box: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
+        let range = self.solid.range(&aabb(r#box)?);
+        Ok((range.lo, range.hi))
+    }
+
+    /// The solid at a time.
+    ///
+    /// Parameters
+    /// ----------
+    /// time : float, s
+    ///
+    /// Returns
+    /// -------
+    /// Solid; nothing is compiled again. A solid at rest is the same at all times.
+    fn at(&self, py: Python<'_>, time: f64) -> PyResult<Self> {
+        self.between(py, time, time)
+    }
+
+    /// The solid during a stretch of time: values are those at its end, ranges and bounds hold for all of it, and
+    /// paths of `first_entry` pass from its beginning to its end.
+    ///
+    /// Parameters
+    /// ----------
+    /// start, end : floats, s
+    fn between(&self, py: Python<'_>, start: f64, end: f64) -> PyResult<Self> {
+        for time in [start, end] {
+            if !time.is_finite() {
+                return Err(PyValueError::new_err(format!("the time is {time} s, expected a finite number")));
+            }
+        }
+        Self::new(self.program.bind(py), self.solid.clone(), [start, end])
+    }
+
+    /// The volume, m³, found on meshes with `cells` cells and half as many along the longest side.
+    ///
+    /// Parameters
+    /// ----------
+    /// cells : int
+    /// threads : int, optional
+    #[pyo3(signature = (cells=96, *, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, cells=96, *, threads=None)")]
+    fn volume(&self, py: Python<'_>, cells: usize, threads: Threads) -> PyResult<f64> {
+        let solid = &self.solid;
+        run(py, threads, || {
+            let bounds = match solid.bounds() {
+                Bounds::Within(bounds) => bounds,
+                Bounds::Empty => return Ok(0.0),
+                Bounds::Unbounded => return Err(refused(unbounded(solid))),
+            };
+            let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
+            mesh::volume(&*surface, bounds, cells).map(|found| found.volume).map_err(refused)
+        })?
+    }
+
+    /// A closed triangle mesh of the surface.
+    ///
+    /// Parameters
+    /// ----------
+    /// cells : int
+    ///     Cells along the longest side.
+    /// cell : float, m, optional
+    ///     Size of a cell instead of their number.
+    /// method : "dc" or "mc"
+    ///     Dual contouring, which puts vertices on edges and corners too, or marching cubes, which are three times
+    ///     as fast for as many cells.
+    /// box : two corners, m, optional
+    ///     What is meshed instead of the solid's bounds; the mesh is closed at its border.
+    /// no_slivers : bool
+    ///     Contract the shortest edges, so that no triangle is very thin.
+    /// threads : int, optional
+    #[pyo3(signature = (cells=128, *, cell=None, method="dc", r#box=None, no_slivers=false, threads=Threads::Auto))]
+    #[pyo3(
+        text_signature = "($self, cells=128, *, cell=None, method='dc', box=None, no_slivers=False, threads=None)"
+    )]
+    #[allow(clippy::too_many_arguments)] // they have names in Python
+    fn mesh(
+        &self,
+        py: Python<'_>,
+        cells: usize,
+        cell: Option<f64>,
+        method: &str,
+        r#box: Option<&Bound<'_, PyAny>>,
+        no_slivers: bool,
+        threads: Threads,
+    ) -> PyResult<PyMesh> {
+        let resolution = cell.map_or(mesh::Resolution::Cells(cells), mesh::Resolution::Spacing);
+        let domain = r#box.map(aabb).transpose()?;
+        let mesher = crate::mesh::mesher(method)?;
+        let solid = &self.solid;
+        run(py, threads, || {
+            let grid = match (domain, solid.bounds()) {
+                (Some(domain), _) => mesh::Grid::filling(&domain, resolution),
+                (None, Bounds::Within(bounds)) => mesh::Grid::around(bounds, resolution),
+                (None, Bounds::Empty) => return Ok(PyMesh::empty()),
+                (None, Bounds::Unbounded) => return Err(refused(unbounded(solid))),
+            };
+            let grid = grid.map_err(refused)?;
+            let surface = solid.surface(*grid.bounds());
+            PyMesh::new(&*surface, &grid, mesher, no_slivers)
+        })?
+    }
+
+    /// ω in a plane.
+    ///
+    /// Parameters
+    /// ----------
+    /// x, y, z : float, m
+    ///     The plane: one of the three.
+    /// samples : int
+    ///     Number of samples along the longer side, 2 to 8192.
+    /// window : (u0, v0, u1, v1), m, optional
+    ///     The part of the plane; u and v are the two other coordinates. If it is not stated, it is that of the
+    ///     scene's box, or what lies around the solid.
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// `Slice` with the samples, as SVG, and as PNG
+    #[pyo3(signature = (*, x=None, y=None, z=None, samples=320, window=None, threads=Threads::Auto))]
+    #[pyo3(text_signature = "($self, *, x=None, y=None, z=None, samples=320, window=None, threads=None)")]
+    #[allow(clippy::too_many_arguments)] // they have names in Python
+    fn slice(
+        &self,
+        py: Python<'_>,
+        x: Option<f64>,
+        y: Option<f64>,
+        z: Option<f64>,
+        samples: usize,
+        window: Option<[f64; 4]>,
+        threads: Threads,
+    ) -> PyResult<PySlice> {
+        let plane = crate::slice::plane([x, y, z])?;
+        let solid = (&self.solid, self.chosen.as_ref());
+        PySlice::new(py, solid, plane, samples, window, self.domain(), threads)
+    }
+
+    /// A picture for notebooks: the slice across y through the middle of the scene's box or of the bounds.
+    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let Some(domain) = self.domain() else { return Ok(None) };
+        let middle = match self.solid.bounds() {
+            Bounds::Within(bounds) => bounds.centre().y,
+            Bounds::Unbounded | Bounds::Empty => domain.centre().y,
+        };
+        let slice = self.slice(py, None, Some(middle), None, 200, None, Threads::Auto)?;
+        slice.svg().map(Some)
+    }
+
+    /// A picture with the most important facts, for notebooks.
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        let picture = self._repr_svg_(py)?.unwrap_or_default();
+        let bounds = match self.solid.bounds() {
+            Bounds::Within(found) => format!("{:.4} … {:.4} m", found.min, found.max),
+            Bounds::Unbounded => "none found".into(),
+            Bounds::Empty => "the solid is empty".into(),
+        };
+        let motion = if self.solid.moves() { format!(", at t = {} s", self.time()) } else { String::new() };
+        let name = rfm::slice::escaped(self.solid.name());
+        Ok(format!("<div><p><b>solid {name}</b>{motion}; bounds {bounds}</p>{picture}</div>"))
+    }
+
+    fn __repr__(&self) -> String {
+        let time = if self.solid.moves() { format!(" at t = {} s", self.time()) } else { String::new() };
+        format!("<rfm.Solid {}{time}>", self.solid.name())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let rebuild = py.import("rfm._rfm")?.getattr("_solid")?;
+        let [from, to] = this.stretch;
+        Ok((rebuild, (this.program.clone_ref(py), this.solid.name(), from, to).into_pyobject(py)?))
+    }
+}
+
+fn unbounded(solid: &Solid) -> String {
+    format!("`{}` could not be proven to end anywhere: state the box to mesh", solid.name())
+}
+
+/// A solid of a program by its name, at a stretch of time; for pickles.
+#[pyfunction(name = "_solid")]
+pub fn solid_from_pickle(
+    program: &Bound<'_, PyProgram>,
+    name: &str,
+    from: f64,
+    to: f64,
+) -> PyResult<PySolid> {
+    let solid = program.get().compiled(program.py(), name)?;
+    PySolid::new(program, solid, [from, to])
+}

@@ -1,0 +1,33 @@
+"""What the tests share: files of the project, and the program `rfm`, whose answers the module must match."""
+
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+import rfm
+
+ROOT = pathlib.Path(__file__).resolve().parents[4]
+EXAMPLES = ROOT / "examples"
+
+
+@pytest.fixture(scope="session")
+def pawn():
+    return rfm.load(EXAMPLES / "pawn.rfm")["pawn"]
+
+
+@pytest.fixture(scope="session")
+def program():
+    """Runs the program `rfm`. It is that of RFM_PROGRAM, or the one that Cargo makes."""
+    command = [os.environ["RFM_PROGRAM"]] if "RFM_PROGRAM" in os.environ else None
+    if command is None:
+        cargo = ["cargo", "build", "--quiet", "--release", "--locked", "--bin", "rfm"]
+        subprocess.run(cargo, cwd=ROOT, check=True)
+        target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+        command = [str(target / "release" / "rfm")]
+
+    def run(*arguments, **options):
+        return subprocess.run([*command, *map(str, arguments)], check=True, capture_output=True, text=True, **options)
+
+    return run

@@ -1,0 +1,233 @@
+"""The module as a whole: programs, meshes, slices, pickles, processes and threads, stubs."""
+
+import copy
+import multiprocessing
+import os
+import pickle
+import pydoc
+import subprocess
+import sys
+import threading
+import time
+import xml.etree.ElementTree
+
+import numpy as np
+import pytest
+
+import rfm
+from conftest import EXAMPLES, ROOT
+
+POINTS = np.random.default_rng(3).uniform(0.5, 2.5, (50_000, 3))
+
+
+def test_a_program_says_what_it_has():
+    program = rfm.load(EXAMPLES / "pawn.rfm", cx=1.25)
+    assert program.solids == ["pawn"] == list(program) and program.scenes == ["drop"] and len(program) == 1
+    assert "pawn" in program and "queen" not in program
+    assert program.params["cx"] == (1.25, 0.5, 2.5, "axis of the pawn, x")
+    assert program.params["cy"].value == 1.5 and list(program.params) == ["cx", "cy", "particles"]
+    assert program.path == str(EXAMPLES / "pawn.rfm") and program.text.startswith("rfm 1\n")
+    moved = program.with_params(cy=2.0)
+    assert (moved.params["cx"].value, moved.params["cy"].value) == (1.25, 2.0)
+    assert moved["pawn"](1.25, 2.0, 0.5) == program["pawn"](1.25, 1.5, 0.5)
+    assert program["pawn"].program.text == program.text and repr(program["pawn"]) == "<rfm.Solid pawn>"
+    assert "1 solid, 1 scene" in repr(program)
+    warned = rfm.load("rfm 1\nlet unused = 1\nsolid a = sphere(1)")
+    assert [found.severity for found in warned.warnings] == ["warning"] and warned.path is None
+    assert warned.solid()(0.0, 0.0, 0.0) > 0.0
+
+
+def test_meshes_are_arrays(pawn, tmp_path):
+    mesh = pawn.mesh(32)
+    assert mesh.closed and mesh.vertices.dtype == np.float64 and mesh.triangles.dtype == np.uint32
+    assert mesh.vertices.shape == mesh.normals.shape and mesh.triangles.max() + 1 == len(mesh.vertices)
+    assert np.abs(pawn.contact(mesh.vertices).distance).max() < 1e-9
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(mesh.volume)
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 == pytest.approx(mesh.area)
+    assert mesh.volume == pytest.approx(pawn.volume(), rel=0.02)
+    one = pawn.mesh(32, threads=1)
+    assert np.array_equal(one.vertices, mesh.vertices) and np.array_equal(one.triangles, mesh.triangles)
+    assert pawn.mesh(32, method="mc").closed and pawn.mesh(cell=0.1, no_slivers=True).closed
+    for ending in ("stl", "ply", "obj", "vtp", "glb", "3mf"):
+        path = tmp_path / f"pawn.{ending}"
+        mesh.save(path)
+        assert path.stat().st_size > 1000
+    mesh.save(str(tmp_path / "text.stl"), ascii=True)
+    assert (tmp_path / "text.stl").read_text().startswith("solid rfm")
+
+
+def test_a_saved_mesh_is_that_of_the_program(pawn, program, tmp_path):
+    program("mesh", EXAMPLES / "pawn.rfm", "--cells", "24", "-o", tmp_path / "theirs.ply")
+    pawn.mesh(24).save(tmp_path / "ours.ply")
+    assert (tmp_path / "ours.ply").read_bytes() == (tmp_path / "theirs.ply").read_bytes()
+
+
+def test_meshes_become_those_of_other_packages(pawn):
+    mesh = pawn.mesh(24)
+    trimesh = pytest.importorskip("trimesh")
+    found = mesh.to_trimesh()
+    assert isinstance(found, trimesh.Trimesh) and found.is_watertight and found.volume == pytest.approx(mesh.volume)
+    meshio = pytest.importorskip("meshio")
+    found = mesh.to_meshio()
+    assert isinstance(found, meshio.Mesh) and np.array_equal(found.cells[0].data, mesh.triangles)
+    assert np.array_equal(found.point_data["normals"], mesh.normals)
+
+
+def test_a_mesh_becomes_one_of_pyvista(pawn):
+    pyvista = pytest.importorskip("pyvista")
+    mesh = pawn.mesh(24)
+    found = mesh.to_pyvista()
+    assert isinstance(found, pyvista.PolyData) and found.is_all_triangles and found.n_open_edges == 0
+    assert found.volume == pytest.approx(mesh.volume) and np.array_equal(found.points, mesh.vertices)
+
+
+def test_a_package_that_is_not_there_is_named(pawn, monkeypatch):
+    for name in ("trimesh", "pyvista", "meshio"):
+        monkeypatch.setitem(sys.modules, name, None)
+        with pytest.raises(ImportError, match=f"pip install {name}"):
+            getattr(pawn.mesh(8), f"to_{name}")()
+
+
+def test_slices_are_samples_and_pictures(pawn, program, tmp_path):
+    found = pawn.slice(y=1.5, samples=61)
+    assert found.axes == ("x", "z") and found.extent == (0.0, 3.0, 0.0, 3.0) and found.omega.shape == (61, 61)
+    assert np.array_equal(found.omega, pawn.omega(found.u, 1.5, found.v[:, None]))
+    xml.etree.ElementTree.fromstring(found.svg())
+    found = pawn.slice(z=0.5, window=(1, 1, 2, 1.5), samples=21)
+    assert found.omega.shape == (11, 21) and found.u[0] == 1.0 and found.v[-1] == 1.5
+    for ending in ("svg", "png"):
+        pawn.slice(y=1.5).save(tmp_path / f"ours.{ending}")
+    assert (tmp_path / "ours.png").read_bytes().startswith(b"\x89PNG")
+    options = ("--slice", "y=1.5", "--window", "0,0,3,3", "-o", tmp_path / "theirs.svg")
+    program("check", EXAMPLES / "pawn.rfm", *options)
+    assert (tmp_path / "ours.svg").read_bytes() == (tmp_path / "theirs.svg").read_bytes()
+
+
+def test_notebooks_see_a_picture(pawn):
+    assert pawn._repr_svg_().startswith("<svg") and "<svg" in pawn._repr_html_() and "pawn" in pawn._repr_html_()
+    assert pawn.slice(z=0.5)._repr_svg_().startswith("<svg")
+
+
+def test_pickles_keep_source_params_and_time():
+    program = rfm.load(EXAMPLES / "gate.rfm", width=0.5)
+    again = pickle.loads(pickle.dumps(program))
+    assert again.text == program.text and again.params == program.params and again.path == program.path
+    gate = program["gate"].at(0.75)
+    for twin in (pickle.loads(pickle.dumps(gate)), copy.copy(gate), copy.deepcopy(gate)):
+        assert (twin.name, twin.time) == ("gate", 0.75)
+        assert np.array_equal(twin.omega(POINTS - 1), gate.omega(POINTS - 1))
+    contact = pickle.loads(pickle.dumps(gate.contact(POINTS[:5])))
+    assert isinstance(contact, rfm.Contact) and contact.normal.shape == (5, 3)
+
+
+def in_child(pawn, queue):
+    points = np.random.default_rng(3).uniform(0.5, 2.5, (50_000, 3))
+    queue.put((pawn.omega(points, threads=2), len(pawn.mesh(16).vertices), pawn.slice(z=0.5).omega.sum()))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_a_forked_child_does_not_wait_for_threads_that_it_has_not(pawn):
+    expected = pawn.omega(POINTS, threads=2), len(pawn.mesh(16).vertices), pawn.slice(z=0.5).omega.sum()
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    child = context.Process(target=in_child, args=(pawn, queue))
+    child.start()
+    found = queue.get(timeout=60)
+    child.join(timeout=60)
+    assert child.exitcode == 0
+    assert np.array_equal(found[0], expected[0]) and found[1:] == expected[1:]
+    # the parent goes on with its threads
+    assert np.array_equal(pawn.omega(POINTS, threads=2), expected[0])
+
+
+def test_many_processes_share_a_solid(pawn):
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        parts = pool.map(pawn.omega, np.array_split(POINTS, 4))
+    assert np.array_equal(np.concatenate(parts), pawn.omega(POINTS))
+
+
+def test_threads_of_python_share_a_solid_that_nobody_has_compiled():
+    solid = rfm.load(EXAMPLES / "bishop.rfm")["bishop"]
+    found = {}
+    barrier = threading.Barrier(4)
+
+    def ask(number):
+        barrier.wait()
+        found[number] = solid.omega_gradient(POINTS, threads=number % 2 + 1)
+
+    threads = [threading.Thread(target=ask, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=60)
+    assert len(found) == 4
+    assert all(np.array_equal(omega, found[0][0]) and np.array_equal(g, found[0][1]) for omega, g in found.values())
+
+
+def test_other_threads_go_on_while_points_are_evaluated(pawn):
+    points = np.concatenate([POINTS] * 60)
+    seen, done = [], threading.Event()
+
+    def look():
+        while not done.wait(0.001):
+            seen.append(time.perf_counter())
+
+    watcher = threading.Thread(target=look)
+    watcher.start()
+    started = time.perf_counter()
+    pawn.contact(points, threads=1)
+    ended = time.perf_counter()
+    done.set()
+    watcher.join()
+    # at the ends of the call the watcher may have run before or after it
+    quarter = (ended - started) / 4
+    assert any(started + quarter < moment < ended - quarter for moment in seen)
+
+
+def test_everything_is_described():
+    for owner in (rfm, rfm.Program, rfm.Solid, rfm.Mesh, rfm.Slice, rfm.Simulation):
+        for name in dir(owner):
+            if not name.startswith("_"):
+                text = pydoc.getdoc(getattr(owner, name))
+                assert len(text) > 10, f"{owner.__name__}.{name}"
+
+
+def test_the_module_imports_little():
+    code = "import sys, rfm; print(sorted({'numpy', 'typing', 'collections', 'rfm._records'} & set(sys.modules)))"
+    out = subprocess.run([sys.executable, "-S", "-c", f"import sys; sys.path += {sys.path!r}; {code}"],
+                         capture_output=True, text=True, check=True)
+    assert "numpy" not in out.stdout and "_records" not in out.stdout
+
+
+def test_the_doctest_of_the_module():
+    import doctest
+
+    assert doctest.testmod(rfm).failed == 0 and doctest.testmod(rfm).attempted >= 4
+
+
+def test_stubs_say_what_is_there():
+    pytest.importorskip("mypy")
+    run = subprocess.run(
+        [sys.executable, "-m", "mypy.stubtest", "rfm", "--ignore-missing-stub"], capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+def test_typed_programs_pass_and_wrong_ones_do_not(tmp_path):
+    pytest.importorskip("mypy")
+    config = ROOT / "src/bindings/python/pyproject.toml"
+    (tmp_path / "right.py").write_text(
+        "import numpy as np\nimport rfm\n\n"
+        "pawn = rfm.load('a.rfm', cx=1.0)['pawn']\n"
+        "value: float = pawn(1.0, 2.0, 3.0)\n"
+        "distance, normal, curvature = pawn.contact(np.zeros((4, 3)), threads=2)\n"
+        "simulation = rfm.load('a.rfm').scene()\nsimulation.advance(1.0, progress=True)\n"
+        "height = simulation.probes['gauge']['height'].max()\n"
+    )
+    (tmp_path / "wrong.py").write_text("import rfm\n\nrfm.load('a.rfm').scene().step('ten')\n")
+    for name, code in (("right", 0), ("wrong", 1)):
+        command = [sys.executable, "-m", "mypy", "--config-file", config, "--cache-dir", tmp_path, f"{name}.py"]
+        run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert run.returncode == code, run.stdout + run.stderr
