@@ -36,8 +36,8 @@
 //! angular momentum.
 //!
 //! The reported pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
-//! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over many steps at rest,
-//! because the divergence of velocity that one step leaves is a pressure in the next.
+//! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over τ, because the
+//! divergence of velocity that one step leaves is a pressure in the next.
 //!
 //! Invariant: the densities are those of the present positions.
 
@@ -60,21 +60,21 @@ use crate::sph::{
     particles::{Particles, Vectors},
 };
 
-/// The time in which a debt is paid back, in steps.
+/// The relaxation time, in steps, where the fastest particle moves as far in a step as it may.
 const RELAXATION_STEPS: f64 = 8.0;
+
+/// The relaxation time at rest, in units of √(h/g), however short the steps are: the debt of a whole column is paid
+/// at once, and with eight steps a column of eighty layers bursts at its start.
+const RELAXATION_FALLS: f64 = 2.0;
+
+/// The most steps of a relaxation time, for a gravity close to zero. Where a column would burst, steps are so
+/// short that a relaxation time has some sixty of them.
+const MOST_RELAXATION_STEPS: f64 = 100.0;
 
 /// Part of a density that displacements take away which becomes a debt. Without it a column of forty layers, ten
 /// wide, sinks at 0.3 m/s with a velocity in which the system of forces sees no divergence, and displacements
-/// cannot hold it. With all of it a fluid at rest gains 5 % of its energy.
-const OWED: f64 = 0.3;
-
-/// The time over which pressures are averaged, in steps where the fastest particle moves as far in a step as it
-/// may, and in units of √(h/g) at rest.
-const AVERAGED_STEPS: f64 = 8.0;
-const AVERAGED_FALLS: f64 = 2.0;
-
-/// The most steps of an average, for a gravity close to zero.
-const MOST_AVERAGED_STEPS: f64 = 100.0;
+/// cannot hold it. With all of it, and with a third, a column of eighty layers, eight wide, bursts at its start.
+const OWED: f64 = 0.6;
 
 /// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
 /// a weakly compressible fluid, so that the same α damps alike.
@@ -270,7 +270,7 @@ impl DivergenceFree {
     /// Changes velocities by pressure so that nothing is compressed beyond the rest density.
     fn keep_density(&mut self, core: &mut Core, dt: f64) {
         let rest = core.parameters.rest_density;
-        let relaxation = RELAXATION_STEPS * dt;
+        let relaxation = relaxation_time(&core.parameters, core.speed, dt);
         // the compression to come without pressure; each iteration finds what s takes away
         self.forces.find_rate_of(core, &self.walls, &core.particles.velocity, true);
         let wanted = |rho: f64, debt: f64| ((rho - rest).min(0.0) + debt) / relaxation;
@@ -296,9 +296,8 @@ impl DivergenceFree {
         add_scaled(&mut core.particles.velocity, &self.forces.push, dt);
         add_scaled(&mut core.acceleration, &self.forces.push, 1.0);
         let Particles { pressure: p, density, .. } = &mut core.particles;
-        // until the averaging time has passed, the mean is taken since the start
-        let averaged = averaging_time(&core.parameters, core.speed, dt);
-        let share = (dt / averaged.min(core.time + dt)).min(1.0);
+        // until the relaxation time has passed, the mean is taken since the start
+        let share = (dt / relaxation.min(core.time + dt)).min(1.0);
         for (((p, s), rho), g) in p.iter_mut().zip(&self.forces.s).zip(density).zip(&self.spread) {
             *p += share * ((1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho - *p);
         }
@@ -337,11 +336,13 @@ impl DivergenceFree {
     }
 }
 
-/// The time, s, over which pressures are averaged, after a step of the length `dt` with this greatest speed.
-fn averaging_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
+/// The time, s, in which a debt is paid back, after a step of the length `dt` with this greatest speed. Reported
+/// pressures are averaged over the same time.
+fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
     let fall = (parameters.support_radius / parameters.gravity.length()).sqrt();
-    let falls = if fall.is_finite() { (AVERAGED_FALLS * fall).min(MOST_AVERAGED_STEPS * dt) } else { 0.0 };
-    let moving = AVERAGED_STEPS * dt;
+    let falls =
+        if fall.is_finite() { (RELAXATION_FALLS * fall).min(MOST_RELAXATION_STEPS * dt) } else { 0.0 };
+    let moving = RELAXATION_STEPS * dt;
     let slow = falls.max(moving);
     let courant = (dt * speed / (ADVECTION * parameters.spacing())).min(1.0);
     slow + (moving - slow) * courant
