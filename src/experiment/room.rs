@@ -167,24 +167,29 @@ impl Experiment {
     /// [`Error::Diagnostics`] if the fluid's shape lies outside the box.
     pub fn estimated_particles(&self) -> Result<f64, Error> {
         let region = self.reach()?.intersection(&self.scene.domain);
-        let (mut fluid, mut all) = (0.0, 0.0);
+        let (mut fluid, mut shape, mut all) = (0.0, 0.0, 0.0);
         for at in samples(&region) {
             all += 1.0;
-            let wet = self.fluid.omega(at) > 0.0 && self.bodies.iter().all(|body| body.solid.omega(at) < 0.0);
-            fluid += f64::from(u8::from(wet));
+            if self.fluid.omega(at) > 0.0 {
+                shape += 1.0;
+                let wet = self.bodies.iter().all(|body| body.solid.omega(at) < 0.0);
+                fluid += f64::from(u8::from(wet));
+            }
         }
         let cell = self.parameters.spacing().powi(3);
-        let (sites, room) = (region.volume() / cell, region.volume() * fluid / all / cell);
+        let sites = region.volume() / cell;
+        // the shape is filled first, and then obstacles carve it
+        let [fits, room] = [shape, fluid].map(|count: f64| sites * count / all);
         if sites > MAX_SITES {
             return Err(self.no_fluid(&SeedError::TooLarge { sites }));
         }
         let Some(wanted) = self.scene.fluid.particles else { return Ok(room) };
         // few particles are counted when they are placed
-        let is_certain = room > 1000.0 && wanted as f64 > 1.1 * room;
+        let is_certain = fits > 1000.0 && wanted as f64 > 1.1 * fits;
         if is_certain {
             // rounded down to what fits for certain
-            let unit = 10f64.powf((0.95 * room).log10().floor() - 1.0);
-            let room = (unit * (0.95 * room / unit).floor()) as usize;
+            let unit = 10f64.powf((0.95 * fits).log10().floor() - 1.0);
+            let room = (unit * (0.95 * fits / unit).floor()) as usize;
             return Err(self.no_fluid(&SeedError::DoesNotFit { wanted, room }));
         }
         Ok(room.min(wanted as f64))

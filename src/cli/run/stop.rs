@@ -50,7 +50,9 @@ impl Stop {
                  left for it; let them leave a gap, or end the run before with --until",
                 short_time(*time)
             )),
-            Self::Numerical(StepError::NonFinite { step, cause: Cause::StepTooLong { dt, .. }, .. }) => {
+            Self::Numerical(StepError::NonFinite { step, cause: Cause::StepTooLong { dt, .. }, .. })
+                if *dt > experiment.parameters().stable_dt(experiment.typical_speed()) =>
+            {
                 let stable = experiment.parameters().stable_dt(experiment.typical_speed());
                 Some(format!(
                     "step {step}: the time step of {dt} s is too long, and the fluid has exploded; {stable:.1e} s is stable \

@@ -42,7 +42,7 @@ pub(in crate::sph) struct Coverage<F = ()> {
     pub spread: Symmetric,
     /// ∇λ·v for walls that move with the velocity v, 1/s.
     pub sweep: f64,
-    /// The barrier B and its gradient, see [`OfFace::barrier`]; zero for a continuous wall.
+    /// The barrier B and its gradient, see [`OfFace::barrier`]; without meaning for a continuous wall.
     pub barrier: Barrier,
     /// Friction with a viscous fluid.
     pub friction: F,

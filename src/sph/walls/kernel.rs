@@ -147,7 +147,7 @@ pub(in crate::sph) struct OfFace {
     /// λ by layers a spacing apart: what a wall adds to the sum over a lattice of particles, of which the
     /// first layer is half a spacing away.
     pub filled: f64,
-    /// B, what a wall adds to the density of a fluid that must not be compressed; zero for a continuous wall. It
+    /// B, what a wall in layers adds to the density of a fluid that must not be compressed. It
     /// is λ, and nearer than half a spacing, where a fluid at rest touches the wall, λ counts twice: the wall
     /// mirrors the fluid. Between, over a width of [`BEND`], it bends. (With λ alone the fluid creeps into the
     /// walls, and a level of ten layers sinks by 3 %. With a kink instead of the bend water at rest never
@@ -156,6 +156,9 @@ pub(in crate::sph) struct OfFace {
     /// −h·dB/dd.
     pub barrier_area: f64,
 }
+
+/// λ on a flat face.
+const ON_FACE: f64 = 0.5;
 
 /// Half the width, in λ, of the bend of a barrier.
 const BEND: f64 = 0.02;
@@ -253,7 +256,12 @@ impl Wall {
     #[inline]
     fn with_barrier(&self, of_face: OfFace) -> OfFace {
         let beyond = of_face.part - self.at_rest;
+        // behind the face the wall is no mirror any more: deep in it B is one, as λ is
+        let most = ON_FACE - self.at_rest;
         let (more, slope) = match () {
+            () if of_face.part > ON_FACE => {
+                (most * (1.0 - of_face.part) / (1.0 - ON_FACE), -most / (1.0 - ON_FACE))
+            }
             () if beyond > BEND => (beyond, 1.0),
             () if beyond < -BEND => (0.0, 0.0),
             () => ((beyond + BEND).powi(2) / (4.0 * BEND), (beyond + BEND) / (2.0 * BEND)),
@@ -482,6 +490,12 @@ mod tests {
             let slope = (before.barrier - after.barrier) / (2.0 * step);
             assert!((slope - now.barrier_area).abs() < 1e-5, "{delta}: {slope} {}", now.barrier_area);
             assert!(now.barrier >= now.part);
+        }
+        for k in 1..=100 {
+            let deep = wall.of_face(-0.01 * f64::from(k), 0.0);
+            assert!(deep.barrier <= 1.0 + 1e-12 && deep.barrier >= deep.part - 1e-12, "{k}: {deep:?}");
+            // the sum over layers falls by a thousandth here and there
+            assert!(deep.barrier_area >= -2e-3, "{k}: {deep:?}");
         }
         // where a fluid rests it is λ, up to the bend; on the wall a mirrored layer is added
         let at_rest = wall.of_face(0.5 / 2.2, 0.0);

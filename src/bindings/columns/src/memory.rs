@@ -107,6 +107,9 @@ impl<T: Number, const N: usize> Job<T, N> {
     /// If there are fewer points.
     pub fn run(&self, part: Range<usize>, evaluate: &impl Fn([&[T]; 3], [&mut [T]; N])) {
         assert!(part.start <= part.end && part.end <= self.count, "a part of the points");
+        if part.is_empty() {
+            return; // the addresses of no numbers may be null
+        }
         let Some(results) = self.slices else { return self.run_in_blocks(part, evaluate) };
         let points = self.points.map(|column| self.slice(column, &part));
         let results = results.map(|column| {

@@ -34,10 +34,10 @@ def test_mistakes_in_a_file_have_places():
         (lambda: rfm.load("rfm 1\nparam a = 1", b=3), rfm.RfmError, "no param `b`|`b`"),
         (lambda: rfm.load("rfm 1\nparam a = 1", a="x"), TypeError, "param `a`"),
         (lambda: rfm.load("rfm 1\nparam a = 1", a=float("nan")), rfm.RfmError, None),
-        (lambda: rfm.load("rfm 1\n")["post"], KeyError, "no solid `post`"),
+        (lambda: rfm.load("rfm 1\nsolid a = sphere(1)")["post"], KeyError, "no solid `post`"),
         (lambda: rfm.load("rfm 1\nsolid post = sphere(1)").solid("pst"), rfm.RfmError, "did you mean `post`"),
-        (lambda: rfm.load("rfm 1\n").solid(), rfm.RfmError, "solid"),
-        (lambda: rfm.load("rfm 1\n").scene(), rfm.RfmError, "no scene"),
+        (lambda: rfm.load("rfm 1\n"), rfm.RfmError, "defines nothing"),
+        (lambda: rfm.load("rfm 1\nsolid a = sphere(1)").scene(), rfm.RfmError, "no scene"),
         (lambda: rfm.load("rfm 1\nsolid post = sphere(1)").scene("x"), rfm.RfmError, "no scene `x`"),
         (
             lambda: rfm.load("rfm 1\n@tolerance(1e-30)\nsolid a = sphere(1)")["a"],

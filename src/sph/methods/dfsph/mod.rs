@@ -29,10 +29,10 @@ const SOLVED_FORCE_FACTOR: f64 = 0.15;
 /// Numbers of the divergence-free method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dfsph {
-    /// Mean compression in one step that is accepted, as a part of the rest density. Default 1e-4: a tenth of
-    /// that hardly changes the pressure of a fluid at rest, ten times that makes it 5 % too high.
+    /// Mean excess of the density that is accepted, as a part of the rest density. One particle in two hundred may
+    /// exceed it by more than ten times as much. Default 1e-4.
     pub tolerance: f64,
-    /// Most iterations of the solver in one step. Default 100.
+    /// Most iterations of each of the two solves in one step. Default 100.
     pub most_iterations: u32,
     /// α of the artificial viscosity (Monaghan 1992), for a speed of sound of ten times the greatest expected
     /// speed. Default 0.04; zero: the term is not computed.
@@ -66,7 +66,7 @@ impl Declaration for Dfsph {
         Key {
             name: "compression",
             block: KeyBlock::Solver,
-            about: "mean compression by one step that is accepted, as a part of the density",
+            about: "mean excess of the density that is accepted, as a part of it",
             value: Value::Number {
                 dimension: Dimension::NONE,
                 bound: Bound::From(1e-9, 1.0),
@@ -123,15 +123,8 @@ impl Declaration for Dfsph {
         (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
         (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
-    const SAVES: &'static [&'static str] = &[
-        "specific pressure",
-        "displacing pressure",
-        "debt",
-        "stiffness",
-        "crowding x",
-        "crowding y",
-        "crowding z",
-    ];
+    const SAVES: &'static [&'static str] =
+        &["specific pressure", "debt", "stiffness", "crowding x", "crowding y", "crowding z"];
 }
 
 impl Numerics for Dfsph {

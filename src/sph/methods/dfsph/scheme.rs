@@ -27,7 +27,7 @@
 //! comes out 2.2 times too high, and in a narrow vessel all of it by 20 %.)
 //!
 //! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is λ where a
-//! fluid at rest touches the wall, and b(s′) by its exact derivative. So what the solve makes right is right when
+//! fluid at rest touches the wall, and b(s′) by its derivative, exact for each face. So what the solve makes right is right when
 //! the density is found next, up to the square of the displacement. (With the system of forces a breaking dam
 //! keeps three times the tolerance.)
 //!
@@ -80,7 +80,7 @@ const OWED: f64 = 0.6;
 /// a weakly compressible fluid, so that the same α damps alike.
 const NOMINAL_SOUND: f64 = 10.0;
 
-/// The scheme. It keeps the solvers' answers between steps; the rest is working memory.
+/// The scheme. It keeps the pressures, and what is owed, between steps; the rest is working memory.
 pub struct DivergenceFree {
     numbers: Dfsph,
     /// Finds pressures that change velocities; its answer is p/ρ².
@@ -121,10 +121,9 @@ impl Scheme for DivergenceFree {
         Ok(dt)
     }
 
-    /// Saves the answers of the last step. All else follows from the positions.
+    /// Saves the answer of the last step. All else follows from the positions.
     fn save(&self, checkpoint: &mut Checkpoint) {
         checkpoint.set("specific pressure", self.forces.s.clone());
-        checkpoint.set("displacing pressure", self.places.s.clone());
         checkpoint.set("debt", self.debt.clone());
         checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         save_crowding(&self.crowding, checkpoint);
@@ -132,7 +131,6 @@ impl Scheme for DivergenceFree {
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         self.forces.s = checkpoint.of_particles("specific pressure")?;
-        self.places.s = checkpoint.of_particles("displacing pressure")?;
         self.debt = checkpoint.of_particles("debt")?;
         if let [forces, places] = checkpoint.get("stiffness")? {
             (self.forces.stiffness, self.places.stiffness) = (*forces, *places);
@@ -203,7 +201,8 @@ impl DivergenceFree {
                 break;
             }
             core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
-            self.find_displacements(core, 1.0);
+            // walls that move do not sweep before the first step
+            self.find_displacements(core, 0.0);
             // the first step will report a place at which an obstacle has no value
             if core.drift(1.0, Some((&self.displacement, 1.0))).is_err() {
                 break;
@@ -214,12 +213,12 @@ impl DivergenceFree {
         (core.particles.velocity, core.speed) = (velocity, speed);
         core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
         core.particles.pressure.fill(0.0);
+        self.iterations = 0;
     }
 
     /// Finds the order, walls, densities and factors for the present positions.
     fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
-        let mut columns: SmallVec<[&mut Vec<f64>; 8]> =
-            smallvec![&mut self.forces.s, &mut self.places.s, &mut self.debt];
+        let mut columns: SmallVec<[&mut Vec<f64>; 8]> = smallvec![&mut self.forces.s, &mut self.debt];
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
         core.find_near();

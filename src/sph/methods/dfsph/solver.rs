@@ -96,7 +96,7 @@ impl Solver {
     }
 
     /// Finds s ≥ 0 such that the rate of density `free` + dt·(rate of a(s)) vanishes where s > 0 and is not
-    /// positive elsewhere, beginning with the last answer. Leaves a(s) in `push` and its rate in `rate`, and
+    /// positive elsewhere, beginning with what `s` holds. Leaves a(s) in `push` and its rate in `rate`, and
     /// returns the number of iterations.
     ///
     /// The method is projected gradients with momentum (Nesterov 1983), scaled by the diagonal, and restarted
