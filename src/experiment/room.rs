@@ -195,7 +195,8 @@ impl Experiment {
         Ok(room.min(wanted as f64))
     }
 
-    /// The same scene with larger particles, as many as are wanted: what it costs tells what the scene costs.
+    /// The same scene with fewer, larger particles. A run of it is short, and its cost per particle forecasts that of
+    /// the scene itself.
     ///
     /// # Errors
     /// Those of [`Experiment::new`].

@@ -107,7 +107,16 @@ impl Lowering<'_> {
             ExprKind::Method { .. } | ExprKind::Logic { .. } | ExprKind::Not(_) | ExprKind::Fold { .. } => {
                 true
             }
-            _ => false,
+            ExprKind::Number(_)
+            | ExprKind::Quantity { .. }
+            | ExprKind::Text(_)
+            | ExprKind::Vector(_)
+            | ExprKind::Compare { .. }
+            | ExprKind::Sum { .. }
+            | ExprKind::Product { .. }
+            | ExprKind::Negate(_)
+            | ExprKind::Power { .. }
+            | ExprKind::Component { .. } => false,
         }
     }
 

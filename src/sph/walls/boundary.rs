@@ -21,14 +21,14 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    field::{Face, Faces, Moving, Part, Path, Walls},
+    field::{Face, Faces, Moving, Path, Walls},
     geom::Aabb,
 };
 
 use crate::sph::{VectorField, contacts::Contacts, particles::Vectors, scales::Slip};
 
 use super::{
-    contact::{Contact, Trouble, Undefined, first_contact, push_out, reflect, turn_back},
+    contact::{Contact, Trouble, Undefined, bounce, first_contact, push_out, reflect, rubbed, turn_back},
     coverage::Coverage,
     friction::Friction,
     kernel::Wall,
@@ -73,7 +73,8 @@ pub struct Obstacle {
     /// How the body acts on a fluid that moves along it.
     pub slip: Slip,
     /// Motion of the surface within itself, m/s, as that of a belt or of a turning cylinder. It takes along a
-    /// fluid that sticks.
+    /// fluid that sticks. It is evaluated at the places of particles near the surface, so that the field of a body
+    /// that turns does not rub on a fluid that turns with it.
     pub surface_velocity: Option<Arc<VectorField>>,
 }
 
@@ -247,7 +248,7 @@ impl Boundary {
                 coverage.set_in_motion(field.wall_velocity(p));
             }
             if let Some(velocity) = &obstacle.surface_velocity {
-                coverage.friction.take_along(velocity(nearest_place(p, &faces), self.time));
+                coverage.friction.take_along(velocity(p, self.time));
             }
             whole = whole.or(&coverage);
         }
@@ -342,8 +343,7 @@ impl Boundary {
             let wall =
                 if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
             let arriving = velocity - wall;
-            let turned = turn_back(arriving, &contact, obstacle.restitution);
-            velocity = wall + rubbed(arriving, turned, contact.normal, obstacle.friction);
+            velocity = wall + bounce(arriving, &contact, obstacle.restitution, obstacle.friction);
             let rest = target - contact.point;
             let slide = turn_back(rest, &contact, 0.0);
             here = contact.point;
@@ -372,22 +372,6 @@ impl Boundary {
         }
         Ok(nearest)
     }
-}
-
-/// The nearest point of the nearest face.
-fn nearest_place(p: DVec3, faces: &[Part]) -> DVec3 {
-    let faces = faces.iter().filter_map(|part| if let Part::Face(face) = part { Some(face) } else { None });
-    let nearest = faces.min_by(|a, b| a.distance.abs().total_cmp(&b.distance.abs()));
-    nearest.map_or(p, |face| p - face.distance * face.normal)
-}
-
-/// A velocity after a contact with friction. The contact changed it from `before` to `after`; along the face
-/// it loses μ times the change along the normal, at most all of it.
-fn rubbed(before: DVec3, after: DVec3, normal: DVec3, friction: f64) -> DVec3 {
-    let change = (after - before).dot(normal).abs();
-    let along = after - after.dot(normal) * normal;
-    let speed = along.length();
-    if friction == 0.0 || speed == 0.0 { after } else { after - along * (friction * change / speed).min(1.0) }
 }
 
 /// The smallest and the largest of some numbers.

@@ -222,6 +222,22 @@ pub(super) fn reflect(velocity: DVec3, normal: DVec3, restitution: f64) -> DVec3
     if speed < 0.0 { velocity - (1.0 + restitution) * speed * normal } else { velocity }
 }
 
+/// The velocity with which a particle leaves a contact at which it arrives with a velocity, m/s, both relative
+/// to the wall: reflected with a restitution c_R, 0 to 1, and slowed along the face by friction μ times the
+/// change of its normal velocity. A particle that is leaving already keeps its velocity.
+pub fn bounce(arriving: DVec3, contact: &Contact, restitution: f64, friction: f64) -> DVec3 {
+    rubbed(arriving, turn_back(arriving, contact, restitution), contact.normal, friction)
+}
+
+/// A velocity after a contact with friction. The contact changed it from `before` to `after`; along the face
+/// it loses μ times the change along the normal, at most all of it.
+pub(super) fn rubbed(before: DVec3, after: DVec3, normal: DVec3, friction: f64) -> DVec3 {
+    let change = (after - before).dot(normal).abs();
+    let along = after - after.dot(normal) * normal;
+    let speed = along.length();
+    if friction == 0.0 || speed == 0.0 { after } else { after - along * (friction * change / speed).min(1.0) }
+}
+
 /// ω at a part of a path, at the time at which the path passes it.
 fn on_path(field: &dyn Walls, path: &Path, t: f64) -> Result<f64, Undefined> {
     let w = field.on_path(path, t);

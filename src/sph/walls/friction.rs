@@ -1,11 +1,23 @@
 //! Friction between walls and a viscous fluid, which sticks to them or slips along them. A fluid without
 //! viscosity carries none of this data.
+//!
+//! Viscous forces act along the lines between particles (Monaghan & Gingold 1983): 10ν Σ V (v_ij·r)/r²·∇W. So they
+//! conserve angular momentum, leave a rigid rotation alone, and vanish at a free surface as the stress does
+//! there (Colagrossi et al. 2011). A wall to which the fluid sticks continues the velocity linearly. With s the
+//! distance along the wall's normal and ρ along the wall, its part is −2ν·v/d times
+//!
+//! ```text
+//! Aᵥ/h = (5/2) ∫_{s>d} s·(ρ²/r²)·|W'|/r dV
+//! Aᵥ   = (525/2)·[1/140 − δ²/10 − (13/12)δ⁴ − δ⁴ ln δ + (8/5)δ⁵ − δ⁶/2 + (8/105)δ⁷]     (Wendland C2)
+//! ```
+//!
+//! in place of A, to which it is equal in the mean: ∫Aᵥ dδ = ∫A dδ = ½.
 
 use glam::DVec3;
 
 use crate::field::Face;
 
-use super::symmetric::Symmetric;
+use super::{kernel::WallKernel, symmetric::Symmetric};
 
 /// Least free part of a kernel by which corrections for walls divide.
 pub(super) const LEAST_FREE: f64 = 0.25;
@@ -17,7 +29,7 @@ const NEAREST: f64 = 0.1;
 /// The friction of the faces near a particle, a part of [`super::Coverage`]. It is `()` for a fluid without
 /// viscosity.
 pub(in crate::sph) trait Friction: Copy + Default {
-    /// The friction of one face whose ∇λ has the length `area`, 1/m.
+    /// The friction of one face whose ∇λ has the length `area`, 1/m, with the kernel Wendland C2.
     fn of_face(face: &Face, area: f64, h: f64) -> Self;
 
     /// The friction of two walls combined; `da` and `db` are the derivatives of the combined λ by their λ.
@@ -51,7 +63,7 @@ impl Friction for () {
 /// The friction of a viscous fluid with walls.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct WallDrag {
-    /// Σ (A/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks. Times −2ν and a velocity it is
+    /// Σ (Aᵥ/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks. Times −2ν and a velocity it is
     /// the drag of walls at rest.
     pub tensor: Symmetric,
     /// λ of those walls along which the fluid slips.
@@ -63,6 +75,7 @@ pub(in crate::sph) struct WallDrag {
 impl Friction for WallDrag {
     fn of_face(face: &Face, area: f64, h: f64) -> Self {
         let along = Symmetric::IDENTITY - Symmetric::square(face.normal);
+        let area = area * along_lines(face.distance / h);
         Self { tensor: area / face.distance.max(NEAREST * h) * along, ..Self::default() }
     }
 
@@ -85,5 +98,55 @@ impl Friction for WallDrag {
     fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3 {
         let completed = drag / (1.0 - self.slippery).max(LEAST_FREE);
         completed - 2.0 * viscosity * (self.tensor * velocity - self.haul)
+    }
+}
+
+/// Aᵥ/A for the kernel Wendland C2, even in δ.
+fn along_lines(delta: f64) -> f64 {
+    let d = delta.abs();
+    // the formula cancels near δ = 1, where the ratio tends to (5/6)(1 − δ)
+    if d > 0.95 {
+        return 5.0 / 6.0 * (1.0 - d).max(0.0);
+    }
+    let logarithm = if d > 0.0 { d.ln() } else { 0.0 };
+    let high = -13.0 / 12.0 - logarithm + d * (1.6 + d * (-0.5 + d * (8.0 / 105.0)));
+    262.5 * (1.0 / 140.0 + d * d * (-0.1 + d * d * high)) / WallKernel::WendlandC2.slope(d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ∫ over the part of the support behind a plane, by rings.
+    fn by_quadrature(d: f64) -> f64 {
+        let (n, c) = (4000, 210.0 / std::f64::consts::PI);
+        let step = (1.0 - d) / f64::from(n);
+        let shells = (0..n).map(|k| d + (f64::from(k) + 0.5) * step).map(|r| {
+            let rings = 200;
+            let width = (1.0 - d / r) / f64::from(rings);
+            let ring = |k: i32| {
+                let cosine = d / r + (f64::from(k) + 0.5) * width;
+                r * cosine * (1.0 - cosine * cosine)
+            };
+            let over_rings: f64 = (0..rings).map(|k| ring(k) * width).sum();
+            2.0 * std::f64::consts::PI * r * r * c * (1.0 - r).powi(3) * over_rings
+        });
+        2.5 * step * shells.sum::<f64>()
+    }
+
+    #[test]
+    fn walls_rub_along_lines_as_the_integral_does() {
+        for d in [0.0, 0.05, 0.3, 0.6, 0.9] {
+            let found = along_lines(d) * WallKernel::WendlandC2.slope(d);
+            assert!((found / by_quadrature(d) - 1.0).abs() < 1e-4, "{d}: {found} {}", by_quadrature(d));
+        }
+        assert!((along_lines(0.0) - 1.25).abs() < 1e-14);
+        let (below, above) = (along_lines(0.9499999), along_lines(0.9500001));
+        assert!((below / above - 1.0).abs() < 0.02, "{below} {above}");
+        let mean: f64 = (0..20_000)
+            .map(|k| (f64::from(k) + 0.5) / 20_000.0)
+            .map(|d| along_lines(d) * WallKernel::WendlandC2.slope(d) / 20_000.0)
+            .sum();
+        assert!((mean - 0.5).abs() < 1e-6, "{mean}");
     }
 }

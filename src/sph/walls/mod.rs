@@ -16,7 +16,7 @@ mod way_out;
 pub use boundary::Obstacle;
 pub(super) use boundary::{Boundary, Fault, MARKED, UNKNOWN};
 pub(super) use contact::Trouble;
-pub use contact::{Contact, Undefined, first_contact, push_out};
+pub use contact::{Contact, Undefined, bounce, first_contact, push_out};
 pub(super) use coverage::Coverage;
 pub(super) use friction::{Friction, WallDrag};
 pub(super) use kernel::Wall;

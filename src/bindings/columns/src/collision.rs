@@ -2,7 +2,7 @@
 
 use rfm::Solid;
 use rfm::glam::DVec3;
-use rfm::sph::push_out;
+use rfm::sph::{self, push_out};
 
 /// How a solid answers to what hits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,12 +31,12 @@ pub enum Collision {
 /// Puts a particle that is inside a solid, or on its surface, back to the nearest place outside, and reflects its
 /// velocity relative to the surface's own.
 pub fn collide(solid: &Solid, bounce: &Bounce, position: &mut DVec3, velocity: &mut DVec3) -> Collision {
+    if !(position.is_finite() && velocity.is_finite()) {
+        return Collision::Undefined;
+    }
     let omega = solid.omega(*position);
     if omega < 0.0 {
         return Collision::None;
-    }
-    if omega.is_nan() || !velocity.is_finite() {
-        return Collision::Undefined;
     }
     let contact = match push_out(solid, *position, bounce.reach, 0.0) {
         Ok(Some(contact)) => contact,
@@ -44,17 +44,7 @@ pub fn collide(solid: &Solid, bounce: &Bounce, position: &mut DVec3, velocity: &
         Err(_) => return Collision::Undefined,
     };
     let wall = solid.wall_velocity(contact.point);
-    let (normal, relative) = (contact.normal, *velocity - wall);
-    let approach = relative.dot(normal);
-    if approach < 0.0 {
-        let along = relative - approach * normal;
-        let change = (1.0 + bounce.restitution) * -approach;
-        let kept = match along.length() {
-            speed if speed > 0.0 => (1.0 - bounce.friction * change / speed).max(0.0),
-            _ => 0.0,
-        };
-        *velocity = wall + kept * along - bounce.restitution * approach * normal;
-    }
+    *velocity = wall + sph::bounce(*velocity - wall, &contact, bounce.restitution, bounce.friction);
     *position = contact.point;
     Collision::Hit
 }

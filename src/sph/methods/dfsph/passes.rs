@@ -47,6 +47,9 @@ impl Constants {
     }
 }
 
+/// Squares of distances below this part of h² do not count as a direction.
+const LEAST_DISTANCE: f64 = 1e-6;
+
 /// How a linear system takes walls into account.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Continuation {
@@ -194,10 +197,10 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
     }
 }
 
-/// Finds the acceleration by laminar viscosity (Morris et al. 1997), by artificial viscosity (Monaghan 1992)
-/// and by gravity.
+/// Finds the acceleration by viscosity and by gravity. Viscosity is laminar (Monaghan & Gingold 1983), artificial
+/// (Monaghan 1992) or both; both act along the lines between particles.
 #[derive(Clone, Copy)]
-pub(super) struct Drag<'a> {
+pub(super) struct Drag<'a, const LAMINAR: bool> {
     pub constants: Constants,
     pub walls: &'a Walls,
     pub velocity: &'a Vectors,
@@ -208,7 +211,8 @@ pub(super) struct Drag<'a> {
     pub gravity: DVec3,
 }
 
-impl PairPass<3, 6, 3> for Drag<'_> {
+impl<const LAMINAR: bool> PairPass<3, 3, 3> for Drag<'_, LAMINAR> {
+    /// Both viscosities are one sum, but only the artificial one makes do with twelve bits.
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
@@ -216,27 +220,27 @@ impl PairPass<3, 6, 3> for Drag<'_> {
         r2: V,
         own: &[V; 3],
         other: [V; 3],
-        sums: &mut [V; 6],
+        sums: &mut [V; 3],
     ) {
         let s = self.constants.kernel.nearness(r2);
-        let f = s * s * s;
         let relative = [other[0] - own[0], other[1] - own[1], other[2] - own[2]];
         let arriving = relative[2].mul_add(d[2], relative[1].mul_add(d[1], relative[0] * d[0]));
-        let least = V::Element::of(0.01 * (0.5 * self.constants.kernel.h).powi(2));
-        let push = f * arriving * (r2 + least).approximate_recip();
+        // a particle has no line to itself
+        let least = V::Element::of(LEAST_DISTANCE * self.constants.kernel.h.powi(2));
+        let along = s * s * s * arriving;
+        let push = if LAMINAR { along / (r2 + least) } else { along * (r2 + least).approximate_recip() };
         for k in 0..3 {
-            sums[k] = f.mul_add(relative[k], sums[k]);
-            sums[3 + k] = push.mul_add(d[k], sums[3 + k]);
+            sums[k] = push.mul_add(d[k], sums[k]);
         }
     }
 
-    fn finish(&self, i: usize, [x, y, z, u, v, w]: [f64; 6]) -> [f64; 3] {
+    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
-        let steepness = mass_steepness / rest_density;
-        let mut drag = 2.0 * self.kinematic * steepness * DVec3::new(x, y, z);
-        if let Some((wall, _)) = self.walls.near(i) {
+        let along = mass_steepness / rest_density * DVec3::from_array(sums);
+        let mut drag = 10.0 * self.kinematic * along;
+        if LAMINAR && let Some((wall, _)) = self.walls.near(i) {
             drag = wall.friction.complete(drag, self.velocity.get(i), self.kinematic);
         }
-        (drag + self.artificial * steepness * DVec3::new(u, v, w) + self.gravity).to_array()
+        (drag + self.artificial * along + self.gravity).to_array()
     }
 }

@@ -27,13 +27,13 @@
 //! comes out 2.2 times too high, and in a narrow vessel all of it by 20 %.)
 //!
 //! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is λ where a
-//! fluid at rest touches the wall, and b(s′) by its derivative, exact for each face. So what the solve makes right is right when
-//! the density is found next, up to the square of the displacement. (With the system of forces a breaking dam
+//! fluid at rest touches the wall, and b(s′) by its derivative, exact for each face. The solve therefore meets the
+//! density that is found next, up to the square of the displacement. (With the system of forces a breaking dam
 //! keeps three times the tolerance.)
 //!
 //! Artificial viscosity (Monaghan 1992) takes the noise of the particles' disorder, which nothing else would
-//! take from a fluid without viscosity. It acts along the lines between particles, and conserves momentum and
-//! angular momentum.
+//! take from a fluid without viscosity. Both viscosities act along the lines between particles, and conserve
+//! momentum and angular momentum.
 //!
 //! The reported pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
 //! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over τ, because the
@@ -245,17 +245,18 @@ impl DivergenceFree {
             * parameters.support_radius
             * NOMINAL_SOUND
             * parameters.expected_speed;
-        if parameters.viscosity > 0.0 || artificial > 0.0 {
-            let Vectors { x: vx, y: vy, z: vz } = &core.particles.velocity;
-            let pass = Drag {
-                constants: Constants::of(&core.parameters),
-                walls: &self.walls,
-                velocity: &core.particles.velocity,
-                kinematic: core.parameters.viscosity / core.parameters.rest_density,
-                artificial,
-                gravity: g,
-            };
-            core.sum(&pass, [&vx[..], vy, vz], [&mut x[..], y, z]);
+        let kinematic = parameters.viscosity / parameters.rest_density;
+        if kinematic > 0.0 || artificial > 0.0 {
+            let (constants, velocity) = (Constants::of(parameters), &core.particles.velocity);
+            let fields = [&velocity.x[..], &velocity.y, &velocity.z];
+            let (out, walls) = ([&mut x[..], y, z], &self.walls);
+            if kinematic > 0.0 {
+                let pass = Drag::<true> { constants, walls, velocity, kinematic, artificial, gravity: g };
+                core.sum(&pass, fields, out);
+            } else {
+                let pass = Drag::<false> { constants, walls, velocity, kinematic, artificial, gravity: g };
+                core.sum(&pass, fields, out);
+            }
         } else {
             x.fill(g.x);
             y.fill(g.y);

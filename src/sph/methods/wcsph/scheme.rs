@@ -21,7 +21,8 @@
 //!
 //! Kernel: Wendland C2 (1995), under which particles do not clump. Density diffusion: Molteni & Colagrossi
 //! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
-//! Viscosity: laminar (Morris et al. 1997) or artificial (Monaghan 1992).
+//! Viscosity: laminar (Monaghan & Gingold 1983, with the factor 2(d + 2) = 10 of three dimensions) and artificial
+//! (Monaghan 1992). Both act along the lines between particles and so conserve angular momentum.
 //!
 //! With `gradients: differences` the depth of the fluid has gradients by differences instead, divided by what
 //! the sum makes of the gradient of a position, G = −⅓ Σ V r·∇W + ⅓ tr K (0.98 on a lattice at h = 2.6 spacings). A pressure that is linear in space has
@@ -113,6 +114,9 @@ pub struct Weakly {
 
 /// Names of the scheme's columns in a checkpoint.
 const COLUMNS: [&str; 4] = ["places", "density rate", "earlier density rate", "density drift"];
+
+/// Squares of distances below this part of h² do not count as a direction.
+const LEAST_DISTANCE: f64 = 1e-6;
 
 /// Name of the length of the last step in a checkpoint.
 const LAST_STEP: &str = "last step";
@@ -400,7 +404,7 @@ impl<'a> Rates<'a> {
 
 /// The pass over pairs, with laminar and artificial viscosity or without, and for particles that are kept
 /// even or not. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
-/// f·(ρ_j − ρ_i), f·d, f·d², W and f·(v_j − v_i). For particles that are not kept even it sums p_j + p_i
+/// f·(ρ_j − ρ_i), f·d, f·d², W and f·((v_j − v_i)·d)·d/d². For particles that are not kept even it sums p_j + p_i
 /// instead of p_j − p_i, and omits f·d and f·d².
 #[derive(Clone, Copy)]
 struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
@@ -448,8 +452,11 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         // 1 + 4q = 5 − 4s
         sums[9] = (f * s).mul_add(s.mul_add(of(-4.0), of(5.0)), sums[9]);
         if LAMINAR {
+            // a particle has no line to itself
+            let least = of(LEAST_DISTANCE * rates.kernel.h.powi(2));
+            let rubbing = f * departing / (r2 + least);
             for k in 0..3 {
-                sums[10 + k] = f.mul_add(other[k] - own[k], sums[10 + k]);
+                sums[10 + k] = d[k].mul_add(-rubbing, sums[10 + k]);
             }
         }
     }
@@ -467,7 +474,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let mut push = steepness * DVec3::new(px, py, pz);
         let mut spread = steepness * squares / 3.0;
         let mut compression = -steepness * departing;
-        let mut drag = 2.0 * laminar * steepness * DVec3::new(ux, uy, uz);
+        let mut drag = 10.0 * laminar * steepness * DVec3::new(ux, uy, uz);
         let velocity = rates.velocity.get(i);
         // a fluid without viscosity feels no friction, and most have none
         let wall = if LAMINAR {
