@@ -6,16 +6,20 @@
 //!
 //! Invariant: nothing here knows that a compiler exists, so a closure can stand in for a compiled solid.
 
+mod cut;
 mod faces;
 mod path;
+mod region;
 mod walls;
 
 use glam::DVec3;
 
 use crate::{geom::Aabb, interval::Interval};
 
+pub(crate) use cut::{Cut, cut, is_inside};
 pub use faces::{Face, Faces, Part};
 pub use path::{Entry, Normals, Path, last_outside};
+pub(crate) use region::Region;
 pub(crate) use walls::clearance_by_ranges;
 pub use walls::{Moving, Still, Walls, search_path};
 

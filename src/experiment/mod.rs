@@ -15,6 +15,7 @@
 mod bodies;
 mod deviation;
 mod every;
+mod filling;
 mod fingerprint;
 mod parameters;
 mod probes;
@@ -29,20 +30,16 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Fluid, Gravity, Scene};
-use crate::sph::{
-    Checkpoint, FluidBlock, FluidShape, Obstacle, Parameters, Particles, SetupError, Simulation, VectorField,
-    carve, make_room,
-};
+use crate::sph::{Checkpoint, Obstacle, Parameters, Particles, SetupError, Simulation, VectorField};
 use crate::{Engine, Program, Solid};
+
+use filling::Filling;
 
 pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
 pub use every::Every;
 pub use parameters::TimeStep;
 pub use probes::{probe_column, probe_of};
-
-/// Least distance of particles from obstacles at the start, over the spacing.
-const CLEARANCE: f64 = 0.5;
 
 /// A scene, compiled and checked: all that a simulation needs besides its particles.
 pub struct Experiment {
@@ -79,7 +76,8 @@ impl Experiment {
     fn of_scene(program: Program, scene: Scene, engine: Engine) -> Result<Self, Error> {
         let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
         let typical_speed = parameters::typical_speed(&program, &scene);
-        let mut parameters = parameters::of_scene(&program, &scene, typical_speed);
+        let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
+        let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let (time_step, too_long) = parameters::time_step(&scene, &parameters);
         parameters.time_step = time_step.seconds;
         parameters.validate().map_err(|error| {
@@ -137,12 +135,14 @@ impl Experiment {
     /// [`Error::Diagnostics`] if the fluid has no room.
     pub fn start(&self) -> Result<Start, Error> {
         let fluid = &self.scene.fluid;
-        let mut particles = self.seed()?;
-        self.set_in_motion(&mut particles);
         let obstacles = self.obstacles();
-        let (carved, warning) = self.carve(&mut particles, &obstacles)?;
-        self.put_under_pressure(&mut particles);
-        let simulation = Simulation::new(self.parameters.clone(), particles, self.scene.domain, obstacles);
+        let filling = self.fill(&obstacles)?;
+        let warning = self.carving(&filling);
+        let Filling { mut particles, carved, mass, .. } = filling;
+        self.set_in_motion(&mut particles);
+        let parameters = Parameters { particle_mass: mass, ..self.parameters.clone() };
+        put_under_pressure(&parameters, &mut particles);
+        let simulation = Simulation::new(parameters, particles, self.scene.domain, obstacles);
         let mut simulation = simulation.map_err(|e| {
             let no_room = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, e.to_string());
             refuse(&self.program, no_room)
@@ -150,6 +150,7 @@ impl Experiment {
         self.set_gravity(&mut simulation);
         let outside = self.reach().ok().and_then(|bounds| self.outside(&bounds));
         let warnings = self.diagnostics(outside.into_iter().chain(warning).collect());
+        let carved = carved.inside + carved.too_close + carved.outside_box;
         Ok(Start { simulation, carved, warnings })
     }
 
@@ -181,21 +182,6 @@ impl Experiment {
         }
     }
 
-    /// Particles at rest that fill the shape of the fluid.
-    fn seed(&self) -> Result<Particles, Error> {
-        let fluid = &self.scene.fluid;
-        let bounds = self.reach()?;
-        let block = FluidBlock {
-            shape: FluidShape::Field { field: &self.fluid, bounds, fill: fluid.fill },
-            count: fluid.particles,
-            allow_fewer: false,
-            velocity: DVec3::ZERO,
-            jitter: fluid.jitter,
-            seed: fluid.seed,
-        };
-        block.seed(&self.parameters, self.scene.domain).map_err(|e| self.no_fluid(&e))
-    }
-
     /// Gives each particle its velocity at the start, by the formulas of the scene.
     fn set_in_motion(&self, particles: &mut Particles) {
         let velocities = velocities(&self.program, &self.scene.fluid);
@@ -204,49 +190,22 @@ impl Experiment {
         }
     }
 
-    /// Removes particles that obstacles leave no room for. Returns their number, and a warning if there are
-    /// any.
-    fn carve(
-        &self,
-        particles: &mut Particles,
-        obstacles: &[Obstacle],
-    ) -> Result<(usize, Option<Diagnostic>), Error> {
-        let (span, domain) = (self.scene.fluid.shape_span, &self.scene.domain);
-        let mut clearance = CLEARANCE * self.parameters.spacing();
-        if self.parameters.makes_room_at_start() {
-            // particles that are too near may move; only those that find no place are removed
-            make_room(particles, domain, obstacles, clearance);
-            clearance *= 0.5;
-        }
-        let carved = carve(particles, domain, obstacles, clearance).map_err(|e| self.no_fluid(&e))?;
-        let lost = carved.inside + carved.too_close + carved.outside_box;
-        let message = || {
-            format!(
-                "{lost} of the fluid's particles were carved off: {} in an obstacle, {} too close to one, {} \
-                 outside the box; {} are left",
-                carved.inside, carved.too_close, carved.outside_box, carved.kept
-            )
-        };
-        Ok((lost, (lost > 0).then(|| Diagnostic::warning(Code::FLUID_IN_OBSTACLE, span, message()))))
-    }
-
-    /// Sets the densities of a fluid at rest under its own weight, for methods that start so. The fluid's
-    /// surface lies half a spacing above the highest particle.
-    fn put_under_pressure(&self, particles: &mut Particles) {
-        let p = &self.parameters;
-        let up = -p.gravity.normalize_or_zero();
-        let height = |at: DVec3| up.dot(at);
-        let top = particles.position.iter().map(height).fold(f64::NEG_INFINITY, f64::max) + 0.5 * p.spacing();
-        let pressure = |at: DVec3| p.rest_density * p.gravity.length() * (top - height(at));
-        let densities: Option<Vec<f64>> =
-            particles.position.iter().map(|at| p.density_at_start(pressure(at))).collect();
-        if let Some(densities) = densities {
-            particles.density = densities;
-        }
-    }
-
     fn diagnostics(&self, list: Vec<Diagnostic>) -> Diagnostics {
         Diagnostics { list, sources: self.program.sources().clone() }
+    }
+}
+
+/// Sets the densities of a fluid at rest under its own weight, for methods that start so. The fluid's
+/// surface lies half a spacing above the highest particle.
+fn put_under_pressure(p: &Parameters, particles: &mut Particles) {
+    let up = -p.gravity.normalize_or_zero();
+    let height = |at: DVec3| up.dot(at);
+    let top = particles.position.iter().map(height).fold(f64::NEG_INFINITY, f64::max) + 0.5 * p.spacing();
+    let pressure = |at: DVec3| p.rest_density * p.gravity.length() * (top - height(at));
+    let densities: Option<Vec<f64>> =
+        particles.position.iter().map(|at| p.density_at_start(pressure(at))).collect();
+    if let Some(densities) = densities {
+        particles.density = densities;
     }
 }
 

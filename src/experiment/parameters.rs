@@ -25,13 +25,14 @@ pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
     (start * start + 2.0 * gravity.length() * height).sqrt()
 }
 
-/// All parameters except the time step, which is 1 s here.
-pub(super) fn of_scene(program: &Program, scene: &Scene, typical_speed: f64) -> Parameters {
+/// All parameters except the time step, which is 1 s here. `mass` is that of a particle, kg.
+pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_speed: f64) -> Parameters {
     let (fluid, method) = (&scene.fluid, scene.method.fluid());
+    let usual = method.support.radius((mass / fluid.density).cbrt());
     Parameters {
         rest_density: fluid.density,
-        particle_mass: fluid.mass,
-        support_radius: fluid.support_radius,
+        particle_mass: mass,
+        support_radius: fluid.support_radius.unwrap_or(usual),
         viscosity: fluid.viscosity,
         surface_tension: fluid.surface_tension,
         gravity: at_start(program, &scene.gravity),

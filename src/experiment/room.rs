@@ -204,7 +204,7 @@ impl Experiment {
         let factor = (self.estimated_particles()? / particles).max(1.0);
         let mut scene: Scene = self.scene.clone();
         scene.fluid.mass *= factor;
-        scene.fluid.support_radius *= factor.cbrt();
+        scene.fluid.support_radius = scene.fluid.support_radius.map(|h| h * factor.cbrt());
         scene.fluid.particles =
             scene.fluid.particles.map(|wanted| ((wanted as f64 / factor) as usize).max(1));
         Self::of_scene(self.program.clone(), scene, engine)

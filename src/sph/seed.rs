@@ -56,6 +56,8 @@ pub enum FluidShape<'a> {
 pub struct FluidBlock<'a> {
     /// The space that the fluid fills.
     pub shape: FluidShape<'a>,
+    /// Size of the lattice's cells, m; `None`: cubes as wide as the particles' spacing.
+    pub cell: Option<DVec3>,
     /// Number of particles wanted; `None` fills the shape. A box with more room is filled from below, as a
     /// vessel is, and a field as its [`Fill`] states. A drop takes the sites nearest to its centre; it needs
     /// a count, because nothing else determines its size.
@@ -73,7 +75,15 @@ pub struct FluidBlock<'a> {
 impl<'a> FluidBlock<'a> {
     /// Fluid at rest that fills a shape, on the exact lattice.
     pub fn filling(shape: FluidShape<'a>) -> Self {
-        Self { shape, count: None, allow_fewer: false, velocity: DVec3::ZERO, jitter: 0.0, seed: 0 }
+        Self {
+            shape,
+            cell: None,
+            count: None,
+            allow_fewer: false,
+            velocity: DVec3::ZERO,
+            jitter: 0.0,
+            seed: 0,
+        }
     }
 
     /// A drop of exactly `count` particles at rest.
@@ -142,10 +152,11 @@ impl FluidBlock<'_> {
             return Err(SeedError::Jitter(self.jitter));
         }
         let spacing = parameters.spacing();
+        let cell = self.cell.unwrap_or(DVec3::splat(spacing));
         let mut sites = match self.shape {
-            FluidShape::Box(aabb) => lattice(aabb.intersection(&container), spacing)?,
+            FluidShape::Box(aabb) => lattice(aabb.intersection(&container), cell)?,
             FluidShape::Field { field, bounds, fill } => {
-                let all = lattice(bounds.intersection(&container), spacing)?;
+                let all = lattice(bounds.intersection(&container), cell)?;
                 let mut inside = keep_inside(field, all)?;
                 if fill == Fill::Middle {
                     // stable: equal ω keep the lattice's order
@@ -178,14 +189,13 @@ impl FluidBlock<'_> {
     }
 }
 
-/// Sites of the lattice in a box, beginning half a spacing from its lower faces; lowest z first, then y, then
-/// x.
-fn lattice(aabb: Aabb, spacing: f64) -> Result<Vec<DVec3>, SeedError> {
+/// Sites of the lattice in a box, beginning half a cell from its lower faces; lowest z first, then y, then x.
+fn lattice(aabb: Aabb, cell: DVec3) -> Result<Vec<DVec3>, SeedError> {
     if aabb.is_empty() {
         return Ok(Vec::new());
     }
     // a box of whole spacings must not lose a layer to rounding
-    let counts = (aabb.size() / spacing + 1e-9).floor();
+    let counts = (aabb.size() / cell + 1e-9).floor();
     let sites = counts.element_product();
     let affordable = sites <= MAX_SITES;
     if !affordable {
@@ -196,7 +206,7 @@ fn lattice(aabb: Aabb, spacing: f64) -> Result<Vec<DVec3>, SeedError> {
     for k in 0..nz {
         for j in 0..ny {
             for i in 0..nx {
-                result.push(aabb.min + spacing * (DVec3::new(i as f64, j as f64, k as f64) + 0.5));
+                result.push(aabb.min + cell * (DVec3::new(i as f64, j as f64, k as f64) + 0.5));
             }
         }
     }

@@ -41,6 +41,10 @@ pub struct Simulation {
 /// Name of the audit's memory in a checkpoint.
 const AUDIT: &str = "audit";
 
+/// Name of the mass of a particle in a checkpoint. It may differ from that of the scene, so that the fluid weighs
+/// what its shape does.
+const MASS: &str = "particle mass";
+
 impl Simulation {
     /// Checks the input and finds the densities and forces of the first instant.
     ///
@@ -91,11 +95,14 @@ impl Simulation {
     /// # Errors
     /// [`SetupError`] as for [`Simulation::new`], or if the checkpoint belongs to another method.
     pub fn resume(
-        parameters: Parameters,
+        mut parameters: Parameters,
         checkpoint: &Checkpoint,
         domain: Aabb,
         obstacles: Vec<Obstacle>,
     ) -> Result<Self, SetupError> {
+        if let Ok([mass]) = checkpoint.get(MASS) {
+            parameters.particle_mass = *mass;
+        }
         let particles = checkpoint.particles().map_err(SetupError::Checkpoint)?;
         // the particles of a checkpoint are sorted already: sorting them again leaves their order
         let instant = Some((checkpoint.steps, checkpoint.time));
@@ -113,6 +120,7 @@ impl Simulation {
         let mut checkpoint = self.core.checkpoint();
         self.scheme.save(&mut checkpoint);
         checkpoint.set(AUDIT, self.audit.memory());
+        checkpoint.set(MASS, vec![self.core.parameters.particle_mass]);
         checkpoint
     }
 

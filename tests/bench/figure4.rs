@@ -179,7 +179,7 @@ fn simulation(scene: &Scene, pawn: &Solid, count: usize) -> Simulation {
     let mut parameters = Parameters {
         rest_density: scene.fluid.density,
         particle_mass: scene.fluid.mass,
-        support_radius: scene.fluid.support_radius,
+        support_radius: scene.fluid.support_radius.unwrap_or(Parameters::default().support_radius),
         viscosity: scene.fluid.viscosity,
         surface_tension: scene.fluid.surface_tension,
         method: scene.method,

@@ -41,7 +41,7 @@ struct Resolution {
     density: f64,
     mass: f64,
     size_span: Option<Span>,
-    support_radius: f64,
+    support_radius: Option<f64>,
 }
 
 impl<'a> Lowering<'a> {
@@ -144,7 +144,7 @@ impl<'a> Lowering<'a> {
             }
         };
         let fill = self.word_key(block, "fill", &[("below", Fill::Below), ("middle", Fill::Middle)]);
-        let resolution = self.resolution(block, method);
+        let resolution = self.resolution(block);
         let mut number =
             |key, dimension, default, bound| self.number_key(block, key, dimension, Some(default), bound);
         let viscosity = number("viscosity", Dimension::VISCOSITY, defaults.viscosity, Bound::NotNegative);
@@ -176,7 +176,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reads density, mass and support radius of the particles. A spacing may replace the mass.
-    fn resolution(&mut self, block: &Block<'_>, method: &Method) -> Option<Resolution> {
+    fn resolution(&mut self, block: &Block<'_>) -> Option<Resolution> {
         let mut number =
             |key, dimension, default| self.number_key(block, key, dimension, Some(default), Bound::Positive);
         let density = number("density", Dimension::DENSITY, 998.29);
@@ -192,9 +192,12 @@ impl<'a> Lowering<'a> {
         }
         let (mass, density) = (mass?, density?);
         let mass = if both.1.is_some() { density * spacing?.powi(3) } else { mass };
-        let own = method.fluid().support.radius((mass / density).cbrt());
-        let support_radius =
-            self.number_key(block, "support_radius", Dimension::LENGTH, Some(own), Bound::Positive)?;
+        let support_radius = match block.setting("support_radius") {
+            Some(_) => {
+                Some(self.number_key(block, "support_radius", Dimension::LENGTH, None, Bound::Positive)?)
+            }
+            None => None,
+        };
         let size_span = both.1.or(both.0).map(|(_, value)| value.span);
         Some(Resolution { density, mass, size_span, support_radius })
     }

@@ -148,13 +148,13 @@ pub struct Fluid {
     pub shape_span: Span,
     /// Which part of the shape is taken when it has room for more particles than are wanted.
     pub fill: Fill,
-    /// Number of particles; `None`: as many as fit.
+    /// Number of particles; `None`: as many as fit. If no size is stated, so many particles fill the shape.
     pub particles: Option<usize>,
     /// Place of the number of particles in the text, if it is stated.
     pub particles_span: Option<Span>,
     /// Rest density ρ₀, kg/m³.
     pub density: f64,
-    /// Mass of one particle, kg.
+    /// Mass of one particle, kg. A number of particles without a size determines another one.
     pub mass: f64,
     /// Place of the key that states how large a particle is, `mass` or `spacing`; `None`: the mass is the default.
     pub size_span: Option<Span>,
@@ -162,8 +162,8 @@ pub struct Fluid {
     pub viscosity: f64,
     /// Surface tension, N/m.
     pub surface_tension: f64,
-    /// Support radius h, m.
-    pub support_radius: f64,
+    /// Support radius h, m; `None`: as many spacings as is usual for the method.
+    pub support_radius: Option<f64>,
     /// Velocity at the start, m/s, as formulas of x, y and z.
     pub velocity: [Node; 3],
     /// Random displacement of the start positions, as a part of the particle spacing.

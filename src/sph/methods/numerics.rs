@@ -77,7 +77,8 @@ pub(in crate::sph) trait Numerics: Sync {
     }
 
     /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.
-    /// This suits only methods whose densities do not follow from the places of particles.
+    /// This suits only methods whose densities at the start do not follow from the places of particles, or that spread
+    /// crowded particles before the first step.
     fn makes_room_at_start(&self) -> bool {
         false
     }

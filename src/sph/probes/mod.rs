@@ -9,6 +9,7 @@
 //! gives the same bits.
 
 mod force;
+mod surface;
 
 use glam::{DMat3, DVec3};
 
@@ -148,7 +149,7 @@ impl Gauge {
                 vec![kinetic, potential, elastic, kinetic + potential + elastic]
             }
             Probe::Force { obstacle, about } => {
-                let mut force = force::pressure_on(core, obstacle, about);
+                let mut force = force::on_surface(core, obstacle, about);
                 let (time, total) =
                     (core.time, core.contacts.as_ref().map_or([0.0; 6], |c| c.total(obstacle)));
                 let passed = time - self.last[0];

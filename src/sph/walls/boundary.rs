@@ -139,6 +139,13 @@ impl Boundary {
         REACH * self.clearance
     }
 
+    /// The velocity of an obstacle's surface near a point, m/s: that of its motion and that within itself.
+    pub fn velocity(&self, k: usize, p: DVec3) -> DVec3 {
+        let obstacle = &self.obstacles[k];
+        let moving = if obstacle.moving.is_some() { self.field(k).wall_velocity(p) } else { DVec3::ZERO };
+        moving + obstacle.surface_velocity.as_ref().map_or(DVec3::ZERO, |velocity| velocity(p, self.time))
+    }
+
     /// The fields of all obstacles during the present step.
     pub fn fields(&self) -> impl Iterator<Item = &dyn Walls> {
         (0..self.obstacles.len()).map(|k| self.field(k))

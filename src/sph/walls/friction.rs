@@ -105,7 +105,7 @@ impl Friction for WallDrag {
 fn along_lines(delta: f64) -> f64 {
     let d = delta.abs();
     // the formula cancels near δ = 1, where the ratio tends to (5/6)(1 − δ)
-    if d > 0.95 {
+    if d > 0.98 {
         return 5.0 / 6.0 * (1.0 - d).max(0.0);
     }
     let logarithm = if d > 0.0 { d.ln() } else { 0.0 };
@@ -141,7 +141,7 @@ mod tests {
             assert!((found / by_quadrature(d) - 1.0).abs() < 1e-4, "{d}: {found} {}", by_quadrature(d));
         }
         assert!((along_lines(0.0) - 1.25).abs() < 1e-14);
-        let (below, above) = (along_lines(0.9499999), along_lines(0.9500001));
+        let (below, above) = (along_lines(0.979_999_9), along_lines(0.980_000_1));
         assert!((below / above - 1.0).abs() < 0.02, "{below} {above}");
         let mean: f64 = (0..20_000)
             .map(|k| (f64::from(k) + 0.5) / 20_000.0)

@@ -151,6 +151,11 @@ impl Numerics for Dfsph {
         Wall::in_layers(WallKernel::WendlandC2, scales.support_radius, scales.spacing())
     }
 
+    /// The first solve of places spreads what is crowded then.
+    fn makes_room_at_start(&self) -> bool {
+        true
+    }
+
     fn elastic_energy(&self, _scales: &Scales, _density: f64) -> f64 {
         0.0
     }

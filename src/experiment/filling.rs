@@ -1,0 +1,247 @@
+//! How particles fill the shape of a fluid so that they weigh what it does.
+//!
+//! A lattice seldom divides a shape. Its cells are therefore fitted: in a box that the fluid fills they are
+//! stretched along each axis so that whole layers reach from face to face, elsewhere their size is varied until
+//! their number times their volume is that of the fluid. What is left of the difference goes into the mass of the
+//! particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
+//!
+//! A scene that states how many particles there are and how large each is has no such freedom. It is filled as it
+//! says, from below or from the middle.
+
+use glam::DVec3;
+
+use super::{Experiment, refuse};
+use crate::Solid;
+use crate::compile::Error;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::field::{Field, Region};
+use crate::geom::Aabb;
+use crate::lower::Scene;
+use crate::solid::Bounds;
+use crate::sph::{Carved, FluidBlock, FluidShape, Obstacle, Particles, carve, make_room};
+
+/// Least distance of particles from obstacles at the start, over the spacing.
+const CLEARANCE: f64 = 0.5;
+
+/// Difference between the volume of a fluid and that of its cells at which the search for a spacing ends.
+const GOOD_ENOUGH: f64 = 1e-3;
+
+/// Difference between the masses of a particle that is not told from the error of the volume.
+const SAME: f64 = 3e-4;
+
+/// Lattices that are tried for one shape, at most.
+const TRIALS: usize = 6;
+
+/// Change of a particle's mass that is not made, because it is no rounding of a lattice any more.
+const TOO_FAR: f64 = 0.1;
+
+/// A fluid at the start.
+pub(super) struct Filling {
+    pub particles: Particles,
+    /// What carving removed.
+    pub carved: Carved,
+    /// Mass of a particle, kg.
+    pub mass: f64,
+    /// Volume of the fluid's shape in the box and outside all bodies, m³; `None` if it does not count.
+    pub volume: Option<f64>,
+}
+
+/// The mass of a particle, kg, for a scene that states a number of them and not how large they are; `None` for
+/// other scenes.
+pub(super) fn mass_by_number(scene: &Scene, shape: &Solid) -> Option<f64> {
+    let number = scene.fluid.particles.filter(|_| scene.fluid.size_span.is_none())?;
+    let within = match shape.bounds() {
+        Bounds::Within(bounds) => bounds.intersection(&scene.domain),
+        Bounds::Unbounded => scene.domain,
+        Bounds::Empty => return None,
+    };
+    let volume = Region { shape, bodies: Vec::new(), within }.volume();
+    (volume > 0.0 && volume.is_finite()).then(|| scene.fluid.density * volume / number as f64)
+}
+
+impl Experiment {
+    /// Places the particles.
+    pub(super) fn fill(&self, obstacles: &[Obstacle]) -> Result<Filling, Error> {
+        let fluid = &self.scene.fluid;
+        let mass = self.parameters.particle_mass;
+        let within = self.reach()?.intersection(&self.scene.domain);
+        if fluid.particles.is_some() && fluid.size_span.is_some() {
+            let (particles, carved) = self.place(obstacles, None, fluid.particles)?;
+            return Ok(Filling { particles, carved, mass, volume: None });
+        }
+        let bodies = self.bodies.iter().map(|body| &body.solid as &dyn Field).collect();
+        let volume = Region { shape: &self.fluid, bodies, within }.volume();
+        let (mut particles, carved, cell) = self.fit(obstacles, within, volume)?;
+        if let Some(number) = fluid.particles {
+            particles.truncate(number);
+        }
+        let fitted = fluid.density * volume / particles.len() as f64;
+        // a fluid of a few particles is not a lattice, and the volume itself is known to a part in ten thousand
+        let is_lattice = (fitted / (fluid.density * cell.element_product()) - 1.0).abs() < TOO_FAR;
+        let is_same = (fitted / mass - 1.0).abs() < SAME;
+        let mass = if is_lattice && !is_same { fitted } else { mass };
+        Ok(Filling { particles, carved, mass, volume: Some(volume) })
+    }
+
+    /// Places particles on the lattice that fits the shape best. Returns them, what was carved, and the size of the
+    /// lattice's cells.
+    fn fit(
+        &self,
+        obstacles: &[Obstacle],
+        within: Aabb,
+        volume: f64,
+    ) -> Result<(Particles, Carved, DVec3), Error> {
+        let wanted = self.scene.fluid.particles;
+        let spacing = self.parameters.spacing();
+        // a hair smaller than the box, whose faces have ω = 0
+        let is_box = self.fluid.range(&within.grown(-1e-6 * within.size().min_element())).lo > 0.0;
+        if is_box {
+            let cell = fitted_to(within.size(), spacing, wanted.filter(|_| obstacles.is_empty()));
+            let (particles, carved) = self.place(obstacles, Some(cell), None)?;
+            if wanted.is_none_or(|wanted| particles.len() >= wanted) {
+                return Ok((particles, carved, cell));
+            }
+        }
+        let mut best: Option<(f64, (Particles, Carved, DVec3))> = None;
+        let mut size = spacing;
+        for _ in 0..TRIALS {
+            let cell = DVec3::splat(size);
+            let (particles, carved) = self.place(obstacles, Some(cell), None)?;
+            let number = particles.len() as f64;
+            let enough = wanted.is_none_or(|wanted| particles.len() >= wanted);
+            let off = (number * size.powi(3) / volume).ln();
+            // with a number of particles the cells may be a little smaller, but not larger
+            let error = if enough { off.abs() } else { f64::INFINITY };
+            if best.as_ref().is_none_or(|(least, _)| error < *least) {
+                best = Some((error, (particles, carved, cell)));
+            }
+            if error < GOOD_ENOUGH {
+                break;
+            }
+            size *= match wanted {
+                Some(wanted) if !enough => (number / wanted as f64).cbrt() * (1.0 - 0.3 * GOOD_ENOUGH),
+                _ => (-off / 3.0).exp(),
+            };
+        }
+        match best {
+            Some((_, found)) => Ok(found),
+            None => Err(refuse(
+                &self.program,
+                Diagnostic::error(
+                    Code::SCENE_NO_ROOM,
+                    self.scene.fluid.shape_span,
+                    "no lattice fits the shape of the fluid",
+                ),
+            )),
+        }
+    }
+
+    /// Places particles at rest on a lattice with these cells, or with the spacing, and removes those that obstacles
+    /// leave no room for.
+    fn place(
+        &self,
+        obstacles: &[Obstacle],
+        cell: Option<DVec3>,
+        count: Option<usize>,
+    ) -> Result<(Particles, Carved), Error> {
+        let (fluid, domain) = (&self.scene.fluid, &self.scene.domain);
+        let block = FluidBlock {
+            shape: FluidShape::Field { field: &self.fluid, bounds: self.reach()?, fill: fluid.fill },
+            cell,
+            count,
+            allow_fewer: false,
+            velocity: DVec3::ZERO,
+            jitter: fluid.jitter,
+            seed: fluid.seed,
+        };
+        let mut particles = block.seed(&self.parameters, *domain).map_err(|e| self.no_fluid(&e))?;
+        let spacing = cell.map_or(self.parameters.spacing(), |cell| cell.element_product().cbrt());
+        let mut clearance = CLEARANCE * spacing;
+        if self.parameters.makes_room_at_start() {
+            // particles that are too near may move; only those that find no place are removed
+            make_room(&mut particles, domain, obstacles, clearance);
+            clearance *= 0.5;
+        }
+        let carved = carve(&mut particles, domain, obstacles, clearance).map_err(|e| self.no_fluid(&e))?;
+        Ok((particles, carved))
+    }
+
+    /// A warning if obstacles took particles, with the part of the fluid that this was.
+    pub(super) fn carving(
+        &self,
+        Filling { carved, mass, volume, particles }: &Filling,
+    ) -> Option<Diagnostic> {
+        let lost = carved.inside + carved.too_close + carved.outside_box;
+        if lost == 0 {
+            return None;
+        }
+        let mut message = format!(
+            "{lost} of the fluid's particles were carved off: {} in an obstacle, {} too close to one, {} \
+             outside the box; {} are left",
+            carved.inside, carved.too_close, carved.outside_box, carved.kept
+        );
+        if let Some(volume) = volume {
+            let (has, asked) = (mass * particles.len() as f64, self.scene.fluid.density * volume);
+            let off = has / asked - 1.0;
+            message += &if off.abs() < GOOD_ENOUGH {
+                ", as heavy as the free part of the shape".to_string()
+            } else {
+                format!(
+                    ", {:.1} % {} than the free part of the shape",
+                    100.0 * off.abs(),
+                    if off > 0.0 { "heavier" } else { "lighter" }
+                )
+            };
+        }
+        Some(Diagnostic::warning(Code::FLUID_IN_OBSTACLE, self.scene.fluid.shape_span, message))
+    }
+}
+
+/// The size of cells with a spacing about as given that fill a box; with a number of particles, not fewer than so
+/// many.
+fn fitted_to(size: DVec3, spacing: f64, number: Option<usize>) -> DVec3 {
+    let layers = (size / spacing).to_array().map(|n| (n.floor().max(1.0), n.ceil().max(1.0)));
+    let stretch = |counts: DVec3| {
+        let cell = size / counts;
+        cell.max_element() / cell.min_element()
+    };
+    let mut best: Option<(f64, DVec3)> = None;
+    for choice in 0..8 {
+        let pick = |axis: usize| if choice >> axis & 1 == 0 { layers[axis].0 } else { layers[axis].1 };
+        let counts = DVec3::new(pick(0), pick(1), pick(2));
+        let cells = counts.element_product();
+        let excess = match number {
+            Some(number) if cells < number as f64 => continue,
+            Some(number) => cells / number as f64,
+            // as near as may be to the spacing that is asked for
+            None => (size.element_product() / cells / spacing.powi(3)).ln().abs().exp(),
+        };
+        let badness = stretch(counts).ln() + excess.ln();
+        if best.is_none_or(|(least, _)| badness < least) {
+            best = Some((badness, counts));
+        }
+    }
+    size / best.map_or(DVec3::from_array(layers.map(|(_, most)| most)), |(_, counts)| counts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_fill_a_box_with_whole_layers() {
+        let size = DVec3::new(1.0, 0.5, 0.26);
+        let cell = fitted_to(size, 0.05, None);
+        let counts = size / cell;
+        assert_eq!(counts.round(), DVec3::new(20.0, 10.0, 5.0));
+        assert!((counts - counts.round()).abs().max_element() < 1e-12);
+        // enough layers for a number of particles
+        let cell = fitted_to(size, 0.05, Some(1001));
+        assert_eq!((size / cell).round(), DVec3::new(20.0, 10.0, 6.0));
+        // a box thinner than the spacing holds one layer
+        assert_eq!(
+            (DVec3::new(1.0, 1.0, 0.01) / fitted_to(DVec3::new(1.0, 1.0, 0.01), 0.1, None)).round().z,
+            1.0
+        );
+    }
+}

@@ -1,0 +1,121 @@
+//! A box cut by the surface ω = 0, by tetrahedra: the surface in it, and the volume inside.
+//!
+//! In each of the six tetrahedra along the box's diagonal the surface is a plane through its crossings with the
+//! edges. Neighbouring boxes share their crossings, so a surface cut by many boxes has no gaps.
+
+use glam::DVec3;
+
+/// The six tetrahedra of a box along its diagonal, by the numbers of its corners (x + 2y + 4z).
+const TETRAHEDRA: [[usize; 4]; 6] =
+    [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
+
+/// What lies in a box that a surface cuts.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Cut {
+    /// The area of the surface times its normal out of the inside, m².
+    pub area: DVec3,
+    /// The middle of the surface, m; the origin if there is none.
+    pub middle: DVec3,
+    /// The volume where ω ≥ 0, m³.
+    pub inside: f64,
+}
+
+/// ω = 0 counts as inside, as it does where particles meet obstacles.
+pub(crate) fn is_inside(omega: f64) -> bool {
+    omega >= 0.0
+}
+
+/// Cuts the box with these corners, in the order of [`Aabb::corners`](crate::geom::Aabb::corners), and the values of ω
+/// there.
+pub(crate) fn cut(corners: &[DVec3; 8], values: &[f64; 8], omega: &dyn Fn(DVec3) -> f64) -> Cut {
+    let (mut area, mut moment, mut whole, mut inside) = (DVec3::ZERO, DVec3::ZERO, 0.0, 0.0);
+    for tetrahedron in TETRAHEDRA {
+        let place = |k: usize| corners[k];
+        let crossing = |i: usize, o: usize| crossing((corners[i], values[i]), (corners[o], values[o]), omega);
+        let (within, without): (Vec<usize>, Vec<usize>) =
+            tetrahedron.into_iter().partition(|&k| is_inside(values[k]));
+        let polygon: Vec<DVec3> = match (&within[..], &without[..]) {
+            (&[a], &[p, q, r]) => {
+                let polygon = vec![crossing(a, p), crossing(a, q), crossing(a, r)];
+                inside += volume(place(a), polygon[0], polygon[1], polygon[2]);
+                polygon
+            }
+            (&[a, b, c], &[p]) => {
+                let polygon = vec![crossing(a, p), crossing(b, p), crossing(c, p)];
+                inside += volume(place(a), place(b), place(c), place(p))
+                    - volume(place(p), polygon[0], polygon[1], polygon[2]);
+                polygon
+            }
+            (&[a, b], &[p, q]) => {
+                let polygon = vec![crossing(a, p), crossing(a, q), crossing(b, q), crossing(b, p)];
+                // a prism from the triangle at a to that at b
+                inside += volume(place(a), polygon[0], polygon[1], polygon[2])
+                    + volume(place(a), polygon[0], polygon[2], polygon[3])
+                    + volume(place(a), place(b), polygon[2], polygon[3]);
+                polygon
+            }
+            (&[a, b, c, d], []) => {
+                inside += volume(place(a), place(b), place(c), place(d));
+                continue;
+            }
+            _ => continue, // nothing is inside
+        };
+        let out = place(without[0]) - place(within[0]);
+        for k in 2..polygon.len() {
+            let [a, b, c] = [polygon[0], polygon[k - 1], polygon[k]];
+            let twice = (b - a).cross(c - a);
+            let half = 0.5 * if twice.dot(out) < 0.0 { -twice } else { twice };
+            let size = half.length();
+            area += half;
+            moment += size / 3.0 * (a + b + c);
+            whole += size;
+        }
+    }
+    Cut { area, middle: if whole > 0.0 { moment / whole } else { DVec3::ZERO }, inside }
+}
+
+/// The volume of a tetrahedron.
+fn volume(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
+    (b - a).cross(c - a).dot(d - a).abs() / 6.0
+}
+
+/// Where the surface crosses an edge, from a corner inside to one outside, with their ω.
+fn crossing(
+    (inside, w_in): (DVec3, f64),
+    (outside, w_out): (DVec3, f64),
+    omega: &dyn Fn(DVec3) -> f64,
+) -> DVec3 {
+    let between = |a: DVec3, w_a: f64, b: DVec3, w_b: f64| {
+        let part = w_a / (w_a - w_b);
+        a.lerp(b, if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.5 })
+    };
+    let first = between(inside, w_in, outside, w_out);
+    let w = omega(first);
+    if is_inside(w) { between(first, w, outside, w_out) } else { between(inside, w_in, first, w) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Aabb;
+
+    /// A plane cuts a box exactly, however it lies.
+    #[test]
+    fn planes_cut_exactly() {
+        let unit = Aabb::new(DVec3::ZERO, DVec3::new(1.0, 2.0, 0.5));
+        let corners = unit.corners();
+        for (normal, offset) in [(DVec3::X, 0.3), (DVec3::Z, 0.5), (DVec3::new(1.0, 2.0, -0.7), 1.1)] {
+            let omega = |p: DVec3| offset - normal.dot(p);
+            let found = cut(&corners, &corners.map(omega), &omega);
+            // by a grid of points
+            let n = 120;
+            let points =
+                (0..n * n * n).map(|k| DVec3::new((k % n) as f64, (k / n % n) as f64, (k / n / n) as f64));
+            let below = points.filter(|p| omega((p + 0.5) / f64::from(n) * unit.max) > 0.0).count();
+            let volume = below as f64 / f64::from(n).powi(3);
+            assert!((found.inside - volume).abs() < 2e-3, "{} {volume}", found.inside);
+            assert!(found.area.length() > 0.0 && found.area.cross(normal).length() < 1e-12, "{}", found.area);
+            assert!(found.area.dot(normal) > 0.0 && omega(found.middle).abs() < 1e-12);
+        }
+    }
+}
