@@ -11,7 +11,7 @@ use rfm::diagnostic::{is_hidden, printable, printable_line};
 
 use super::failure::{Failure, complain};
 
-/// Beginning of the names of temporary files.
+/// Beginning of the names of temporary files. The name of the file that is written follows.
 pub(super) const TEMPORARY: &str = ".rfm-";
 
 /// Writes a file through a callback. If anything fails, a file that was there before is unchanged.
@@ -34,7 +34,9 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
             format!("cannot write `{}`: the folder `{}` does not exist", path.shown(), folder.shown());
         return Err(Failure::usage(message));
     }
-    let temporary = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(folder).map_err(failed)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let prefix = format!("{TEMPORARY}{name}-");
+    let temporary = tempfile::Builder::new().prefix(&prefix).tempfile_in(folder).map_err(failed)?;
     let mut writer = BufWriter::new(temporary);
     fill(&mut writer).map_err(failed)?;
     let temporary = writer.into_inner().map_err(|e| failed(e.into_error()))?;

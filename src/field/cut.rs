@@ -104,7 +104,7 @@ mod tests {
     fn planes_cut_exactly() {
         let unit = Aabb::new(DVec3::ZERO, DVec3::new(1.0, 2.0, 0.5));
         let corners = unit.corners();
-        for (normal, offset) in [(DVec3::X, 0.3), (DVec3::Z, 0.5), (DVec3::new(1.0, 2.0, -0.7), 1.1)] {
+        for (normal, offset) in [(DVec3::X, 0.3), (DVec3::Z, 0.2), (DVec3::new(1.0, 2.0, -0.7), 1.1)] {
             let omega = |p: DVec3| offset - normal.dot(p);
             let found = cut(&corners, &corners.map(omega), &omega);
             // by a grid of points

@@ -282,12 +282,12 @@ fn two_runs_never_share_a_folder() {
     // a run that is killed leaves its lock to nobody, and its temporary files to the next
     first.kill().unwrap();
     first.wait().unwrap();
-    for part in ["out/.rfm-abc", "out/frames/.rfm-def"] {
+    for part in ["out/.rfm-summary.json-abc", "out/frames/.rfm-def"] {
         std::fs::write(here.join(part), "half a file").unwrap();
     }
     run(here, &["out", "--force", "--until", "0.02"]).expect(0);
     for part in ["out", "out/frames", "out/checkpoints", "out/probes"] {
-        assert!(names(&here.join(part)).iter().all(|name| !name.starts_with(".rfm")), "{part}");
+        assert!(names(&here.join(part)).iter().all(|name| !name.starts_with(".rfm-")), "{part}");
     }
 }
 

@@ -14,19 +14,15 @@ use super::checkpoints;
 const LOCK: &str = ".rfm.lock";
 
 /// Folders within that of a run.
-const PARTS: [&str; 5] = ["", "frames", "pictures", "checkpoints", "probes"];
+const PARTS: [&str; 4] = ["frames", "pictures", "checkpoints", "probes"];
 
-/// The right to write into a folder, until it is dropped.
+/// Beginnings of the names of files that a run writes beside these folders.
+const FILES: [&str; 3] = ["summary", "particles", "obstacle"];
+
+/// The right to write into a folder, until it is dropped. The file with the lock stays: if it were removed, another run
+/// could hold the lock of the removed file while a third locks a new one.
 pub(super) struct Hold {
-    path: PathBuf,
     _lock: File,
-}
-
-impl Drop for Hold {
-    fn drop(&mut self) {
-        // it is still locked, so nobody else has it; a file that stays behind is unlocked and harms nobody
-        let _ = std::fs::remove_file(&self.path);
-    }
 }
 
 /// The folder for a run's files. The default is beside the file, `pawn.rfm` → `pawn.out`; for standard input
@@ -90,17 +86,23 @@ impl Hold {
             // some network folders cannot be locked
             Err(TryLockError::Error(e)) => note(format!("`{}` cannot be locked: {e}", folder.shown())),
         }
+        // the folder may be one that other commands write into, too
+        remove_temporaries(folder, &FILES);
         for part in PARTS {
-            remove_temporaries(&folder.join(part));
+            remove_temporaries(&folder.join(part), &[""]);
         }
-        Ok(Self { path, _lock: lock })
+        Ok(Self { _lock: lock })
     }
 }
 
-/// Removes files that a killed run was writing. One that cannot be removed harms nobody.
-fn remove_temporaries(folder: &Path) {
+/// Removes files that a killed run was writing, by the beginnings of their names. One that cannot be removed harms
+/// nobody.
+fn remove_temporaries(folder: &Path, names: &[&str]) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_of_run = |rest: &str| names.iter().any(|beginning| rest.starts_with(beginning));
+        if name.strip_prefix(TEMPORARY).is_some_and(is_of_run) {
             let _ = std::fs::remove_file(entry.path());
         }
     }

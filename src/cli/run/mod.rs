@@ -43,6 +43,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let folder = folder::of(options);
     if options.dry_run {
         let goal = Goal::of(options, &experiment)?;
+        frames_fit(options, goal, &experiment)?;
         return forecast::dry_run(shared, options, &experiment, goal);
     }
     folder::may_be_written(&folder, options)?;
@@ -56,6 +57,8 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let goal = Goal::of(options, &experiment)?;
     frames_fit(options, goal, &experiment)?;
     let _held = held.map_or_else(|| Hold::take(&folder), Ok)?;
+    // another run may have ended in the meantime
+    folder::may_be_written(&folder, options)?;
     let mut recording = Recording {
         frames: Frames::new(options, &experiment, resumed.as_ref())?,
         probes: Probes::start(&folder, experiment.scene(), &mut simulation, resumed.as_ref())?,
