@@ -104,23 +104,26 @@ impl Experiment {
         }
         let mut best: Option<(f64, (Particles, Carved, DVec3))> = None;
         let mut size = spacing;
+        // along how many axes the cells may change
+        let free =
+            (self.cell(within, 2.0 * spacing) / self.cell(within, spacing)).map(f64::log2).element_sum();
         for _ in 0..TRIALS {
-            let cell = DVec3::splat(size);
+            let cell = self.cell(within, size);
             let (particles, carved) = self.place(obstacles, Some(cell), None)?;
             let number = particles.len() as f64;
             let enough = wanted.is_none_or(|wanted| particles.len() >= wanted);
-            let off = (number * size.powi(3) / volume).ln();
+            let off = (number * cell.element_product() / volume).ln();
             // with a number of particles the cells may be a little smaller, but not larger
             let error = if enough { off.abs() } else { f64::INFINITY };
             if best.as_ref().is_none_or(|(least, _)| error < *least) {
                 best = Some((error, (particles, carved, cell)));
             }
-            if error < GOOD_ENOUGH {
+            if error < GOOD_ENOUGH || free == 0.0 {
                 break;
             }
             size *= match wanted {
                 Some(wanted) if !enough => (number / wanted as f64).cbrt() * (1.0 - 0.3 * GOOD_ENOUGH),
-                _ => (-off / 3.0).exp(),
+                _ => (-off / free).exp(),
             };
         }
         match best {
@@ -136,6 +139,36 @@ impl Experiment {
         }
     }
 
+    /// Cells of about a size, m, of which whole layers reach from wall to wall where the fluid does.
+    fn cell(&self, within: Aabb, size: f64) -> DVec3 {
+        let domain = self.scene.domain;
+        DVec3::from_array(std::array::from_fn(|axis| {
+            let spans = within.min[axis] <= domain.min[axis] && within.max[axis] >= domain.max[axis];
+            let length = within.size()[axis];
+            if spans { length / (length / self.parameters.spacing()).round().max(1.0) } else { size }
+        }))
+    }
+
+    /// The box of a lattice with these cells: it begins at a wall of the box where the fluid touches one, and lies in
+    /// the middle of the fluid's bounds elsewhere, so that what is symmetric stays so.
+    fn lattice_box(&self, within: Aabb, cell: DVec3) -> Aabb {
+        let domain = self.scene.domain;
+        let layers = (within.size() / cell + 1e-9).floor();
+        let spare = within.size() - layers * cell;
+        let before = DVec3::from_array(std::array::from_fn(|axis| {
+            let low = within.min[axis] <= domain.min[axis];
+            let high = within.max[axis] >= domain.max[axis];
+            match (low, high) {
+                (true, _) => 0.0,
+                (false, true) => spare[axis],
+                (false, false) => 0.5 * spare[axis],
+            }
+        }));
+        // a hair more room, so that rounding does not take a layer
+        let min = within.min + before;
+        Aabb::new(min, min + layers * cell * (1.0 + 1e-12))
+    }
+
     /// Places particles at rest on a lattice with these cells, or with the spacing, and removes those that obstacles
     /// leave no room for.
     fn place(
@@ -145,8 +178,10 @@ impl Experiment {
         count: Option<usize>,
     ) -> Result<(Particles, Carved), Error> {
         let (fluid, domain) = (&self.scene.fluid, &self.scene.domain);
+        let reach = self.reach()?;
+        let bounds = cell.map_or(reach, |cell| self.lattice_box(reach.intersection(domain), cell));
         let block = FluidBlock {
-            shape: FluidShape::Field { field: &self.fluid, bounds: self.reach()?, fill: fluid.fill },
+            shape: FluidShape::Field { field: &self.fluid, bounds, fill: fluid.fill },
             cell,
             count,
             allow_fewer: false,

@@ -7,6 +7,7 @@
 
 mod declaration;
 mod dfsph;
+mod free_bodies;
 mod negative_pressure;
 mod numerics;
 mod paper;

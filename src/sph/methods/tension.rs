@@ -12,11 +12,13 @@
 //! tangential moment Σ V c f·½(r² − (r·n̂)²). This is exact where the normals turn evenly (Sirotkin & Yoh
 //! 2012 renormalise the full matrix).
 //!
-//! Walls count as fluid: a surface meets a wall at a right angle.
+//! Walls count as fluid: a surface meets a wall at a right angle. The forces on a body of fluid that touches no wall
+//! have neither a resultant nor a torque ([`free_bodies`]).
 
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
+use super::free_bodies;
 use crate::sph::{
     core::{Core, add_scaled},
     kernel::Wendland,
@@ -68,6 +70,7 @@ impl Tension {
         let Vectors { x, y, z } = &mut self.force;
         core.sum(&pass, [&dx[..], dy, dz, &self.weight], [x, y, z]);
 
+        free_bodies::balance(core, &mut self.force, &self.weight);
         add_scaled(&mut core.acceleration, &self.force, 1.0);
     }
 
