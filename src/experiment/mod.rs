@@ -33,8 +33,6 @@ use crate::lower::{Fluid, Gravity, Scene};
 use crate::sph::{Checkpoint, Obstacle, Parameters, Particles, SetupError, Simulation, VectorField};
 use crate::{Engine, Program, Solid};
 
-use filling::Filling;
-
 pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
 pub use every::Every;
@@ -138,7 +136,7 @@ impl Experiment {
         let obstacles = self.obstacles();
         let filling = self.fill(&obstacles)?;
         let warning = self.carving(&filling);
-        let Filling { mut particles, carved, mass, .. } = filling;
+        let filling::Filling { mut particles, carved, mass, .. } = filling;
         self.set_in_motion(&mut particles);
         let parameters = Parameters { particle_mass: mass, ..self.parameters.clone() };
         put_under_pressure(&parameters, &mut particles);
