@@ -5,6 +5,9 @@
 //! their number times their volume is that of the fluid. What is left of the difference goes into the mass of the
 //! particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
 //!
+//! A fluid that must not be compressed and has no free surface gets the lattice as it is, less what is too near to a
+//! body: with all of its mass it would not fit between walls that take a little more than their volume.
+//!
 //! A scene that states how many particles there are and how large each is has no such freedom. It is filled as it
 //! says, from below or from the middle.
 
@@ -29,8 +32,11 @@ const GOOD_ENOUGH: f64 = 1e-3;
 /// Difference between the masses of a particle that is not told from the error of the volume.
 const SAME: f64 = 3e-4;
 
+/// Room of a scene over the volume of its fluid, from which on the fluid has a surface.
+const LEAST_ROOM: f64 = 1.03;
+
 /// Lattices that are tried for one shape, at most.
-const TRIALS: usize = 6;
+const TRIALS: usize = 8;
 
 /// Change of a particle's mass that is not made, because it is no rounding of a lattice any more.
 const TOO_FAR: f64 = 0.1;
@@ -71,13 +77,19 @@ impl Experiment {
         }
         let bodies = self.bodies.iter().map(|body| &body.solid as &dyn Field).collect();
         let volume = Region { shape: &self.fluid, bodies, within }.volume();
-        let (mut particles, carved, cell) = self.fit(obstacles, within, volume)?;
+        if self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume {
+            let (particles, carved) = self.place(obstacles, None, fluid.particles)?;
+            return Ok(Filling { particles, carved, mass, volume: Some(volume) });
+        }
+        let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume)?;
         if let Some(number) = fluid.particles {
             particles.truncate(number);
+            carved.kept = particles.len();
         }
         let fitted = fluid.density * volume / particles.len() as f64;
         // a fluid of a few particles is not a lattice, and the volume itself is known to a part in ten thousand
-        let is_lattice = (fitted / (fluid.density * cell.element_product()) - 1.0).abs() < TOO_FAR;
+        let is_lattice = fluid.particles.is_some()
+            || (fitted / (fluid.density * cell.element_product()) - 1.0).abs() < TOO_FAR;
         let is_same = (fitted / mass - 1.0).abs() < SAME;
         let mass = if is_lattice && !is_same { fitted } else { mass };
         Ok(Filling { particles, carved, mass, volume: Some(volume) })
@@ -113,8 +125,12 @@ impl Experiment {
             let number = particles.len() as f64;
             let enough = wanted.is_none_or(|wanted| particles.len() >= wanted);
             let off = (number * cell.element_product() / volume).ln();
-            // with a number of particles the cells may be a little smaller, but not larger
-            let error = if enough { off.abs() } else { f64::INFINITY };
+            // a number of particles is reached from above: the last of them are left out
+            let error = match wanted {
+                Some(wanted) if enough => (number / wanted as f64).ln(),
+                Some(_) => f64::INFINITY,
+                None => off.abs(),
+            };
             if best.as_ref().is_none_or(|(least, _)| error < *least) {
                 best = Some((error, (particles, carved, cell)));
             }
@@ -122,8 +138,9 @@ impl Experiment {
                 break;
             }
             size *= match wanted {
-                Some(wanted) if !enough => (number / wanted as f64).cbrt() * (1.0 - 0.3 * GOOD_ENOUGH),
-                _ => (-off / free).exp(),
+                Some(wanted) if enough => (number / wanted as f64).powf(0.7 / free),
+                Some(wanted) => (number / wanted as f64).powf(1.0 / free) * (1.0 - GOOD_ENOUGH),
+                None => (-off / free).exp(),
             };
         }
         match best {
@@ -192,7 +209,8 @@ impl Experiment {
         let mut particles = block.seed(&self.parameters, *domain).map_err(|e| self.no_fluid(&e))?;
         let spacing = cell.map_or(self.parameters.spacing(), |cell| cell.element_product().cbrt());
         let mut clearance = CLEARANCE * spacing;
-        if self.parameters.makes_room_at_start() {
+        let is_fitted = cell.is_some();
+        if self.parameters.makes_room_at_start() && (is_fitted || !self.parameters.keeps_density()) {
             // particles that are too near may move; only those that find no place are removed
             make_room(&mut particles, domain, obstacles, clearance);
             clearance *= 0.5;

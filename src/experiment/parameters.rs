@@ -28,7 +28,9 @@ pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
 /// All parameters except the time step, which is 1 s here. `mass` is that of a particle, kg.
 pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_speed: f64) -> Parameters {
     let (fluid, method) = (&scene.fluid, scene.method.fluid());
-    let usual = method.support.radius((mass / fluid.density).cbrt());
+    // a length that is stated for the usual particles grows with those of another size
+    let (stated, derived) = ((fluid.mass / fluid.density).cbrt(), (mass / fluid.density).cbrt());
+    let usual = method.support.radius(stated) * (derived / stated);
     Parameters {
         rest_density: fluid.density,
         particle_mass: mass,

@@ -70,6 +70,12 @@ impl Experiment {
                     )
                 })
             }
+            SeedError::TooLarge { sites }
+                if sites.is_finite() && fluid.size_span.is_none() && fluid.particles.is_some() =>
+            {
+                let message = format!("so many particles are too many: at most {MAX_SITES:.0e} are possible");
+                no_room(at, message).help(format!("write for example `particles: {:.0}`", 0.2 * MAX_SITES))
+            }
             SeedError::TooLarge { sites } if sites.is_finite() => {
                 let message = format!(
                     "with {} between particles the shape would hold {sites:.1e} of them; at most {MAX_SITES:.0e} are possible",

@@ -35,6 +35,8 @@ fn files(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        // what a run locks stays in its folder
+        .filter(|name| name != ".rfm.lock")
         .collect();
     names.sort();
     names
