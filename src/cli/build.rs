@@ -1,0 +1,138 @@
+//! `rfm build`: a solid as source text or object code for other programs, in the language that the file's ending
+//! names.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::args::{Build as Options, BuildWhat, Shared};
+use super::failure::{Failure, note};
+use super::{choose, input, output};
+use crate::cli::output::Shown;
+use rfm::source::{self, Target};
+use rfm::{Program, Solid};
+
+/// Functions with more operations than this take compilers of shaders and of Rust seconds to minutes.
+const MANY_OPERATIONS: usize = 5000;
+
+/// What a file can be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Source(Target),
+    Object,
+}
+
+pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
+    let path = options.output.as_deref().ok_or_else(no_output)?;
+    let kind = kind(path)?;
+    let program = input::program(shared, &options.file)?;
+    let solid = choose::solid(shared, &program, options.solid.as_deref())?;
+    let text_options = text_options(&program, &solid, options);
+    let made = match kind {
+        Kind::Source(target) => {
+            source::write(&solid, target, &text_options).map_err(|error| advised(&error, &solid))?
+        }
+        Kind::Object => return Err(Failure::usage("no objects yet")),
+    };
+    output::write(path, |out| out.write_all(made.text.as_bytes()))?;
+    let mut files = vec![path.to_path_buf()];
+    if let Some(header) = &made.header {
+        let beside = path.with_extension("h");
+        output::write(&beside, |out| out.write_all(header.as_bytes()))?;
+        files.push(beside);
+    }
+    if made.operations > MANY_OPERATIONS && !matches!(kind, Kind::Source(Target::C | Target::Header)) {
+        note(format!(
+            "`{}` has {} operations in straight lines: its compiler may take minutes; .c and .h have them in loops",
+            solid.name(),
+            made.operations
+        ));
+    }
+    report(shared, &solid, &files, made.operations)
+}
+
+/// What is written, as JSON.
+#[derive(Serialize)]
+struct Summary<'a> {
+    schema: u32,
+    solid: &'a str,
+    files: Vec<String>,
+    operations: usize,
+}
+
+fn report(shared: &Shared, solid: &Solid, files: &[PathBuf], operations: usize) -> Result<(), Failure> {
+    let shown: Vec<String> = files.iter().map(|file| file.shown()).collect();
+    if shared.json {
+        return output::json(&Summary { schema: 1, solid: solid.name(), files: shown, operations });
+    }
+    say!("{}: {operations} operations, written to {}", solid.name(), shown.join(" and "));
+    Ok(())
+}
+
+/// How the solid is written.
+fn text_options(program: &Program, solid: &Solid, options: &Options) -> source::Options {
+    let file = options.file.shown();
+    let mut origin =
+        vec![format!("Made by rfm {} from {file}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
+    let params: Vec<String> =
+        program.module().params.iter().map(|param| format!("{} = {:?}", param.name, param.value)).collect();
+    if !params.is_empty() {
+        origin.push(format!("Params: {}.", params.join(", ")));
+    }
+    source::Options {
+        prefix: options.prefix.clone(),
+        sign: options.what.contains(&BuildWhat::Sign),
+        distance: options.what.contains(&BuildWhat::Distance),
+        precisions: options.precision.clone(),
+        math: options.math.into(),
+        params: Vec::new(),
+        origin: origin.into_iter().map(|line| line.replace("*/", "* /")).collect(),
+    }
+}
+
+/// What the ending of a path asks for.
+fn kind(path: &Path) -> Result<Kind, Failure> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if ending == "o" {
+        return Ok(Kind::Object);
+    }
+    Target::of_ending(&ending).map(Kind::Source).ok_or_else(|| {
+        Failure::usage(format!(
+            "cannot tell the language of `{}`: the ending must be {}",
+            path.shown(),
+            endings()
+        ))
+    })
+}
+
+fn endings() -> String {
+    let endings: Vec<String> = Target::ALL.iter().map(|target| format!(".{}", target.ending())).collect();
+    format!("{} or .o", endings.join(", "))
+}
+
+fn no_output() -> Failure {
+    Failure::usage(format!("no output: give -o FILE with the ending {}", endings()))
+}
+
+/// The error with what helps on the command line.
+fn advised(error: &source::SourceError, solid: &Solid) -> Failure {
+    use source::SourceError;
+    Failure::usage(match error {
+        SourceError::BadPrefix(prefix) if prefix == solid.name() => {
+            format!("{error}, by --prefix")
+        }
+        SourceError::NoSuchPrecision(..) => format!("{error}; leave out --precision"),
+        SourceError::NoSuchMath(..) => format!("{error}; leave out --math"),
+        SourceError::BadPrefix(_) | SourceError::NumberOutOfRange(_) => error.to_string(),
+    })
+}
+
+/// The help of `--output`.
+pub(super) fn output_help() -> String {
+    let targets: Vec<String> =
+        Target::ALL.iter().map(|target| format!(".{} {}", target.ending(), target.title())).collect();
+    format!(
+        "Where it goes; the ending chooses the language: {}; .o object code, with a header",
+        targets.join("; ")
+    )
+}
