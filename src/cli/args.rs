@@ -272,6 +272,12 @@ pub(super) struct Build {
     /// Whose sin, exp and so on are called
     #[arg(long, value_enum, default_value_t = BuildMath::System)]
     pub math: BuildMath,
+    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants
+    #[arg(long)]
+    pub runtime_params: bool,
+    /// The machine of an object file, as in x86_64-apple-darwin [default: this one, with all that its processor has]
+    #[arg(long, value_name = "TRIPLE")]
+    pub target: Option<String>,
     /// What all names begin with [default: the name of the solid]
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,

@@ -9,7 +9,8 @@ use super::args::{Build as Options, BuildWhat, Shared};
 use super::failure::{Failure, note};
 use super::{choose, input, output};
 use crate::cli::output::Shown;
-use rfm::source::{self, Target};
+use rfm::codegen::CodegenError;
+use rfm::source::{self, ObjectError, Param, Target};
 use rfm::{Program, Solid};
 
 /// Functions with more operations than this take compilers of shaders and of Rust seconds to minutes.
@@ -25,16 +26,29 @@ enum Kind {
 pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let path = options.output.as_deref().ok_or_else(no_output)?;
     let kind = kind(path)?;
+    if options.target.is_some() && kind != Kind::Object {
+        return Err(Failure::usage("--target is for .o files: source text is the same for all machines"));
+    }
     let program = input::program(shared, &options.file)?;
     let solid = choose::solid(shared, &program, options.solid.as_deref())?;
-    let text_options = text_options(&program, &solid, options);
+    let (solid, params) = if options.runtime_params { open(&program, &solid)? } else { (solid, Vec::new()) };
+    let text_options = text_options(&program, &solid, options, params);
     let made = match kind {
         Kind::Source(target) => {
-            source::write(&solid, target, &text_options).map_err(|error| advised(&error, &solid))?
+            let made =
+                source::write(&solid, target, &text_options).map_err(|error| advised(&error, &solid))?;
+            Made { bytes: made.text.into_bytes(), header: made.header, operations: made.operations }
         }
-        Kind::Object => return Err(Failure::usage("no objects yet")),
+        Kind::Object => {
+            let made = source::object(&solid, &text_options, options.target.as_deref());
+            let made = made.map_err(|error| match error {
+                ObjectError::Source(error) => advised(&error, &solid),
+                ObjectError::Codegen(error) => no_machine(&error, options.target.as_deref()),
+            })?;
+            Made { bytes: made.bytes, header: Some(made.header), operations: made.operations }
+        }
     };
-    output::write(path, |out| out.write_all(made.text.as_bytes()))?;
+    output::write(path, |out| out.write_all(&made.bytes))?;
     let mut files = vec![path.to_path_buf()];
     if let Some(header) = &made.header {
         let beside = path.with_extension("h");
@@ -43,12 +57,47 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     if made.operations > MANY_OPERATIONS && !matches!(kind, Kind::Source(Target::C | Target::Header)) {
         note(format!(
-            "`{}` has {} operations in straight lines: its compiler may take minutes; .c and .h have them in loops",
+            "`{}` has {} operations in straight lines, which may take its compiler minutes; .c and .h have them in \
+             loops",
             solid.name(),
             made.operations
         ));
     }
     report(shared, &solid, &files, made.operations)
+}
+
+/// What is written to files.
+struct Made {
+    bytes: Vec<u8>,
+    header: Option<String>,
+    operations: usize,
+}
+
+/// The solid with its params as arguments, and what they are.
+fn open(program: &Program, solid: &Solid) -> Result<(Solid, Vec<Param>), Failure> {
+    let (opened, fixed) = program.with_open_params().map_err(choose::usage)?;
+    let solid = opened.solid_with(solid.name(), rfm::Engine::Interpreter).map_err(choose::usage)?;
+    if !fixed.is_empty() {
+        note(format!(
+            "{} {} how a solid is built and {} as in the file",
+            fixed.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", "),
+            if fixed.len() == 1 { "decides" } else { "decide" },
+            if fixed.len() == 1 { "stays" } else { "stay" },
+        ));
+    }
+    let params = opened.module().params.iter();
+    let params = params.map(|p| Param { name: p.name.clone(), value: p.value, doc: p.doc.clone() });
+    Ok((solid, params.collect()))
+}
+
+/// The failure of a target that there is no code generator for.
+fn no_machine(error: &CodegenError, target: Option<&str>) -> Failure {
+    match target {
+        Some(target) => Failure::usage(format!(
+            "cannot make object code for `{target}`: {error}; a .c file can be compiled for any machine"
+        )),
+        None => Failure::usage(error),
+    }
 }
 
 /// What is written, as JSON.
@@ -70,14 +119,14 @@ fn report(shared: &Shared, solid: &Solid, files: &[PathBuf], operations: usize) 
 }
 
 /// How the solid is written.
-fn text_options(program: &Program, solid: &Solid, options: &Options) -> source::Options {
+fn text_options(program: &Program, solid: &Solid, options: &Options, params: Vec<Param>) -> source::Options {
     let file = options.file.shown();
     let mut origin =
         vec![format!("Made by rfm {} from {file}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
-    let params: Vec<String> =
+    let values: Vec<String> =
         program.module().params.iter().map(|param| format!("{} = {:?}", param.name, param.value)).collect();
-    if !params.is_empty() {
-        origin.push(format!("Params: {}.", params.join(", ")));
+    if !values.is_empty() && params.is_empty() {
+        origin.push(format!("Params: {}.", values.join(", ")));
     }
     source::Options {
         prefix: options.prefix.clone(),
@@ -85,7 +134,7 @@ fn text_options(program: &Program, solid: &Solid, options: &Options) -> source::
         distance: options.what.contains(&BuildWhat::Distance),
         precisions: options.precision.clone(),
         math: options.math.into(),
-        params: Vec::new(),
+        params,
         origin: origin.into_iter().map(|line| line.replace("*/", "* /")).collect(),
     }
 }

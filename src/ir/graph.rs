@@ -273,6 +273,15 @@ impl Graph {
         self.uses(root, Axis::T)
     }
 
+    /// The numbers of the parameters that a root depends on.
+    pub fn parameters(&self, root: Node) -> Vec<u32> {
+        let number = |node: Node| match self.expr(node) {
+            Expr::Parameter(number) => Some(number),
+            _ => None,
+        };
+        self.cone(root).into_iter().filter_map(number).collect()
+    }
+
     /// Whether a parameter occurs in what some roots depend on.
     pub fn uses_parameters(&self, roots: &[Node]) -> bool {
         let is_parameter = |expr: &Expr| matches!(expr, Expr::Parameter(_));

@@ -7,7 +7,7 @@ use super::language::{C, pair};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
-use super::{File, Math, SourceError};
+use super::{File, Math, OpenParam, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
 
@@ -48,11 +48,12 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
     for program in file.programs {
         functions.extend(writer.uniforms(program)?);
         for &precision in file.precisions {
-            let body = writer.body(program, precision)?;
+            let blocks = writer.blocks(program, precision);
+            let body = writer.body(program, precision, blocks.as_ref())?;
             operations.extend(body.operations.iter().map(|&op| (op, precision == Precision::F32)));
             functions.extend(body.lines);
-            functions.extend(writer.point(program, precision));
-            functions.extend(writer.columns(program, precision));
+            functions.extend(writer.point(program, precision, blocks.as_ref()));
+            functions.extend(writer.columns(program, precision, blocks.as_ref()));
             if flavour == Flavour::Cuda {
                 functions.extend(writer.kernel(program, precision));
             }
@@ -81,6 +82,45 @@ pub(super) fn header(file: &File<'_>) -> String {
     lines.push(String::new());
     lines.extend(writer.declarations());
     lines.extend(["", "#ifdef __cplusplus", "}", "#endif", "", "#endif"].map(String::from));
+    lines.join("\n") + "\n"
+}
+
+/// The name of the machine code of a program in an object file: for one point, or for blocks of points.
+pub(super) fn raw_name(file: &File<'_>, program: &Program, precision: Precision, blocks: bool) -> String {
+    let blocks = if blocks { "_blocks" } else { "" };
+    format!("{}_raw_{}{blocks}{}", file.prefix, program.question.name(), C.suffix(precision))
+}
+
+/// The name of the machine code that finds what depends on time and params alone.
+pub(super) fn raw_uniforms(file: &File<'_>, program: &Program) -> String {
+    format!("{}_raw_uniforms_{}", file.prefix, program.question.name())
+}
+
+/// The header of an object file: its machine code as the functions that a C file would have.
+pub(super) fn object_header(file: &File<'_>) -> String {
+    let writer = CFile { file, flavour: Flavour::Header };
+    let mut lines = vec!["/*".to_string()];
+    lines.extend(file.title().iter().map(|line| format!(" * {line}")));
+    lines.push(
+        " * Functions of the object file beside it, with the bits of rfm. Columns must not overlap.".into(),
+    );
+    lines.push(" */".into());
+    lines.extend(writer.macros());
+    lines.extend(writer.params());
+    lines.extend(["", "#ifdef __cplusplus", "extern \"C\" {", "#endif"].map(String::from));
+    for program in file.programs {
+        lines.extend(writer.raw_declarations(program));
+    }
+    lines.extend(["#ifdef __cplusplus", "}", "#endif"].map(String::from));
+    for program in file.programs {
+        lines.extend(writer.raw_uniforms_call(program));
+        for &precision in file.precisions {
+            lines.extend(writer.raw_at(program, precision));
+            lines.extend(writer.point(program, precision, None));
+            lines.extend(writer.raw_columns(program, precision));
+        }
+    }
+    lines.extend(["", "#endif"].map(String::from));
     lines.join("\n") + "\n"
 }
 
@@ -159,7 +199,7 @@ impl CFile<'_> {
             "#if defined(__GNUC__) || defined(__clang__)".into(),
             format!("#define RFM_INLINE static inline {qualifiers}__attribute__((always_inline, unused))"),
             "#else".into(),
-            format!("#define RFM_INLINE static inline {qualifiers}"),
+            format!("#define RFM_INLINE static inline {qualifiers}").trim_end().to_string(),
             "#endif".into(),
             "#if defined(__GNUC__) || defined(__clang__) || defined(_MSC_VER)".into(),
             "#define RFM_RESTRICT __restrict".into(),
@@ -173,20 +213,20 @@ impl CFile<'_> {
 
     /// The structure of params, with the values of the file.
     fn params(&self) -> Vec<String> {
-        let File { prefix, options, fields, .. } = self.file;
-        if options.params.is_empty() {
+        let File { prefix, params, .. } = self.file;
+        if params.is_empty() {
             return Vec::new();
         }
         let mut lines = vec![String::new(), "/* The params of the file, in SI units. */".into()];
         lines.push("typedef struct {".into());
-        for (param, field) in options.params.iter().zip(fields) {
+        for OpenParam { param, field, .. } in params {
             let doc =
                 param.doc.as_ref().map_or(String::new(), |doc| format!(": {}", doc.replace("*/", "* /")));
             lines.push(format!("    double {field}; /* {} = {:?}{doc} */", param.name, param.value));
         }
         lines.push(format!("}} {prefix}_params;"));
         let values: Vec<String> =
-            options.params.iter().filter_map(|param| C.constant(param.value, Precision::F64)).collect();
+            params.iter().filter_map(|open| C.constant(open.param.value, Precision::F64)).collect();
         let comment = "/* The values that the file gives them: start from a copy. */";
         lines.extend([comment.into(), "#if defined(__GNUC__) || defined(__clang__)".into()]);
         lines.extend(["__attribute__((unused))".into(), "#endif".to_string()]);
@@ -197,7 +237,7 @@ impl CFile<'_> {
     /// Arguments between the point and the results.
     fn extra_arguments(&self) -> String {
         let time = if self.file.moves { ", double t" } else { "" };
-        let params = if self.file.options.params.is_empty() {
+        let params = if self.file.params.is_empty() {
             String::new()
         } else {
             format!(", const {}_params *p", self.file.prefix)
@@ -206,7 +246,7 @@ impl CFile<'_> {
     }
 
     fn extra_values(&self) -> &'static str {
-        match (self.file.moves, self.file.options.params.is_empty()) {
+        match (self.file.moves, self.file.params.is_empty()) {
             (false, true) => "",
             (true, true) => ", t",
             (false, false) => ", p",
@@ -290,6 +330,7 @@ impl CFile<'_> {
             axes,
             parameter,
             uniform,
+            gathered: None,
             values: "v",
             own_power: false,
         }
@@ -303,7 +344,7 @@ impl CFile<'_> {
     fn uniforms(&self, program: &Program) -> Result<Vec<String>, SourceError> {
         let Some((graph, roots)) = &program.uniforms else { return Ok(Vec::new()) };
         let names = self.names();
-        let parameter = |i: u32| format!("p->{}", self.file.fields[i as usize]);
+        let parameter = |i: u32| format!("p->{}", self.file.field(i));
         let writer = self.writer(&names, Precision::F64, &|_| String::new(), &parameter);
         let forms = Forms::default();
         let made = writer.statements(&Part { graph, inputs: &[], outputs: roots, forms: &forms })?;
@@ -316,7 +357,7 @@ impl CFile<'_> {
         if self.file.moves && !roots.iter().any(|&root| graph.uses_time(root)) {
             lines.push("    (void)t;".into());
         }
-        if !self.file.options.params.is_empty() && !graph.uses_parameters(roots) {
+        if !self.file.params.is_empty() && !graph.uses_parameters(roots) {
             lines.push("    (void)p;".into());
         }
         lines.push("}".into());
@@ -331,7 +372,7 @@ impl CFile<'_> {
             if self.file.moves {
                 lines.push("    (void)t;".into());
             }
-            if !self.file.options.params.is_empty() {
+            if !self.file.params.is_empty() {
                 lines.push("    (void)p;".into());
             }
             return lines;
@@ -367,12 +408,17 @@ impl CFile<'_> {
         Blocks::of(program, precision)
     }
 
-    fn body(&self, program: &Program, precision: Precision) -> Result<Body, SourceError> {
+    fn body(
+        &self,
+        program: &Program,
+        precision: Precision,
+        blocks: Option<&Blocks>,
+    ) -> Result<Body, SourceError> {
         let names = self.names();
         let parameter = |_: u32| String::new();
         let uniform = |i: u32| format!("u[{i}]");
         let writer = self.writer(&names, precision, &uniform, &parameter);
-        if let Some(blocks) = self.blocks(program, precision) {
+        if let Some(blocks) = blocks {
             let made = blocks.write(&writer, &self.at_name(program, precision), program)?;
             return Ok(Body { lines: made.lines, operations: made.operations });
         }
@@ -411,7 +457,7 @@ impl CFile<'_> {
     }
 
     /// The function for one point.
-    fn point(&self, program: &Program, precision: Precision) -> Vec<String> {
+    fn point(&self, program: &Program, precision: Precision, blocks: Option<&Blocks>) -> Vec<String> {
         let question = program.question;
         let mut lines = vec![
             String::new(),
@@ -420,7 +466,7 @@ impl CFile<'_> {
         lines.extend(self.fill_uniforms(program, precision));
         let (number, name) = (C.number(precision), self.at_name(program, precision));
         let u = if program.uniforms.is_some() { ", u" } else { "" };
-        if let Some(blocks) = self.blocks(program, precision) {
+        if let Some(blocks) = blocks {
             lines.extend(blocks.point(&name, number, question));
         } else if question == Question::Gradient {
             lines.push(format!("    const {} all = {name}(x, y, z{u});", self.answer(precision)));
@@ -435,7 +481,7 @@ impl CFile<'_> {
     }
 
     /// The function for columns.
-    fn columns(&self, program: &Program, precision: Precision) -> Vec<String> {
+    fn columns(&self, program: &Program, precision: Precision, blocks: Option<&Blocks>) -> Vec<String> {
         let question = program.question;
         let signature = self
             .columns_signature(question, precision)
@@ -445,7 +491,7 @@ impl CFile<'_> {
         lines.extend(self.fill_uniforms(program, precision));
         let (number, name) = (C.number(precision), self.at_name(program, precision));
         let u = if program.uniforms.is_some() { ", u" } else { "" };
-        if let Some(blocks) = self.blocks(program, precision) {
+        if let Some(blocks) = blocks {
             lines.extend(blocks.columns(&name, number, question));
             lines.push("}".into());
             return lines;
@@ -463,6 +509,103 @@ impl CFile<'_> {
         lines
     }
 
+    fn raw_declarations(&self, program: &Program) -> Vec<String> {
+        let mut lines = Vec::new();
+        if program.uniforms.is_some() {
+            let params = if self.file.params.is_empty() { "" } else { ", const double *params" };
+            let name = raw_uniforms(self.file, program);
+            lines.push(format!("void {name}(double t, double none, double nothing, double *u{params});"));
+        }
+        for &precision in self.file.precisions {
+            let number = C.number(precision);
+            let u = if program.uniforms.is_some() { format!(", const {number} *u") } else { String::new() };
+            let [point, blocks] = [false, true].map(|blocks| raw_name(self.file, program, precision, blocks));
+            lines.push(format!("void {point}({number} x, {number} y, {number} z, {number} *out{u});"));
+            lines.push(format!("void {blocks}({number} *const *columns, size_t blocks{u});"));
+        }
+        lines
+    }
+
+    fn raw_uniforms_call(&self, program: &Program) -> Vec<String> {
+        if program.uniforms.is_none() {
+            return Vec::new();
+        }
+        let arguments = self.extra_arguments();
+        let time = if self.file.moves { "t" } else { "0.0" };
+        let params = if self.file.params.is_empty() { "" } else { ", (const double *)p" };
+        vec![
+            String::new(),
+            format!(
+                "RFM_INLINE void {}({}, double *u) {{",
+                self.uniforms_name(program),
+                arguments.trim_start_matches(", ")
+            ),
+            format!("    {}({time}, 0.0, 0.0, u{params});", raw_uniforms(self.file, program)),
+            "}".into(),
+        ]
+    }
+
+    /// The function for one point that the others call, over the machine code.
+    fn raw_at(&self, program: &Program, precision: Precision) -> Vec<String> {
+        let (number, question) = (C.number(precision), program.question);
+        let results = question.results();
+        let many = results.len() > 1;
+        let mut lines = vec![String::new()];
+        if many {
+            lines.extend((C.structure)(&self.answer(precision), number, results));
+        }
+        let (arguments, u) = match program.uniforms {
+            Some(_) => (format!(", const {number} *u"), ", u"),
+            None => (String::new(), ""),
+        };
+        let result = if many { self.answer(precision) } else { number.into() };
+        let name = self.at_name(program, precision);
+        lines.push(format!("RFM_INLINE {result} {name}({number} x, {number} y, {number} z{arguments}) {{"));
+        lines.push(format!("    {number} out[{}];", results.len()));
+        if many {
+            lines.push(format!("    {result} all;"));
+        }
+        lines.push(format!("    {}(x, y, z, out{u});", raw_name(self.file, program, precision, false)));
+        if many {
+            let fields = results.iter().enumerate();
+            lines.extend(fields.map(|(i, field)| format!("    all.{field} = out[{i}];")));
+            lines.push("    return all;".into());
+        } else {
+            lines.push("    return out[0];".into());
+        }
+        lines.push("}".into());
+        lines
+    }
+
+    /// The function for columns over the machine code, which takes whole blocks; the last points come one by one.
+    fn raw_columns(&self, program: &Program, precision: Precision) -> Vec<String> {
+        let (number, question) = (C.number(precision), program.question);
+        let results = question.results();
+        let signature = self.columns_signature(question, precision);
+        let mut lines = vec![String::new(), format!("{}{signature} {{", self.flavour.linkage())];
+        lines.extend(self.fill_uniforms(program, precision));
+        let u = if program.uniforms.is_some() { ", u" } else { "" };
+        let lanes = precision.lanes();
+        lines.push(format!("    {number} *columns[{}];", 3 + results.len()));
+        lines.push("    size_t i;".into());
+        for (i, axis) in ["x", "y", "z"].iter().enumerate() {
+            lines.push(format!("    columns[{i}] = ({number} *){axis};"));
+        }
+        lines.extend(results.iter().enumerate().map(|(i, r)| format!("    columns[{}] = {r};", 3 + i)));
+        lines
+            .push(format!("    {}(columns, n / {lanes}{u});", raw_name(self.file, program, precision, true)));
+        lines.push(format!("    for (i = n / {lanes} * {lanes}; i < n; i++) {{"));
+        let call = format!("{}(x[i], y[i], z[i]{u})", self.at_name(program, precision));
+        if let [result] = results {
+            lines.push(format!("        {result}[i] = {call};"));
+        } else {
+            lines.push(format!("        const {} all = {call};", self.answer(precision)));
+            lines.extend(results.iter().map(|r| format!("        {r}[i] = all.{r};")));
+        }
+        lines.extend(["    }".into(), "}".to_string()]);
+        lines
+    }
+
     /// The kernel of CUDA for columns in the memory of the device.
     fn kernel(&self, program: &Program, precision: Precision) -> Vec<String> {
         let question = program.question;
@@ -470,7 +613,7 @@ impl CFile<'_> {
         let kernel = name.replace("_many", "_kernel");
         let signature = self.columns_signature(question, precision).replace(&name, &kernel);
         let signature = signature.replace(&format!(", const {}_params *p", self.file.prefix), "");
-        let params = if self.file.options.params.is_empty() {
+        let params = if self.file.params.is_empty() {
             String::new()
         } else {
             format!(", {}_params params", self.file.prefix)
@@ -480,7 +623,7 @@ impl CFile<'_> {
         let mut lines = vec![String::new(), "#ifdef __CUDACC__".into()];
         lines.push("/* Any number of threads: each takes every gridDim.x * blockDim.x-th point. */".into());
         lines.push(format!("static __global__ {signature} {{"));
-        if !self.file.options.params.is_empty() {
+        if !self.file.params.is_empty() {
             lines.push(format!("    const {}_params *p = &params;", self.file.prefix));
         }
         lines.push("    size_t i;".into());

@@ -4,6 +4,10 @@
 //! and differ in a table of constants, and each operation that joins them is a short loop. A solid of 500 balls is
 //! compiled as one ball.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+use super::c_chunks::{Chunk, chunks};
 use super::language::C;
 use super::operations::{Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
@@ -23,9 +27,15 @@ const CACHED_BYTES: usize = 24 << 10;
 const SHORTEST: usize = 32;
 const LONGEST: usize = 256;
 
+/// How the functions of a block write the coordinates of a point.
+const IN_COLUMNS: [&str; 4] = ["x[i]", "y[i]", "z[i]", "t"];
+
 /// A program as steps.
 pub(super) struct Blocks {
     plan: BlockPlan,
+    steps: Vec<Step>,
+    /// Columns of a block: those of the plan, and those that the chunks of long pieces hand on.
+    columns: usize,
     precision: Precision,
     /// Points of a block.
     points: usize,
@@ -33,7 +43,13 @@ pub(super) struct Blocks {
     has_uniforms: bool,
 }
 
-/// What a step does, as the number that the table has for it: its place in this list, counted from 1.
+/// A step of the plan, or a part of one.
+enum Step {
+    Planned(BlockStep),
+    Chunk { chunk: Chunk, reads: Vec<ColumnPlace>, writes: Vec<ColumnPlace> },
+}
+
+/// What a step does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Action {
     Piece(usize),
@@ -43,17 +59,48 @@ enum Action {
     Copy,
 }
 
+/// A function that steps call.
+struct Called {
+    name: String,
+    /// Whether it is a piece of arithmetic, which is given the points.
+    is_piece: bool,
+    has_constants: bool,
+    /// How many columns it is given.
+    columns: usize,
+}
+
+/// What is written for the steps.
+#[derive(Default)]
+struct Written {
+    made: Statements,
+    called: Vec<Called>,
+    constants: Vec<f64>,
+    /// The table: the number of a function, counted from 1, its constants and its columns.
+    table: Vec<i64>,
+    actions: Vec<(Action, usize)>,
+    /// Functions of chunks by their texts.
+    chunks: HashMap<String, usize>,
+}
+
 impl Blocks {
     /// `None` if the graph has no parts that would be steps.
     pub fn of(program: &Program, precision: Precision) -> Option<Self> {
         let plan = BlockPlan::new(&program.graph, &program.outputs, program.forms(precision))?;
+        let mut columns = plan.columns;
+        let mut steps = Vec::with_capacity(plan.steps.len());
+        for step in &plan.steps {
+            match divided(&plan, &program.graph, step, &mut columns) {
+                Some(chunks) => steps.extend(chunks),
+                None => steps.push(Step::Planned(step.clone())),
+            }
+        }
         let size = match precision {
             Precision::F64 => 8,
             Precision::F32 => 4,
         };
-        let fitting = CACHED_BYTES / (size * plan.columns.max(1));
+        let fitting = CACHED_BYTES / (size * columns.max(1));
         let points = (fitting / SHORTEST * SHORTEST).clamp(SHORTEST, LONGEST);
-        Some(Self { plan, precision, points, has_uniforms: program.uniforms.is_some() })
+        Some(Self { plan, steps, columns, precision, points, has_uniforms: program.uniforms.is_some() })
     }
 
     /// The functions and tables: in the end a function that evaluates one block.
@@ -63,38 +110,103 @@ impl Blocks {
         name: &str,
         program: &Program,
     ) -> Result<Statements, SourceError> {
-        let mut made = Statements::default();
+        let mut written = Written { constants: self.plan.constants.clone(), ..Written::default() };
+        for step in &self.steps {
+            match step {
+                Step::Planned(step) => {
+                    let called = self.planned(Action::of(step), name, (writer, program), &mut written)?;
+                    written.table.push(called as i64 + 1);
+                    written.table.extend(operands(step));
+                }
+                Step::Chunk { chunk, reads, writes } => {
+                    let function = format!("{name}_chunk{}", written.chunks.len());
+                    self.chunk(chunk, &function, (writer, program), &mut written)?;
+                    written.table.extend(reads.iter().chain(writes).map(column));
+                }
+            }
+        }
+        let Written { mut made, called, constants, table, .. } = written;
+        let lines = &mut made.lines;
         let number = c::number(self.precision);
-        for (i, piece) in self.plan.pieces.iter().enumerate() {
-            self.piece(piece, &format!("{name}_part{i}"), (writer, program), &mut made)?;
-        }
-        let actions = self.actions();
-        for &action in &actions {
-            self.action(action, name, writer, &mut made)?;
-        }
-        self.table(name, &actions, &mut made.lines);
-        if !self.plan.constants.is_empty() {
+        if !constants.is_empty() {
             let constants: Vec<String> =
-                self.plan.constants.iter().filter_map(|&value| C.constant(value, self.precision)).collect();
-            made.lines.push(String::new());
-            made.lines.push(format!("static const {number} {name}_constants[{}] = {{", constants.len()));
-            made.lines.extend(constants.chunks(8).map(|row| format!("    {},", row.join(", "))));
-            made.lines.push("};".into());
+                constants.iter().filter_map(|&value| C.constant(value, self.precision)).collect();
+            lines.push(String::new());
+            lines.push(format!("static const {number} {name}_constants[{}] = {{", constants.len()));
+            lines.extend(constants.chunks(8).map(|row| format!("    {},", row.join(", "))));
+            lines.push("};".into());
         }
-        self.run(name, &actions, program, &mut made.lines);
+        let numbers: Vec<String> = table.iter().chain([&0]).map(ToString::to_string).collect();
+        lines.push(String::new());
+        lines.push(format!("static const int {name}_steps[{}] = {{", numbers.len()));
+        lines.extend(numbers.chunks(20).map(|row| format!("    {},", row.join(", "))));
+        lines.push("};".into());
+        self.run(name, &called, lines);
         Ok(made)
     }
 
-    /// What the steps do, each once, in the order in which it is met.
-    fn actions(&self) -> Vec<Action> {
-        let mut actions: Vec<Action> = Vec::new();
-        for step in &self.plan.steps {
-            let action = Action::of(step);
-            if !actions.contains(&action) {
-                actions.push(action);
-            }
+    /// The number of the function for what a step of the plan does, which is written if it is new.
+    fn planned(
+        &self,
+        action: Action,
+        name: &str,
+        (writer, program): (&Writer<'_>, &Program),
+        written: &mut Written,
+    ) -> Result<usize, SourceError> {
+        if let Some((_, called)) = written.actions.iter().find(|(known, _)| *known == action) {
+            return Ok(*called);
         }
-        actions
+        let function = format!("{name}_{}", action.name());
+        let called = match action {
+            Action::Piece(number) => {
+                let piece = &self.plan.pieces[number];
+                self.piece(piece, &function, (writer, program), &mut written.made)?;
+                let columns = piece.inputs.len() + piece.outputs.len();
+                Called { name: function, is_piece: true, has_constants: piece.parameters > 0, columns }
+            }
+            Action::Join(..) | Action::Weighted(..) | Action::Negate | Action::Copy => {
+                self.action(action, &function, writer, &mut written.made)?;
+                Called { name: function, is_piece: false, has_constants: false, columns: action.columns() }
+            }
+        };
+        written.called.push(called);
+        written.actions.push((action, written.called.len() - 1));
+        Ok(written.called.len() - 1)
+    }
+
+    /// A chunk of a long piece: its function, if none has its text yet, and its first numbers in the table.
+    fn chunk(
+        &self,
+        chunk: &Chunk,
+        name: &str,
+        (writer, program): (&Writer<'_>, &Program),
+        written: &mut Written,
+    ) -> Result<(), SourceError> {
+        let gathered = RefCell::new(Vec::new());
+        let writer = Writer { axes: IN_COLUMNS, gathered: Some(&gathered), ..*writer };
+        let inputs: Vec<(Node, String)> =
+            chunk.reads.iter().enumerate().map(|(i, &node)| (node, format!("r{i}[i]"))).collect();
+        let forms = Forms::default(); // a piece has no R₀
+        let part = Part { graph: &program.graph, inputs: &inputs, outputs: &chunk.writes, forms: &forms };
+        let body = writer.statements(&part)?;
+        let text = body.lines.join("\n") + &body.outputs.join(",");
+        let constants = gathered.into_inner();
+        let known = written.chunks.get(&text).copied();
+        let called = known.unwrap_or_else(|| {
+            let has_constants = !constants.is_empty();
+            let counts = [chunk.reads.len(), chunk.writes.len()];
+            self.loop_of(name, counts, has_constants, &body, &mut written.made);
+            let columns = chunk.reads.len() + chunk.writes.len();
+            written.called.push(Called { name: name.into(), is_piece: true, has_constants, columns });
+            written.chunks.insert(text, written.called.len() - 1);
+            written.called.len() - 1
+        });
+        written.table.push(called as i64 + 1);
+        if !constants.is_empty() {
+            written.table.push(written.constants.len() as i64);
+            written.constants.extend(constants);
+        }
+        Ok(())
     }
 
     /// A piece of arithmetic as a loop over the points of a block.
@@ -109,48 +221,59 @@ impl Blocks {
         let inputs: Vec<(Node, String)> =
             piece.inputs.iter().enumerate().map(|(i, &node)| (node, format!("r{i}[i]"))).collect();
         let parameter = |i: u32| format!("c[{i}]");
-        let writer = Writer { axes: ["x[i]", "y[i]", "z[i]", "t"], parameter: &parameter, ..*writer };
+        let writer = Writer { axes: IN_COLUMNS, parameter: &parameter, ..*writer };
         let forms = Forms::default(); // a piece has no R₀
         let part = Part { graph, inputs: &inputs, outputs: &piece.outputs, forms: &forms };
         let body = writer.statements(&part)?;
-        made.operations.extend(body.operations);
+        let counts = [piece.inputs.len(), piece.outputs.len()];
+        self.loop_of(name, counts, piece.parameters > 0, &body, made);
+        Ok(())
+    }
+
+    /// A function that computes statements for the points of a block.
+    fn loop_of(
+        &self,
+        name: &str,
+        [reads, writes]: [usize; 2],
+        has_constants: bool,
+        body: &Statements,
+        made: &mut Statements,
+    ) {
+        made.operations.extend(&body.operations);
         let number = c::number(self.precision);
         let mut arguments = vec!["size_t n".to_string()];
         arguments.extend(["x", "y", "z"].map(|axis| format!("const {number} *RFM_RESTRICT {axis}")));
-        if program.uniforms.is_some() {
+        if self.has_uniforms {
             arguments.push(format!("const {number} *RFM_RESTRICT u"));
         }
-        if piece.parameters > 0 {
+        if has_constants {
             arguments.push(format!("const {number} *RFM_RESTRICT c"));
         }
-        let reads = (0..piece.inputs.len()).map(|i| format!("const {number} *RFM_RESTRICT r{i}"));
-        let writes = (0..piece.outputs.len()).map(|i| format!("{number} *RFM_RESTRICT w{i}"));
-        arguments.extend(reads.chain(writes));
+        arguments.extend((0..reads).map(|i| format!("const {number} *RFM_RESTRICT r{i}")));
+        arguments.extend((0..writes).map(|i| format!("{number} *RFM_RESTRICT w{i}")));
         let lines = &mut made.lines;
         lines.push(String::new());
         lines.push(format!("static void {name}({}) {{", arguments.join(", ")));
         lines.push("    size_t i;".into());
-        lines.push("    (void)x; (void)y; (void)z;".into());
-        if program.uniforms.is_some() {
-            lines.push("    (void)u;".into());
-        }
+        lines.push(format!(
+            "    (void)x; (void)y; (void)z;{}",
+            if self.has_uniforms { " (void)u;" } else { "" }
+        ));
         lines.push("    for (i = 0; i < n; i++) {".into());
         lines.extend(body.lines.iter().map(|line| format!("        {line}")));
         lines.extend(body.outputs.iter().enumerate().map(|(i, text)| format!("        w{i}[i] = {text};")));
         lines.extend(["    }".into(), "}".to_string()]);
-        Ok(())
     }
 
     /// The loop of an operation that joins columns.
     fn action(
         &self,
         action: Action,
-        name: &str,
+        function: &str,
         writer: &Writer<'_>,
         made: &mut Statements,
     ) -> Result<(), SourceError> {
         let number = c::number(self.precision);
-        let function = format!("{name}_{}", action.name());
         let column = |name: &str| format!("const {number} *RFM_RESTRICT {name}");
         let result = |name: &str| format!("{number} *RFM_RESTRICT {name}");
         let (arguments, body) = match action {
@@ -192,29 +315,12 @@ impl Blocks {
         Ok(())
     }
 
-    /// The steps: the number of an action, then its columns. Columns of the caller are −1, −2 …
-    fn table(&self, name: &str, actions: &[Action], lines: &mut Vec<String>) {
-        let mut numbers: Vec<String> = Vec::new();
-        for step in &self.plan.steps {
-            let action = Action::of(step);
-            let code = actions.iter().position(|known| *known == action).map_or(0, |i| i + 1);
-            numbers.push(code.to_string());
-            numbers.extend(operands(step).into_iter().map(|number| number.to_string()));
-        }
-        numbers.push("0".into());
-        lines.push(String::new());
-        lines.push(format!("static const int {name}_steps[{}] = {{", numbers.len()));
-        lines.extend(numbers.chunks(20).map(|row| format!("    {},", row.join(", "))));
-        lines.push("};".into());
-    }
-
-    /// The function that takes the steps for one block of points.
-    fn run(&self, name: &str, actions: &[Action], program: &Program, lines: &mut Vec<String>) {
+    /// The function that takes the steps for one block of points. Columns of the caller are −1, −2 …
+    fn run(&self, name: &str, called: &[Called], lines: &mut Vec<String>) {
         let number = c::number(self.precision);
-        let has_uniforms = program.uniforms.is_some();
-        let u = if has_uniforms { format!(", const {number} *u") } else { String::new() };
+        let u = if self.has_uniforms { format!(", const {number} *u") } else { String::new() };
         lines.push(String::new());
-        lines.push("/* n points at most as many as a column of its own has room for: `stride`. */".into());
+        lines.push("/* n points, as many as a column of its own has room for: stride. */".into());
         lines.push(format!(
             "static void {name}(size_t n, const {number} *x, const {number} *y, const {number} *z{u}, \
              {number} *columns, size_t stride, {number} *const *out) {{"
@@ -225,28 +331,19 @@ impl Blocks {
         );
         lines.push("    while (*s) {".into());
         lines.push("        switch (*s++) {".into());
-        for (i, &action) in actions.iter().enumerate() {
+        for (i, function) in called.iter().enumerate() {
             let mut arguments = vec!["n".to_string()];
-            let mut first = 0;
-            let mut columns = action.columns();
-            let mut function = format!("{name}_{}", action.name());
-            if let Action::Piece(number) = action {
-                let piece = &self.plan.pieces[number];
-                function = format!("{name}_part{number}");
+            if function.is_piece {
                 arguments.extend(["x", "y", "z"].map(String::from));
-                if has_uniforms {
-                    arguments.push("u".into());
-                }
-                if piece.parameters > 0 {
-                    arguments.push(format!("{name}_constants + s[0]"));
-                    first = 1;
-                }
-                columns = piece.inputs.len() + piece.outputs.len();
+                arguments.extend(self.has_uniforms.then(|| "u".to_string()));
             }
-            arguments.extend((first..first + columns).map(|k| format!("RFM_COLUMN({k})")));
+            arguments.extend(function.has_constants.then(|| format!("{name}_constants + s[0]")));
+            let first = usize::from(function.has_constants);
+            let last = first + function.columns;
+            arguments.extend((first..last).map(|k| format!("RFM_COLUMN({k})")));
             lines.push(format!("        case {}:", i + 1));
-            lines.push(format!("            {function}({});", arguments.join(", ")));
-            lines.push(format!("            s += {};", first + columns));
+            lines.push(format!("            {}({});", function.name, arguments.join(", ")));
+            lines.push(format!("            s += {last};"));
             lines.push("            break;".into());
         }
         lines.extend(["        default:", "            return;", "        }", "    }"].map(String::from));
@@ -258,7 +355,7 @@ impl Blocks {
     pub fn point(&self, name: &str, number: &str, question: Question) -> Vec<String> {
         let results = question.results();
         let u = self.uniforms_argument();
-        let mut lines = vec![format!("    {number} columns[{}];", self.plan.columns.max(1))];
+        let mut lines = vec![format!("    {number} columns[{}];", self.columns.max(1))];
         lines.push(format!("    {number} all[{}];", results.len()));
         let places: Vec<String> = (0..results.len()).map(|i| format!("all + {i}")).collect();
         lines.push(format!("    {number} *out[{}];", results.len()));
@@ -275,7 +372,7 @@ impl Blocks {
     pub fn columns(&self, name: &str, number: &str, question: Question) -> Vec<String> {
         let results = question.results();
         let u = self.uniforms_argument();
-        let (points, columns) = (self.points, self.plan.columns.max(1));
+        let (points, columns) = (self.points, self.columns.max(1));
         let mut lines = vec![
             "    size_t at;".to_string(),
             format!(
@@ -339,12 +436,16 @@ impl Action {
     }
 }
 
-/// The numbers of a step in the table, in the order of the arguments of its function.
-fn operands(step: &BlockStep) -> Vec<i64> {
-    let column = |place: &ColumnPlace| match *place {
+/// The number of a column in the table.
+fn column(place: &ColumnPlace) -> i64 {
+    match *place {
         ColumnPlace::Own(number) => i64::from(number),
         ColumnPlace::Output(number) => -1 - i64::from(number),
-    };
+    }
+}
+
+/// The numbers of a step in the table, in the order of the arguments of its function.
+fn operands(step: &BlockStep) -> Vec<i64> {
     match step {
         BlockStep::Arithmetic { parameters, reads, writes, .. } => {
             let constants = (!parameters.is_empty()).then_some(parameters.start as i64);
@@ -358,4 +459,48 @@ fn operands(step: &BlockStep) -> Vec<i64> {
         }
         BlockStep::Copy { from, to } => [from, to].map(column).to_vec(),
     }
+}
+
+/// The chunks of a step that is a long piece of arithmetic. What they hand on gets columns behind the first `columns`,
+/// which grow to hold it.
+fn divided(plan: &BlockPlan, graph: &Graph, step: &BlockStep, columns: &mut usize) -> Option<Vec<Step>> {
+    let BlockStep::Arithmetic { program, reads, writes, .. } = step else { return None };
+    let piece = &plan.pieces[*program];
+    if piece.shape.is_some() {
+        return None;
+    }
+    let chunks = chunks(graph, &piece.inputs, &piece.outputs)?;
+    let mut last_read: HashMap<Node, usize> = HashMap::new();
+    for (i, chunk) in chunks.iter().enumerate() {
+        last_read.extend(chunk.reads.iter().map(|&node| (node, i)));
+    }
+    let given = piece.inputs.iter().copied().zip(reads.iter().copied());
+    let results = piece.outputs.iter().copied().zip(writes.iter().copied());
+    let mut places: HashMap<Node, ColumnPlace> = given.chain(results).collect();
+    let mut free: Vec<u32> = Vec::new();
+    let mut next = plan.columns as u32;
+    let mut steps = Vec::with_capacity(chunks.len());
+    for (i, chunk) in chunks.into_iter().enumerate() {
+        let read: Vec<ColumnPlace> = chunk.reads.iter().map(|node| places[node]).collect();
+        let mut written = Vec::with_capacity(chunk.writes.len());
+        for node in &chunk.writes {
+            let place = *places.entry(*node).or_insert_with(|| {
+                ColumnPlace::Own(free.pop().unwrap_or_else(|| {
+                    next += 1;
+                    next - 1
+                }))
+            });
+            written.push(place);
+        }
+        for node in chunk.reads.iter().filter(|node| last_read[*node] == i) {
+            if let Some(ColumnPlace::Own(column)) = places.get(node)
+                && *column as usize >= plan.columns
+            {
+                free.push(*column);
+            }
+        }
+        steps.push(Step::Chunk { chunk, reads: read, writes: written });
+    }
+    *columns = (*columns).max(next as usize);
+    Some(steps)
 }

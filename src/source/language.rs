@@ -131,8 +131,7 @@ pub(super) static C: Language = Language {
             Math::System => "",
             Math::Rfm => "rfm_math_",
         };
-        let suffix = pair(["", "f"], precision);
-        format!("{library}{}{suffix}({})", c_name(function), operands.join(", "))
+        format!("{library}{}({})", c_name(function, precision), operands.join(", "))
     },
     pick: |_, name| format!("#define {name}(condition, yes, no) ((condition) ? (yes) : (no))"),
 };
@@ -154,7 +153,12 @@ pub(super) static RUST: Language = Language {
     head: |head| {
         let operands: Vec<String> =
             head.operands.iter().map(|name| format!("{name}: {}", head.operand)).collect();
-        format!("#[inline(always)]\nfn {}({}) -> {} {{", head.name, operands.join(", "), head.result)
+        format!(
+            "#[inline(always)]\n#[allow(unused_parens)]\nfn {}({}) -> {} {{",
+            head.name,
+            operands.join(", "),
+            head.result
+        )
     },
     give: |value| value.into(),
     give_all: |structure, fields| vec![format!("{structure} {{ {} }}", fields.join(", "))],
@@ -169,7 +173,7 @@ pub(super) static RUST: Language = Language {
     magnitude: ["f64::abs", "f32::abs"],
     function: |function, precision, math, operands| match math {
         Math::Rfm => {
-            format!("libm::{}{}({})", c_name(function), pair(["", "f"], precision), operands.join(", "))
+            format!("libm::{}({})", c_name(function, precision), operands.join(", "))
         }
         Math::System => format!("{}::{}({})", precision.name(), rust_name(function), operands.join(", ")),
     },
@@ -235,12 +239,11 @@ pub(super) static GLSL: Language = Language {
     },
 };
 
-/// The name in the library of C, in `double`.
-pub(super) fn c_name(function: Function) -> &'static str {
+/// The name in the library of C.
+fn c_name(function: Function, precision: Precision) -> &'static str {
     match function {
-        Function::Unary(UnaryFunction::Ln) => "log",
-        Function::Unary(other) => other.name(),
-        Function::Binary(other) => other.name(),
+        Function::Unary(function) => function.c_name(precision),
+        Function::Binary(function) => function.c_name(precision),
     }
 }
 
@@ -257,7 +260,7 @@ fn rust_name(function: Function) -> &'static str {
 fn shader_call(function: Function, atan2: &str, operands: &[&str]) -> String {
     let name = match function {
         Function::Binary(BinaryFunction::Atan2) => atan2,
-        other => c_name(other),
+        other => c_name(other, Precision::F64),
     };
     format!("{name}({})", operands.join(", "))
 }

@@ -1,4 +1,5 @@
-//! A solid as source text for other programs: C, CUDA, Rust, WGSL and GLSL, from one printer.
+//! A solid as source text for other programs: C, CUDA, Rust, WGSL and GLSL, from one printer; and as
+//! object code.
 //!
 //! ```
 //! use rfm::{Program, source};
@@ -16,7 +17,8 @@
 //! | `language` | the table of languages: numbers, declarations, functions |
 //! | `operations` | R₀ and other operations that are functions of a file, each written once for all languages |
 //! | `statements` | a graph as a list of declarations |
-//! | `c`, `c_blocks`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
+//! | `c`, `c_blocks`, `c_chunks`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
+//! | `object` | object code with its header |
 //! | `names` | which names a file may use |
 //!
 //! Invariant: a text has the operations of the machine code in the same order and the same numbers, so C and Rust
@@ -24,13 +26,17 @@
 
 mod c;
 mod c_blocks;
+mod c_chunks;
 mod language;
 mod names;
+mod object;
 mod operations;
 mod program;
 mod rust;
 mod shader;
 mod statements;
+
+pub use object::{Object, ObjectError, object};
 
 use std::fmt;
 
@@ -195,41 +201,51 @@ impl std::error::Error for SourceError {}
 /// If the target has no such precision or functions, or cannot hold a number of the formula, or if no name may begin
 /// with the prefix.
 pub fn write(solid: &Solid, target: Target, options: &Options) -> Result<Source, SourceError> {
-    let prefix = names::prefix(options.prefix.as_deref().unwrap_or(solid.name()))?;
-    let both = [Precision::F64, Precision::F32];
-    let wanted = |precision: &Precision| {
-        if options.precisions.is_empty() {
-            return *precision == Precision::F32 || !target.is_shader();
+    if target.is_shader() {
+        if options.precisions.contains(&Precision::F64) {
+            return Err(SourceError::NoSuchPrecision(target, Precision::F64));
         }
-        options.precisions.contains(precision)
+        if options.math == Math::Rfm {
+            return Err(SourceError::NoSuchMath(target));
+        }
+    }
+    in_file(solid, target.is_shader(), options, |file| {
+        let operations = file.programs.iter().map(Program::operations).max().unwrap_or(0);
+        let (text, header) = match target {
+            Target::C => (c::source(file, c::Flavour::Unit)?, Some(c::header(file))),
+            Target::Header => (c::source(file, c::Flavour::Header)?, None),
+            Target::Cuda => (c::source(file, c::Flavour::Cuda)?, None),
+            Target::Wgsl => (shader::source(file, &shader::WGSL)?, None),
+            Target::Glsl => (shader::source(file, &shader::GLSL)?, None),
+            Target::Rust => (rust::source(file)?, None),
+        };
+        Ok(Source { text, header, operations })
+    })?
+}
+
+/// Calls `make` with what a file is written from.
+fn in_file<R>(
+    solid: &Solid,
+    in_f32_alone: bool,
+    options: &Options,
+    make: impl FnOnce(&File<'_>) -> R,
+) -> Result<R, SourceError> {
+    let prefix = names::prefix(options.prefix.as_deref().unwrap_or(solid.name()))?;
+    let wanted = |precision: &Precision| match options.precisions.is_empty() {
+        true => *precision == Precision::F32 || !in_f32_alone,
+        false => options.precisions.contains(precision),
     };
-    let precisions: Vec<Precision> = both.into_iter().filter(wanted).collect();
-    if target.is_shader() && precisions.contains(&Precision::F64) {
-        return Err(SourceError::NoSuchPrecision(target, Precision::F64));
-    }
-    if target.is_shader() && options.math == Math::Rfm {
-        return Err(SourceError::NoSuchMath(target));
-    }
+    let precisions: Vec<Precision> = [Precision::F64, Precision::F32].into_iter().filter(wanted).collect();
     let programs = Program::of(solid, options);
-    let operations = programs.iter().map(Program::operations).max().unwrap_or(0);
-    let file = File {
+    Ok(make(&File {
         prefix: &prefix,
         solid: solid.name(),
         moves: solid.moves(),
-        fields: names::fields(&options.params),
+        params: open_params(&programs, options),
         options,
         precisions: &precisions,
         programs: &programs,
-    };
-    let (text, header) = match target {
-        Target::C => (c::source(&file, c::Flavour::Unit)?, Some(c::header(&file))),
-        Target::Header => (c::source(&file, c::Flavour::Header)?, None),
-        Target::Cuda => (c::source(&file, c::Flavour::Cuda)?, None),
-        Target::Wgsl => (shader::source(&file, &shader::WGSL)?, None),
-        Target::Glsl => (shader::source(&file, &shader::GLSL)?, None),
-        Target::Rust => (rust::source(&file)?, None),
-    };
-    Ok(Source { text, header, operations })
+    }))
 }
 
 /// All that a file is written from.
@@ -237,14 +253,37 @@ struct File<'a> {
     prefix: &'a str,
     solid: &'a str,
     moves: bool,
-    /// The names of params in a text.
-    fields: Vec<String>,
+    /// The params that are arguments.
+    params: Vec<OpenParam<'a>>,
     options: &'a Options,
     precisions: &'a [Precision],
     programs: &'a [Program],
 }
 
+/// A param that is an argument, because the solid depends on it.
+struct OpenParam<'a> {
+    /// Its number in the graphs.
+    number: u32,
+    /// Its name in a text.
+    field: String,
+    param: &'a Param,
+}
+
+fn open_params<'a>(programs: &[Program], options: &'a Options) -> Vec<OpenParam<'a>> {
+    let mut numbers: Vec<u32> = programs.iter().flat_map(Program::parameters).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let fields = names::fields(&options.params);
+    let named = numbers.into_iter().filter_map(|number| Some((number, options.params.get(number as usize)?)));
+    named.map(|(number, param)| OpenParam { number, field: fields[number as usize].clone(), param }).collect()
+}
+
 impl File<'_> {
+    /// How a text names a param.
+    fn field(&self, number: u32) -> &str {
+        self.params.iter().find(|open| open.number == number).map_or("", |open| open.field.as_str())
+    }
+
     /// The first lines of every file, without the signs of a comment.
     fn title(&self) -> Vec<String> {
         let mut lines = vec![format!(

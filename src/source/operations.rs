@@ -182,15 +182,12 @@ impl Operation {
                 .collect();
         let write = |text: &str| translated(text, language, precision, names);
         let formula = self.formula();
-        for line in formula.lines() {
-            let Some((name, value)) = line.split_once(" = ") else { continue };
+        for (name, value) in used_lines(&formula, weighted) {
             let (name, kind) = match name.strip_suffix('?') {
                 Some(name) => (name, language.truth),
                 None => (name, number),
             };
-            if is_used(&formula, name, weighted) {
-                lines.push(format!("    {}", (language.declare)(kind, name, &write(value))));
-            }
+            lines.push(format!("    {}", (language.declare)(kind, name, &write(value))));
         }
         let last = if weighted {
             (language.give_all)(&joint, &WEIGHTED_FIELDS)
@@ -203,12 +200,20 @@ impl Operation {
     }
 }
 
-/// Whether a value of a formula is read in it or given by it.
-fn is_used(formula: &str, name: &str, weighted: bool) -> bool {
-    let result = if weighted { WEIGHTED_FIELDS.contains(&name) } else { name == "value" };
+/// The names and values of a formula that its results depend on, in order.
+fn used_lines(formula: &str, weighted: bool) -> Vec<(&str, &str)> {
+    let results: &[&str] = if weighted { &WEIGHTED_FIELDS } else { &WEIGHTED_FIELDS[..1] };
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
-    let mut values = formula.lines().filter_map(|line| line.split_once(" = ")).map(|(_, value)| value);
-    result || values.any(|value| value.split(|c| !is_word(c)).any(|word| word == name))
+    let mut read: Vec<&str> = results.to_vec();
+    let mut used = Vec::new();
+    for (name, value) in formula.lines().rev().filter_map(|line| line.split_once(" = ")) {
+        if read.contains(&name.trim_end_matches('?')) {
+            read.extend(value.split(|c| !is_word(c)));
+            used.push((name, value));
+        }
+    }
+    used.reverse();
+    used
 }
 
 /// The names that a file makes for itself: they all begin with its prefix.

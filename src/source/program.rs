@@ -103,6 +103,12 @@ impl Program {
         self.uniforms.as_ref().map_or(0, |(_, roots)| roots.len())
     }
 
+    /// The numbers of the params that it depends on: they are all in the formulas of its uniforms.
+    pub fn parameters(&self) -> Vec<u32> {
+        let Some((graph, roots)) = &self.uniforms else { return Vec::new() };
+        roots.iter().flat_map(|&root| graph.parameters(root)).collect()
+    }
+
     /// How many nodes it computes.
     pub fn operations(&self) -> usize {
         self.graph.reachable(&self.outputs).into_iter().filter(|&used| used).count()

@@ -6,7 +6,7 @@ use super::language::RUST;
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
-use super::{File, Math, SourceError};
+use super::{File, Math, OpenParam, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
 
@@ -63,15 +63,15 @@ impl RustFile<'_> {
     }
 
     fn params(&self) -> Vec<String> {
-        let File { prefix, options, fields, .. } = self.file;
-        if options.params.is_empty() {
+        let File { prefix, params, .. } = self.file;
+        if params.is_empty() {
             return Vec::new();
         }
         let mut lines = vec![String::new(), "/// The params of the file, in SI units.".into()];
         lines.push("#[allow(non_camel_case_types)]".into());
         lines.push("#[derive(Debug, Clone, Copy, PartialEq)]".into());
         lines.push(format!("pub struct {prefix}_params {{"));
-        for (param, field) in options.params.iter().zip(fields) {
+        for OpenParam { param, field, .. } in params {
             let doc = param.doc.as_ref().map_or(String::new(), |doc| format!(": {doc}"));
             lines.push(format!("    /// `{}`, in the file {:?}{doc}", param.name, param.value));
             lines.push(format!("    pub {field}: f64,"));
@@ -81,7 +81,7 @@ impl RustFile<'_> {
         lines.push("/// The values that the file gives them.".into());
         lines.push("#[allow(dead_code, non_upper_case_globals)]".into());
         lines.push(format!("pub const {prefix}_defaults: {prefix}_params = {prefix}_params {{"));
-        for (param, field) in options.params.iter().zip(fields) {
+        for OpenParam { param, field, .. } in params {
             lines.push(format!(
                 "    {field}: {},",
                 RUST.constant(param.value, Precision::F64).unwrap_or_default()
@@ -93,7 +93,7 @@ impl RustFile<'_> {
 
     fn extra_arguments(&self) -> String {
         let time = if self.file.moves { ", t: f64" } else { "" };
-        let params = if self.file.options.params.is_empty() {
+        let params = if self.file.params.is_empty() {
             String::new()
         } else {
             format!(", p: &{}_params", self.file.prefix)
@@ -136,6 +136,7 @@ impl RustFile<'_> {
             axes: ["x", "y", "z", "t"],
             parameter,
             uniform: &|i| format!("u[{i}]"),
+            gathered: None,
             values: "v",
             own_power: false,
         }
@@ -148,7 +149,7 @@ impl RustFile<'_> {
     fn uniforms(&self, program: &Program) -> Result<Vec<String>, SourceError> {
         let Some((graph, roots)) = &program.uniforms else { return Ok(Vec::new()) };
         let names = self.names();
-        let parameter = |i: u32| format!("p.{}", self.file.fields[i as usize]);
+        let parameter = |i: u32| format!("p.{}", self.file.field(i));
         let writer = self.writer(&names, Precision::F64, &parameter);
         let forms = Forms::default();
         let made = writer.statements(&Part { graph, inputs: &[], outputs: roots, forms: &forms })?;
@@ -189,7 +190,7 @@ impl RustFile<'_> {
             None => String::new(),
         };
         let mut lines = vec![String::new(), "#[inline(always)]".into()];
-        lines.push("#[allow(unused_variables, clippy::all)]".into());
+        lines.push("#[allow(unused_variables, unused_parens, clippy::all)]".into());
         lines.push(format!(
             "fn {}(x: {number}, y: {number}, z: {number}{u}) -> [{number}; {}] {{",
             self.at_name(program, precision),
@@ -206,7 +207,7 @@ impl RustFile<'_> {
         if program.uniforms.is_none() {
             return (None, "");
         }
-        let values = match (self.file.moves, self.file.options.params.is_empty()) {
+        let values = match (self.file.moves, self.file.params.is_empty()) {
             (true, true) => "t",
             (true, false) => "t, p",
             (false, _) => "p",

@@ -6,7 +6,7 @@ use super::language::{self, Language};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
-use super::{File, Math, SourceError};
+use super::{File, Math, OpenParam, SourceError};
 use crate::ir::Forms;
 use crate::precision::Precision;
 
@@ -81,14 +81,14 @@ pub(super) fn source(file: &File<'_>, shader: &Shader) -> Result<String, SourceE
 /// The structure of params; shaders have no constants of such a type that all of them could start from, so their
 /// values stand in comments.
 fn params(file: &File<'_>, shader: &Shader) -> Vec<String> {
-    if file.options.params.is_empty() {
+    if file.params.is_empty() {
         return Vec::new();
     }
-    let described = |(field, param): (&String, &super::Param)| {
+    let described = |OpenParam { field, param, .. }: &OpenParam<'_>| {
         let doc = param.doc.as_ref().map_or(String::new(), |doc| format!(": {doc}"));
         (field.clone(), format!("{} = {:?}{doc}", param.name, param.value))
     };
-    let fields: Vec<_> = file.fields.iter().zip(&file.options.params).map(described).collect();
+    let fields: Vec<_> = file.params.iter().map(described).collect();
     let mut lines = vec![
         String::new(),
         "// The params of the file, in SI units, with the values that it gives them.".into(),
@@ -106,7 +106,7 @@ fn function(
     let names = Names { prefix: file.prefix };
     let Shader { language, vectors: [vec4, vec3], .. } = shader;
     let number = language.number(PRECISION);
-    let parameter = |i: u32| format!("params.{}", file.fields[i as usize]);
+    let parameter = |i: u32| format!("params.{}", file.field(i));
     let uniform_names = |i: u32| format!("u{i}");
     let writer = Writer {
         language,
@@ -116,6 +116,7 @@ fn function(
         axes: ["p.x", "p.y", "p.z", "t"],
         parameter: &parameter,
         uniform: &uniform_names,
+        gathered: None,
         values: "v",
         own_power: true,
     };
@@ -128,7 +129,7 @@ fn function(
     if file.moves {
         arguments.push((shader.parameter)(number, "t"));
     }
-    if !file.options.params.is_empty() {
+    if !file.params.is_empty() {
         arguments.push((shader.parameter)(&format!("{}_params", file.prefix), "params"));
     }
     let result = if *question == Question::Gradient { vec4 } else { number };

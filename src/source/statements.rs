@@ -1,5 +1,6 @@
 //! A graph as statements: one declaration for each operation, in the graph's order.
 
+use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::language::{Function, Language};
@@ -21,6 +22,9 @@ pub(super) struct Writer<'a> {
     pub parameter: &'a dyn Fn(u32) -> String,
     /// How a uniform is written.
     pub uniform: &'a dyn Fn(u32) -> String,
+    /// Where constants are gathered, to be written as `c[0]`, `c[1]` …, and values are numbered one after the other:
+    /// parts of one shape then have one text.
+    pub gathered: Option<&'a RefCell<Vec<f64>>>,
     /// What the names of values begin with, so that two graphs may stand in one function.
     pub values: &'a str,
     /// Whether powers of negative numbers need a function of the file's own.
@@ -88,19 +92,17 @@ struct State<'a> {
 impl State<'_> {
     /// What the outputs depend on, down to the inputs and without them, in the graph's order.
     fn needed(&self) -> Vec<Node> {
-        let graph = self.part.graph;
-        let mut used = vec![false; graph.len()];
-        self.part.outputs.iter().for_each(|output| used[output.index()] = true);
-        for i in (0..graph.len()).rev() {
-            let node = graph.node(i);
-            if self.texts.contains_key(&node) {
-                used[i] = false;
-            }
-            if used[i] {
-                graph.expr(node).operands().for_each(|operand| used[operand.index()] = true);
+        let mut seen: HashSet<Node> = HashSet::new();
+        let mut found: Vec<Node> = Vec::new();
+        let mut stack: Vec<Node> = self.part.outputs.to_vec();
+        while let Some(node) = stack.pop() {
+            if !self.texts.contains_key(&node) && seen.insert(node) {
+                found.push(node);
+                stack.extend(self.part.graph.expr(node).operands());
             }
         }
-        (0..graph.len()).filter(|&i| used[i]).map(|i| graph.node(i)).collect()
+        found.sort_unstable();
+        found
     }
 
     /// How a node is written: a number, an argument, or the name of a new constant.
@@ -111,7 +113,7 @@ impl State<'_> {
     ) -> Result<String, SourceError> {
         let writer = self.writer;
         let value = match self.part.graph.expr(node) {
-            Expr::Constant(bits) => return self.constant(f64::from_bits(bits)),
+            Expr::Constant(bits) => return self.given(f64::from_bits(bits)),
             Expr::Coordinate(Axis::X) => return Ok(writer.axes[0].into()),
             Expr::Coordinate(Axis::Y) => return Ok(writer.axes[1].into()),
             Expr::Coordinate(Axis::Z) => return Ok(writer.axes[2].into()),
@@ -129,15 +131,29 @@ impl State<'_> {
                 self.binary(op, &u, &v)?
             }
         };
-        let name = format!("{}{}", self.writer.values, node.index());
+        let name = self.name(node);
         self.declare(writer.language.number(writer.precision), &name, &value);
         Ok(name)
+    }
+
+    /// The name of the value of a node.
+    fn name(&self, node: Node) -> String {
+        let number = if self.writer.gathered.is_some() { self.made.lines.len() } else { node.index() };
+        format!("{}{number}", self.writer.values)
     }
 
     fn declare(&mut self, kind: &str, name: &str, value: &str) {
         self.made.lines.push((self.writer.language.declare)(kind, name, value));
     }
 
+    /// A constant of the graph.
+    fn given(&self, value: f64) -> Result<String, SourceError> {
+        let Some(gathered) = self.writer.gathered else { return self.constant(value) };
+        gathered.borrow_mut().push(value);
+        Ok(format!("c[{}]", gathered.borrow().len() - 1))
+    }
+
+    /// A constant of an operation.
     fn constant(&self, value: f64) -> Result<String, SourceError> {
         let written = self.writer.language.constant(value, self.writer.precision);
         written.ok_or(SourceError::NumberOutOfRange(value))
@@ -163,7 +179,7 @@ impl State<'_> {
         if !weights {
             let operands = format!("{}, {}", self.texts[&u], self.texts[&v]);
             let value = self.operation(Operation::Join(junction, style), &operands);
-            let name = format!("{}{}", self.writer.values, node.index());
+            let name = self.name(node);
             self.declare(language.number(precision), &name, &value);
             return name;
         }
