@@ -245,15 +245,16 @@ pub(super) enum MeshMethod {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "In C:      rfm build examples/pawn.rfm -o pawn.c\n           \
+#[command(after_help = "In C:           rfm build examples/pawn.rfm -o pawn.c\n                \
                         cc -O3 -march=native -ffp-contract=off -fno-math-errno -fno-trapping-math -c pawn.c\n\
-                        In CUDA:   rfm build examples/pawn.rfm -o pawn.cu\n\
-                        In Rust:   rfm build examples/pawn.rfm -o pawn.rs\n\
-                        On the web: rfm build examples/pawn.rfm -o pawn.wgsl\n\n\
-                        For a solid `pawn` a file has pawn_omega and pawn_omega_gradient, for one point and (_many) for \
-                        columns, in f64 and (f at the end in C, _f32 in Rust) in f32; with --what also pawn_sign and \
-                        pawn_distance. Moving solids take the time as an argument. C and Rust give the bits of rfm if they \
-                        are compiled as their first lines say; shaders compute in f32 and promise no bits.")]
+                        In Rust:        rfm build examples/pawn.rfm -o pawn.rs\n\
+                        In a shader:    rfm build examples/pawn.rfm -o pawn.wgsl\n\
+                        With a linker:  rfm build examples/pawn.rfm -o pawn.o --what sign,distance\n\n\
+                        For a solid `pawn` a file has pawn_omega and pawn_omega_gradient, and with --what also pawn_sign and \
+                        pawn_distance: for one point, and with _many for columns of points; in f64, and with f (C) or _f32 \
+                        (Rust) at the end of the name in f32. Solids that move take the time as an argument. C and Rust \
+                        give the bits of rfm if they are compiled as their first lines say; shaders compute in f32 and \
+                        promise no bits. Beside a .c or .o file a header .h of the same name is written.")]
 pub(super) struct Build {
     /// The file; `-` is standard input
     pub file: PathBuf,

@@ -16,6 +16,9 @@ use rfm::{Program, Solid};
 /// Functions with more operations than this take compilers of shaders and of Rust seconds to minutes.
 const MANY_OPERATIONS: usize = 5000;
 
+/// What stands in every text that this command writes.
+const MADE: &str = "Made by rfm";
+
 /// What a file can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -48,10 +51,13 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
             Made { bytes: made.bytes, header: Some(made.header), operations: made.operations }
         }
     };
+    let beside = path.with_extension("h");
+    if made.header.is_some() {
+        may_replace(&beside)?;
+    }
     output::write(path, |out| out.write_all(&made.bytes))?;
     let mut files = vec![path.to_path_buf()];
     if let Some(header) = &made.header {
-        let beside = path.with_extension("h");
         output::write(&beside, |out| out.write_all(header.as_bytes()))?;
         files.push(beside);
     }
@@ -64,6 +70,18 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         ));
     }
     report(shared, &solid, &files, made.operations)
+}
+
+/// Refuses to replace a header that this command has not made: nobody has named it.
+fn may_replace(header: &Path) -> Result<(), Failure> {
+    match std::fs::read_to_string(header) {
+        Ok(text) if !text.contains(MADE) => Err(Failure::usage(format!(
+            "`{}` would be replaced by the header that belongs to the file, and it is not one of ours: choose another name",
+            header.shown()
+        ))),
+        // a header of ours, none, or one whose writing will say what is wrong
+        Ok(_) | Err(_) => Ok(()),
+    }
 }
 
 /// What is written to files.
@@ -122,7 +140,7 @@ fn report(shared: &Shared, solid: &Solid, files: &[PathBuf], operations: usize) 
 fn text_options(program: &Program, solid: &Solid, options: &Options, params: Vec<Param>) -> source::Options {
     let file = options.file.shown();
     let mut origin =
-        vec![format!("Made by rfm {} from {file}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
+        vec![format!("{MADE} {} from {file}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
     let values: Vec<String> =
         program.module().params.iter().map(|param| format!("{} = {:?}", param.name, param.value)).collect();
     if !values.is_empty() && params.is_empty() {

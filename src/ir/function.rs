@@ -20,7 +20,7 @@ macro_rules! functions {
         }
     ) => {
         $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum $type {
             $($(#[$variant_meta])* $variant,)+
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::c_blocks::{self, Blocks};
-use super::language::{C, pair};
+use super::language::{C, Function, pair};
 use super::operations::{Names, Operation, WEIGHTED_FIELDS};
 use super::program::{Program, Question};
 use super::statements::{Part, Statements, Writer};
@@ -24,7 +24,7 @@ pub(super) enum Flavour {
 
 impl Flavour {
     /// What stands before the functions that others call.
-    fn linkage(self) -> &'static str {
+    pub fn linkage(self) -> &'static str {
         match self {
             Self::Unit => "",
             Self::Header => "static inline ",
@@ -44,13 +44,17 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
         lines.extend(writer.declarations());
     }
     let mut operations: BTreeSet<(Operation, bool)> = BTreeSet::new();
+    let mut called: BTreeSet<(Function, bool)> = BTreeSet::new();
     let mut functions = Vec::new();
     for program in file.programs {
-        functions.extend(writer.uniforms(program)?);
+        let uniforms = writer.uniforms(program)?;
+        called.extend(uniforms.functions.iter().map(|&function| (function, false)));
+        functions.extend(uniforms.lines);
         for &precision in file.precisions {
             let blocks = writer.blocks(program, precision);
             let body = writer.body(program, precision, blocks.as_ref())?;
             operations.extend(body.operations.iter().map(|&op| (op, precision == Precision::F32)));
+            called.extend(body.functions.iter().map(|&function| (function, precision == Precision::F32)));
             functions.extend(body.lines);
             functions.extend(writer.point(program, precision, blocks.as_ref()));
             functions.extend(writer.columns(program, precision, blocks.as_ref()));
@@ -59,6 +63,7 @@ pub(super) fn source(file: &File<'_>, flavour: Flavour) -> Result<String, Source
             }
         }
     }
+    lines.extend(writer.library(&called));
     lines.extend(writer.operations(&operations));
     lines.extend(functions);
     if flavour != Flavour::Unit {
@@ -85,54 +90,17 @@ pub(super) fn header(file: &File<'_>) -> String {
     lines.join("\n") + "\n"
 }
 
-/// The name of the machine code of a program in an object file: for one point, or for blocks of points.
-pub(super) fn raw_name(file: &File<'_>, program: &Program, precision: Precision, blocks: bool) -> String {
-    let blocks = if blocks { "_blocks" } else { "" };
-    format!("{}_raw_{}{blocks}{}", file.prefix, program.question.name(), C.suffix(precision))
-}
-
-/// The name of the machine code that finds what depends on time and params alone.
-pub(super) fn raw_uniforms(file: &File<'_>, program: &Program) -> String {
-    format!("{}_raw_uniforms_{}", file.prefix, program.question.name())
-}
-
-/// The header of an object file: its machine code as the functions that a C file would have.
-pub(super) fn object_header(file: &File<'_>) -> String {
-    let writer = CFile { file, flavour: Flavour::Header };
-    let mut lines = vec!["/*".to_string()];
-    lines.extend(file.title().iter().map(|line| format!(" * {line}")));
-    lines.push(
-        " * Functions of the object file beside it, with the bits of rfm. Columns must not overlap.".into(),
-    );
-    lines.push(" */".into());
-    lines.extend(writer.macros());
-    lines.extend(writer.params());
-    lines.extend(["", "#ifdef __cplusplus", "extern \"C\" {", "#endif"].map(String::from));
-    for program in file.programs {
-        lines.extend(writer.raw_declarations(program));
-    }
-    lines.extend(["#ifdef __cplusplus", "}", "#endif"].map(String::from));
-    for program in file.programs {
-        lines.extend(writer.raw_uniforms_call(program));
-        for &precision in file.precisions {
-            lines.extend(writer.raw_at(program, precision));
-            lines.extend(writer.point(program, precision, None));
-            lines.extend(writer.raw_columns(program, precision));
-        }
-    }
-    lines.extend(["", "#endif"].map(String::from));
-    lines.join("\n") + "\n"
-}
-
 /// A body of one program in one precision: what the functions for points and columns call.
+#[derive(Default)]
 struct Body {
     lines: Vec<String>,
     operations: BTreeSet<Operation>,
+    functions: BTreeSet<Function>,
 }
 
-struct CFile<'a> {
-    file: &'a File<'a>,
-    flavour: Flavour,
+pub(super) struct CFile<'a> {
+    pub file: &'a File<'a>,
+    pub flavour: Flavour,
 }
 
 impl CFile<'_> {
@@ -178,7 +146,7 @@ impl CFile<'_> {
         lines
     }
 
-    fn macros(&self) -> Vec<String> {
+    pub fn macros(&self) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         if self.flavour != Flavour::Unit {
             let guard = format!("{}_SOURCE_H", self.file.prefix.to_uppercase());
@@ -212,7 +180,7 @@ impl CFile<'_> {
     }
 
     /// The structure of params, with the values of the file.
-    fn params(&self) -> Vec<String> {
+    pub fn params(&self) -> Vec<String> {
         let File { prefix, params, .. } = self.file;
         if params.is_empty() {
             return Vec::new();
@@ -235,7 +203,7 @@ impl CFile<'_> {
     }
 
     /// Arguments between the point and the results.
-    fn extra_arguments(&self) -> String {
+    pub fn extra_arguments(&self) -> String {
         let time = if self.file.moves { ", double t" } else { "" };
         let params = if self.file.params.is_empty() {
             String::new()
@@ -265,7 +233,7 @@ impl CFile<'_> {
         format!("{number} {name}({number} x, {number} y, {number} z{}{results})", self.extra_arguments())
     }
 
-    fn columns_signature(&self, question: Question, precision: Precision) -> String {
+    pub fn columns_signature(&self, question: Question, precision: Precision) -> String {
         let (number, name) = (C.number(precision), self.columns_name(question, precision));
         let points: Vec<String> = ["x", "y", "z"].map(|axis| format!("const {number} *{axis}")).to_vec();
         let results: Vec<String> = question.results().iter().map(|r| format!("{number} *{r}")).collect();
@@ -291,6 +259,19 @@ impl CFile<'_> {
                 lines.push(self.columns_signature(question, precision) + ";");
             }
         }
+        lines
+    }
+
+    /// Declarations of the functions that the C library of `rfm` has.
+    fn library(&self, called: &BTreeSet<(Function, bool)>) -> Vec<String> {
+        if self.file.options.math == Math::System || called.is_empty() {
+            return Vec::new();
+        }
+        let precision = |single| if single { Precision::F32 } else { Precision::F64 };
+        let mut lines = vec![String::new()];
+        lines.extend(["#ifdef __cplusplus", "extern \"C\" {", "#endif"].map(String::from));
+        lines.extend(called.iter().map(|(function, single)| function.declaration(precision(*single))));
+        lines.extend(["#ifdef __cplusplus", "}", "#endif"].map(String::from));
         lines
     }
 
@@ -336,13 +317,13 @@ impl CFile<'_> {
         }
     }
 
-    fn uniforms_name(&self, program: &Program) -> String {
+    pub fn uniforms_name(&self, program: &Program) -> String {
         format!("{}_uniforms_{}", self.file.prefix, program.question.name())
     }
 
     /// The function that finds what depends on time and params alone, in `double`.
-    fn uniforms(&self, program: &Program) -> Result<Vec<String>, SourceError> {
-        let Some((graph, roots)) = &program.uniforms else { return Ok(Vec::new()) };
+    fn uniforms(&self, program: &Program) -> Result<Body, SourceError> {
+        let Some((graph, roots)) = &program.uniforms else { return Ok(Body::default()) };
         let names = self.names();
         let parameter = |i: u32| format!("p->{}", self.file.field(i));
         let writer = self.writer(&names, Precision::F64, &|_| String::new(), &parameter);
@@ -361,11 +342,11 @@ impl CFile<'_> {
             lines.push("    (void)p;".into());
         }
         lines.push("}".into());
-        Ok(lines)
+        Ok(Body { lines, operations: made.operations, functions: made.functions })
     }
 
     /// Lines that fill `u`, if the program has uniforms.
-    fn fill_uniforms(&self, program: &Program, precision: Precision) -> Vec<String> {
+    pub fn fill_uniforms(&self, program: &Program, precision: Precision) -> Vec<String> {
         let count = program.uniform_count();
         let mut lines = Vec::new();
         if program.uniforms.is_none() {
@@ -396,7 +377,7 @@ impl CFile<'_> {
         lines
     }
 
-    fn at_name(&self, program: &Program, precision: Precision) -> String {
+    pub fn at_name(&self, program: &Program, precision: Precision) -> String {
         format!("{}_at_{}{}", self.file.prefix, program.question.name(), C.suffix(precision))
     }
 
@@ -420,11 +401,11 @@ impl CFile<'_> {
         let writer = self.writer(&names, precision, &uniform, &parameter);
         if let Some(blocks) = blocks {
             let made = blocks.write(&writer, &self.at_name(program, precision), program)?;
-            return Ok(Body { lines: made.lines, operations: made.operations });
+            return Ok(Body { lines: made.lines, operations: made.operations, functions: made.functions });
         }
         let Program { graph, outputs, question, .. } = program;
         let part = Part { graph, inputs: &[], outputs, forms: program.forms(precision) };
-        let Statements { lines: statements, outputs, operations } = writer.statements(&part)?;
+        let Statements { lines: statements, outputs, operations, functions } = writer.statements(&part)?;
         let (number, name) = (C.number(precision), self.at_name(program, precision));
         let mut lines = vec![String::new()];
         let many = question.results().len() > 1;
@@ -448,16 +429,16 @@ impl CFile<'_> {
             lines.insert(lines.len() - 1, "    (void)u;".into());
         }
         lines.push("}".into());
-        Ok(Body { lines, operations })
+        Ok(Body { lines, operations, functions })
     }
 
     /// The structure of ω and ∇ω.
-    fn answer(&self, precision: Precision) -> String {
+    pub fn answer(&self, precision: Precision) -> String {
         format!("{}_answer{}", self.file.prefix, C.suffix(precision))
     }
 
     /// The function for one point.
-    fn point(&self, program: &Program, precision: Precision, blocks: Option<&Blocks>) -> Vec<String> {
+    pub fn point(&self, program: &Program, precision: Precision, blocks: Option<&Blocks>) -> Vec<String> {
         let question = program.question;
         let mut lines = vec![
             String::new(),
@@ -504,103 +485,6 @@ impl CFile<'_> {
         } else {
             lines.push(format!("        const {} all = {call};", self.answer(precision)));
             lines.extend(question.results().iter().map(|r| format!("        {r}[i] = all.{r};")));
-        }
-        lines.extend(["    }".into(), "}".to_string()]);
-        lines
-    }
-
-    fn raw_declarations(&self, program: &Program) -> Vec<String> {
-        let mut lines = Vec::new();
-        if program.uniforms.is_some() {
-            let params = if self.file.params.is_empty() { "" } else { ", const double *params" };
-            let name = raw_uniforms(self.file, program);
-            lines.push(format!("void {name}(double t, double none, double nothing, double *u{params});"));
-        }
-        for &precision in self.file.precisions {
-            let number = C.number(precision);
-            let u = if program.uniforms.is_some() { format!(", const {number} *u") } else { String::new() };
-            let [point, blocks] = [false, true].map(|blocks| raw_name(self.file, program, precision, blocks));
-            lines.push(format!("void {point}({number} x, {number} y, {number} z, {number} *out{u});"));
-            lines.push(format!("void {blocks}({number} *const *columns, size_t blocks{u});"));
-        }
-        lines
-    }
-
-    fn raw_uniforms_call(&self, program: &Program) -> Vec<String> {
-        if program.uniforms.is_none() {
-            return Vec::new();
-        }
-        let arguments = self.extra_arguments();
-        let time = if self.file.moves { "t" } else { "0.0" };
-        let params = if self.file.params.is_empty() { "" } else { ", (const double *)p" };
-        vec![
-            String::new(),
-            format!(
-                "RFM_INLINE void {}({}, double *u) {{",
-                self.uniforms_name(program),
-                arguments.trim_start_matches(", ")
-            ),
-            format!("    {}({time}, 0.0, 0.0, u{params});", raw_uniforms(self.file, program)),
-            "}".into(),
-        ]
-    }
-
-    /// The function for one point that the others call, over the machine code.
-    fn raw_at(&self, program: &Program, precision: Precision) -> Vec<String> {
-        let (number, question) = (C.number(precision), program.question);
-        let results = question.results();
-        let many = results.len() > 1;
-        let mut lines = vec![String::new()];
-        if many {
-            lines.extend((C.structure)(&self.answer(precision), number, results));
-        }
-        let (arguments, u) = match program.uniforms {
-            Some(_) => (format!(", const {number} *u"), ", u"),
-            None => (String::new(), ""),
-        };
-        let result = if many { self.answer(precision) } else { number.into() };
-        let name = self.at_name(program, precision);
-        lines.push(format!("RFM_INLINE {result} {name}({number} x, {number} y, {number} z{arguments}) {{"));
-        lines.push(format!("    {number} out[{}];", results.len()));
-        if many {
-            lines.push(format!("    {result} all;"));
-        }
-        lines.push(format!("    {}(x, y, z, out{u});", raw_name(self.file, program, precision, false)));
-        if many {
-            let fields = results.iter().enumerate();
-            lines.extend(fields.map(|(i, field)| format!("    all.{field} = out[{i}];")));
-            lines.push("    return all;".into());
-        } else {
-            lines.push("    return out[0];".into());
-        }
-        lines.push("}".into());
-        lines
-    }
-
-    /// The function for columns over the machine code, which takes whole blocks; the last points come one by one.
-    fn raw_columns(&self, program: &Program, precision: Precision) -> Vec<String> {
-        let (number, question) = (C.number(precision), program.question);
-        let results = question.results();
-        let signature = self.columns_signature(question, precision);
-        let mut lines = vec![String::new(), format!("{}{signature} {{", self.flavour.linkage())];
-        lines.extend(self.fill_uniforms(program, precision));
-        let u = if program.uniforms.is_some() { ", u" } else { "" };
-        let lanes = precision.lanes();
-        lines.push(format!("    {number} *columns[{}];", 3 + results.len()));
-        lines.push("    size_t i;".into());
-        for (i, axis) in ["x", "y", "z"].iter().enumerate() {
-            lines.push(format!("    columns[{i}] = ({number} *){axis};"));
-        }
-        lines.extend(results.iter().enumerate().map(|(i, r)| format!("    columns[{}] = {r};", 3 + i)));
-        lines
-            .push(format!("    {}(columns, n / {lanes}{u});", raw_name(self.file, program, precision, true)));
-        lines.push(format!("    for (i = n / {lanes} * {lanes}; i < n; i++) {{"));
-        let call = format!("{}(x[i], y[i], z[i]{u})", self.at_name(program, precision));
-        if let [result] = results {
-            lines.push(format!("        {result}[i] = {call};"));
-        } else {
-            lines.push(format!("        const {} all = {call};", self.answer(precision)));
-            lines.extend(results.iter().map(|r| format!("        {r}[i] = all.{r};")));
         }
         lines.extend(["    }".into(), "}".to_string()]);
         lines

@@ -240,6 +240,7 @@ impl Blocks {
         made: &mut Statements,
     ) {
         made.operations.extend(&body.operations);
+        made.functions.extend(&body.functions);
         let number = c::number(self.precision);
         let mut arguments = vec!["size_t n".to_string()];
         arguments.extend(["x", "y", "z"].map(|axis| format!("const {number} *RFM_RESTRICT {axis}")));

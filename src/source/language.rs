@@ -40,10 +40,22 @@ pub(super) struct Language {
 }
 
 /// A function of the mathematical library.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Function {
     Unary(UnaryFunction),
     Binary(BinaryFunction),
+}
+
+impl Function {
+    /// Its declaration in C, where it is not one of the system's.
+    pub fn declaration(self, precision: Precision) -> String {
+        let number = C.number(precision);
+        let operands = match self {
+            Self::Unary(_) => format!("{number} a"),
+            Self::Binary(_) => format!("{number} a, {number} b"),
+        };
+        format!("{number} rfm_math_{}({operands});", c_name(self, precision))
+    }
 }
 
 /// What stands before the body of a function.

@@ -18,7 +18,7 @@
 //! | `operations` | R₀ and other operations that are functions of a file, each written once for all languages |
 //! | `statements` | a graph as a list of declarations |
 //! | `c`, `c_blocks`, `c_chunks`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
-//! | `object` | object code with its header |
+//! | `object`, `c_object` | object code with its header |
 //! | `names` | which names a file may use |
 //!
 //! Invariant: a text has the operations of the machine code in the same order and the same numbers, so C and Rust
@@ -27,6 +27,7 @@
 mod c;
 mod c_blocks;
 mod c_chunks;
+mod c_object;
 mod language;
 mod names;
 mod object;

@@ -1,6 +1,6 @@
 //! A solid as object code: the machine code of its programs, and a header that makes them functions of C.
 
-use super::c;
+use super::c_object;
 use super::program::Program;
 use super::{File, Math, Options, SourceError, in_file};
 use crate::codegen::{self, CodegenError, Forms, Library, ObjectProgram, Request, Shape};
@@ -62,7 +62,7 @@ pub fn object(solid: &Solid, options: &Options, triple: Option<&str>) -> Result<
                     parameters: !file.params.is_empty(),
                     uniforms: false,
                 };
-                programs.push(ObjectProgram { symbol: c::raw_uniforms(file, program), request });
+                programs.push(ObjectProgram { symbol: c_object::raw_uniforms(file, program), request });
             }
             for &precision in file.precisions {
                 for shape in [Shape::Point, Shape::Batch] {
@@ -77,7 +77,7 @@ pub fn object(solid: &Solid, options: &Options, triple: Option<&str>) -> Result<
                         uniforms: program.uniforms.is_some(),
                     };
                     let blocks = shape == Shape::Batch;
-                    let symbol = c::raw_name(file, program, precision, blocks);
+                    let symbol = c_object::raw_name(file, program, precision, blocks);
                     programs.push(ObjectProgram { symbol, request });
                 }
             }
@@ -88,7 +88,7 @@ pub fn object(solid: &Solid, options: &Options, triple: Option<&str>) -> Result<
         };
         let bytes = codegen::object(&programs, library, triple).map_err(ObjectError::Codegen)?;
         let operations = file.programs.iter().map(Program::operations).max().unwrap_or(0);
-        Ok(Object { bytes, header: c::object_header(file), operations })
+        Ok(Object { bytes, header: c_object::object_header(file), operations })
     })
     .map_err(ObjectError::Source)?
 }

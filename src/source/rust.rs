@@ -154,7 +154,7 @@ impl RustFile<'_> {
         let forms = Forms::default();
         let made = writer.statements(&Part { graph, inputs: &[], outputs: roots, forms: &forms })?;
         let arguments = self.extra_arguments();
-        let mut lines = vec![String::new(), "#[allow(unused_variables)]".into()];
+        let mut lines = vec![String::new(), "#[allow(unused_variables, unused_parens, clippy::all)]".into()];
         lines.push(format!(
             "fn {}({}) -> [f64; {}] {{",
             self.uniforms_name(program),
@@ -182,7 +182,7 @@ impl RustFile<'_> {
         let writer = self.writer(&names, precision, &parameter);
         let Program { graph, outputs, question, .. } = program;
         let part = Part { graph, inputs: &[], outputs, forms: program.forms(precision) };
-        let Statements { lines: statements, outputs, operations: called } = writer.statements(&part)?;
+        let Statements { lines: statements, outputs, operations: called, .. } = writer.statements(&part)?;
         operations.extend(called.into_iter().map(|operation| (operation, precision == Precision::F32)));
         let number = RUST.number(precision);
         let u = match program.uniforms {

@@ -104,7 +104,7 @@ fn function(
     operations: &mut BTreeSet<Operation>,
 ) -> Result<Vec<String>, SourceError> {
     let names = Names { prefix: file.prefix };
-    let Shader { language, vectors: [vec4, vec3], .. } = shader;
+    let Shader { language, vectors: [vec4, _], .. } = shader;
     let number = language.number(PRECISION);
     let parameter = |i: u32| format!("params.{}", file.field(i));
     let uniform_names = |i: u32| format!("u{i}");
@@ -122,16 +122,10 @@ fn function(
     };
     let Program { graph, outputs, question, .. } = program;
     let part = Part { graph, inputs: &[], outputs, forms: program.forms(PRECISION) };
-    let Statements { lines: statements, outputs, operations: called } = writer.statements(&part)?;
+    let Statements { lines: statements, outputs, operations: called, .. } = writer.statements(&part)?;
     operations.extend(called);
 
-    let mut arguments = vec![(shader.parameter)(vec3, "p")];
-    if file.moves {
-        arguments.push((shader.parameter)(number, "t"));
-    }
-    if !file.params.is_empty() {
-        arguments.push((shader.parameter)(&format!("{}_params", file.prefix), "params"));
-    }
+    let arguments = arguments(file, shader);
     let result = if *question == Question::Gradient { vec4 } else { number };
     let name = format!("{}_{}", file.prefix, question.name());
     let mut lines = vec![String::new()];
@@ -162,4 +156,16 @@ fn function(
     });
     lines.push("}".into());
     Ok(lines)
+}
+
+/// The parameters of every function: the point, the time of a solid that moves, open params.
+fn arguments(file: &File<'_>, shader: &Shader) -> Vec<String> {
+    let mut arguments = vec![(shader.parameter)(shader.vectors[1], "p")];
+    if file.moves {
+        arguments.push((shader.parameter)(shader.language.number(PRECISION), "t"));
+    }
+    if !file.params.is_empty() {
+        arguments.push((shader.parameter)(&format!("{}_params", file.prefix), "params"));
+    }
+    arguments
 }

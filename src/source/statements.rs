@@ -37,8 +37,10 @@ pub(super) struct Statements {
     pub lines: Vec<String>,
     /// How the outputs are written.
     pub outputs: Vec<String>,
-    /// The functions that the statements call.
+    /// The functions of the file that the statements call.
     pub operations: BTreeSet<Operation>,
+    /// The functions of the mathematical library that they call.
+    pub functions: BTreeSet<Function>,
 }
 
 /// A part of a graph: nodes that are known already, with how they are written, and the outputs.
@@ -210,7 +212,10 @@ impl State<'_> {
                 let other = self.pick(&format!("{a} < {zero}"), &minus, a);
                 self.pick(&format!("{a} > {zero}"), &one, &other)
             }
-            Unary::Call(function) => (language.function)(Function::Unary(function), precision, math, &[a]),
+            Unary::Call(function) => {
+                self.made.functions.insert(Function::Unary(function));
+                (language.function)(Function::Unary(function), precision, math, &[a])
+            }
         })
     }
 
@@ -242,6 +247,7 @@ impl State<'_> {
                 self.operation(Operation::Power, &format!("{a}, {b}"))
             }
             Binary::Call(function) => {
+                self.made.functions.insert(Function::Binary(function));
                 (language.function)(Function::Binary(function), precision, math, &[a, b])
             }
             Binary::And | Binary::Or | Binary::AndWeight | Binary::OrWeight => {

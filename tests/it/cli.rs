@@ -47,6 +47,7 @@ fn help_and_usage() {
         &["check", "--help"],
         &["eval", "--help"],
         &["mesh", "--help"],
+        &["build", "--help"],
         &["run", "--help"],
         &["report", "--help"],
         &["explain", "--help"],

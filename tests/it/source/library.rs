@@ -48,11 +48,6 @@ pub fn mathematics() -> String {
     text
 }
 
-/// Declarations of the functions of [`mathematics`].
-pub fn mathematics_declared() -> String {
-    mathematics().lines().filter(|line| line.ends_with(");")).map(|line| format!("{line}\n")).collect()
-}
-
 unsafe extern "C" {
     fn dlopen(path: *const c_char, flags: c_int) -> *mut c_void;
     fn dlsym(library: *mut c_void, name: *const c_char) -> *mut c_void;
