@@ -166,7 +166,10 @@ impl CFile<'_> {
             "#ifndef RFM_INLINE".into(),
             "#if defined(__GNUC__) || defined(__clang__)".into(),
             format!("#define RFM_INLINE static inline {qualifiers}__attribute__((always_inline, unused))"),
+            // many functions that are called once: in one another, they would take a compiler minutes
+            "#define RFM_NOINLINE static __attribute__((noinline))".into(),
             "#else".into(),
+            "#define RFM_NOINLINE static".into(),
             format!("#define RFM_INLINE static inline {qualifiers}").trim_end().to_string(),
             "#endif".into(),
             "#if defined(__GNUC__) || defined(__clang__) || defined(_MSC_VER)".into(),

@@ -46,7 +46,14 @@ pub(super) struct Blocks {
 /// A step of the plan, or a part of one.
 enum Step {
     Planned(BlockStep),
-    Chunk { chunk: Chunk, reads: Vec<ColumnPlace>, writes: Vec<ColumnPlace> },
+    /// A chunk of a piece, by the piece's number. `constants` says where those of a piece with parameters begin.
+    Chunk {
+        piece: usize,
+        chunk: Chunk,
+        constants: Option<usize>,
+        reads: Vec<ColumnPlace>,
+        writes: Vec<ColumnPlace>,
+    },
 }
 
 /// What a step does.
@@ -118,9 +125,10 @@ impl Blocks {
                     written.table.push(called as i64 + 1);
                     written.table.extend(operands(step));
                 }
-                Step::Chunk { chunk, reads, writes } => {
+                Step::Chunk { piece, chunk, constants, reads, writes } => {
                     let function = format!("{name}_chunk{}", written.chunks.len());
-                    self.chunk(chunk, &function, (writer, program), &mut written)?;
+                    let graph = self.plan.pieces[*piece].shape.as_ref().unwrap_or(&program.graph);
+                    self.chunk((graph, chunk, *constants), &function, writer, &mut written)?;
                     written.table.extend(reads.iter().chain(writes).map(column));
                 }
             }
@@ -177,23 +185,24 @@ impl Blocks {
     /// A chunk of a long piece: its function, if none has its text yet, and its first numbers in the table.
     fn chunk(
         &self,
-        chunk: &Chunk,
+        (graph, chunk, constants): (&Graph, &Chunk, Option<usize>),
         name: &str,
-        (writer, program): (&Writer<'_>, &Program),
+        writer: &Writer<'_>,
         written: &mut Written,
     ) -> Result<(), SourceError> {
         let gathered = RefCell::new(Vec::new());
-        let writer = Writer { axes: IN_COLUMNS, gathered: Some(&gathered), ..*writer };
+        let parameter = |i: u32| format!("c[{i}]");
+        let writer = Writer { axes: IN_COLUMNS, gathered: Some(&gathered), parameter: &parameter, ..*writer };
         let inputs: Vec<(Node, String)> =
             chunk.reads.iter().enumerate().map(|(i, &node)| (node, format!("r{i}[i]"))).collect();
         let forms = Forms::default(); // a piece has no R₀
-        let part = Part { graph: &program.graph, inputs: &inputs, outputs: &chunk.writes, forms: &forms };
+        let part = Part { graph, inputs: &inputs, outputs: &chunk.writes, forms: &forms };
         let body = writer.statements(&part)?;
         let text = body.lines.join("\n") + &body.outputs.join(",");
-        let constants = gathered.into_inner();
+        let gathered = gathered.into_inner();
+        let has_constants = constants.is_some() || !gathered.is_empty();
         let known = written.chunks.get(&text).copied();
         let called = known.unwrap_or_else(|| {
-            let has_constants = !constants.is_empty();
             let counts = [chunk.reads.len(), chunk.writes.len()];
             self.loop_of(name, counts, has_constants, &body, &mut written.made);
             let columns = chunk.reads.len() + chunk.writes.len();
@@ -202,9 +211,11 @@ impl Blocks {
             written.called.len() - 1
         });
         written.table.push(called as i64 + 1);
-        if !constants.is_empty() {
+        if let Some(first) = constants {
+            written.table.push(first as i64);
+        } else if has_constants {
             written.table.push(written.constants.len() as i64);
-            written.constants.extend(constants);
+            written.constants.extend(gathered);
         }
         Ok(())
     }
@@ -254,12 +265,11 @@ impl Blocks {
         arguments.extend((0..writes).map(|i| format!("{number} *RFM_RESTRICT w{i}")));
         let lines = &mut made.lines;
         lines.push(String::new());
-        lines.push(format!("static void {name}({}) {{", arguments.join(", ")));
+        lines.push(format!("RFM_NOINLINE void {name}({}) {{", arguments.join(", ")));
         lines.push("    size_t i;".into());
-        lines.push(format!(
-            "    (void)x; (void)y; (void)z;{}",
-            if self.has_uniforms { " (void)u;" } else { "" }
-        ));
+        let unused = [("u", self.has_uniforms), ("c", has_constants)];
+        let unused = unused.iter().filter(|(_, is)| *is).map(|(name, _)| format!(" (void){name};"));
+        lines.push(format!("    (void)x; (void)y; (void)z;{}", unused.collect::<String>()));
         lines.push("    for (i = 0; i < n; i++) {".into());
         lines.extend(body.lines.iter().map(|line| format!("        {line}")));
         lines.extend(body.outputs.iter().enumerate().map(|(i, text)| format!("        w{i}[i] = {text};")));
@@ -308,7 +318,7 @@ impl Blocks {
             }
         };
         made.lines.push(String::new());
-        made.lines.push(format!("static void {function}(size_t n, {}) {{", arguments.join(", ")));
+        made.lines.push(format!("RFM_NOINLINE void {function}(size_t n, {}) {{", arguments.join(", ")));
         made.lines.push("    size_t i;".into());
         made.lines.push("    for (i = 0; i < n; i++) {".into());
         made.lines.extend(body.into_iter().map(|line| format!("        {line}")));
@@ -465,11 +475,10 @@ fn operands(step: &BlockStep) -> Vec<i64> {
 /// The chunks of a step that is a long piece of arithmetic. What they hand on gets columns behind the first `columns`,
 /// which grow to hold it.
 fn divided(plan: &BlockPlan, graph: &Graph, step: &BlockStep, columns: &mut usize) -> Option<Vec<Step>> {
-    let BlockStep::Arithmetic { program, reads, writes, .. } = step else { return None };
+    let BlockStep::Arithmetic { program, reads, writes, parameters } = step else { return None };
     let piece = &plan.pieces[*program];
-    if piece.shape.is_some() {
-        return None;
-    }
+    let graph = piece.shape.as_ref().unwrap_or(graph);
+    let constants = piece.shape.is_some().then_some(parameters.start);
     let chunks = chunks(graph, &piece.inputs, &piece.outputs)?;
     let mut last_read: HashMap<Node, usize> = HashMap::new();
     for (i, chunk) in chunks.iter().enumerate() {
@@ -500,7 +509,7 @@ fn divided(plan: &BlockPlan, graph: &Graph, step: &BlockStep, columns: &mut usiz
                 free.push(*column);
             }
         }
-        steps.push(Step::Chunk { chunk, reads: read, writes: written });
+        steps.push(Step::Chunk { piece: *program, chunk, constants, reads: read, writes: written });
     }
     *columns = (*columns).max(next as usize);
     Some(steps)

@@ -219,8 +219,9 @@ fn a_header_is_c_and_cplusplus_and_cuda_is_cplusplus() {
     }
 }
 
+/// The sums of a gradient may have another order, and round differently, where params are no constants.
 #[test]
-fn params_that_stay_open_give_the_bits_of_params_that_were_set() {
+fn params_that_stay_open_give_the_values_of_params_that_were_set() {
     let text = "rfm 1\nparam side = 2 in 0.1 .. 9 \"of the cube\"\nparam turn = 0.3\nparam n = 3\nparam unused = 1\n\
                 let _ = unused\nsolid s = box([-side/2, -side, -1], [side/2, side, 1]).rotate_z(turn + t).move([turn, 0, 0])\n  \
                 \\ any i in 0..n: ball([0.3*i, 0, 0], side/4)";
@@ -247,8 +248,8 @@ fn params_that_stay_open_give_the_bits_of_params_that_were_set() {
         let set = set.solid_with("s", Engine::Jit).unwrap().at(0.4);
         let extra = Extra { time: Some(0.4), params: Some(vec![side, turn]) };
         let counts = compare(&library, "s", &set, &points(FEW, 3), extra);
-        // another order of the sums of a gradient may round differently, and it does not here
-        assert_eq!(counts.different, 0, "{counts:?}");
+        assert_eq!(counts.different_values, 0, "{counts:?}");
+        assert!(counts.worst < 1e-4, "{counts:?}");
     }
 }
 
