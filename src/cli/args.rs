@@ -273,7 +273,8 @@ pub(super) struct Build {
     /// Whose sin, exp and so on are called
     #[arg(long, value_enum, default_value_t = BuildMath::System)]
     pub math: BuildMath,
-    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants
+    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants: ω keeps its
+    /// bits, gradients may round differently
     #[arg(long)]
     pub runtime_params: bool,
     /// The machine of an object file, as in x86_64-apple-darwin [default: this one, with all that its processor has]

@@ -16,8 +16,6 @@ pub struct Counts {
     pub different: usize,
     /// Those of `different` that are values of ω or signs.
     pub different_values: usize,
-    /// The largest difference, relative to 1 + |number|.
-    pub worst: f64,
 }
 
 impl AddAssign for Counts {
@@ -25,7 +23,6 @@ impl AddAssign for Counts {
         self.compared += other.compared;
         self.different += other.different;
         self.different_values += other.different_values;
-        self.worst = self.worst.max(other.worst);
     }
 }
 
@@ -176,9 +173,6 @@ fn compare_in<T: Columns>(
                 counts.different += 1;
                 counts.different_values +=
                     usize::from(["omega", "omega with gradient", "sign"].contains(&what));
-                let (found, expected) = (found[i].wide(), expected[i].wide());
-                let error = (found - expected).abs() / (1.0 + expected.abs());
-                counts.worst = counts.worst.max(if error.is_nan() { f64::INFINITY } else { error });
             }
         }
     };
