@@ -21,7 +21,7 @@ use crate::codegen::CodegenError;
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source, nearest};
 use crate::geom::Aabb;
 use crate::ir::Node;
-use crate::lower::{self, Module, Options, Scene, Tolerance};
+use crate::lower::{self, Module, OpenParams, Options, Scene, Tolerance};
 use crate::solid::{Bounds, Chosen, Engine, Solid};
 use crate::sph::Method;
 use crate::syntax::{self, Ast};
@@ -169,6 +169,26 @@ impl Program {
     /// [`Error::Diagnostics`] if the method makes the file wrong.
     pub fn with_method(&self, method: Method) -> Result<Self, Error> {
         self.lowered_again(Options { method: Some(method), ..self.options.clone() })
+    }
+
+    /// Checks the same file again with open params: its solids have them as arguments, and cannot be evaluated. They
+    /// are for [`source`](crate::source). Params that decide how a solid is built, such as the length of a range,
+    /// remain constants; their names come second. There are no scenes.
+    ///
+    /// # Errors
+    /// None that the file does not have with constant params.
+    pub fn with_open_params(&self) -> Result<(Self, Vec<String>), Error> {
+        let mut open = OpenParams::default();
+        loop {
+            let again = self.lowered_again(Options { open: Some(open.clone()), ..self.options.clone() })?;
+            let names = again.module.fixed.iter().map(|&i| again.module.params[i as usize].name.clone());
+            let known = open.fixed.len();
+            open.fixed.extend(names);
+            // one that is fixed may show another one that must be
+            if open.fixed.len() == known {
+                return Ok((again, open.fixed.into_iter().collect()));
+            }
+        }
     }
 
     fn lowered_again(&self, options: Options) -> Result<Self, Error> {

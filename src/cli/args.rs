@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::build::output_help as build_output_help;
 use super::mesh::{ascii_help, format_name, output_help};
 use super::values::{
     Definition, Frames, Tolerance, aabb, count, definition, frames, length, plane, point, seconds, threads,
@@ -85,6 +86,8 @@ pub(super) enum Command {
     Eval(Eval),
     /// Make a closed triangle mesh of a solid, or of the fluid of a run
     Mesh(Mesh),
+    /// Write a solid as source or object code for other programs: C, CUDA, Rust, WGSL, GLSL
+    Build(Build),
     /// Simulate the fluid of a scene around its obstacles
     Run(Run),
     /// Measure speed against error: of every program of a solid and its meshes, or of a flow that is known
@@ -239,6 +242,72 @@ pub(super) enum MeshMethod {
     Mc,
     /// Dual contouring: also edges and corners are exact, so an eighth of the cells do for the same error
     Dc,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "In C:           rfm build examples/pawn.rfm -o pawn.c\n                \
+                        cc -O3 -march=native -ffp-contract=off -fno-math-errno -fno-trapping-math -c pawn.c\n\
+                        In Rust:        rfm build examples/pawn.rfm -o pawn.rs\n\
+                        In a shader:    rfm build examples/pawn.rfm -o pawn.wgsl\n\
+                        With a linker:  rfm build examples/pawn.rfm -o pawn.o --what sign,distance\n\n\
+                        For a solid `pawn` a file has pawn_omega and pawn_omega_gradient, and with --what also pawn_sign and \
+                        pawn_distance: for one point, and with _many for columns of points; in f64, and with f (C) or _f32 \
+                        (Rust) at the end of the name in f32. Solids that move take the time as an argument. C and Rust \
+                        give the bits of rfm if they are compiled as their first lines say; shaders compute in f32 and \
+                        promise no bits. Beside a .c or .o file a header .h of the same name is written.")]
+pub(super) struct Build {
+    /// The file; `-` is standard input
+    pub file: PathBuf,
+    /// The solid [default: the only one, or the first obstacle of the scene]
+    #[arg(short, long, value_name = "NAME")]
+    pub solid: Option<String>,
+    // where the text goes; `output_help` writes the help, which lists the targets
+    #[arg(short, long, value_name = "FILE", help = build_output_help())]
+    pub output: Option<PathBuf>,
+    /// Functions besides those of ω and ∇ω
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub what: Vec<BuildWhat>,
+    /// Precisions of the functions [default: f64 and f32; shaders have f32 alone]
+    #[arg(long, value_parser = precision(), value_delimiter = ',')]
+    pub precision: Vec<Precision>,
+    /// Whose sin, exp and so on are called
+    #[arg(long, value_enum, default_value_t = BuildMath::System)]
+    pub math: BuildMath,
+    /// Keep the params of the file as arguments of the functions, in a structure, instead of constants: ω keeps its
+    /// bits, gradients may round differently
+    #[arg(long)]
+    pub runtime_params: bool,
+    /// The machine of an object file, as in x86_64-apple-darwin [default: this one, with all that its processor has]
+    #[arg(long, value_name = "TRIPLE")]
+    pub target: Option<String>,
+    /// What all names begin with [default: the name of the solid]
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum BuildWhat {
+    /// 1 inside, 0 on the surface, −1 outside
+    Sign,
+    /// Distance from the surface, positive outside: accurate near it, an estimate far away
+    Distance,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum BuildMath {
+    /// Those of the language: nothing else is needed, and their last bits differ between systems
+    System,
+    /// Those of rfm, with its bits: rfm_math_sin … of its C library, libm::sin … in Rust
+    Rfm,
+}
+
+impl From<BuildMath> for rfm::source::Math {
+    fn from(math: BuildMath) -> Self {
+        match math {
+            BuildMath::System => Self::System,
+            BuildMath::Rfm => Self::Rfm,
+        }
+    }
 }
 
 #[derive(Debug, Args)]

@@ -33,7 +33,7 @@ pub(super) fn check(shared: &Shared, source: Source) -> Result<Program, Diagnost
     let overrides = shared.define.iter().map(|given| (given.name.clone(), given.value)).collect();
     let dimensions =
         shared.define.iter().filter_map(|given| Some((given.name.clone(), given.dimension?))).collect();
-    let options = Options { overrides, dimensions, max_nodes: shared.max_nodes, method: None };
+    let options = Options { overrides, dimensions, max_nodes: shared.max_nodes, ..Options::default() };
     Program::check(source, options)
 }
 

@@ -9,6 +9,7 @@ macro_rules! say {
 }
 
 mod args;
+mod build;
 mod check;
 mod choose;
 mod eval;
@@ -73,6 +74,7 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         args::Command::Check(options) => check::run(&shared, &options),
         args::Command::Eval(options) => eval::run(&shared, &options),
         args::Command::Mesh(options) => mesh::run(&shared, &options),
+        args::Command::Build(options) => build::run(&shared, &options),
         args::Command::Run(options) => run::run(&shared, &options),
         args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),

@@ -7,6 +7,15 @@ use cranelift_codegen::isa::CallConv;
 use crate::ir::{Binary, BinaryFunction, Expr, Unary, UnaryFunction};
 use crate::precision::Precision;
 
+/// Whose functions of the mathematical library a program calls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Library {
+    /// Those of the interpreter.
+    Rfm,
+    /// Those of the C library that an object file is linked with.
+    System,
+}
+
 /// A function of the mathematical library.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum HostFunction {
@@ -31,12 +40,15 @@ impl HostFunction {
     }
 
     /// Its name for the linker.
-    pub fn symbol(self, precision: Precision) -> String {
+    pub fn symbol(self, precision: Precision, library: Library) -> String {
         let name = match self {
-            Self::Unary(function) => function.name(),
-            Self::Binary(function) => function.name(),
+            Self::Unary(function) => function.c_name(precision),
+            Self::Binary(function) => function.c_name(precision),
         };
-        format!("rfm_{name}_{precision:?}")
+        match library {
+            Library::Rfm => format!("rfm_math_{name}"),
+            Library::System => name.into(),
+        }
     }
 
     pub fn address(self, precision: Precision) -> *const u8 {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-use cranelift_codegen::isa::OwnedTargetIsa;
+use cranelift_codegen::isa::{self, OwnedTargetIsa};
 use cranelift_codegen::settings::{self, Configurable};
 
 /// Why there is no program.
@@ -30,32 +30,60 @@ impl std::error::Error for CodegenError {}
 /// (66 000 instructions: 1.8 s against 0.1 s).
 const SINGLE_PASS_ABOVE: usize = 4_000;
 
+fn allocator(nodes: usize) -> &'static str {
+    if nodes > SINGLE_PASS_ABOVE { "single_pass" } else { "backtracking" }
+}
+
 /// The instruction set of this machine, found out once per register allocator.
 pub(super) fn target(nodes: usize) -> Result<OwnedTargetIsa, CodegenError> {
     static THOROUGH: OnceLock<Result<OwnedTargetIsa, CodegenError>> = OnceLock::new();
     static FAST: OnceLock<Result<OwnedTargetIsa, CodegenError>> = OnceLock::new();
-    let (cell, allocator) =
-        if nodes > SINGLE_PASS_ABOVE { (&FAST, "single_pass") } else { (&THOROUGH, "backtracking") };
-    cell.get_or_init(|| detect(allocator)).as_ref().map(Arc::clone).map_err(Clone::clone)
+    let cell = if nodes > SINGLE_PASS_ABOVE { &FAST } else { &THOROUGH };
+    let allocator = allocator(nodes);
+    cell.get_or_init(|| detect(allocator, Place::Memory)).as_ref().map(Arc::clone).map_err(Clone::clone)
 }
 
-fn detect(allocator: &str) -> Result<OwnedTargetIsa, CodegenError> {
+/// Where code is put.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// The memory of this process.
+    Memory,
+    /// An object file, which a linker may put anywhere.
+    Object,
+}
+
+/// The instruction set of this machine, for an object file.
+pub(super) fn object_target(nodes: usize) -> Result<OwnedTargetIsa, CodegenError> {
+    detect(allocator(nodes), Place::Object)
+}
+
+/// Another instruction set, without any extension, for an object file.
+pub(super) fn object_target_of(builder: isa::Builder, nodes: usize) -> Result<OwnedTargetIsa, CodegenError> {
+    let flags = flags(allocator(nodes), Place::Object)?;
+    builder.finish(flags).map_err(|e| CodegenError::Unsupported(e.to_string()))
+}
+
+fn detect(allocator: &str, place: Place) -> Result<OwnedTargetIsa, CodegenError> {
+    let unsupported = |e: &dyn fmt::Display| CodegenError::Unsupported(e.to_string());
+    let builder = cranelift_native::builder().map_err(|e| unsupported(&e))?;
+    builder.finish(flags(allocator, place)?).map_err(|e| unsupported(&e))
+}
+
+fn flags(allocator: &str, place: Place) -> Result<settings::Flags, CodegenError> {
     let mut flags = settings::builder();
     let verify = if cfg!(debug_assertions) { "true" } else { "false" };
     let options = [
         ("opt_level", "speed"),
         ("regalloc_algorithm", allocator),
         ("enable_verifier", verify),
-        ("is_pic", "false"),
+        ("is_pic", if place == Place::Object { "true" } else { "false" }),
         ("use_colocated_libcalls", "false"),
         ("unwind_info", "false"),
     ];
     for (name, value) in options {
         flags.set(name, value).map_err(|e| CodegenError::Bug(format!("setting {name}: {e}")))?;
     }
-    let unsupported = |e: &dyn fmt::Display| CodegenError::Unsupported(e.to_string());
-    let builder = cranelift_native::builder().map_err(|e| unsupported(&e))?;
-    builder.finish(settings::Flags::new(flags)).map_err(|e| unsupported(&e))
+    Ok(settings::Flags::new(flags))
 }
 
 /// The instruction set extensions that generated code uses here, for reports.

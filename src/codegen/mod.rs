@@ -1,4 +1,4 @@
-//! Graph → machine code, through Cranelift.
+//! Graph → machine code, through Cranelift: into executable memory, or into an object file.
 //!
 //! A *program* is one function: its outputs (ω; or ω and ∇ω) at one point, or at many points in blocks of one
 //! 128-bit vector (two `f64` or four `f32`), the widest that the code generator has. The same translation
@@ -12,14 +12,17 @@ mod emitter;
 mod host_functions;
 mod machine;
 mod memory;
+mod object;
 mod operations;
 mod r0;
 mod range;
 mod request;
 mod translate;
 
+pub use host_functions::Library;
 pub use machine::{CodegenError, target_description};
 pub(crate) use memory::Code;
+pub use object::{ObjectProgram, object};
 pub(crate) use range::{
     REACH as RANGE_REACH, knows as range_is_known, stays_finite as range_stays_finite,
     supports as range_is_supported,

@@ -7,10 +7,10 @@ use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::{AbiParam, Function, InstBuilder, MemFlagsData, UserFuncName, Value, types};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
-use cranelift_module::{Linkage, Module, default_libcall_names};
+use cranelift_module::{FuncId, Linkage, Module, default_libcall_names};
 
 use super::emitter::{Emitter, Hosts};
-use super::host_functions::HostFunction;
+use super::host_functions::{HostFunction, Library};
 use super::machine::{CodegenError, target};
 use super::memory::Code;
 use super::range;
@@ -48,6 +48,47 @@ impl Listing {
 }
 
 fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), CodegenError> {
+    let isa = target(needed(request).len())?;
+    let mut linker = JITBuilder::with_isa(isa, default_libcall_names());
+    for function in HostFunction::all() {
+        let symbol = function.symbol(request.precision, Library::Rfm);
+        linker.symbol(symbol, function.address(request.precision));
+    }
+    let mut module = JITModule::new(linker);
+    let named = Named { name: "program", linkage: Linkage::Local, library: Library::Rfm };
+    let Defined { id, size, listing } = define(&mut module, request, named, listing)?;
+    module.finalize_definitions().map_err(|e| CodegenError::Unsupported(e.to_string()))?;
+    let entry = module.get_finalized_function(id);
+    let code = Code::new(module, entry, (request.precision, request.shape), request.outputs.len(), size);
+    Ok((code, listing))
+}
+
+/// How a function stands in its module.
+#[derive(Clone, Copy)]
+pub(super) struct Named<'a> {
+    pub name: &'a str,
+    pub linkage: Linkage,
+    /// Whose functions of the mathematical library it calls.
+    pub library: Library,
+}
+
+/// A function that a module has.
+pub(super) struct Defined {
+    id: FuncId,
+    size: usize,
+    listing: Listing,
+}
+
+/// Compiles a program into a module: one of executable memory, or an object file.
+///
+/// # Errors
+/// [`CodegenError::Bug`] if the generated function is refused.
+pub(super) fn define(
+    module: &mut impl Module,
+    request: Request<'_>,
+    named: Named<'_>,
+    listing: bool,
+) -> Result<Defined, CodegenError> {
     let needed = needed(request);
     if needed.iter().any(|&node| request.graph.expr(node) == Expr::Coordinate(Axis::T)) {
         return Err(CodegenError::Bug("time is in the graph of a program".into()));
@@ -57,18 +98,13 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
             .ok_or_else(|| CodegenError::Bug("a range program of this formula".into()))?,
         Shape::Point | Shape::Batch => range::Instructions::default(),
     };
-    let isa = target(needed.len())?;
     let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
-    let mut linker = JITBuilder::with_isa(isa, default_libcall_names());
-    for function in HostFunction::all() {
-        linker.symbol(function.symbol(request.precision), function.address(request.precision));
-    }
-    let mut module = JITModule::new(linker);
     let mut context = module.make_context();
     context.func = Function::with_name_signature(UserFuncName::user(0, 0), module.make_signature());
-    declare_parameters(&mut context.func, &module, request);
+    declare_parameters(&mut context.func, module, request);
 
-    let hosts = declare_hosts(&mut module, &mut context.func, request, &needed).map_err(|e| bug(&e))?;
+    let hosts = declare_hosts(module, &mut context.func, (request, named.library), &needed);
+    let hosts = hosts.map_err(|e| bug(&e))?;
     let mut shared = FunctionBuilderContext::new();
     let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
     match request.shape {
@@ -83,13 +119,10 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     let clif = if listing { context.func.display().to_string() } else { String::new() };
     context.set_disasm(listing);
     let signature = context.func.signature.clone();
-    let id = module.declare_function("program", Linkage::Local, &signature).map_err(|e| bug(&e))?;
+    let id = module.declare_function(named.name, named.linkage, &signature).map_err(|e| bug(&e))?;
     module.define_function(id, &mut context).map_err(|e| CodegenError::Bug(format!("{e:?}")))?;
     let (size, assembly) = compiled_texts(&context);
-    module.finalize_definitions().map_err(|e| CodegenError::Unsupported(e.to_string()))?;
-    let entry = module.get_finalized_function(id);
-    let code = Code::new(module, entry, (request.precision, request.shape), request.outputs.len(), size);
-    Ok((code, Listing { clif, assembly }))
+    Ok(Defined { id, size, listing: Listing { clif, assembly } })
 }
 
 fn compiled_texts(context: &Context) -> (usize, String) {
@@ -98,7 +131,7 @@ fn compiled_texts(context: &Context) -> (usize, String) {
         .map_or((0, String::new()), |code| (code.code_buffer().len(), code.vcode.clone().unwrap_or_default()))
 }
 
-fn declare_parameters(function: &mut Function, module: &JITModule, request: Request<'_>) {
+fn declare_parameters(function: &mut Function, module: &impl Module, request: Request<'_>) {
     let pointer = AbiParam::new(module.target_config().pointer_type());
     let scalar = AbiParam::new(match request.precision {
         Precision::F32 => types::F32,
@@ -113,9 +146,9 @@ fn declare_parameters(function: &mut Function, module: &JITModule, request: Requ
 }
 
 fn declare_hosts(
-    module: &mut JITModule,
+    module: &mut impl Module,
     function: &mut Function,
-    request: Request<'_>,
+    (request, library): (Request<'_>, Library),
     needed: &[Node],
 ) -> Result<Hosts, cranelift_module::ModuleError> {
     let mut hosts = Hosts::default();
@@ -126,7 +159,8 @@ fn declare_hosts(
         }
         let convention = module.target_config().default_call_conv;
         let signature = host.signature(convention, request.precision);
-        let id = module.declare_function(&host.symbol(request.precision), Linkage::Import, &signature)?;
+        let id =
+            module.declare_function(&host.symbol(request.precision, library), Linkage::Import, &signature)?;
         hosts.insert(host, module.declare_func_in_func(id, function));
     }
     Ok(hosts)
@@ -241,7 +275,7 @@ fn nodes(
 }
 
 /// What the outputs of a program depend on, down to its inputs and without them, in the graph's order.
-fn needed(request: Request<'_>) -> Vec<Node> {
+pub(super) fn needed(request: Request<'_>) -> Vec<Node> {
     let known: FxHashSet<Node> = request.inputs.iter().copied().collect();
     let mut seen: FxHashSet<Node> = FxHashSet::default();
     let mut found: Vec<Node> = Vec::new();

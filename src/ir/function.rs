@@ -6,6 +6,8 @@
 //!
 //! Values come from one portable library, so that results do not depend on the system.
 
+use crate::precision::Precision;
+
 /// Declares functions of the mathematical library, one on each line: their variant, their name in files and
 /// dumps, and the functions that compute them in `f64` and in `f32`. Before them stand the operands in the
 /// ways in which Rust wants them written.
@@ -18,7 +20,7 @@ macro_rules! functions {
         }
     ) => {
         $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum $type {
             $($(#[$variant_meta])* $variant,)+
         }
@@ -31,6 +33,14 @@ macro_rules! functions {
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name,)+
+                }
+            }
+
+            /// Its name in the mathematical library of C.
+            pub fn c_name(self, precision: Precision) -> &'static str {
+                match (self, precision) {
+                    $((Self::$variant, Precision::F64) => stringify!($double),
+                    (Self::$variant, Precision::F32) => stringify!($single),)+
                 }
             }
 

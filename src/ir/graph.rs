@@ -273,6 +273,25 @@ impl Graph {
         self.uses(root, Axis::T)
     }
 
+    /// The numbers of the parameters that a root depends on.
+    pub fn parameters(&self, root: Node) -> Vec<u32> {
+        let number = |node: Node| match self.expr(node) {
+            Expr::Parameter(number) => Some(number),
+            _ => None,
+        };
+        self.cone(root).into_iter().filter_map(number).collect()
+    }
+
+    /// Whether a parameter occurs in what some roots depend on.
+    pub fn uses_parameters(&self, roots: &[Node]) -> bool {
+        let is_parameter = |expr: &Expr| matches!(expr, Expr::Parameter(_));
+        // few graphs have parameters, and the others need not be walked
+        self.exprs.iter().any(is_parameter) && {
+            let used = self.reachable(roots);
+            std::iter::zip(&self.exprs, used).any(|(expr, used)| used && is_parameter(expr))
+        }
+    }
+
     /// The node with x, y, z replaced: the same shape in other coordinates, at the same time.
     pub fn substitute(&mut self, root: Node, coordinates: [Node; 3]) -> Node {
         let mut image: FxHashMap<Node, Node> = FxHashMap::default();
@@ -292,13 +311,19 @@ impl Graph {
         image[&root]
     }
 
-    /// The value of a node that uses no coordinate.
+    /// The value of a node that uses no coordinate and no parameter.
     pub fn constant_value(&self, root: Node) -> Option<f64> {
+        self.value_with(root, &[])
+    }
+
+    /// The value of a node that uses no coordinate, with these values of parameters.
+    pub fn value_with(&self, root: Node, parameters: &[f64]) -> Option<f64> {
         let mut values: FxHashMap<Node, f64> = FxHashMap::default();
         for node in self.cone(root) {
             let value = match self.expr(node) {
                 Expr::Constant(bits) => f64::from_bits(bits),
-                Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => return None,
+                Expr::Parameter(i) => *parameters.get(i as usize)?,
+                Expr::Coordinate(_) | Expr::Uniform(_) => return None,
                 Expr::Unary(op, a) => op.eval(values[&a]),
                 Expr::Binary(op, a, b) => op.eval(values[&a], values[&b]),
             };

@@ -38,7 +38,7 @@ pub(crate) use bounds::range::{Affine, RangeRule, Region};
 pub(crate) use derived::contact::{contact, wall_velocity};
 pub use derived::gradient::gradient;
 pub use derived::gradient::gradient_and_rate;
-pub(crate) use derived::hoisted::{Hoisted, Uniforms, hoisted};
+pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, hoisted};
 pub use derived::localised::localised;
 pub(crate) use derived::sign::SignRule;
 pub(crate) use derived::twin::twin;

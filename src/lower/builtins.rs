@@ -199,7 +199,7 @@ impl Lowering<'_> {
     fn positive(&mut self, value: &Expr, what: Option<&Expr>, span: Span) -> Value {
         let result = self.expr(value);
         let Value::Number(node) = result else { return result };
-        let Some(number) = self.module.graph.constant_value(node) else { return result };
+        let Some(number) = self.known_value(node) else { return result };
         if number > 0.0 && number.is_finite() {
             return result;
         }

@@ -273,9 +273,10 @@ impl Lowering<'_> {
     }
 
     pub fn raise(&mut self, a: Node, b: Node, span: Span) -> Node {
-        let Some(exponent) = self.module.graph.constant_value(b) else {
+        let Some(exponent) = self.known_value(b) else {
             return self.binary(BinaryFunction::Pow.into(), a, b, span);
         };
+        self.fix(b);
         if exponent == 0.5 {
             return self.unary(Unary::Sqrt, a, span);
         }

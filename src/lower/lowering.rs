@@ -35,6 +35,8 @@ pub(super) struct Lowering<'a> {
     pub bare: HashSet<String>,
     /// The method that all scenes get, whatever they state.
     pub method: Option<Method>,
+    /// Whether some params are no constants.
+    pub has_open_params: bool,
     max_nodes: usize,
     budget_reported: bool,
     /// Expressions evaluated so far.
@@ -85,6 +87,7 @@ impl Lowering<'_> {
             dimensions: HashMap::new(),
             bare: HashSet::new(),
             method: None,
+            has_open_params: false,
             max_nodes,
             budget_reported: false,
             evaluations: 0,
@@ -190,8 +193,28 @@ impl Lowering<'_> {
         }
     }
 
+    /// The value that a node has with the present values of params; `None` if it depends on the place or on time.
+    pub fn known_value(&self, node: Node) -> Option<f64> {
+        let values: Vec<f64> = self.module.params.iter().map(|param| param.value).collect();
+        self.module.graph.value_with(node, &values)
+    }
+
+    /// Remembers that the values of the open params in a node have decided how a solid is built.
+    pub fn fix(&mut self, node: Node) {
+        if self.has_open_params {
+            let found = self.module.graph.parameters(node);
+            self.module.fixed.extend(found);
+        }
+    }
+
+    /// Whether a value depends on an open param.
+    pub fn is_open(&self, node: Node) -> bool {
+        self.has_open_params && !self.module.graph.parameters(node).is_empty()
+    }
+
     pub fn as_constant(&mut self, node: Node, span: Span, what: &str) -> Option<f64> {
-        let value = self.module.graph.constant_value(node);
+        let value = self.known_value(node);
+        self.fix(node);
         if value.is_none() {
             let span = self.user_span(span);
             let on = if self.depends_on_place(node) { "x, y or z" } else { "t" };

@@ -19,7 +19,7 @@ mod slips;
 mod transforms;
 mod value;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 
 pub use module::{Module, NamedSolid, ParamValue};
@@ -28,6 +28,7 @@ pub use scene::{
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
+use crate::ir::Expr as Operation;
 use crate::quantity::{Dimension, Unit, in_unit, parse_unit};
 use crate::sph::Method;
 use crate::syntax::Ast;
@@ -48,11 +49,27 @@ pub struct Options {
     /// The method of every scene, in place of the one that it states. Defaults that depend on the method
     /// follow it.
     pub method: Option<Method>,
+    /// Params that stay open: solids have them as `Expr::Parameter` with their number in [`Module::params`]. No scene
+    /// is read then. `None` if all params are constants.
+    pub open: Option<OpenParams>,
+}
+
+/// Which params stay open.
+#[derive(Debug, Clone, Default)]
+pub struct OpenParams {
+    /// Names of those that are constants all the same.
+    pub fixed: BTreeSet<String>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { overrides: BTreeMap::new(), dimensions: BTreeMap::new(), max_nodes: 1_000_000, method: None }
+        Self {
+            overrides: BTreeMap::new(),
+            dimensions: BTreeMap::new(),
+            max_nodes: 1_000_000,
+            method: None,
+            open: None,
+        }
     }
 }
 
@@ -96,6 +113,7 @@ pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
 fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
     let mut lowering = Lowering::new(ast.text.clone(), options.max_nodes);
     lowering.method = options.method;
+    lowering.has_open_params = options.open.is_some();
     for item in &prelude().items {
         lowering.item(item, options);
     }
@@ -122,6 +140,7 @@ impl<'a> Lowering<'a> {
                 }
             }
             Item::Solid(definition) => self.solid(definition),
+            Item::Scene(_) if options.open.is_some() => {}
             Item::Scene(scene) => {
                 let named = self.may_define(&scene.name);
                 if named {
@@ -140,6 +159,8 @@ impl<'a> Lowering<'a> {
         if !self.may_define(&param.name) {
             return;
         }
+        // a param that is given by another one has a value of its own, and so do ranges: nothing is fixed by them
+        let fixed = self.module.fixed.clone();
         let value = self.constant_expr(&param.value, "the value of a param");
         let range = param.range.as_ref().map(|(low, high)| {
             (
@@ -147,6 +168,7 @@ impl<'a> Lowering<'a> {
                 self.constant_expr(high, "the range of a param"),
             )
         });
+        self.module.fixed = fixed;
         let range = match range {
             Some((Some(low), Some(high))) => Some((low, high)),
             _ => None,
@@ -168,7 +190,15 @@ impl<'a> Lowering<'a> {
         };
         let fits = (overridden.is_none() || self.override_fits(&given, options))
             && self.param_fits(param, &given, overridden.is_some());
-        let value_now = if fits { Value::Number(self.module.graph.constant(value)) } else { Value::Failed };
+        let is_open = options.open.as_ref().is_some_and(|open| !open.fixed.contains(&given.name));
+        let value_now = match (fits, is_open) {
+            (false, _) => Value::Failed,
+            (true, false) => Value::Number(self.module.graph.constant(value)),
+            (true, true) => {
+                let number = self.module.params.len() as u32;
+                Value::Number(self.module.graph.intern(Operation::Parameter(number), None))
+            }
+        };
         self.names.define(self.scope.source, &param.name, Kind::Value(value_now));
         self.module.params.push(given);
     }

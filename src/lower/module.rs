@@ -1,5 +1,7 @@
 //! A file after lowering: its graph, and what the file defines in it.
 
+use std::collections::BTreeSet;
+
 use super::scene::{Scene, Tolerance};
 use crate::diagnostic::Span;
 use crate::ir::{Graph, Node};
@@ -12,6 +14,9 @@ pub struct Module {
     pub graph: Graph,
     /// The params, in the order of the file.
     pub params: Vec<ParamValue>,
+    /// Numbers of open params whose values have decided how a solid is built, such as the length of a range. They
+    /// must be constants, see [`Options::open`](super::Options::open).
+    pub fixed: BTreeSet<u32>,
     /// The solids, in the order of the file.
     pub solids: Vec<NamedSolid>,
     /// The scenes, in the order of the file.

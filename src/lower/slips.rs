@@ -40,7 +40,7 @@ impl Lowering<'_> {
 
     /// Warns of a solid that has no surface because its ω is a constant.
     pub fn warn_of_constant(&mut self, name: &str, node: Node, value: &Expr) {
-        let Some(constant) = self.module.graph.constant_value(node) else { return };
+        let Some(constant) = self.known_value(node) else { return };
         let holds = if constant > 0.0 { "holds all of space" } else { "is empty" };
         let message = format!("solid `{name}` is the constant {constant}: it {holds}");
         let warning = Diagnostic::warning(Code::CONSTANT_SOLID, value.span, message);
@@ -55,7 +55,7 @@ impl Lowering<'_> {
 
     /// Warns of a division by a constant zero.
     pub fn warn_of_zero(&mut self, divisor: Node, expr: &Expr) {
-        let is_zero = self.module.graph.constant_value(divisor) == Some(0.0);
+        let is_zero = self.known_value(divisor) == Some(0.0);
         // elsewhere a value that is not finite is an error of its own
         if is_zero && self.in_shape && expr.span.source == SourceId::File {
             self.report(

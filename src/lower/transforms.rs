@@ -105,7 +105,7 @@ impl Lowering<'_> {
                     return Value::Failed;
                 }
                 if let Value::Number(node) = &value
-                    && let Some(angle) = self.module.graph.constant_value(*node)
+                    && let Some(angle) = self.known_value(*node)
                 {
                     self.warn_of_large_angle(angle, &argument.value);
                 }
@@ -230,7 +230,7 @@ impl Lowering<'_> {
     /// Sine and cosine of an angle that may depend on time, but not on the place.
     fn angle(&mut self, value: &Value, at: Span) -> Option<Turn> {
         let angle = self.as_number(value, at)?;
-        if self.module.graph.constant_value(angle).is_some() || self.depends_on_place(angle) {
+        if (self.known_value(angle).is_some() && !self.is_open(angle)) || self.depends_on_place(angle) {
             let angle = self.as_constant(angle, at, "an angle")?;
             let (sin, cos) = sin_cos(angle);
             return Some(Turn::Fixed { sin, cos });

@@ -186,6 +186,12 @@ impl Solid {
         (&programs.graph, &programs.outputs)
     }
 
+    /// The formulas of the numbers that [`Solid::graph`] has as uniforms: they depend on time alone, or on
+    /// parameters. `None` if it has none.
+    pub fn uniform_formulas(&self, kind: ProgramKind) -> Option<(&Graph, &[Node])> {
+        self.programs(kind).uniforms.as_ref().map(Uniforms::formulas)
+    }
+
     /// ω as one expression: the simplified graph without the guards of its programs.
     pub fn formula(&self) -> (&Graph, Node) {
         (&self.inner.omega.graph, self.inner.omega.root)

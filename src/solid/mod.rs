@@ -39,6 +39,8 @@ pub use depth::Depth;
 pub use engine::{Engine, ProgramKind};
 pub use evaluation::Contact;
 pub use inspection::{LeafInfo, Remainder};
+pub(crate) use programs::block_plan::{BlockPlan, BlockStep, Operation as JoiningOperation, Piece};
+pub(crate) use programs::columns::ColumnPlace;
 pub use programs::compiled::RangeProgram;
 pub use programs::on_demand::Lane;
 pub use tolerance::{Chosen, OutOfTolerance, ProgramVariant};

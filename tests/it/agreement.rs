@@ -12,7 +12,7 @@ fn example(name: &str) -> [Solid; 2] {
 }
 
 /// Every operation of the language in one solid.
-const EVERYTHING: &str = "rfm 1
+pub const EVERYTHING: &str = "rfm 1
 let r = sqrt(x^2 + y^2)
 solid everything = (sin(x) <= cos(y) and exp(-z^2) >= abs(x)/3 or atan2(y, x) <= 1)
   and min(x, y, z) <= max(x, 2)^3 or (tan(x/4) + asin(x/9) + acos(y/9) + atan(z) <= ln(4 + x) + pow(2 + y^2, z/3))
@@ -29,12 +29,12 @@ fn awkward_coordinates() -> Vec<f64> {
     values
 }
 
-fn same(a: f64, b: f64) -> bool {
+pub fn same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a == 0.0 && b == 0.0)
 }
 
 /// A fold written by hand. In `f32` some of its operations are scaled, in `f64` none.
-fn left_fold(members: usize) -> String {
+pub fn left_fold(members: usize) -> String {
     let steps = (1..members).map(|i| format!("let u{i} = u{} or {i}*x - y\n", i - 1)).collect::<String>();
     format!("rfm 1\nlet u0 = x - z\n{steps}solid fold = u{}\n", members - 1)
 }

@@ -49,6 +49,7 @@ fn help_and_usage() {
         &["check", "--help"],
         &["eval", "--help"],
         &["mesh", "--help"],
+        &["build", "--help"],
         &["run", "--help"],
         &["report", "--help"],
         &["explain", "--help"],

@@ -23,6 +23,7 @@ mod properties;
 mod ranges;
 mod run;
 mod simplify;
+mod source;
 mod sweep;
 mod tidy;
 mod tolerance;

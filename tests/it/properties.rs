@@ -30,7 +30,7 @@ fn point() -> impl Strategy<Value = DVec3> {
 }
 
 /// A number-valued expression of the language, fully bracketed.
-fn expression() -> impl Strategy<Value = String> {
+pub fn expression() -> impl Strategy<Value = String> {
     let leaf = prop_oneof![
         prop::sample::select(vec!["x", "y", "z", "0", "1", "0.3", "2", "(x^2 + y^2)"]).prop_map(String::from),
         prop::sample::select(vec![

@@ -26,6 +26,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("simplify", &["ir", "diagnostic"]),
     ("codegen", &["ir", "diagnostic", "geom", "precision"]),
     ("solid", &["diagnostic", "ir", "simplify", "codegen", "field", "geom", "interval", "precision"]),
+    ("source", &["ir", "codegen", "precision", "solid"]),
     ("compile", &["diagnostic", "geom", "syntax", "ir", "lower", "simplify", "codegen", "solid", "sph"]),
     ("slice", &["field", "geom", "interval", "lettering"]),
     ("mesh", &["field", "geom", "interval"]),

@@ -14,6 +14,8 @@ use crate::ir::interpreter::{Given, Interpreter};
 /// The numbers of a graph that depend on time alone.
 #[derive(Debug, Clone)]
 pub struct Uniforms {
+    /// The formulas alone.
+    graph: Graph,
     interpreter: Interpreter,
     ranges: RangeEvaluator,
     roots: Vec<Node>,
@@ -36,6 +38,12 @@ impl Uniforms {
     /// How many they are.
     pub fn len(&self) -> usize {
         self.roots.len()
+    }
+
+    /// Their formulas: a graph of time, and of parameters if [`Outside::TimeAndParameters`] was taken out; and
+    /// the nodes of the numbers in it.
+    pub fn formulas(&self) -> (&Graph, &[Node]) {
+        (&self.graph, &self.roots)
     }
 
     /// Whether there are none.
@@ -65,17 +73,28 @@ impl Uniforms {
     }
 }
 
-/// Takes out the largest parts of some outputs that depend on time alone.
-pub fn hoisted(graph: &Graph, outputs: &[Node]) -> Hoisted {
-    let mut uses_time = vec![false; graph.len()];
+/// What does not differ from point to point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outside {
+    /// Time. Parameters are constants of a leaf: nothing is gained by taking them out.
+    Time,
+    /// Time, and parameters that the whole formula shares.
+    TimeAndParameters,
+}
+
+/// Takes out the largest parts of some outputs that depend on time alone, or on parameters as well.
+pub fn hoisted(graph: &Graph, outputs: &[Node], outside: Outside) -> Hoisted {
+    let mut varies = vec![false; graph.len()];
     let mut uses_space = vec![false; graph.len()];
     for (node, expr) in graph.nodes() {
         let any = |of: &[bool]| expr.operands().any(|operand| of[operand.index()]);
-        uses_time[node.index()] = expr == Expr::Coordinate(Axis::T) || any(&uses_time);
+        let is_outside = expr == Expr::Coordinate(Axis::T)
+            || (outside == Outside::TimeAndParameters && matches!(expr, Expr::Parameter(_)));
+        varies[node.index()] = is_outside || any(&varies);
         let is_place = matches!(expr, Expr::Coordinate(Axis::X | Axis::Y | Axis::Z));
         uses_space[node.index()] = is_place || any(&uses_space);
     }
-    let alone = |node: Node| uses_time[node.index()] && !uses_space[node.index()];
+    let alone = |node: Node| varies[node.index()] && !uses_space[node.index()];
     // what is left needs, down to the parts that are taken out
     let mut needed = vec![false; graph.len()];
     outputs.iter().for_each(|output| needed[output.index()] = true);
@@ -101,5 +120,5 @@ pub fn hoisted(graph: &Graph, outputs: &[Node]) -> Hoisted {
     let (alone, roots) = graph.extract(&roots);
     let interpreter = Interpreter::new(&alone, &roots);
     let ranges = RangeEvaluator::new(&alone, roots.last().copied().unwrap_or(outputs[0]));
-    Hoisted { graph: rest, outputs, uniforms: Uniforms { interpreter, ranges, roots }, image }
+    Hoisted { graph: rest, outputs, uniforms: Uniforms { graph: alone, interpreter, ranges, roots }, image }
 }

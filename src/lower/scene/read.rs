@@ -181,7 +181,7 @@ impl<'a> Lowering<'a> {
             return Some(Gravity::Still(DVec3::new(0.0, 0.0, -9.81)));
         };
         let nodes = self.components(value, Dimension::ACCELERATION, "gravity")?;
-        let turns = nodes.iter().any(|&node| self.module.graph.constant_value(node).is_none());
+        let turns = nodes.iter().any(|&node| self.known_value(node).is_none());
         if !turns {
             return self
                 .vector_key(block, "gravity", Dimension::ACCELERATION, DVec3::ZERO)

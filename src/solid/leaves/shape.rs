@@ -8,7 +8,8 @@ use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
-    self, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region, Uniforms,
+    self, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, Outside, RangeEvaluator, Region,
+    Uniforms,
 };
 use crate::simplify::simplify;
 use crate::solid::engine::Engine;
@@ -69,7 +70,7 @@ impl Shape {
             let mut all = graph.clone();
             let [x, y, z] = ir::wall_velocity(&mut all, root);
             let (all, outputs, _) = simplify(&all, &[root, x, y, z]);
-            let Hoisted { graph: rest, outputs, uniforms, .. } = ir::hoisted(&all, &outputs);
+            let Hoisted { graph: rest, outputs, uniforms, .. } = ir::hoisted(&all, &outputs, Outside::Time);
             let velocity = rest.extract(&outputs[1..]);
             let motion = Motion { graph, root, uniforms, velocity, velocity_code: OnceLock::new() };
             let (rest, root) = rest.extract_cone(outputs[0]);

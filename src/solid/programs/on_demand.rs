@@ -7,7 +7,9 @@ use super::block_program::BlockProgram;
 use super::compiled::{BatchProgram, PointProgram};
 use super::number::{Number, UniformValues};
 use crate::codegen::{CodegenError, Form, Forms, Precision};
-use crate::ir::{self, Axis, Binary, Expr, Graph, Hoisted, Interpreter, Magnitudes, Node, Unary, Uniforms};
+use crate::ir::{
+    self, Axis, Binary, Expr, Graph, Hoisted, Interpreter, Magnitudes, Node, Outside, Unary, Uniforms,
+};
 use crate::solid::engine::Engine;
 
 /// Where a program gives NaN although its formula might not.
@@ -85,7 +87,7 @@ pub struct Programs {
     /// How R₀ is evaluated in `f64` and in `f32`.
     forms: [Forms; 2],
     pub interpreter: Interpreter,
-    /// What depends on time alone; `None` if the solid is at rest.
+    /// What depends on time alone, or on parameters; `None` if the solid is at rest and has none.
     pub uniforms: Option<Uniforms>,
     double: Compiled<f64>,
     single: Compiled<f32>,
@@ -125,8 +127,9 @@ impl Programs {
         let used = graph.reachable(&outputs);
         let (graph, outputs) = graph.extract(&outputs);
         let forms = forms.map(|forms| forms.kept(&used, &graph));
-        let (graph, outputs, forms, uniforms) = if moves {
-            let Hoisted { graph, outputs, uniforms, image } = ir::hoisted(&graph, &outputs);
+        let (graph, outputs, forms, uniforms) = if moves || graph.uses_parameters(&outputs) {
+            let Hoisted { graph, outputs, uniforms, image } =
+                ir::hoisted(&graph, &outputs, Outside::TimeAndParameters);
             let forms = forms.map(|forms| forms.mapped(|node| image[node.index()]));
             (graph, outputs, forms, Some(uniforms))
         } else {

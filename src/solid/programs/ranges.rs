@@ -6,7 +6,7 @@ use super::compiled::RangeProgram;
 use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{self, Graph, Hoisted, Node, RangeEvaluator, Region};
+use crate::ir::{self, Graph, Hoisted, Node, Outside, RangeEvaluator, Region};
 use crate::solid::engine::Engine;
 
 pub struct Ranges {
@@ -27,7 +27,7 @@ pub struct UniformRanges {
 
 impl Ranges {
     pub fn new(graph: &Graph, root: Node) -> Self {
-        let moving = graph.uses_time(root).then(|| ir::hoisted(graph, &[root]));
+        let moving = graph.uses_time(root).then(|| ir::hoisted(graph, &[root], Outside::Time));
         let evaluator = match &moving {
             Some(Hoisted { graph, outputs, .. }) => RangeEvaluator::new(graph, outputs[0]),
             None => RangeEvaluator::new(graph, root),

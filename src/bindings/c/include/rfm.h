@@ -296,6 +296,66 @@ bool rfm_error_diagnostic(const struct RfmError *error, size_t index, struct Rfm
 // Frees an error object; does nothing with null.
 void rfm_error_free(struct RfmError *error);
 
+// The sine, with the bits that solids have.
+double rfm_math_sin(double a);
+
+// The sine, with the bits that solids have.
+float rfm_math_sinf(float a);
+
+// The cosine, with the bits that solids have.
+double rfm_math_cos(double a);
+
+// The cosine, with the bits that solids have.
+float rfm_math_cosf(float a);
+
+// The tangent, with the bits that solids have.
+double rfm_math_tan(double a);
+
+// The tangent, with the bits that solids have.
+float rfm_math_tanf(float a);
+
+// The arc sine, with the bits that solids have.
+double rfm_math_asin(double a);
+
+// The arc sine, with the bits that solids have.
+float rfm_math_asinf(float a);
+
+// The arc cosine, with the bits that solids have.
+double rfm_math_acos(double a);
+
+// The arc cosine, with the bits that solids have.
+float rfm_math_acosf(float a);
+
+// The arc tangent, with the bits that solids have.
+double rfm_math_atan(double a);
+
+// The arc tangent, with the bits that solids have.
+float rfm_math_atanf(float a);
+
+// The exponential, with the bits that solids have.
+double rfm_math_exp(double a);
+
+// The exponential, with the bits that solids have.
+float rfm_math_expf(float a);
+
+// The natural logarithm, with the bits that solids have.
+double rfm_math_log(double a);
+
+// The natural logarithm, with the bits that solids have.
+float rfm_math_logf(float a);
+
+// A to the power b, with the bits that solids have.
+double rfm_math_pow(double a, double b);
+
+// A to the power b, with the bits that solids have.
+float rfm_math_powf(float a, float b);
+
+// The angle of the point (b, a), with the bits that solids have.
+double rfm_math_atan2(double a, double b);
+
+// The angle of the point (b, a), with the bits that solids have.
+float rfm_math_atan2f(float a, float b);
+
 // Reads and checks a file, with values for `count` of its params; `params` may be null if there are none.
 enum RfmStatus rfm_load_file(const char *path,
                              const struct RfmParam *params,
@@ -575,6 +635,66 @@ enum RfmStatus rfm_collide(const struct RfmSolid *solid,
                            double reach,
                            struct RfmCollisions *collisions,
                            struct RfmError **error);
+
+// The sine, with the bits that solids have.
+double rfm_math_sin(double a);
+
+// The sine, with the bits that solids have.
+float rfm_math_sinf(float a);
+
+// The cosine, with the bits that solids have.
+double rfm_math_cos(double a);
+
+// The cosine, with the bits that solids have.
+float rfm_math_cosf(float a);
+
+// The tangent, with the bits that solids have.
+double rfm_math_tan(double a);
+
+// The tangent, with the bits that solids have.
+float rfm_math_tanf(float a);
+
+// The arc sine, with the bits that solids have.
+double rfm_math_asin(double a);
+
+// The arc sine, with the bits that solids have.
+float rfm_math_asinf(float a);
+
+// The arc cosine, with the bits that solids have.
+double rfm_math_acos(double a);
+
+// The arc cosine, with the bits that solids have.
+float rfm_math_acosf(float a);
+
+// The arc tangent, with the bits that solids have.
+double rfm_math_atan(double a);
+
+// The arc tangent, with the bits that solids have.
+float rfm_math_atanf(float a);
+
+// The exponential, with the bits that solids have.
+double rfm_math_exp(double a);
+
+// The exponential, with the bits that solids have.
+float rfm_math_expf(float a);
+
+// The natural logarithm, with the bits that solids have.
+double rfm_math_log(double a);
+
+// The natural logarithm, with the bits that solids have.
+float rfm_math_logf(float a);
+
+// A to the power b, with the bits that solids have.
+double rfm_math_pow(double a, double b);
+
+// A to the power b, with the bits that solids have.
+float rfm_math_powf(float a, float b);
+
+// The angle of the point (b, a), with the bits that solids have.
+double rfm_math_atan2(double a, double b);
+
+// The angle of the point (b, a), with the bits that solids have.
+float rfm_math_atan2f(float a, float b);
 
 #ifdef __cplusplus
 }  // extern "C"

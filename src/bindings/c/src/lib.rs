@@ -6,6 +6,7 @@
 //! | `program` | files and texts, checked |
 //! | `solid` | solids, and questions about one point |
 //! | `columns` | questions about many points, and collisions |
+//! | `mathematics` | sin, exp and so on with the bits of `rfm`, for generated source and object code |
 //!
 //! `include/rfm.h` is made from these files and says what callers owe. Invariant: no panic leaves a function, and
 //! nothing is kept outside of handles.
@@ -15,6 +16,7 @@
 
 mod columns;
 mod error;
+mod mathematics;
 mod program;
 mod solid;
 

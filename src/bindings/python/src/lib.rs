@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `program`, `solid`, `mesh`, `slice`, `simulation` | one class of Python each |
 //! | `points`, `results`, `evaluate`, `path` | arguments as columns, new and given arrays, questions about many points |
+//! | `source` | solids as source text |
 //! | `memory`, `state` | the memory of arrays; the particles of a simulation as arrays |
 //! | `pool`, `error` | threads, and what happens to them in a forked process; exceptions |
 //!
@@ -21,6 +22,7 @@ mod results;
 mod simulation;
 mod slice;
 mod solid;
+mod source;
 mod state;
 
 use pyo3::prelude::*;

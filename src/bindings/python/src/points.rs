@@ -8,6 +8,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyInt, PyModule, PyTuple};
+use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::solid::Lane;
 use rfm_columns::Column;
@@ -171,4 +172,24 @@ fn number_type(dtype: &Bound<'_, PyAny>) -> PyResult<&'static str> {
         "f" | "i" | "u" | "b" => Ok("f8"),
         _ => Err(PyTypeError::new_err(format!("coordinates are {dtype}, expected real numbers"))),
     }
+}
+
+/// A box: its lowest and its highest corner, or six numbers.
+///
+/// # Errors
+/// `ValueError` or `TypeError` if it is neither, or empty or not finite.
+pub fn aabb(given: &Bound<'_, PyAny>) -> PyResult<Aabb> {
+    let corners = numpy(given.py())?.call_method1("asarray", (given, "f8"))?.call_method0("ravel")?;
+    let corners: Vec<f64> = corners.extract()?;
+    let &[x0, y0, z0, x1, y1, z1] = &corners[..] else {
+        return Err(PyValueError::new_err("expected a box: its lowest and its highest corner"));
+    };
+    let found = Aabb::new(DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
+    if found.is_empty() || !found.is_finite() {
+        return Err(PyValueError::new_err(format!(
+            "the box from {} to {} is empty or not finite",
+            found.min, found.max
+        )));
+    }
+    Ok(found)
 }

@@ -8,17 +8,19 @@ use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::solid::{Bounds, Chosen};
+use rfm::source::Target;
 use rfm::{Solid, mesh};
 
 use crate::error::{of_diagnostics, refused};
 use crate::evaluate::Question;
 use crate::mesh::PyMesh;
 use crate::path::first_entry;
-use crate::points::{Given, numpy};
+use crate::points::{Given, aabb};
 use crate::pool::{Threads, run};
 use crate::program::PyProgram;
 use crate::results::{no_out, several};
 use crate::slice::PySlice;
+use crate::source::{Asked, text};
 
 /// A compiled obstacle: ω, its gradient, its sign and its surface.
 ///
@@ -89,26 +91,6 @@ impl PySolid {
 /// A vector as an array of three doubles.
 fn array(py: Python<'_>, vector: DVec3) -> Bound<'_, PyAny> {
     numpy::PyArray1::from_slice(py, &vector.to_array()).into_any()
-}
-
-/// A box: its lowest and its highest corner, or six numbers.
-///
-/// # Errors
-/// `ValueError` or `TypeError` if it is neither, or empty or not finite.
-pub fn aabb(given: &Bound<'_, PyAny>) -> PyResult<Aabb> {
-    let corners = numpy(given.py())?.call_method1("asarray", (given, "f8"))?.call_method0("ravel")?;
-    let corners: Vec<f64> = corners.extract()?;
-    let &[x0, y0, z0, x1, y1, z1] = &corners[..] else {
-        return Err(PyValueError::new_err("expected a box: its lowest and its highest corner"));
-    };
-    let found = Aabb::new(DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
-    if found.is_empty() || !found.is_finite() {
-        return Err(PyValueError::new_err(format!(
-            "the box from {} to {} is empty or not finite",
-            found.min, found.max
-        )));
-    }
-    Ok(found)
 }
 
 #[pymethods]
@@ -522,6 +504,61 @@ impl PySolid {
         let plane = crate::slice::plane([x, y, z])?;
         let solid = (&self.solid, self.chosen.as_ref());
         PySlice::new(py, solid, plane, samples, window, self.domain(), threads)
+    }
+
+    /// The solid as C, for programs without Python: text of a file with ω and ∇ω at one point and over columns.
+    ///
+    /// Its first lines say how to compile it so that it gives the bits of `omega`. A solid that moves takes the
+    /// time as an argument.
+    ///
+    /// Parameters
+    /// ----------
+    /// header : bool
+    ///     Whether all functions are `static inline`, for a header, rather than for a file of its own.
+    /// sign, distance : bool
+    ///     Whether there are functions for the sign and for the distance from the surface.
+    /// prefix : str, optional
+    ///     What all names begin with: the name of the solid.
+    /// open_params : bool
+    ///     Whether the params of the file are arguments of the functions instead of constants.
+    #[pyo3(signature = (*, header=false, sign=false, distance=false, prefix=None, open_params=false))]
+    fn to_c(
+        &self,
+        py: Python<'_>,
+        header: bool,
+        sign: bool,
+        distance: bool,
+        prefix: Option<String>,
+        open_params: bool,
+    ) -> PyResult<String> {
+        let target = if header { Target::Header } else { Target::C };
+        text(py, (&self.program, &self.solid), target, Asked { sign, distance, prefix, open_params })
+    }
+
+    /// The solid as functions for a WGSL shader, in single precision. Parameters as in `to_c`.
+    #[pyo3(signature = (*, sign=false, distance=false, prefix=None, open_params=false))]
+    fn to_wgsl(
+        &self,
+        py: Python<'_>,
+        sign: bool,
+        distance: bool,
+        prefix: Option<String>,
+        open_params: bool,
+    ) -> PyResult<String> {
+        text(py, (&self.program, &self.solid), Target::Wgsl, Asked { sign, distance, prefix, open_params })
+    }
+
+    /// The solid as functions for a GLSL ES 3.0 shader, in single precision. Parameters as in `to_c`.
+    #[pyo3(signature = (*, sign=false, distance=false, prefix=None, open_params=false))]
+    fn to_glsl(
+        &self,
+        py: Python<'_>,
+        sign: bool,
+        distance: bool,
+        prefix: Option<String>,
+        open_params: bool,
+    ) -> PyResult<String> {
+        text(py, (&self.program, &self.solid), Target::Glsl, Asked { sign, distance, prefix, open_params })
     }
 
     /// A picture for notebooks: the slice across y through the middle of the scene's box or of the bounds.

@@ -7,7 +7,7 @@ fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let config = cbindgen::Config::from_file(folder.join("cbindgen.toml"))?;
     let mut builder = cbindgen::Builder::new().with_config(config);
-    for file in ["lib", "error", "program", "solid", "columns"] {
+    for file in ["lib", "error", "program", "solid", "columns", "mathematics"] {
         builder = builder.with_src(folder.join("src").join(file).with_extension("rs"));
     }
     let mut header = Vec::new();

@@ -1,0 +1,44 @@
+//! Solids as source text.
+
+use pyo3::prelude::*;
+use rfm::Solid;
+use rfm::source::{self, Options, Param, Target};
+
+use crate::error::{raised, refused};
+use crate::program::PyProgram;
+
+/// What Python asks of a text.
+pub struct Asked {
+    pub sign: bool,
+    pub distance: bool,
+    pub prefix: Option<String>,
+    pub open_params: bool,
+}
+
+/// The text of a solid of a program in a language.
+///
+/// # Errors
+/// `RfmError` if the language cannot hold a number of the formula, or if no name may begin with the prefix.
+pub fn text(
+    py: Python<'_>,
+    (program, solid): (&Py<PyProgram>, &Solid),
+    target: Target,
+    asked: Asked,
+) -> PyResult<String> {
+    let Asked { sign, distance, prefix, open_params } = asked;
+    let origin = vec![format!("Made by rfm {}, solid {}.", env!("CARGO_PKG_VERSION"), solid.name())];
+    let mut options = Options { prefix, sign, distance, origin, ..Options::default() };
+    let mut solid = solid.clone();
+    if open_params {
+        let program = &program.bind(py).get().program;
+        let (opened, _) = program.with_open_params().map_err(|error| raised(py, error))?;
+        let params = opened.module().params.iter();
+        options.params = params
+            .map(|param| Param { name: param.name.clone(), value: param.value, doc: param.doc.clone() })
+            .collect();
+        solid = opened
+            .solid_with(solid.name(), rfm::Engine::Interpreter)
+            .map_err(|error| raised(py, error))?;
+    }
+    py.detach(|| source::write(&solid, target, &options)).map(|made| made.text).map_err(refused)
+}

@@ -1,0 +1,51 @@
+//! Programs as an object file, for linkers of other programs.
+
+use cranelift_codegen::isa::{self, OwnedTargetIsa};
+use cranelift_module::{Linkage, default_libcall_names};
+use cranelift_object::{ObjectBuilder, ObjectModule};
+
+use super::host_functions::Library;
+use super::machine::{CodegenError, object_target, object_target_of};
+use super::request::Request;
+use super::translate::{Named, define, needed};
+
+/// A program of an object file, under the name that a linker knows it by.
+pub struct ObjectProgram<'a> {
+    /// Name of the symbol.
+    pub symbol: String,
+    /// What is compiled.
+    pub request: Request<'a>,
+}
+
+/// Compiles programs into an object file, for this machine or for another one of the same kind of processor, named
+/// by its triple as in `x86_64-apple-darwin`.
+///
+/// # Errors
+/// [`CodegenError::Unsupported`] if there is no code generator for the machine; [`CodegenError::Bug`] if a generated
+/// function is refused.
+pub fn object(
+    programs: &[ObjectProgram<'_>],
+    library: Library,
+    triple: Option<&str>,
+) -> Result<Vec<u8>, CodegenError> {
+    let largest = programs.iter().map(|program| needed(program.request).len()).max().unwrap_or(0);
+    let isa: OwnedTargetIsa = match triple {
+        None => object_target(largest)?,
+        Some(triple) => {
+            let triple = triple.parse().map_err(|error| {
+                CodegenError::Unsupported(format!("`{triple}` names no machine: {error}"))
+            })?;
+            let builder =
+                isa::lookup(triple).map_err(|error| CodegenError::Unsupported(error.to_string()))?;
+            object_target_of(builder, largest)?
+        }
+    };
+    let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
+    let builder = ObjectBuilder::new(isa, "rfm", default_libcall_names()).map_err(|error| bug(&error))?;
+    let mut module = ObjectModule::new(builder);
+    for ObjectProgram { symbol, request } in programs {
+        let named = Named { name: symbol, linkage: Linkage::Export, library };
+        define(&mut module, *request, named, false)?;
+    }
+    module.finish().emit().map_err(|error| bug(&error))
+}

@@ -1,0 +1,278 @@
+//! The table of target languages: how each of them writes numbers, declarations and functions.
+//!
+//! All of them agree in how `a + b * c`, `a < b` and `f(a, b)` are written, and a choice is a call of `pick`
+//! everywhere; the table holds the rest.
+
+use super::Math;
+use crate::ir::{BinaryFunction, UnaryFunction};
+use crate::precision::Precision;
+
+/// A language that formulas are printed in.
+pub(super) struct Language {
+    /// The types of `f64` and `f32`.
+    pub types: [&'static str; 2],
+    /// The type of a truth value.
+    pub truth: &'static str,
+    /// What names in `f32` end with, where both precisions stand in one file.
+    pub single_suffix: &'static str,
+    /// A number that is finite in the precision.
+    pub finite: fn(f64, Precision) -> String,
+    /// ∞, −∞ and NaN; `None` where the language cannot write them.
+    pub infinite: Option<fn(f64, Precision) -> String>,
+    /// The declaration of a constant: type, name, value.
+    pub declare: fn(&str, &str, &str) -> String,
+    /// The head of a function: type of its result, name, parameters of one type.
+    pub head: fn(Head<'_>) -> String,
+    /// The last lines of a function that gives one value.
+    pub give: fn(&str) -> String,
+    /// The last lines of a function that gives a structure: its name and those of its fields, which are names of
+    /// values as well.
+    pub give_all: fn(&str, &[&str]) -> Vec<String>,
+    /// A structure of numbers: its name, their type, their names.
+    pub structure: fn(&str, &str, &[&str]) -> Vec<String>,
+    /// The root and the magnitude.
+    pub root: [&'static str; 2],
+    pub magnitude: [&'static str; 2],
+    /// The call of a function of the mathematical library.
+    pub function: fn(Function, Precision, Math, &[&str]) -> String,
+    /// How `pick` is defined for a type, under its full name.
+    pub pick: fn(&str, &str) -> String,
+}
+
+/// A function of the mathematical library.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Function {
+    Unary(UnaryFunction),
+    Binary(BinaryFunction),
+}
+
+impl Function {
+    /// Its declaration in C, where it is not one of the system's.
+    pub fn declaration(self, precision: Precision) -> String {
+        let number = C.number(precision);
+        let operands = match self {
+            Self::Unary(_) => format!("{number} a"),
+            Self::Binary(_) => format!("{number} a, {number} b"),
+        };
+        format!("{number} rfm_math_{}({operands});", c_name(self, precision))
+    }
+}
+
+/// What stands before the body of a function.
+pub(super) struct Head<'a> {
+    pub result: &'a str,
+    pub name: &'a str,
+    pub operand: &'a str,
+    pub operands: &'a [&'a str],
+}
+
+impl Language {
+    /// The type of a number.
+    pub fn number(&self, precision: Precision) -> &'static str {
+        pair(self.types, precision)
+    }
+
+    /// What a name in a precision ends with.
+    pub fn suffix(&self, precision: Precision) -> &'static str {
+        match precision {
+            Precision::F64 => "",
+            Precision::F32 => self.single_suffix,
+        }
+    }
+
+    /// A constant in a precision; `None` if the language cannot write it.
+    pub fn constant(&self, value: f64, precision: Precision) -> Option<String> {
+        let rounded = match precision {
+            Precision::F64 => value,
+            Precision::F32 => f64::from(value as f32),
+        };
+        if rounded.is_finite() {
+            let text = (self.finite)(rounded, precision);
+            return Some(if rounded.is_sign_negative() { format!("({text})") } else { text });
+        }
+        self.infinite.map(|write| write(rounded, precision))
+    }
+}
+
+/// The one of two that belongs to a precision.
+pub(super) fn pair(both: [&'static str; 2], precision: Precision) -> &'static str {
+    match precision {
+        Precision::F64 => both[0],
+        Precision::F32 => both[1],
+    }
+}
+
+/// The shortest digits that give the number back.
+fn digits(value: f64, precision: Precision) -> String {
+    match precision {
+        Precision::F64 => format!("{value:?}"),
+        Precision::F32 => format!("{:?}", value as f32),
+    }
+}
+
+pub(super) static C: Language = Language {
+    types: ["double", "float"],
+    truth: "int",
+    single_suffix: "f",
+    finite: |value, precision| digits(value, precision) + pair(["", "f"], precision),
+    infinite: Some(|value, _| match value {
+        v if v.is_nan() => "NAN".into(),
+        v if v > 0.0 => "INFINITY".into(),
+        _ => "(-INFINITY)".into(),
+    }),
+    declare: |kind, name, value| format!("const {kind} {name} = {value};"),
+    head: |head| {
+        let operands: Vec<String> =
+            head.operands.iter().map(|name| format!("{} {name}", head.operand)).collect();
+        format!("RFM_INLINE {} {}({}) {{", head.result, head.name, operands.join(", "))
+    },
+    give: |value| format!("return {value};"),
+    give_all: |structure, fields| {
+        let mut lines = vec![format!("{structure} all;")];
+        lines.extend(fields.iter().map(|field| format!("all.{field} = {field};")));
+        lines.push("return all;".into());
+        lines
+    },
+    structure: |name, kind, fields| {
+        vec![format!("typedef struct {{ {kind} {}; }} {name};", fields.join(", "))]
+    },
+    root: ["sqrt", "sqrtf"],
+    magnitude: ["fabs", "fabsf"],
+    function: |function, precision, math, operands| {
+        let library = match math {
+            Math::System => "",
+            Math::Rfm => "rfm_math_",
+        };
+        format!("{library}{}({})", c_name(function, precision), operands.join(", "))
+    },
+    pick: |_, name| format!("#define {name}(condition, yes, no) ((condition) ? (yes) : (no))"),
+};
+
+pub(super) static RUST: Language = Language {
+    types: ["f64", "f32"],
+    truth: "bool",
+    single_suffix: "_f32",
+    finite: |value, precision| digits(value, precision) + pair(["_f64", "_f32"], precision),
+    infinite: Some(|value, precision| {
+        let kind = precision.name();
+        match value {
+            v if v.is_nan() => format!("{kind}::NAN"),
+            v if v > 0.0 => format!("{kind}::INFINITY"),
+            _ => format!("{kind}::NEG_INFINITY"),
+        }
+    }),
+    declare: |kind, name, value| format!("let {name}: {kind} = {value};"),
+    head: |head| {
+        let operands: Vec<String> =
+            head.operands.iter().map(|name| format!("{name}: {}", head.operand)).collect();
+        format!(
+            "#[inline(always)]\n#[allow(unused_parens)]\nfn {}({}) -> {} {{",
+            head.name,
+            operands.join(", "),
+            head.result
+        )
+    },
+    give: |value| value.into(),
+    give_all: |structure, fields| vec![format!("{structure} {{ {} }}", fields.join(", "))],
+    structure: |name, kind, fields| {
+        let fields: Vec<String> = fields.iter().map(|field| format!("{field}: {kind}")).collect();
+        vec![
+            "#[allow(non_camel_case_types, dead_code)]".into(),
+            format!("struct {name} {{ {} }}", fields.join(", ")),
+        ]
+    },
+    root: ["f64::sqrt", "f32::sqrt"],
+    magnitude: ["f64::abs", "f32::abs"],
+    function: |function, precision, math, operands| match math {
+        Math::Rfm => {
+            format!("libm::{}({})", c_name(function, precision), operands.join(", "))
+        }
+        Math::System => format!("{}::{}({})", precision.name(), rust_name(function), operands.join(", ")),
+    },
+    pick: |kind, name| {
+        format!(
+            "#[inline(always)]\nfn {name}(condition: bool, yes: {kind}, no: {kind}) -> {kind} {{\n    \
+             if condition {{ yes }} else {{ no }}\n}}"
+        )
+    },
+};
+
+pub(super) static WGSL: Language = Language {
+    types: ["f32", "f32"],
+    truth: "bool",
+    single_suffix: "",
+    finite: |value, precision| digits(value, precision) + "f",
+    infinite: None,
+    declare: |_, name, value| format!("let {name} = {value};"),
+    head: |head| {
+        let operands: Vec<String> =
+            head.operands.iter().map(|name| format!("{name}: {}", head.operand)).collect();
+        format!("fn {}({}) -> {} {{", head.name, operands.join(", "), head.result)
+    },
+    give: |value| format!("return {value};"),
+    give_all: |structure, fields| vec![format!("return {structure}({});", fields.join(", "))],
+    structure: |name, kind, fields| {
+        let fields: Vec<String> = fields.iter().map(|field| format!("{field}: {kind}")).collect();
+        vec![format!("struct {name} {{ {} }}", fields.join(", "))]
+    },
+    root: ["sqrt", "sqrt"],
+    magnitude: ["abs", "abs"],
+    function: |function, _, _, operands| shader_call(function, "atan2", operands),
+    pick: |kind, name| {
+        format!(
+            "fn {name}(condition: bool, yes: {kind}, no: {kind}) -> {kind} {{ return select(no, yes, condition); }}"
+        )
+    },
+};
+
+pub(super) static GLSL: Language = Language {
+    types: ["float", "float"],
+    truth: "bool",
+    single_suffix: "",
+    finite: digits,
+    infinite: None,
+    declare: |kind, name, value| format!("{kind} {name} = {value};"),
+    head: |head| {
+        let operands: Vec<String> =
+            head.operands.iter().map(|name| format!("{} {name}", head.operand)).collect();
+        format!("{} {}({}) {{", head.result, head.name, operands.join(", "))
+    },
+    give: |value| format!("return {value};"),
+    give_all: |structure, fields| vec![format!("return {structure}({});", fields.join(", "))],
+    structure: |name, kind, fields| {
+        let fields: Vec<String> = fields.iter().map(|field| format!("{kind} {field};")).collect();
+        vec![format!("struct {name} {{ {} }};", fields.join(" "))]
+    },
+    root: ["sqrt", "sqrt"],
+    magnitude: ["abs", "abs"],
+    function: |function, _, _, operands| shader_call(function, "atan", operands),
+    pick: |kind, name| {
+        format!("{kind} {name}(bool condition, {kind} yes, {kind} no) {{ return condition ? yes : no; }}")
+    },
+};
+
+/// The name in the library of C.
+fn c_name(function: Function, precision: Precision) -> &'static str {
+    match function {
+        Function::Unary(function) => function.c_name(precision),
+        Function::Binary(function) => function.c_name(precision),
+    }
+}
+
+fn rust_name(function: Function) -> &'static str {
+    match function {
+        Function::Binary(BinaryFunction::Pow) => "powf",
+        Function::Unary(other) => other.name(),
+        Function::Binary(other) => other.name(),
+    }
+}
+
+/// Shaders have all functions under the names of C, but a power of negative numbers is undefined: a function of the
+/// file itself stands for it, see `operations`.
+fn shader_call(function: Function, atan2: &str, operands: &[&str]) -> String {
+    let name = match function {
+        Function::Binary(BinaryFunction::Atan2) => atan2,
+        other => c_name(other, Precision::F64),
+    };
+    format!("{name}({})", operands.join(", "))
+}

@@ -1,0 +1,260 @@
+//! The operations that need more than an operator: R₀ in its forms, each written once for all languages.
+//!
+//! A formula is a list of lines `name = expression`; a name that ends with `?` holds a truth value. `pick(c, a, b)`
+//! is a where c holds and b elsewhere. These are the operations of `ir::r0`, in their order, with the signs of a
+//! disjunction worked in: so the C has the bits of the interpreter.
+
+use super::language::{Head, Language};
+use crate::ir::{Form, R0, r0};
+use crate::precision::Precision;
+
+/// A function that a file defines for its formulas.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Operation {
+    /// u ∧ v or u ∨ v.
+    Join(Junction, Style),
+    /// u ∧ v or u ∨ v, with ∂/∂u and ∂/∂v.
+    Weighted(Junction, Style),
+    /// aᵇ also for negative a, for languages whose own power has positive bases only.
+    Power,
+}
+
+/// ∧ or ∨
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Junction {
+    And,
+    Or,
+}
+
+/// A form of R₀ for single points, where the guarded one is the stable one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Style {
+    Stable,
+    Scaled,
+    Textbook,
+}
+
+impl From<Form> for Style {
+    fn from(form: Form) -> Self {
+        match form {
+            Form::Stable | Form::Guarded => Self::Stable,
+            Form::Scaled => Self::Scaled,
+            Form::Textbook => Self::Textbook,
+        }
+    }
+}
+
+impl From<R0> for Junction {
+    fn from(r0: R0) -> Self {
+        match r0 {
+            R0::And | R0::AndWeight => Self::And,
+            R0::Or | R0::OrWeight => Self::Or,
+        }
+    }
+}
+
+/// The fields of what a weighted operation gives.
+pub(super) const WEIGHTED_FIELDS: [&str; 3] = ["value", "by_u", "by_v"];
+
+/// What both branches of the stable form need.
+const STABLE: &str = "less? = u < v
+more? = v < u
+low = pick(less, u, v)
+high = pick(more, u, v)
+sum = u + v
+a = abs(u)
+b = abs(v)
+larger = pick(b < a, a, b)
+root = sqrt(u * u + v * v)
+h = pick(root < larger, larger, root)
+below = larger + h
+";
+
+const STABLE_VALUE: &str = "value = pick(is_small, nearer ∓ nearer * (nearer / below), sum ∓ h)
+";
+
+const STABLE_WEIGHTED: &str = "ratio = pick(is_small, nearer, farther) / below
+value = pick(is_small, nearer ∓ nearer * ratio, sum ∓ h)
+tau = pick(below == {0}, {corner}, ratio)
+";
+
+const SCALED: &str = "less? = u < v
+more? = v < u
+low = pick(less, u, v)
+high = pick(less, v, u)
+sum = u + v
+";
+
+const SCALED_VALUE: &str = "m = pick(is_small, nearer, farther)
+big = pick(is_small, farther, nearer)
+q = pick(m == big, {1}, m / big)
+k = {1} + sqrt({1} + q * q)
+ratio = q / k
+value = pick(is_small, m - m * ratio, big * (k + q))
+";
+
+const TEXTBOOK: &str = "h = sqrt(u * u + v * v)
+value = (u + v) ∓ h
+";
+
+const TEXTBOOK_WEIGHTS: &str = "by_u = {1} ∓ u / h
+by_v = {1} ∓ v / h
+";
+
+/// The weights from τ. A choice of choices, and not a comparison of two truth values: compilers then keep their
+/// vectors.
+const WEIGHTS: &str = "square = tau * tau
+scale = {1} / ({1} + square)
+rest = {1} ∓ tau
+lesser = rest * rest * scale
+greater = pick(is_small, square, {1}) * (scale + scale)
+by_u = pick(is_small, pick(u_is_near, lesser, greater), pick(u_is_near, greater, lesser))
+by_v = pick(is_small, pick(v_is_near, lesser, greater), pick(v_is_near, greater, lesser))
+";
+
+/// |a|ᵇ with the sign that a whole b gives it; NaN for other exponents, from the root of a negative number.
+const POWER: &str = "whole? = floor(v) == v
+odd? = v - {2} * floor(v / {2}) == {1}
+power = pow(abs(u), v)
+value = pick(u < {0}, pick(whole, pick(odd, -power, power), sqrt(u)), power)
+";
+
+impl Operation {
+    /// Its name in a file, behind the prefix.
+    pub fn name(self) -> String {
+        let name = |junction: Junction| match junction {
+            Junction::And => "and",
+            Junction::Or => "or",
+        };
+        let style = |style: Style| match style {
+            Style::Stable => "",
+            Style::Scaled => "_scaled",
+            Style::Textbook => "_textbook",
+        };
+        match self {
+            Self::Join(junction, form) => format!("op_{}{}", name(junction), style(form)),
+            Self::Weighted(junction, form) => format!("op_{}_weighted{}", name(junction), style(form)),
+            Self::Power => "op_pow".into(),
+        }
+    }
+
+    /// Its formula, line by line.
+    fn formula(self) -> String {
+        let branch = |junction| match junction {
+            Junction::And => "nearer = low\nfarther = high\nis_small? = sum > {0}\n",
+            Junction::Or => "nearer = high\nfarther = low\nis_small? = sum < {0}\n",
+        };
+        let near = |junction| match junction {
+            Junction::And => "u_is_near? = less\nv_is_near? = more\n",
+            Junction::Or => "u_is_near? = more\nv_is_near? = less\n",
+        };
+        let (junction, parts): (Junction, Vec<&str>) = match self {
+            Self::Join(j, Style::Stable) => (j, vec![STABLE, branch(j), STABLE_VALUE]),
+            Self::Join(j, Style::Scaled) => (j, vec![SCALED, branch(j), SCALED_VALUE]),
+            Self::Join(j, Style::Textbook) => (j, vec![TEXTBOOK]),
+            Self::Weighted(j, Style::Stable) => {
+                (j, vec![STABLE, branch(j), STABLE_WEIGHTED, near(j), WEIGHTS])
+            }
+            Self::Weighted(j, Style::Scaled) => {
+                // with the signs of the operands in it, τ serves both operations in the form of a conjunction
+                let tau = "tau = pick(is_small, ratio, -ratio)\n";
+                let parts = [SCALED, branch(j), SCALED_VALUE, tau, near(j), WEIGHTS];
+                return signed(&parts[..4], j) + &signed(&parts[4..], Junction::And);
+            }
+            Self::Weighted(j, Style::Textbook) => (j, vec![TEXTBOOK, TEXTBOOK_WEIGHTS]),
+            Self::Power => (Junction::And, vec![POWER]),
+        };
+        signed(&parts, junction)
+    }
+
+    /// Its definition in a language.
+    pub fn definition(self, language: &Language, precision: Precision, names: &Names<'_>) -> Vec<String> {
+        let number = language.number(precision);
+        let weighted = matches!(self, Self::Weighted(..));
+        let joint = names.joint(language, precision);
+        let result = if weighted { joint.as_str() } else { number };
+        let name = names.operation(self, language, precision);
+        let operands = ["u", "v"];
+        let mut lines: Vec<String> =
+            (language.head)(Head { result, name: &name, operand: number, operands: &operands })
+                .lines()
+                .map(String::from)
+                .collect();
+        let write = |text: &str| translated(text, language, precision, names);
+        let formula = self.formula();
+        for (name, value) in used_lines(&formula, weighted) {
+            let (name, kind) = match name.strip_suffix('?') {
+                Some(name) => (name, language.truth),
+                None => (name, number),
+            };
+            lines.push(format!("    {}", (language.declare)(kind, name, &write(value))));
+        }
+        let last = if weighted {
+            (language.give_all)(&joint, &WEIGHTED_FIELDS)
+        } else {
+            vec![(language.give)("value")]
+        };
+        lines.extend(last.into_iter().map(|line| format!("    {line}")));
+        lines.push("}".into());
+        lines
+    }
+}
+
+/// The names and values of a formula that its results depend on, in order.
+fn used_lines(formula: &str, weighted: bool) -> Vec<(&str, &str)> {
+    let results: &[&str] = if weighted { &WEIGHTED_FIELDS } else { &WEIGHTED_FIELDS[..1] };
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut read: Vec<&str> = results.to_vec();
+    let mut used = Vec::new();
+    for (name, value) in formula.lines().rev().filter_map(|line| line.split_once(" = ")) {
+        if read.contains(&name.trim_end_matches('?')) {
+            read.extend(value.split(|c| !is_word(c)));
+            used.push((name, value));
+        }
+    }
+    used.reverse();
+    used
+}
+
+/// The names that a file makes for itself: they all begin with its prefix.
+pub(super) struct Names<'a> {
+    pub prefix: &'a str,
+}
+
+impl Names<'_> {
+    pub fn operation(&self, operation: Operation, language: &Language, precision: Precision) -> String {
+        format!("{}_{}{}", self.prefix, operation.name(), language.suffix(precision))
+    }
+
+    /// The structure of a value with its weights.
+    pub fn joint(&self, language: &Language, precision: Precision) -> String {
+        format!("{}_joint{}", self.prefix, language.suffix(precision))
+    }
+
+    pub fn pick(&self, language: &Language, precision: Precision) -> String {
+        format!("{}_pick{}", self.prefix, language.suffix(precision))
+    }
+}
+
+/// The parts as one text with the signs of a junction.
+fn signed(parts: &[&str], junction: Junction) -> String {
+    let (sign, corner) = match junction {
+        Junction::And => ("-", "{-corner}"),
+        Junction::Or => ("+", "{corner}"),
+    };
+    parts.concat().replace('∓', sign).replace("{corner}", corner)
+}
+
+/// An expression of a formula in a language.
+fn translated(text: &str, language: &Language, precision: Precision, names: &Names<'_>) -> String {
+    let constant = |value: f64| language.constant(value, precision).unwrap_or_default();
+    let function = |both: [&'static str; 2]| super::language::pair(both, precision).to_string() + "(";
+    text.replace("{0}", &constant(0.0))
+        .replace("{1}", &constant(1.0))
+        .replace("{2}", &constant(2.0))
+        .replace("{corner}", &constant(r0::SINGULAR_TAU))
+        .replace("{-corner}", &constant(-r0::SINGULAR_TAU))
+        .replace("pick(", &format!("{}(", names.pick(language, precision)))
+        .replace("sqrt(", &function(language.root))
+        .replace("abs(", &function(language.magnitude))
+}

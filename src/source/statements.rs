@@ -1,0 +1,258 @@
+//! A graph as statements: one declaration for each operation, in the graph's order.
+
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap, HashSet};
+
+use super::language::{Function, Language};
+use super::operations::{Junction, Names, Operation};
+use super::{Math, SourceError};
+use crate::ir::{Axis, Binary, BinaryFunction, Expr, Forms, Graph, Node, Unary};
+use crate::precision::Precision;
+
+/// How a graph is written.
+#[derive(Clone, Copy)]
+pub(super) struct Writer<'a> {
+    pub language: &'a Language,
+    pub precision: Precision,
+    pub names: &'a Names<'a>,
+    pub math: Math,
+    /// How x, y, z and t are written.
+    pub axes: [&'a str; 4],
+    /// How a parameter is written, by its number.
+    pub parameter: &'a dyn Fn(u32) -> String,
+    /// How a uniform is written.
+    pub uniform: &'a dyn Fn(u32) -> String,
+    /// Where constants are gathered, to be written as `c[0]`, `c[1]` …, and values are numbered one after the other:
+    /// parts of one shape then have one text.
+    pub gathered: Option<&'a RefCell<Vec<f64>>>,
+    /// What the names of values begin with, so that two graphs may stand in one function.
+    pub values: &'a str,
+    /// Whether powers of negative numbers need a function of the file's own.
+    pub own_power: bool,
+}
+
+/// A graph as statements.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Statements {
+    pub lines: Vec<String>,
+    /// How the outputs are written.
+    pub outputs: Vec<String>,
+    /// The functions of the file that the statements call.
+    pub operations: BTreeSet<Operation>,
+    /// The functions of the mathematical library that they call.
+    pub functions: BTreeSet<Function>,
+}
+
+/// A part of a graph: nodes that are known already, with how they are written, and the outputs.
+pub(super) struct Part<'a> {
+    pub graph: &'a Graph,
+    pub inputs: &'a [(Node, String)],
+    pub outputs: &'a [Node],
+    pub forms: &'a Forms,
+}
+
+impl Writer<'_> {
+    /// The statements of a part of a graph.
+    ///
+    /// # Errors
+    /// If the language cannot write one of its numbers.
+    pub fn statements(&self, part: &Part<'_>) -> Result<Statements, SourceError> {
+        let texts = part.inputs.iter().cloned().collect();
+        let mut state =
+            State { writer: self, part, made: Statements::default(), texts, joints: HashSet::new() };
+        let needed = state.needed();
+        let weighted = weighted_pairs(part.graph, &needed);
+        for &node in &needed {
+            let text = state.node(node, &weighted)?;
+            state.texts.insert(node, text);
+        }
+        state.made.outputs = part.outputs.iter().map(|output| state.texts[output].clone()).collect();
+        Ok(state.made)
+    }
+}
+
+/// The pairs of operands whose weights are asked for, the lesser node first.
+fn weighted_pairs(graph: &Graph, needed: &[Node]) -> BTreeSet<(Node, Node, Junction)> {
+    let weight = |&node: &Node| match graph.expr(node) {
+        Expr::Binary(op @ (Binary::AndWeight | Binary::OrWeight), u, v) => {
+            op.r0().map(|r0| (u.min(v), u.max(v), Junction::from(r0)))
+        }
+        _ => None,
+    };
+    needed.iter().filter_map(weight).collect()
+}
+
+struct State<'a> {
+    writer: &'a Writer<'a>,
+    part: &'a Part<'a>,
+    made: Statements,
+    texts: HashMap<Node, String>,
+    /// Names of values with their weights that are declared already.
+    joints: HashSet<String>,
+}
+
+impl State<'_> {
+    /// What the outputs depend on, down to the inputs and without them, in the graph's order.
+    fn needed(&self) -> Vec<Node> {
+        let mut seen: HashSet<Node> = HashSet::new();
+        let mut found: Vec<Node> = Vec::new();
+        let mut stack: Vec<Node> = self.part.outputs.to_vec();
+        while let Some(node) = stack.pop() {
+            if !self.texts.contains_key(&node) && seen.insert(node) {
+                found.push(node);
+                stack.extend(self.part.graph.expr(node).operands());
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// How a node is written: a number, an argument, or the name of a new constant.
+    fn node(
+        &mut self,
+        node: Node,
+        weighted: &BTreeSet<(Node, Node, Junction)>,
+    ) -> Result<String, SourceError> {
+        let writer = self.writer;
+        let value = match self.part.graph.expr(node) {
+            Expr::Constant(bits) => return self.given(f64::from_bits(bits)),
+            Expr::Coordinate(Axis::X) => return Ok(writer.axes[0].into()),
+            Expr::Coordinate(Axis::Y) => return Ok(writer.axes[1].into()),
+            Expr::Coordinate(Axis::Z) => return Ok(writer.axes[2].into()),
+            Expr::Coordinate(Axis::T) => return Ok(writer.axes[3].into()),
+            Expr::Parameter(i) => return Ok((writer.parameter)(i)),
+            Expr::Uniform(i) => return Ok((writer.uniform)(i)),
+            Expr::Unary(op, a) => self.unary(op, &self.texts[&a].clone())?,
+            Expr::Binary(op, u, v) => {
+                if let Some(r0) = op.r0() {
+                    let pair = (u.min(v), u.max(v), Junction::from(r0));
+                    let weights = weighted.contains(&pair);
+                    return Ok(self.join(op, (u, v), weights, node));
+                }
+                let (u, v) = (self.texts[&u].clone(), self.texts[&v].clone());
+                self.binary(op, &u, &v)?
+            }
+        };
+        let name = self.name(node);
+        self.declare(writer.language.number(writer.precision), &name, &value);
+        Ok(name)
+    }
+
+    /// The name of the value of a node.
+    fn name(&self, node: Node) -> String {
+        let number = if self.writer.gathered.is_some() { self.made.lines.len() } else { node.index() };
+        format!("{}{number}", self.writer.values)
+    }
+
+    fn declare(&mut self, kind: &str, name: &str, value: &str) {
+        self.made.lines.push((self.writer.language.declare)(kind, name, value));
+    }
+
+    /// A constant of the graph.
+    fn given(&self, value: f64) -> Result<String, SourceError> {
+        let Some(gathered) = self.writer.gathered else { return self.constant(value) };
+        gathered.borrow_mut().push(value);
+        Ok(format!("c[{}]", gathered.borrow().len() - 1))
+    }
+
+    /// A constant of an operation.
+    fn constant(&self, value: f64) -> Result<String, SourceError> {
+        let written = self.writer.language.constant(value, self.writer.precision);
+        written.ok_or(SourceError::NumberOutOfRange(value))
+    }
+
+    fn operation(&mut self, operation: Operation, operands: &str) -> String {
+        self.made.operations.insert(operation);
+        let Writer { names, language, precision, .. } = *self.writer;
+        format!("{}({operands})", names.operation(operation, language, precision))
+    }
+
+    fn pick(&self, condition: &str, yes: &str, no: &str) -> String {
+        let Writer { names, language, precision, .. } = *self.writer;
+        format!("{}({condition}, {yes}, {no})", names.pick(language, precision))
+    }
+
+    /// ∧, ∨ or a weight. A pair of operands whose weights are asked for is computed once, with its value.
+    fn join(&mut self, op: Binary, (u, v): (Node, Node), weights: bool, node: Node) -> String {
+        let Some(r0) = op.r0() else { unreachable!("{op:?} joins nothing") };
+        let (junction, style) = (r0.into(), self.part.forms.of(u, v).into());
+        let Writer { names, language, precision, .. } = *self.writer;
+        let (first, second) = (u.min(v), u.max(v));
+        if !weights {
+            let operands = format!("{}, {}", self.texts[&u], self.texts[&v]);
+            let value = self.operation(Operation::Join(junction, style), &operands);
+            let name = self.name(node);
+            self.declare(language.number(precision), &name, &value);
+            return name;
+        }
+        let kind = if junction == Junction::And { "and" } else { "or" };
+        let joint = format!("{}_{kind}{}_{}", self.writer.values, first.index(), second.index());
+        if self.joints.insert(joint.clone()) {
+            let operands = format!("{}, {}", self.texts[&first], self.texts[&second]);
+            let value = self.operation(Operation::Weighted(junction, style), &operands);
+            self.declare(&names.joint(language, precision), &joint, &value);
+        }
+        let field = match op {
+            Binary::AndWeight | Binary::OrWeight if u == first => "by_u",
+            Binary::AndWeight | Binary::OrWeight => "by_v",
+            _ => "value",
+        };
+        format!("{joint}.{field}")
+    }
+
+    fn unary(&mut self, op: Unary, a: &str) -> Result<String, SourceError> {
+        let Writer { language, precision, math, .. } = *self.writer;
+        let of = |both| format!("{}({a})", super::language::pair(both, precision));
+        Ok(match op {
+            Unary::Neg => format!("-{a}"),
+            Unary::Abs => of(language.magnitude),
+            Unary::Sqrt => of(language.root),
+            Unary::Sign => {
+                let (zero, one, minus) = (self.constant(0.0)?, self.constant(1.0)?, self.constant(-1.0)?);
+                let other = self.pick(&format!("{a} < {zero}"), &minus, a);
+                self.pick(&format!("{a} > {zero}"), &one, &other)
+            }
+            Unary::Call(function) => {
+                self.made.functions.insert(Function::Unary(function));
+                (language.function)(Function::Unary(function), precision, math, &[a])
+            }
+        })
+    }
+
+    fn binary(&mut self, op: Binary, a: &str, b: &str) -> Result<String, SourceError> {
+        let Writer { language, precision, math, own_power, .. } = *self.writer;
+        Ok(match op {
+            Binary::Add => format!("{a} + {b}"),
+            Binary::Sub => format!("{a} - {b}"),
+            Binary::Mul => format!("{a} * {b}"),
+            Binary::Div => format!("{a} / {b}"),
+            Binary::DivOrZero => {
+                let zero = self.constant(0.0)?;
+                self.pick(&format!("{b} == {zero}"), &zero, &format!("{a} / {b}"))
+            }
+            Binary::Min | Binary::Max => {
+                let sign = if op == Binary::Min { '<' } else { '>' };
+                let other = self.pick(&format!("{a} == {a}"), b, a);
+                self.pick(&format!("{a} {sign} {b}"), a, &other)
+            }
+            Binary::PlainMin => self.pick(&format!("{a} < {b}"), a, b),
+            Binary::PlainMax => self.pick(&format!("{b} < {a}"), a, b),
+            Binary::MinWeight | Binary::MaxWeight => {
+                let sign = if op == Binary::MinWeight { '<' } else { '>' };
+                let (zero, half, one) = (self.constant(0.0)?, self.constant(0.5)?, self.constant(1.0)?);
+                let other = self.pick(&format!("{a} == {b}"), &half, &zero);
+                self.pick(&format!("{a} {sign} {b}"), &one, &other)
+            }
+            Binary::Call(BinaryFunction::Pow) if own_power => {
+                self.operation(Operation::Power, &format!("{a}, {b}"))
+            }
+            Binary::Call(function) => {
+                self.made.functions.insert(Function::Binary(function));
+                (language.function)(Function::Binary(function), precision, math, &[a, b])
+            }
+            Binary::And | Binary::Or | Binary::AndWeight | Binary::OrWeight => {
+                unreachable!("{op:?} is written by `join`")
+            }
+        })
+    }
+}

@@ -1,0 +1,381 @@
+//! Solids as source text and object code: compiled by the compilers that are here, and compared with the machine code
+//! of `rfm` bit by bit.
+
+mod compare;
+mod library;
+mod shaders;
+
+use std::time::Instant;
+
+use proptest::strategy::{Strategy, ValueTree};
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use rfm::codegen::Form;
+use rfm::precision::Precision;
+use rfm::source::{self, Math, Options, Param, Target};
+use rfm::{Engine, Program, Solid};
+
+use crate::agreement::{EVERYTHING, left_fold};
+use crate::properties::expression;
+use crate::tool::{rfm, root};
+use compare::{Counts, Extra, compare, points};
+use library::{Workshop, compile, is_here, mathematics};
+
+/// Points in the usual run, and in the one that is asked for.
+const FEW: usize = 4000;
+const MANY: usize = 1_000_000;
+
+fn exact(prefix: &str) -> Options {
+    Options { prefix: Some(prefix.into()), sign: true, distance: true, math: Math::Rfm, ..Options::default() }
+}
+
+/// A file whose functions of the mathematical library are those of `rfm`.
+fn c_text(solid: &Solid, prefix: &str) -> String {
+    source::write(solid, Target::C, &exact(prefix)).unwrap_or_else(|e| panic!("{e}")).text
+}
+
+/// Solids of random formulas.
+fn random_solids(count: usize) -> Vec<Solid> {
+    let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &[7; 32]);
+    let mut runner = TestRunner::new_with_rng(Config::default(), rng);
+    let mut solids = Vec::new();
+    while solids.len() < count {
+        let text = expression().new_tree(&mut runner).unwrap().current();
+        let program = Program::from_source("random.rfm", format!("rfm 1\nsolid s = {text}"));
+        solids.push(program.unwrap_or_else(|e| panic!("{e}")).solid_with("s", Engine::Jit).unwrap());
+    }
+    solids
+}
+
+/// All solids of all examples, those that move at a time at which they have moved.
+fn example_solids() -> Vec<Solid> {
+    let mut solids = Vec::new();
+    for folder in ["examples", "examples/validation"] {
+        let mut paths: Vec<_> =
+            std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+        paths.sort();
+        for path in paths.iter().filter(|path| path.extension().is_some_and(|ending| ending == "rfm")) {
+            let program = Program::from_path(path).unwrap_or_else(|e| panic!("{e}"));
+            let named = program.module().solids.iter();
+            solids.extend(named.map(|solid| program.solid(&solid.name).unwrap().at(0.37)));
+        }
+    }
+    assert!(solids.len() >= 8, "{}", solids.len());
+    solids
+}
+
+/// Every operation in every form, and folds whose operands leave the range of `f32`.
+fn solids_of_every_operation() -> Vec<Solid> {
+    let program = Program::from_source("everything.rfm", EVERYTHING).unwrap();
+    let (graph, node) = (&program.module().graph, program.module().solids[0].node);
+    let mut solids: Vec<Solid> = [Form::Stable, Form::Textbook, Form::Scaled]
+        .into_iter()
+        .map(|form| Solid::with_form("everything", graph, node, Engine::Jit, form).unwrap())
+        .collect();
+    let moving =
+        "rfm 1\nsolid s = (box() \\ sphere(0.7)).rotate_z(3*t).move([sin(t), t^2, 0]) or t*x <= y/(1 + t)";
+    for text in [left_fold(90), moving.to_string(), "rfm 1\nsolid s = sphere(1) \\ z <= -1e300*x".into()] {
+        let program = Program::from_source("s.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+        let name = program.module().solids[0].name.clone();
+        solids.push(program.solid_with(&name, Engine::Jit).unwrap().at(0.8));
+    }
+    solids
+}
+
+/// All numbers of a C library of some solids against those of their machine code.
+fn compare_c(compiler: &str, solids: &[Solid], count: usize) -> Counts {
+    let workshop = Workshop::new();
+    let mut files = Vec::new();
+    for (i, solid) in solids.iter().enumerate() {
+        files.push(format!("s{i}.c"));
+        workshop.write(&files[i], c_text(solid, &format!("s{i}")));
+    }
+    workshop.write("mathematics.c", mathematics());
+    files.push("mathematics.c".into());
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let library = workshop.library(compiler, &files);
+    let mut counts = Counts::default();
+    for (i, solid) in solids.iter().enumerate() {
+        counts += compare(&library, &format!("s{i}"), solid, &points(count, i as u64), Extra::of(solid));
+    }
+    counts
+}
+
+fn compilers() -> Vec<&'static str> {
+    ["gcc", "clang"].into_iter().filter(|compiler| is_here(compiler)).collect()
+}
+
+#[test]
+fn c_of_every_operation_has_the_bits_of_rfm() {
+    for compiler in compilers() {
+        let counts = compare_c(compiler, &solids_of_every_operation(), FEW);
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+    }
+}
+
+#[test]
+fn c_of_random_solids_has_the_bits_of_rfm() {
+    for compiler in compilers() {
+        let counts = compare_c(compiler, &random_solids(16), FEW);
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+    }
+}
+
+#[test]
+fn c_of_all_examples_has_the_bits_of_rfm() {
+    for compiler in compilers() {
+        let counts = compare_c(compiler, &example_solids(), FEW);
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+    }
+}
+
+#[test]
+#[ignore = "a million points for each of 150 solids: minutes"]
+fn c_has_the_bits_of_rfm_at_a_million_points() {
+    for compiler in compilers() {
+        let mut counts = Counts::default();
+        for solids in [solids_of_every_operation(), example_solids(), random_solids(100)] {
+            for some in solids.chunks(20) {
+                counts += compare_c(compiler, some, MANY / 4);
+            }
+        }
+        for solids in [solids_of_every_operation(), example_solids()] {
+            counts += compare_c(compiler, &solids, MANY);
+        }
+        println!("{compiler}: {counts:?}");
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+    }
+}
+
+/// Nanoseconds per point of C and of machine code, in columns, the best of many rounds that take turns.
+#[test]
+#[ignore = "a measurement: run it alone, in a quiet moment"]
+fn c_takes_as_long_as_machine_code() {
+    for compiler in compilers() {
+        let mut solids = example_solids();
+        solids.truncate(6);
+        solids.push(balls(20));
+        solids.push(balls(500));
+        let workshop = Workshop::new();
+        workshop.write("mathematics.c", mathematics());
+        let mut files = vec!["mathematics.c".to_string()];
+        for (i, solid) in solids.iter().enumerate() {
+            workshop.write(&format!("s{i}.c"), c_text(solid, &format!("s{i}")));
+            files.push(format!("s{i}.c"));
+        }
+        let files: Vec<&str> = files.iter().map(String::as_str).collect();
+        let library = workshop.library(compiler, &files);
+        println!("{compiler}: ns per point in columns, C and machine code");
+        for (i, solid) in solids.iter().enumerate() {
+            println!("{solid:?}: {}", compare::speed(&library, &format!("s{i}"), solid, &Extra::of(solid)));
+        }
+    }
+}
+
+fn balls(count: usize) -> Solid {
+    let text = format!(
+        "rfm 1\nsolid s = any i in 0..{count}: ball([2*sin(i*1.7), 2*cos(i*2.3), i/{count}], 0.1 + i/{count}/9)"
+    );
+    Program::from_source("s.rfm", text)
+        .unwrap_or_else(|e| panic!("{e}"))
+        .solid_with("s", Engine::Jit)
+        .unwrap()
+}
+
+#[test]
+fn five_hundred_parts_are_compiled_in_seconds_and_have_the_bits_of_rfm() {
+    for compiler in compilers() {
+        let started = Instant::now();
+        let counts = compare_c(compiler, &[balls(500)], FEW);
+        let seconds = started.elapsed().as_secs_f64();
+        println!("{compiler}: 500 balls written, compiled and compared in {seconds:.1} s");
+        assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
+        assert!(seconds < 60.0, "{compiler}: {seconds} s");
+    }
+}
+
+#[test]
+fn a_header_is_c_and_cplusplus_and_cuda_is_cplusplus() {
+    let solid = example_solids().remove(0);
+    let workshop = Workshop::new();
+    for (target, name) in [(Target::Header, "s.h"), (Target::Cuda, "s.cu")] {
+        workshop.write(name, source::write(&solid, target, &exact("s")).unwrap().text);
+    }
+    let use_it = |file: &str| {
+        format!(
+            "#include \"{file}\"\n#include \"{file}\"\nint main(void) {{ return s_omega(0, 0, 0) > 1e300; }}\n"
+        )
+    };
+    workshop.write("header.c", use_it("s.h"));
+    workshop.write("header.cpp", use_it("s.h"));
+    workshop.write("cuda.cpp", use_it("s.cu"));
+    let warnings = ["-Wall", "-Wextra", "-fsyntax-only"];
+    if is_here("gcc") {
+        compile("gcc", workshop.path(), &[&warnings[..], &["-std=c99", "-pedantic", "header.c"]].concat());
+    }
+    if is_here("g++") {
+        for file in ["header.cpp", "cuda.cpp"] {
+            compile("g++", workshop.path(), &[&warnings[..], &["-std=c++11", file]].concat());
+        }
+    }
+}
+
+/// ω and signs to the bit. The sums of a gradient have another order where params are no constants, and at creases any
+/// member of its limits is as good.
+#[test]
+fn params_that_stay_open_give_the_values_of_params_that_were_set() {
+    let text = "rfm 1\nparam side = 2 in 0.1 .. 9 \"of the cube\"\nparam turn = 0.3\nparam n = 3\nparam unused = 1\n\
+                let _ = unused\nsolid s = box([-side/2, -side, -1], [side/2, side, 1]).rotate_z(turn + t).move([turn, 0, 0])\n  \
+                \\ any i in 0..n: ball([0.3*i, 0, 0], side/4)";
+    let program = Program::from_source("s.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let (opened, fixed) = program.with_open_params().unwrap();
+    assert_eq!(fixed, ["n"]);
+    let params = opened.module().params.iter();
+    let params = params
+        .map(|p| Param { name: p.name.clone(), value: p.value, doc: p.doc.clone() })
+        .collect::<Vec<_>>();
+    let solid = opened.solid_with("s", Engine::Interpreter).unwrap();
+    let options = Options { params, ..exact("s") };
+    let text = source::write(&solid, Target::C, &options).unwrap().text;
+    assert!(text.contains("double side;") && !text.contains("double n;") && !text.contains("double unused;"));
+    if !is_here("gcc") {
+        return;
+    }
+    let workshop = Workshop::new();
+    workshop.write("s.c", &text);
+    workshop.write("mathematics.c", mathematics());
+    let library = workshop.library("gcc", &["s.c", "mathematics.c"]);
+    for (side, turn) in [(2.0, 0.3), (0.7, -1.1)] {
+        let set = program.with("side", side).unwrap().with("turn", turn).unwrap();
+        let set = set.solid_with("s", Engine::Jit).unwrap().at(0.4);
+        let extra = Extra { time: Some(0.4), params: Some(vec![side, turn]) };
+        let counts = compare(&library, "s", &set, &points(FEW, 3), extra);
+        assert_eq!(counts.different_values, 0, "{counts:?}");
+    }
+}
+
+#[test]
+fn an_object_file_is_linked_into_a_c_host_and_has_the_bits_of_rfm() {
+    if !is_here("gcc") {
+        return;
+    }
+    let workshop = Workshop::new();
+    let mut solids = solids_of_every_operation();
+    solids.extend(example_solids());
+    let mut files = vec!["mathematics.c".to_string()];
+    workshop.write("mathematics.c", mathematics());
+    for (i, solid) in solids.iter().enumerate() {
+        let prefix = format!("s{i}");
+        let made = source::object(solid, &exact(&prefix), None).unwrap_or_else(|e| panic!("{e}"));
+        workshop.write(&format!("{prefix}.o"), &made.bytes);
+        // the functions of a header are its own: these are for others to find
+        let header = made
+            .header
+            .replace("static inline void s", "void s")
+            .replace("static inline double s", "double s");
+        let header = header.replace("static inline float s", "float s");
+        workshop.write(&format!("{prefix}.h"), made.header);
+        workshop.write(&format!("{prefix}_host.c"), header);
+        files.extend([format!("{prefix}.o"), format!("{prefix}_host.c")]);
+    }
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let library = workshop.library("gcc", &files);
+    for (i, solid) in solids.iter().enumerate() {
+        let counts = compare(&library, &format!("s{i}"), solid, &points(FEW + 1, 9), Extra::of(solid));
+        assert_eq!(counts.different, 0, "{solid:?}: {counts:?}");
+    }
+}
+
+#[test]
+fn rust_is_compiled_by_rustc_alone_and_has_the_bits_of_rfm() {
+    if !is_here("rustc") {
+        return;
+    }
+    let workshop = Workshop::new();
+    let mut text = String::new();
+    let mut solids = solids_of_every_operation();
+    solids.retain(|solid| solid.name() != "everything"); // its functions are those of the system
+    solids.extend(example_solids());
+    for (i, solid) in solids.iter().enumerate() {
+        let prefix = format!("s{i}");
+        let options = Options { math: Math::System, ..exact(&prefix) };
+        let module = source::write(solid, Target::Rust, &options).unwrap().text;
+        text += &format!("mod m{i} {{\n{module}\n}}\n");
+        text += &compare::rust_host(i, &prefix, solid.moves());
+    }
+    workshop.write("all.rs", text);
+    let arguments = ["--edition=2021", "-O", "--crate-type=cdylib", "-Dwarnings", "-o", "all.so", "all.rs"];
+    compile("rustc", workshop.path(), &arguments);
+    let library = library::Library::load(&workshop.path().join("all.so"));
+    for (i, solid) in solids.iter().enumerate() {
+        let turns = solid.uniform_formulas(rfm::solid::ProgramKind::Value).is_some();
+        if turns {
+            continue; // sines of the system: compiled above, and compared with those of rfm in C
+        }
+        let counts = compare(&library, &format!("s{i}"), solid, &points(FEW, 5), Extra::of(solid));
+        assert_eq!(counts.different, 0, "{solid:?}: {counts:?}");
+    }
+    let everything = solids_of_every_operation().remove(0);
+    for math in [Math::System, Math::Rfm] {
+        let options = Options { math, ..exact("s") };
+        let text = source::write(&everything, Target::Rust, &options).unwrap().text;
+        assert_eq!(text.contains("libm::sin("), math == Math::Rfm);
+        if math == Math::System {
+            workshop.write("everything.rs", text);
+            let arguments = ["--edition=2021", "--crate-type=lib", "-Dwarnings", "everything.rs"];
+            compile("rustc", workshop.path(), &arguments);
+        }
+    }
+}
+
+#[test]
+fn one_precision_and_no_more_functions_than_asked_for() {
+    let solid = balls(3);
+    let options = Options { precisions: vec![Precision::F32], ..Options::default() };
+    for target in [Target::C, Target::Rust, Target::Wgsl] {
+        let text = source::write(&solid, target, &options).unwrap().text;
+        assert!(!text.contains("double") && !text.contains("f64") && !text.contains("s_sign"), "{text}");
+    }
+    let refused = Options { precisions: vec![Precision::F64], ..Options::default() };
+    assert!(source::write(&solid, Target::Glsl, &refused).is_err());
+    let refused = Options { prefix: Some("2d".into()), ..Options::default() };
+    assert!(source::write(&solid, Target::C, &refused).is_err());
+}
+
+#[test]
+fn the_command_writes_files_and_refuses_with_advice() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = "rfm 1\nparam r = 1\nparam n = 3\nsolid post = cylinder(r, 1) and any i in 0..n: x <= i\nsolid wheel = sphere(r).rotate_z(t)\n";
+    std::fs::write(folder.path().join("a.rfm"), file).unwrap();
+    let build = |arguments: &[&str]| rfm(folder.path(), &[&["build", "a.rfm"], arguments].concat());
+    std::fs::write(folder.path().join("mine.h"), "int mine;\n").unwrap();
+    let mut transcript = String::new();
+    for arguments in [
+        &["-s", "post", "-o", "post.c"][..],
+        &["-s", "post", "-o", "post.c"],
+        &["-s", "post", "-o", "mine.c"],
+        &["-s", "wheel", "-o", "wheel.wgsl", "--what", "sign,distance"],
+        &["-s", "post", "-o", "post.rs", "--runtime-params"],
+        &["-s", "post", "-o", "post.o", "--json"],
+        &["-s", "post", "-o", "post.zig"],
+        &["-s", "post", "-o", "post"],
+        &["-s", "post"],
+        &["-s", "pots", "-o", "post.c"],
+        &["-o", "post.c"],
+        &["-s", "post", "-o", "nowhere/post.c"],
+        &["-s", "post", "-o", "post.glsl", "--precision", "f64"],
+        &["-s", "post", "-o", "post.glsl", "--math", "rfm"],
+        &["-s", "post", "-o", "post.c", "--prefix", "2d"],
+        &["-s", "post", "-o", "post.c", "--target", "x86_64-apple-darwin"],
+        &["-s", "post", "-o", "post.o", "--target", "pdp11"],
+    ] {
+        transcript +=
+            &format!("$ rfm build a.rfm {}\n{}\n", arguments.join(" "), build(arguments).transcript());
+    }
+    crate::tool::snapshot("cli", "build", &transcript);
+    let mut files: Vec<String> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    assert_eq!(files, ["a.rfm", "mine.h", "post.c", "post.h", "post.o", "post.rs", "wheel.wgsl"]);
+}

@@ -1,0 +1,140 @@
+//! Shaders: what naga says of them, and what GLSL computes where C++ reads it.
+
+use std::process::Command;
+use std::time::Instant;
+
+use naga::front::{glsl, wgsl};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use rfm::Solid;
+use rfm::source::{self, Math, Options, Target};
+
+use super::compare::points;
+use super::library::{Workshop, compile, is_here};
+use super::{balls, exact, example_solids, random_solids, solids_of_every_operation};
+
+fn shader(solid: &Solid, target: Target) -> String {
+    let options = Options { math: Math::System, ..exact("s") };
+    source::write(solid, target, &options).unwrap_or_else(|e| panic!("{e}")).text
+}
+
+fn validate(module: &naga::Module, text: &str) {
+    let result = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(module);
+    assert!(result.is_ok(), "{:?}\n{text}", result.err());
+}
+
+fn validate_wgsl(text: &str) {
+    let module = wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}\n{text}", e.emit_to_string(text)));
+    validate(&module, text);
+}
+
+/// A fragment shader around the functions. naga reads the desktop's GLSL, in which they mean the same.
+fn validate_glsl(text: &str) {
+    let whole = format!("#version 450\nprecision highp float;\n{text}\nvoid main() {{}}\n");
+    let options = glsl::Options::from(naga::ShaderStage::Fragment);
+    let module = glsl::Frontend::default().parse(&options, &whole);
+    validate(&module.unwrap_or_else(|e| panic!("{}\n{whole}", e.emit_to_string(&whole))), &whole);
+}
+
+/// Solids whose numbers `f32` can hold.
+fn solids() -> Vec<Solid> {
+    let mut solids = solids_of_every_operation();
+    solids.pop(); // it has 1e300, see below
+    solids.extend(example_solids());
+    solids.extend(random_solids(40));
+    solids
+}
+
+#[test]
+fn naga_accepts_wgsl_and_glsl_of_every_operation() {
+    for solid in solids() {
+        validate_wgsl(&shader(&solid, Target::Wgsl));
+        validate_glsl(&shader(&solid, Target::Glsl));
+    }
+    let started = Instant::now();
+    validate_wgsl(&shader(&balls(500), Target::Wgsl));
+    println!("500 balls validated in {:.2} s", started.elapsed().as_secs_f64());
+}
+
+#[test]
+fn numbers_that_shaders_cannot_hold_are_refused() {
+    let solid = solids_of_every_operation().pop().unwrap();
+    for target in [Target::Wgsl, Target::Glsl] {
+        let error = source::write(&solid, target, &Options::default()).unwrap_err().to_string();
+        assert!(error.contains("f32 cannot hold"), "{error}");
+    }
+}
+
+/// As much of GLSL as the functions use, in C++.
+const GLSL_IN_CPLUSPLUS: &str = "#include <cmath>\n#include <cstdio>\n#include <cstring>\n\
+struct vec3 { float x, y, z; };\n\
+struct vec4 { float x, y, z, w; vec4(float a, float b, float c, float d) : x(a), y(b), z(c), w(d) {} };\n\
+using std::abs; using std::acos; using std::asin; using std::atan; using std::cos; using std::exp; using std::floor;\n\
+using std::log; using std::pow; using std::sin; using std::sqrt; using std::tan;\n\
+static float atan(float y, float x) { return std::atan2(y, x); }\n";
+
+#[test]
+fn glsl_computes_omega_to_the_digits_of_f32() {
+    if !is_here("g++") {
+        return;
+    }
+    let mut solids = example_solids();
+    solids.extend(random_solids(12));
+    solids.push(solids_of_every_operation().remove(0));
+    for (i, solid) in solids.iter().enumerate() {
+        let workshop = Workshop::new();
+        let mut text = GLSL_IN_CPLUSPLUS.to_string() + &shader(solid, Target::Glsl);
+        let t = if solid.moves() { format!(", {}f", solid.time()) } else { String::new() };
+        text += &format!(
+            "int main() {{ float p[3]; while (std::fread(p, 4, 3, stdin) == 3) {{ vec3 q = {{p[0], p[1], p[2]}}; \
+             vec4 g = s_omega_gradient(q{t}); float out[6] = {{s_omega(q{t}), s_sign(q{t}), g.x, g.y, g.z, g.w}}; \
+             std::fwrite(out, 4, 6, stdout); }} return 0; }}\n"
+        );
+        workshop.write("s.cpp", text);
+        compile("g++", workshop.path(), &["-std=c++20", "-O1", "-ffp-contract=off", "-o", "s", "s.cpp"]);
+        let [x, y, z] = points(1000, i as u64);
+        let places: Vec<[f32; 3]> = (0..1000).map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]).collect();
+        let bytes: Vec<u8> = places.iter().flatten().flat_map(|c| c.to_ne_bytes()).collect();
+        let input = workshop.write("points", bytes);
+        let output = Command::new(workshop.path().join("s"))
+            .stdin(std::fs::File::open(input).unwrap())
+            .output()
+            .unwrap();
+        assert!(output.status.success());
+        let numbers: Vec<f32> =
+            output.stdout.chunks(4).map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])).collect();
+        check(solid, &places, &numbers);
+    }
+}
+
+/// Values in `f32` against those of the machine code in `f32`: functions of the system differ in their last bits.
+fn check(solid: &Solid, places: &[[f32; 3]], numbers: &[f32]) {
+    let mut largest = 0f32;
+    for p in places.iter().filter(|p| p.iter().all(|c| c.abs() <= 3.0)) {
+        let omega = solid.omega_f32((*p).into());
+        if omega.is_finite() {
+            largest = largest.max(omega.abs());
+        }
+    }
+    for (p, found) in places.iter().zip(numbers.chunks(6)) {
+        let (omega, gradient) = solid.omega_grad_f32((*p).into());
+        if !p.iter().all(|c| c.abs() <= 3.0) || !omega.is_finite() {
+            continue;
+        }
+        let error = (found[0] - omega).abs();
+        assert!(error <= 4e-6 * largest, "{solid:?} at {p:?}: {} and {omega}", found[0]);
+        if omega.abs() > 4e-6 * largest {
+            assert!(found[0].signum() == omega.signum(), "{solid:?} at {p:?}: {} and {omega}", found[0]);
+        }
+        if gradient.is_finite() && solid.name() != "everything" {
+            let error = (glam(found) - gradient).length();
+            assert!(
+                error <= 1e-3 * (1.0 + gradient.length()),
+                "{solid:?} at {p:?}: {found:?} and {gradient}"
+            );
+        }
+    }
+}
+
+fn glam(found: &[f32]) -> rfm::glam::Vec3 {
+    rfm::glam::Vec3::new(found[2], found[3], found[4])
+}
