@@ -27,6 +27,7 @@ mod project;
 mod qef;
 mod quads;
 mod refine;
+mod secure;
 mod sharp;
 #[cfg(test)]
 mod tests;
@@ -72,7 +73,7 @@ pub fn dual_contouring(
     let crossing = Crossing::find(field, &lattice, &near, progress, &mut work)?;
     let rings = Rings::new(crossing.crossed.vertices);
     let (mut vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
-    let triangles = join(field, &crossing, &rings, &placed, &mut vertices, grid, &mut work);
+    let triangles = join((field, &lattice), &crossing, &rings, &placed, &mut vertices, grid, &mut work);
 
     let mut draft = Draft::new(field, grid, vertices, triangles, work);
     let left = draft.refine();
@@ -200,9 +201,9 @@ fn place(placement: &Placement<'_>) -> (Vertices, Vec<Placed>) {
     (vertices, placed)
 }
 
-/// Joins the vertices around each hit to triangles, and adds the tubes of tunnels.
+/// Joins the vertices around each hit to triangles that do not cross, and adds the tubes of tunnels.
 fn join(
-    field: &dyn Field,
+    (field, lattice): (&dyn Field, &Lattice),
     crossing: &Crossing,
     rings: &Rings,
     placed: &[Placed],
@@ -211,15 +212,14 @@ fn join(
     work: &mut Work,
 ) -> Vec<[u32; 3]> {
     let Crossing { signs, crossed, hits } = crossing;
-    let quads = Quads::join(field, signs, crossed, (hits, rings), placed, vertices);
+    let quads = Quads::join((field, lattice), signs, crossed, (hits, rings), placed, vertices);
     let mut cut = quads.cut(vertices);
     let fallbacks = placed.iter().flat_map(|part| part.fallbacks.iter().copied()).collect();
     let size = grid.spacing().min_element();
     move_spoilt(&quads, &mut cut, vertices, fallbacks, size, &mut work.gradients);
     work.gradients += cut.gradients + placed.iter().map(|part| part.gradients).sum::<u64>();
-    let mut triangles = quads.triangles(cut, vertices);
-    triangles.extend(placed.iter().flat_map(|part| &part.tubes));
-    triangles
+    let tubes: Vec<[u32; 3]> = placed.iter().flat_map(|part| part.tubes.iter().copied()).collect();
+    secure::secure(quads, cut, vertices, &tubes, size)
 }
 
 /// How often vertices are moved back because triangles lie upside down.
