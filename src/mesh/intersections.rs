@@ -17,14 +17,18 @@ use crate::geom::Aabb;
 
 /// Pairs of triangles that cross, ascending. A mesh without any bounds a solid without overlaps.
 pub fn self_intersections(mesh: &Mesh) -> Vec<[u32; 2]> {
-    let extent = |t: &[u32; 3]| {
+    let extents = mesh.triangles.iter().map(|t| {
         let bounds = bounds_of(corners(&mesh.positions, *t));
         if bounds.is_finite() { bounds.size().max_element() } else { 0.0 }
-    };
-    let mean = mesh.triangles.iter().map(extent).sum::<f64>() / mesh.triangles.len().max(1) as f64;
+    });
+    let (sum, largest) = extents.fold((0.0, 0.0), |(sum, most), x| (sum + x, f64::max(most, x)));
+    let mean = sum / mesh.triangles.len().max(1) as f64;
     let all: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-    crossing_pairs(&mesh.positions, &mesh.triangles, &all, mean)
+    crossing_pairs(&mesh.positions, &mesh.triangles, &all, mean.max(largest / MOST_CUBES))
 }
+
+/// The most cubes that a triangle may reach over on one axis.
+const MOST_CUBES: f64 = 64.0;
 
 pub(super) type Triangle = [DVec3; 3];
 
@@ -47,24 +51,35 @@ pub(super) fn crossing_pairs(
     if suspects.is_empty() || !(size > 0.0 && size.is_finite()) {
         return Vec::new();
     }
-    let near = Neighbours::find(positions, triangles, suspects, Cubes { size });
+    let cubes = Cubes { size: CUBE * size };
     let mut is_suspect = vec![false; triangles.len()];
     suspects.iter().for_each(|&t| is_suspect[t as usize] = true);
-    let found: Vec<Vec<[u32; 2]>> = suspects
-        .par_chunks(SUSPECTS_PER_TASK)
-        .map(|part| {
+    let mut places = places(positions, triangles, (suspects, 0.0), &cubes);
+    places.par_sort_unstable();
+    let by_cube: Vec<&[(Cube, u32)]> = places.chunk_by(|a, b| a.0 == b.0).collect();
+    let found: Vec<Vec<[u32; 2]>> = by_cube
+        .par_chunks(CUBES_PER_TASK)
+        .map_init(Vec::new, |members: &mut Vec<(u32, bool, Aabb)>, part| {
             let mut found = Vec::new();
-            for &t in part {
-                let own = corners(positions, triangles[t as usize]);
-                let bounds = bounds_of(own);
-                for other in near.around(&bounds) {
-                    // a pair of two suspects is looked at once
-                    if other <= t && (other == t || is_suspect[other as usize]) {
-                        continue;
-                    }
-                    let place = corners(positions, triangles[other as usize]);
-                    if overlap(&bounds, &bounds_of(place)) && cross(&own, &place) {
-                        found.push([t.min(other), t.max(other)]);
+            for list in part {
+                members.clear();
+                members.extend(list.iter().map(|&(_, t)| {
+                    (t, is_suspect[t as usize], bounds_of(corners(positions, triangles[t as usize])))
+                }));
+                let cube = list[0].0;
+                for (i, (s, suspect, own)) in members.iter().enumerate() {
+                    for (t, other_suspect, bounds) in &members[i + 1..] {
+                        // a pair that shares several cubes is looked at in the first
+                        if (*suspect | *other_suspect)
+                            && overlap(own, bounds)
+                            && cubes.of(own.min.max(bounds.min)) == cube
+                            && cross(
+                                &corners(positions, triangles[*s as usize]),
+                                &corners(positions, triangles[*t as usize]),
+                            )
+                        {
+                            found.push([*s, *t]);
+                        }
                     }
                 }
             }
@@ -73,32 +88,82 @@ pub(super) fn crossing_pairs(
         .collect();
     let mut found = found.concat();
     found.par_sort_unstable();
-    found.dedup(); // two triangles may share several cubes
     found
 }
 
-const SUSPECTS_PER_TASK: usize = 256;
+const CUBES_PER_TASK: usize = 64;
 const TRIANGLES_PER_TASK: usize = 4096;
 
-/// Boxes over more cubes than this are compared with everything.
-const MOST_CUBES: i64 = 512;
+/// The side of the cubes, in sizes of triangles. Smaller ones hold fewer pairs, but triangles lie in more.
+const CUBE: f64 = 1.5;
 
-/// A division of space into cubes.
+/// The triangles in the cubes that suspects touch, give or take a margin, with those cubes. It may hold others.
+fn places(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    (suspects, margin): (&[u32], f64),
+    cubes: &Cubes,
+) -> Vec<(Cube, u32)> {
+    let [mut filter, mut coarse] = [(); 2].map(|()| Filter(vec![0; Filter::BITS / 64]));
+    for &t in suspects {
+        let bounds = bounds_of(corners(positions, triangles[t as usize])).grown(margin);
+        for cube in cubes.touched(&bounds) {
+            filter.mark(cube);
+            coarse.mark(cube.map(block_of));
+        }
+    }
+    let parts: Vec<Vec<(Cube, u32)>> = triangles
+        .par_chunks(TRIANGLES_PER_TASK)
+        .enumerate()
+        .map(|(part, triangles)| {
+            let first = (part * TRIANGLES_PER_TASK) as u32;
+            let mut near = Vec::new();
+            for (t, triangle) in (first..).zip(triangles) {
+                let bounds = bounds_of(corners(positions, *triangle));
+                let (low, high) = (cubes.of(bounds.min), cubes.of(bounds.max));
+                // most triangles lie in one block, and that holds no suspect
+                let blocks = [low, high].map(|cube| cube.map(block_of));
+                if blocks[0] == blocks[1] && !coarse.may_hold(blocks[0]) {
+                    continue;
+                }
+                for z in low[2]..=high[2] {
+                    for y in low[1]..=high[1] {
+                        for x in low[0]..=high[0] {
+                            if filter.may_hold([x, y, z]) {
+                                near.push(([x, y, z], t));
+                            }
+                        }
+                    }
+                }
+            }
+            near
+        })
+        .collect();
+    parts.concat()
+}
+
+/// The number of a block of cubes, by that of a cube on an axis.
+fn block_of(cube: i32) -> i32 {
+    cube >> 3
+}
+
+/// A division of space into cubes. Those beside a plane of zero coordinates are twice as long across it.
 pub(super) struct Cubes {
     pub size: f64,
 }
 
-type Cube = [i64; 3];
+type Cube = [i32; 3];
 
 impl Cubes {
     fn of(&self, p: DVec3) -> Cube {
-        (p / self.size).floor().to_array().map(|x| x as i64)
+        // truncation keeps the order of numbers, and needs no call as rounding down does
+        (p / self.size).to_array().map(|x| x as i32)
     }
 
     /// The cubes that a box touches.
     pub fn touched(&self, bounds: &Aabb) -> impl Iterator<Item = Cube> + use<> {
         let (low, high) = (self.of(bounds.min), self.of(bounds.max));
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| low[axis]..=high[axis].min(low[axis] + MOST_CUBES));
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| low[axis]..=high[axis]);
         z.flat_map(move |k| {
             let x = x.clone();
             y.clone().flat_map(move |j| x.clone().map(move |i| [i, j, k]))
@@ -137,32 +202,16 @@ pub(super) struct Neighbours {
 }
 
 impl Neighbours {
-    /// All triangles in the cubes that the suspects touch.
-    pub fn find(positions: &[DVec3], triangles: &[[u32; 3]], suspects: &[u32], cubes: Cubes) -> Self {
-        let mut filter = Filter(vec![0; Filter::BITS / 64]);
+    /// All triangles in the cubes that the suspects touch, or touch once they have moved by a margin.
+    pub fn find(
+        positions: &[DVec3],
+        triangles: &[[u32; 3]],
+        (suspects, margin): (&[u32], f64),
+        cubes: Cubes,
+    ) -> Self {
         let mut by_cube: FxHashMap<Cube, SmallVec<[u32; 12]>> = FxHashMap::default();
-        for &t in suspects {
-            for cube in cubes.touched(&bounds_of(corners(positions, triangles[t as usize]))) {
-                filter.mark(cube);
-                by_cube.entry(cube).or_default();
-            }
-        }
-        let parts: Vec<Vec<(u32, Aabb)>> = triangles
-            .par_chunks(TRIANGLES_PER_TASK)
-            .enumerate()
-            .map(|(part, triangles)| {
-                let first = (part * TRIANGLES_PER_TASK) as u32;
-                let bounds = triangles.iter().map(|t| bounds_of(corners(positions, *t)));
-                let near = (first..).zip(bounds);
-                near.filter(|(_, b)| cubes.touched(b).any(|cube| filter.may_hold(cube))).collect()
-            })
-            .collect();
-        for (t, b) in parts.into_iter().flatten() {
-            for cube in cubes.touched(&b) {
-                if let Some(list) = by_cube.get_mut(&cube) {
-                    list.push(t);
-                }
-            }
+        for (cube, t) in places(positions, triangles, (suspects, margin), &cubes) {
+            by_cube.entry(cube).or_default().push(t);
         }
         Self { cubes, by_cube }
     }
@@ -261,7 +310,8 @@ fn overlap_in_plane(s: &Triangle, t: &Triangle, shared: usize) -> bool {
     if shared == 2 {
         let apex = |of: &Triangle, other: &Triangle| of.iter().copied().find(|p| !other.contains(p));
         let mut common = s.iter().copied().filter(|p| t.contains(p));
-        let (Some(a), Some(b), Some(c), Some(d)) = (common.next(), common.next(), apex(s, t), apex(t, s)) else {
+        let (Some(a), Some(b), Some(c), Some(d)) = (common.next(), common.next(), apex(s, t), apex(t, s))
+        else {
             return false;
         };
         let side = |p: DVec3| along.dot((b - a).cross(p - a));

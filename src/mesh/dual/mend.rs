@@ -51,13 +51,7 @@ pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
 
 /// Mends the mesh around the given edges, which ascend, until about `budget` evaluations are spent. Returns
 /// their number.
-pub(super) fn mend(
-    mut patch: Patch<'_>,
-    edges: Vec<[u32; 2]>,
-    tolerance: f64,
-    aim: Aim,
-    budget: u64,
-) -> u64 {
+pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim, budget: u64) -> u64 {
     let looks = LOOKS * edges.len();
     let mut waiting: FxHashSet<[u32; 2]> = edges.iter().copied().collect();
     let mut queue = VecDeque::from(edges);

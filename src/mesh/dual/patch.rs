@@ -106,7 +106,8 @@ impl<'a> Patch<'a> {
         let mut own: Vec<u32> = fans.values().flatten().copied().collect();
         own.sort_unstable();
         own.dedup();
-        let near = Neighbours::find(&vertices.positions, triangles, &own, Cubes { size });
+        // vertices move by a cell at most
+        let near = Neighbours::find(&vertices.positions, triangles, (&own, size), Cubes { size });
         Self { field, bounds, size, vertices, triangles, fans, near, count: 0 }
     }
 

@@ -123,13 +123,7 @@ struct Retreat {
 }
 
 /// Moves the marked vertices into their cells and makes fans of their quads, with bent sides.
-fn retreat(
-    quads: &mut Quads<'_>,
-    cut: &mut Cut,
-    vertices: &mut Vertices,
-    is_marked: &[bool],
-    round: usize,
-) {
+fn retreat(quads: &mut Quads<'_>, cut: &mut Cut, vertices: &mut Vertices, is_marked: &[bool], round: usize) {
     let touched = quads.with_corners(is_marked);
     let mut sides: BTreeMap<[u32; 2], SmallVec<[u32; 4]>> = BTreeMap::new();
     let mut cells: BTreeMap<u32, Retreat> = BTreeMap::new();
@@ -206,7 +200,10 @@ fn is_enveloped(quads: &Quads<'_>, vertices: &Vertices, quad: &Quad, cut: &Cut) 
     let (from, to) = (corner(0), corner(2));
     let turn = |a: DVec3, b: DVec3| DVec2::new(a.x, a.y).perp_dot(DVec2::new(b.x, b.y));
     // the corner on whose side the diagonal passes the edge
-    let ring = turn(corner(0), corner(1)) + turn(corner(1), corner(2)) + turn(corner(2), corner(3)) + turn(corner(3), corner(0));
+    let ring = turn(corner(0), corner(1))
+        + turn(corner(1), corner(2))
+        + turn(corner(2), corner(3))
+        + turn(corner(3), corner(0));
     let beside = if (turn(from, to) > 0.0) == (ring > 0.0) { corner(1) } else { corner(3) };
     passes_within(from, beside, to, length) && passes_within(to, beside, from, length)
 }
