@@ -107,6 +107,9 @@ fn places(
     let [mut filter, mut coarse] = [(); 2].map(|()| Filter(vec![0; Filter::BITS / 64]));
     for &t in suspects {
         let bounds = bounds_of(corners(positions, triangles[t as usize])).grown(margin);
+        if !bounds.is_finite() {
+            continue; // triangles without finite corners cross nothing
+        }
         for cube in cubes.touched(&bounds) {
             filter.mark(cube);
             coarse.mark(cube.map(block_of));
@@ -120,6 +123,9 @@ fn places(
             let mut near = Vec::new();
             for (t, triangle) in (first..).zip(triangles) {
                 let bounds = bounds_of(corners(positions, *triangle));
+                if !bounds.is_finite() {
+                    continue;
+                }
                 let (low, high) = (cubes.of(bounds.min), cubes.of(bounds.max));
                 // most triangles lie in one block, and that holds no suspect
                 let blocks = [low, high].map(|cube| cube.map(block_of));

@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use super::{
     Grid, MeshError,
     crossings::sample,
+    patches::undecided_cells,
     prune::{BRICK, Bricks, Lattice},
     signs::{Brick, Signs, crossed_cells},
 };
@@ -83,8 +84,9 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
             }
             let around = Brick::new(&near, &signs, number).around(&signs);
             let crossed = std::array::from_fn(|z| crossed_cells(&around.corners(z)));
+            let undecided = std::array::from_fn(|z| undecided_cells(&around.corners(z)));
             let low = brick.at.map(|b| b * BRICK);
-            Search { field, lattice: &lattice, low, cells, crossed }.count([0; 3], BRICK)
+            Search { field, lattice: &lattice, low, cells, crossed, undecided }.count([0; 3], BRICK)
         })
         .collect();
     Ok(parts.into_iter().fold(ThinCells::NONE, ThinCells::and))
@@ -99,6 +101,7 @@ struct Search<'a> {
     /// The numbers of cells of the grid.
     cells: [usize; 3],
     crossed: Signs,
+    undecided: Signs,
 }
 
 impl Search<'_> {
@@ -119,8 +122,10 @@ impl Search<'_> {
             if (0..3).any(|axis| low[axis] == 0) {
                 return ThinCells::NONE;
             }
-            let is_crossed = self.crossed[first[2]] >> (BRICK * first[1] + first[0]) & 1 == 1;
-            return Look { field: self.field, lattice: self.lattice, low, bounds, is_crossed }.into_cell();
+            let holds = |cells: &Signs| cells[first[2]] >> (BRICK * first[1] + first[0]) & 1 == 1;
+            let (is_crossed, is_undecided) = (holds(&self.crossed), holds(&self.undecided));
+            let Self { field, lattice, .. } = *self;
+            return Look { field, lattice, low, bounds, is_crossed, is_undecided }.into_cell();
         }
         if self.any_crossed(first, size) && look::is_one_sheet(self.field, &bounds) {
             return ThinCells::NONE;

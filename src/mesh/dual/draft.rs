@@ -22,7 +22,7 @@ const REPAIRS: usize = 4;
 /// Evaluations for mending, as a share of those that found the surface, which were made many at a time, and
 /// the fewest.
 const MENDING: f64 = 0.25;
-const LEAST_MENDING: u64 = 2000;
+const LEAST_MENDING: u64 = 60_000;
 
 /// Rounds of moving cuts back, at most. The last one moves all back.
 const UNDOINGS: usize = 8;

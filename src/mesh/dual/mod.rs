@@ -5,9 +5,12 @@
 //! 1. [`Crossing::find`]: the cells that the surface passes and its hits on their edges, as for marching
 //!    cubes; `loops` finds which hits belong together.
 //! 2. [`place`](fn@place): a vertex for each loop, by `place`, `sharp`, `qef` and `crease`.
-//! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two.
-//! 4. [`Draft::refine`]: edges that are still too far from the surface are cut (`refine`).
-//! 5. [`Draft::mend`]: what stays far off or lies upside down is looked at one by one (`mend`).
+//! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two; `secure`
+//!    makes fans of quads that cross.
+//! 4. [`Draft::refine`]: edges that are still too far from the surface are cut (`refine`). Cuts move back to
+//!    the middles of their edges where triangles would cross.
+//! 5. [`Draft::mend`]: what stays far off or lies upside down is looked at one by one (`mend`), as far as a
+//!    budget allows, and without crossings.
 //!
 //! The vertices are those of the dual of the marching-cubes mesh (Schaefer, Ju, Warren: Manifold dual
 //! contouring, IEEE TVCG 13, 2007), so the topology is that of marching cubes. The quadratic error is that of

@@ -14,7 +14,7 @@
 //!
 //! Invariant: retreats change no topology, and they spread until nothing crosses.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
@@ -141,9 +141,10 @@ fn retreat(quads: &mut Quads<'_>, cut: &mut Cut, vertices: &mut Vertices, is_mar
             }
         }
     }
+    let ends_of_tunnels: BTreeSet<u32> = quads.seconds.values().copied().collect();
     for (v, Retreat { hits, count, cell }) in cells {
         let place = v as usize;
-        let is_end_of_tunnel = quads.seconds.values().any(|&second| second == v);
+        let is_end_of_tunnel = ends_of_tunnels.contains(&v);
         let is_flat = cell.size().min_element() <= 0.0;
         if is_end_of_tunnel || is_flat || vertices.kinds[place] == VertexKind::Cap {
             continue;

@@ -30,6 +30,9 @@ const STEPS: usize = 8;
 /// A point nearer to a face than this, in cells, is on it.
 const ON_FACE: f64 = 1e-8;
 
+/// A face that agrees more than this (cosine) with the way to it ends a thickness.
+const BACK: f64 = 0.5;
+
 /// The longest way in cells over which a thickness is measured, and its steps.
 const THICKEST: f64 = 2.0;
 const STEPS_ACROSS: usize = 64;
@@ -73,6 +76,8 @@ pub(super) struct Look<'a> {
     pub low: [usize; 3],
     pub bounds: Aabb,
     pub is_crossed: bool,
+    /// Whether the signs at its corners leave a choice.
+    pub is_undecided: bool,
 }
 
 /// What the grid has seen.
@@ -111,7 +116,9 @@ impl Look<'_> {
         let seen = self.seen();
         let mut findings = Findings::default();
         self.divide(&self.bounds, &seen, HALVINGS, &mut findings);
-        let opposed = |all: &[DVec3]| has_opposed(all, &seen.own);
+        // where the signs leave a choice, walls that are seen on both sides may still have holes
+        let own = if self.is_undecided { &[][..] } else { &seen.own[..] };
+        let opposed = |all: &[DVec3]| has_opposed(all, own);
         if findings.open.is_empty() && !opposed(&findings.proven) {
             return ThinCells::NONE;
         }
@@ -127,7 +134,7 @@ impl Look<'_> {
                     continue;
                 }
                 if !is_known || opposed(&normals) {
-                    let found = self.counted(foot);
+                    let found = self.counted(foot, &seen);
                     if found.count > 0 {
                         return found;
                     }
@@ -206,21 +213,39 @@ impl Look<'_> {
         })
     }
 
-    /// The count of this cell, with the thickness at a point that the grid does not know. Nothing if it is thick
-    /// there.
-    fn counted(&self, foot: Foot) -> ThinCells {
-        let size = self.bounds.size().min_element();
-        let across = |way: DVec3, inside: bool| {
-            let step = THICKEST * size / STEPS_ACROSS as f64;
-            let ends = (0..STEPS_ACROSS).map(|i| step * (i as f64 + 0.5));
-            let mut ends = ends.filter(|t| (self.field.omega(foot.at + *t * way) > 0.0) != inside);
-            ends.next().unwrap_or(f64::INFINITY)
+    /// The count of this cell, with the thickness at a point that the grid does not know. Nothing if the grid
+    /// knows other faces nearby, and what the face belongs to is thicker than two cells.
+    fn counted(&self, foot: Foot, seen: &Seen) -> ThinCells {
+        // across the face, and along the faces beside it: a bump on a wall is as thin as it is wide
+        let beside = seen.around.iter().filter_map(|n| unit(foot.normal - n.dot(foot.normal) * *n));
+        let ways = || std::iter::once(foot.normal).chain(beside.clone());
+        let least = |inside: bool| {
+            let sign = if inside { -1.0 } else { 1.0 };
+            ways().map(|way| self.across(foot.at, sign * way, inside)).fold(f64::INFINITY, f64::min)
         };
-        let (wall, gap) = (across(-foot.normal, true), across(foot.normal, false));
-        if wall.min(gap) == f64::INFINITY {
+        let (wall, gap) = (least(true), least(false));
+        let thickness = wall.min(gap);
+        if thickness == f64::INFINITY && !seen.around.is_empty() {
             return ThinCells::NONE; // a step or an edge of something thick
         }
-        ThinCells { count: 1, bounds: self.bounds, thickness: wall.min(gap), at: foot.at, is_gap: gap < wall }
+        ThinCells { count: 1, bounds: self.bounds, thickness, at: foot.at, is_gap: gap < wall }
+    }
+
+    /// The distance from a point of the surface to where it is met again from inside, or from outside, if the
+    /// face there turns its back. Infinite beyond two cells.
+    fn across(&self, from: DVec3, way: DVec3, inside: bool) -> f64 {
+        let step = THICKEST * self.bounds.size().min_element() / STEPS_ACROSS as f64;
+        let is_beyond = |t: f64| (self.field.omega(from + t * way) > 0.0) != inside;
+        let ends = (0..STEPS_ACROSS).map(|i| step * (i as f64 + 0.5));
+        let Some(mut far) = ends.into_iter().find(|t| is_beyond(*t)) else { return f64::INFINITY };
+        let mut near = f64::max(far - step, 0.0);
+        for _ in 0..HALVED {
+            let middle = 0.5 * (near + far);
+            if is_beyond(middle) { far = middle } else { near = middle }
+        }
+        let towards = if inside { way } else { -way };
+        let end = unit(-self.field.omega_grad(from + far * way).1);
+        if end.is_some_and(|normal| normal.dot(towards) > BACK) { far } else { f64::INFINITY }
     }
 
     /// The normals where the surface crosses the edges of this cell and of those around it.
