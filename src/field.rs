@@ -76,6 +76,14 @@ pub struct GradientsMut<'a> {
     pub z: &'a mut [f64],
 }
 
+/// A face that may be part of the surface in a box.
+pub struct Sheet<'a> {
+    /// Encloses the gradient that ω has in the box where this face decides: it points inwards.
+    pub slopes: [Interval; 3],
+    /// ω and ∇ω at a point where this face decides; elsewhere the function that belongs to the face.
+    pub at: &'a dyn Fn(DVec3) -> (f64, DVec3),
+}
+
 /// A scalar field over space: positive inside an obstacle, negative in the fluid.
 ///
 /// Implementations are pure: the same point gives the same bits on every thread. Non-finite coordinates
@@ -115,6 +123,12 @@ pub trait Field: Send + Sync {
     fn range(&self, _over: &Aabb) -> Interval {
         Interval::ALL
     }
+
+    /// Visits the faces that may be part of the surface in a box, and may visit others. Returns whether they
+    /// are all; the default knows none.
+    fn sheets(&self, _over: &Aabb, _visit: &mut dyn FnMut(Sheet<'_>)) -> bool {
+        false
+    }
 }
 
 impl<F: Field + ?Sized> Field for &F {
@@ -140,6 +154,10 @@ impl<F: Field + ?Sized> Field for &F {
 
     fn range(&self, over: &Aabb) -> Interval {
         (**self).range(over)
+    }
+
+    fn sheets(&self, over: &Aabb, visit: &mut dyn FnMut(Sheet<'_>)) -> bool {
+        (**self).sheets(over, visit)
     }
 }
 

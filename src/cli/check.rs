@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::args::{Check, Deny, Shared};
 use super::failure::{Failure, complain, note};
+use super::mesh::hidden;
 use super::{choose, input, output, section};
 use crate::cli::output::Shown;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
@@ -19,6 +20,7 @@ use rfm::{Precision, Program, Solid};
 
 /// Cells along the longest side of the mesh that volumes are measured on.
 const VOLUME_CELLS: usize = 96;
+const RESOLUTION: Resolution = Resolution::Cells(VOLUME_CELLS);
 
 #[derive(Serialize)]
 struct Document {
@@ -56,7 +58,12 @@ struct Facts {
     /// Estimated from two resolutions.
     volume_error: Option<f64>,
     area: Option<f64>,
+    /// Estimated from two resolutions.
+    area_error: Option<f64>,
     components: Option<usize>,
+    /// Whether two resolutions have as many components and no part is thinner than a cell. If not, the volume,
+    /// the area and their errors are those of what the finer one shows.
+    resolved: Option<bool>,
     /// The tolerance for the error of ω that the file states, the program that keeps it, and the program's
     /// certified bound.
     tolerance: Option<f64>,
@@ -66,6 +73,9 @@ struct Facts {
     time: Option<f64>,
     /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
     thin_cells: Option<usize>,
+    /// The number of components that half as many cells show.
+    #[serde(skip)]
+    components_coarser: Option<usize>,
 }
 
 impl Facts {
@@ -78,12 +88,15 @@ impl Facts {
             volume: None,
             volume_error: None,
             area: None,
+            area_error: None,
             components: None,
+            resolved: None,
             tolerance: None,
             program: None,
             error_bound: None,
             time: solid.moves().then(|| solid.time()),
             thin_cells: None,
+            components_coarser: None,
         }
     }
 }
@@ -255,10 +268,12 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
         }
         Bounds::Within(_) => {}
     }
-    if thin.count > 0 {
+    let grid = solid.bounds().aabb().and_then(|bounds| Grid::around(&bounds, RESOLUTION).ok());
+    if let Some(grid) = grid.filter(|_| thin.count > 0) {
         let message = format!(
-            "solid `{}` has parts or gaps thinner than 1/{} of its longest side, in {} cells between {:.3} and {:.3}",
-            named.name, VOLUME_CELLS, thin.count, thin.bounds.min, thin.bounds.max
+            "solid `{}` has parts or gaps that {VOLUME_CELLS} cells along its longest side do not show, {}",
+            named.name,
+            hidden(thin, &grid)
         );
         let help = "mesh it with more --cells, until `thin_cells` is 0";
         found.push(warning(Code::THIN_PARTS, message).help(help));
@@ -294,7 +309,9 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
                 volume: zero,
                 volume_error: zero,
                 area: zero,
+                area_error: zero,
                 components: Some(0),
+                resolved: Some(true),
                 thin_cells: Some(0),
                 ..facts
             };
@@ -303,14 +320,17 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
     };
     facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-    let grid = Grid::around(bounds, Resolution::Cells(VOLUME_CELLS)).map_err(Failure::usage)?;
+    let grid = Grid::around(bounds, RESOLUTION).map_err(Failure::usage)?;
     let thin = mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE);
     match mesh::volume(&*surface, bounds, VOLUME_CELLS) {
         Ok(found) => {
             facts.volume = Some(found.volume);
             facts.volume_error = Some(found.error);
             facts.area = Some(found.area);
+            facts.area_error = Some(found.area_error);
             facts.components = Some(found.solids);
+            facts.components_coarser = Some(found.solids_coarser);
+            facts.resolved = Some(found.solids == found.solids_coarser && thin.count == 0);
         }
         Err(VolumeError::TooThin) => {}
         Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
@@ -357,9 +377,22 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
         if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
             say!("    volume      {} ± {error:.1e}", significant(volume));
         }
-        if let (Some(area), Some(components), false) = (solid.area, solid.components, solid.empty) {
-            say!("    area        {}", significant(area));
-            say!("    components  {components}");
+        if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
+            say!("    area        {} ± {error:.1e}", significant(area));
+        }
+        if let (Some(components), Some(coarser), false) =
+            (solid.components, solid.components_coarser, solid.empty)
+        {
+            let half = VOLUME_CELLS / 2;
+            match coarser == components {
+                true => say!("    components  {components}"),
+                false => say!(
+                    "    components  {components}, but {coarser} with {half} cells instead of {VOLUME_CELLS}"
+                ),
+            }
+        }
+        if solid.resolved == Some(false) {
+            say!("    not resolved: volume, area and components are those of what {VOLUME_CELLS} cells show");
         }
         if let (Some(name), Some(bound), Some(tolerance)) =
             (&solid.program, solid.error_bound, solid.tolerance)

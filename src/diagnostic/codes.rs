@@ -156,8 +156,9 @@ that can be had. If there is none at all, a formula in the box may divide by zer
 or leave the range of numbers; or the solid has neither bounds nor a scene with a box.";
 THIN_PARTS = "W0408":
 "Parts of the solid, or gaps in it, are thinner than the cells of the grid that it was measured on, and pass between
-its nodes: they are missing from its volume, and from a mesh with as many cells. The box tells where. Such cells are
-found by the ranges of ω over an eighth of a cell, so surfaces that only touch, as in `a and not a`, count as well.";
+its nodes or beside its triangles: they are missing from its volume, and from a mesh with as many cells. The message says
+where the thinnest is and how many cells would show it. Each cell that is counted holds a point of a surface which the
+grid does not know, so surfaces that only touch, as in `a and not a`, do not count.";
 LARGE_ANGLE = "W0409":
 "Angles are radians unless a unit says otherwise, and this one is more than a whole turn. Write `45 deg` for degrees, or
 `45 rad` if radians are meant.";

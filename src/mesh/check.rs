@@ -141,10 +141,11 @@ fn distances(mesh: &Mesh, field: &dyn Field) -> (f64, f64) {
     mesh.caps.iter().for_each(|&v| is_cap[v as usize] = true);
     let on_surface: Vec<DVec3> =
         mesh.positions.iter().zip(&is_cap).filter(|(_, cap)| !**cap).map(|(p, _)| *p).collect();
+    let largest = on_surface.iter().fold(0.0, |most, p| f64::max(most, p.abs().max_element()));
     let parts: Vec<(f64, f64)> = on_surface
         .par_chunks(BATCH)
         .map(|part| {
-            let distances = project(field, part);
+            let distances = project(field, part, largest);
             distances.iter().fold((0.0, 0.0), |(max, sum), d| (f64::max(max, *d), sum + d * d))
         })
         .collect();
@@ -157,7 +158,8 @@ const NEWTON_STEPS: usize = 8;
 
 /// The distance of each point from ω = 0: the way that Newton's method along ∇ω takes to the surface. The
 /// distance within which ω changes sign is taken if it is shorter, or if Newton's method does not converge.
-fn project(field: &dyn Field, points: &[DVec3]) -> Vec<f64> {
+/// `largest` is the largest coordinate of all points: a tip at the origin is no more exact than the rest.
+fn project(field: &dyn Field, points: &[DVec3], largest: f64) -> Vec<f64> {
     let mut at = points.to_vec();
     let mut directions = vec![DVec3::ZERO; points.len()];
     let mut gradients = GradientColumns::default();
@@ -184,26 +186,22 @@ fn project(field: &dyn Field, points: &[DVec3]) -> Vec<f64> {
         .map(|i| {
             let way = at[i].distance(points[i]);
             let left = residuals[i].0.abs() / residuals[i].1.length();
-            let converged = residuals[i].0 == 0.0 || left <= 1e-3 * way || left <= rounding(points[i]);
-            if converged && way <= 1e3 * rounding(points[i]) {
+            let rounding = f64::EPSILON * largest;
+            let converged = residuals[i].0 == 0.0 || left <= 1e-3 * way || left <= rounding;
+            if converged && way <= 1e3 * rounding {
                 return way;
             }
             let newton = if converged { way } else { f64::INFINITY };
-            newton.min(sign_change_distance(field, points[i], directions[i]))
+            newton.min(sign_change_distance(field, points[i], directions[i], rounding))
         })
         .collect()
 }
 
-/// The rounding of a point's coordinates.
-fn rounding(p: DVec3) -> f64 {
-    f64::EPSILON * p.abs().max_element()
-}
-
 /// The least radius, up to a factor of two, at which ω has both signs on the axes and on the gradient's line
 /// through a point. This bound for the distance holds for flat and kinked fields too. It is infinite if there
-/// is no change of sign within the size of the point's coordinates.
-fn sign_change_distance(field: &dyn Field, p: DVec3, direction: DVec3) -> f64 {
-    let mut radius = rounding(p);
+/// is no change of sign within the size of the coordinates, whose rounding is the least radius tried.
+fn sign_change_distance(field: &dyn Field, p: DVec3, direction: DVec3, rounding: f64) -> f64 {
+    let mut radius = rounding;
     for _ in 0..52 {
         let ways = [direction, DVec3::X, DVec3::Y, DVec3::Z];
         let around = ways.into_iter().flat_map(|way| [p + radius * way, p - radius * way]);
@@ -283,7 +281,7 @@ mod tests {
                 omega: move |p: DVec3| omega(p.x - 1.0),
                 gradient: move |p: DVec3| slope(p.x - 1.0) * DVec3::X,
             };
-            project(&field, &[DVec3::new(1.001, 5.0, 7.0)])[0]
+            project(&field, &[DVec3::new(1.001, 5.0, 7.0)], 7.0)[0]
         };
         let plain = wall_at_one(|s| 50.0 * s, |_| 50.0);
         assert!((plain - 1e-3).abs() < 1e-12, "{plain}");
@@ -294,5 +292,12 @@ mod tests {
         let kinked = wall_at_one(|s| s.min(100.0 * s), |s| if s > 0.0 { 1.0 } else { 100.0 });
         assert!((kinked - 1e-3).abs() < 1e-12, "{kinked}");
         assert_eq!(wall_at_one(|_| 1.0, |_| 0.0), f64::INFINITY);
+        // the tip of a cone at the origin, where the gradient vanishes and all coordinates are zero
+        let cone = Closures {
+            omega: |p: DVec3| p.z * p.z - p.x * p.x - p.y * p.y,
+            gradient: |p: DVec3| 2.0 * DVec3::new(-p.x, -p.y, p.z),
+        };
+        let tip = project(&cone, &[DVec3::ZERO], 1.0)[0];
+        assert!(tip < 1e-15, "{tip}");
     }
 }

@@ -3,7 +3,8 @@
 //! A [`Grid`] says where the nodes are. [`marching_cubes`] or [`dual_contouring`] makes a mesh: the first
 //! cuts creases off between nodes, the second puts vertices on them. [`remove_slivers`] and [`simplify()`]
 //! contract edges of a mesh. [`check`] reports its topology, volume and distance, [`thin_cells`] counts what
-//! the grid could not see, and [`measure`] finds the distance both ways. The [`FORMATS`] write it to files.
+//! the grid could not see, [`self_intersections`] lists triangles that cross, and [`measure`] finds the
+//! distance both ways. The [`FORMATS`] write it to files.
 //!
 //! Marching cubes sample ω in the bricks of cells that ranges do not exclude. They connect crossed edges by
 //! the case table, or by the corners' values where the table leaves a choice. A root search on ω itself puts
@@ -42,6 +43,7 @@ mod dual;
 mod extract;
 mod formats;
 mod grid;
+mod intersections;
 mod normals;
 mod patches;
 mod prune;
@@ -66,6 +68,7 @@ pub use dual::dual_contouring;
 pub use extract::marching_cubes;
 pub use formats::*;
 pub use grid::{Grid, GridError, Resolution};
+pub use intersections::self_intersections;
 pub use quality::{Distances, Quality, Reference, measure};
 pub use shells::{Shell, shells};
 pub use simplify::simplify;

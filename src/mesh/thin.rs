@@ -1,49 +1,72 @@
-//! What marching cubes cannot see: parts of a solid, or gaps in it, that pass between the nodes of the grid.
+//! What a grid cannot see: parts of a solid, or gaps in it, that are thinner than a cell. They may pass between
+//! the nodes, or beside triangles that show something else.
 //!
-//! A cell that touches no triangle has corners of one sign only, and so have all cells around it. If the
-//! ranges over its parts, an eighth of a cell long, do not exclude the surface, or if a point of the other
-//! sign is found, something thinner than a cell is hidden there. Cells next to triangles are not examined,
-//! because every curved surface bulges a little into some of them.
+//! A cell holds what the grid says if every face in it is known: it faces nearly as the surface does where it
+//! crosses an edge of the grid within a cell around, and no two faces back onto each other unless the
+//! cell's own edges show both. Ranges of the derivatives prove that for most cells, eight cells at a time
+//! where the surface is smooth. All others are looked into: they are divided, and from each part the surface
+//! is sought along the gradient of every face that may be in it. A point with a change of sign whose face is
+//! not known is a witness, and its cell is counted. So creases, bulges, faces that coincide and fields that
+//! touch zero are not counted, since they have no witness; nor are steps and edges of parts and gaps that are
+//! thicker than two cells.
 //!
-//! Invariant: a cell that is not counted and touches no triangle is proven to hold no surface; or the field
-//! knows no ranges there, and no sampled point of the cell has the other sign.
+//! Invariant: a cell that is not counted is proven to hold what the grid says, or it was searched down to an
+//! eighth of a cell without a witness.
 
+mod look;
+
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
     Grid, MeshError,
     crossings::sample,
-    prune::{BRICK, BrickKind, Bricks, Lattice},
+    patches::undecided_cells,
+    prune::{BRICK, Bricks, Lattice},
     signs::{Brick, Signs, crossed_cells},
 };
-use crate::{field::Field, geom::Aabb, interval::Interval};
+use crate::{field::Field, geom::Aabb};
+use look::Look;
 
-/// The cells away from the mesh in which a surface is hidden from the grid.
+/// The cells in which a surface is hidden from the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThinCells {
     /// The number of such cells.
     pub count: usize,
     /// The smallest box around all of them, in metres; empty if there are none.
     pub bounds: Aabb,
+    /// The least thickness that was found in them, in metres; infinite if there are none.
+    pub thickness: f64,
+    /// A point of the surface where it is that thin, in metres. NaN if there is none.
+    pub at: DVec3,
+    /// Whether a gap is that thin, rather than a part of the solid.
+    pub is_gap: bool,
 }
 
 impl ThinCells {
     /// The result for a grid that sees everything.
-    pub const NONE: Self = Self { count: 0, bounds: Aabb::EMPTY };
+    pub const NONE: Self =
+        Self { count: 0, bounds: Aabb::EMPTY, thickness: f64::INFINITY, at: DVec3::NAN, is_gap: false };
+
+    /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
+    /// `None` if nothing hides, or its thickness is not known.
+    pub fn cells_needed(&self, grid: &Grid) -> Option<usize> {
+        let needed = (2.0 * grid.bounds().size().max_element() / self.thickness).ceil();
+        (self.count > 0 && needed.is_finite() && needed > 0.0).then_some(needed as usize)
+    }
 
     fn and(self, other: Self) -> Self {
-        Self { count: self.count + other.count, bounds: self.bounds.union(&other.bounds) }
+        let thinner = if other.count > 0 && (self.count == 0 || other.thickness < self.thickness) {
+            other
+        } else {
+            self
+        };
+        let (count, bounds) = (self.count + other.count, self.bounds.union(&other.bounds));
+        Self { count, bounds, ..thinner }
     }
 }
 
-/// The number of times that an undecided cell is halved on each axis.
-const HALVINGS: u32 = 3;
-
-/// Rows of a brick's cells and of the cells next to it. Bit 0 is the cell before the brick's first.
-type Rows = [[u16; BRICK + 2]; BRICK + 2];
-
-/// Counts the cells of a grid in which [`marching_cubes`](super::marching_cubes) misses a surface, or may
-/// miss one.
+/// Counts the cells of a grid in which [`marching_cubes`](super::marching_cubes) misses a part of the surface.
 ///
 /// # Errors
 /// [`MeshError::NotANumber`] if ω is NaN at a node.
@@ -51,13 +74,6 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
     let lattice = Lattice::new(grid);
     let near = Bricks::classify(field, &lattice);
     let signs = sample(field, &lattice, &near, &mut 0, &|| ())?;
-    let crossed: Vec<Signs> = (0..near.near.len())
-        .into_par_iter()
-        .map(|number| {
-            let around = Brick::new(&near, &signs, number).around(&signs);
-            std::array::from_fn(|z| crossed_cells(&around.corners(z)))
-        })
-        .collect();
     let cells = grid.cells();
     let parts: Vec<ThinCells> = (0..near.near.len())
         .into_par_iter()
@@ -66,128 +82,64 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
             if brick.solid {
                 return ThinCells::NONE;
             }
-            let rows = crossed_rows(&near, &crossed, brick.at);
-            let untouched = std::array::from_fn(|z| untouched_plane(&rows, z));
-            let search = HiddenSearch {
-                field,
-                lattice: &lattice,
-                low: brick.at.map(|b| b * BRICK),
-                cells,
-                untouched,
-                signs: &signs[number],
-            };
-            search.count([0; 3], BRICK)
+            let around = Brick::new(&near, &signs, number).around(&signs);
+            let crossed = std::array::from_fn(|z| crossed_cells(&around.corners(z)));
+            let undecided = std::array::from_fn(|z| undecided_cells(&around.corners(z)));
+            let low = brick.at.map(|b| b * BRICK);
+            Search { field, lattice: &lattice, low, cells, crossed, undecided }.count([0; 3], BRICK)
         })
         .collect();
     Ok(parts.into_iter().fold(ThinCells::NONE, ThinCells::and))
 }
 
-/// The crossed cells of a brick and of the layer of cells around it.
-fn crossed_rows(near: &Bricks, crossed: &[Signs], at: [usize; 3]) -> Rows {
-    let mut rows = [[0; BRICK + 2]; BRICK + 2];
-    for i in 0..27 {
-        let step = [i % 3, i / 3 % 3, i / 9]; // 0 below, 1 here, 2 above
-        if (0..3).any(|axis| at[axis] + step[axis] == 0) {
-            continue;
-        }
-        let BrickKind::Near(number) = near.kind([0, 1, 2].map(|axis| at[axis] + step[axis] - 1)) else {
-            continue;
-        };
-        let planes = &crossed[number as usize];
-        // only the last or the first layer of a neighbour lies next to the brick
-        let layers = |axis: usize| match step[axis] {
-            0 => BRICK - 1..BRICK,
-            1 => 0..BRICK,
-            _ => 0..1,
-        };
-        let place = |axis: usize, cell: usize| (cell + 1 + step[axis] * BRICK) - BRICK;
-        for z in layers(2) {
-            for y in layers(1) {
-                let row = (planes[z] >> (BRICK * y) & 0xff) as u16;
-                let (kept, shift) = match step[0] {
-                    0 => (row >> (BRICK - 1), 0),
-                    1 => (row, 1),
-                    _ => (row & 1, BRICK + 1),
-                };
-                rows[place(2, z)][place(1, y)] |= kept << shift;
-            }
-        }
-    }
-    rows
-}
-
-/// The cells of a plane of the brick that have no crossed cell around them.
-fn untouched_plane(rows: &Rows, z: usize) -> u64 {
-    let mut touched = 0;
-    for y in 0..BRICK {
-        let around = (z..z + 3).flat_map(|z| (y..y + 3).map(move |y| rows[z][y]));
-        let row = around.fold(0, |bits, row| bits | row | row << 1 | row >> 1) >> 1 & 0xff;
-        touched |= u64::from(row) << (BRICK * y);
-    }
-    !touched
-}
-
 /// The search for hidden surfaces in one brick.
-struct HiddenSearch<'a> {
+struct Search<'a> {
     field: &'a dyn Field,
     lattice: &'a Lattice,
     /// The extended indices of the brick's first node.
     low: [usize; 3],
     /// The numbers of cells of the grid.
     cells: [usize; 3],
-    /// The cells to search.
-    untouched: Signs,
-    signs: &'a Signs,
+    crossed: Signs,
+    undecided: Signs,
 }
 
-impl HiddenSearch<'_> {
+impl Search<'_> {
     /// The thin cells in a cube of cells, whose first cell is counted from the brick's first.
     fn count(&self, first: [usize; 3], size: usize) -> ThinCells {
-        let row = ((1_u64 << size) - 1) << first[0];
-        let square = (first[1]..first[1] + size).fold(0, |bits, y| bits | row << (BRICK * y));
-        let any = self.untouched[first[2]..first[2] + size].iter().any(|plane| plane & square != 0);
         let low = [0, 1, 2].map(|axis| self.low[axis] + first[axis]);
         // cells of the ring, below the first node of the grid or from the last node on, have no extent
         let beyond = (0..3).any(|axis| low[axis] + size <= 1 || low[axis] > self.cells[axis]);
-        if !any || beyond {
+        if beyond {
             return ThinCells::NONE;
         }
         let high = low.map(|n| n + size);
         let bounds = Aabb::new(self.lattice.position(low), self.lattice.position(high));
-        if is_decided(self.field.range(&bounds)) {
+        if look::is_decided(self.field.range(&bounds)) {
             return ThinCells::NONE;
         }
         if size == 1 {
-            let inside = self.signs[first[2]] >> (BRICK * first[1] + first[0]) & 1 == 1;
-            let hides = hides_surface(self.field, &bounds, inside, HALVINGS);
-            return if hides { ThinCells { count: 1, bounds } } else { ThinCells::NONE };
+            if (0..3).any(|axis| low[axis] == 0) {
+                return ThinCells::NONE;
+            }
+            let holds = |cells: &Signs| cells[first[2]] >> (BRICK * first[1] + first[0]) & 1 == 1;
+            let (is_crossed, is_undecided) = (holds(&self.crossed), holds(&self.undecided));
+            let Self { field, lattice, .. } = *self;
+            return Look { field, lattice, low, bounds, is_crossed, is_undecided }.into_cell();
+        }
+        if self.any_crossed(first, size) && look::is_one_sheet(self.field, &bounds) {
+            return ThinCells::NONE;
         }
         let half = size / 2;
         let child = |i: usize| [0, 1, 2].map(|axis: usize| first[axis] + (i >> axis & 1) * half);
         (0..8).map(|i| self.count(child(i), half)).fold(ThinCells::NONE, ThinCells::and)
     }
-}
 
-fn is_decided(range: Interval) -> bool {
-    range.lo > 0.0 || range.hi <= 0.0
-}
-
-/// Whether the middle of the box or of one of its parts has the other sign, or one of its smallest parts
-/// cannot be excluded.
-fn hides_surface(field: &dyn Field, bounds: &Aabb, inside: bool, halvings: u32) -> bool {
-    let range = field.range(bounds);
-    if is_decided(range) {
-        return false;
+    fn any_crossed(&self, first: [usize; 3], size: usize) -> bool {
+        let row = ((1_u64 << size) - 1) << first[0];
+        let square = (first[1]..first[1] + size).fold(0, |bits, y| bits | row << (BRICK * y));
+        self.crossed[first[2]..first[2] + size].iter().any(|plane| plane & square != 0)
     }
-    let centre = bounds.centre();
-    if (field.omega(centre) > 0.0) != inside {
-        return true;
-    }
-    if halvings == 0 {
-        return range != Interval::ALL; // a field that knows nothing here is not blamed
-    }
-    let parts = bounds.corners().map(|corner| Aabb::new(corner.min(centre), corner.max(centre)));
-    parts.iter().any(|part| hides_surface(field, part, inside, halvings - 1))
 }
 
 #[cfg(test)]

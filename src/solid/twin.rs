@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::construction::Solid;
 use super::engine::ProgramKind;
 use super::path::sweep::Sweep;
-use crate::field::{Entry, Faces, Field, GradientsMut, Path, Points, Walls, search_path};
+use crate::field::{Entry, Faces, Field, GradientsMut, Path, Points, Sheet, Walls, search_path};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 
@@ -49,6 +49,12 @@ impl Field for Twin {
     fn range(&self, over: &Aabb) -> Interval {
         let Solid { inner, moment } = &self.solid;
         self.solid.twin_function().range(inner.engine, over, moment, true)
+    }
+
+    fn sheets(&self, over: &Aabb, visit: &mut dyn FnMut(Sheet<'_>)) -> bool {
+        let Some(parts) = self.solid.parts() else { return false };
+        parts.leaves.sheets(&parts.words, over, &mut Vec::new(), visit);
+        true
     }
 }
 

@@ -11,7 +11,7 @@ use rfm::mesh::{Grid, Resolution, check, dual_contouring, marching_cubes, measur
 use rfm::solid::Depth;
 use rfm::{Engine, Program, Solid};
 
-const DOMAIN: Aabb = Aabb { min: DVec3::NEG_ONE, max: DVec3::ONE };
+pub const DOMAIN: Aabb = Aabb { min: DVec3::NEG_ONE, max: DVec3::ONE };
 
 fn number(range: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
     // three digits, so that a failure can be read
@@ -24,7 +24,7 @@ fn vector(reach: f64) -> impl Strategy<Value = [f64; 3]> {
 }
 
 /// Up to six balls, boxes, cylinders and half spaces at any angle, joined by `and`, `or` and `not`.
-fn csg() -> impl Strategy<Value = String> {
+pub fn csg() -> impl Strategy<Value = String> {
     let size = || number(0.2..0.7);
     let leaf = prop_oneof![
         (vector(0.7), size()).prop_map(|(c, r)| format!("ball({c:?}, {r})")),
@@ -43,13 +43,13 @@ fn csg() -> impl Strategy<Value = String> {
 }
 
 /// A solid, in the domain's box or cut by its border.
-fn solid(text: &str, is_cut: bool) -> Solid {
+pub fn solid(text: &str, is_cut: bool) -> Solid {
     let within = if is_cut { "" } else { " and box([-0.93, -0.93, -0.93], [0.95, 0.95, 0.95])" };
     let program = Program::from_source("p.rfm", format!("rfm 1\nsolid s = ({text}){within}"));
     program.unwrap_or_else(|e| panic!("{e}")).solid_with("s", Engine::Auto).unwrap()
 }
 
-fn config(cases: u32) -> ProptestConfig {
+pub fn config(cases: u32) -> ProptestConfig {
     ProptestConfig {
         failure_persistence: None,
         rng_seed: RngSeed::Fixed(4),

@@ -80,9 +80,9 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         Some(grid) => mesh::thin_cells(&*surface, grid).map_err(Failure::usage)?,
     };
     times.checking = milliseconds(started);
-    remark(&solid, &mesh, &thin, options);
+    remark(&solid, &mesh, (&thin, grid.as_ref()), options);
     if mesh.triangles.is_empty() {
-        return nothing_to_write(shared, options, (&solid, &report, &times));
+        return nothing_to_write(shared, options, (&solid, &report, thin.count, &times));
     }
     if let (Some(path), Some(write)) = (&options.output, write) {
         let started = Instant::now();
@@ -105,11 +105,11 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
 fn nothing_to_write(
     shared: &Shared,
     options: &Options,
-    (solid, report, times): (&Solid, &mesh::Report, &Times),
+    (solid, report, thin_cells, times): (&Solid, &mesh::Report, usize, &Times),
 ) -> Result<(), Failure> {
     if shared.json {
         let names = (solid.name(), options.method.name());
-        output::json(&MeshSummary::new(names, report, 0, None, None, *times))?;
+        output::json(&MeshSummary::new(names, report, thin_cells, None, None, *times))?;
     }
     if let Some(path) = &options.output {
         complain(&format!("the mesh is empty: `{}` is not written", path.shown()));
@@ -216,14 +216,24 @@ fn measured(
     Ok((options.quality.then_some(quality), found))
 }
 
+/// What hides from a grid, as a sentence without its subject: how much, where, and how many cells would
+/// show it.
+pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
+    let (what, at) = (if thin.is_gap { "a gap" } else { "a part" }, thin.at);
+    let how = match thin.cells_needed(grid) {
+        Some(needed) => format!("{what} {:.2e} thick: about {needed} cells would show it", thin.thickness),
+        None => format!("{what} of unknown thickness"),
+    };
+    format!(
+        "in {} cells between {:.3} and {:.3}, the thinnest at {at:.3}, {how}",
+        thin.count, thin.bounds.min, thin.bounds.max
+    )
+}
+
 /// Says on standard error what the grid could not see, and why a mesh is empty.
-fn remark(solid: &Solid, mesh: &Mesh, thin: &ThinCells, options: &Options) {
-    if thin.count > 0 {
-        note(format!(
-            "{} cells away from the mesh hide parts of the surface that are thinner than a cell, between {:.3} and {:.3}; \
-             try more cells",
-            thin.count, thin.bounds.min, thin.bounds.max
-        ));
+fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>), options: &Options) {
+    if let Some(grid) = grid.filter(|_| thin.count > 0) {
+        note(format!("the mesh misses what is thinner than a cell {}", hidden(thin, grid)));
     }
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(solid, options)));

@@ -42,6 +42,9 @@ pub(super) struct MeshSummary {
     /// The time of the whole: to mesh, to simplify and measure, to check, and to write.
     milliseconds: f64,
     meshing_milliseconds: f64,
+    /// Only with `--quality` or `--simplify`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measuring_milliseconds: Option<f64>,
     method: &'static str,
     /// Only with `--quality`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -103,6 +106,7 @@ impl MeshSummary {
             evaluations: report.evaluations,
             milliseconds: times.total(),
             meshing_milliseconds: times.meshing,
+            measuring_milliseconds: (quality.is_some() || simplified.is_some()).then_some(times.measuring),
             method,
             quality,
             simplified: simplified.map(SimplifiedFigures::from),
@@ -112,8 +116,11 @@ impl MeshSummary {
     /// Prints the figures as text.
     pub fn print(&self) {
         let yes = |b: bool| if b { "yes" } else { "NO" };
+        let measuring = self
+            .measuring_milliseconds
+            .map_or_else(String::new, |time| format!(" and {time:.1} ms to simplify or measure it"));
         say!(
-            "{} vertices, {} triangles in {:.1} ms, {:.1} ms of them to mesh ({} evaluations of ω)",
+            "{} vertices, {} triangles in {:.1} ms, {:.1} ms of them to mesh{measuring} ({} evaluations of ω)",
             self.vertices,
             self.triangles,
             self.milliseconds,

@@ -1,21 +1,37 @@
 //! The mesh between its first triangles and its end: refined, mended, merged, and given its last normals.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::super::{
     Grid, Mesh, MeshError, Work,
     collapse::{self, AtNode},
+    intersections::crossing_pairs,
     normals,
 };
 use super::mend::{self, Aim};
 use super::patch::Patch;
-use super::refine;
-use super::vertices::{VertexKind, Vertices};
+use super::refine::{self, Refined};
+use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 use crate::geom::Aabb;
 
 /// How often folded triangles are looked for and mended.
 const REPAIRS: usize = 4;
+
+/// Evaluations for mending, as a share of those that found the surface, which were made many at a time, and
+/// the fewest.
+const MENDING: f64 = 0.25;
+const LEAST_MENDING: u64 = 60_000;
+
+/// Rounds of moving cuts back, at most. The last one moves all back.
+const UNDOINGS: usize = 8;
+
+/// A triangle that agrees less than this (cosine) with the surface at a corner is compared with others.
+const AGREEING: f64 = 0.3;
+
+/// Triangles in a batch.
+const BATCH: usize = 4096;
 
 /// Vertices on a crease that an edge shorter than this joins are merged, in cells. Two cells, or two cut
 /// edges, may have put them at nearly the same point.
@@ -49,10 +65,87 @@ impl<'a> Draft<'a> {
     /// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be
     /// cut, ascending.
     pub fn refine(&mut self) -> Vec<[u32; 2]> {
-        let (left, evaluations) =
+        let first = self.vertices.len();
+        let Refined { left, ends, evaluations } =
             refine::refine(self.field, &mut self.vertices, &mut self.triangles, self.size);
         self.work.gradients += evaluations;
+        if !ends.is_empty() {
+            self.uncross(first, &ends);
+        }
         left
+    }
+
+    /// Moves vertices that cut edges back to the middles of their edges where triangles cross. The vertices
+    /// from `first` on cut the edges with the given ends; without them nothing crosses.
+    fn uncross(&mut self, first: usize, ends: &[[u32; 2]]) {
+        let mut is_back = vec![false; ends.len()];
+        let mut suspects = self.doubtful_since(first);
+        for round in 0..UNDOINGS {
+            let pairs = crossing_pairs(&self.vertices.positions, &self.triangles, &suspects, self.size);
+            let mut moves = round > 0 && !pairs.is_empty();
+            let last = round + 1 == UNDOINGS;
+            for v in pairs.iter().flatten().flat_map(|&t| self.triangles[t as usize]) {
+                if let Some(place) = (v as usize).checked_sub(first) {
+                    moves |= !is_back[place];
+                    is_back[place] = true;
+                }
+            }
+            if pairs.is_empty() || !moves {
+                break;
+            }
+            // what lies beside a vertex that moves may cross now
+            let beside = |t: &[u32; 3]| {
+                t.iter().any(|&v| (v as usize).checked_sub(first).is_some_and(|place| is_back[place]))
+            };
+            let touched: Vec<u32> =
+                (0..).zip(&self.triangles).filter(|(_, t)| beside(t)).map(|(t, _)| t).collect();
+            if round > 1 {
+                for &t in &touched {
+                    for v in self.triangles[t as usize] {
+                        if let Some(place) = (v as usize).checked_sub(first) {
+                            is_back[place] = true;
+                        }
+                    }
+                }
+            }
+            suspects.extend(touched);
+            suspects.sort_unstable();
+            suspects.dedup();
+            if last {
+                is_back.fill(true);
+            }
+            for (place, [a, b]) in ends.iter().enumerate().filter(|(place, _)| is_back[*place]) {
+                let [p, q] = [a, b].map(|v| self.vertices.positions[*v as usize]);
+                let vertex = Vertex { position: p.midpoint(q), normal: DVec3::ZERO, kind: VertexKind::Sharp };
+                self.vertices.set((first + place) as u32, vertex);
+            }
+        }
+    }
+
+    /// The triangles that have a vertex from `first` on and are not surely clear of others, ascending: they
+    /// have a doubtful corner, or do not face as the surface does at all of their corners.
+    fn doubtful_since(&self, first: usize) -> Vec<u32> {
+        let Vertices { positions, normals, doubtful, .. } = &self.vertices;
+        let is_doubtful = |t: &[u32; 3]| {
+            let t = t.map(|v| v as usize);
+            if t.iter().all(|&v| v < first) {
+                return false;
+            }
+            let [a, b, c] = t.map(|v| positions[v]);
+            let facing = (b - a).cross(c - a);
+            let least = AGREEING * facing.length();
+            t.iter().any(|&v| doubtful[v] || facing.dot(normals[v]) < least)
+        };
+        let parts: Vec<Vec<u32>> = self
+            .triangles
+            .par_chunks(BATCH)
+            .enumerate()
+            .map(|(part, triangles)| {
+                let numbered = ((part * BATCH) as u32..).zip(triangles);
+                numbered.filter(|(_, t)| is_doubtful(t)).map(|(t, _)| t).collect()
+            })
+            .collect();
+        parts.concat()
     }
 
     /// Mends the mesh around the given edges, merges vertices that are too close, and mends folded triangles.
@@ -60,27 +153,50 @@ impl<'a> Draft<'a> {
     /// # Errors
     /// [`MeshError::TooManyVertices`] if refining and mending made too many.
     pub fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<(), MeshError> {
+        let mut budget = ((MENDING * self.work.evaluations as f64) as u64).max(LEAST_MENDING);
         if mend::is_worth(&far, &self.triangles) {
-            self.mend_around(far, Aim::Distance);
+            self.mend_around(far, Aim::Distance, &mut budget);
         }
         MeshError::check_vertices(self.vertices.len())?;
-        self.merge(TOO_CLOSE * self.size);
+        self.merge_close();
         for _ in 0..REPAIRS {
             let (folded, evaluations) = mend::folded(self.field, &self.vertices, &self.triangles, self.size);
             self.work.gradients += evaluations;
-            if !mend::is_worth(&folded, &self.triangles) {
+            if !mend::is_worth(&folded, &self.triangles) || budget == 0 {
                 break;
             }
-            self.mend_around(folded, Aim::Folds);
+            self.mend_around(folded, Aim::Folds, &mut budget);
             self.merge(0.0);
         }
         Ok(())
     }
 
-    fn mend_around(&mut self, edges: Vec<[u32; 2]>, aim: Aim) {
+    fn mend_around(&mut self, edges: Vec<[u32; 2]>, aim: Aim, budget: &mut u64) {
         let place = (self.bounds, self.size);
         let patch = Patch::new(self.field, place, &mut self.vertices, &mut self.triangles, &edges);
-        self.work.gradients += mend::mend(patch, edges, refine::TOLERANCE * self.size, aim);
+        let count = mend::mend(patch, edges, refine::TOLERANCE * self.size, aim, *budget);
+        self.work.gradients += count;
+        *budget = budget.saturating_sub(count);
+    }
+
+    /// Merges vertices that coincide, and ends of short edges on creases unless triangles would cross.
+    fn merge_close(&mut self) {
+        let close: Vec<[u32; 2]> = self
+            .mergeable(TOO_CLOSE * self.size)
+            .into_iter()
+            .filter_map(|group| <[u32; 2]>::try_from(group).ok())
+            .filter(|ends| {
+                let [a, b] = ends.map(|v| self.vertices.positions[v as usize]);
+                a != b
+            })
+            .collect();
+        if !close.is_empty() {
+            let place = (self.bounds, self.size);
+            let (vertices, triangles) = (&mut self.vertices, &mut self.triangles);
+            let mut patch = Patch::new(self.field, place, vertices, triangles, &close);
+            close.into_iter().for_each(|[kept, lost]| patch.join(kept, lost));
+        }
+        self.merge(0.0);
     }
 
     /// Merges vertices that coincide, and ends of edges on creases that are shorter than `too_close`.
@@ -99,6 +215,8 @@ impl<'a> Draft<'a> {
         let lost = collapse::merge_coincident(&mut mesh, at_nodes).unwrap_or_default();
         let mut is_lost = lost.iter();
         self.vertices.kinds.retain(|_| is_lost.next() != Some(&true));
+        let mut is_lost = lost.iter();
+        self.vertices.doubtful.retain(|_| is_lost.next() != Some(&true));
         (self.vertices.positions, self.vertices.normals, self.triangles) =
             (mesh.positions, mesh.normals, mesh.triangles);
         self.work.merged += mesh.work.merged;
@@ -134,7 +252,7 @@ impl<'a> Draft<'a> {
 
     /// The finished mesh, with normals for the vertices that have none yet.
     pub fn finish(self) -> Mesh {
-        let Vertices { positions, normals, kinds } = self.vertices;
+        let Vertices { positions, normals, kinds, .. } = self.vertices;
         let caps = (0..).zip(&kinds).filter(|(_, kind)| **kind == VertexKind::Cap).map(|(i, _)| i).collect();
         let mut mesh = Mesh { positions, normals, triangles: self.triangles, caps, work: self.work };
         let is_unknown = |v: usize| kinds[v] != VertexKind::Smooth || mesh.normals[v] == DVec3::ZERO;

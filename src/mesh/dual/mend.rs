@@ -27,10 +27,9 @@ const LEFT: f64 = 0.9;
 /// No edge shorter than this is cut, and none shorter than half of it is made, in cells.
 const SHORTEST: f64 = 0.1;
 
-/// The most edges that are looked at: for each edge in the queue at first, and in all, which takes a second.
-/// Few are looked at so often unless the grid resolves nothing.
+/// The most edges that are looked at, for each edge in the queue at first. Few are looked at so often unless
+/// the grid resolves nothing.
 const LOOKS: usize = 40;
-const MOST: usize = 20_000;
 
 /// The largest number of edges to mend for each triangle, of which a mesh has 1.5 in all. With more the grid
 /// does not resolve the surface, and nothing is mended.
@@ -50,12 +49,16 @@ pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
     !edges.is_empty() && edges.len() as f64 <= RESOLVED * triangles.len() as f64
 }
 
-/// Mends the mesh around the given edges, which ascend. Returns the number of evaluations.
-pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim) -> u64 {
-    let looks = MOST.min(LOOKS * edges.len());
+/// Mends the mesh around the given edges, which ascend, until about `budget` evaluations are spent. Returns
+/// their number.
+pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim, budget: u64) -> u64 {
+    let looks = LOOKS * edges.len();
     let mut waiting: FxHashSet<[u32; 2]> = edges.iter().copied().collect();
     let mut queue = VecDeque::from(edges);
     for _ in 0..looks {
+        if patch.count > budget {
+            break;
+        }
         let Some(edge) = queue.pop_front() else { break };
         waiting.remove(&edge);
         let Some(pair) = patch.pair(edge) else { continue };
@@ -86,9 +89,10 @@ impl Choice {
         f64::min(LEFT * before, before - self.0.map_or(0.0, |(most, _)| most))
     }
 
-    fn consider(&mut self, before: f64, after: f64, change: Change) {
+    /// Chooses a change if it helps most so far, and if no triangle then crosses another.
+    fn consider(&mut self, before: f64, after: f64, change: Change, is_free: impl FnOnce() -> bool) {
         let gain = before - after;
-        if after <= LEFT * before && self.0.is_none_or(|(most, _)| gain > most) {
+        if after <= LEFT * before && self.0.is_none_or(|(most, _)| gain > most) && is_free() {
             self.0 = Some((gain, change));
         }
     }
@@ -105,7 +109,7 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
     let [c, d] = pair.apexes;
     if c != d && !patch.is_edge(pair.apexes) {
         let after = patch.badness(&pair.turned(), &patch.along(pair.apexes), choice.limit(before));
-        choice.consider(before, after, Change::Turn);
+        choice.consider(before, after, Change::Turn, || !patch.cross(&pair.turned(), &pair.places));
     }
     let [p, q] = pair.ends.map(|v| patch.position(v));
     if p.distance(q) > SHORTEST * patch.size {
@@ -118,8 +122,9 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
             patch.vertices.push(vertex);
             let spokes = pair.corners().map(|v| patch.along([v, new])).concat();
             let after = patch.badness(&pair.cut(new), &spokes, choice.limit(before));
-            patch.vertices.pop();
-            choice.consider(before, after, Change::Cut(vertex));
+            let is_free = || !patch.cross(&pair.cut(new), &pair.places);
+            choice.consider(before, after, Change::Cut(vertex), is_free);
+            patch.vertices.truncate(new as usize);
         }
     }
     let may_merge = aim == Aim::Folds || old.iter().any(|t| patch.fold(*t) > FACING);
@@ -132,7 +137,7 @@ fn best(patch: &mut Patch<'_>, pair: Pair, tolerance: f64, aim: Aim) -> Option<C
         for vertex in places(patch, v, may_merge) {
             patch.vertices.set(v, vertex);
             let after = patch.badness_around(v, choice.limit(before));
-            choice.consider(before, after, Change::Move(v, vertex));
+            choice.consider(before, after, Change::Move(v, vertex), || !patch.crosses_around(v));
         }
         patch.vertices.set(v, old);
     }
@@ -318,7 +323,7 @@ mod tests {
         let (edges, _) = folded(&floor, &vertices, &triangles, 1.0);
         assert_eq!(edges, [[1, 2], [1, 3], [2, 3]]);
         let patch = Patch::new(&floor, (&BOUNDS, 1.0), &mut vertices, &mut triangles, &edges);
-        mend(patch, edges, 0.01, Aim::Folds);
+        mend(patch, edges, 0.01, Aim::Folds, u64::MAX);
         assert_eq!(folded(&floor, &vertices, &triangles, 1.0).0, [[0; 2]; 0]);
         assert_eq!(triangles.len(), 2);
     }
@@ -337,7 +342,7 @@ mod tests {
         let mut triangles = vec![[1, 2, 0], [1, 0, 3]];
         let edges = vec![[0, 1]];
         let patch = Patch::new(&plate, (&BOUNDS, 1.0), &mut vertices, &mut triangles, &edges);
-        mend(patch, edges, 0.025, Aim::Distance);
+        mend(patch, edges, 0.025, Aim::Distance, u64::MAX);
         let farthest = vertices.positions.iter().map(|p| p.x).fold(0.0, f64::max);
         assert!((farthest - 1.0).abs() < 1e-9, "{:?}", vertices.positions);
         assert!(triangles.len() > 2);

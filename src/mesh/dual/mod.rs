@@ -5,9 +5,12 @@
 //! 1. [`Crossing::find`]: the cells that the surface passes and its hits on their edges, as for marching
 //!    cubes; `loops` finds which hits belong together.
 //! 2. [`place`](fn@place): a vertex for each loop, by `place`, `sharp`, `qef` and `crease`.
-//! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two.
-//! 4. [`Draft::refine`]: edges that are still too far from the surface are cut (`refine`).
-//! 5. [`Draft::mend`]: what stays far off or lies upside down is looked at one by one (`mend`).
+//! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two; `secure`
+//!    makes fans of quads that cross.
+//! 4. [`Draft::refine`]: edges that are still too far from the surface are cut (`refine`). Cuts move back to
+//!    the middles of their edges where triangles would cross.
+//! 5. [`Draft::mend`]: what stays far off or lies upside down is looked at one by one (`mend`), as far as a
+//!    budget allows, and without crossings.
 //!
 //! The vertices are those of the dual of the marching-cubes mesh (Schaefer, Ju, Warren: Manifold dual
 //! contouring, IEEE TVCG 13, 2007), so the topology is that of marching cubes. The quadratic error is that of
@@ -27,6 +30,7 @@ mod project;
 mod qef;
 mod quads;
 mod refine;
+mod secure;
 mod sharp;
 #[cfg(test)]
 mod tests;
@@ -72,7 +76,7 @@ pub fn dual_contouring(
     let crossing = Crossing::find(field, &lattice, &near, progress, &mut work)?;
     let rings = Rings::new(crossing.crossed.vertices);
     let (mut vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
-    let triangles = join(field, &crossing, &rings, &placed, &mut vertices, grid, &mut work);
+    let triangles = join((field, &lattice), &crossing, &rings, &placed, &mut vertices, grid, &mut work);
 
     let mut draft = Draft::new(field, grid, vertices, triangles, work);
     let left = draft.refine();
@@ -200,9 +204,9 @@ fn place(placement: &Placement<'_>) -> (Vertices, Vec<Placed>) {
     (vertices, placed)
 }
 
-/// Joins the vertices around each hit to triangles, and adds the tubes of tunnels.
+/// Joins the vertices around each hit to triangles that do not cross, and adds the tubes of tunnels.
 fn join(
-    field: &dyn Field,
+    (field, lattice): (&dyn Field, &Lattice),
     crossing: &Crossing,
     rings: &Rings,
     placed: &[Placed],
@@ -211,15 +215,14 @@ fn join(
     work: &mut Work,
 ) -> Vec<[u32; 3]> {
     let Crossing { signs, crossed, hits } = crossing;
-    let quads = Quads::join(field, signs, crossed, (hits, rings), placed, vertices);
+    let quads = Quads::join((field, lattice), signs, crossed, (hits, rings), placed, vertices);
     let mut cut = quads.cut(vertices);
     let fallbacks = placed.iter().flat_map(|part| part.fallbacks.iter().copied()).collect();
     let size = grid.spacing().min_element();
     move_spoilt(&quads, &mut cut, vertices, fallbacks, size, &mut work.gradients);
     work.gradients += cut.gradients + placed.iter().map(|part| part.gradients).sum::<u64>();
-    let mut triangles = quads.triangles(cut, vertices);
-    triangles.extend(placed.iter().flat_map(|part| &part.tubes));
-    triangles
+    let tubes: Vec<[u32; 3]> = placed.iter().flat_map(|part| part.tubes.iter().copied()).collect();
+    secure::secure(quads, cut, vertices, &tubes, size)
 }
 
 /// How often vertices are moved back because triangles lie upside down.

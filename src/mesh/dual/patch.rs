@@ -6,6 +6,7 @@
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
+use super::super::intersections::{Cubes, Neighbours, Triangle, bounds_of, corners, cross, overlap};
 use super::super::normals::unit;
 use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
@@ -37,6 +38,8 @@ pub(super) struct Patch<'a> {
     pub triangles: &'a mut Vec<[u32; 3]>,
     /// The triangles around each vertex of the patch.
     fans: FxHashMap<u32, Vec<u32>>,
+    /// The triangles near those of the patch, some of which may have moved away.
+    near: Neighbours,
     /// Evaluations of ω and ∇ω.
     pub count: u64,
 }
@@ -44,7 +47,7 @@ pub(super) struct Patch<'a> {
 /// The two triangles at an edge a–b: (a, b, c) and (b, a, d).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair {
-    places: [u32; 2],
+    pub places: [u32; 2],
     pub ends: [u32; 2],
     pub apexes: [u32; 2],
 }
@@ -100,7 +103,12 @@ impl<'a> Patch<'a> {
                 fans.entry(*v).or_default().push(i);
             }
         }
-        Self { field, bounds, size, vertices, triangles, fans, count: 0 }
+        let mut own: Vec<u32> = fans.values().flatten().copied().collect();
+        own.sort_unstable();
+        own.dedup();
+        // vertices move by a cell at most
+        let near = Neighbours::find(&vertices.positions, triangles, (&own, size), Cubes { size });
+        Self { field, bounds, size, vertices, triangles, fans, near, count: 0 }
     }
 
     /// The triangles at an edge. `None` if the edge is gone, leaves the patch or touches the border.
@@ -164,7 +172,30 @@ impl<'a> Patch<'a> {
                 None => self.triangles.push(*t),
             }
             t.iter().for_each(|v| self.fans.entry(*v).or_default().push(place));
+            self.near.add(place, &bounds_of(corners(&self.vertices.positions, *t)));
         }
+    }
+
+    /// Whether triangles would cross one another or others near them, except for those that they replace.
+    pub fn cross(&self, triangles: &[[u32; 3]], replaced: &[u32]) -> bool {
+        let positions = &self.vertices.positions;
+        let new: Vec<Triangle> = triangles.iter().map(|t| corners(positions, *t)).collect();
+        let meets_other = |t: &Triangle| {
+            let bounds = bounds_of(*t);
+            self.near.around(&bounds).any(|other| {
+                let place = corners(positions, self.triangles[other as usize]);
+                !replaced.contains(&other) && overlap(&bounds, &bounds_of(place)) && cross(t, &place)
+            })
+        };
+        let pairs = (0..new.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+        pairs.into_iter().any(|(i, j)| cross(&new[i], &new[j])) || new.iter().any(meets_other)
+    }
+
+    /// Whether the triangles around a vertex cross one another or others near them.
+    pub fn crosses_around(&self, v: u32) -> bool {
+        let fan = self.fans.get(&v).map_or(&[][..], Vec::as_slice);
+        let triangles: Vec<[u32; 3]> = self.fan(v).collect();
+        self.cross(&triangles, fan)
     }
 
     /// Points spread along an edge.
@@ -250,6 +281,21 @@ impl<'a> Patch<'a> {
         (step, unit(-gradient))
     }
 
+    /// Moves a vertex onto a neighbour, so that they can be merged, unless triangles would cross or one of them
+    /// was moved before.
+    pub fn join(&mut self, kept: u32, lost: u32) {
+        if !self.fans.contains_key(&kept) || !self.mergeable(lost).contains(&kept) {
+            return;
+        }
+        let (old, new) = (self.vertices.get(lost), self.vertices.get(kept));
+        self.vertices.set(lost, new);
+        let crosses = self.crosses_around(lost);
+        self.vertices.set(lost, old);
+        if !crosses {
+            self.put(lost, new);
+        }
+    }
+
     /// Moves a vertex and returns the triangles around it. If it moves onto another vertex, the two are to be
     /// merged later. Both and all vertices around them then stay as they are, so that this remains possible.
     pub fn put(&mut self, v: u32, vertex: Vertex) -> Vec<[u32; 3]> {
@@ -257,6 +303,9 @@ impl<'a> Patch<'a> {
         let around = self.around(v);
         let met = around.iter().copied().find(|&other| self.position(other) == vertex.position);
         self.vertices.set(v, vertex);
+        for &t in self.fans.get(&v).into_iter().flatten() {
+            self.near.add(t, &bounds_of(corners(&self.vertices.positions, self.triangles[t as usize])));
+        }
         if let Some(met) = met {
             self.vertices.kinds[met as usize] = VertexKind::Sharp;
             let others = self.around(met);

@@ -61,6 +61,8 @@ pub(super) struct Placed {
     pub seconds: Vec<((u32, u32), u32)>,
     /// The triangles of tunnels.
     pub tubes: Vec<[u32; 3]>,
+    /// Vertices that share their cell with others.
+    pub crowded: Vec<u32>,
     pub gradients: u64,
 }
 
@@ -92,6 +94,14 @@ struct Output<'s, 'm> {
     placed: Placed,
 }
 
+impl Output<'_, '_> {
+    /// Notes that the vertices at these places share a cell.
+    fn crowd(&mut self, places: std::ops::Range<usize>) {
+        let first = self.slots.first;
+        self.placed.crowded.extend(places.map(|place| first + place as u32));
+    }
+}
+
 /// What all tasks read, and the rings that they fill.
 pub(super) struct Placement<'a> {
     pub field: &'a dyn Field,
@@ -116,8 +126,12 @@ impl Placement<'_> {
             for z in 0..BRICK {
                 let corners = around.corners(z);
                 for bit in set_positions(crossed_cells(&corners)) {
-                    for of_cell in &loops[usize::from(inside_corners(&corners, bit))] {
-                        self.add(brick, (z, bit), of_cell, next, &mut output);
+                    let of_cell = &loops[usize::from(inside_corners(&corners, bit))];
+                    if of_cell.len() > 1 {
+                        output.crowd(next..next + of_cell.len());
+                    }
+                    for around in of_cell {
+                        self.add(brick, (z, bit), around, next, &mut output);
                         next += 1;
                     }
                 }
@@ -131,6 +145,9 @@ impl Placement<'_> {
                         self.add(brick, cell.cell, of_cell, next, &mut output);
                     }
                     next += cell.vertices(number);
+                }
+                if next > first + 1 {
+                    output.crowd(first..next);
                 }
                 self.add_tube(cell, first, &mut output);
             }

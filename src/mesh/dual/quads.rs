@@ -17,29 +17,42 @@ use rayon::prelude::*;
 use super::super::{
     crossings::{self, Crossed, Task},
     normals::{GradientColumns, unit},
-    prune::BRICK,
+    prune::{BRICK, Lattice},
     signs::Signs,
 };
 use super::loops::Sheets;
 use super::place::Placed;
 use super::vertices::{Hit, Hits, NONE, Rings, Vertex, VertexKind, Vertices};
 use crate::field::Field;
+use crate::geom::Aabb;
 
 /// The quads around all crossed edges.
 pub(super) struct Quads<'a> {
     pub field: &'a dyn Field,
+    pub lattice: &'a Lattice,
     signs: &'a [Signs],
     crossed: &'a Crossed<Sheets>,
-    hits: &'a Hits,
+    pub hits: &'a Hits,
     rings: &'a Rings,
-    /// Vertices in the middle of sides that two quads would share with two others, by hit and ends.
-    middles: BTreeMap<(u32, [u32; 2]), u32>,
+    /// Vertices in the middle of sides, by hit and ends: of those that two quads would share with two others,
+    /// and of those that are bent into the faces of cells (see `secure`).
+    pub middles: BTreeMap<(u32, [u32; 2]), u32>,
     /// The second vertex of a cell at a hit, by hit and first vertex.
-    seconds: BTreeMap<(u32, u32), u32>,
+    pub seconds: BTreeMap<(u32, u32), u32>,
 }
 
-/// A quad: its hit, and its corners counter-clockwise as seen from the fluid.
-type Quad = (u32, [u32; 4]);
+/// A quad around a crossed edge of the grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Quad {
+    pub hit: u32,
+    /// Counter-clockwise as seen from the fluid.
+    pub corners: [u32; 4],
+    /// The edge's axis, and the extended indices of its low end.
+    pub axis: usize,
+    pub low: [usize; 3],
+    /// Whether the low end is inside.
+    pub is_inside: bool,
+}
 
 /// The triangles of all quads. `triangles` has two for each hit, which are [`NOTHING`] if there is no quad or
 /// a fan.
@@ -48,26 +61,31 @@ pub(super) struct Cut {
     pub triangles: Vec<[u32; 3]>,
     /// Vertices with triangles that lie upside down for either diagonal.
     pub spoilt: Vec<u32>,
-    /// The corners of fans, around their hits.
-    fans: Vec<(u32, Vec<u32>)>,
+    /// The corners of fans, by their hits.
+    pub fans: BTreeMap<u32, Vec<u32>>,
     /// Quads that are not on a smooth surface, in the order of their hits.
-    doubtful: Vec<Quad>,
+    pub doubtful: Vec<Quad>,
+    /// Quads on a smooth surface with a corner outside its own cell, or in a cell with other vertices.
+    pub astray: Vec<u32>,
     pub gradients: u64,
 }
 
 /// No triangle.
-const NOTHING: [u32; 3] = [NONE; 3];
+pub(super) const NOTHING: [u32; 3] = [NONE; 3];
 
 impl<'a> Quads<'a> {
     /// Joins the vertices around each hit. Adds the vertices that lie between two cells.
     pub fn join(
-        field: &'a dyn Field,
+        (field, lattice): (&'a dyn Field, &'a Lattice),
         signs: &'a [Signs],
         crossed: &'a Crossed<Sheets>,
         (hits, rings): (&'a Hits, &'a Rings),
         placed: &[Placed],
         vertices: &mut Vertices,
     ) -> Self {
+        for &v in placed.iter().flat_map(|part| &part.crowded) {
+            vertices.doubtful[v as usize] = true;
+        }
         let mut twice: Vec<_> = placed.iter().flat_map(|part| part.twice.iter().copied()).collect();
         twice.sort_unstable();
         let mut middles = BTreeMap::new();
@@ -81,7 +99,7 @@ impl<'a> Quads<'a> {
             }
         }
         let seconds = placed.iter().flat_map(|part| part.seconds.iter().copied()).collect();
-        Self { field, signs, crossed, hits, rings, middles, seconds }
+        Self { field, lattice, signs, crossed, hits, rings, middles, seconds }
     }
 
     /// Cuts all quads.
@@ -96,11 +114,16 @@ impl<'a> Quads<'a> {
                 let mut doubtful = Vec::new();
                 let first = task.first as u32;
                 self.for_each_quad(task, |quad, rim| {
-                    let pair = &mut triangles[2 * (quad.0 - first) as usize..][..2];
+                    let pair = &mut triangles[2 * (quad.hit - first) as usize..][..2];
                     match rim {
-                        Some(rim) => cut.fans.push((quad.0, rim)),
-                        None => match self.cut_smooth(vertices, quad) {
-                            Some(along_first) => pair.copy_from_slice(&halves(quad.1, along_first)),
+                        Some(rim) => _ = cut.fans.insert(quad.hit, rim),
+                        None => match self.cut_smooth(vertices, &quad) {
+                            Some(along_first) => {
+                                pair.copy_from_slice(&halves(quad.corners, along_first));
+                                if !self.is_at_home(vertices, &quad, ASTRAY) {
+                                    cut.astray.push(quad.hit);
+                                }
+                            }
                             None => doubtful.push(quad),
                         },
                     }
@@ -117,6 +140,7 @@ impl<'a> Quads<'a> {
             cut.spoilt.extend(part.spoilt);
             cut.fans.extend(part.fans);
             cut.doubtful.extend(part.doubtful);
+            cut.astray.extend(part.astray);
             cut.gradients += part.gradients;
         }
         cut
@@ -126,7 +150,7 @@ impl<'a> Quads<'a> {
     /// their quads are doubtful ones, or lie on a cap where nothing changes.
     pub fn cut_again(&self, vertices: &Vertices, moved: &[u32], cut: &mut Cut) {
         let is_moved = |v: &u32| moved.binary_search(v).is_ok();
-        let touched = cut.doubtful.iter().filter(|quad| quad.1.iter().any(is_moved));
+        let touched = cut.doubtful.iter().filter(|quad| quad.corners.iter().any(is_moved));
         let touched: Vec<Quad> = touched.copied().collect();
         let mut triangles = std::mem::take(&mut cut.triangles);
         cut.spoilt.clear();
@@ -136,20 +160,39 @@ impl<'a> Quads<'a> {
         cut.triangles = triangles;
     }
 
-    /// All triangles, those of fans last. Adds the middles of the fans to the vertices.
-    pub fn triangles(&self, cut: Cut, vertices: &mut Vertices) -> Vec<[u32; 3]> {
-        let Cut { mut triangles, fans, .. } = cut;
-        if !fans.is_empty() || triangles.contains(&NOTHING) {
-            triangles.retain(|t| *t != NOTHING);
-        }
-        for (hit, rim) in fans {
-            let centre = vertices.len() as u32;
-            let Hit { position, normal, .. } = self.hits.get(hit);
-            vertices.push(Vertex { position, normal, kind: VertexKind::Sharp });
-            let next = rim.iter().cycle().skip(1);
-            triangles.extend(rim.iter().zip(next).map(|(&a, &b)| [centre, a, b]));
-        }
-        triangles
+    /// All quads that have one of the marked corners, in the order of their hits.
+    pub fn with_corners(&self, is_marked: &[bool]) -> Vec<Quad> {
+        let find = |task: &Task<Sheets>| {
+            let mut found = Vec::new();
+            self.for_each_quad(task, |quad, _| {
+                if quad.corners.iter().any(|&v| is_marked[v as usize]) {
+                    found.push(quad);
+                }
+            });
+            found
+        };
+        let parts: Vec<Vec<Quad>> = self.crossed.tasks.par_iter().map(find).collect();
+        parts.concat()
+    }
+
+    /// The cell of a quad's corner.
+    pub fn cell(&self, quad: &Quad, corner: usize) -> Aabb {
+        let place = quad.places()[corner];
+        let mut low = quad.low;
+        low[(quad.axis + 1) % 3] -= place & 1;
+        low[(quad.axis + 2) % 3] -= place >> 1;
+        Aabb::new(self.lattice.position(low), self.lattice.position(low.map(|n| n + 1)))
+    }
+
+    /// Whether the corners of a quad lie in their own cells, give or take a part of a cell, and have them to
+    /// themselves.
+    pub fn is_at_home(&self, vertices: &Vertices, quad: &Quad, slack: f64) -> bool {
+        (0..4).all(|i| {
+            let (v, cell) = (quad.corners[i] as usize, self.cell(quad, i));
+            let (p, margin) = (vertices.positions[v], slack * cell.size());
+            let is_within = (p.cmpge(cell.min - margin) & p.cmple(cell.max + margin)).all();
+            is_within && !vertices.doubtful[v]
+        })
     }
 
     /// Calls `visit(quad, rim)` for each crossed edge that has a vertex in each of the four cells around it.
@@ -158,23 +201,23 @@ impl<'a> Quads<'a> {
         for brick in &task.bricks {
             let inside = &self.signs[brick.number];
             let mut hit = brick.first;
-            brick.for_each_edge(|_, [x, y, z]| {
+            brick.for_each_edge(|axis, [x, y, z]| {
                 let around = self.rings.get(hit);
                 if !around.contains(&NONE) {
-                    // counter-clockwise as seen from the high end, where the fluid is if the low end
-                    // is inside
-                    let [a, b, c, d] = around;
                     let is_inside = inside[z] >> (BRICK * y + x) & 1 == 1;
-                    let corners = if is_inside { [d, c, a, b] } else { [b, a, c, d] };
-                    visit((hit, corners), self.rim((hit, corners)));
+                    let low = [brick.low[0] + x, brick.low[1] + y, brick.low[2] + z];
+                    let mut quad = Quad { hit, corners: around, axis, low, is_inside };
+                    quad.corners = quad.places().map(|place| around[place]);
+                    visit(quad, self.rim(&quad).filter(|rim| rim.len() > 4));
                 }
                 hit += 1;
             });
         }
     }
 
-    /// The corners and middles around a quad. `None` if there are only four.
-    fn rim(&self, (hit, corners): Quad) -> Option<Vec<u32>> {
+    /// The corners and middles around a quad. `None` if no quad has middles.
+    pub fn rim(&self, quad: &Quad) -> Option<Vec<u32>> {
+        let Quad { hit, corners, .. } = *quad;
         if self.middles.is_empty() && self.seconds.is_empty() {
             return None;
         }
@@ -185,12 +228,12 @@ impl<'a> Quads<'a> {
             rim.extend(self.seconds.get(&(hit, a)));
             rim.extend(self.middles.get(&(hit, [a.min(b), a.max(b)])));
         }
-        (rim.len() > 4).then_some(rim)
+        Some(rim)
     }
 
     /// Whether the first diagonal cuts a quad on a smooth surface. `None` if the quad needs a closer look.
-    fn cut_smooth(&self, vertices: &Vertices, (hit, corners): Quad) -> Option<bool> {
-        let corners = corners.map(|v| v as usize);
+    fn cut_smooth(&self, vertices: &Vertices, quad: &Quad) -> Option<bool> {
+        let (hit, corners) = (quad.hit, quad.corners.map(|v| v as usize));
         if self.hits.is_cap[hit as usize] {
             return Some(true).filter(|_| corners.iter().all(|&v| vertices.kinds[v] == VertexKind::Cap));
         }
@@ -235,11 +278,11 @@ impl<'a> Quads<'a> {
         let choices = |quad: [u32; 4]| [true, false].map(|first| halves(quad, first)).into_iter().flatten();
         let middles: Vec<DVec3> = quads
             .iter()
-            .flat_map(|(_, quad)| choices(*quad).map(|t| corners(t).iter().sum::<DVec3>() / 3.0))
+            .flat_map(|quad| choices(quad.corners).map(|t| corners(t).iter().sum::<DVec3>() / 3.0))
             .collect();
         cut.gradients += middles.len() as u64;
         let mut below = gradients.at(self.field, &middles);
-        for &(hit, quad) in quads {
+        for &Quad { hit, corners: quad, .. } in quads {
             let Hit { normal, is_cap, .. } = self.hits.get(hit);
             let mut agreement = [0.0; 4];
             for (agreement, t) in agreement.iter_mut().zip(choices(quad)) {
@@ -257,12 +300,24 @@ impl<'a> Quads<'a> {
     }
 }
 
+impl Quad {
+    /// For each corner the place of the edge in the corner's cell: bit 0 is set if the edge lies on the high
+    /// side of the cell on the axis after its own, bit 1 on the one after that.
+    pub fn places(&self) -> [usize; 4] {
+        // counter-clockwise as seen from the high end, where the fluid is if the low end is inside
+        if self.is_inside { [3, 2, 0, 1] } else { [1, 0, 2, 3] }
+    }
+}
+
 /// The triangles of a quad cut along its first diagonal (from corner 0) or its second.
 fn halves(quad: [u32; 4], along_first: bool) -> [[u32; 3]; 2] {
     // indices instead of a branch, which would be taken in half of the cases
     let corner = |i: usize| quad[(i + usize::from(!along_first)) % 4];
     [[corner(0), corner(1), corner(2)], [corner(0), corner(2), corner(3)]]
 }
+
+/// A vertex of a smooth surface that lies farther than this from its cell, in cells, is astray.
+const ASTRAY: f64 = 0.05;
 
 /// A bulge below this share of a chord counts as flat, and the shorter diagonal makes the better triangles.
 const FLAT: f64 = 1e-3;

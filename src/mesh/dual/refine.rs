@@ -39,15 +39,24 @@ const LONGEST_DROP: f64 = 2.0;
 /// The face of an edge's end is looked up at this share of the edge's length from the end.
 const BESIDE: f64 = 0.1;
 
-/// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be cut,
-/// ascending, and the number of evaluations of ∇ω.
+/// What refining a mesh has found.
+pub(super) struct Refined {
+    /// Edges that are not near the surface and could not be cut, ascending.
+    pub left: Vec<[u32; 2]>,
+    /// For each vertex that was added the ends of the edge that it cuts, in their order.
+    pub ends: Vec<[u32; 2]>,
+    /// The number of evaluations of ∇ω.
+    pub evaluations: u64,
+}
+
+/// Cuts edges until the mesh is near the surface.
 pub(super) fn refine(
     field: &dyn Field,
     vertices: &mut Vertices,
     triangles: &mut Vec<[u32; 3]>,
     size: f64,
-) -> (Vec<[u32; 2]>, u64) {
-    let mut evaluations = 0;
+) -> Refined {
+    let (mut evaluations, mut ends) = (0, Vec::new());
     let mut left = Vec::new();
     // triangles whose edges have not been looked at yet
     let mut fresh = 0..triangles.len();
@@ -63,14 +72,17 @@ pub(super) fn refine(
         }
         let first = vertices.len() as u32;
         let numbers: Vec<([u32; 2], u32)> = cuts.iter().zip(first..).map(|(cut, v)| (cut.0, v)).collect();
-        cuts.into_iter().for_each(|cut| vertices.push(cut.1));
+        for (edge, vertex) in cuts {
+            vertices.push(vertex);
+            ends.push(edge);
+        }
         let whole = triangles.len();
         changed = divide(vertices, triangles, &numbers);
         fresh = whole..triangles.len();
     }
     left.sort_unstable();
     left.dedup();
-    (left, evaluations)
+    Refined { left, ends, evaluations }
 }
 
 /// An edge's ends, ascending, and the vertex that cuts it.
@@ -194,7 +206,7 @@ fn far_beside(
 /// mesh is such an edge of one triangle.
 fn add_bulging(vertices: &Vertices, t: [u32; 3], tolerance: f64, edges: &mut Vec<[u32; 2]>) {
     let [a, b, c] = t.map(|v| v as usize);
-    let Vertices { positions, normals, kinds } = vertices;
+    let Vertices { positions, normals, kinds, .. } = vertices;
     let positions = [positions[a], positions[b], positions[c]];
     let normals = [normals[a], normals[b], normals[c]];
     let kinds = [kinds[a], kinds[b], kinds[c]];

@@ -32,13 +32,17 @@ pub(super) struct Vertices {
     pub positions: Vec<DVec3>,
     pub normals: Vec<DVec3>,
     pub kinds: Vec<VertexKind>,
+    /// Whether triangles at the vertex may cross others: it shares its cell with another vertex, or lies
+    /// beside its cell or on a crease.
+    pub doubtful: Vec<bool>,
 }
 
 impl Vertices {
     pub fn new(count: usize) -> Self {
         // rayon writes the zeros, so each thread touches memory of its own for the first time
         let zeros = || rayon::iter::repeat_n(DVec3::ZERO, count).collect();
-        Self { positions: zeros(), normals: zeros(), kinds: vec![VertexKind::Smooth; count] }
+        let kinds = vec![VertexKind::Smooth; count];
+        Self { positions: zeros(), normals: zeros(), kinds, doubtful: vec![false; count] }
     }
 
     pub fn len(&self) -> usize {
@@ -54,6 +58,7 @@ impl Vertices {
         self.positions.push(vertex.position);
         self.normals.push(vertex.normal);
         self.kinds.push(vertex.kind);
+        self.doubtful.push(vertex.kind != VertexKind::Smooth);
     }
 
     pub fn set(&mut self, v: u32, vertex: Vertex) {
@@ -61,11 +66,12 @@ impl Vertices {
         (self.positions[v], self.normals[v], self.kinds[v]) = (vertex.position, vertex.normal, vertex.kind);
     }
 
-    /// Drops the last vertex.
-    pub fn pop(&mut self) {
-        self.positions.pop();
-        self.normals.pop();
-        self.kinds.pop();
+    /// Keeps the first vertices only.
+    pub fn truncate(&mut self, count: usize) {
+        self.positions.truncate(count);
+        self.normals.truncate(count);
+        self.kinds.truncate(count);
+        self.doubtful.truncate(count);
     }
 }
 

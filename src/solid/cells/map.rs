@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::grid::{Cell, Cells, Found, SIDE};
-use crate::field::{Entry, Faces, Field, Normals, Path, Points, Walls, clearance_by_ranges};
+use crate::field::{Entry, Faces, Field, Normals, Path, Points, Sheet, Walls, clearance_by_ranges};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
@@ -406,6 +406,24 @@ impl Field for CellMap {
             Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Interval::point(free),
             _ => Interval::ALL,
         }
+    }
+
+    fn sheets(&self, over: &Aabb, visit: &mut dyn FnMut(Sheet<'_>)) -> bool {
+        let domain = self.cells.domain;
+        if domain.union(over) != domain || over.is_empty() {
+            return self.twin.sheets(over, visit);
+        }
+        let Some(touched) = self.cells.touched(over, MOST_TOUCHED) else {
+            return self.twin.sheets(over, visit);
+        };
+        let mut known = Vec::new();
+        for cell in touched {
+            if let Cell::Near(program) = cell {
+                let tree = &self.cells.programs[program as usize..];
+                self.parts.leaves.sheets(tree, over, &mut known, visit);
+            }
+        }
+        true
     }
 }
 

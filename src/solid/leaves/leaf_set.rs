@@ -9,9 +9,10 @@ use glam::DVec3;
 
 use smallvec::SmallVec;
 
+use super::pruning::{Verdict, prune};
 use super::shape::{Motion, Shape};
 use super::words::{self, Word};
-use crate::field::Path;
+use crate::field::{Path, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{Enclosure, Expr, Graph, Node, Region};
@@ -188,6 +189,39 @@ impl Leaves {
         }
         let uniforms = &ranges.uniforms[own];
         shape.range.eval_with(&Region { parameters: constants, uniforms, ..Region::of(over) })
+    }
+
+    /// Enclosures of the leaf's derivatives over a box, at all times of the stretch.
+    pub fn slopes(&self, leaf: u32, over: &Aabb) -> [Interval; 3] {
+        let (shape, constants, own) = self.of(leaf);
+        if own.is_empty() {
+            return shape.slopes().over(&Region { parameters: constants, ..Region::of(over) });
+        }
+        let first = self.store.leaves[leaf as usize].first_uniform as usize;
+        let uniforms = &self.ranges().uniforms[first..first + own.len()];
+        shape.slopes().over(&Region { parameters: constants, uniforms, ..Region::of(over) })
+    }
+
+    /// Visits the faces of a tree in prefix form that may be part of its surface in a box, those of leaves
+    /// that `known` does not hold yet.
+    pub fn sheets(&self, tree: &[u32], over: &Aabb, known: &mut Vec<u32>, visit: &mut dyn FnMut(Sheet<'_>)) {
+        let mut left = Vec::new();
+        if prune(tree, &mut |leaf| self.range(leaf, over), &mut left) != Verdict::Near {
+            return;
+        }
+        for word in left {
+            let Word::Leaf { leaf, negated } = Word::read(word) else { continue };
+            if known.contains(&word) {
+                continue;
+            }
+            known.push(word);
+            let slopes = self.slopes(leaf, over).map(|slope| if negated { -slope } else { slope });
+            let at = |p: DVec3| {
+                let (value, gradient) = self.gradient(leaf, p);
+                if negated { (-value, -gradient) } else { (value, gradient) }
+            };
+            visit(Sheet { slopes, at: &at });
+        }
     }
 
     #[inline]

@@ -37,6 +37,28 @@ pub struct Shape {
     /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
     polynomial: OnceLock<Option<Evaluator>>,
     enclosures: OnceLock<EnclosureEvaluator>,
+    slopes: OnceLock<SlopeEvaluator>,
+}
+
+/// Ranges of a shape's derivatives.
+pub struct SlopeEvaluator {
+    ranges: RangeEvaluator,
+    derivatives: [Node; 3],
+}
+
+impl SlopeEvaluator {
+    fn new(graph: &Graph, root: Node) -> Self {
+        let mut graph = graph.clone();
+        let derivatives = ir::gradient(&mut graph, root);
+        let (graph, roots, _) = simplify(&graph, &derivatives);
+        Self { ranges: RangeEvaluator::new(&graph, roots[0]), derivatives: [roots[0], roots[1], roots[2]] }
+    }
+
+    /// Enclosures of the derivatives over a region.
+    pub fn over(&self, region: &Region<'_>) -> [Interval; 3] {
+        let all = self.ranges.all_with(region);
+        self.derivatives.map(|node| all[node.index()])
+    }
 }
 
 /// What is peculiar to leaves that move.
@@ -81,6 +103,7 @@ impl Shape {
         let range = RangeEvaluator::new(&graph, root);
         let (range_code, value, gradient) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
         let (contact, polynomial, enclosures) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        let slopes = OnceLock::new();
         Self {
             graph,
             root,
@@ -94,6 +117,7 @@ impl Shape {
             contact,
             polynomial,
             enclosures,
+            slopes,
         }
     }
 
@@ -153,6 +177,11 @@ impl Shape {
             let (graph, root) = self.formula();
             EnclosureEvaluator::new(graph, root)
         })
+    }
+
+    /// Ranges of the derivatives.
+    pub fn slopes(&self) -> &SlopeEvaluator {
+        self.slopes.get_or_init(|| SlopeEvaluator::new(&self.graph, self.root))
     }
 
     #[inline]

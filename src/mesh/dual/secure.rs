@@ -1,0 +1,227 @@
+//! A mesh of quads that does not cross itself.
+//!
+//! The grid's edge and two neighbouring corners of its quad span a tetrahedron. If every corner lies in its
+//! own cell, the four tetrahedra around an edge fill the quad's envelope, and envelopes of different edges
+//! have no inner point in common, because those within a cell are pyramids over different parts of its faces.
+//! So quads within their envelopes cannot cross (Ju, Udeshi: Intersection-free contouring on an octree grid,
+//! Pacific Graphics 2006). Smooth surfaces with their corners in their cells do not need that test: around
+//! each corner they are a graph over its tangent plane.
+//!
+//! All other quads are compared with the triangles near them. Where some cross, the vertices of their cells
+//! retreat: into their cells first, then to the mean of their hits. Their quads become fans around the hits,
+//! and sides are bent so that they pass through the faces between cells. Each triangle then lies in one cell,
+//! and those of a cell are a cone over a closed curve on its faces.
+//!
+//! Invariant: retreats change no topology, and they spread until nothing crosses.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DVec2, DVec3};
+use smallvec::SmallVec;
+
+use super::super::intersections::crossing_pairs;
+use super::quads::{Cut, NOTHING, Quad, Quads};
+use super::vertices::{Vertex, VertexKind, Vertices};
+use crate::geom::Aabb;
+
+/// Rounds of retreats at most. From the third on they spread to the cells around.
+const ROUNDS: usize = 8;
+
+/// Vertices in retreat keep this distance from the faces of their cells, in cells.
+const INSET: f64 = 0.05;
+
+/// The triangles of all quads and tubes, without crossings. Adds the middles of fans and of bent sides to the
+/// vertices. `size` is the shortest side of a cell.
+pub(super) fn secure(
+    mut quads: Quads<'_>,
+    mut cut: Cut,
+    vertices: &mut Vertices,
+    tubes: &[[u32; 3]],
+    size: f64,
+) -> Vec<[u32; 3]> {
+    let suspects: Vec<u32> = cut
+        .doubtful
+        .iter()
+        .filter(|quad| !is_enveloped(&quads, vertices, quad, &cut))
+        .map(|quad| quad.hit)
+        .chain(cut.astray.iter().copied())
+        .collect();
+    let cell_vertices = vertices.len();
+    let mut lasting = cell_vertices;
+    for round in 0.. {
+        vertices.truncate(lasting);
+        let (triangles, suspects) = assemble(&quads, &cut, vertices, tubes, &suspects);
+        let pairs = if round < ROUNDS {
+            crossing_pairs(&vertices.positions, &triangles, &suspects, size)
+        } else {
+            Vec::new()
+        };
+        if pairs.is_empty() {
+            return triangles;
+        }
+        vertices.truncate(lasting);
+        let mut is_marked = vec![false; lasting];
+        let crossing = pairs.iter().flatten().flat_map(|&t| triangles[t as usize]);
+        crossing.filter(|&v| (v as usize) < cell_vertices).for_each(|v| is_marked[v as usize] = true);
+        if round >= 2 {
+            for quad in quads.with_corners(&is_marked) {
+                quad.corners.iter().for_each(|&v| is_marked[v as usize] = true);
+            }
+        }
+        retreat(&mut quads, &mut cut, vertices, &is_marked, round);
+        lasting = vertices.len();
+    }
+    Vec::new()
+}
+
+/// All triangles, and the numbers of those that are to be compared with others, ascending.
+fn assemble(
+    quads: &Quads<'_>,
+    cut: &Cut,
+    vertices: &mut Vertices,
+    tubes: &[[u32; 3]],
+    suspects: &[u32],
+) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let mut triangles = Vec::with_capacity(cut.triangles.len() + tubes.len());
+    let mut chosen: Vec<u32> = Vec::new();
+    if cut.fans.is_empty() && !cut.triangles.contains(&NOTHING) {
+        triangles.extend_from_slice(&cut.triangles);
+        chosen.extend(suspects.iter().flat_map(|&hit| [2 * hit, 2 * hit + 1]));
+    } else {
+        let mut is_suspect = vec![false; cut.triangles.len() / 2];
+        suspects.iter().for_each(|&hit| is_suspect[hit as usize] = true);
+        for (pair, is_suspect) in cut.triangles.chunks_exact(2).zip(is_suspect) {
+            for t in pair.iter().filter(|t| **t != NOTHING) {
+                if is_suspect {
+                    chosen.push(triangles.len() as u32);
+                }
+                triangles.push(*t);
+            }
+        }
+    }
+    let whole = triangles.len();
+    for (&hit, rim) in &cut.fans {
+        let centre = vertices.len() as u32;
+        let hit = quads.hits.get(hit);
+        let kind = if hit.is_cap { VertexKind::Cap } else { VertexKind::Sharp };
+        vertices.push(Vertex { position: hit.position, normal: hit.normal, kind });
+        let next = rim.iter().cycle().skip(1);
+        triangles.extend(rim.iter().zip(next).map(|(&a, &b)| [centre, a, b]));
+    }
+    triangles.extend_from_slice(tubes);
+    chosen.extend(whole as u32..triangles.len() as u32);
+    chosen.sort_unstable();
+    chosen.dedup();
+    (triangles, chosen)
+}
+
+/// What is known of a cell that retreats.
+struct Retreat {
+    hits: DVec3,
+    count: f64,
+    cell: Aabb,
+}
+
+/// Moves the marked vertices into their cells and makes fans of their quads, with bent sides.
+fn retreat(quads: &mut Quads<'_>, cut: &mut Cut, vertices: &mut Vertices, is_marked: &[bool], round: usize) {
+    let touched = quads.with_corners(is_marked);
+    let mut sides: BTreeMap<[u32; 2], SmallVec<[u32; 4]>> = BTreeMap::new();
+    let mut cells: BTreeMap<u32, Retreat> = BTreeMap::new();
+    for quad in &touched {
+        for i in 0..4 {
+            let (a, b) = (quad.corners[i], quad.corners[(i + 1) % 4]);
+            if is_marked[a as usize] {
+                let new = || Retreat { hits: DVec3::ZERO, count: 0.0, cell: quads.cell(quad, i) };
+                let found = cells.entry(a).or_insert_with(new);
+                found.hits += quads.hits.positions[quad.hit as usize];
+                found.count += 1.0;
+            }
+            if is_marked[a as usize] || is_marked[b as usize] {
+                sides.entry([a.min(b), a.max(b)]).or_default().push(quad.hit);
+            }
+        }
+    }
+    let ends_of_tunnels: BTreeSet<u32> = quads.seconds.values().copied().collect();
+    for (v, Retreat { hits, count, cell }) in cells {
+        let place = v as usize;
+        let is_end_of_tunnel = ends_of_tunnels.contains(&v);
+        let is_flat = cell.size().min_element() <= 0.0;
+        if is_end_of_tunnel || is_flat || vertices.kinds[place] == VertexKind::Cap {
+            continue;
+        }
+        let inset = INSET * cell.size();
+        let position = if round == 0 && !vertices.doubtful[place] {
+            vertices.positions[place].clamp(cell.min + inset, cell.max - inset)
+        } else {
+            hits / count
+        };
+        if position != vertices.positions[place] {
+            vertices.set(v, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
+        }
+    }
+    for (ends, hits) in sides {
+        let &[first, second] = &hits[..] else { continue };
+        if quads.middles.contains_key(&(first, ends)) {
+            continue;
+        }
+        let [p, q] = [first, second].map(|hit| quads.hits.get(hit));
+        let kind = if p.is_cap && q.is_cap { VertexKind::Cap } else { VertexKind::Sharp };
+        let middle = vertices.len() as u32;
+        vertices.push(Vertex { position: p.position.midpoint(q.position), normal: DVec3::ZERO, kind });
+        for hit in [first, second] {
+            quads.middles.insert((hit, ends), middle);
+        }
+    }
+    for quad in &touched {
+        cut.triangles[2 * quad.hit as usize..][..2].fill(NOTHING);
+        if let Some(rim) = quads.rim(quad) {
+            cut.fans.insert(quad.hit, rim);
+        }
+    }
+}
+
+/// Whether a quad lies in its envelope.
+fn is_enveloped(quads: &Quads<'_>, vertices: &Vertices, quad: &Quad, cut: &Cut) -> bool {
+    if !quads.is_at_home(vertices, quad, 0.0) {
+        return false;
+    }
+    let [u, v, w] = [1, 2, 0].map(|step| (quad.axis + step) % 3);
+    let begin = quads.lattice.position(quad.low);
+    let mut above = quad.low;
+    above[quad.axis] += 1;
+    let length = quads.lattice.coordinate(quad.axis, above[quad.axis]) - begin[quad.axis];
+    let places = quad.corners.map(|corner| {
+        let p = vertices.positions[corner as usize] - begin;
+        DVec3::new(p[u], p[v], p[w])
+    });
+    // the triangles begin with the diagonal's ends
+    let first = cut.triangles[2 * quad.hit as usize][0];
+    let start = usize::from(first != quad.corners[0]);
+    let corner = |i: usize| places[(start + i) % 4];
+    let (from, to) = (corner(0), corner(2));
+    let turn = |a: DVec3, b: DVec3| DVec2::new(a.x, a.y).perp_dot(DVec2::new(b.x, b.y));
+    // the corner on whose side the diagonal passes the edge
+    let ring = turn(corner(0), corner(1))
+        + turn(corner(1), corner(2))
+        + turn(corner(2), corner(3))
+        + turn(corner(3), corner(0));
+    let beside = if (turn(from, to) > 0.0) == (ring > 0.0) { corner(1) } else { corner(3) };
+    passes_within(from, beside, to, length) && passes_within(to, beside, from, length)
+}
+
+/// Whether the line from a corner to the opposite one passes the face between the cells of the first and of
+/// `beside` within the triangle of the edge, from 0 to `length` on the third axis, and the point where the
+/// side between these two passes.
+fn passes_within(from: DVec3, beside: DVec3, to: DVec3, length: f64) -> bool {
+    // neighbours lie on different sides on one of the two axes
+    let across = usize::from((from.x > 0.0) == (beside.x > 0.0));
+    let along = 1 - across;
+    let meet = |other: DVec3| {
+        let at = from.lerp(other, from[across] / (from[across] - other[across]));
+        (at[along].abs(), at.z)
+    };
+    let ((reach, height), (distance, found)) = (meet(beside), meet(to));
+    let share = distance / reach;
+    // comparisons with NaN fail
+    share <= 1.0 && found >= share * height && found <= length + share * (height - length)
+}

@@ -1,0 +1,327 @@
+//! A closer look into one cell: which faces it holds, and whether the grid knows them.
+
+use glam::DVec3;
+use smallvec::SmallVec;
+
+use super::super::{normals::unit, prune::Lattice};
+use super::ThinCells;
+use crate::field::{Field, Sheet};
+use crate::geom::Aabb;
+use crate::interval::Interval;
+
+/// A face that agrees more than this (cosine) with one that the grid has seen nearby is known.
+const KNOWN: f64 = 0.6;
+
+/// Faces that agree less than this (cosine) back onto each other: a wall, a gap, or a wedge of 37° or less.
+const OPPOSED: f64 = -0.8;
+
+/// The number of times that a cell is halved on each axis.
+const HALVINGS: u32 = 3;
+
+/// Faces whose directions agree less than this (cosine) are not parallel.
+const PARALLEL: f64 = 0.9;
+
+/// Distances from a surface, in cells, at which ω must have both signs for one of them.
+const BESIDE: [f64; 3] = [1e-2, 1e-4, 1e-6];
+
+/// Steps of Newton's method onto a face at most.
+const STEPS: usize = 8;
+
+/// A point nearer to a face than this, in cells, is on it.
+const ON_FACE: f64 = 1e-8;
+
+/// A face that agrees more than this (cosine) with the way to it ends a thickness.
+const BACK: f64 = 0.5;
+
+/// The longest way in cells over which a thickness is measured, and its steps.
+const THICKEST: f64 = 2.0;
+const STEPS_ACROSS: usize = 64;
+
+type Normals = SmallVec<[DVec3; 16]>;
+
+pub(super) fn is_decided(range: Interval) -> bool {
+    range.lo > 0.0 || range.hi <= 0.0
+}
+
+/// Whether a box holds a single face that nearly keeps its direction.
+pub(super) fn is_one_sheet(field: &dyn Field, over: &Aabb) -> bool {
+    let (mut count, mut keeps) = (0, true);
+    let all = field.sheets(over, &mut |sheet| {
+        count += 1;
+        keeps &= middle(&sheet).is_some_and(|way| agrees(&sheet.slopes, way, KNOWN));
+    });
+    all && keeps && count <= 1
+}
+
+/// The outward direction in the middle of a face's slopes.
+fn middle(sheet: &Sheet<'_>) -> Option<DVec3> {
+    unit(-DVec3::from_array(sheet.slopes.map(|slope| 0.5 * slope.lo + 0.5 * slope.hi)))
+}
+
+/// Whether all outward normals that the slopes allow agree with a direction by more than a cosine below 1.
+fn agrees(slopes: &[Interval; 3], way: DVec3, cosine: f64) -> bool {
+    // g·w − c·|g| is concave in g, so its least value over a box is at a corner
+    (0..8).all(|corner: usize| {
+        let end = |axis: usize| if corner >> axis & 1 == 0 { slopes[axis].lo } else { slopes[axis].hi };
+        let g = -DVec3::new(end(0), end(1), end(2));
+        g.dot(way) > cosine * g.length() // false for NaN and infinity
+    })
+}
+
+/// A cell to look into.
+pub(super) struct Look<'a> {
+    pub field: &'a dyn Field,
+    pub lattice: &'a Lattice,
+    /// The extended indices of its low corner.
+    pub low: [usize; 3],
+    pub bounds: Aabb,
+    pub is_crossed: bool,
+    /// Whether the signs at its corners leave a choice.
+    pub is_undecided: bool,
+}
+
+/// What the grid has seen.
+struct Seen {
+    /// Outward normals where the surface crosses edges of this cell and of those around it.
+    around: Normals,
+    /// Those of this cell alone.
+    own: Normals,
+}
+
+/// What is found in a cell.
+#[derive(Default)]
+struct Findings {
+    /// Directions of faces that are proven to be known.
+    proven: Normals,
+    /// Boxes in which a face is not proven to be known.
+    open: SmallVec<[Aabb; 32]>,
+    /// Boxes with a face.
+    held: SmallVec<[Aabb; 32]>,
+}
+
+/// A point of the surface.
+#[derive(Clone, Copy)]
+struct Foot {
+    at: DVec3,
+    /// The outward unit normal.
+    normal: DVec3,
+}
+
+impl Look<'_> {
+    /// The cell, if it holds a surface that the grid does not know.
+    pub fn into_cell(self) -> ThinCells {
+        if self.is_crossed && is_one_sheet(self.field, &self.bounds) {
+            return ThinCells::NONE;
+        }
+        let seen = self.seen();
+        let mut findings = Findings::default();
+        self.divide(&self.bounds, &seen, HALVINGS, &mut findings);
+        // where the signs leave a choice, walls that are seen on both sides may still have holes
+        let own = if self.is_undecided { &[][..] } else { &seen.own[..] };
+        let opposed = |all: &[DVec3]| has_opposed(all, own);
+        if findings.open.is_empty() && !opposed(&findings.proven) {
+            return ThinCells::NONE;
+        }
+        let is_opposed = opposed(&findings.proven);
+        let boxes = if is_opposed { &findings.held } else { &findings.open };
+        let mut normals: Normals = SmallVec::new();
+        for part in boxes {
+            for foot in self.feet(part) {
+                let is_known = is_known(foot.normal, &seen.around);
+                if !normals.iter().any(|other| other.dot(foot.normal) > 0.98) {
+                    normals.push(foot.normal);
+                } else if is_known {
+                    continue;
+                }
+                if !is_known || opposed(&normals) {
+                    let found = self.counted(foot, &seen);
+                    if found.count > 0 {
+                        return found;
+                    }
+                }
+            }
+        }
+        ThinCells::NONE
+    }
+
+    /// Divides a box until its faces are proven to be known, or are one or several parallel ones, or as often as
+    /// `halvings` allows.
+    fn divide(&self, over: &Aabb, seen: &Seen, halvings: u32, findings: &mut Findings) {
+        let range = self.field.range(over);
+        if is_decided(range) {
+            return;
+        }
+        let mut normals: Normals = SmallVec::new();
+        let (mut known, mut flat) = (true, true);
+        let all = self.field.sheets(over, &mut |sheet| {
+            let way = seen.around.iter().find(|normal| agrees(&sheet.slopes, **normal, KNOWN));
+            known &= way.is_some();
+            let middle = middle(&sheet);
+            flat &= middle.is_some_and(|way| agrees(&sheet.slopes, way, PARALLEL));
+            normals.extend(middle);
+        });
+        if all && known {
+            if !normals.is_empty() {
+                findings.held.push(*over);
+                for normal in normals {
+                    if !findings.proven.iter().any(|other| other.dot(normal) > 0.98) {
+                        findings.proven.push(normal);
+                    }
+                }
+            }
+            return;
+        }
+        flat &= normals.iter().all(|way| way.dot(normals[0]).abs() > PARALLEL);
+        if halvings == 0 || all && flat || !all {
+            findings.held.push(*over);
+            findings.open.push(*over);
+            return;
+        }
+        let centre = over.centre();
+        for corner in over.corners() {
+            self.divide(&Aabb::new(corner.min(centre), corner.max(centre)), seen, halvings - 1, findings);
+        }
+    }
+
+    /// Points of the surface in a box or a little beside it, at most one for each face and start.
+    fn feet(&self, over: &Aabb) -> SmallVec<[Foot; 8]> {
+        let mut found: SmallVec<[Foot; 8]> = SmallVec::new();
+        let reach = 0.5 * over.size();
+        let within = Aabb::new(over.min - reach, over.max + reach);
+        let size = self.bounds.size().min_element();
+        let mut seek = |at: &dyn Fn(DVec3) -> (f64, DVec3)| {
+            for start in std::iter::once(over.centre()).chain(over.corners()) {
+                let Some(foot) = descend(at, start, &within, size) else { continue };
+                let is_new = |other: &Foot| other.normal.dot(foot.normal) < 0.95;
+                if self.bounds.contains(foot.at) && found.iter().all(is_new) && self.is_surface(&foot, size) {
+                    found.push(foot);
+                }
+            }
+        };
+        let all = self.field.sheets(over, &mut |sheet| seek(sheet.at));
+        if !all {
+            seek(&|p| self.field.omega_grad(p));
+        }
+        found
+    }
+
+    /// Whether ω changes its sign at a point.
+    fn is_surface(&self, foot: &Foot, size: f64) -> bool {
+        BESIDE.iter().any(|beside| {
+            let step = beside * size * foot.normal;
+            self.field.omega(foot.at - step) > 0.0 && self.field.omega(foot.at + step) <= 0.0
+        })
+    }
+
+    /// The count of this cell, with the thickness at a point that the grid does not know. Nothing if the grid
+    /// knows other faces nearby, and what the face belongs to is thicker than two cells.
+    fn counted(&self, foot: Foot, seen: &Seen) -> ThinCells {
+        // across the face, and along the faces beside it: a bump on a wall is as thin as it is wide
+        let beside = seen.around.iter().filter_map(|n| unit(foot.normal - n.dot(foot.normal) * *n));
+        let ways = || std::iter::once(foot.normal).chain(beside.clone());
+        let least = |inside: bool| {
+            let sign = if inside { -1.0 } else { 1.0 };
+            ways().map(|way| self.across(foot.at, sign * way, inside)).fold(f64::INFINITY, f64::min)
+        };
+        let (wall, gap) = (least(true), least(false));
+        let thickness = wall.min(gap);
+        if thickness == f64::INFINITY && !seen.around.is_empty() {
+            return ThinCells::NONE; // a step or an edge of something thick
+        }
+        ThinCells { count: 1, bounds: self.bounds, thickness, at: foot.at, is_gap: gap < wall }
+    }
+
+    /// The distance from a point of the surface to where it is met again from inside, or from outside, if the
+    /// face there turns its back. Infinite beyond two cells.
+    fn across(&self, from: DVec3, way: DVec3, inside: bool) -> f64 {
+        let step = THICKEST * self.bounds.size().min_element() / STEPS_ACROSS as f64;
+        let is_beyond = |t: f64| (self.field.omega(from + t * way) > 0.0) != inside;
+        let ends = (0..STEPS_ACROSS).map(|i| step * (i as f64 + 0.5));
+        let Some(mut far) = ends.into_iter().find(|t| is_beyond(*t)) else { return f64::INFINITY };
+        let mut near = f64::max(far - step, 0.0);
+        for _ in 0..HALVED {
+            let middle = 0.5 * (near + far);
+            if is_beyond(middle) { far = middle } else { near = middle }
+        }
+        let towards = if inside { way } else { -way };
+        let end = unit(-self.field.omega_grad(from + far * way).1);
+        if end.is_some_and(|normal| normal.dot(towards) > BACK) { far } else { f64::INFINITY }
+    }
+
+    /// The normals where the surface crosses the edges of this cell and of those around it.
+    fn seen(&self) -> Seen {
+        let mut seen = Seen { around: SmallVec::new(), own: SmallVec::new() };
+        // nodes from one below the cell to one above it, those of the ring outside
+        let node = |i: [usize; 3]| [0, 1, 2].map(|axis: usize| self.low[axis] + i[axis] - 1);
+        let place = |i: [usize; 3]| self.lattice.position(node(i));
+        let mut inside = [false; 64];
+        for (number, inside) in inside.iter_mut().enumerate() {
+            let i = [number % 4, number / 4 % 4, number / 16];
+            let is_ring = (0..3).any(|axis| self.lattice.is_ring(axis, node(i)[axis]));
+            *inside = !is_ring && self.field.omega(place(i)) > 0.0;
+        }
+        for number in 0..64 {
+            let i = [number % 4, number / 4 % 4, number / 16];
+            for (axis, step) in [1, 4, 16].into_iter().enumerate() {
+                if i[axis] == 3 || inside[number] == inside[number + step] {
+                    continue;
+                }
+                let mut other = i;
+                other[axis] += 1;
+                let mut ends = [place(i), place(other)];
+                if inside[number] {
+                    ends.reverse();
+                }
+                let Some(normal) = self.normal_between(ends) else { continue };
+                let beside = [(axis + 1) % 3, (axis + 2) % 3];
+                if i[axis] == 1 && beside.iter().all(|&axis| i[axis] == 1 || i[axis] == 2) {
+                    seen.own.push(normal);
+                }
+                if !seen.around.iter().any(|other| other.dot(normal) > 0.999) {
+                    seen.around.push(normal);
+                }
+            }
+        }
+        seen
+    }
+
+    /// The outward normal where ω changes its sign between a point outside and one inside.
+    fn normal_between(&self, [mut outside, mut inside]: [DVec3; 2]) -> Option<DVec3> {
+        for _ in 0..HALVED {
+            let middle = outside.midpoint(inside);
+            if self.field.omega(middle) > 0.0 { inside = middle } else { outside = middle }
+        }
+        unit(-self.field.omega_grad(inside).1)
+    }
+}
+
+/// Bisections of an edge. They leave a millionth of it.
+const HALVED: usize = 20;
+
+/// The surface of a face by Newton's method. `None` if it leaves the box or does not settle.
+fn descend(at: &dyn Fn(DVec3) -> (f64, DVec3), start: DVec3, within: &Aabb, size: f64) -> Option<Foot> {
+    let mut p = start;
+    for _ in 0..STEPS {
+        let (omega, gradient) = at(p);
+        let step = gradient * (omega / gradient.length_squared());
+        p -= step;
+        if !p.is_finite() || !within.contains(p) {
+            return None;
+        }
+        if step.length() <= ON_FACE * size {
+            return Some(Foot { at: p, normal: unit(-gradient)? });
+        }
+    }
+    None
+}
+
+fn is_known(normal: DVec3, seen: &[DVec3]) -> bool {
+    seen.iter().any(|other| other.dot(normal) > KNOWN)
+}
+
+/// Whether two of the normals are opposed and the cell's own edges do not show both.
+fn has_opposed(all: &[DVec3], own: &[DVec3]) -> bool {
+    all.iter().enumerate().any(|(i, a)| {
+        all[..i].iter().any(|b| a.dot(*b) < OPPOSED && !(is_known(*a, own) && is_known(*b, own)))
+    })
+}

@@ -1,0 +1,181 @@
+//! Parts and gaps thinner than a cell are shown by the mesh or counted, wherever they are, and nothing else is
+//! counted.
+
+use rfm::glam::DVec3;
+use rfm::mesh::{Grid, Mesh, Resolution, ThinCells, marching_cubes, thin_cells};
+use rfm::{Engine, Program, Solid};
+
+fn solid(text: &str) -> Solid {
+    let program = Program::from_source("t.rfm", format!("rfm 1\nsolid s = {text}"));
+    program.unwrap_or_else(|e| panic!("{text}: {e}")).solid_with("s", Engine::Auto).unwrap()
+}
+
+fn looked_at(solid: &Solid, cells: usize) -> (Mesh, ThinCells) {
+    let grid = Grid::around(&solid.bounds().aabb().unwrap(), Resolution::Cells(cells)).unwrap();
+    let field = solid.surface(*grid.bounds());
+    (marching_cubes(&*field, &grid, &|_| {}).unwrap(), thin_cells(&*field, &grid).unwrap())
+}
+
+/// How often the mesh goes around a point, by the solid angles of its triangles (van Oosterom and Strackee,
+/// IEEE Trans. Biomed. Eng. 30, 1983).
+fn turns(mesh: &Mesh, p: DVec3) -> f64 {
+    let angle = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| mesh.positions[v as usize] - p);
+        let [la, lb, lc] = [a, b, c].map(|v| v.length());
+        let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        2.0 * a.dot(b.cross(c)).atan2(below)
+    };
+    mesh.triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+/// A small generator (Knuth's linear congruence).
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        loop {
+            let v = DVec3::from_array([(); 3].map(|()| self.within(-1.0, 1.0)));
+            if (0.1..1.0).contains(&v.length()) {
+                return v.normalize();
+            }
+        }
+    }
+}
+
+const CELLS: usize = 32;
+
+/// A solid with one feature, and points of the feature with whether they lie inside.
+struct Feature {
+    text: String,
+    points: Vec<(DVec3, bool)>,
+}
+
+fn moved_along(shape: &str, way: DVec3) -> String {
+    // the z axis turned to `way`
+    let (tilt, turn) = (way.z.acos(), way.y.atan2(way.x));
+    format!("{shape}.rotate_y({tilt}).rotate_z({turn})")
+}
+
+fn feature(kind: &str, random: &mut Random) -> Feature {
+    // 0.1 to 2 cells of a ball of radius 1
+    let size = 2.0 / (CELLS as f64 - 1.4) * 0.1 * 20_f64.powf(random.unit());
+    let (way, half) = (random.direction(), 0.5 * size);
+    match kind {
+        "bump" => {
+            let centre = random.within(1.0 - 0.2 * half, 1.0 + 0.9 * half) * way;
+            let [x, y, z] = centre.to_array();
+            Feature {
+                text: format!("sphere(1) or ball([{x}, {y}, {z}], {half})"),
+                points: vec![(centre + 0.6 * half * way, true)],
+            }
+        }
+        "spike" => {
+            let spike = moved_along(&format!("cylinder({half}, 1.2)"), way);
+            Feature {
+                text: format!("sphere(1) or {spike}"),
+                points: [1.05, 1.1, 1.15].map(|r| (r * way, true)).to_vec(),
+            }
+        }
+        "tunnel" => {
+            let tunnel = moved_along(&format!("cylinder({half}, 4).move([0, 0, -2])"), way);
+            Feature {
+                text: format!("sphere(1) \\ {tunnel}"),
+                points: [-0.9, -0.31, 0.37, 0.83].map(|r| (r * way, false)).to_vec(),
+            }
+        }
+        "slit" => {
+            let depth = random.within(0.2, 0.6);
+            let slit = moved_along(&format!("box([-{half}, -0.5, {depth}], [{half}, 0.5, 2])"), way);
+            // the slit's broad side after the turns
+            let turn = way.y.atan2(way.x);
+            let broad = DVec3::new(-turn.sin(), turn.cos(), 0.0);
+            let points = [(-0.3, 0.75), (0.0, 0.8), (0.2, 0.9)];
+            Feature {
+                text: format!("sphere(1) \\ {slit}"),
+                points: points.map(|(a, r)| (a * broad + r * way, false)).to_vec(),
+            }
+        }
+        "shell" => Feature {
+            text: format!("sphere(1) \\ sphere({})", 1.0 - size),
+            points: (0..12).map(|_| ((1.0 - half) * random.direction(), true)).collect(),
+        },
+        _ => unreachable!("{kind}"),
+    }
+}
+
+/// Features that the mesh does not show and nobody has counted.
+fn missed(count: u64) -> Vec<String> {
+    let mut missed = Vec::new();
+    for kind in ["bump", "spike", "tunnel", "slit", "shell"] {
+        let (mut shown, mut counted) = (0, 0);
+        for number in 0..count {
+            let mut random = Random(1000 * number + kind.len() as u64);
+            (0..5).for_each(|_| _ = random.unit());
+            let Feature { text, points } = feature(kind, &mut random);
+            let (mesh, thin) = looked_at(&solid(&text), CELLS);
+            if thin.count > 0 {
+                counted += 1;
+            } else if points.iter().all(|&(p, inside)| (turns(&mesh, p) > 0.5) == inside) {
+                shown += 1;
+            } else {
+                missed.push(format!("{kind} {number}: {text}"));
+            }
+        }
+        println!("{kind}: {counted} counted, {shown} shown, of {count}");
+        assert!(counted * 4 >= count, "{kind}: most are thinner than a cell, and {counted} were counted");
+    }
+    missed
+}
+
+#[test]
+fn random_thin_features_are_shown_or_counted() {
+    assert_eq!(missed(25), Vec::<String>::new());
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn a_thousand_thin_features_of_each_kind_are_shown_or_counted() {
+    assert_eq!(missed(1000), Vec::<String>::new());
+}
+
+#[test]
+fn what_hides_has_a_place_and_a_thickness() {
+    for cells in [32, 64, 96] {
+        let (_, bump) = looked_at(&solid("sphere(1) or sphere(0.012).move([0.601, 0, 0.8])"), cells);
+        assert!(bump.count > 0 && bump.at.distance(DVec3::new(0.601, 0.0, 0.8)) < 0.013, "{cells}: {bump:?}");
+        assert!(bump.thickness < 0.026, "{cells}: {bump:?}");
+        let (_, spike) = looked_at(&solid("sphere(1) or cylinder(0.01, 1.05).rotate_x(0.3)"), cells);
+        let tip = DVec3::new(0.0, -0.3_f64.sin(), 0.3_f64.cos());
+        assert!(spike.count > 0 && spike.at.distance(1.02 * tip) < 0.1, "{cells}: {spike:?}");
+        // it is measured across the spike, or aslant where its rim is near
+        assert!((0.009..0.025).contains(&spike.thickness) && !spike.is_gap, "{cells}: {spike:?}");
+    }
+    let (_, shell) = looked_at(&solid("sphere(1) \\ sphere(0.985)"), 64);
+    assert!(shell.count > 100 && (shell.thickness - 0.015).abs() < 0.001 && !shell.is_gap, "{shell:?}");
+    let (_, slit) = looked_at(&solid("sphere(1) \\ box([0.1, -2, -2], [0.107, 2, 2])"), 48);
+    assert!(slit.count > 100 && (slit.thickness - 0.007).abs() < 0.001 && slit.is_gap, "{slit:?}");
+}
+
+#[test]
+fn faces_that_coincide_and_smooth_surfaces_hide_nothing() {
+    let nut = "(all i in 0..6: half_space([1, 0, 0], [1, 0, 0]).rotate_z(i*60 deg)) and 0 <= z <= 0.5 \\ cylinder(0.5, 0.5)";
+    let spillway = "any i in 0..6: box([i*0.3, 0, 0], [(i + 1)*0.3, 1, (6 - i)*0.2])";
+    let square = "-y^2 <= 0 and box([-1, -1, -1], [1, 1, 1])";
+    let gear = "hypot(x, y) <= 1 + 0.05*sin(12*atan2(y, x)) and 0 <= z <= 0.3";
+    for text in [nut, spillway, square, gear, "torus(0.8, 0.25)", "cone(0.5, 1)"] {
+        let solid = solid(text);
+        for cells in [40, 64] {
+            let (_, thin) = looked_at(&solid, cells);
+            assert_eq!(thin.count, 0, "{text}, {cells} cells: {thin:?}");
+        }
+    }
+}
