@@ -119,6 +119,9 @@ pub(super) struct Check {
     /// Time at which moving solids are evaluated, in seconds or with a unit
     #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
+    /// Time after which no further solid of a file is measured, in seconds or with a unit
+    #[arg(long, value_name = "TIME", default_value_t = 10.0, value_parser = seconds)]
+    pub budget: f64,
     /// Treat a kind of message as an error
     #[arg(long, value_enum, value_name = "KIND")]
     pub deny: Option<Deny>,
@@ -162,8 +165,10 @@ pub(super) enum What {
     Gradient,
     /// 1 inside, 0 on the surface, −1 outside
     Sign,
-    /// Distance from the surface, positive in the fluid: accurate near it, an estimate far away
+    /// Distance from the nearest point of the surface that was found, positive in the fluid
     Distance,
+    /// Radius of a ball around the point that is proven not to meet the surface
+    Clearance,
     /// Outward unit normal −∇ω/|∇ω|
     Normal,
 }

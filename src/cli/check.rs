@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 use std::path::Path;
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
 use rfm::ir::Magnitudes;
 use rfm::lower::NamedSolid;
 use rfm::mesh::{self, Grid, Resolution, ThinCells, VolumeError};
-use rfm::solid::{Bounds, ProgramKind};
+use rfm::solid::{Bounds, ProgramKind, Unbounded};
 use rfm::{Precision, Program, Solid};
 
 /// Cells along the longest side of the mesh that volumes are measured on.
@@ -43,6 +43,9 @@ struct Message {
 
 /// The most operations of a solid that is measured. A larger one would take minutes.
 const MOST_MEASURED: usize = 120_000;
+
+/// Seconds for each operation of a solid that is evaluated as a whole, at a million points.
+const SECONDS_OF_OPERATION: f64 = 4e-4;
 
 /// What is known about a solid. Numbers that do not exist (the volume of an unbounded solid) or that were not
 /// found (the volume of one too thin for the grid) are null.
@@ -146,7 +149,7 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
             }
             Ok(program) => {
                 let mut diagnostics = program.warnings();
-                let facts = solids(shared, &program, &file, options.time, &mut diagnostics)?;
+                let facts = solids(shared, &program, &file, options, &mut diagnostics)?;
                 let denied = options.deny == Some(Deny::Warnings) && !diagnostics.list.is_empty();
                 if denied || diagnostics.has_errors() {
                     document.ok = false;
@@ -209,15 +212,25 @@ fn solids(
     shared: &Shared,
     program: &Program,
     file: &str,
-    time: f64,
+    options: &Check,
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<Facts>, Failure> {
+    let (time, budget) = (options.time, options.budget);
     let mut facts = Vec::new();
-    for named in &program.module().solids {
+    let (start, named_solids) = (Instant::now(), &program.module().solids);
+    for named in named_solids {
+        if !facts.is_empty() && start.elapsed().as_secs_f64() > budget {
+            let measured = facts.len();
+            note(format!(
+                "{measured} of {} solids were measured in {budget} s; --budget SECONDS gives more time",
+                named_solids.len()
+            ));
+            break;
+        }
         let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?.at(time);
         let operations = solid.graph(ProgramKind::Value).0.len();
-        if operations > MOST_MEASURED {
-            note(format!("solid `{}` has {operations} operations: it is not measured", named.name));
+        if let Some(why) = too_long(&solid, operations, budget) {
+            note(format!("solid `{}` has {operations} operations: {why}", named.name));
             let tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
             facts.push(Facts { tolerance, ..Facts::unknown(&solid, file) });
             continue;
@@ -239,6 +252,22 @@ fn solids(
     Ok(facts)
 }
 
+/// Why a solid is not measured, if it is not.
+fn too_long(solid: &Solid, operations: usize, budget: f64) -> Option<String> {
+    if operations > MOST_MEASURED {
+        return Some("it is not measured".into());
+    }
+    // leaf by leaf the work depends on the surface alone
+    if solid.leaf_count().is_some() {
+        return None;
+    }
+    let seconds = SECONDS_OF_OPERATION * operations as f64;
+    (seconds > budget).then(|| {
+        let enough = seconds.ceil();
+        format!("measuring it would take about {enough} s; --budget {enough} allows it")
+    })
+}
+
 /// Warnings about a solid that is empty, unbounded or thin.
 fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnostic> {
     let warning = |code, message| Diagnostic::warning(code, named.span, message);
@@ -249,9 +278,7 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
             found.push(warning(Code::EMPTY_SOLID, message));
         }
         Bounds::Unbounded => {
-            let message = format!("solid `{}` could not be proven to end anywhere", named.name);
-            let help = "intersect it with a box, or mesh it with --box";
-            found.push(warning(Code::UNBOUNDED_SOLID, message).help(help));
+            found.push(unbounded(named, solid));
         }
         Bounds::Within(_) => {}
     }
@@ -264,6 +291,20 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
         found.push(warning(Code::THIN_PARTS, message).help(help));
     }
     found
+}
+
+/// A warning that says which operand of a solid was not found to end, and where.
+fn unbounded(named: &NamedSolid, solid: &Solid) -> Diagnostic {
+    let why = solid.unbounded();
+    let sides = why.as_ref().map_or(String::new(), Unbounded::direction);
+    let message = format!("solid `{}` could not be proven to end {sides}", named.name);
+    let help = "intersect it with a box, or mesh it with --box";
+    let warning = Diagnostic::warning(Code::UNBOUNDED_SOLID, named.span, message).help(help);
+    let operand = why.filter(|why| !why.is_whole).and_then(|why| why.operand);
+    match operand.filter(|operand| operand.source == named.span.source) {
+        Some(operand) => warning.label(operand, "this operand has no bounds"),
+        None => warning,
+    }
 }
 
 /// A warning if ω may leave the range of numbers although its leaves do not.

@@ -3,12 +3,14 @@
 mod agreement;
 mod bad_input;
 mod blocks;
+mod bounds;
 mod cells;
 mod certificates;
 mod circles;
 mod cli;
 mod contact;
 mod diagnostics;
+mod distance;
 mod documents;
 mod examples;
 mod fluid_surface;

@@ -61,7 +61,7 @@ impl RangeRule {
         match *self {
             Self::Square(a) => Some(range(a).square()),
             Self::Slab { of, first, second } => {
-                let line = |affine: Affine| (affine.slope, offset(affine, &range));
+                let line = |affine: Affine| (affine.slope, affine.number(&range));
                 Some(slab(range(of), line(first), line(second)))
             }
             Self::Plain(_) => None,
@@ -144,7 +144,7 @@ impl RangeEvaluator {
                 RangeRule::Square(a) | RangeRule::Slab { of: a, .. } if unknown(a) => Interval::ALL,
                 RangeRule::Square(a) => values[a.index()].square(),
                 RangeRule::Slab { of, first, second } => {
-                    let number = |affine: Affine| offset(affine, |node| values[node.index()]);
+                    let number = |affine: Affine| affine.number(|node| values[node.index()]);
                     slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
                 }
                 RangeRule::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
@@ -175,12 +175,14 @@ fn affine(graph: &Graph, node: Node) -> (Node, Affine) {
     }
 }
 
-/// The number that is added; NaN if it is not known.
-fn offset(affine: Affine, range: impl Fn(Node) -> Interval) -> f64 {
-    let Some(node) = affine.offset else { return 0.0 };
-    let Interval { lo, hi } = range(node);
-    let number = if lo == hi { lo } else { f64::NAN };
-    if affine.minus { -number } else { number }
+impl Affine {
+    /// The number that is added; NaN if it is not known.
+    pub(in crate::ir) fn number(self, range: impl Fn(Node) -> Interval) -> f64 {
+        let Some(node) = self.offset else { return 0.0 };
+        let Interval { lo, hi } = range(node);
+        let number = if lo == hi { lo } else { f64::NAN };
+        if self.minus { -number } else { number }
+    }
 }
 
 fn at((slope, offset): (f64, f64), e: Interval) -> Interval {

@@ -8,7 +8,7 @@ use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
-    self, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region, Uniforms,
+    self, Contractor, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region, Uniforms,
 };
 use crate::simplify::simplify;
 use crate::solid::engine::Engine;
@@ -36,6 +36,7 @@ pub struct Shape {
     /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
     polynomial: OnceLock<Option<Evaluator>>,
     enclosures: OnceLock<EnclosureEvaluator>,
+    contractor: OnceLock<Contractor>,
 }
 
 /// What is peculiar to leaves that move.
@@ -93,6 +94,7 @@ impl Shape {
             contact,
             polynomial,
             enclosures,
+            contractor: OnceLock::new(),
         }
     }
 
@@ -152,6 +154,11 @@ impl Shape {
             let (graph, root) = self.formula();
             EnclosureEvaluator::new(graph, root)
         })
+    }
+
+    /// What makes boxes smaller around the points where a leaf is positive.
+    pub fn contractor(&self) -> &Contractor {
+        self.contractor.get_or_init(|| Contractor::new(&self.graph, self.root))
     }
 
     #[inline]

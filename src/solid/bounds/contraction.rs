@@ -1,0 +1,219 @@
+//! A box around a tree of leaves, made smaller without losing a point of the solid.
+//!
+//! Each member of "all of" makes the box smaller for the next one, and the linear forms of all members are
+//! solved together. "Any of" gives the hull of what each member leaves. Members that are decided in the box
+//! drop out of the tree. A point where a leaf is not a number is not in the solid, so a leaf that is positive
+//! nowhere decides "all of" whatever the others are.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::geom::Aabb;
+use crate::ir::{Contracted, LinearForm, contract_linear, contract_linear_around};
+use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
+use crate::solid::leaves::words::{PAYLOAD, Word, skip};
+
+use super::search::{Effort, Shrink};
+
+/// Rounds over the whole tree for a box of unknown size. Each halves it at least, or is the last.
+const MOST_ROUNDS: usize = 24;
+
+/// Rounds for a cell of a subdivision.
+const ROUNDS_OF_CELL: usize = 2;
+
+/// A round that leaves more than this of each side is the last one.
+const WORTH_ANOTHER: f64 = 0.8;
+
+/// The words of the part of a tree that still matters in a box; `None` if all of the box is inside.
+pub type Remaining = Option<Arc<[u32]>>;
+
+/// A tree of the leaves of a solid: that of the solid, or of its complement.
+pub struct Tree {
+    pub parts: Arc<LeafTree>,
+    pub words: Arc<[u32]>,
+}
+
+impl Shrink for Tree {
+    type Known = Remaining;
+
+    fn everything(&self) -> Remaining {
+        Some(self.words.clone())
+    }
+
+    fn shrink(&self, known: &Remaining, space: &mut Aabb, effort: Effort) -> Option<Remaining> {
+        let Some(words) = known else { return Some(None) };
+        let mut words = words.clone();
+        let rounds = if effort == Effort::Large { MOST_ROUNDS } else { ROUNDS_OF_CELL };
+        for _ in 0..rounds {
+            let before = *space;
+            let (left, forms) = (Vec::new(), Vec::new());
+            let mut pass = Pass { leaves: &self.parts.leaves, words: &words, effort, origin: space.centre(), left, forms };
+            match pass.tree(&mut 0, space) {
+                Contracted::Nowhere => return None,
+                Contracted::Everywhere => return Some(None),
+                Contracted::Somewhere => {}
+            }
+            if !pass.solve(0, space) {
+                return None;
+            }
+            if pass.left.len() < words.len() {
+                words = pass.left.into();
+            }
+            if (0..3).all(|axis| space.size()[axis] >= WORTH_ANOTHER * before.size()[axis]) {
+                break;
+            }
+        }
+        Some(Some(words))
+    }
+
+    fn work(&self, known: &Remaining) -> usize {
+        known.as_ref().map_or(1, |words| words.len())
+    }
+
+    fn is_inside(known: &Remaining) -> bool {
+        known.is_none()
+    }
+
+    /// The members of "any of", each with the box that it had alone.
+    fn parts(&self, space: &Aabb) -> Vec<(Aabb, Remaining)> {
+        let Word::Any(count) = Word::read(self.words[0]) else {
+            return vec![(*space, self.everything())];
+        };
+        let mut at = 1;
+        let members = (0..count).filter_map(|_| {
+            let begin = at;
+            skip(&self.words, &mut at);
+            let words: Arc<[u32]> = self.words[begin..at].into();
+            let mut own = *space;
+            let known = self.shrink(&Some(words), &mut own, Effort::Large)?;
+            Some((own, known))
+        });
+        members.collect()
+    }
+}
+
+/// One walk over a tree.
+struct Pass<'a> {
+    leaves: &'a Leaves,
+    words: &'a [u32],
+    effort: Effort,
+    /// Derivatives speak of distances from here.
+    origin: DVec3,
+    /// The part of the tree that still matters.
+    left: Vec<u32>,
+    /// Linear forms of the leaves joined by "all of" that is being walked.
+    forms: Vec<LinearForm>,
+}
+
+impl Pass<'_> {
+    fn tree(&mut self, at: &mut usize, space: &mut Aabb) -> Contracted {
+        let code = self.words[*at];
+        *at += 1;
+        match Word::read(code) {
+            Word::Leaf { leaf, negated } => {
+                let verdict = self.leaf(leaf, negated, space);
+                if verdict == Contracted::Somewhere {
+                    self.left.push(code);
+                }
+                verdict
+            }
+            Word::All(parts) => self.all(code, parts, at, space),
+            Word::Any(parts) => self.any(code, parts, at, space),
+        }
+    }
+
+    fn leaf(&mut self, leaf: u32, negated: bool, space: &mut Aabb) -> Contracted {
+        let (contractor, wanted) = self.leaves.contractor(leaf, negated);
+        let is_large = self.effort == Effort::Large;
+        let verdict = contractor.contract(&wanted, space, is_large.then_some(&mut self.forms));
+        if verdict != Contracted::Somewhere || is_large || self.effort == Effort::Point {
+            return verdict;
+        }
+        contractor.contract_by_slopes(&wanted, space, (self.origin, &mut self.forms))
+    }
+
+    /// Cuts off what the linear forms from `first` on exclude together. False if nothing is left.
+    fn solve(&self, first: usize, space: &mut Aabb) -> bool {
+        let forms = &self.forms[first..];
+        match self.effort {
+            Effort::Large => contract_linear(forms, space),
+            Effort::Cell => contract_linear_around(self.origin, forms, space),
+            Effort::Point => true,
+        }
+    }
+
+    fn all(&mut self, code: u32, parts: u32, at: &mut usize, space: &mut Aabb) -> Contracted {
+        let (start, first_form) = (self.left.len(), self.forms.len());
+        self.left.push(code);
+        let (mut count, mut missed) = (0, false);
+        for _ in 0..parts {
+            if missed {
+                skip(self.words, at);
+                continue;
+            }
+            match self.tree(at, space) {
+                Contracted::Nowhere => missed = true,
+                Contracted::Everywhere => {}
+                Contracted::Somewhere => count += 1,
+            }
+        }
+        missed = missed || !self.solve(first_form, space);
+        self.forms.truncate(first_form);
+        if missed {
+            self.left.truncate(start);
+            return Contracted::Nowhere;
+        }
+        self.close(start, code, count, Contracted::Everywhere)
+    }
+
+    fn any(&mut self, code: u32, parts: u32, at: &mut usize, space: &mut Aabb) -> Contracted {
+        let (start, first_form) = (self.left.len(), self.forms.len());
+        self.left.push(code);
+        let (mut count, mut filled, mut hull) = (0, false, Aabb::EMPTY);
+        for _ in 0..parts {
+            if filled {
+                skip(self.words, at);
+                continue;
+            }
+            let (mut own, before) = (*space, self.left.len());
+            let mut verdict = self.tree(at, &mut own);
+            if verdict == Contracted::Somewhere && !self.solve(first_form, &mut own) {
+                verdict = Contracted::Nowhere;
+                self.left.truncate(before);
+            }
+            self.forms.truncate(first_form);
+            match verdict {
+                Contracted::Nowhere => {}
+                Contracted::Everywhere => filled = true,
+                Contracted::Somewhere => {
+                    hull = hull.union(&own);
+                    count += 1;
+                }
+            }
+        }
+        if filled {
+            self.left.truncate(start);
+            return Contracted::Everywhere;
+        }
+        if count > 0 {
+            *space = space.intersection(&hull);
+        }
+        self.close(start, code, count, Contracted::Nowhere)
+    }
+
+    /// Ends a list of `count` members that are left. Without any its verdict is `neutral`.
+    fn close(&mut self, start: usize, code: u32, count: u32, neutral: Contracted) -> Contracted {
+        match count {
+            0 => {
+                self.left.truncate(start);
+                return neutral;
+            }
+            1 => {
+                self.left.remove(start);
+            }
+            _ => self.left[start] = code & !PAYLOAD | count,
+        }
+        Contracted::Somewhere
+    }
+}
