@@ -129,7 +129,16 @@ impl Table {
             writeln!(out, "{}", names.join(","))?;
         }
         let precision = options.precision.unwrap_or(Precision::F64);
-        Ok(Self { solid, chosen, what: asked, precision, json: json.then(Vec::new), names, distances: OnceCell::new(), out })
+        Ok(Self {
+            solid,
+            chosen,
+            what: asked,
+            precision,
+            json: json.then(Vec::new),
+            names,
+            distances: OnceCell::new(),
+            out,
+        })
     }
 
     fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {

@@ -87,7 +87,11 @@ impl Solid {
     pub fn contact(&self, p: DVec3) -> Contact {
         let contact = self.estimated_contact(p);
         let is_lost = contact.distance == 0.0 || contact.distance.is_nan();
-        if is_lost && self.sign(p).abs() == 1.0 { self.searched_contact(p).unwrap_or(contact) } else { contact }
+        if is_lost && self.sign(p).abs() == 1.0 {
+            self.searched_contact(p).unwrap_or(contact)
+        } else {
+            contact
+        }
     }
 
     /// The contact that its program finds. Where no derivative tells anything its distance is 0.

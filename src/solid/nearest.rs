@@ -119,8 +119,8 @@ impl Distances {
             work = work.saturating_sub(target.work(&known));
             best.try_cell(&space);
             for mut half in space.halves() {
-                let Some(known) = target.shrink(&known, &mut half, Effort::Cell) else { continue };
-                let distance = distance_to(&half, p);
+                let Some((known, beyond)) = target.shrink_from(&known, &mut half, p) else { continue };
+                let distance = distance_to(&half, p).max(beyond);
                 if distance < best.distance {
                     queue.push(Cell { distance, space: half, known });
                 }

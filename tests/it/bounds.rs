@@ -69,13 +69,20 @@ fn conjuncts_bound_each_other() {
 
 #[test]
 fn a_conjunct_with_a_box_has_at_least_that_box() {
-    for other in ["x^y <= 1", "(-x)^0.5 <= 1", "x/y <= 1", "asin(x*y) >= 0", "ln(x - 0.5) <= 9", "tan(x) <= 2"] {
+    for other in
+        ["x^y <= 1", "(-x)^0.5 <= 1", "x/y <= 1", "asin(x*y) >= 0", "ln(x - 0.5) <= 9", "tan(x) <= 2"]
+    {
         let solid = solid(&format!("{other} and box()"));
         match *solid.bounds() {
             Bounds::Within(found) => {
-                assert!(found.union(&Aabb::new(DVec3::ZERO, DVec3::ONE)).size() == DVec3::ONE, "{other}: {found:?}");
+                assert!(
+                    found.union(&Aabb::new(DVec3::ZERO, DVec3::ONE)).size() == DVec3::ONE,
+                    "{other}: {found:?}"
+                );
             }
-            Bounds::Empty => assert!(sampled(&solid, &Aabb::new(DVec3::ZERO, DVec3::ONE), 100_000).is_empty()),
+            Bounds::Empty => {
+                assert!(sampled(&solid, &Aabb::new(DVec3::ZERO, DVec3::ONE), 100_000).is_empty())
+            }
             Bounds::Unbounded => panic!("{other} and box() has no bounds"),
         }
     }
@@ -87,10 +94,16 @@ fn turned_half_spaces_are_solved_together() {
     // a wedge: the tetrahedron with the corners 0, x, y and z at 2
     let wedge = "(x >= 0 and y >= 0 and z >= 0 and x + y + z <= 2)";
     let rotation = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
-    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|c| rotation * (2.0 * c) + DVec3::new(3.0, -1.0, 2.0));
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]
+        .map(|c| rotation * (2.0 * c) + DVec3::new(3.0, -1.0, 2.0));
     let truth = corners.iter().fold(Aabb::EMPTY, |hull, &c| hull.including(c));
     check(&format!("{wedge}{turn}"), truth.min.to_array(), truth.max.to_array(), 1e-6);
-    check(&format!("({wedge}{turn}) or ({wedge}{turn} and z >= x)"), truth.min.to_array(), truth.max.to_array(), 1e-6);
+    check(
+        &format!("({wedge}{turn}) or ({wedge}{turn} and z >= x)"),
+        truth.min.to_array(),
+        truth.max.to_array(),
+        1e-6,
+    );
 }
 
 #[test]
@@ -139,7 +152,11 @@ fn unbounded_solids_say_which_operand_and_where() {
         let why = solid.unbounded().unwrap_or_else(|| panic!("{text} has bounds"));
         let span = why.operand.unwrap();
         assert_eq!(&source[span.range()], operand);
-        assert!(!why.sides.is_empty() && why.sides.iter().all(|side| sides.contains(side)), "{text}: {:?}", why.sides);
+        assert!(
+            !why.sides.is_empty() && why.sides.iter().all(|side| sides.contains(side)),
+            "{text}: {:?}",
+            why.sides
+        );
     }
 }
 
@@ -166,25 +183,23 @@ fn convex() -> impl Strategy<Value = (String, DVec3, DVec3)> {
                     format!("box([-{a}, -{b}, -{c}], [{a}, {b}, {c}])"),
                     reach(&|r| r.abs().dot(DVec3::new(a, b, c))),
                 ),
-                1 => (
-                    format!("ellipsoid({a}, {b}, {c})"),
-                    reach(&|r| (r * DVec3::new(a, b, c)).length()),
-                ),
+                1 => (format!("ellipsoid({a}, {b}, {c})"), reach(&|r| (r * DVec3::new(a, b, c)).length())),
                 2 => (
                     format!("cylinder({a}, {b}).move([0, 0, -{b}/2])"),
                     reach(&|r| disc(r) + 0.5 * b * r.z.abs()),
                 ),
-                _ => (
-                    format!("capsule({a}, {b}).move([0, 0, -{b}/2])"),
-                    reach(&|r| a + 0.5 * b * r.z.abs()),
-                ),
+                _ => (format!("capsule({a}, {b}).move([0, 0, -{b}/2])"), reach(&|r| a + 0.5 * b * r.z.abs())),
             };
             (format!("{text}.rotate({axis:?}, {angle}).move({by:?})"), DVec3::from_array(by), reach)
         })
 }
 
 fn config(cases: u32) -> ProptestConfig {
-    ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::with_cases(cases) }
+    ProptestConfig {
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(7),
+        ..ProptestConfig::with_cases(cases)
+    }
 }
 
 #[test]
@@ -252,7 +267,10 @@ fn random_bounded_solids_have_bounds_that_hold_all_their_points() {
                 // again where the solid is, so that many points are near its sides
                 let near = sampled(&solid, &found.grown(0.1 * found.size().max_element()), 20_000);
                 for points in [points, near] {
-                    prop_assert!(points.is_empty() || found.union(&points) == found, "{text}: {points:?}, {found:?}");
+                    prop_assert!(
+                        points.is_empty() || found.union(&points) == found,
+                        "{text}: {points:?}, {found:?}"
+                    );
                 }
             }
             Bounds::Empty => prop_assert!(points.is_empty(), "{text} is not empty"),

@@ -48,9 +48,13 @@ impl RangeRule {
             if a == b {
                 return Self::Square(a);
             }
-            let ((of, first), (other, second)) = (affine(graph, a), affine(graph, b));
-            if of == other && !is_number(graph, of) {
-                return Self::Slab { of, first, second };
+            let itself = |node| (node, Affine { slope: 1.0, offset: None, minus: false });
+            let (of_a, of_b) = (affine(graph, a), affine(graph, b));
+            // a·(h − a) is a slab of a, whatever a is made of
+            for ((of, first), (other, second)) in [(of_a, of_b), (itself(a), of_b), (of_a, itself(b))] {
+                if of == other && !is_number(graph, of) {
+                    return Self::Slab { of, first, second };
+                }
             }
         }
         Self::Plain(expr)

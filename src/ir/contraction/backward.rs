@@ -186,7 +186,10 @@ pub fn power(value: Interval, a: Interval, exponent: u32) -> Option<Interval> {
     let value = value.widened(exponent.saturating_mul(2).min(200));
     if exponent.is_multiple_of(2) {
         let value = meet(value, POSITIVE)?;
-        return either_sign(a, Interval { lo: root(value.lo, exponent, false), hi: root(value.hi, exponent, true) });
+        return either_sign(
+            a,
+            Interval { lo: root(value.lo, exponent, false), hi: root(value.hi, exponent, true) },
+        );
     }
     let signed = |x: f64, up: bool| if x < 0.0 { -root(-x, exponent, !up) } else { root(x, exponent, up) };
     meet(a, Interval { lo: signed(value.lo, false), hi: signed(value.hi, true) })
@@ -230,7 +233,8 @@ pub fn slab(value: Interval, e: Interval, first: (f64, f64), second: (f64, f64))
     let t = Interval { lo: root(square.lo, 2, false), hi: root(square.hi, 2, true) };
     let slack = 4.0 * f64::EPSILON * (middle.abs() + high.abs() + low.abs());
     let slack_at = |x: f64| slack + 1e-14 * x.abs();
-    let right = Interval { lo: middle + t.lo - slack_at(t.lo), hi: middle + t.hi + slack_at(t.hi.min(1e300)) };
+    let right =
+        Interval { lo: middle + t.lo - slack_at(t.lo), hi: middle + t.hi + slack_at(t.hi.min(1e300)) };
     let left = Interval { lo: middle - t.hi - slack_at(t.hi.min(1e300)), hi: middle - t.lo + slack_at(t.lo) };
     meet_either(e, [left, right])
 }

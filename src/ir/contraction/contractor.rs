@@ -207,9 +207,7 @@ impl Contractor {
                     values[b.index()] = right;
                 }
             }
-            Rule::Plain(
-                Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_),
-            ) => {}
+            Rule::Plain(Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_)) => {}
         }
         Some(())
     }

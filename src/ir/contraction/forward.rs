@@ -95,7 +95,8 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Numbers {
         Binary::Sub => sum(a, -b).into(),
         Binary::Mul => (a * b).into(),
         Binary::Div if b.contains(0.0) => Numbers { range: Some(Interval::ALL), may_fail: true },
-        Binary::Div | Binary::DivOrZero
+        Binary::Div
+        | Binary::DivOrZero
         | Binary::Min
         | Binary::Max
         | Binary::PlainMin
@@ -121,8 +122,20 @@ fn conjunction(a: Interval, b: Interval) -> Interval {
 pub fn sum(a: Interval, b: Interval) -> Interval {
     let (lo, low_error) = exact_sum(a.lo, b.lo);
     let (hi, high_error) = exact_sum(a.hi, b.hi);
-    let lo = if lo.is_nan() { f64::NEG_INFINITY } else if low_error < 0.0 { lo.next_down() } else { lo };
-    let hi = if hi.is_nan() { f64::INFINITY } else if high_error > 0.0 { hi.next_up() } else { hi };
+    let lo = if lo.is_nan() {
+        f64::NEG_INFINITY
+    } else if low_error < 0.0 {
+        lo.next_down()
+    } else {
+        lo
+    };
+    let hi = if hi.is_nan() {
+        f64::INFINITY
+    } else if high_error > 0.0 {
+        hi.next_up()
+    } else {
+        hi
+    };
     Interval { lo, hi }
 }
 
@@ -154,7 +167,10 @@ pub fn power(a: Interval, exponent: u32) -> Interval {
         let (lo, hi) = (at(a.lo), at(a.hi));
         return Interval { lo: if a.lo == 0.0 { 0.0 } else { lo.lo.max(0.0) }, hi: hi.hi };
     }
-    Interval { lo: if a.lo == 0.0 { 0.0 } else { at(a.lo).lo }, hi: if a.hi == 0.0 { 0.0 } else { at(a.hi).hi } }
+    Interval {
+        lo: if a.lo == 0.0 { 0.0 } else { at(a.lo).lo },
+        hi: if a.hi == 0.0 { 0.0 } else { at(a.hi).hi },
+    }
 }
 
 trait Squared {

@@ -32,6 +32,22 @@ impl LinearForm {
     }
 }
 
+impl LinearForm {
+    /// A bound from below of the distance between a point and the points of a box that the form leaves. All of
+    /// them are relative to the origin of the form.
+    pub fn distance(&self, p: DVec3, over: &Aabb) -> f64 {
+        let middle = DVec3::from_array(self.slopes.map(|slope| 0.5 * (slope.lo + slope.hi)));
+        let error = DVec3::from_array(self.slopes.map(|slope| 0.5 * slope.width().next_up()));
+        let reach = over.min.abs().max(over.max.abs());
+        // middle·q is at least this for all q that are left
+        let least = self.range.lo - error.dot(reach);
+        let rounding = 1e-14 * (middle.abs().dot(reach + p.abs()) + self.range.lo.abs());
+        let distance = (least - middle.dot(p) - rounding) / middle.length() * (1.0 - 1e-14);
+        // NaN for slopes that are not known
+        if distance > 0.0 && distance.is_finite() { distance } else { 0.0 }
+    }
+}
+
 /// aᵢ·p ≤ b
 #[derive(Clone, Copy)]
 struct Constraint {
@@ -183,7 +199,11 @@ fn constraints(forms: &[&LinearForm], space: &Aabb) -> Vec<Constraint> {
     for (sign, corner) in [(1.0, space.max), (-1.0, -space.min)] {
         for axis in 0..3 {
             let normal = DVec3::AXES[axis] * sign;
-            out.push(Constraint { slopes: normal.to_array().map(Interval::point), most: corner[axis], normal });
+            out.push(Constraint {
+                slopes: normal.to_array().map(Interval::point),
+                most: corner[axis],
+                normal,
+            });
         }
     }
     let reach = space.min.abs().max(space.max.abs());
@@ -204,7 +224,8 @@ fn constraints(forms: &[&LinearForm], space: &Aabb) -> Vec<Constraint> {
 
 /// A bound of direction·p under constraints, the first six of which are a box.
 fn largest(constraints: &[Constraint], direction: DVec3) -> Option<f64> {
-    let mut basis: [usize; 3] = std::array::from_fn(|axis| if direction[axis] < 0.0 { axis + 3 } else { axis });
+    let mut basis: [usize; 3] =
+        std::array::from_fn(|axis| if direction[axis] < 0.0 { axis + 3 } else { axis });
     for _ in 0..MOST_PIVOTS {
         let inverse = inverse_of(constraints, basis)?;
         let multipliers = (inverse * direction).max(DVec3::ZERO);
@@ -249,7 +270,12 @@ fn most_violated(constraints: &[Constraint], basis: [usize; 3], inverse: &DMat3)
 }
 
 /// The bound that multipliers prove: Σ λb, and what they miss of the direction at its worst in the box.
-fn proven(constraints: &[Constraint], basis: [usize; 3], multipliers: DVec3, direction: DVec3) -> Option<f64> {
+fn proven(
+    constraints: &[Constraint],
+    basis: [usize; 3],
+    multipliers: DVec3,
+    direction: DVec3,
+) -> Option<f64> {
     let mut bound = ZERO;
     let mut missing = direction.to_array().map(Interval::point);
     for (i, multiplier) in basis.into_iter().zip(multipliers.to_array()) {

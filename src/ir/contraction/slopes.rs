@@ -70,7 +70,8 @@ fn solve(most: f64, slopes: Slopes, centre: DVec3, space: &mut Aabb) -> Contract
     };
     for axis in 0..3 {
         let others = (0..3).filter(|&other| other != axis);
-        let gained = others.fold(Interval::point(most), |sum, other| sum + slopes[other] * offset(space, other));
+        let gained =
+            others.fold(Interval::point(most), |sum, other| sum + slopes[other] * offset(space, other));
         if !gained.hi.is_finite() {
             continue;
         }
@@ -127,9 +128,10 @@ fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval) -
             let (a, da) = of(a);
             let factor = match op {
                 Unary::Neg => -ONE,
-                Unary::Abs => {
-                    Interval { lo: if a.lo >= 0.0 { 1.0 } else { -1.0 }, hi: if a.hi <= 0.0 { -1.0 } else { 1.0 } }
-                }
+                Unary::Abs => Interval {
+                    lo: if a.lo >= 0.0 { 1.0 } else { -1.0 },
+                    hi: if a.hi <= 0.0 { -1.0 } else { 1.0 },
+                },
                 Unary::Sqrt => ONE / (TWO * value),
                 // it jumps
                 Unary::Sign => return constant_or_unknown(da),
@@ -164,9 +166,7 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
             let weight = Interval { lo: 0.0, hi: 2.0_f64.next_up() };
             mixed(weight, weight)
         }
-        Binary::Call(BinaryFunction::Pow) if b.lo == b.hi && a.lo > 0.0 => {
-            scaled(b * (value / a), da)
-        }
+        Binary::Call(BinaryFunction::Pow) if b.lo == b.hi && a.lo > 0.0 => scaled(b * (value / a), da),
         Binary::Call(BinaryFunction::Atan2) => {
             let squares = a.square() + b.square();
             mixed(b / squares, -(a / squares))

@@ -22,10 +22,10 @@ use crate::ir::derived::sign::SignRule;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 
-/// How far a point is moved off a singular place of a leaf, relative to its coordinates, and at least. Their squares
-/// must be numbers in `f32` as well.
+/// How far a point is moved off a singular place of a leaf, relative to the leaf's value and to the coordinates. Second
+/// derivatives grow with its inverse, and lose as many digits.
+const STEP: f64 = 1e-6;
 const RELATIVE_STEP: f64 = 2.5e-7;
-const ABSOLUTE_STEP: f64 = 1e-15;
 
 /// What is known of the surface nearest to a point, as nodes.
 #[derive(Debug, Clone, Copy)]
@@ -179,6 +179,7 @@ impl Builder<'_> {
     /// The coordinates, moved a little where a root or a magnitude in u vanishes: there its derivative is put to
     /// 0, which hides the surface around an axis. `None` if u has neither.
     fn beside_singular(&mut self, u: Node) -> Option<[Node; 3]> {
+        use Binary::{Add, Min, MinWeight, Mul};
         let arguments: Vec<Node> = self
             .graph
             .cone(u)
@@ -190,21 +191,26 @@ impl Builder<'_> {
             .filter(|&a| Axis::SPACE.iter().any(|&axis| self.graph.uses(a, axis)))
             .collect();
         let magnitudes: Vec<Node> = arguments.iter().map(|&a| self.graph.unary(Unary::Abs, a)).collect();
-        let smallest = magnitudes.into_iter().reduce(|a, b| self.graph.binary(Binary::Min, a, b))?;
-        let is_regular = self.graph.unary(Unary::Sign, smallest);
-        let one = self.graph.constant(1.0);
-        let is_singular = self.graph.binary(Binary::Sub, one, is_regular);
+        let smallest = magnitudes.into_iter().reduce(|a, b| self.graph.binary(Min, a, b))?;
+        // the step in lengths: the value of a leaf is about its distance
+        let (step, half) = (self.graph.constant(STEP), self.graph.constant(0.5 * STEP));
+        let size = self.graph.unary(Unary::Abs, u);
+        let [step, near] = [step, half].map(|factor| self.graph.binary(Mul, factor, size));
+        let near = self.graph.binary(Mul, near, near);
+        let is_singular = self.graph.binary(MinWeight, smallest, near);
         let mut part = 1.0;
         Some(Axis::SPACE.map(|axis| {
             let coordinate = self.graph.coordinate(axis);
-            let [relative, absolute] = [RELATIVE_STEP, ABSOLUTE_STEP].map(|step| self.graph.constant(part * step));
+            let magnitude = self.graph.unary(Unary::Abs, coordinate);
+            let relative = self.graph.constant(RELATIVE_STEP);
+            let relative = self.graph.binary(Mul, relative, magnitude);
+            let both = self.graph.binary(Add, relative, step);
             // in no direction that a formula is likely to have
+            let factor = self.graph.constant(part);
             part *= 0.7;
-            let size = self.graph.unary(Unary::Abs, coordinate);
-            let step = self.graph.binary(Binary::Mul, relative, size);
-            let step = self.graph.binary(Binary::Add, step, absolute);
-            let step = self.graph.binary(Binary::Mul, is_singular, step);
-            self.graph.binary(Binary::Add, coordinate, step)
+            let offset = self.graph.binary(Mul, factor, both);
+            let offset = self.graph.binary(Mul, is_singular, offset);
+            self.graph.binary(Add, coordinate, offset)
         }))
     }
 

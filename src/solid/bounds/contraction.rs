@@ -42,29 +42,11 @@ impl Shrink for Tree {
     }
 
     fn shrink(&self, known: &Remaining, space: &mut Aabb, effort: Effort) -> Option<Remaining> {
-        let Some(words) = known else { return Some(None) };
-        let mut words = words.clone();
-        let rounds = if effort == Effort::Large { MOST_ROUNDS } else { ROUNDS_OF_CELL };
-        for _ in 0..rounds {
-            let before = *space;
-            let (left, forms) = (Vec::new(), Vec::new());
-            let mut pass = Pass { leaves: &self.parts.leaves, words: &words, effort, origin: space.centre(), left, forms };
-            match pass.tree(&mut 0, space) {
-                Contracted::Nowhere => return None,
-                Contracted::Everywhere => return Some(None),
-                Contracted::Somewhere => {}
-            }
-            if !pass.solve(0, space) {
-                return None;
-            }
-            if pass.left.len() < words.len() {
-                words = pass.left.into();
-            }
-            if (0..3).all(|axis| space.size()[axis] >= WORTH_ANOTHER * before.size()[axis]) {
-                break;
-            }
-        }
-        Some(Some(words))
+        self.rounds(known, space, effort, None).map(|(known, _)| known)
+    }
+
+    fn shrink_from(&self, known: &Remaining, space: &mut Aabb, p: DVec3) -> Option<(Remaining, f64)> {
+        self.rounds(known, space, Effort::Cell, Some(p))
     }
 
     fn work(&self, known: &Remaining) -> usize {
@@ -93,11 +75,62 @@ impl Shrink for Tree {
     }
 }
 
+impl Tree {
+    /// Walks over the tree until that no longer pays. With a point `from` it also tells how far from it all that
+    /// is left must be.
+    fn rounds(
+        &self,
+        known: &Remaining,
+        space: &mut Aabb,
+        effort: Effort,
+        from: Option<DVec3>,
+    ) -> Option<(Remaining, f64)> {
+        let Some(words) = known else { return Some((None, 0.0)) };
+        let mut words = words.clone();
+        let rounds = if effort == Effort::Large { MOST_ROUNDS } else { ROUNDS_OF_CELL };
+        let mut distance: f64 = 0.0;
+        for _ in 0..rounds {
+            let before = *space;
+            let (left, forms) = (Vec::new(), Vec::new());
+            let mut pass = Pass {
+                leaves: &self.parts.leaves,
+                words: &words,
+                effort,
+                from,
+                origin: space.centre(),
+                distance: 0.0,
+                left,
+                forms,
+            };
+            match pass.tree(&mut 0, space) {
+                Contracted::Nowhere => return None,
+                Contracted::Everywhere => return Some((None, 0.0)),
+                Contracted::Somewhere => {}
+            }
+            if !pass.solve(0, space) {
+                return None;
+            }
+            distance = pass.distance.max(distance);
+            if pass.left.len() < words.len() {
+                words = pass.left.into();
+            }
+            if (0..3).all(|axis| space.size()[axis] >= WORTH_ANOTHER * before.size()[axis]) {
+                break;
+            }
+        }
+        Some((Some(words), distance))
+    }
+}
+
 /// One walk over a tree.
 struct Pass<'a> {
     leaves: &'a Leaves,
     words: &'a [u32],
     effort: Effort,
+    /// The point whose distance is asked for.
+    from: Option<DVec3>,
+    /// A bound from below of its distance from what was left of the tree that was walked last.
+    distance: f64,
     /// Derivatives speak of distances from here.
     origin: DVec3,
     /// The part of the tree that still matters.
@@ -124,13 +157,20 @@ impl Pass<'_> {
     }
 
     fn leaf(&mut self, leaf: u32, negated: bool, space: &mut Aabb) -> Contracted {
+        self.distance = 0.0;
         let (contractor, wanted) = self.leaves.contractor(leaf, negated);
         let is_large = self.effort == Effort::Large;
         let verdict = contractor.contract(&wanted, space, is_large.then_some(&mut self.forms));
         if verdict != Contracted::Somewhere || is_large || self.effort == Effort::Point {
             return verdict;
         }
-        contractor.contract_by_slopes(&wanted, space, (self.origin, &mut self.forms))
+        let count = self.forms.len();
+        let verdict = contractor.contract_by_slopes(&wanted, space, (self.origin, &mut self.forms));
+        if let (Some(p), Some(form)) = (self.from, self.forms.get(count)) {
+            let local = Aabb::new(space.min - self.origin, space.max - self.origin);
+            self.distance = form.distance(p - self.origin, &local);
+        }
+        verdict
     }
 
     /// Cuts off what the linear forms from `first` on exclude together. False if nothing is left.
@@ -146,7 +186,7 @@ impl Pass<'_> {
     fn all(&mut self, code: u32, parts: u32, at: &mut usize, space: &mut Aabb) -> Contracted {
         let (start, first_form) = (self.left.len(), self.forms.len());
         self.left.push(code);
-        let (mut count, mut missed) = (0, false);
+        let (mut count, mut missed, mut distance) = (0, false, 0.0_f64);
         for _ in 0..parts {
             if missed {
                 skip(self.words, at);
@@ -155,9 +195,13 @@ impl Pass<'_> {
             match self.tree(at, space) {
                 Contracted::Nowhere => missed = true,
                 Contracted::Everywhere => {}
-                Contracted::Somewhere => count += 1,
+                Contracted::Somewhere => {
+                    count += 1;
+                    distance = distance.max(self.distance);
+                }
             }
         }
+        self.distance = distance;
         missed = missed || !self.solve(first_form, space);
         self.forms.truncate(first_form);
         if missed {
@@ -170,7 +214,7 @@ impl Pass<'_> {
     fn any(&mut self, code: u32, parts: u32, at: &mut usize, space: &mut Aabb) -> Contracted {
         let (start, first_form) = (self.left.len(), self.forms.len());
         self.left.push(code);
-        let (mut count, mut filled, mut hull) = (0, false, Aabb::EMPTY);
+        let (mut count, mut filled, mut hull, mut distance) = (0, false, Aabb::EMPTY, f64::INFINITY);
         for _ in 0..parts {
             if filled {
                 skip(self.words, at);
@@ -188,10 +232,12 @@ impl Pass<'_> {
                 Contracted::Everywhere => filled = true,
                 Contracted::Somewhere => {
                     hull = hull.union(&own);
+                    distance = distance.min(self.distance);
                     count += 1;
                 }
             }
         }
+        self.distance = if filled || count == 0 { 0.0 } else { distance };
         if filled {
             self.left.truncate(start);
             return Contracted::Everywhere;

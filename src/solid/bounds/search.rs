@@ -46,6 +46,8 @@ pub trait Shrink {
     fn everything(&self) -> Self::Known;
     /// What is known of the smaller box; `None` if it is proven to be outside. `known` holds of a larger one.
     fn shrink(&self, known: &Self::Known, space: &mut Aabb, effort: Effort) -> Option<Self::Known>;
+    /// As for a cell, with a bound from below of the distance between a point and all that is left.
+    fn shrink_from(&self, known: &Self::Known, space: &mut Aabb, p: DVec3) -> Option<(Self::Known, f64)>;
     /// What a call costs, in units that `WORK_OF_SIDE` knows.
     fn work(&self, known: &Self::Known) -> usize;
     /// Boxes that together hold the part of the solid in `space`.

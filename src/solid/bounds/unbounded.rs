@@ -43,9 +43,9 @@ impl Solid {
         let operand = self.unbounded_operand(graph, root);
         let part = if operand == root { None } else { self.operand(graph, operand) };
         let open = part.as_ref().unwrap_or(self).open_sides();
-        let sides = open.into_iter().map(|Side { axis, upper }| {
-            [["-x", "+x"], ["-y", "+y"], ["-z", "+z"]][axis][usize::from(upper)]
-        });
+        let sides = open
+            .into_iter()
+            .map(|Side { axis, upper }| [["-x", "+x"], ["-y", "+y"], ["-z", "+z"]][axis][usize::from(upper)]);
         Some(Unbounded { operand: graph.span(operand), is_whole: operand == root, sides: sides.collect() })
     }
 
@@ -69,8 +69,7 @@ impl Solid {
             };
             let mut is_open = |node: Node| {
                 looks = usize::saturating_sub(looks, 1);
-                looks > 0
-                    && self.operand(graph, node).is_some_and(|part| *part.bounds() == Bounds::Unbounded)
+                looks > 0 && self.operand(graph, node).is_some_and(|part| *part.bounds() == Bounds::Unbounded)
             };
             node = if is_open(a) {
                 a

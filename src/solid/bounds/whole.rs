@@ -33,7 +33,8 @@ impl WholeFormula {
     }
 
     fn contract(&self, space: &mut Aabb, effort: Effort) -> Contracted {
-        let wanted = Wanted { region: Region { time: self.time, ..Region::of(&Aabb::EMPTY) }, negated: self.negated };
+        let wanted =
+            Wanted { region: Region { time: self.time, ..Region::of(&Aabb::EMPTY) }, negated: self.negated };
         let mut forms = Vec::new();
         let wants_forms = (effort == Effort::Large).then_some(&mut forms);
         let verdict = self.contractor.contract(&wanted, space, wants_forms);
@@ -69,6 +70,10 @@ impl Shrink for WholeFormula {
             Contracted::Everywhere => Some(true),
             Contracted::Somewhere => Some(false),
         }
+    }
+
+    fn shrink_from(&self, known: &bool, space: &mut Aabb, _: DVec3) -> Option<(bool, f64)> {
+        self.shrink(known, space, Effort::Cell).map(|known| (known, 0.0))
     }
 
     fn work(&self, _: &bool) -> usize {

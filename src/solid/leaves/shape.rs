@@ -8,7 +8,8 @@ use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
-    self, Contractor, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region, Uniforms,
+    self, Contractor, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, RangeEvaluator, Region,
+    Uniforms,
 };
 use crate::simplify::simplify;
 use crate::solid::engine::Engine;
