@@ -271,6 +271,9 @@ pub(super) struct Run {
     /// Print what would be run, and run nothing
     #[arg(long, conflicts_with = "resume")]
     pub dry_run: bool,
+    /// Refuse scenes with more obstacles than this: many parts are better joined with `or` into one solid
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    pub most_obstacles: usize,
     /// Write no pictures
     #[arg(long)]
     pub no_pictures: bool,

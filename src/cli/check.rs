@@ -11,6 +11,9 @@ use super::failure::{Failure, complain, note};
 use super::{choose, input, output, section};
 use crate::cli::output::Shown;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::interval::Interval;
 use rfm::ir::Magnitudes;
 use rfm::lower::NamedSolid;
 use rfm::mesh::{self, Grid, Resolution, ThinCells, VolumeError};
@@ -41,11 +44,15 @@ struct Message {
     help: Option<String>,
 }
 
-/// The most operations of a solid that is measured. A larger one would take minutes.
-const MOST_MEASURED: usize = 120_000;
+/// Seconds for each operation of a solid of many leaves: of ten thousand parts a minute was seen.
+const SECONDS_BY_LEAVES: f64 = 8e-5;
 
 /// Seconds for each operation of a solid that is evaluated as a whole, at a million points.
-const SECONDS_OF_OPERATION: f64 = 4e-4;
+const SECONDS_AS_A_WHOLE: f64 = 4e-4;
+
+/// Boxes along each side of a solid in which its range is tried; one in so many may be unknown.
+const PROBES: u32 = 16;
+const MOST_UNKNOWN: usize = 50;
 
 /// What is known about a solid. Numbers that do not exist (the volume of an unbounded solid) or that were not
 /// found (the volume of one too thin for the grid) are null.
@@ -69,6 +76,9 @@ struct Facts {
     time: Option<f64>,
     /// The number of cells of the finer grid in which parts of the surface hide, see `mesh::thin_cells`.
     thin_cells: Option<usize>,
+    /// Whether it was tried to find all this.
+    #[serde(skip)]
+    is_measured: bool,
 }
 
 impl Facts {
@@ -87,6 +97,7 @@ impl Facts {
             error_bound: None,
             time: solid.moves().then(|| solid.time()),
             thin_cells: None,
+            is_measured: true,
         }
     }
 }
@@ -95,6 +106,12 @@ impl Facts {
 struct Box3 {
     min: [f64; 3],
     max: [f64; 3],
+}
+
+impl Box3 {
+    fn of(bounds: &Aabb) -> Self {
+        Self { min: bounds.min.to_array(), max: bounds.max.to_array() }
+    }
 }
 
 pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
@@ -232,7 +249,10 @@ fn solids(
         if let Some(why) = too_long(&solid, operations, budget) {
             note(format!("solid `{}` has {operations} operations: {why}", named.name));
             let tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
-            facts.push(Facts { tolerance, ..Facts::unknown(&solid, file) });
+            let bounds = solid.bounds().aabb().map(|bounds| Box3::of(&bounds));
+            let empty = *solid.bounds() == Bounds::Empty;
+            let unknown = Facts::unknown(&solid, file);
+            facts.push(Facts { tolerance, bounds, empty, is_measured: false, ..unknown });
             continue;
         }
         let (mut found, thin) = measure(&solid, file)?;
@@ -252,20 +272,13 @@ fn solids(
     Ok(facts)
 }
 
-/// Why a solid is not measured, if it is not.
+/// Why a solid is not measured, if that would take longer than the budget.
 fn too_long(solid: &Solid, operations: usize, budget: f64) -> Option<String> {
-    if operations > MOST_MEASURED {
-        return Some("it is not measured".into());
-    }
-    // leaf by leaf the work depends on the surface alone
-    if solid.leaf_count().is_some() {
-        return None;
-    }
-    let seconds = SECONDS_OF_OPERATION * operations as f64;
-    (seconds > budget).then(|| {
-        let enough = seconds.ceil();
-        format!("measuring it would take about {enough} s; --budget {enough} allows it")
-    })
+    // leaf by leaf the work grows with the surface rather than with the formula
+    let each = if solid.leaf_count().is_some() { SECONDS_BY_LEAVES } else { SECONDS_AS_A_WHOLE };
+    let seconds = (each * operations as f64).ceil();
+    let why = || format!("measuring it may take {seconds} s; --budget {seconds} allows it");
+    (seconds > budget).then(why)
 }
 
 /// Warnings about a solid that is empty, unbounded or thin.
@@ -342,10 +355,18 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
             return Ok((facts, ThinCells::NONE));
         }
     };
-    facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
+    facts.bounds = Some(Box3::of(bounds));
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
     let grid = Grid::around(bounds, Resolution::Cells(VOLUME_CELLS)).map_err(Failure::usage)?;
-    let thin = mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE);
+    let thin = if knows_ranges(solid, bounds) {
+        Some(mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE))
+    } else {
+        note(format!(
+            "thin parts of `{}` are not looked for: the ranges of its formula are unknown",
+            solid.name()
+        ));
+        None
+    };
     match mesh::volume(&*surface, bounds, VOLUME_CELLS) {
         Ok(found) => {
             facts.volume = Some(found.volume);
@@ -358,8 +379,22 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
         // a field that is not a number somewhere has no volume
         Err(VolumeError::Mesh(_)) => return Ok((facts, ThinCells::NONE)),
     }
-    facts.thin_cells = Some(thin.count);
-    Ok((facts, thin))
+    facts.thin_cells = thin.as_ref().map(|thin| thin.count);
+    Ok((facts, thin.unwrap_or(ThinCells::NONE)))
+}
+
+/// Whether ranges tell anything of the solid nearly everywhere in a box. Where they do not, a search for thin
+/// parts would divide every cell to the end.
+fn knows_ranges(solid: &Solid, bounds: &Aabb) -> bool {
+    let size = bounds.size() / f64::from(PROBES);
+    let probe = |i: u32| {
+        let place =
+            DVec3::new(f64::from(i % PROBES), f64::from(i / PROBES % PROBES), f64::from(i / PROBES.pow(2)));
+        let low = bounds.min + size * place;
+        solid.range(&Aabb::new(low, low + size)) == Interval::ALL
+    };
+    let unknown = (0..PROBES.pow(3)).filter(|&i| probe(i)).count();
+    unknown * MOST_UNKNOWN <= PROBES.pow(3) as usize
 }
 
 fn print(file: &str, program: &Program, facts: &[Facts]) {
@@ -389,7 +424,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
         if let Some(bounds) = &solid.bounds {
             let [min, max] = corners(bounds);
             say!("    bounds      {min} … {max}");
-            if solid.volume.is_none() {
+            if solid.volume.is_none() && solid.is_measured {
                 say!("    volume      not found: too thin for {} cells along its longest side", VOLUME_CELLS);
             }
         } else if !solid.empty {

@@ -49,7 +49,7 @@ const GAP: f64 = 1e-4;
 /// Cells looked at for one point. In the middle of a ball all of its surface is equally near.
 const MOST_CELLS: usize = 1_000;
 
-/// Words of trees looked at for one point.
+/// Work for one point, in the unit of `bounds::search`.
 const MOST_WORK: usize = 100_000;
 
 /// Rays get twice as long so many times.

@@ -150,9 +150,9 @@ fn pawn_distances_far_from_the_wall() {
             continue;
         }
         let found = distances.at(p);
-        // the profile resolves distances to 1e-7
+        // the profile has points up to 2e-5 apart, and none at its corners
         assert!(found.clearance <= exact, "{p}: {found:?} for {exact}");
-        assert!(found.estimate.abs() >= exact - 1e-6, "{p}: {found:?} for {exact}");
+        assert!(found.estimate.abs() >= exact - 2e-5, "{p}: {found:?} for {exact}");
         errors.push((found.estimate.abs() / exact - 1.0).abs());
         gaps.push(1.0 - found.clearance / exact);
     }

@@ -6,7 +6,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::forward::{POSITIVE, sum};
-use super::{meet, meet_either};
+use super::sets::{meet, meet_either};
 use crate::interval::Interval;
 use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::op::{Binary, Unary};

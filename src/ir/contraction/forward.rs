@@ -1,7 +1,7 @@
 //! The numbers that an operation may give.
 
-use super::meet;
 use super::rule::Rule;
+use super::sets::meet;
 use crate::interval::Interval;
 use crate::ir::bounds::range::{self, Region};
 use crate::ir::function::{BinaryFunction, UnaryFunction};

@@ -7,12 +7,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::contractor::{Contractor, Scratch};
-use super::rule::{Degree, Rule};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::graph::{Axis, Expr, Node};
-use crate::ir::op::{Binary, Unary};
 
 /// A linear form of the coordinates whose values are known: `slopes`·p ∈ `range`.
 #[derive(Debug, Clone, Copy)]
@@ -26,6 +22,14 @@ pub struct LinearForm {
 }
 
 impl LinearForm {
+    /// Forms that are used: more would cost more than they gain.
+    pub const MOST: usize = 4096;
+
+    /// slopes·p ∈ range, computed with a number of this magnitude added.
+    pub fn new(slopes: [Interval; 3], range: Interval, offset: f64) -> Self {
+        Self { slopes, range, offset }
+    }
+
     /// slopes·p ≥ least
     pub(super) fn at_least(slopes: [Interval; 3], least: f64) -> Self {
         Self { slopes, range: Interval { lo: least, hi: f64::INFINITY }, offset: least.abs() }
@@ -57,80 +61,51 @@ struct Constraint {
     normal: DVec3,
 }
 
-const ZERO: Interval = Interval::point(0.0);
+pub const ZERO: Interval = Interval::point(0.0);
 
 /// Steps of one linear program. Some five are needed.
 const MOST_PIVOTS: usize = 60;
-
-/// Forms that are used: more would cost more than they gain.
-const MOST_FORMS: usize = 4096;
 
 /// Rounds over the six sides. A multiplier that misses a millionth of a millionth of a side in the search
 /// region, which is huge, needs several.
 const MOST_ROUNDS: usize = 8;
 
-/// Appends the forms among `nodes` with the values that contraction has left them.
-pub fn collect(contractor: &Contractor, nodes: &[Node], scratch: &mut Scratch, out: &mut Vec<LinearForm>) {
-    if nodes.is_empty() || out.len() >= MOST_FORMS {
-        return;
-    }
-    let Scratch { values, linear, .. } = scratch;
-    linear.clear();
-    for (i, rule) in contractor.rules[..values.len()].iter().enumerate() {
-        let form = match contractor.degrees[i] {
-            Degree::Other => [ZERO; 4],
-            Degree::Number => [ZERO, ZERO, ZERO, values[i]],
-            Degree::Linear => form(rule, linear),
-        };
-        linear.push(form);
-    }
-    for node in nodes {
-        let [x, y, z, offset] = linear[node.index()];
-        let range = values[node.index()].widened(2) - offset;
-        if range.lo.is_finite() || range.hi.is_finite() {
-            let offset = offset.lo.abs().max(offset.hi.abs());
-            out.push(LinearForm { slopes: [x, y, z], range, offset });
-        }
-    }
-}
-
-/// Coefficients of x, y, z and 1.
-fn form(rule: &Rule, of: &[[Interval; 4]]) -> [Interval; 4] {
-    let one = Interval::point(1.0);
-    let get = |node: Node| of[node.index()];
-    match *rule {
-        Rule::Plain(Expr::Coordinate(Axis::X)) => [one, ZERO, ZERO, ZERO],
-        Rule::Plain(Expr::Coordinate(Axis::Y)) => [ZERO, one, ZERO, ZERO],
-        Rule::Plain(Expr::Coordinate(Axis::Z)) => [ZERO, ZERO, one, ZERO],
-        Rule::Plain(Expr::Unary(Unary::Neg, a)) => get(a).map(|c| -c),
-        Rule::Plain(Expr::Binary(Binary::Add, a, b)) => {
-            let (a, b) = (get(a), get(b));
-            std::array::from_fn(|i| plus(a[i], b[i]))
-        }
-        Rule::Plain(Expr::Binary(Binary::Sub, a, b)) => {
-            let (a, b) = (get(a), get(b));
-            std::array::from_fn(|i| plus(a[i], -b[i]))
-        }
-        Rule::Plain(Expr::Binary(Binary::Mul, a, b)) => {
-            let (a, b) = (get(a), get(b));
-            let (number, form) = if a[..3] == [ZERO; 3] { (a[3], b) } else { (b[3], a) };
-            form.map(|c| if c == ZERO { c } else { number * c })
-        }
-        Rule::Plain(Expr::Binary(Binary::Div, a, b)) => {
-            let (form, number) = (get(a), get(b)[3]);
-            form.map(|c| if c == ZERO { c } else { c / number })
-        }
-        Rule::Plain(_) | Rule::Power { .. } | Rule::Slab { .. } => [Interval::ALL; 4],
-    }
-}
-
-fn plus(a: Interval, b: Interval) -> Interval {
+pub fn plus(a: Interval, b: Interval) -> Interval {
     if a == ZERO {
         b
     } else if b == ZERO {
         a
     } else {
         a + b
+    }
+}
+
+/// A box and forms with known ranges, of which the ranges of other forms follow.
+pub struct LinearProgram {
+    constraints: Vec<Constraint>,
+    /// The largest magnitudes of the coordinates.
+    reach: DVec3,
+}
+
+impl LinearProgram {
+    pub fn new(given: &[LinearForm], space: &Aabb) -> Self {
+        let turned: Vec<&LinearForm> = given.iter().filter(|form| is_turned(form)).collect();
+        Self { constraints: constraints(&turned, space), reach: space.min.abs().max(space.max.abs()) }
+    }
+
+    /// The values of slopes·p, computed with a number of this magnitude added. `None` if nothing is known that the
+    /// box does not know.
+    pub fn range(&self, slopes: [Interval; 3], offset: f64) -> Option<Interval> {
+        if !is_turned(&LinearForm::new(slopes, Interval::ALL, offset)) {
+            return None;
+        }
+        let direction = DVec3::from_array(slopes.map(|slope| 0.5 * (slope.lo + slope.hi)));
+        let (hi, lo) = (largest(&self.constraints, direction)?, -largest(&self.constraints, -direction)?);
+        // the slopes are not exactly the direction, and programs round their sum
+        let error = DVec3::from_array(slopes.map(|slope| slope.width().next_up()));
+        let rounding = 4.0 * f64::EPSILON * (direction.abs().dot(self.reach) + offset);
+        let slack = error.dot(self.reach) + rounding;
+        (lo - slack <= hi + slack).then_some(Interval { lo: lo - slack, hi: hi + slack })
     }
 }
 

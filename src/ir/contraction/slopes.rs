@@ -6,11 +6,12 @@
 
 use glam::DVec3;
 
-use super::contractor::{Contractor, Scratch, Wanted};
+use super::backward;
+use super::contractor::{Contractor, SCRATCH, Scratch, Wanted};
 use super::forward::power;
 use super::linear::LinearForm;
 use super::rule::Rule;
-use super::{Contracted, backward, meet};
+use super::sets::{Contracted, meet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::bounds::range::Region;
@@ -27,9 +28,25 @@ const TWO: Interval = Interval::point(2.0);
 
 type Slopes = [Interval; 3];
 
+impl Contractor {
+    /// Cuts off what the formula's derivatives exclude. It pays in boxes that are small on the scale of the
+    /// formula. `forms` receives what they say of the distance from an origin.
+    pub fn contract_by_slopes(
+        &self,
+        wanted: &Wanted<'_>,
+        space: &mut Aabb,
+        forms: (DVec3, &mut Vec<LinearForm>),
+    ) -> Contracted {
+        SCRATCH.with_borrow_mut(|scratch| {
+            scratch.known.clear();
+            contract(self, wanted, space, forms, scratch)
+        })
+    }
+}
+
 /// Cuts off what the derivatives exclude. `forms` receives what they say of p − `origin`, so that several
 /// formulas can be solved together.
-pub fn contract(
+fn contract(
     contractor: &Contractor,
     wanted: &Wanted<'_>,
     space: &mut Aabb,

@@ -14,7 +14,7 @@ use crate::ir::{Contracted, LinearForm, contract_linear, contract_linear_around}
 use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
 use crate::solid::leaves::words::{PAYLOAD, Word, skip};
 
-use super::search::{Effort, Shrink};
+use super::search::{Effort, NODES_PER_WORK, Shrink};
 
 /// Rounds over the whole tree for a box of unknown size. Each halves it at least, or is the last.
 const MOST_ROUNDS: usize = 24;
@@ -24,6 +24,14 @@ const ROUNDS_OF_CELL: usize = 2;
 
 /// A round that leaves more than this of each side is the last one.
 const WORTH_ANOTHER: f64 = 0.8;
+
+/// Boxes larger than this are those of leaves that know too little by themselves.
+const UNKNOWN_SIZE: f64 = 1e30;
+
+/// Rounds in which leaves tell each other their linear forms, the leaves that do, and the forms that are told.
+const EXCHANGES: usize = 3;
+const MOST_EXCHANGING: usize = 16;
+const MOST_GIVEN: usize = 64;
 
 /// The words of the part of a tree that still matters in a box; `None` if all of the box is inside.
 pub type Remaining = Option<Arc<[u32]>>;
@@ -50,7 +58,12 @@ impl Shrink for Tree {
     }
 
     fn work(&self, known: &Remaining) -> usize {
-        known.as_ref().map_or(1, |words| words.len())
+        let Some(words) = known else { return 1 };
+        let leaf = |&word: &u32| match Word::read(word) {
+            Word::Leaf { leaf, .. } => 1 + self.parts.leaves.contractor(leaf, false).0.len() / NODES_PER_WORK,
+            Word::All(_) | Word::Any(_) => 1,
+        };
+        words.iter().map(leaf).sum()
     }
 
     fn is_inside(known: &Remaining) -> bool {
@@ -202,6 +215,9 @@ impl Pass<'_> {
             }
         }
         self.distance = distance;
+        if !missed && self.effort == Effort::Large && space.size().max_element() > UNKNOWN_SIZE {
+            missed = !self.exchange(first_form, start, space);
+        }
         missed = missed || !self.solve(first_form, space);
         self.forms.truncate(first_form);
         if missed {
@@ -209,6 +225,33 @@ impl Pass<'_> {
             return Contracted::Nowhere;
         }
         self.close(start, code, count, Contracted::Everywhere)
+    }
+
+    /// Lets the leaves that are joined by "all of" know of each other's linear forms: a cone ends where its
+    /// base is, of which its mantle knows nothing. False if nothing is left of the box.
+    fn exchange(&mut self, first_form: usize, start: usize, space: &mut Aabb) -> bool {
+        let leaves: Vec<(u32, bool)> = self.left[start + 1..]
+            .iter()
+            .map_while(|&word| match Word::read(word) {
+                Word::Leaf { leaf, negated } => Some((leaf, negated)),
+                Word::All(_) | Word::Any(_) => None,
+            })
+            .take(MOST_EXCHANGING)
+            .collect();
+        for _ in 0..EXCHANGES {
+            let given: Vec<LinearForm> = self.forms[first_form..].iter().take(MOST_GIVEN).copied().collect();
+            for &(leaf, negated) in &leaves {
+                let (contractor, wanted) = self.leaves.contractor(leaf, negated);
+                let forms = Some(&mut self.forms);
+                if contractor.contract_given(&given, &wanted, space, forms) == Contracted::Nowhere {
+                    return false;
+                }
+            }
+            if !contract_linear(&self.forms[first_form..], space) {
+                return false;
+            }
+        }
+        true
     }
 
     fn any(&mut self, code: u32, parts: u32, at: &mut usize, space: &mut Aabb) -> Contracted {

@@ -5,11 +5,13 @@
 //! | `extent` | what is known of it |
 //! | `contraction` | boxes around trees of leaves, made smaller from all conjuncts together |
 //! | `whole` | the same for solids that are too large to be taken apart |
-//! | `search` | the box of a solid: contraction first, then subdivision from each side |
+//! | `search` | contraction first, then subdivision from each side |
+//! | `find` | the bounds of a solid |
 //! | `unbounded` | which operand has no box, and to which sides |
 
 pub mod contraction;
 pub mod extent;
+mod find;
 pub mod search;
 pub mod unbounded;
 pub mod whole;

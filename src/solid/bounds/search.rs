@@ -9,20 +9,22 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::contraction::Tree;
-use super::extent::Bounds;
-use super::whole::WholeFormula;
 use crate::geom::Aabb;
-use crate::solid::construction::Solid;
 
 /// Half the side of the cube in which solids are looked for. Programs answer no signs farther out than 2²⁵⁶.
 pub const SEARCH_RADIUS: f64 = 1.809_251_394_333_065_6e75; // 2²⁵⁰
 
+/// What reaches so far has no end: bounds of linear programs over the whole region lie a little within it.
+const OPEN: f64 = SEARCH_RADIUS * 1e-12;
+
 /// Cells looked at for one side at most.
 const CELLS_OF_SIDE: usize = 600;
 
-/// Words of trees looked at for one side: fewer cells of a large tree.
+/// Work for one side, in the unit below: fewer cells of a large solid. It is some tenths of a second.
 const WORK_OF_SIDE: usize = 200_000;
+
+/// Nodes of formulas that make a unit of work.
+pub const NODES_PER_WORK: usize = 16;
 
 /// How close to a point of the solid a side is moved, relative to the longest side, for the first so many cells.
 /// Most sides reach the first goal within 50 cells; those that touch a thin curved edge would need thousands.
@@ -88,38 +90,13 @@ impl Side {
         }
     }
 
-    fn is_open(self, space: &Aabb) -> bool {
-        self.of(space) >= SEARCH_RADIUS
-    }
-}
-
-impl Solid {
-    /// Where the solid is; found on first use, then kept.
-    pub fn bounds(&self) -> &Bounds {
-        self.moment.bounds(|| match self.hull() {
-            None => Bounds::Empty,
-            Some(hull) if Side::all().any(|side| side.is_open(&hull)) => Bounds::Unbounded,
-            Some(hull) => Bounds::Within(hull),
-        })
-    }
-
-    /// A box around the solid, which may reach to the ends of the search region; `None` for an empty solid.
-    fn hull(&self) -> Option<Aabb> {
-        match self.parts() {
-            Some(parts) => search(&Tree { words: parts.words.clone(), parts }),
-            None => search(&WholeFormula::of(self, false)),
-        }
-    }
-
-    /// The sides to which no end of the solid was found.
-    pub(super) fn open_sides(&self) -> Vec<Side> {
-        let hull = if *self.bounds() == Bounds::Unbounded { self.hull() } else { None };
-        hull.map_or(Vec::new(), |hull| Side::all().filter(|side| side.is_open(&hull)).collect())
+    pub fn is_open(self, space: &Aabb) -> bool {
+        self.of(space) >= OPEN
     }
 }
 
 /// A box around a solid; `None` if it is proven to be empty.
-fn search<S: Shrink>(solid: &S) -> Option<Aabb> {
+pub fn search<S: Shrink>(solid: &S) -> Option<Aabb> {
     let mut hull = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
     solid.shrink(&solid.everything(), &mut hull, Effort::Large)?;
     let mut cells = solid.parts(&hull);
@@ -211,7 +188,7 @@ impl<S: Shrink> Faces<'_, S> {
             return 0.0;
         }
         let relative = GOALS.iter().find(|(most, _)| cells < *most).map_or(1e-3, |(_, goal)| *goal);
-        let sides = self.hull.size().to_array().into_iter().filter(|&side| side < SEARCH_RADIUS);
+        let sides = self.hull.size().to_array().into_iter().filter(|&side| side < OPEN);
         relative * sides.fold(0.0, f64::max)
     }
 

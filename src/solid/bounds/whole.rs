@@ -5,14 +5,11 @@ use crate::interval::Interval;
 use crate::ir::{Contracted, Contractor, Graph, Node, Region, SignRule, Wanted, contract_linear};
 use crate::solid::construction::Solid;
 
-use super::search::{Effort, SEARCH_RADIUS, Shrink};
+use super::search::{Effort, NODES_PER_WORK, SEARCH_RADIUS, Shrink};
 use glam::DVec3;
 
 /// Leaves that get a box of their own. Solids that cannot be taken apart have few: they use each often.
 const MOST_LEAVES: usize = 50_000;
-
-/// Nodes that cost as much as one leaf of a tree.
-const NODES_OF_LEAF: usize = 16;
 
 /// The formula of a solid as one.
 pub struct WholeFormula {
@@ -77,7 +74,7 @@ impl Shrink for WholeFormula {
     }
 
     fn work(&self, _: &bool) -> usize {
-        1 + self.contractor.len() / NODES_OF_LEAF
+        1 + self.contractor.len() / NODES_PER_WORK
     }
 
     fn parts(&self, space: &Aabb) -> Vec<(Aabb, bool)> {
