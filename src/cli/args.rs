@@ -122,6 +122,9 @@ pub(super) struct Check {
     /// Time at which moving solids are evaluated, in seconds or with a unit
     #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
+    /// Time after which no further solid of a file is measured, in seconds or with a unit
+    #[arg(long, value_name = "TIME", default_value_t = 10.0, value_parser = seconds)]
+    pub budget: f64,
     /// Treat a kind of message as an error
     #[arg(long, value_enum, value_name = "KIND")]
     pub deny: Option<Deny>,
@@ -165,8 +168,10 @@ pub(super) enum What {
     Gradient,
     /// 1 inside, 0 on the surface, −1 outside
     Sign,
-    /// Distance from the surface, positive in the fluid: accurate near it, an estimate far away
+    /// Distance from the nearest point of the surface that was found, positive in the fluid
     Distance,
+    /// Radius of a ball around the point that is proven not to meet the surface
+    Clearance,
     /// Outward unit normal −∇ω/|∇ω|
     Normal,
 }
@@ -335,6 +340,9 @@ pub(super) struct Run {
     /// Print what would be run, and run nothing
     #[arg(long, conflicts_with = "resume")]
     pub dry_run: bool,
+    /// Refuse scenes with more obstacles than this: many parts are better joined with `or` into one solid
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    pub most_obstacles: usize,
     /// Write no pictures
     #[arg(long)]
     pub no_pictures: bool,

@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 use std::path::Path;
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use serde::Serialize;
 
@@ -12,10 +12,13 @@ use super::mesh::hidden;
 use super::{choose, input, output, section};
 use crate::cli::output::Shown;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::interval::Interval;
 use rfm::ir::Magnitudes;
 use rfm::lower::NamedSolid;
 use rfm::mesh::{self, Grid, Resolution, ThinCells, VolumeError};
-use rfm::solid::{Bounds, ProgramKind};
+use rfm::solid::{Bounds, ProgramKind, Unbounded};
 use rfm::{Precision, Program, Solid};
 
 /// Cells along the longest side of the mesh that volumes are measured on.
@@ -43,8 +46,15 @@ struct Message {
     help: Option<String>,
 }
 
-/// The most operations of a solid that is measured. A larger one would take minutes.
-const MOST_MEASURED: usize = 120_000;
+/// Seconds for each operation of a solid of many leaves: of ten thousand parts a minute was seen.
+const SECONDS_BY_LEAVES: f64 = 8e-5;
+
+/// Seconds for each operation of a solid that is evaluated as a whole, at a million points.
+const SECONDS_AS_A_WHOLE: f64 = 4e-4;
+
+/// Boxes along each side of a solid in which its range is tried; one in so many may be unknown.
+const PROBES: u32 = 16;
+const MOST_UNKNOWN: usize = 50;
 
 /// What is known about a solid. Numbers that do not exist (the volume of an unbounded solid) or that were not
 /// found (the volume of one too thin for the grid) are null.
@@ -76,6 +86,9 @@ struct Facts {
     /// The number of components that half as many cells show.
     #[serde(skip)]
     components_coarser: Option<usize>,
+    /// Whether it was tried to find all this.
+    #[serde(skip)]
+    is_measured: bool,
 }
 
 impl Facts {
@@ -97,6 +110,7 @@ impl Facts {
             time: solid.moves().then(|| solid.time()),
             thin_cells: None,
             components_coarser: None,
+            is_measured: true,
         }
     }
 }
@@ -105,6 +119,12 @@ impl Facts {
 struct Box3 {
     min: [f64; 3],
     max: [f64; 3],
+}
+
+impl Box3 {
+    fn of(bounds: &Aabb) -> Self {
+        Self { min: bounds.min.to_array(), max: bounds.max.to_array() }
+    }
 }
 
 pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
@@ -159,7 +179,7 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
             }
             Ok(program) => {
                 let mut diagnostics = program.warnings();
-                let facts = solids(shared, &program, &file, options.time, &mut diagnostics)?;
+                let facts = solids(shared, &program, &file, options, &mut diagnostics)?;
                 let denied = options.deny == Some(Deny::Warnings) && !diagnostics.list.is_empty();
                 if denied || diagnostics.has_errors() {
                     document.ok = false;
@@ -222,17 +242,30 @@ fn solids(
     shared: &Shared,
     program: &Program,
     file: &str,
-    time: f64,
+    options: &Check,
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<Facts>, Failure> {
+    let (time, budget) = (options.time, options.budget);
     let mut facts = Vec::new();
-    for named in &program.module().solids {
+    let (start, named_solids) = (Instant::now(), &program.module().solids);
+    for named in named_solids {
+        if !facts.is_empty() && start.elapsed().as_secs_f64() > budget {
+            let measured = facts.len();
+            note(format!(
+                "{measured} of {} solids were measured in {budget} s; --budget SECONDS gives more time",
+                named_solids.len()
+            ));
+            break;
+        }
         let solid = program.solid_with(&named.name, shared.engine.into()).map_err(choose::usage)?.at(time);
         let operations = solid.graph(ProgramKind::Value).0.len();
-        if operations > MOST_MEASURED {
-            note(format!("solid `{}` has {operations} operations: it is not measured", named.name));
+        if let Some(why) = too_long(&solid, operations, budget) {
+            note(format!("solid `{}` has {operations} operations: {why}", named.name));
             let tolerance = program.tolerance(&named.name).map(|tolerance| tolerance.value);
-            facts.push(Facts { tolerance, ..Facts::unknown(&solid, file) });
+            let bounds = solid.bounds().aabb().map(|bounds| Box3::of(&bounds));
+            let empty = *solid.bounds() == Bounds::Empty;
+            let unknown = Facts::unknown(&solid, file);
+            facts.push(Facts { tolerance, bounds, empty, is_measured: false, ..unknown });
             continue;
         }
         let (mut found, thin) = measure(&solid, file)?;
@@ -252,6 +285,15 @@ fn solids(
     Ok(facts)
 }
 
+/// Why a solid is not measured, if that would take longer than the budget.
+fn too_long(solid: &Solid, operations: usize, budget: f64) -> Option<String> {
+    // leaf by leaf the work grows with the surface rather than with the formula
+    let each = if solid.leaf_count().is_some() { SECONDS_BY_LEAVES } else { SECONDS_AS_A_WHOLE };
+    let seconds = (each * operations as f64).ceil();
+    let why = || format!("measuring it may take {seconds} s; --budget {seconds} allows it");
+    (seconds > budget).then(why)
+}
+
 /// Warnings about a solid that is empty, unbounded or thin.
 fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnostic> {
     let warning = |code, message| Diagnostic::warning(code, named.span, message);
@@ -262,9 +304,7 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
             found.push(warning(Code::EMPTY_SOLID, message));
         }
         Bounds::Unbounded => {
-            let message = format!("solid `{}` could not be proven to end anywhere", named.name);
-            let help = "intersect it with a box, or mesh it with --box";
-            found.push(warning(Code::UNBOUNDED_SOLID, message).help(help));
+            found.push(unbounded(named, solid));
         }
         Bounds::Within(_) => {}
     }
@@ -279,6 +319,20 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
         found.push(warning(Code::THIN_PARTS, message).help(help));
     }
     found
+}
+
+/// A warning that says which operand of a solid was not found to end, and where.
+fn unbounded(named: &NamedSolid, solid: &Solid) -> Diagnostic {
+    let why = solid.unbounded();
+    let sides = why.as_ref().map_or(String::new(), Unbounded::direction);
+    let message = format!("solid `{}` could not be proven to end {sides}", named.name);
+    let help = "intersect it with a box, or mesh it with --box";
+    let warning = Diagnostic::warning(Code::UNBOUNDED_SOLID, named.span, message).help(help);
+    let operand = why.filter(|why| !why.is_whole).and_then(|why| why.operand);
+    match operand.filter(|operand| operand.source == named.span.source) {
+        Some(operand) => warning.label(operand, "this operand has no bounds"),
+        None => warning,
+    }
 }
 
 /// A warning if ω may leave the range of numbers although its leaves do not.
@@ -318,10 +372,18 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
             return Ok((facts, ThinCells::NONE));
         }
     };
-    facts.bounds = Some(Box3 { min: bounds.min.to_array(), max: bounds.max.to_array() });
+    facts.bounds = Some(Box3::of(bounds));
     let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
     let grid = Grid::around(bounds, RESOLUTION).map_err(Failure::usage)?;
-    let thin = mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE);
+    let thin = if knows_ranges(solid, bounds) {
+        Some(mesh::thin_cells(&*surface, &grid).unwrap_or(ThinCells::NONE))
+    } else {
+        note(format!(
+            "thin parts of `{}` are not looked for: the ranges of its formula are unknown",
+            solid.name()
+        ));
+        None
+    };
     match mesh::volume(&*surface, bounds, VOLUME_CELLS) {
         Ok(found) => {
             facts.volume = Some(found.volume);
@@ -330,15 +392,30 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
             facts.area_error = Some(found.area_error);
             facts.components = Some(found.solids);
             facts.components_coarser = Some(found.solids_coarser);
-            facts.resolved = Some(found.solids == found.solids_coarser && thin.count == 0);
+            let no_thin_parts = thin.as_ref().is_some_and(|thin| thin.count == 0);
+            facts.resolved = Some(found.solids == found.solids_coarser && no_thin_parts);
         }
         Err(VolumeError::TooThin) => {}
         Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
         // a field that is not a number somewhere has no volume
         Err(VolumeError::Mesh(_)) => return Ok((facts, ThinCells::NONE)),
     }
-    facts.thin_cells = Some(thin.count);
-    Ok((facts, thin))
+    facts.thin_cells = thin.as_ref().map(|thin| thin.count);
+    Ok((facts, thin.unwrap_or(ThinCells::NONE)))
+}
+
+/// Whether ranges tell anything of the solid nearly everywhere in a box. Where they do not, a search for thin
+/// parts would divide every cell to the end.
+fn knows_ranges(solid: &Solid, bounds: &Aabb) -> bool {
+    let size = bounds.size() / f64::from(PROBES);
+    let probe = |i: u32| {
+        let place =
+            DVec3::new(f64::from(i % PROBES), f64::from(i / PROBES % PROBES), f64::from(i / PROBES.pow(2)));
+        let low = bounds.min + size * place;
+        solid.range(&Aabb::new(low, low + size)) == Interval::ALL
+    };
+    let unknown = (0..PROBES.pow(3)).filter(|&i| probe(i)).count();
+    unknown * MOST_UNKNOWN <= PROBES.pow(3) as usize
 }
 
 fn print(file: &str, program: &Program, facts: &[Facts]) {
@@ -368,7 +445,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
         if let Some(bounds) = &solid.bounds {
             let [min, max] = corners(bounds);
             say!("    bounds      {min} … {max}");
-            if solid.volume.is_none() {
+            if solid.volume.is_none() && solid.is_measured {
                 say!("    volume      not found: too thin for {} cells along its longest side", VOLUME_CELLS);
             }
         } else if !solid.empty {

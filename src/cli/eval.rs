@@ -1,5 +1,6 @@
 //! `rfm eval`: ω and related values at points, as CSV with 17 significant digits.
 
+use std::cell::OnceCell;
 use std::io::{self, BufRead, BufWriter, Read, Write};
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use super::failure::Failure;
 use super::{choose, input, output};
 use crate::cli::output::Shown;
 use rfm::ir::Unary;
-use rfm::solid::Chosen;
+use rfm::solid::{Chosen, Distance, Distances};
 use rfm::{Field, Precision, Solid};
 
 /// Points that are evaluated at a time, so that memory stays small for any number of points.
@@ -102,6 +103,8 @@ struct Table {
     /// The rows for JSON, which are collected because they are one document.
     json: Option<Vec<serde_json::Value>>,
     names: Vec<&'static str>,
+    /// Made when a distance is first asked for.
+    distances: OnceCell<Distances>,
     out: BufWriter<io::Stdout>,
 }
 
@@ -117,6 +120,7 @@ impl Table {
                 What::Gradient => &["gx", "gy", "gz"],
                 What::Sign => &["sign"],
                 What::Distance => &["distance"],
+                What::Clearance => &["clearance"],
                 What::Normal => &["nx", "ny", "nz"],
             });
         }
@@ -125,7 +129,16 @@ impl Table {
             writeln!(out, "{}", names.join(","))?;
         }
         let precision = options.precision.unwrap_or(Precision::F64);
-        Ok(Self { solid, chosen, what: asked, precision, json: json.then(Vec::new), names, out })
+        Ok(Self {
+            solid,
+            chosen,
+            what: asked,
+            precision,
+            json: json.then(Vec::new),
+            names,
+            distances: OnceCell::new(),
+            out,
+        })
     }
 
     fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {
@@ -161,6 +174,8 @@ impl Table {
             }
             (Precision::F32, false) => (self.solid.omega_f32(p.as_vec3()).into(), DVec3::NAN),
         };
+        let found = OnceCell::new();
+        let distance = || *found.get_or_init(|| self.distances().at(p));
         let mut row = p.to_array().to_vec();
         for what in &self.what {
             match what {
@@ -170,14 +185,29 @@ impl Table {
                 What::Sign if self.chosen.is_some() => row.push(self.solid.sign(p)),
                 What::Sign => row.push(Unary::Sign.eval(omega)),
                 What::Distance => row.push(match self.precision {
-                    Precision::F64 => self.solid.contact(p).distance,
+                    Precision::F64 => distance().estimate,
                     Precision::F32 => self.solid.distance_f32(p.as_vec3()).into(),
                 }),
-                // NaN where there is no normal, as at centres and where surfaces touch
-                What::Normal => row.extend((-gradient / gradient.length()).to_array()),
+                What::Clearance => row.push(distance().clearance),
+                What::Normal => row.extend(self.normal(p, gradient).to_array()),
             }
         }
         row
+    }
+
+    /// The outward unit normal. Where ω has no gradient, as at centres, it points away from the nearest point of
+    /// the surface, or towards it from inside; NaN where surfaces touch.
+    fn normal(&self, p: DVec3, gradient: DVec3) -> DVec3 {
+        let length = gradient.length();
+        if length > 0.0 {
+            return -gradient / length;
+        }
+        let Distance { estimate, nearest, .. } = self.distances().at(p);
+        (p - nearest) / estimate
+    }
+
+    fn distances(&self) -> &Distances {
+        self.distances.get_or_init(|| Distances::new(&self.solid))
     }
 
     fn finish(mut self) -> Result<(), Failure> {

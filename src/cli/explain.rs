@@ -235,7 +235,7 @@ impl Explanation<'_> {
         let bounds = match self.solid.bounds() {
             Bounds::Within(bounds) => *bounds,
             Bounds::Empty => return say!("  bounds: empty, proven by ranges"),
-            Bounds::Unbounded => return say!("  bounds: none within 2²⁰ of the origin"),
+            Bounds::Unbounded => return say!("  bounds: none found"),
         };
         // + 0 turns −0 into 0
         let number = |x: f64| format!("{:.3}", (1e3 * x).round() / 1e3 + 0.0);

@@ -138,8 +138,9 @@ EMPTY_SOLID = "W0402":
 "Interval arithmetic proves that ω is nowhere positive: the solid is empty, its mesh has no triangles and nothing
 ever collides with it.";
 UNBOUNDED_SOLID = "W0403":
-"The solid could not be proven to end within a million units of the origin: it cannot be meshed over its own bounds.
-Intersect it with a box, or mesh it over a scene's box.";
+"The solid could not be proven to end towards the sides that the message names: it cannot be meshed over its own
+bounds. If one member of a union is to blame, the message marks it. Intersect it with a box, or mesh it over a scene's
+box.";
 FOLD_OF_ONE = "W0404":
 "`any` or `all` over a range with one member is likely a slip: the range `a..b` holds a, a+1, … b−1.";
 STRICT_COMPARISON = "W0405":

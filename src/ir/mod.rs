@@ -10,6 +10,7 @@
 //! | `interpreter` | the meaning of a graph |
 //! | `derived` | graphs made of a graph: gradient, contact, sign twin, what depends on time alone |
 //! | `bounds` | ranges, magnitudes and rounding errors over boxes |
+//! | `contraction` | boxes made smaller around the points at which a formula is positive |
 //! | `on_path` | what is known of a leaf along a straight path |
 //! | `exact` | true values, to 120 digits |
 //! | `function_rules` | what all of these need to know of a function of the mathematical library |
@@ -17,6 +18,7 @@
 //! Invariant: nothing here knows the syntax or the code generator; equal expressions have equal [`Node`]s.
 
 mod bounds;
+mod contraction;
 mod derived;
 mod dump;
 pub mod exact;
@@ -35,6 +37,9 @@ pub use bounds::float::FloatType;
 pub use bounds::magnitude::Magnitudes;
 pub use bounds::range::RangeEvaluator;
 pub(crate) use bounds::range::{Affine, RangeRule, Region};
+pub(crate) use contraction::{
+    Contracted, Contractor, LinearForm, Wanted, contract_linear, contract_linear_around,
+};
 pub(crate) use derived::contact::{contact, wall_velocity};
 pub use derived::gradient::gradient;
 pub use derived::gradient::gradient_and_rate;

@@ -147,6 +147,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::interval::Interval;
     use crate::mesh::Resolution;
 
     /// A shell between two balls, with its exact range up to rounding.

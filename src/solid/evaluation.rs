@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::construction::Solid;
 use super::engine::ProgramKind;
+use super::nearest::Distance;
 use super::programs::on_demand::Lane;
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
@@ -11,7 +12,7 @@ use crate::interval::Interval;
 use crate::ir::Unary;
 
 /// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far
-/// away.
+/// away. [`Solid::distance`] is slow and right everywhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Length, positive in the fluid, negative inside the solid.
@@ -82,12 +83,31 @@ impl Solid {
     }
 
     /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
-    /// estimate far away.
+    /// estimate far away, but never 0 off the surface.
     pub fn contact(&self, p: DVec3) -> Contact {
+        let contact = self.estimated_contact(p);
+        let is_lost = contact.distance == 0.0 || contact.distance.is_nan();
+        if is_lost && self.sign(p).abs() == 1.0 {
+            self.searched_contact(p).unwrap_or(contact)
+        } else {
+            contact
+        }
+    }
+
+    /// The contact that its program finds. Where no derivative tells anything its distance is 0.
+    pub(super) fn estimated_contact(&self, p: DVec3) -> Contact {
         let mut out = [0.0; 5];
         self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
         let [distance, nx, ny, nz, mean_curvature] = out;
         Contact { distance, normal: DVec3::new(nx, ny, nz), mean_curvature }
+    }
+
+    /// The contact with the nearest point of the surface; `None` if there is no surface. Nothing is known of
+    /// its curvature.
+    fn searched_contact(&self, p: DVec3) -> Option<Contact> {
+        let Distance { estimate, nearest, .. } = self.distance(p);
+        let normal = (p - nearest) / estimate;
+        normal.is_finite().then_some(Contact { distance: estimate, normal, mean_curvature: 0.0 })
     }
 
     /// The velocity of the surface near a point, along its normal, in lengths per second: that of the face
@@ -109,12 +129,22 @@ impl Solid {
         out[0]
     }
 
-    /// Distance, normal x, y, z and mean curvature at many points given by columns.
+    /// Distance, normal x, y, z and mean curvature at many points given by columns, as [`Solid::contact`].
     ///
     /// # Panics
     /// If the columns differ in length.
     pub fn contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
-        self.evaluate_many(ProgramKind::Contact, points, out);
+        let [distance, nx, ny, nz, curvature] = out;
+        self.evaluate_many(ProgramKind::Contact, points, [distance, nx, ny, nz, curvature]);
+        for i in 0..distance.len() {
+            let found = distance[i].to_f64();
+            if found == 0.0 || found.is_nan() {
+                let p = DVec3::from_array(points.map(|column| column[i].to_f64()));
+                let Contact { distance: d, normal, mean_curvature } = self.contact(p);
+                let row = [d, normal.x, normal.y, normal.z, mean_curvature].map(T::from_f64);
+                [distance[i], nx[i], ny[i], nz[i], curvature[i]] = row;
+            }
+        }
     }
 
     /// Inside (1), on the surface (0) or outside (−1) at many points given by columns, as [`Solid::sign`].

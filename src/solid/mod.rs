@@ -5,6 +5,7 @@
 //! | file or folder | what it holds |
 //! |---|---|
 //! | `construction`, `evaluation` | [`Solid`], its programs and its values |
+//! | `nearest` | distances with proofs |
 //! | `twin`, `walls`, `surface`, `depth` | its views: sign, walls of a fluid, the cheapest field, depth |
 //! | `programs` | compiled code, the programs made on demand, programs over blocks of points |
 //! | `leaves` | a solid taken apart into leaves, and what is left of it in a box |
@@ -24,6 +25,7 @@ mod evaluation;
 mod inspection;
 mod leaves;
 mod moment;
+mod nearest;
 mod path;
 mod programs;
 mod surface;
@@ -32,6 +34,7 @@ mod twin;
 mod walls;
 
 pub use bounds::extent::Bounds;
+pub use bounds::unbounded::Unbounded;
 pub use cells::map::{CellMap, CellStats, Place};
 pub use cells::moving::MovingMap;
 pub use construction::Solid;
@@ -39,6 +42,7 @@ pub use depth::Depth;
 pub use engine::{Engine, ProgramKind};
 pub use evaluation::Contact;
 pub use inspection::{LeafInfo, Remainder};
+pub use nearest::{Distance, Distances};
 pub(crate) use programs::block_plan::{BlockPlan, BlockStep, Operation as JoiningOperation, Piece};
 pub(crate) use programs::columns::ColumnPlace;
 pub use programs::compiled::RangeProgram;

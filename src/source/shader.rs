@@ -20,8 +20,11 @@ pub(super) struct Shader {
     /// A function: type of its result, name, parameters.
     head: fn(&str, &str, &str) -> String,
     /// A structure with a line for each field and what is said of it.
-    params: fn(&str, &[(String, String)]) -> Vec<String>,
+    params: Structure,
 }
+
+/// A structure: its name, and the name and the comment of each field → lines.
+type Structure = fn(&str, &[(String, String)]) -> Vec<String>;
 
 pub(super) static WGSL: Shader = Shader {
     language: &language::WGSL,

@@ -62,9 +62,9 @@ fn nested_ten_thousand_times() {
 fn long_chains() {
     let n = 100_000;
     let terms: Vec<String> = (0..n).map(|i| format!("{i}*x")).collect();
-    check(solid(&terms.join(" + ")), 0, "is not measured");
+    check(solid(&terms.join(" + ")), 0, "measuring it may take");
     let planes: Vec<String> = (0..n).map(|i| format!("x <= {i}")).collect();
-    check(solid(&planes.join(" and ")), 0, "is not measured");
+    check(solid(&planes.join(" and ")), 0, "measuring it may take");
     check(solid(&vec!["sphere(1)"; n].join(" and ")), 0, "");
     check(solid(&("x+".repeat(500_000) + "@")), 1, "unexpected `@`");
     check(format!("rfm 1\nlet a = {}", "x".repeat(1_000_000)), 1, "unknown name `xxx");

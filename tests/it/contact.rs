@@ -1,6 +1,7 @@
 //! The contact program against closed forms and, for the pawn, against the nearest point of its profile.
 
 use rfm::glam::{DVec2, DVec3};
+use rfm::solid::Distances;
 use rfm::{Engine, Program, Solid};
 
 fn solid(definition: &str) -> Solid {
@@ -126,4 +127,41 @@ fn pawn_distances_near_the_wall() {
     );
     // the method's median is 5e-6 and its p95 0.1 %; the sampled profile resolves 1e-7
     assert!(median < 2e-5 && p95 < 2e-3, "median {median:e}, p95 {p95:e}");
+}
+
+/// Far from the wall too the distance found is that of the nearest point, and the clearance is never longer.
+#[test]
+fn pawn_distances_far_from_the_wall() {
+    let path = format!("{}/examples/pawn.rfm", env!("CARGO_MANIFEST_DIR"));
+    let pawn = Program::from_path(path).unwrap().solid("pawn").unwrap();
+    let (profile, distances) = (pawn_profile(&pawn), Distances::new(&pawn));
+    let mut seed = 11u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let (mut errors, mut gaps) = (Vec::new(), Vec::new());
+    while errors.len() < 200 {
+        let q = profile[(random() * profile.len() as f64) as usize]
+            + DVec2::new(random() - 0.5, random() - 0.5) * 0.1;
+        let p = DVec3::new(1.5 + q.x, 1.5, q.y);
+        let exact = profile.iter().map(|s| (*s - q).length_squared()).fold(f64::INFINITY, f64::min).sqrt();
+        if q.x < 0.0 || !(0.02..=0.05).contains(&exact) {
+            continue;
+        }
+        let found = distances.at(p);
+        // the profile has points up to 2e-5 apart, and none at its corners
+        assert!(found.clearance <= exact, "{p}: {found:?} for {exact}");
+        assert!(found.estimate.abs() >= exact - 2e-5, "{p}: {found:?} for {exact}");
+        errors.push((found.estimate.abs() / exact - 1.0).abs());
+        gaps.push(1.0 - found.clearance / exact);
+    }
+    errors.sort_by(f64::total_cmp);
+    gaps.sort_by(f64::total_cmp);
+    let p95 = errors.len() * 95 / 100;
+    println!(
+        "pawn, 20–50 mm from the wall: estimate p95 {:.1e}, clearance p95 {:.1e}",
+        errors[p95], gaps[p95]
+    );
+    assert!(errors[p95] < 5e-3 && gaps[p95] < 1e-2, "{} {}", errors[p95], gaps[p95]);
 }

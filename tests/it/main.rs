@@ -3,6 +3,7 @@
 mod agreement;
 mod bad_input;
 mod blocks;
+mod bounds;
 mod cells;
 mod certificates;
 mod circles;
@@ -10,6 +11,7 @@ mod cli;
 mod contact;
 mod crossings;
 mod diagnostics;
+mod distance;
 mod documents;
 mod examples;
 mod fluid_surface;

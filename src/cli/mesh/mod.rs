@@ -147,8 +147,9 @@ fn grid(solid: &Solid, options: &Options) -> Result<Option<Grid>, Failure> {
         (None, Bounds::Within(bounds)) => Some(Grid::around(bounds, resolution)),
         (None, Bounds::Empty) => None,
         (None, Bounds::Unbounded) => {
+            let sides = solid.unbounded().map_or(String::new(), |why| why.direction());
             return Err(Failure::usage(format!(
-                "`{}` could not be proven to end anywhere: give the box to mesh with --box X0,Y0,Z0,X1,Y1,Z1",
+                "`{}` could not be proven to end {sides}: give the box to mesh with --box X0,Y0,Z0,X1,Y1,Z1",
                 solid.name()
             )));
         }

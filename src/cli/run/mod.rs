@@ -35,9 +35,13 @@ use stop::{NoRoom, Stop};
 use summary::Summary;
 use watch::{WATCH, Watch};
 
+/// Memory that an obstacle of a single leaf was found to take.
+const MEGABYTES_OF_OBSTACLE: f64 = 0.7;
+
 pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let program = input::program(shared, &options.file)?;
     let scene = choose::scene(&program, options.scene.as_deref())?;
+    obstacles_fit(options, scene)?;
     let experiment = experiment(shared, &program, &scene.name)?;
     let fingerprint = experiment.fingerprint();
     let folder = folder::of(options);
@@ -77,6 +81,20 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         Err(other) => return Err(other),
     };
     conclude(shared, &folder, &recording, &simulation, stopped)
+}
+
+/// Refuses more obstacles than are reasonable: each has programs and a map of the box of its own.
+fn obstacles_fit(options: &Run, scene: &Scene) -> Result<(), Failure> {
+    let count = scene.obstacles.len();
+    if count <= options.most_obstacles {
+        return Ok(());
+    }
+    let megabytes = (count as f64 * MEGABYTES_OF_OBSTACLE).round();
+    Err(Failure::usage(format!(
+        "scene `{}` has {count} obstacles, which would take about {megabytes} MB, because each has programs of its own: \
+         join them with `or` into one solid, or allow them with --most-obstacles {count}",
+        scene.name
+    )))
 }
 
 /// Refuses more frames than there are names for.

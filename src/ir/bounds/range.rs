@@ -48,9 +48,13 @@ impl RangeRule {
             if a == b {
                 return Self::Square(a);
             }
-            let ((of, first), (other, second)) = (affine(graph, a), affine(graph, b));
-            if of == other && !is_number(graph, of) {
-                return Self::Slab { of, first, second };
+            let itself = |node| (node, Affine { slope: 1.0, offset: None, minus: false });
+            let (of_a, of_b) = (affine(graph, a), affine(graph, b));
+            // a·(h − a) is a slab of a, whatever a is made of
+            for ((of, first), (other, second)) in [(of_a, of_b), (itself(a), of_b), (of_a, itself(b))] {
+                if of == other && !is_number(graph, of) {
+                    return Self::Slab { of, first, second };
+                }
             }
         }
         Self::Plain(expr)
@@ -61,7 +65,7 @@ impl RangeRule {
         match *self {
             Self::Square(a) => Some(range(a).square()),
             Self::Slab { of, first, second } => {
-                let line = |affine: Affine| (affine.slope, offset(affine, &range));
+                let line = |affine: Affine| (affine.slope, affine.number(&range));
                 Some(slab(range(of), line(first), line(second)))
             }
             Self::Plain(_) => None,
@@ -144,7 +148,7 @@ impl RangeEvaluator {
                 RangeRule::Square(a) | RangeRule::Slab { of: a, .. } if unknown(a) => Interval::ALL,
                 RangeRule::Square(a) => values[a.index()].square(),
                 RangeRule::Slab { of, first, second } => {
-                    let number = |affine: Affine| offset(affine, |node| values[node.index()]);
+                    let number = |affine: Affine| affine.number(|node| values[node.index()]);
                     slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
                 }
                 RangeRule::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
@@ -175,12 +179,14 @@ fn affine(graph: &Graph, node: Node) -> (Node, Affine) {
     }
 }
 
-/// The number that is added; NaN if it is not known.
-fn offset(affine: Affine, range: impl Fn(Node) -> Interval) -> f64 {
-    let Some(node) = affine.offset else { return 0.0 };
-    let Interval { lo, hi } = range(node);
-    let number = if lo == hi { lo } else { f64::NAN };
-    if affine.minus { -number } else { number }
+impl Affine {
+    /// The number that is added; NaN if it is not known.
+    pub(in crate::ir) fn number(self, range: impl Fn(Node) -> Interval) -> f64 {
+        let Some(node) = self.offset else { return 0.0 };
+        let Interval { lo, hi } = range(node);
+        let number = if lo == hi { lo } else { f64::NAN };
+        if self.minus { -number } else { number }
+    }
 }
 
 fn at((slope, offset): (f64, f64), e: Interval) -> Interval {

@@ -19,8 +19,13 @@ use rustc_hash::FxHashMap;
 
 use crate::ir::derived::gradient::{gradient, gradient_and_rate};
 use crate::ir::derived::sign::SignRule;
-use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
+
+/// How far a point is moved off a singular place of a leaf, relative to the leaf's value and to the coordinates. Second
+/// derivatives grow with its inverse, and lose as many digits.
+const STEP: f64 = 1e-6;
+const RELATIVE_STEP: f64 = 2.5e-7;
 
 /// What is known of the surface nearest to a point, as nodes.
 #[derive(Debug, Clone, Copy)]
@@ -164,6 +169,63 @@ impl Builder<'_> {
     }
 
     fn leaf(&mut self, u: Node) -> Surface {
+        let surface = self.smooth_leaf(u);
+        match self.beside_singular(u) {
+            Some(beside) => self.moved(surface, beside),
+            None => surface,
+        }
+    }
+
+    /// The coordinates, moved a little where a root or a magnitude in u vanishes: there its derivative is put to
+    /// 0, which hides the surface around an axis. `None` if u has neither.
+    fn beside_singular(&mut self, u: Node) -> Option<[Node; 3]> {
+        use Binary::{Add, Min, MinWeight, Mul};
+        let arguments: Vec<Node> = self
+            .graph
+            .cone(u)
+            .into_iter()
+            .filter_map(|node| match self.graph.expr(node) {
+                Expr::Unary(Unary::Sqrt | Unary::Abs, a) => Some(a),
+                _ => None,
+            })
+            .filter(|&a| Axis::SPACE.iter().any(|&axis| self.graph.uses(a, axis)))
+            .collect();
+        let magnitudes: Vec<Node> = arguments.iter().map(|&a| self.graph.unary(Unary::Abs, a)).collect();
+        let smallest = magnitudes.into_iter().reduce(|a, b| self.graph.binary(Min, a, b))?;
+        // the step in lengths: the value of a leaf is about its distance
+        let (step, half) = (self.graph.constant(STEP), self.graph.constant(0.5 * STEP));
+        let size = self.graph.unary(Unary::Abs, u);
+        let [step, near] = [step, half].map(|factor| self.graph.binary(Mul, factor, size));
+        let near = self.graph.binary(Mul, near, near);
+        let is_singular = self.graph.binary(MinWeight, smallest, near);
+        let mut part = 1.0;
+        Some(Axis::SPACE.map(|axis| {
+            let coordinate = self.graph.coordinate(axis);
+            let magnitude = self.graph.unary(Unary::Abs, coordinate);
+            let relative = self.graph.constant(RELATIVE_STEP);
+            let relative = self.graph.binary(Mul, relative, magnitude);
+            let both = self.graph.binary(Add, relative, step);
+            // in no direction that a formula is likely to have
+            let factor = self.graph.constant(part);
+            part *= 0.7;
+            let offset = self.graph.binary(Mul, factor, both);
+            let offset = self.graph.binary(Mul, is_singular, offset);
+            self.graph.binary(Add, coordinate, offset)
+        }))
+    }
+
+    /// A surface as seen from other coordinates.
+    fn moved(&mut self, s: Surface, to: [Node; 3]) -> Surface {
+        let mut at = |node: Node| self.graph.substitute(node, to);
+        Surface {
+            depth: at(s.depth),
+            normal: s.normal.map(&mut at),
+            curvature: at(s.curvature),
+            velocity: s.velocity.map(|velocity| velocity.map(&mut at)),
+        }
+    }
+
+    fn smooth_leaf(&mut self, u: Node) -> Surface {
         use Binary::{Add, DivOrZero, Mul, Sub};
         let slopes = gradient(self.graph, u);
         let g2 = self.dot(slopes, slopes);
@@ -173,14 +235,14 @@ impl Builder<'_> {
         let half_g2 = self.graph.binary(Mul, half, g2);
         let bent = gradient(self.graph, half_g2);
         let along = self.dot(slopes, bent);
-        let trace = self.trace(slopes);
+        let [trace, squares] = self.second_derivatives(slopes);
         let b = self.graph.binary(DivOrZero, along, g2);
-        // where there is no normal every direction is as good: the mean second derivative
+        // where there is no normal the steepest direction counts: Σλ²/Σλ of the eigenvalues of Hess u, which
+        // for balls, cylinders and layers is the one that they have
         let has_normal = self.graph.unary(Unary::Sign, g2);
         let one = self.graph.constant(1.0);
-        let third = self.graph.constant(1.0 / 3.0);
         let has_none = self.graph.binary(Sub, one, has_normal);
-        let mean = self.graph.binary(Mul, third, trace);
+        let mean = self.graph.binary(DivOrZero, squares, trace);
         let mean = self.graph.binary(Mul, has_none, mean);
         let b = self.graph.binary(Add, b, mean);
         let depth = self.depth(u, g, g2, b);
@@ -219,11 +281,14 @@ impl Builder<'_> {
         self.graph.binary(DivOrZero, twice, below)
     }
 
-    /// ∂²u/∂x² + ∂²u/∂y² + ∂²u/∂z²
-    fn trace(&mut self, slopes: [Node; 3]) -> Node {
-        let [xx, yy, zz] = std::array::from_fn(|i| gradient(self.graph, slopes[i])[i]);
-        let sum = self.graph.binary(Binary::Add, xx, yy);
-        self.graph.binary(Binary::Add, sum, zz)
+    /// The trace of Hess u, and the sum of the squares of its elements.
+    fn second_derivatives(&mut self, slopes: [Node; 3]) -> [Node; 2] {
+        let rows = slopes.map(|slope| gradient(self.graph, slope));
+        let sum = self.graph.binary(Binary::Add, rows[0][0], rows[1][1]);
+        let trace = self.graph.binary(Binary::Add, sum, rows[2][2]);
+        let [x, y, z] = rows.map(|row| self.dot(row, row));
+        let sum = self.graph.binary(Binary::Add, x, y);
+        [trace, self.graph.binary(Binary::Add, sum, z)]
     }
 
     fn dot(&mut self, a: [Node; 3], b: [Node; 3]) -> Node {

@@ -172,7 +172,7 @@ impl Look<'_> {
             return;
         }
         flat &= normals.iter().all(|way| way.dot(normals[0]).abs() > PARALLEL);
-        if halvings == 0 || all && flat || !all {
+        if halvings == 0 || flat || !all {
             findings.held.push(*over);
             findings.open.push(*over);
             return;

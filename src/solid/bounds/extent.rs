@@ -5,12 +5,13 @@ use crate::geom::Aabb;
 /// What is known about the extent of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bounds {
-    /// It is proven that ω > 0 nowhere in the cube of half-side 2²⁰ around the origin.
+    /// It is proven that ω > 0 nowhere, up to 2²⁵⁰ from the origin.
     Empty,
     /// It is proven that the solid lies in this box. Each face is within a millionth of the longest side of
-    /// the solid itself, where the budget of the proof allowed it.
+    /// the solid itself, where the budget of the search allowed it.
     Within(Aabb),
-    /// No such box was found within that cube.
+    /// No such box was found; [`Solid::unbounded`](crate::Solid::unbounded) tells which operand has
+    /// none.
     Unbounded,
 }
 

@@ -1,4 +1,17 @@
 //! Where a solid is.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `extent` | what is known of it |
+//! | `contraction` | boxes around trees of leaves, made smaller from all conjuncts together |
+//! | `whole` | the same for solids that are too large to be taken apart |
+//! | `search` | contraction first, then subdivision from each side |
+//! | `find` | the bounds of a solid |
+//! | `unbounded` | which operand has no box, and to which sides |
 
+pub mod contraction;
 pub mod extent;
-mod search;
+mod find;
+pub mod search;
+pub mod unbounded;
+pub mod whole;

@@ -1,189 +1,238 @@
-//! Where a solid is: a box that provably contains it, made tight by subdivision with guaranteed ranges.
+//! The box of a solid: contraction of all space first, then subdivision from each side.
+//!
+//! A side is found by looking at the farthest cell first: it is made smaller, dropped if it is empty, or cut in
+//! two, until a point of the solid is known to be as far out as the farthest cell. Whenever the search ends, all
+//! cells together still hold the solid, so the box is right and can only be too large.
 
-use std::sync::Arc;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-use super::extent::Bounds;
 use crate::geom::Aabb;
-use crate::solid::construction::Solid;
-use crate::solid::leaves::leaf_set::LeafTree;
-use crate::solid::leaves::pruning::{Verdict, prune};
 
-/// Half the side of the cube around the origin in which solids are looked for.
-pub const SEARCH_RADIUS: f64 = 1_048_576.0;
+/// Half the side of the cube in which solids are looked for. Programs answer no signs farther out than 2²⁵⁶.
+pub const SEARCH_RADIUS: f64 = 1.809_251_394_333_065_6e75; // 2²⁵⁰
 
-/// Cells kept undecided on one level. Beyond it the search ends with the box that it has found.
-const MOST_CELLS: usize = 50_000;
+/// What reaches so far has no end: bounds of linear programs over the whole region lie a little within it.
+const OPEN: f64 = SEARCH_RADIUS * 1e-12;
 
-/// Cells along the longest side at which the first search ends.
-const ENOUGH_CELLS: f64 = 24.0;
+/// Cells looked at for one side at most.
+const CELLS_OF_SIDE: usize = 600;
 
-/// Ranges spent on one attempt to move one face.
-const PROOF_BUDGET: usize = 3_000;
+/// Work for one side, in the unit below: fewer cells of a large solid. It is some tenths of a second.
+const WORK_OF_SIDE: usize = 200_000;
 
-/// Attempts for each face: each halves the uncertainty.
-const FACE_STEPS: usize = 24;
+/// Nodes of formulas that make a unit of work.
+pub const NODES_PER_WORK: usize = 16;
 
-/// What tells whether a box may hold a part of the solid, the better the smaller the box.
-trait Probe {
+/// How close to a point of the solid a side is moved, relative to the longest side, for the first so many cells.
+/// Most sides reach the first goal within 50 cells; those that touch a thin curved edge would need thousands.
+const GOALS: [(usize, f64); 4] = [(100, 1e-6), (200, 1e-5), (300, 1e-4), (CELLS_OF_SIDE, 1e-3)];
+
+/// How much a box is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// A box that may be far too large: linear forms are solved together.
+    Large,
+    /// One of many cells: derivatives are used.
+    Cell,
+    /// A box of one point, to find out whether it is inside.
+    Point,
+}
+
+/// What makes a box smaller without losing a point of a solid, the better the smaller the box.
+pub trait Shrink {
     /// What is known of a box, handed on to the boxes within it.
     type Known: Clone;
     fn everything(&self) -> Self::Known;
-    /// What is known of a box that lies within another one, of which `known` holds; `None` if it is proven to
-    /// be outside.
-    fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known>;
-    fn is_inside(&self, known: &Self::Known, p: DVec3) -> bool;
+    /// What is known of the smaller box; `None` if it is proven to be outside. `known` holds of a larger one.
+    fn shrink(&self, known: &Self::Known, space: &mut Aabb, effort: Effort) -> Option<Self::Known>;
+    /// As for a cell, with a bound from below of the distance between a point and all that is left.
+    fn shrink_from(&self, known: &Self::Known, space: &mut Aabb, p: DVec3) -> Option<(Self::Known, f64)>;
+    /// What a call costs, in units that `WORK_OF_SIDE` knows.
+    fn work(&self, known: &Self::Known) -> usize;
+    /// Boxes that together hold the part of the solid in `space`.
+    fn parts(&self, space: &Aabb) -> Vec<(Aabb, Self::Known)>;
+    /// Whether a box lies inside the solid as a whole.
+    fn is_inside(known: &Self::Known) -> bool;
 }
 
-/// Asks for the range of the whole solid.
-struct Whole<'a>(&'a Solid);
-
-impl Probe for Whole<'_> {
-    type Known = ();
-
-    fn everything(&self) {}
-
-    fn look(&self, (): &(), cell: &Aabb) -> Option<()> {
-        // a range without a positive part proves that no point is inside
-        (self.0.range(cell).hi > 0.0).then_some(())
-    }
-
-    fn is_inside(&self, (): &(), p: DVec3) -> bool {
-        self.0.sign(p) > 0.0
-    }
+/// A side of a box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Side {
+    /// 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    /// Whether it is the side with the larger coordinate.
+    pub upper: bool,
 }
 
-/// Asks only for the ranges of the leaves that still matter in a box.
-struct ByLeaves<'a> {
-    parts: &'a LeafTree,
-}
-
-impl Probe for ByLeaves<'_> {
-    /// What is left of the solid; `None` if the box is inside it.
-    type Known = Option<Arc<[u32]>>;
-
-    fn everything(&self) -> Self::Known {
-        Some(self.parts.words.clone())
+impl Side {
+    /// The six sides of a box.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..3).flat_map(|axis| [false, true].map(|upper| Self { axis, upper }))
     }
 
-    fn look(&self, known: &Self::Known, cell: &Aabb) -> Option<Self::Known> {
-        let Some(words) = known else { return Some(None) };
-        let mut left = Vec::new();
-        match prune(words, &mut |leaf| self.parts.leaves.range(leaf, cell), &mut left) {
-            Verdict::Outside => None,
-            Verdict::Inside => Some(None),
-            Verdict::Near => Some(Some(left.into())),
+    /// How far out a box reaches on this side.
+    fn of(self, space: &Aabb) -> f64 {
+        if self.upper { space.max[self.axis] } else { -space.min[self.axis] }
+    }
+
+    fn of_point(self, p: DVec3) -> f64 {
+        if self.upper { p[self.axis] } else { -p[self.axis] }
+    }
+
+    fn set(self, space: &mut Aabb, reach: f64) {
+        if self.upper {
+            space.max[self.axis] = reach;
+        } else {
+            space.min[self.axis] = -reach;
         }
     }
 
-    fn is_inside(&self, known: &Self::Known, p: DVec3) -> bool {
-        known.as_ref().is_none_or(|words| self.parts.leaves.decide(words, &mut 0, p).0 > 0.0)
+    pub fn is_open(self, space: &Aabb) -> bool {
+        self.of(space) >= OPEN
     }
 }
 
-impl Solid {
-    /// Where the solid is; found on first use by subdivision, then kept.
-    pub fn bounds(&self) -> &Bounds {
-        self.moment.bounds(|| find(self))
-    }
-}
-
-/// Looks for the solid in the whole search cube.
-fn find(solid: &Solid) -> Bounds {
-    match solid.parts() {
-        Some(parts) => search(&ByLeaves { parts: &parts }),
-        None => search(&Whole(solid)),
-    }
-}
-
-fn search<P: Probe>(probe: &P) -> Bounds {
-    let everything = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
-    let Some((hull, known)) = coarse_hull(probe, everything) else { return Bounds::Empty };
-    let touches = hull.min.cmple(everything.min).any() || hull.max.cmpge(everything.max).any();
-    if touches {
-        return Bounds::Unbounded;
-    }
-    Bounds::Within(tighten(probe, &known, hull))
-}
-
-/// A box around the solid, and what is known of it. Cells that may hold a part of the solid are divided level
-/// by level, the others are dropped. `None` if no cell is left.
-fn coarse_hull<P: Probe>(probe: &P, everything: Aabb) -> Option<(Aabb, P::Known)> {
-    let mut cells = vec![(everything, probe.everything())];
-    loop {
-        let look = |(cell, known): &(Aabb, P::Known)| Some((*cell, probe.look(known, cell)?));
-        let kept: Vec<(Aabb, P::Known)> = cells.iter().filter_map(look).collect();
-        let hull = kept.iter().fold(Aabb::EMPTY, |hull, (cell, _)| hull.union(cell));
-        let (first, _) = kept.first()?;
-        let fine = hull.size().max_element() >= ENOUGH_CELLS * first.size().max_element();
-        // below this a cell is a point in double precision: a solid of no extent, or a range that never
-        // decides
-        let exhausted = first.size().max_element() < 1e-12 || kept.len() > MOST_CELLS;
-        if fine || exhausted {
-            let known = probe.look(&probe.everything(), &hull)?;
-            return Some((hull, known));
+/// A box around a solid; `None` if it is proven to be empty.
+pub fn search<S: Shrink>(solid: &S) -> Option<Aabb> {
+    let mut hull = Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS));
+    solid.shrink(&solid.everything(), &mut hull, Effort::Large)?;
+    let mut cells = solid.parts(&hull);
+    // a solid that does not end on one side need not be measured on the others
+    let (open, closed): (Vec<Side>, Vec<Side>) = Side::all().partition(|side| side.is_open(&hull));
+    for side in open.into_iter().chain(closed) {
+        let mut faces = Faces { solid, side, cells: Vec::new(), hull };
+        let reach;
+        (reach, cells) = faces.find(cells)?;
+        side.set(&mut hull, reach);
+        if side.is_open(&hull) {
+            break;
         }
-        let octants = |(cell, known): &(Aabb, P::Known)| {
-            let centre = cell.centre();
-            cell.corners().map(|corner| (Aabb::new(corner.min(centre), corner.max(centre)), known.clone()))
+    }
+    Some(hull)
+}
+
+/// A cell with its order in the queue.
+struct Cell<K> {
+    reach: f64,
+    space: Aabb,
+    known: K,
+}
+
+impl<K> PartialEq for Cell<K> {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl<K> Eq for Cell<K> {}
+
+impl<K> PartialOrd for Cell<K> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<K> Ord for Cell<K> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.reach.total_cmp(&other.reach)
+    }
+}
+
+/// The search for one side.
+struct Faces<'a, S: Shrink> {
+    solid: &'a S,
+    side: Side,
+    cells: Vec<Cell<S::Known>>,
+    hull: Aabb,
+}
+
+/// How far a solid reaches to one side, and cells that hold it, each with what is known of it there.
+type Reach<K> = (f64, Vec<(Aabb, K)>);
+
+impl<S: Shrink> Faces<'_, S> {
+    /// How far the solid reaches, and cells that hold it; `None` if there is no part of it.
+    fn find(&mut self, parts: Vec<(Aabb, S::Known)>) -> Option<Reach<S::Known>> {
+        let (side, hull) = (self.side, self.hull);
+        let cell = |(space, known): (Aabb, S::Known)| {
+            let space = space.intersection(&hull);
+            (!space.is_empty()).then(|| Cell { reach: side.of(&space), space, known })
         };
-        cells = kept.iter().flat_map(octants).collect();
-    }
-}
-
-/// Whether it can be proven within a budget of looks that no point of the box is inside.
-fn prove_empty<P: Probe>(probe: &P, known: &P::Known, over: Aabb) -> bool {
-    let mut stack = vec![(over, known.clone())];
-    let mut left = PROOF_BUDGET;
-    while let Some((cell, known)) = stack.pop() {
-        if left == 0 {
-            return false;
-        }
-        left -= 1;
-        if let Some(known) = probe.look(&known, &cell) {
-            // a point inside ends the attempt at once
-            if probe.is_inside(&known, cell.centre()) {
-                return false;
+        let mut queue: BinaryHeap<Cell<S::Known>> = parts.into_iter().filter_map(cell).collect();
+        self.cells.clear();
+        // how far out a point of the solid is known
+        let mut found = f64::NEG_INFINITY;
+        let (mut cells, mut work) = (0, WORK_OF_SIDE);
+        loop {
+            let farthest = queue.pop()?;
+            let goal = self.goal(&farthest, cells);
+            if farthest.reach - found > goal {
+                found = found.max(self.farthest_point(&farthest, goal));
             }
-            stack.extend(cell.halves().map(|half| (half, known.clone())));
-        }
-    }
-    true
-}
-
-/// Moves each face inwards as far as the slab that is cut off is proven empty.
-fn tighten<P: Probe>(probe: &P, known: &P::Known, hull: Aabb) -> Aabb {
-    let mut bounds = hull;
-    let goal = 1e-6 * hull.size().max_element();
-    for axis in 0..3 {
-        for upper in [false, true] {
-            // between `near` (known to be needed or not yet proven) and `far` (proven to be outside)
-            let mut far = if upper { bounds.max[axis] } else { bounds.min[axis] };
-            let mut near = bounds.centre()[axis];
-            for _ in 0..FACE_STEPS {
-                if (far - near).abs() <= goal {
-                    break;
-                }
-                let middle = 0.5 * (near + far);
-                let mut slab = bounds;
-                if upper {
-                    slab.min[axis] = middle;
-                } else {
-                    slab.max[axis] = middle;
-                }
-                if prove_empty(probe, known, slab) {
-                    far = middle;
-                    if upper {
-                        bounds.max[axis] = middle;
-                    } else {
-                        bounds.min[axis] = middle;
-                    }
-                } else {
-                    near = middle;
+            if farthest.reach - found <= goal || cells == CELLS_OF_SIDE || work == 0 {
+                let reach = farthest.reach;
+                queue.push(farthest);
+                return Some((reach, queue.into_iter().map(|cell| (cell.space, cell.known)).collect()));
+            }
+            cells += 1;
+            work = work.saturating_sub(self.solid.work(&farthest.known));
+            for mut half in halves(&farthest.space) {
+                if let Some(known) = self.solid.shrink(&farthest.known, &mut half, Effort::Cell) {
+                    queue.push(Cell { reach: side.of(&half), space: half, known });
                 }
             }
         }
     }
-    bounds
+
+    fn goal(&self, cell: &Cell<S::Known>, cells: usize) -> f64 {
+        if self.side.is_open(&cell.space) {
+            return 0.0;
+        }
+        let relative = GOALS.iter().find(|(most, _)| cells < *most).map_or(1e-3, |(_, goal)| *goal);
+        let sides = self.hull.size().to_array().into_iter().filter(|&side| side < OPEN);
+        relative * sides.fold(0.0, f64::max)
+    }
+
+    /// How far out a point of the solid is known in a cell.
+    fn farthest_point(&self, cell: &Cell<S::Known>, goal: f64) -> f64 {
+        if S::is_inside(&cell.known) {
+            return cell.reach;
+        }
+        let mut face = cell.space.centre();
+        let inwards = 0.5 * goal;
+        let sign = if self.side.upper { 1.0 } else { -1.0 };
+        face[self.side.axis] = sign * (cell.reach - inwards);
+        // the point of the side that is nearest to the origin: unbounded solids are often seen there
+        let mut near = DVec3::ZERO.clamp(cell.space.min, cell.space.max);
+        near[self.side.axis] = face[self.side.axis];
+        let is_inside = |p: &DVec3| {
+            let known = self.solid.shrink(&cell.known, &mut Aabb::new(*p, *p), Effort::Point);
+            known.is_some_and(|known| S::is_inside(&known))
+        };
+        let is_open = self.side.is_open(&cell.space);
+        let points = [Some(face), is_open.then_some(near), Some(cell.space.centre())];
+        // the farthest come first
+        let inside = points.into_iter().flatten().find(is_inside);
+        inside.map_or(f64::NEG_INFINITY, |p| self.side.of_point(p))
+    }
+}
+
+/// The two halves of a cell. Huge ones are cut by magnitude, so that the scale of a solid is found in a few
+/// steps.
+fn halves(space: &Aabb) -> [Aabb; 2] {
+    const HUGE: f64 = 1e6;
+    if space.size().max_element() < HUGE {
+        return space.halves();
+    }
+    let scale = |x: f64| x.signum() * x.abs().ln_1p();
+    let lengths = DVec3::from_array(std::array::from_fn(|i| scale(space.max[i]) - scale(space.min[i])));
+    let axis = lengths.max_position();
+    let middle = 0.5 * (scale(space.min[axis]) + scale(space.max[axis]));
+    let cut = (middle.signum() * middle.abs().exp_m1()).clamp(space.min[axis], space.max[axis]);
+    let (mut low, mut high) = (*space, *space);
+    low.max[axis] = cut;
+    high.min[axis] = cut;
+    [low, high]
 }

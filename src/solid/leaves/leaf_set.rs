@@ -15,7 +15,7 @@ use super::words::{self, Word};
 use crate::field::{Path, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{Enclosure, Expr, Graph, Node, Region};
+use crate::ir::{Contractor, Enclosure, Expr, Graph, Node, Region, Wanted};
 use crate::solid::engine::Engine;
 
 struct Leaf {
@@ -222,6 +222,18 @@ impl Leaves {
             };
             visit(Sheet { slopes, at: &at });
         }
+    }
+
+    /// What makes boxes smaller around the points where a leaf is positive, or negative where it is negated, at
+    /// some time of the stretch.
+    pub fn contractor(&self, leaf: u32, negated: bool) -> (&Contractor, Wanted<'_>) {
+        let (shape, parameters, own) = self.of(leaf);
+        let mut region = Region { parameters, ..Region::of(&Aabb::EMPTY) };
+        if !own.is_empty() {
+            let first = self.store.leaves[leaf as usize].first_uniform as usize;
+            region.uniforms = &self.ranges().uniforms[first..first + own.len()];
+        }
+        (shape.contractor(), Wanted { region, negated })
     }
 
     #[inline]

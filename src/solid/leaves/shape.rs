@@ -8,8 +8,8 @@ use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
-    self, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, Outside, RangeEvaluator, Region,
-    Uniforms,
+    self, Contractor, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, Outside, RangeEvaluator,
+    Region, Uniforms,
 };
 use crate::simplify::simplify;
 use crate::solid::engine::Engine;
@@ -38,6 +38,7 @@ pub struct Shape {
     polynomial: OnceLock<Option<Evaluator>>,
     enclosures: OnceLock<EnclosureEvaluator>,
     slopes: OnceLock<SlopeEvaluator>,
+    contractor: OnceLock<Contractor>,
 }
 
 /// Ranges of a shape's derivatives.
@@ -118,6 +119,7 @@ impl Shape {
             polynomial,
             enclosures,
             slopes,
+            contractor: OnceLock::new(),
         }
     }
 
@@ -182,6 +184,11 @@ impl Shape {
     /// Ranges of the derivatives.
     pub fn slopes(&self) -> &SlopeEvaluator {
         self.slopes.get_or_init(|| SlopeEvaluator::new(&self.graph, self.root))
+    }
+
+    /// What makes boxes smaller around the points where a leaf is positive.
+    pub fn contractor(&self) -> &Contractor {
+        self.contractor.get_or_init(|| Contractor::new(&self.graph, self.root))
     }
 
     #[inline]

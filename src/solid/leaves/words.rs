@@ -6,7 +6,7 @@
 use super::tree::Logic;
 
 const KIND_SHIFT: u32 = 30;
-pub(super) const PAYLOAD: u32 = (1 << KIND_SHIFT) - 1;
+pub const PAYLOAD: u32 = (1 << KIND_SHIFT) - 1;
 const LEAF: u32 = 0;
 const ALL: u32 = 1;
 const ANY: u32 = 2;
@@ -45,6 +45,16 @@ pub fn encode(logic: &Logic, out: &mut Vec<u32>) {
     };
     out.push(kind << KIND_SHIFT | parts.len() as u32);
     parts.iter().for_each(|part| encode(part, out));
+}
+
+/// The tree of the complement: leaves change their signs, "all of" and "any of" their places.
+pub fn opposite(words: &[u32]) -> Vec<u32> {
+    let other = |&word: &u32| match word >> KIND_SHIFT {
+        LEAF => word ^ 1,
+        ALL => ANY << KIND_SHIFT | word & PAYLOAD,
+        _ => ALL << KIND_SHIFT | word & PAYLOAD,
+    };
+    words.iter().map(other).collect()
 }
 
 /// Moves past the tree that begins at `at`.

@@ -1,0 +1,195 @@
+//! All nodes of a graph: values forwards, what they leave of their operands backwards.
+
+use std::cell::RefCell;
+
+use super::backward;
+use super::forward::{POSITIVE, numbers};
+use super::rule::{Degree, Rule};
+use super::sets::meet;
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::bounds::range::{Affine, Region};
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+
+/// A graph prepared for contraction.
+#[derive(Debug, Clone)]
+pub struct Contractor {
+    pub(super) rules: Vec<Rule>,
+    pub(super) degrees: Vec<Degree>,
+    root: Node,
+    /// Whether the root is a number only if the node is.
+    needed: Vec<bool>,
+    /// The operands of each node that it needs.
+    needs: Vec<[bool; 2]>,
+    /// Linear forms that something else is computed from, or the root.
+    pub(super) forms: Vec<Node>,
+    coordinates: [Option<Node>; 3],
+}
+
+/// What is asked of a formula.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Time, and the numbers that the formula takes. Its space is not used.
+    pub region: Region<'a>,
+    /// Whether the formula is to be negative instead of positive.
+    pub negated: bool,
+}
+
+/// Intervals of the nodes, kept between calls.
+#[derive(Default)]
+pub(super) struct Scratch {
+    pub values: Vec<Interval>,
+    /// Whether a node may be undefined somewhere.
+    pub may_fail: Vec<bool>,
+    pub slopes: Vec<[Interval; 3]>,
+    pub linear: Vec<[Interval; 4]>,
+    /// What is known of some nodes beforehand, in their order.
+    pub known: Vec<(Node, Interval)>,
+}
+
+thread_local! {
+    pub(super) static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+impl Contractor {
+    /// Prepares a root of a graph.
+    pub fn new(graph: &Graph, root: Node) -> Self {
+        let rules = Rule::all(graph);
+        let mut degrees: Vec<Degree> = Vec::with_capacity(rules.len());
+        for rule in &rules {
+            degrees.push(rule.degree(|node| degrees[node.index()]));
+        }
+        let needs = rules.iter().map(|rule| {
+            let needed: Vec<Node> = rule.needed(graph).collect();
+            let mut flags = [false; 2];
+            for (flag, operand) in flags.iter_mut().zip(rule.operands()) {
+                *flag = needed.contains(&operand);
+            }
+            flags
+        });
+        let needs: Vec<[bool; 2]> = needs.collect();
+        let mut needed = vec![false; rules.len()];
+        needed[root.index()] = true;
+        let mut read_by_other = vec![false; rules.len()];
+        read_by_other[root.index()] = true;
+        for i in (0..=root.index()).rev() {
+            for (operand, is_needed) in rules[i].operands().zip(needs[i]) {
+                needed[operand.index()] |= needed[i] && is_needed;
+                read_by_other[operand.index()] |= needed[i] && degrees[i] == Degree::Other;
+            }
+        }
+        let is_form = |&(node, expr): &(Node, Expr)| {
+            degrees[node.index()] == Degree::Linear
+                && read_by_other[node.index()]
+                && needed[node.index()]
+                && !matches!(expr, Expr::Coordinate(_))
+        };
+        let forms = graph.nodes().filter(is_form).map(|(node, _)| node).collect();
+        let coordinates = Axis::SPACE.map(|axis| graph.find(Expr::Coordinate(axis)));
+        Self { rules, degrees, root, needed, needs, forms, coordinates }
+    }
+
+    /// How many nodes a call visits.
+    pub fn len(&self) -> usize {
+        self.rules.len()
+    }
+
+    /// Forwards and backwards. `None` if the root is positive nowhere, true if it is everywhere.
+    pub(super) fn pass(&self, region: &Region<'_>, negated: bool, scratch: &mut Scratch) -> Option<bool> {
+        self.forward(region, scratch)?;
+        let Scratch { values, may_fail, .. } = scratch;
+        let root = self.root.index();
+        let signed = if negated { -values[root] } else { values[root] };
+        if signed.hi <= 0.0 {
+            return None;
+        }
+        if signed.lo > 0.0 && !may_fail[root] {
+            return Some(true);
+        }
+        let positive = meet(signed, POSITIVE)?;
+        values[root] = if negated { -positive } else { positive };
+        for i in (0..=root).rev() {
+            if self.needed[i] {
+                self.backward(i, values)?;
+            }
+        }
+        Some(false)
+    }
+
+    /// The numbers that each node may be. `None` if one that the root needs is undefined everywhere.
+    pub(super) fn forward(&self, region: &Region<'_>, scratch: &mut Scratch) -> Option<()> {
+        let Scratch { values, may_fail, known, .. } = scratch;
+        let mut known = known.iter().peekable();
+        values.clear();
+        may_fail.clear();
+        for (i, rule) in self.rules[..=self.root.index()].iter().enumerate() {
+            // an operand that is undefined where the node is not says nothing of the node
+            let unknown = |node: Node| may_fail[node.index()];
+            let is_open = rule.operands().zip(self.needs[i]).any(|(node, needed)| !needed && unknown(node));
+            let found = numbers(rule, |node| values[node.index()], region);
+            let fails = found.may_fail || rule.operands().any(unknown);
+            let value = match found.range {
+                Some(range) if !is_open => range,
+                None if self.needed[i] && !is_open => return None,
+                _ => Interval::ALL,
+            };
+            let value = match known.next_if(|(node, _)| node.index() == i) {
+                Some((_, range)) => meet(value, *range)?,
+                None => value,
+            };
+            values.push(value);
+            may_fail.push(fails);
+        }
+        Some(())
+    }
+
+    /// What the value of a node leaves of its operands.
+    fn backward(&self, i: usize, values: &mut [Interval]) -> Option<()> {
+        let value = values[i];
+        match self.rules[i] {
+            Rule::Power { of, exponent } => {
+                values[of.index()] = backward::power(value, values[of.index()], exponent)?;
+            }
+            Rule::Slab { of, first, second } => {
+                let line = |affine: Affine| (affine.slope, affine.number(|node| values[node.index()]));
+                let (first, second) = (line(first), line(second));
+                values[of.index()] = backward::slab(value, values[of.index()], first, second)?;
+            }
+            Rule::Plain(Expr::Unary(op, a)) => {
+                values[a.index()] = backward::unary(op, value, values[a.index()])?;
+            }
+            Rule::Plain(Expr::Binary(op, a, b)) => {
+                let [left, right] = backward::binary(op, value, values[a.index()], values[b.index()])?;
+                let [needs_a, needs_b] = self.needs[i];
+                if a == b {
+                    if needs_a && needs_b {
+                        values[a.index()] = meet(left, right)?;
+                    }
+                    return Some(());
+                }
+                if needs_a {
+                    values[a.index()] = left;
+                }
+                if needs_b {
+                    values[b.index()] = right;
+                }
+            }
+            Rule::Plain(Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_)) => {}
+        }
+        Some(())
+    }
+
+    /// What is left of a box.
+    pub(super) fn read_box(&self, values: &[Interval], space: &mut Aabb) -> Option<()> {
+        for (axis, node) in self.coordinates.into_iter().enumerate() {
+            let Some(value) = node.and_then(|node| values.get(node.index())) else { continue };
+            let left = meet(Interval { lo: space.min[axis], hi: space.max[axis] }, *value)?;
+            (space.min[axis], space.max[axis]) = (left.lo, left.hi);
+        }
+        Some(())
+    }
+
+    pub(super) fn root(&self) -> Node {
+        self.root
+    }
+}

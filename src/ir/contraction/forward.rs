@@ -1,0 +1,216 @@
+//! The numbers that an operation may give.
+
+use super::rule::Rule;
+use super::sets::meet;
+use crate::interval::Interval;
+use crate::ir::bounds::range::{self, Region};
+use crate::ir::function::{BinaryFunction, UnaryFunction};
+use crate::ir::graph::{Axis, Expr};
+use crate::ir::op::{Binary, Unary};
+
+pub const POSITIVE: Interval = Interval { lo: 0.0, hi: f64::INFINITY };
+const UP_TO_ONE: Interval = Interval { lo: -1.0, hi: 1.0 };
+
+/// What a node may be.
+#[derive(Debug, Clone, Copy)]
+pub struct Numbers {
+    /// The numbers; `None` if it is undefined everywhere.
+    pub range: Option<Interval>,
+    /// Whether the operation may be undefined for some of its operands.
+    pub may_fail: bool,
+}
+
+impl From<Interval> for Numbers {
+    fn from(range: Interval) -> Self {
+        Self { range: Some(range), may_fail: false }
+    }
+}
+
+/// What an operation gives for operands in a domain; undefined for the others.
+fn partial(operand: Interval, domain: Interval, f: impl Fn(Interval) -> Interval) -> Numbers {
+    let defined = meet(operand, domain);
+    Numbers { range: defined.map(f), may_fail: defined != Some(operand) }
+}
+
+/// What a node with this rule may be; `of` gives that of its operands.
+pub fn numbers(rule: &Rule, of: impl Fn(crate::ir::Node) -> Interval, region: &Region<'_>) -> Numbers {
+    match *rule {
+        Rule::Power { of: base, exponent } => power(of(base), exponent).into(),
+        Rule::Slab { of: e, first, second } => {
+            let rule = range::RangeRule::Slab { of: e, first, second };
+            rule.over(of).unwrap_or(Interval::ALL).into()
+        }
+        Rule::Plain(Expr::Unary(op, a)) => unary(op, of(a)),
+        Rule::Plain(Expr::Binary(op, a, b)) => binary(op, of(a), of(b)),
+        Rule::Plain(Expr::Coordinate(axis)) => coordinate(axis, region).into(),
+        Rule::Plain(Expr::Constant(bits)) => {
+            let value = f64::from_bits(bits);
+            Interval::new(value, value).into()
+        }
+        Rule::Plain(Expr::Parameter(i)) => {
+            let known = region.parameters.get(i as usize);
+            known.map_or(Interval::ALL, |&value| Interval::new(value, value)).into()
+        }
+        Rule::Plain(Expr::Uniform(i)) => {
+            region.uniforms.get(i as usize).copied().unwrap_or(Interval::ALL).into()
+        }
+    }
+}
+
+fn coordinate(axis: Axis, region: &Region<'_>) -> Interval {
+    let (min, max) = (region.space.min, region.space.max);
+    match axis {
+        Axis::X => Interval::new(min.x, max.x),
+        Axis::Y => Interval::new(min.y, max.y),
+        Axis::Z => Interval::new(min.z, max.z),
+        Axis::T => region.time,
+    }
+}
+
+fn unary(op: Unary, a: Interval) -> Numbers {
+    match op {
+        Unary::Neg | Unary::Abs | Unary::Sign => range::unary(op, a).into(),
+        Unary::Sqrt => partial(a, POSITIVE, Interval::sqrt),
+        Unary::Call(function) => match function {
+            UnaryFunction::Sin => a.sin().into(),
+            UnaryFunction::Cos => a.cos().into(),
+            UnaryFunction::Tan | UnaryFunction::Atan => function.range(a).into(),
+            UnaryFunction::Exp => {
+                let range = function.range(a);
+                Interval { lo: range.lo.max(0.0), ..range }.into()
+            }
+            UnaryFunction::Ln => partial(a, POSITIVE, |a| {
+                // the logarithm of 0 is −∞
+                let range = a.increasing(libm::log);
+                if range == Interval::ALL { Interval { hi: f64::INFINITY, ..range } } else { range }
+            }),
+            UnaryFunction::Asin | UnaryFunction::Acos => partial(a, UP_TO_ONE, |a| function.range(a)),
+        },
+    }
+}
+
+fn binary(op: Binary, a: Interval, b: Interval) -> Numbers {
+    match op {
+        Binary::Add => sum(a, b).into(),
+        Binary::Sub => sum(a, -b).into(),
+        Binary::Mul => (a * b).into(),
+        Binary::Div if b.contains(0.0) => Numbers { range: Some(Interval::ALL), may_fail: true },
+        Binary::Div
+        | Binary::DivOrZero
+        | Binary::Min
+        | Binary::Max
+        | Binary::PlainMin
+        | Binary::PlainMax
+        | Binary::MinWeight
+        | Binary::MaxWeight => range::binary(op, a, b).into(),
+        Binary::And => conjunction(a, b).into(),
+        Binary::Or => (-conjunction(-a, -b)).into(),
+        Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() }.into(),
+        Binary::Call(BinaryFunction::Pow) => general_power(a, b),
+        Binary::Call(BinaryFunction::Atan2) => angle(a, b).into(),
+    }
+}
+
+/// u ∧ v is never above the smaller operand.
+fn conjunction(a: Interval, b: Interval) -> Interval {
+    let known = range::binary(Binary::And, a, b);
+    let hi = a.min(b).widened(4).hi;
+    Interval { lo: known.lo, hi: known.hi.min(hi) }
+}
+
+/// A sum, rounded outwards only where it rounds at all: faces at round numbers stay there.
+pub fn sum(a: Interval, b: Interval) -> Interval {
+    let (lo, low_error) = exact_sum(a.lo, b.lo);
+    let (hi, high_error) = exact_sum(a.hi, b.hi);
+    let lo = if lo.is_nan() {
+        f64::NEG_INFINITY
+    } else if low_error < 0.0 {
+        lo.next_down()
+    } else {
+        lo
+    };
+    let hi = if hi.is_nan() {
+        f64::INFINITY
+    } else if high_error > 0.0 {
+        hi.next_up()
+    } else {
+        hi
+    };
+    Interval { lo, hi }
+}
+
+/// a + b as rounded, and what is missing (Knuth's two-sum). An overflow misses something of the other sign.
+fn exact_sum(a: f64, b: f64) -> (f64, f64) {
+    let s = a + b;
+    if !s.is_finite() {
+        return (s, if a.is_finite() && b.is_finite() { -s } else { 0.0 });
+    }
+    let of_b = s - a;
+    (s, (a - (s - of_b)) + (b - of_b))
+}
+
+/// Whole powers: an even one has its minimum at 0.
+pub fn power(a: Interval, exponent: u32) -> Interval {
+    let at = |x: f64| {
+        let (mut result, mut square, mut left) = (Interval::point(1.0), Interval::point(x), exponent);
+        while left > 0 {
+            if left % 2 == 1 {
+                result = result * square;
+            }
+            square = square.square_or_point(left > 1);
+            left /= 2;
+        }
+        result
+    };
+    if exponent.is_multiple_of(2) {
+        let a = a.abs();
+        let (lo, hi) = (at(a.lo), at(a.hi));
+        return Interval { lo: if a.lo == 0.0 { 0.0 } else { lo.lo.max(0.0) }, hi: hi.hi };
+    }
+    Interval {
+        lo: if a.lo == 0.0 { 0.0 } else { at(a.lo).lo },
+        hi: if a.hi == 0.0 { 0.0 } else { at(a.hi).hi },
+    }
+}
+
+trait Squared {
+    fn square_or_point(self, needed: bool) -> Self;
+}
+
+impl Squared for Interval {
+    fn square_or_point(self, needed: bool) -> Self {
+        if needed { self.square() } else { self }
+    }
+}
+
+/// aᵇ. A negative base has a power only where the exponent is whole.
+fn general_power(a: Interval, b: Interval) -> Numbers {
+    let whole = b.lo == b.hi && b.lo.fract() == 0.0;
+    if a.lo < 0.0 && (whole || b.lo != b.hi) || b.contains(0.0) && !a.lo.is_finite() {
+        return Numbers { range: Some(Interval::ALL), may_fail: true };
+    }
+    partial(a, POSITIVE, |a| {
+        let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
+        let corners = corners.map(|(a, b)| libm::pow(a, b));
+        if corners.iter().any(|corner| corner.is_nan()) {
+            return POSITIVE;
+        }
+        let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
+        let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let range = Interval::new(lo, hi).widened(4);
+        Interval { lo: range.lo.max(0.0), ..range }
+    })
+}
+
+/// The angles of the points (b, a). Unless they surround the origin or meet the cut behind it, the corners have
+/// the extreme ones.
+fn angle(a: Interval, b: Interval) -> Interval {
+    if a.contains(0.0) && b.lo <= 0.0 {
+        return BinaryFunction::Atan2.range(a, b);
+    }
+    let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
+    let corners = corners.map(|(a, b)| libm::atan2(a, b));
+    let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
+    let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    Interval::new(lo, hi).widened(4)
+}

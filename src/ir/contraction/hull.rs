@@ -1,0 +1,195 @@
+//! A box made smaller by values: hull consistency.
+
+use super::contractor::{Contractor, SCRATCH, Wanted};
+use super::forms;
+use super::linear::LinearForm;
+use super::sets::Contracted;
+use crate::geom::Aabb;
+use crate::ir::bounds::range::Region;
+
+impl Contractor {
+    /// Cuts off parts of a box where the formula is not positive. With `found` it also tells what it has found
+    /// of the linear forms in the formula.
+    pub fn contract(
+        &self,
+        wanted: &Wanted<'_>,
+        space: &mut Aabb,
+        found: Option<&mut Vec<LinearForm>>,
+    ) -> Contracted {
+        self.contract_given(&[], wanted, space, found)
+    }
+
+    /// Cuts off parts of a box, where linear forms of other formulas have known ranges as well.
+    pub fn contract_given(
+        &self,
+        given: &[LinearForm],
+        wanted: &Wanted<'_>,
+        space: &mut Aabb,
+        found: Option<&mut Vec<LinearForm>>,
+    ) -> Contracted {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let before = *space;
+            let region = Region { space: &before, ..wanted.region };
+            scratch.known.clear();
+            if !given.is_empty() && self.forward(&region, scratch).is_some() {
+                forms::bound(self, &self.forms, given, &before, scratch);
+            }
+            match self.pass(&region, wanted.negated, scratch) {
+                None => Contracted::Nowhere,
+                Some(true) => Contracted::Everywhere,
+                Some(false) => match self.read_box(&scratch.values, space) {
+                    None => Contracted::Nowhere,
+                    Some(()) => {
+                        if let Some(found) = found {
+                            forms::collect(self, &self.forms, scratch, found);
+                        }
+                        Contracted::Somewhere
+                    }
+                },
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::linear::{contract_linear, contract_linear_around};
+    use super::*;
+    use crate::ir::graph::{Axis, Graph, Node};
+    use crate::ir::{Binary, Interpreter, Unary, UnaryFunction};
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    const AXES: [Axis; 3] = Axis::SPACE;
+
+    /// Random formulas: each step applies an operation to two of the nodes made before.
+    fn formula(steps: &[(usize, usize, usize, f64)]) -> (Graph, Node) {
+        let mut graph = Graph::default();
+        let mut nodes: Vec<Node> = AXES.iter().map(|&axis| graph.coordinate(axis)).collect();
+        let unary: Vec<Unary> = Unary::all().collect();
+        let binary: Vec<Binary> = Binary::all().collect();
+        for &(op, i, j, number) in steps {
+            let (a, b) = (nodes[nodes.len() - 1 - i % nodes.len()], nodes[j % nodes.len()]);
+            let constant = graph.constant(number);
+            let node = match op % (unary.len() + 2 * binary.len()) {
+                op if op < unary.len() => graph.unary(unary[op], a),
+                op if op < unary.len() + binary.len() => graph.binary(binary[op - unary.len()], a, b),
+                op => graph.binary(binary[op - unary.len() - binary.len()], a, constant),
+            };
+            nodes.push(node);
+        }
+        (graph, nodes[nodes.len() - 1])
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(3000))]
+        /// Whatever the operations: a point at which the formula is positive is never cut off.
+        #[test]
+        fn no_point_is_cut_off(
+            steps in prop::collection::vec((0..200_usize, 0..4_usize, 0..9_usize, -3.0..3.0f64), 1..9),
+            lo in prop::array::uniform3(-3.0..2.0f64),
+            size in prop::array::uniform3(0.0..4.0f64),
+            points in prop::collection::vec(prop::array::uniform3(0.0..=1.0f64), 24),
+            negated: bool,
+        ) {
+            let (graph, root) = formula(&steps);
+            let (interpreter, contractor) = (Interpreter::new(&graph, &[root]), Contractor::new(&graph, root));
+            let min = DVec3::from_array(lo);
+            let space = Aabb::new(min, min + DVec3::from_array(size));
+            let wanted = Wanted { region: Region::of(&space), negated };
+            let mut forms = Vec::new();
+            let mut left = space;
+            let mut verdict = contractor.contract(&wanted, &mut left, Some(&mut forms));
+            if verdict == Contracted::Somewhere && !contract_linear(&forms, &mut left) {
+                verdict = Contracted::Nowhere;
+            }
+            if verdict == Contracted::Somewhere {
+                let origin = left.centre();
+                forms.clear();
+                for contractor in [&contractor, &contractor] {
+                    verdict = contractor.contract_by_slopes(&wanted, &mut left, (origin, &mut forms));
+                }
+                if verdict == Contracted::Somewhere
+                    && !contract_linear_around(origin, &forms, &mut left)
+                {
+                    verdict = Contracted::Nowhere;
+                }
+            }
+            for at in points {
+                let p = (space.min + space.size() * DVec3::from_array(at)).clamp(space.min, space.max);
+                let mut omega = [0.0];
+                interpreter.eval_f64(p.to_array(), &mut omega);
+                let inside = if negated { omega[0] < 0.0 } else { omega[0] > 0.0 };
+                match verdict {
+                    Contracted::Nowhere => prop_assert!(!inside, "{p} is inside, {omega:?}"),
+                    Contracted::Everywhere => prop_assert!(inside, "{p} is not inside, {omega:?}"),
+                    Contracted::Somewhere => prop_assert!(!inside || left.contains(p), "{p} not in {left:?}"),
+                }
+            }
+        }
+    }
+
+    #[track_caller]
+    fn check(build: impl Fn(&mut Graph, [Node; 3]) -> Node, expected: [[f64; 2]; 3]) {
+        let mut graph = Graph::default();
+        let coordinates = AXES.map(|axis| graph.coordinate(axis));
+        let root = build(&mut graph, coordinates);
+        let contractor = Contractor::new(&graph, root);
+        let mut space = Aabb::new(DVec3::splat(-1e75), DVec3::splat(1e75));
+        let wanted = Wanted { region: Region::of(&Aabb::EMPTY), negated: false };
+        let mut forms = Vec::new();
+        assert_eq!(contractor.contract(&wanted, &mut space, Some(&mut forms)), Contracted::Somewhere);
+        assert!(contract_linear(&forms, &mut space));
+        for (axis, [lo, hi]) in expected.into_iter().enumerate() {
+            let found = [space.min[axis], space.max[axis]];
+            let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs().max(1.0);
+            assert!(near(found[0], lo) && near(found[1], hi), "{space:?}");
+        }
+    }
+
+    #[test]
+    fn operations_are_solved_for_their_operands() {
+        let all = [-1e75, 1e75];
+        // 1 − x² − |y| − √z: each coordinate by itself
+        check(
+            |g, [x, y, z]| {
+                let one = g.constant(1.0);
+                let (x2, y1, z_root) =
+                    (g.binary(Binary::Mul, x, x), g.unary(Unary::Abs, y), g.unary(Unary::Sqrt, z));
+                let a = g.binary(Binary::Sub, one, x2);
+                let b = g.binary(Binary::Sub, a, y1);
+                g.binary(Binary::Sub, b, z_root)
+            },
+            [[-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]],
+        );
+        // 8 − x³ ∧ eʸ − 1
+        check(
+            |g, [x, y, _]| {
+                let (eight, one) = (g.constant(8.0), g.constant(1.0));
+                let square = g.binary(Binary::Mul, x, x);
+                let cube = g.binary(Binary::Mul, square, x);
+                let a = g.binary(Binary::Sub, eight, cube);
+                let exp = g.unary(UnaryFunction::Exp.into(), y);
+                let b = g.binary(Binary::Sub, exp, one);
+                g.binary(Binary::And, a, b)
+            },
+            [[-1e75, 2.0], [0.0, 1e75], all],
+        );
+        // 1 − (0.6x + 0.8y)² − (0.6y − 0.8x)²: only both forms together bound x and y
+        let reach = 1.4;
+        check(
+            |g, [x, y, _]| {
+                let [one, c, s] = [1.0, 0.6, 0.8].map(|number| g.constant(number));
+                let mut form = |op, a, p, b, q| {
+                    let (a, b) = (g.binary(Binary::Mul, a, p), g.binary(Binary::Mul, b, q));
+                    let form = g.binary(op, a, b);
+                    g.binary(Binary::Mul, form, form)
+                };
+                let (u, v) = (form(Binary::Add, c, x, s, y), form(Binary::Sub, c, y, s, x));
+                let a = g.binary(Binary::Sub, one, u);
+                g.binary(Binary::Sub, a, v)
+            },
+            [[-reach, reach], [-reach, reach], all],
+        );
+    }
+}

@@ -1,0 +1,33 @@
+//! Contraction: a box made smaller without losing a point at which a formula is positive.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `rule` | how the nodes of a graph are read: powers and slabs are one operation |
+//! | `forward` | the numbers that an operation may give |
+//! | `backward` | the operands that may give a number |
+//! | `sets` | intervals as sets of numbers, and what is known of a box |
+//! | `contractor` | both, over all nodes of a graph |
+//! | `forms` | the linear forms in a graph |
+//! | `hull` | a box made smaller by values (hull consistency) |
+//! | `slopes` | a box made smaller by derivatives (the mean value form) |
+//! | `linear` | linear forms with known ranges, and the box around them (linear programming) |
+//!
+//! Intervals here hold the *numbers* that a node may be. Where a formula is positive every operand that it
+//! needs is a number, so an undefined operation restricts its operands and does not make the whole unknown.
+//!
+//! Invariant: what is cut off holds no point at which the formula is positive, over the reals or as programs
+//! in `f64` evaluate it. Rules backwards therefore widen a value by the rounding error of its operation first.
+
+mod backward;
+mod contractor;
+mod forms;
+mod forward;
+mod hull;
+mod linear;
+mod rule;
+mod sets;
+mod slopes;
+
+pub use contractor::{Contractor, Wanted};
+pub use linear::{LinearForm, contract_linear, contract_linear_around};
+pub use sets::Contracted;

@@ -1,0 +1,211 @@
+//! Derivatives over a box, and what they exclude.
+//!
+//! For every point p of a box, u(p) ∈ u(c) + G·(p − c), with c its centre and G an enclosure of the
+//! (generalised) gradient over the box: the mean value theorem. What it excludes shrinks with the square of
+//! the box, where values alone are wrong by its size.
+
+use glam::DVec3;
+
+use super::backward;
+use super::contractor::{Contractor, SCRATCH, Scratch, Wanted};
+use super::forward::power;
+use super::linear::LinearForm;
+use super::rule::Rule;
+use super::sets::{Contracted, meet};
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::ir::bounds::range::Region;
+use crate::ir::function::BinaryFunction;
+use crate::ir::graph::{Axis, Expr, Node};
+use crate::ir::op::{Binary, Unary};
+
+/// How far rounding may move a surface, relative to the coordinates of its points.
+const ROUNDING: f64 = 1e-13;
+
+const ZERO: Interval = Interval::point(0.0);
+const ONE: Interval = Interval::point(1.0);
+const TWO: Interval = Interval::point(2.0);
+
+type Slopes = [Interval; 3];
+
+impl Contractor {
+    /// Cuts off what the formula's derivatives exclude. It pays in boxes that are small on the scale of the
+    /// formula. `forms` receives what they say of the distance from an origin.
+    pub fn contract_by_slopes(
+        &self,
+        wanted: &Wanted<'_>,
+        space: &mut Aabb,
+        forms: (DVec3, &mut Vec<LinearForm>),
+    ) -> Contracted {
+        SCRATCH.with_borrow_mut(|scratch| {
+            scratch.known.clear();
+            contract(self, wanted, space, forms, scratch)
+        })
+    }
+}
+
+/// Cuts off what the derivatives exclude. `forms` receives what they say of p − `origin`, so that several
+/// formulas can be solved together.
+fn contract(
+    contractor: &Contractor,
+    wanted: &Wanted<'_>,
+    space: &mut Aabb,
+    (origin, forms): (DVec3, &mut Vec<LinearForm>),
+    scratch: &mut Scratch,
+) -> Contracted {
+    let centre = space.centre();
+    let root = contractor.root().index();
+    let point = Aabb::new(centre, centre);
+    let value = |scratch: &mut Scratch, over: &Aabb| {
+        contractor.forward(&Region { space: over, ..wanted.region }, scratch)?;
+        (!scratch.may_fail[root]).then(|| scratch.values[root])
+    };
+    // where the formula may be undefined there is no gradient to speak of
+    let Some(at_centre) = value(scratch, &point) else { return Contracted::Somewhere };
+    if value(scratch, space).is_none() {
+        return Contracted::Somewhere;
+    }
+    fill(contractor, scratch);
+    let sign = |a: Interval| if wanted.negated { -a } else { a };
+    let slopes = scratch.slopes[root].map(sign);
+    let most = sign(at_centre).hi;
+    let verdict = solve(most, slopes, centre, space);
+    if verdict == Contracted::Somewhere {
+        let to_centre = (centre - origin).to_array().map(|x| Interval::point(x).widened(1));
+        let moved = slopes.iter().zip(to_centre).fold(ZERO, |sum, (&slope, x)| sum + slope * x);
+        let least = (moved - Interval::point(most)).lo;
+        forms.push(LinearForm::at_least(slopes, least));
+    }
+    verdict
+}
+
+/// What is left of a box where `most` + slopes·(p − centre) may be positive.
+fn solve(most: f64, slopes: Slopes, centre: DVec3, space: &mut Aabb) -> Contracted {
+    let offset = |space: &Aabb, axis: usize| Interval {
+        lo: (space.min[axis] - centre[axis]).next_down(),
+        hi: (space.max[axis] - centre[axis]).next_up(),
+    };
+    for axis in 0..3 {
+        let others = (0..3).filter(|&other| other != axis);
+        let gained =
+            others.fold(Interval::point(most), |sum, other| sum + slopes[other] * offset(space, other));
+        if !gained.hi.is_finite() {
+            continue;
+        }
+        let needed = Interval { lo: -gained.hi, hi: f64::INFINITY };
+        let Some(left) = backward::factor(needed, slopes[axis], offset(space, axis)) else {
+            return Contracted::Nowhere;
+        };
+        // programs round a formula, and so move its surface a little
+        let slack = ROUNDING * (space.min[axis].abs().max(space.max[axis].abs()) + space.size()[axis]);
+        let kept = Interval { lo: centre[axis] + left.lo - slack, hi: centre[axis] + left.hi + slack };
+        let Some(kept) = meet(Interval { lo: space.min[axis], hi: space.max[axis] }, kept) else {
+            return Contracted::Nowhere;
+        };
+        (space.min[axis], space.max[axis]) = (kept.lo, kept.hi);
+    }
+    Contracted::Somewhere
+}
+
+/// The slopes of all nodes, from their values.
+fn fill(contractor: &Contractor, scratch: &mut Scratch) {
+    let Scratch { values, slopes, .. } = scratch;
+    slopes.clear();
+    for (i, rule) in contractor.rules[..=contractor.root().index()].iter().enumerate() {
+        let of = |node: Node| (values[node.index()], slopes[node.index()]);
+        let slope = match *rule {
+            Rule::Power { of: base, exponent } => {
+                let (a, da) = of(base);
+                let factor = Interval::point(f64::from(exponent)) * power(a, exponent - 1);
+                da.map(|d| factor * d)
+            }
+            Rule::Slab { of: e, first, second } => {
+                let (value, de) = of(e);
+                let line = |affine: crate::ir::Affine| {
+                    let offset = affine.number(|node| values[node.index()]);
+                    (Interval::point(affine.slope), Interval::new(offset, offset))
+                };
+                let ((p, q), (r, s)) = (line(first), line(second));
+                let factor = TWO * p * r * value + (p * s + r * q);
+                de.map(|d| factor * d)
+            }
+            Rule::Plain(expr) => plain(expr, of, values[i]),
+        };
+        slopes.push(slope);
+    }
+}
+
+fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval) -> Slopes {
+    match expr {
+        Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_) | Expr::Coordinate(Axis::T) => [ZERO; 3],
+        Expr::Coordinate(Axis::X) => [ONE, ZERO, ZERO],
+        Expr::Coordinate(Axis::Y) => [ZERO, ONE, ZERO],
+        Expr::Coordinate(Axis::Z) => [ZERO, ZERO, ONE],
+        Expr::Unary(op, a) => {
+            let (a, da) = of(a);
+            let factor = match op {
+                Unary::Neg => -ONE,
+                Unary::Abs => Interval {
+                    lo: if a.lo >= 0.0 { 1.0 } else { -1.0 },
+                    hi: if a.hi <= 0.0 { -1.0 } else { 1.0 },
+                },
+                Unary::Sqrt => ONE / (TWO * value),
+                // it jumps
+                Unary::Sign => return constant_or_unknown(da),
+                Unary::Call(function) => {
+                    function.slope_and_bend(a, value).map_or(Interval::ALL, |[slope, _]| slope)
+                }
+            };
+            scaled(factor, da)
+        }
+        Expr::Binary(op, a, b) => binary(op, of(a), of(b), value),
+    }
+}
+
+fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), value: Interval) -> Slopes {
+    let mixed = |f: Interval, g: Interval| -> Slopes {
+        let (da, db) = (scaled(f, da), scaled(g, db));
+        std::array::from_fn(|i| da[i] + db[i])
+    };
+    match op {
+        Binary::Add => std::array::from_fn(|i| da[i] + db[i]),
+        Binary::Sub => std::array::from_fn(|i| da[i] - db[i]),
+        Binary::Mul => mixed(b, a),
+        Binary::Div if !b.contains(0.0) => mixed(ONE / b, -(value / b)),
+        Binary::Min | Binary::PlainMin if a.hi < b.lo => da,
+        Binary::Min | Binary::PlainMin if b.hi < a.lo => db,
+        Binary::Max | Binary::PlainMax if a.lo > b.hi => da,
+        Binary::Max | Binary::PlainMax if b.lo > a.hi => db,
+        Binary::Min | Binary::PlainMin | Binary::Max | Binary::PlainMax => {
+            std::array::from_fn(|i| da[i].hull(db[i]))
+        }
+        Binary::And | Binary::Or => {
+            let weight = Interval { lo: 0.0, hi: 2.0_f64.next_up() };
+            mixed(weight, weight)
+        }
+        Binary::Call(BinaryFunction::Pow) if b.lo == b.hi && a.lo > 0.0 => scaled(b * (value / a), da),
+        Binary::Call(BinaryFunction::Atan2) => {
+            let squares = a.square() + b.square();
+            mixed(b / squares, -(a / squares))
+        }
+        Binary::Div
+        | Binary::DivOrZero
+        | Binary::MinWeight
+        | Binary::MaxWeight
+        | Binary::AndWeight
+        | Binary::OrWeight
+        | Binary::Call(BinaryFunction::Pow) => {
+            let (da, db) = (constant_or_unknown(da), constant_or_unknown(db));
+            std::array::from_fn(|i| da[i].hull(db[i]))
+        }
+    }
+}
+
+/// A factor times slopes. What does not vary has no slope, however steep the function of it.
+fn scaled(factor: Interval, slopes: Slopes) -> Slopes {
+    slopes.map(|slope| if slope == ZERO { ZERO } else { factor * slope })
+}
+
+fn constant_or_unknown(slopes: Slopes) -> Slopes {
+    slopes.map(|slope| if slope == ZERO { ZERO } else { Interval::ALL })
+}

@@ -1,0 +1,242 @@
+//! The distance from a point to the surface, proven from both sides.
+//!
+//! A point of the other sign bounds the distance from above: rays find one, cells around the point find nearer
+//! ones. From below it is bounded by the nearest cell that may hold such a point, see `bounds::contraction`.
+//! Neither needs a gradient, so axes, medial surfaces and places without a normal are like any others.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::bounds::contraction::Tree;
+use super::bounds::search::{Effort, SEARCH_RADIUS, Shrink};
+use super::bounds::whole::WholeFormula;
+use super::construction::Solid;
+use super::leaves::words;
+use crate::geom::Aabb;
+
+/// How far a point is from the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distance {
+    /// The distance of [`Distance::nearest`]: positive in the fluid, negative inside the solid, 0 on the
+    /// surface, ±∞ if there is no surface. Never nearer than the surface is.
+    pub estimate: f64,
+    /// The radius of a ball around the point in which ω is proven not to have the other sign; never more
+    /// than the true distance.
+    pub clearance: f64,
+    /// The nearest point of the surface that was found; NaN if there is none.
+    pub nearest: DVec3,
+}
+
+/// What is asked for distances again and again: the solid and its complement, prepared for the search.
+pub struct Distances {
+    solid: Solid,
+    /// Where ω is positive, and where it is negative.
+    positive: Target,
+    negative: Target,
+}
+
+enum Target {
+    Tree(Tree),
+    Whole(Box<WholeFormula>),
+}
+
+/// Clearance and estimate may differ by this part of the distance.
+const GAP: f64 = 1e-4;
+
+/// Cells looked at for one point. In the middle of a ball all of its surface is equally near.
+const MOST_CELLS: usize = 1_000;
+
+/// Work for one point, in the unit of `bounds::search`.
+const MOST_WORK: usize = 100_000;
+
+/// Rays get twice as long so many times.
+const DOUBLINGS: i32 = 60;
+
+/// Halvings of a ray around the surface.
+const HALVINGS: usize = 50;
+
+impl Solid {
+    /// How far a point is from the surface, with a proof. It costs thousands of times as much as
+    /// [`Solid::contact`]; for many points see [`Distances`].
+    pub fn distance(&self, p: DVec3) -> Distance {
+        Distances::new(self).at(p)
+    }
+}
+
+impl Distances {
+    /// Prepares a solid.
+    pub fn new(solid: &Solid) -> Self {
+        let (positive, negative) = match solid.parts() {
+            Some(parts) => {
+                let opposite: Arc<[u32]> = words::opposite(&parts.words).into();
+                let tree = |words: Arc<[u32]>| Target::Tree(Tree { parts: parts.clone(), words });
+                (tree(parts.words.clone()), tree(opposite))
+            }
+            None => {
+                let whole = |negated| Target::Whole(Box::new(WholeFormula::of(solid, negated)));
+                (whole(false), whole(true))
+            }
+        };
+        Self { solid: solid.clone(), positive, negative }
+    }
+
+    /// How far a point is from the surface. All numbers are NaN where the sign is.
+    pub fn at(&self, p: DVec3) -> Distance {
+        let sign = self.solid.sign(p);
+        if sign.is_nan() {
+            return Distance { estimate: f64::NAN, clearance: f64::NAN, nearest: DVec3::NAN };
+        }
+        if sign == 0.0 {
+            return Distance { estimate: 0.0, clearance: 0.0, nearest: p };
+        }
+        let target = if sign < 0.0 { &self.positive } else { &self.negative };
+        let (least, most, nearest) = match target {
+            Target::Tree(tree) => self.search(tree, sign, p),
+            Target::Whole(whole) => self.search(&**whole, sign, p),
+        };
+        Distance { estimate: -sign * most, clearance: least, nearest }
+    }
+
+    /// A bound from below, one from above, and the point that proves the latter.
+    fn search<S: Shrink>(&self, target: &S, sign: f64, p: DVec3) -> (f64, f64, DVec3) {
+        let mut best = Best { solid: &self.solid, sign, p, distance: f64::INFINITY, point: DVec3::NAN };
+        self.rays(&mut best);
+        let reach = DVec3::splat(best.distance.min(2.0 * SEARCH_RADIUS));
+        let mut around = Aabb::new(p - reach, p + reach);
+        let Some(known) = target.shrink(&target.everything(), &mut around, Effort::Large) else {
+            return (best.distance, best.distance, best.point);
+        };
+        let mut queue = BinaryHeap::from([Cell { distance: distance_to(&around, p), space: around, known }]);
+        let (mut cells, mut work) = (0, MOST_WORK);
+        while let Some(Cell { distance, space, known }) = queue.pop() {
+            if distance >= (1.0 - GAP) * best.distance || cells == MOST_CELLS || work == 0 {
+                return (distance.min(best.distance), best.distance, best.point);
+            }
+            cells += 1;
+            work = work.saturating_sub(target.work(&known));
+            best.try_cell(&space);
+            for mut half in space.halves() {
+                let Some((known, beyond)) = target.shrink_from(&known, &mut half, p) else { continue };
+                let distance = distance_to(&half, p).max(beyond);
+                if distance < best.distance {
+                    queue.push(Cell { distance, space: half, known });
+                }
+            }
+        }
+        (best.distance, best.distance, best.point)
+    }
+
+    /// Looks for the surface along the normal and the axes, first as far as the contact estimates.
+    fn rays(&self, best: &mut Best<'_>) {
+        let contact = self.solid.estimated_contact(best.p);
+        let guess = contact.distance.abs();
+        let first = if guess.is_finite() && guess > 0.0 { 1.0001 * guess } else { 1e-6 };
+        let normal = contact.normal * best.sign;
+        let directions = [normal, DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+        for doubling in 0..DOUBLINGS {
+            let reach = first * f64::exp2(f64::from(doubling));
+            for direction in directions {
+                if direction.is_finite() && direction != DVec3::ZERO {
+                    best.try_ray(best.p + reach * direction);
+                }
+            }
+            if best.distance.is_finite() {
+                break;
+            }
+        }
+    }
+}
+
+/// The nearest point of the other sign that is known.
+struct Best<'a> {
+    solid: &'a Solid,
+    /// The sign at p.
+    sign: f64,
+    p: DVec3,
+    distance: f64,
+    point: DVec3,
+}
+
+impl Best<'_> {
+    fn is_other(&self, q: DVec3) -> bool {
+        self.solid.sign(q) * self.sign < 0.0
+    }
+
+    /// Tries the middle of a cell, and its corner that is nearest to the point.
+    fn try_cell(&mut self, cell: &Aabb) {
+        let nearest = self.p.clamp(cell.min, cell.max);
+        if self.is_other(nearest) {
+            self.take(nearest);
+            return;
+        }
+        self.try_ray(cell.centre());
+        self.try_ray(cell.centre() + (cell.centre() - nearest));
+    }
+
+    /// Follows a ray to a point of the other sign back to the surface.
+    fn try_ray(&mut self, end: DVec3) {
+        let direction = (end - self.p).normalize_or_zero();
+        let length = (end - self.p).length();
+        if direction == DVec3::ZERO || !self.is_other(end) {
+            return;
+        }
+        let (mut near, mut far) = (0.0, length);
+        if far > self.distance {
+            // only a nearer point matters
+            if !self.is_other(self.p + self.distance * direction) {
+                return;
+            }
+            far = self.distance;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (near + far);
+            if far - near <= 1e-12 * far {
+                break;
+            }
+            if self.is_other(self.p + middle * direction) { far = middle } else { near = middle }
+        }
+        self.take(self.p + far * direction);
+    }
+
+    fn take(&mut self, q: DVec3) {
+        let distance = (q - self.p).length();
+        if distance < self.distance {
+            (self.distance, self.point) = (distance, q);
+        }
+    }
+}
+
+/// A bound of the distance from a box, rounded downwards.
+fn distance_to(space: &Aabb, p: DVec3) -> f64 {
+    (p.clamp(space.min, space.max) - p).length() * (1.0 - 4.0 * f64::EPSILON)
+}
+
+/// A cell with its order in the queue: the nearest first.
+struct Cell<K> {
+    distance: f64,
+    space: Aabb,
+    known: K,
+}
+
+impl<K> PartialEq for Cell<K> {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl<K> Eq for Cell<K> {}
+
+impl<K> PartialOrd for Cell<K> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<K> Ord for Cell<K> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.distance.total_cmp(&self.distance)
+    }
+}

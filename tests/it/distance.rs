@@ -1,0 +1,116 @@
+//! Distances with proofs: the true distance lies between clearance and estimate, also where no derivative helps.
+
+use rfm::glam::DVec3;
+use rfm::solid::{Distance, Distances};
+use rfm::{Program, Solid};
+
+fn solid(text: &str) -> Solid {
+    let program = Program::from_source("d.rfm", format!("rfm 1\nsolid s = {text}"));
+    program.unwrap_or_else(|e| panic!("{text}: {e}")).solid("s").unwrap()
+}
+
+/// A sequence of numbers in 0 .. 1 that depends on nothing else.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn point(&mut self, reach: f64) -> DVec3 {
+        DVec3::new(self.next(), self.next(), self.next()) * (2.0 * reach) - reach
+    }
+}
+
+/// The clearance is never above the truth, the estimate never below. The estimate is within `gap` of it; the
+/// clearance is farther off in the middle of a ball, all of whose surface is equally near.
+#[track_caller]
+fn check_at(distances: &Distances, text: &str, p: DVec3, truth: f64, gap: f64) {
+    let Distance { estimate, clearance, nearest } = distances.at(p);
+    let context = || format!("{text} at {p}: {clearance} … {estimate} for {truth}");
+    assert!(clearance <= truth.abs() + 1e-9, "the clearance is too long: {}", context());
+    assert!(estimate.abs() >= truth.abs() - 1e-9 && estimate * truth >= 0.0, "{}", context());
+    assert!(estimate.abs() - truth.abs() <= gap * truth.abs() + 1e-12, "{}", context());
+    assert!(truth.abs() - clearance <= (gap + 3e-2) * truth.abs() + 1e-12, "{}", context());
+    assert!((nearest - p).length() - estimate.abs() <= 1e-12 * (1.0 + p.length()), "{}", context());
+}
+
+#[track_caller]
+fn check(text: &str, p: [f64; 3], truth: f64) {
+    check_at(&Distances::new(&solid(text)), text, DVec3::from_array(p), truth, 1e-4);
+}
+
+#[test]
+fn axes_and_medial_surfaces_have_distances() {
+    check("torus(0.9, 0.2)", [0.0, 0.0, 0.0], 0.7);
+    check("torus(0.9, 0.2)", [0.0, 0.0, 0.1], 0.82_f64.sqrt() - 0.2);
+    check("torus(0.9, 0.2)", [0.9, 0.0, 0.0], -0.2);
+    check("torus(0.9, 0.2) or sphere(0.1, [5, 0, 0])", [0.0, 0.0, 0.1], 0.82_f64.sqrt() - 0.2);
+    check("sphere(2)", [0.0, 0.0, 0.0], -2.0);
+    check("x^2 + y^2 <= 1 and abs(z) <= 9", [0.0, 0.0, 0.3], -1.0);
+    check("abs(x) + abs(y) + abs(z) <= 1", [0.0, 0.0, 0.0], -(1.0 / 3_f64.sqrt()));
+    check("abs(x) + abs(y) + abs(z) <= 1", [0.0, 0.5, 0.0], -(0.5 / 3_f64.sqrt()));
+    check("x^4 + y^4 + z^4 <= 1", [0.0, 0.0, 0.0], -1.0);
+    check("box([-1, -1, -1], [1, 2, 3])", [0.0, 0.0, 0.0], -1.0);
+    check("box() and sphere(0.2, [5, 0, 0]) or box([3, 0, 0], [4, 1, 1])", [0.0, 0.5, 0.5], 3.0);
+}
+
+#[test]
+fn contacts_are_never_lost_off_the_surface() {
+    for (text, p, truth) in [
+        ("torus(0.9, 0.2)", [0.0, 0.0, 0.0], 0.7),
+        ("torus(0.9, 0.2)", [0.0, 0.0, 0.1], 0.82_f64.sqrt() - 0.2),
+        ("torus(0.9, 0.2).move([3, 2, 1])", [3.0, 2.0, 1.1], 0.82_f64.sqrt() - 0.2),
+        ("torus(0.9, 0.2).move([3, 2, 1]) or sphere(0.1)", [3.0, 2.0, 1.1], 0.82_f64.sqrt() - 0.2),
+        ("torus(0.9, 0.2)", [0.9, 0.0, 0.0], -0.2),
+        ("abs(x) + abs(y) + abs(z) <= 1", [0.0, 0.5, 0.0], -(0.5 / 3_f64.sqrt())),
+        ("x^4 + y^4 + z^4 <= 1", [0.0, 0.0, 0.0], -1.0),
+        ("x^2 + y^2 <= 1", [0.0, 0.0, 0.3], -1.0),
+        ("cone(1, 2)", [0.0, 0.0, 0.7], -0.581_377_674_149_945_3),
+    ] {
+        let found = solid(text).contact(DVec3::from_array(p));
+        assert!((found.distance / truth - 1.0).abs() < 1e-5, "{text} at {p:?}: {found:?} for {truth}");
+        // zero where all directions are as good
+        assert!(found.normal.is_finite() && found.normal.length() < 1.0 + 1e-9, "{text} at {p:?}: {found:?}");
+        let (mut columns, p) = ([[0.0]; 5], p.map(|x| [x]));
+        solid(text).contact_many([&p[0], &p[1], &p[2]], columns.each_mut().map(|column| &mut column[..]));
+        assert_eq!(columns[0][0], found.distance);
+    }
+}
+
+/// Solids whose distance is known in closed form, at random points and at points of their axes.
+#[test]
+fn clearances_are_never_too_long() {
+    let segment = |p: DVec3| (p.with_z(p.z - p.z.clamp(0.0, 1.5))).length() - 0.4;
+    let ring = |p: DVec3| (p.truncate().length() - 0.9).hypot(p.z) - 0.2;
+    let cuboid = |p: DVec3| {
+        let q = p.abs() - DVec3::new(0.5, 0.7, 0.9);
+        q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
+    };
+    type Known<'a> = (&'a str, &'a dyn Fn(DVec3) -> f64);
+    let balls = |p: DVec3| (p.length() - 0.5).min((p - DVec3::X).length() - 0.3);
+    let known: [Known; 5] = [
+        ("sphere(0.8)", &|p| p.length() - 0.8),
+        ("capsule(0.4, 1.5)", &segment),
+        ("torus(0.9, 0.2)", &ring),
+        ("box([-0.5, -0.7, -0.9], [0.5, 0.7, 0.9])", &cuboid),
+        ("sphere(0.5) or sphere(0.3, [1, 0, 0])", &balls),
+    ];
+    let mut numbers = Numbers(5);
+    for (text, truth) in known {
+        let solid = solid(text);
+        let distances = Distances::new(&solid);
+        for i in 0..120 {
+            let mut p = numbers.point(2.0);
+            if i % 4 == 0 {
+                p = p.with_x(0.0).with_y(0.0);
+            }
+            // inside a union the nearest ball need not be the nearest surface
+            if text.contains(" or ") && truth(p) < 0.0 {
+                continue;
+            }
+            check_at(&distances, text, p, truth(p), 1e-3);
+        }
+    }
+}
