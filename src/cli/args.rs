@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::build::output_help as build_output_help;
 use super::mesh::{ascii_help, format_name, output_help};
 use super::values::{
     Definition, Frames, Tolerance, aabb, count, definition, frames, length, plane, point, seconds, threads,
@@ -17,6 +16,7 @@ use rfm::geom::Aabb;
 use rfm::mesh::Format;
 use rfm::precision::Precision;
 use rfm::slice::Plane;
+use rfm::source::Target;
 use rfm::sph::Method;
 
 /// Obstacles written as R-functions, compiled to machine code: check, mesh, simulate.
@@ -267,7 +267,7 @@ pub(super) struct Build {
     #[arg(short, long, value_name = "NAME")]
     pub solid: Option<String>,
     // where the text goes; `output_help` writes the help, which lists the targets
-    #[arg(short, long, value_name = "FILE", help = build_output_help())]
+    #[arg(short, long, value_name = "FILE", help = languages())]
     pub output: Option<PathBuf>,
     /// Functions besides those of ω and ∇ω
     #[arg(long, value_enum, value_delimiter = ',')]
@@ -432,6 +432,16 @@ pub(super) enum Stage {
     Clif,
     /// Machine code
     Asm,
+}
+
+/// The help of `rfm build --output`: the languages and their endings.
+fn languages() -> String {
+    let targets: Vec<String> =
+        Target::ALL.iter().map(|target| format!(".{} {}", target.ending(), target.title())).collect();
+    format!(
+        "Where it goes; the ending chooses the language: {}; .o object code, with a header",
+        targets.join("; ")
+    )
 }
 
 #[cfg(test)]

@@ -193,13 +193,3 @@ fn advised(error: &source::SourceError, solid: &Solid) -> Failure {
         SourceError::BadPrefix(_) | SourceError::NumberOutOfRange(_) => error.to_string(),
     })
 }
-
-/// The help of `--output`.
-pub(super) fn output_help() -> String {
-    let targets: Vec<String> =
-        Target::ALL.iter().map(|target| format!(".{} {}", target.ending(), target.title())).collect();
-    format!(
-        "Where it goes; the ending chooses the language: {}; .o object code, with a header",
-        targets.join("; ")
-    )
-}

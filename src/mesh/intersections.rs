@@ -385,7 +385,7 @@ mod tests {
         let mut positions = Vec::new();
         for _ in 0..60 {
             let centre = 4.0 * DVec3::new(random(), random(), random());
-            positions.extend((0..3).map(|_| centre + DVec3::new(random(), random(), random())));
+            positions.extend((0..3).map(|_| centre + 3.0 * DVec3::new(random(), random(), random())));
         }
         let triangles: Vec<[u32; 3]> = (0..60).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let mut expected = Vec::new();

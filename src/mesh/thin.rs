@@ -37,7 +37,7 @@ pub struct ThinCells {
     pub bounds: Aabb,
     /// The least thickness that was found in them, in metres; infinite if there are none.
     pub thickness: f64,
-    /// A point of the surface where it is that thin, in metres. NaN if there is none.
+    /// A point of the surface where it is that thin, in metres; the origin if there is none.
     pub at: DVec3,
     /// Whether a gap is that thin, rather than a part of the solid.
     pub is_gap: bool,
@@ -46,7 +46,7 @@ pub struct ThinCells {
 impl ThinCells {
     /// The result for a grid that sees everything.
     pub const NONE: Self =
-        Self { count: 0, bounds: Aabb::EMPTY, thickness: f64::INFINITY, at: DVec3::NAN, is_gap: false };
+        Self { count: 0, bounds: Aabb::EMPTY, thickness: f64::INFINITY, at: DVec3::ZERO, is_gap: false };
 
     /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
     /// `None` if nothing hides, or its thickness is not known.
@@ -162,7 +162,9 @@ mod tests {
             (self.outer - r).min(r - self.inner)
         }
         fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-            (self.omega(p), p)
+            let outwards = p.normalize_or_zero();
+            let to_outer = self.outer - p.length() < p.length() - self.inner;
+            (self.omega(p), if to_outer { -outwards } else { outwards })
         }
         fn range(&self, over: &Aabb) -> Interval {
             let nearest = DVec3::ZERO.clamp(over.min, over.max).length() - 1e-12;

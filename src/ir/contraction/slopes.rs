@@ -184,6 +184,11 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
             mixed(weight, weight)
         }
         Binary::Call(BinaryFunction::Pow) if b.lo == b.hi && a.lo > 0.0 => scaled(b * (value / a), da),
+        // an angle jumps where it turns from π to −π
+        Binary::Call(BinaryFunction::Atan2) if a.contains(0.0) && b.lo <= 0.0 => {
+            let (da, db) = (constant_or_unknown(da), constant_or_unknown(db));
+            std::array::from_fn(|i| da[i].hull(db[i]))
+        }
         Binary::Call(BinaryFunction::Atan2) => {
             let squares = a.square() + b.square();
             mixed(b / squares, -(a / squares))

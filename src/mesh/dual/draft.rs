@@ -9,6 +9,7 @@ use super::super::{
     intersections::crossing_pairs,
     normals,
 };
+use super::Care;
 use super::mend::{self, Aim};
 use super::patch::Patch;
 use super::refine::{self, Refined};
@@ -22,7 +23,7 @@ const REPAIRS: usize = 4;
 /// Evaluations for mending, as a share of those that found the surface, which were made many at a time, and
 /// the fewest.
 const MENDING: f64 = 0.25;
-const LEAST_MENDING: u64 = 60_000;
+const LEAST_MENDING: u64 = 20_000;
 
 /// Rounds of moving cuts back, at most. The last one moves all back.
 const UNDOINGS: usize = 8;
@@ -47,6 +48,7 @@ pub(super) struct Draft<'a> {
     vertices: Vertices,
     triangles: Vec<[u32; 3]>,
     work: Work,
+    care: Care,
 }
 
 impl<'a> Draft<'a> {
@@ -56,10 +58,10 @@ impl<'a> Draft<'a> {
         grid: &'a Grid,
         vertices: Vertices,
         triangles: Vec<[u32; 3]>,
-        work: Work,
+        (work, care): (Work, Care),
     ) -> Self {
         let (bounds, size) = (grid.bounds(), grid.spacing().min_element());
-        Self { field, bounds, size, vertices, triangles, work }
+        Self { field, bounds, size, vertices, triangles, work, care }
     }
 
     /// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be
@@ -69,7 +71,7 @@ impl<'a> Draft<'a> {
         let Refined { left, ends, evaluations } =
             refine::refine(self.field, &mut self.vertices, &mut self.triangles, self.size);
         self.work.gradients += evaluations;
-        if !ends.is_empty() {
+        if self.care == Care::Apart && !ends.is_empty() {
             self.uncross(first, &ends);
         }
         left
@@ -153,7 +155,10 @@ impl<'a> Draft<'a> {
     /// # Errors
     /// [`MeshError::TooManyVertices`] if refining and mending made too many.
     pub fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<(), MeshError> {
-        let mut budget = ((MENDING * self.work.evaluations as f64) as u64).max(LEAST_MENDING);
+        let mut budget = match self.care {
+            Care::Sharp => u64::MAX,
+            Care::Apart => ((MENDING * self.work.evaluations as f64) as u64).max(LEAST_MENDING),
+        };
         if mend::is_worth(&far, &self.triangles) {
             self.mend_around(far, Aim::Distance, &mut budget);
         }
@@ -172,15 +177,18 @@ impl<'a> Draft<'a> {
     }
 
     fn mend_around(&mut self, edges: Vec<[u32; 2]>, aim: Aim, budget: &mut u64) {
-        let place = (self.bounds, self.size);
+        let place = (self.bounds, self.size, self.care);
         let patch = Patch::new(self.field, place, &mut self.vertices, &mut self.triangles, &edges);
         let count = mend::mend(patch, edges, refine::TOLERANCE * self.size, aim, *budget);
         self.work.gradients += count;
         *budget = budget.saturating_sub(count);
     }
 
-    /// Merges vertices that coincide, and ends of short edges on creases unless triangles would cross.
+    /// Merges vertices that coincide, and ends of short edges on creases; with care, unless triangles would cross.
     fn merge_close(&mut self) {
+        if self.care == Care::Sharp {
+            return self.merge(TOO_CLOSE * self.size);
+        }
         let close: Vec<[u32; 2]> = self
             .mergeable(TOO_CLOSE * self.size)
             .into_iter()
@@ -191,7 +199,7 @@ impl<'a> Draft<'a> {
             })
             .collect();
         if !close.is_empty() {
-            let place = (self.bounds, self.size);
+            let place = (self.bounds, self.size, self.care);
             let (vertices, triangles) = (&mut self.vertices, &mut self.triangles);
             let mut patch = Patch::new(self.field, place, vertices, triangles, &close);
             close.into_iter().for_each(|[kept, lost]| patch.join(kept, lost));

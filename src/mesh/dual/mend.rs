@@ -27,9 +27,10 @@ const LEFT: f64 = 0.9;
 /// No edge shorter than this is cut, and none shorter than half of it is made, in cells.
 const SHORTEST: f64 = 0.1;
 
-/// The most edges that are looked at, for each edge in the queue at first. Few are looked at so often unless
-/// the grid resolves nothing.
+/// The most edges that are looked at: for each edge in the queue at first, and in all, which takes a second.
+/// Few are looked at so often unless the grid resolves nothing.
 const LOOKS: usize = 40;
+const MOST: usize = 20_000;
 
 /// The largest number of edges to mend for each triangle, of which a mesh has 1.5 in all. With more the grid
 /// does not resolve the surface, and nothing is mended.
@@ -52,7 +53,7 @@ pub(super) fn is_worth(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> bool {
 /// Mends the mesh around the given edges, which ascend, until about `budget` evaluations are spent. Returns
 /// their number.
 pub(super) fn mend(mut patch: Patch<'_>, edges: Vec<[u32; 2]>, tolerance: f64, aim: Aim, budget: u64) -> u64 {
-    let looks = LOOKS * edges.len();
+    let looks = MOST.min(LOOKS * edges.len());
     let mut waiting: FxHashSet<[u32; 2]> = edges.iter().copied().collect();
     let mut queue = VecDeque::from(edges);
     for _ in 0..looks {
@@ -300,6 +301,7 @@ mod tests {
     use super::*;
     use crate::field::Closures;
     use crate::geom::Aabb;
+    use crate::mesh::dual::Care;
 
     const BOUNDS: Aabb = Aabb { min: DVec3::splat(-9.0), max: DVec3::splat(9.0) };
 
@@ -322,7 +324,7 @@ mod tests {
         let mut triangles = vec![[0, 1, 3], [1, 2, 3]];
         let (edges, _) = folded(&floor, &vertices, &triangles, 1.0);
         assert_eq!(edges, [[1, 2], [1, 3], [2, 3]]);
-        let patch = Patch::new(&floor, (&BOUNDS, 1.0), &mut vertices, &mut triangles, &edges);
+        let patch = Patch::new(&floor, (&BOUNDS, 1.0, Care::Apart), &mut vertices, &mut triangles, &edges);
         mend(patch, edges, 0.01, Aim::Folds, u64::MAX);
         assert_eq!(folded(&floor, &vertices, &triangles, 1.0).0, [[0; 2]; 0]);
         assert_eq!(triangles.len(), 2);
@@ -341,7 +343,7 @@ mod tests {
         let mut vertices = vertices(&[[0.4, 0.0, up], [0.4, 0.0, down], [0.4, 1.0, up], [0.4, -1.0, down]]);
         let mut triangles = vec![[1, 2, 0], [1, 0, 3]];
         let edges = vec![[0, 1]];
-        let patch = Patch::new(&plate, (&BOUNDS, 1.0), &mut vertices, &mut triangles, &edges);
+        let patch = Patch::new(&plate, (&BOUNDS, 1.0, Care::Apart), &mut vertices, &mut triangles, &edges);
         mend(patch, edges, 0.025, Aim::Distance, u64::MAX);
         let farthest = vertices.positions.iter().map(|p| p.x).fold(0.0, f64::max);
         assert!((farthest - 1.0).abs() < 1e-9, "{:?}", vertices.positions);

@@ -5,12 +5,13 @@
 //! 1. [`Crossing::find`]: the cells that the surface passes and its hits on their edges, as for marching
 //!    cubes; `loops` finds which hits belong together.
 //! 2. [`place`](fn@place): a vertex for each loop, by `place`, `sharp`, `qef` and `crease`.
-//! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two; `secure`
-//!    makes fans of quads that cross.
-//! 4. [`Draft::refine`]: edges that are still too far from the surface are cut (`refine`). Cuts move back to
-//!    the middles of their edges where triangles would cross.
-//! 5. [`Draft::mend`]: what stays far off or lies upside down is looked at one by one (`mend`), as far as a
-//!    budget allows, and without crossings.
+//! 3. [`join`]: triangles. `quads` joins the four vertices around each hit and cuts the quad in two.
+//! 4. [`Draft::refine`]: edges that are still too far from the surface are cut (`refine`).
+//! 5. [`Draft::mend`]: what stays far off or lies upside down is looked at one by one (`mend`).
+//!
+//! If triangles cross in the end, the mesh is made again with care: in stage 3 `secure` makes fans of quads that
+//! cross, in stage 4 cuts move back to the middles of their edges where triangles would cross, and stage 5 changes
+//! nothing that would make them cross, as far as a budget allows.
 //!
 //! The vertices are those of the dual of the marching-cubes mesh (Schaefer, Ju, Warren: Manifold dual
 //! contouring, IEEE TVCG 13, 2007), so the topology is that of marching cubes. The quadratic error is that of
@@ -49,6 +50,7 @@ use super::{
     crossings::{self, BRICKS_PER_TASK, Crossed, EdgeScratch, OnEdges, ProgressPart},
     normals::GradientColumns,
     prune::{Bricks, Lattice},
+    self_intersections,
     signs::Signs,
 };
 use crate::field::Field;
@@ -74,14 +76,30 @@ pub fn dual_contouring(
     let mut work = Work::default();
 
     let crossing = Crossing::find(field, &lattice, &near, progress, &mut work)?;
-    let rings = Rings::new(crossing.crossed.vertices);
-    let (mut vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
-    let triangles = join((field, &lattice), &crossing, &rings, &placed, &mut vertices, grid, &mut work);
+    let mut make = |care| -> Result<Mesh, MeshError> {
+        let rings = Rings::new(crossing.crossed.vertices);
+        let (mut vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
+        let place = (field, &lattice, care);
+        let triangles = join(place, &crossing, &rings, &placed, &mut vertices, grid, &mut work);
+        let mut draft = Draft::new(field, grid, vertices, triangles, (work, care));
+        let left = draft.refine();
+        draft.mend(left)?;
+        let mesh = draft.finish();
+        work = mesh.work;
+        Ok(mesh)
+    };
+    let sharp = make(Care::Sharp)?;
+    if self_intersections(&sharp).is_empty() { Ok(sharp) } else { make(Care::Apart) }
+}
 
-    let mut draft = Draft::new(field, grid, vertices, triangles, work);
-    let left = draft.refine();
-    draft.mend(left)?;
-    Ok(draft.finish())
+/// What a mesh is made for. Few meshes cross themselves, and care against that costs sharpness and time, so it is
+/// taken only where a mesh without it does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Care {
+    /// As near to the surface as can be.
+    Sharp,
+    /// Without triangles that cross, though rims may become blunt and vertices leave the surface.
+    Apart,
 }
 
 /// Where the surface crosses the edges of the grid.
@@ -206,7 +224,7 @@ fn place(placement: &Placement<'_>) -> (Vertices, Vec<Placed>) {
 
 /// Joins the vertices around each hit to triangles that do not cross, and adds the tubes of tunnels.
 fn join(
-    (field, lattice): (&dyn Field, &Lattice),
+    (field, lattice, care): (&dyn Field, &Lattice, Care),
     crossing: &Crossing,
     rings: &Rings,
     placed: &[Placed],
@@ -222,7 +240,7 @@ fn join(
     move_spoilt(&quads, &mut cut, vertices, fallbacks, size, &mut work.gradients);
     work.gradients += cut.gradients + placed.iter().map(|part| part.gradients).sum::<u64>();
     let tubes: Vec<[u32; 3]> = placed.iter().flat_map(|part| part.tubes.iter().copied()).collect();
-    secure::secure(quads, cut, vertices, &tubes, size)
+    secure::secure((quads, cut), vertices, &tubes, size, care)
 }
 
 /// How often vertices are moved back because triangles lie upside down.

@@ -8,6 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::super::intersections::{Cubes, Neighbours, Triangle, bounds_of, corners, cross, overlap};
 use super::super::normals::unit;
+use super::Care;
 use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::field::Field;
 use crate::geom::Aabb;
@@ -38,8 +39,8 @@ pub(super) struct Patch<'a> {
     pub triangles: &'a mut Vec<[u32; 3]>,
     /// The triangles around each vertex of the patch.
     fans: FxHashMap<u32, Vec<u32>>,
-    /// The triangles near those of the patch, some of which may have moved away.
-    near: Neighbours,
+    /// The triangles near those of the patch, some of which may have moved away; `None` where triangles may cross.
+    near: Option<Neighbours>,
     /// Evaluations of ω and ∇ω.
     pub count: u64,
 }
@@ -85,7 +86,7 @@ impl Pair {
 impl<'a> Patch<'a> {
     pub fn new(
         field: &'a dyn Field,
-        (bounds, size): (&'a Aabb, f64),
+        (bounds, size, care): (&'a Aabb, f64, Care),
         vertices: &'a mut Vertices,
         triangles: &'a mut Vec<[u32; 3]>,
         edges: &[[u32; 2]],
@@ -103,11 +104,13 @@ impl<'a> Patch<'a> {
                 fans.entry(*v).or_default().push(i);
             }
         }
-        let mut own: Vec<u32> = fans.values().flatten().copied().collect();
-        own.sort_unstable();
-        own.dedup();
-        // vertices move by a cell at most
-        let near = Neighbours::find(&vertices.positions, triangles, (&own, size), Cubes { size });
+        let near = (care == Care::Apart).then(|| {
+            let mut own: Vec<u32> = fans.values().flatten().copied().collect();
+            own.sort_unstable();
+            own.dedup();
+            // vertices move by a cell at most
+            Neighbours::find(&vertices.positions, triangles, (&own, size), Cubes { size })
+        });
         Self { field, bounds, size, vertices, triangles, fans, near, count: 0 }
     }
 
@@ -172,17 +175,21 @@ impl<'a> Patch<'a> {
                 None => self.triangles.push(*t),
             }
             t.iter().for_each(|v| self.fans.entry(*v).or_default().push(place));
-            self.near.add(place, &bounds_of(corners(&self.vertices.positions, *t)));
+            if let Some(near) = &mut self.near {
+                near.add(place, &bounds_of(corners(&self.vertices.positions, *t)));
+            }
         }
     }
 
-    /// Whether triangles would cross one another or others near them, except for those that they replace.
+    /// Whether triangles would cross one another or others near them, except for those that they replace; never where
+    /// no care is taken.
     pub fn cross(&self, triangles: &[[u32; 3]], replaced: &[u32]) -> bool {
+        let Some(near) = &self.near else { return false };
         let positions = &self.vertices.positions;
         let new: Vec<Triangle> = triangles.iter().map(|t| corners(positions, *t)).collect();
         let meets_other = |t: &Triangle| {
             let bounds = bounds_of(*t);
-            self.near.around(&bounds).any(|other| {
+            near.around(&bounds).any(|other| {
                 let place = corners(positions, self.triangles[other as usize]);
                 !replaced.contains(&other) && overlap(&bounds, &bounds_of(place)) && cross(t, &place)
             })
@@ -304,7 +311,8 @@ impl<'a> Patch<'a> {
         let met = around.iter().copied().find(|&other| self.position(other) == vertex.position);
         self.vertices.set(v, vertex);
         for &t in self.fans.get(&v).into_iter().flatten() {
-            self.near.add(t, &bounds_of(corners(&self.vertices.positions, self.triangles[t as usize])));
+            let Some(near) = &mut self.near else { break };
+            near.add(t, &bounds_of(corners(&self.vertices.positions, self.triangles[t as usize])));
         }
         if let Some(met) = met {
             self.vertices.kinds[met as usize] = VertexKind::Sharp;

@@ -20,6 +20,7 @@ use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
 
 use super::super::intersections::crossing_pairs;
+use super::Care;
 use super::quads::{Cut, NOTHING, Quad, Quads};
 use super::vertices::{Vertex, VertexKind, Vertices};
 use crate::geom::Aabb;
@@ -30,15 +31,18 @@ const ROUNDS: usize = 8;
 /// Vertices in retreat keep this distance from the faces of their cells, in cells.
 const INSET: f64 = 0.05;
 
-/// The triangles of all quads and tubes, without crossings. Adds the middles of fans and of bent sides to the
+/// The triangles of all quads and tubes, without crossings if care is taken. Adds the middles of fans and of bent sides to the
 /// vertices. `size` is the shortest side of a cell.
 pub(super) fn secure(
-    mut quads: Quads<'_>,
-    mut cut: Cut,
+    (mut quads, mut cut): (Quads<'_>, Cut),
     vertices: &mut Vertices,
     tubes: &[[u32; 3]],
     size: f64,
+    care: Care,
 ) -> Vec<[u32; 3]> {
+    if care == Care::Sharp {
+        return assemble(&quads, &cut, vertices, tubes, &[]).0;
+    }
     let suspects: Vec<u32> = cut
         .doubtful
         .iter()
