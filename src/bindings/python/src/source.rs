@@ -36,9 +36,8 @@ pub fn text(
         options.params = params
             .map(|param| Param { name: param.name.clone(), value: param.value, doc: param.doc.clone() })
             .collect();
-        solid = opened
-            .solid_with(solid.name(), rfm::Engine::Interpreter)
-            .map_err(|error| raised(py, error))?;
+        solid =
+            opened.solid_with(solid.name(), rfm::Engine::Interpreter).map_err(|error| raised(py, error))?;
     }
     py.detach(|| source::write(&solid, target, &options)).map(|made| made.text).map_err(refused)
 }
