@@ -13,9 +13,9 @@
 //! Invariant: a cell that is not counted is proven to hold what the grid says, or it was searched down to an
 //! eighth of a cell without a witness.
 
+mod found;
 mod look;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
@@ -28,43 +28,7 @@ use super::{
 use crate::{field::Field, geom::Aabb};
 use look::Look;
 
-/// The cells in which a surface is hidden from the grid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThinCells {
-    /// The number of such cells.
-    pub count: usize,
-    /// The smallest box around all of them, in metres; empty if there are none.
-    pub bounds: Aabb,
-    /// The least thickness that was found in them, in metres; infinite if there are none.
-    pub thickness: f64,
-    /// A point of the surface where it is that thin, in metres; the origin if there is none.
-    pub at: DVec3,
-    /// Whether a gap is that thin, rather than a part of the solid.
-    pub is_gap: bool,
-}
-
-impl ThinCells {
-    /// The result for a grid that sees everything.
-    pub const NONE: Self =
-        Self { count: 0, bounds: Aabb::EMPTY, thickness: f64::INFINITY, at: DVec3::ZERO, is_gap: false };
-
-    /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
-    /// `None` if nothing hides, or its thickness is not known.
-    pub fn cells_needed(&self, grid: &Grid) -> Option<usize> {
-        let needed = (2.0 * grid.bounds().size().max_element() / self.thickness).ceil();
-        (self.count > 0 && needed.is_finite() && needed > 0.0).then_some(needed as usize)
-    }
-
-    fn and(self, other: Self) -> Self {
-        let thinner = if other.count > 0 && (self.count == 0 || other.thickness < self.thickness) {
-            other
-        } else {
-            self
-        };
-        let (count, bounds) = (self.count + other.count, self.bounds.union(&other.bounds));
-        Self { count, bounds, ..thinner }
-    }
-}
+pub use found::ThinCells;
 
 /// Counts the cells of a grid in which [`marching_cubes`](super::marching_cubes) misses a part of the surface.
 ///
@@ -204,7 +168,7 @@ mod tests {
         // a speck around the middle of one cell
         let speck = crate::field::Closures {
             omega: |p: DVec3| 0.01 - p.distance(DVec3::splat(0.05)),
-            gradient: |p: DVec3| -p,
+            gradient: |p: DVec3| (DVec3::splat(0.05) - p).normalize_or_zero(),
         };
         assert_eq!(thin(&speck, 20).count, 1);
     }

@@ -68,13 +68,20 @@ mod tests {
         let mut nodes: Vec<Node> = AXES.iter().map(|&axis| graph.coordinate(axis)).collect();
         let unary: Vec<Unary> = Unary::all().collect();
         let binary: Vec<Binary> = Binary::all().collect();
+        let count = binary.len();
         for &(op, i, j, number) in steps {
             let (a, b) = (nodes[nodes.len() - 1 - i % nodes.len()], nodes[j % nodes.len()]);
             let constant = graph.constant(number);
-            let node = match op % (unary.len() + 2 * binary.len()) {
+            // plain minima and maxima are made only of operands that are known to be numbers
+            let binary = |op: usize| match binary[op] {
+                Binary::PlainMin => Binary::Min,
+                Binary::PlainMax => Binary::Max,
+                other => other,
+            };
+            let node = match op % (unary.len() + 2 * count) {
                 op if op < unary.len() => graph.unary(unary[op], a),
-                op if op < unary.len() + binary.len() => graph.binary(binary[op - unary.len()], a, b),
-                op => graph.binary(binary[op - unary.len() - binary.len()], a, constant),
+                op if op < unary.len() + count => graph.binary(binary(op - unary.len()), a, b),
+                op => graph.binary(binary(op - unary.len() - count), a, constant),
             };
             nodes.push(node);
         }

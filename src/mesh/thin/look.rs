@@ -4,7 +4,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::super::{normals::unit, prune::Lattice};
-use super::ThinCells;
+use super::found::ThinCells;
 use crate::field::{Field, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;

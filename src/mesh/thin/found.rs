@@ -1,0 +1,45 @@
+//! What was found of thin parts.
+
+use glam::DVec3;
+
+use super::super::Grid;
+use crate::geom::Aabb;
+
+/// The cells in which a surface is hidden from the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThinCells {
+    /// The number of such cells.
+    pub count: usize,
+    /// The smallest box around all of them, in metres; empty if there are none.
+    pub bounds: Aabb,
+    /// The least thickness that was found in them, in metres; infinite if there are none.
+    pub thickness: f64,
+    /// A point of the surface where it is that thin, in metres; the origin if there is none.
+    pub at: DVec3,
+    /// Whether a gap is that thin, rather than a part of the solid.
+    pub is_gap: bool,
+}
+
+impl ThinCells {
+    /// The result for a grid that sees everything.
+    pub const NONE: Self =
+        Self { count: 0, bounds: Aabb::EMPTY, thickness: f64::INFINITY, at: DVec3::ZERO, is_gap: false };
+
+    /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
+    /// `None` if nothing hides, or its thickness is not known.
+    pub fn cells_needed(&self, grid: &Grid) -> Option<usize> {
+        let needed = (2.0 * grid.bounds().size().max_element() / self.thickness).ceil();
+        (self.count > 0 && needed.is_finite() && needed > 0.0).then_some(needed as usize)
+    }
+
+    /// The cells of two parts of a grid.
+    pub(super) fn and(self, other: Self) -> Self {
+        let thinner = if other.count > 0 && (self.count == 0 || other.thickness < self.thickness) {
+            other
+        } else {
+            self
+        };
+        let (count, bounds) = (self.count + other.count, self.bounds.union(&other.bounds));
+        Self { count, bounds, ..thinner }
+    }
+}
