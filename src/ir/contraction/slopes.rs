@@ -152,6 +152,10 @@ fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval) -
                 Unary::Sqrt => ONE / (TWO * value),
                 // it jumps
                 Unary::Sign => return constant_or_unknown(da),
+                // a tangent jumps at its poles
+                Unary::Call(_) if !(value.lo.is_finite() && value.hi.is_finite()) => {
+                    return constant_or_unknown(da);
+                }
                 Unary::Call(function) => {
                     function.slope_and_bend(a, value).map_or(Interval::ALL, |[slope, _]| slope)
                 }
