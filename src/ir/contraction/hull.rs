@@ -89,7 +89,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(200))]
+        #![proptest_config(ProptestConfig::with_cases(3000))]
         /// Whatever the operations: a point at which the formula is positive is never cut off.
         #[test]
         fn no_point_is_cut_off(
