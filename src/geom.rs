@@ -1,6 +1,6 @@
-//! Axis-aligned boxes in the scene's coordinates, in metres.
+//! Axis-aligned boxes and rigid motions in the scene's coordinates, in metres.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// An axis-aligned box, in metres. It has `min ≤ max` in each coordinate unless it is empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,6 +95,22 @@ impl Aabb {
         low.max[axis] = middle;
         high.min[axis] = middle;
         [low, high]
+    }
+}
+
+/// Where a body is that has been turned about the origin and then moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// The rotation, as a matrix.
+    pub rotation: DMat3,
+    /// The translation, m.
+    pub translation: DVec3,
+}
+
+impl Placement {
+    /// The place in the body at the start of a point that is in it now.
+    pub fn back(&self, p: DVec3) -> DVec3 {
+        self.rotation.transpose() * (p - self.translation)
     }
 }
 

@@ -38,7 +38,7 @@ const LEAST_ROOM: f64 = 1.03;
 /// Lattices that are tried for one shape, at most.
 const TRIALS: usize = 8;
 
-/// Change of a particle's mass that is not made, because it is no rounding of a lattice any more.
+/// Change of a particle's mass or of the spacing that is not made, because it is no rounding of a lattice any more.
 const TOO_FAR: f64 = 0.1;
 
 /// A fluid at the start.
@@ -71,15 +71,22 @@ impl Experiment {
         let fluid = &self.scene.fluid;
         let mass = self.parameters.particle_mass;
         let within = self.reach()?.intersection(&self.scene.domain);
-        if fluid.particles.is_some() && fluid.size_span.is_some() {
+        let as_stated = |volume| {
             let (particles, carved) = self.place(obstacles, None, fluid.particles)?;
-            return Ok(Filling { particles, carved, mass, volume: None });
+            Ok(Filling { particles, carved, mass, volume })
+        };
+        if fluid.particles.is_some() && fluid.size_span.is_some() {
+            return as_stated(None);
         }
         let bodies = self.bodies.iter().map(|body| &body.solid as &dyn Field).collect();
         let volume = Region { shape: &self.fluid, bodies, within }.volume();
+        let is_measured = volume > 0.0 && volume.is_finite();
+        if !is_measured {
+            // a shape too thin for its volume to be found may still hold sites of a lattice
+            return as_stated(None);
+        }
         if self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume {
-            let (particles, carved) = self.place(obstacles, None, fluid.particles)?;
-            return Ok(Filling { particles, carved, mass, volume: Some(volume) });
+            return as_stated(Some(volume));
         }
         let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume)?;
         if let Some(number) = fluid.particles {
@@ -142,6 +149,10 @@ impl Experiment {
                 Some(wanted) => (number / wanted as f64).powf(1.0 / free) * (1.0 - GOOD_ENOUGH),
                 None => (-off / free).exp(),
             };
+            if wanted.is_none() {
+                // a sheet thinner than the spacing weighs what it does by the mass of its particles
+                size = size.clamp((1.0 - TOO_FAR) * spacing, (1.0 + TOO_FAR) * spacing);
+            }
         }
         match best {
             Some((_, found)) => Ok(found),
@@ -201,7 +212,8 @@ impl Experiment {
             shape: FluidShape::Field { field: &self.fluid, bounds, fill: fluid.fill },
             cell,
             count,
-            allow_fewer: false,
+            // a number alone says how fine the fluid is; with a size it is to be met
+            allow_fewer: fluid.size_span.is_none(),
             velocity: DVec3::ZERO,
             jitter: fluid.jitter,
             seed: fluid.seed,

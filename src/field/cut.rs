@@ -18,6 +18,8 @@ pub(crate) struct Cut {
     pub middle: DVec3,
     /// The volume where ω ≥ 0, m³.
     pub inside: f64,
+    /// The integral of the place over that volume, m⁴.
+    pub places: DVec3,
 }
 
 /// ω = 0 counts as inside, as it does where particles meet obstacles.
@@ -28,7 +30,8 @@ pub(crate) fn is_inside(omega: f64) -> bool {
 /// Cuts the box with these corners, in the order of [`Aabb::corners`](crate::geom::Aabb::corners), and the values of ω
 /// there.
 pub(crate) fn cut(corners: &[DVec3; 8], values: &[f64; 8], omega: &dyn Fn(DVec3) -> f64) -> Cut {
-    let (mut area, mut moment, mut whole, mut inside) = (DVec3::ZERO, DVec3::ZERO, 0.0, 0.0);
+    let (mut area, mut moment, mut whole) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    let mut filled = Filled::default();
     for tetrahedron in TETRAHEDRA {
         let place = |k: usize| corners[k];
         let crossing = |i: usize, o: usize| crossing((corners[i], values[i]), (corners[o], values[o]), omega);
@@ -37,28 +40,28 @@ pub(crate) fn cut(corners: &[DVec3; 8], values: &[f64; 8], omega: &dyn Fn(DVec3)
         let polygon: Vec<DVec3> = match (&within[..], &without[..]) {
             (&[a], &[p, q, r]) => {
                 let polygon = vec![crossing(a, p), crossing(a, q), crossing(a, r)];
-                inside += volume(place(a), polygon[0], polygon[1], polygon[2]);
+                filled.add(1.0, [place(a), polygon[0], polygon[1], polygon[2]]);
                 polygon
             }
             (&[a, b, c], &[p]) => {
                 let polygon = vec![crossing(a, p), crossing(b, p), crossing(c, p)];
-                inside += volume(place(a), place(b), place(c), place(p))
-                    - volume(place(p), polygon[0], polygon[1], polygon[2]);
+                filled.add(1.0, [place(a), place(b), place(c), place(p)]);
+                filled.add(-1.0, [place(p), polygon[0], polygon[1], polygon[2]]);
                 polygon
             }
             (&[a, b], &[p, q]) => {
                 let polygon = vec![crossing(a, p), crossing(a, q), crossing(b, q), crossing(b, p)];
                 // a prism from the triangle at a to that at b
-                inside += volume(place(a), polygon[0], polygon[1], polygon[2])
-                    + volume(place(a), polygon[0], polygon[2], polygon[3])
-                    + volume(place(a), place(b), polygon[2], polygon[3]);
+                filled.add(1.0, [place(a), polygon[0], polygon[1], polygon[2]]);
+                filled.add(1.0, [place(a), polygon[0], polygon[2], polygon[3]]);
+                filled.add(1.0, [place(a), place(b), polygon[2], polygon[3]]);
                 polygon
             }
             (&[a, b, c, d], []) => {
-                inside += volume(place(a), place(b), place(c), place(d));
+                filled.add(1.0, [place(a), place(b), place(c), place(d)]);
                 continue;
             }
-            _ => continue, // nothing is inside
+            _ => continue, // four outside: partition gives no other
         };
         let out = place(without[0]) - place(within[0]);
         for k in 2..polygon.len() {
@@ -71,12 +74,24 @@ pub(crate) fn cut(corners: &[DVec3; 8], values: &[f64; 8], omega: &dyn Fn(DVec3)
             whole += size;
         }
     }
-    Cut { area, middle: if whole > 0.0 { moment / whole } else { DVec3::ZERO }, inside }
+    let middle = if whole > 0.0 { moment / whole } else { DVec3::ZERO };
+    Cut { area, middle, inside: filled.volume, places: filled.places }
 }
 
-/// The volume of a tetrahedron.
-fn volume(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
-    (b - a).cross(c - a).dot(d - a).abs() / 6.0
+/// A sum of tetrahedra.
+#[derive(Default)]
+struct Filled {
+    volume: f64,
+    /// The integral of the place.
+    places: DVec3,
+}
+
+impl Filled {
+    fn add(&mut self, factor: f64, [a, b, c, d]: [DVec3; 4]) {
+        let volume = factor * (b - a).cross(c - a).dot(d - a).abs() / 6.0;
+        self.volume += volume;
+        self.places += 0.25 * volume * (a + b + c + d);
+    }
 }
 
 /// Where the surface crosses an edge, from a corner inside to one outside, with their ω.

@@ -9,7 +9,7 @@
 use glam::DVec3;
 
 use super::{Closures, Entry, Face, Faces, Field, Normals, Part, Path, last_outside};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Placement};
 use crate::interval::Interval;
 
 /// Number of radii that [`Walls::clearance`] tries, each half of the one before.
@@ -119,6 +119,12 @@ pub trait Moving: Send + Sync {
     ///
     /// The call is cheap enough for every step.
     fn during(&self, from: f64, to: f64) -> Box<dyn Walls>;
+
+    /// Where the obstacle is at a time, s, seen from where it is at the time 0, if it is known to move without
+    /// deformation. Fluid solvers then know for good what it takes of the kernels near it.
+    fn placement(&self, _time: f64) -> Option<Placement> {
+        None
+    }
 
     /// Whether the obstacle moves. If not, it is the same during every step.
     fn moves(&self) -> bool {

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `graph`, `op`, `function`, `r0`, `form` | the graph, its operations, the forms in which R₀ is computed |
 //! | `interpreter` | the meaning of a graph |
-//! | `derived` | graphs made of a graph: gradient, contact, sign twin, what depends on time alone |
+//! | `derived` | graphs made of a graph: gradient, contact, sign twin, what depends on time alone; and its rigid motion |
 //! | `bounds` | ranges, magnitudes and rounding errors over boxes |
 //! | `contraction` | boxes made smaller around the points at which a formula is positive |
 //! | `on_path` | what is known of a leaf along a straight path |
@@ -45,6 +45,7 @@ pub use derived::gradient::gradient;
 pub use derived::gradient::gradient_and_rate;
 pub(crate) use derived::hoisted::{Hoisted, Outside, Uniforms, hoisted};
 pub use derived::localised::localised;
+pub(crate) use derived::rigid::RigidMotion;
 pub(crate) use derived::sign::SignRule;
 pub(crate) use derived::twin::twin;
 pub use dump::dump;

@@ -11,9 +11,9 @@ use super::programs::number::UniformValues;
 use super::programs::on_demand::{Guard, Lane, Programs};
 use super::programs::ranges::Ranges;
 use crate::codegen::{CodegenError, Form, Forms};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Placement};
 use crate::interval::Interval;
-use crate::ir::{self, Graph, Node, Uniforms};
+use crate::ir::{self, Graph, Node, RigidMotion, Uniforms};
 use crate::precision::Precision;
 use crate::simplify::{Applied, simplify};
 
@@ -36,6 +36,7 @@ pub(super) struct Inner {
     twin: OnceLock<Function>,
     contact: OnceLock<Programs>,
     velocity: OnceLock<Programs>,
+    motion: OnceLock<Option<RigidMotion>>,
     parts: OnceLock<Option<LeavesAtAllTimes>>,
     applied: Applied,
 }
@@ -132,6 +133,7 @@ impl Solid {
             twin: OnceLock::new(),
             contact: OnceLock::new(),
             velocity: OnceLock::new(),
+            motion: OnceLock::new(),
             parts: OnceLock::new(),
             applied,
         };
@@ -145,6 +147,14 @@ impl Solid {
     /// Whether time occurs in the formula.
     pub fn moves(&self) -> bool {
         self.inner.omega.range.moves()
+    }
+
+    /// Where the solid is at a time, s, seen from where it is at the time 0, if it moves without deformation; `None` if
+    /// that is not to be seen in its formula.
+    pub fn placement(&self, time: f64) -> Option<Placement> {
+        let omega = &self.inner.omega;
+        let motion = self.inner.motion.get_or_init(|| RigidMotion::of(&omega.graph, omega.root));
+        motion.as_ref()?.placement(time)
     }
 
     /// How many numbers of a program depend on time alone: they are found once for each time, the rest at

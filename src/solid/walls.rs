@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::construction::Solid;
 use super::evaluation::Contact;
 use crate::field::{Entry, Face, Faces, Moving, Part, Path, Walls};
+use crate::geom::Placement;
 
 impl Solid {
     /// Where the straight path between two points first meets the solid; ω = 0 counts as met.
@@ -50,5 +51,9 @@ impl Moving for Solid {
 
     fn moves(&self) -> bool {
         self.moves()
+    }
+
+    fn placement(&self, time: f64) -> Option<Placement> {
+        self.placement(time)
     }
 }

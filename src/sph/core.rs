@@ -69,7 +69,10 @@ pub(super) struct Core {
 }
 
 impl Core {
-    pub fn new(parameters: Parameters, boundary: Boundary, particles: Particles) -> Self {
+    pub fn new(parameters: Parameters, mut boundary: Boundary, particles: Particles) -> Self {
+        if parameters.walls_have_density() {
+            boundary.map_obstacles(parameters.support_radius);
+        }
         let mut acceleration = Vectors::default();
         acceleration.resize(particles.len());
         let speed = longest(&particles.velocity);
@@ -340,6 +343,7 @@ impl Core {
             + 4 * (id.capacity() + self.sorted_id.capacity())
             + self.columns.bytes()
             + self.near.bytes()
+            + self.boundary.maps.bytes()
     }
 
     fn stalled(&self, dt: f64) -> StepError {

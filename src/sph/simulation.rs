@@ -25,7 +25,7 @@ use super::{
     plan::plan,
     probes::{Gauge, Probe},
     stats::Stats,
-    walls::{Boundary, Obstacle},
+    walls::{Boundary, Maps, Obstacle},
 };
 
 /// Distance from an obstacle at which particles stop, over the support radius.
@@ -79,6 +79,7 @@ impl Simulation {
             during: Vec::new(),
             time: 0.0,
             clearance,
+            maps: Maps::default(),
         };
         boundary.move_to(time, time);
         check_setup(&boundary, &particles)?;

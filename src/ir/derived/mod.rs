@@ -4,5 +4,6 @@ pub mod contact;
 pub mod gradient;
 pub mod hoisted;
 pub mod localised;
+pub mod rigid;
 pub mod sign;
 pub mod twin;

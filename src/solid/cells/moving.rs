@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::grid::{Cells, Pending};
 use super::map::{CellMap, CellStats, margin};
 use crate::field::{Moving, Walls};
-use crate::geom::Aabb;
+use crate::geom::{Aabb, Placement};
 use crate::solid::construction::Solid;
 
 /// A solid that moves, prepared for a box and a run.
@@ -105,6 +105,10 @@ impl Moving for MovingMap {
 
     fn moves(&self) -> bool {
         self.solid.moves()
+    }
+
+    fn placement(&self, time: f64) -> Option<Placement> {
+        self.solid.placement(time)
     }
 }
 

@@ -7,7 +7,10 @@ use std::sync::Arc;
 
 use crate::field::Walls;
 use crate::sph::Parameters;
-use crate::sph::{Dfsph, Method, Obstacle, Paper, Particles, Simulation, Wcsph, scenes, walls::Boundary};
+use crate::sph::{
+    Dfsph, Method, Obstacle, Paper, Particles, Simulation, Wcsph, scenes,
+    walls::{Boundary, Maps},
+};
 
 const G: f64 = 9.81;
 const RHO: f64 = 1000.0;
@@ -68,6 +71,7 @@ fn state_around(method: Method, particles: Particles, domain: Aabb, obstacles: V
         slip: crate::sph::Slip::Free,
         time: 0.0,
         clearance: 1e-6,
+        maps: Maps::default(),
     };
     let mut core = Core::new(water(method), boundary, particles);
     // not the first step: dfsph would move the particles of a start apart

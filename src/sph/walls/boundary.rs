@@ -32,6 +32,7 @@ use super::{
     coverage::Coverage,
     friction::Friction,
     kernel::Wall,
+    volume::{Known, Maps},
 };
 
 /// Number of particles whose paths are first tested together.
@@ -108,6 +109,8 @@ pub(in crate::sph) struct Boundary {
     pub time: f64,
     /// Distance from an obstacle's surface, m, at which particles stop.
     pub clearance: f64,
+    /// What the obstacles take of kernels.
+    pub maps: Maps,
 }
 
 /// A particle that could not be put anywhere, by its index.
@@ -124,6 +127,7 @@ impl Boundary {
         self.during.clear();
         self.during
             .extend(self.obstacles.iter().map(|o| o.moving.as_ref().map(|moving| moving.during(from, to))));
+        self.maps.move_to(&self.obstacles, to);
     }
 
     /// The field of an obstacle during the present step.
@@ -219,16 +223,50 @@ impl Boundary {
         });
     }
 
+    /// Prepares the maps of what obstacles take of kernels with the support radius h, m.
+    pub fn map_obstacles(&mut self, h: f64) {
+        self.maps = Maps::new(&self.obstacles, &self.domain, h, self.time);
+    }
+
     /// What the box and the obstacles take of the kernel of a particle; `None` if they are farther away than
     /// h.
     pub fn coverage<F: Friction>(&self, wall: &Wall, p: DVec3) -> Option<Coverage<F>> {
-        let h = wall.h;
+        let of_box = self.of_box::<F>(wall, p);
+        let mut whole = of_box.without_friction();
+        if let Some(taken) = self.maps.at_rest(p) {
+            let plain = Wall { layer: None, ..*wall };
+            let continuous = if wall.layer.is_some() { self.of_box::<()>(&plain, p) } else { whole };
+            whole = whole.with_bodies(wall, &continuous, &taken);
+        }
+        for k in 0..self.obstacles.len() {
+            match self.maps.of(k, p) {
+                Known::AtRest | Known::Nothing => {}
+                Known::Taken(taken) => {
+                    let none = Coverage::<()>::default();
+                    let mut coverage = none.with_bodies(wall, &none, &taken);
+                    coverage.set_in_motion(self.field(k).wall_velocity(p));
+                    whole = whole.or(&coverage);
+                }
+                Known::ByFaces => whole = self.with_faces(wall, p, whole, k),
+            }
+        }
+        // friction is a matter of faces
+        let friction = if F::IS_NONE {
+            F::default()
+        } else {
+            (0..self.obstacles.len()).fold(of_box, |whole, k| self.with_faces(wall, p, whole, k)).friction
+        };
+        (whole.part > 0.0).then(|| whole.with_friction(friction))
+    }
+
+    /// What the walls of the box take of the kernel of a particle.
+    fn of_box<F: Friction>(&self, wall: &Wall, p: DVec3) -> Coverage<F> {
         let mut whole = Coverage::<F>::default();
         for axis in 0..3 {
             for (distance, side) in
                 [(p[axis] - self.domain.min[axis], 1.0), (self.domain.max[axis] - p[axis], -1.0)]
             {
-                if distance < h {
+                if distance < wall.h {
                     let mut normal = DVec3::ZERO;
                     normal[axis] = side;
                     let face = Face { distance, normal, mean_curvature: 0.0 };
@@ -239,27 +277,28 @@ impl Boundary {
         if self.slip == Slip::Free {
             whole.let_slip();
         }
+        whole
+    }
+
+    /// Adds what an obstacle takes of the kernel of a particle by its faces.
+    fn with_faces<F: Friction>(&self, wall: &Wall, p: DVec3, whole: Coverage<F>, k: usize) -> Coverage<F> {
+        let (obstacle, field) = (&self.obstacles[k], self.field(k));
         let mut faces = Faces::new();
-        for (k, obstacle) in self.obstacles.iter().enumerate() {
-            let field = self.field(k);
-            faces.clear();
-            field.faces(p, h, &mut faces);
-            if faces.is_empty() {
-                continue;
-            }
-            let mut coverage = Coverage::<F>::of_faces(wall, &faces);
-            if obstacle.slip == Slip::Free {
-                coverage.let_slip();
-            }
-            if obstacle.moving.is_some() {
-                coverage.set_in_motion(field.wall_velocity(p));
-            }
-            if let Some(velocity) = &obstacle.surface_velocity {
-                coverage.friction.take_along(velocity(p, self.time));
-            }
-            whole = whole.or(&coverage);
+        field.faces(p, wall.h, &mut faces);
+        if faces.is_empty() {
+            return whole;
         }
-        (whole.part > 0.0).then_some(whole)
+        let mut coverage = Coverage::<F>::of_faces(wall, &faces);
+        if obstacle.slip == Slip::Free {
+            coverage.let_slip();
+        }
+        if obstacle.moving.is_some() {
+            coverage.set_in_motion(field.wall_velocity(p));
+        }
+        if let Some(velocity) = &obstacle.surface_velocity {
+            coverage.friction.take_along(velocity(p, self.time));
+        }
+        whole.or(&coverage)
     }
 
     fn collide_block(&self, block: &mut Block<'_>, contacts: Option<&Contacts>) -> Result<(), Fault> {

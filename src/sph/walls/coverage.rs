@@ -24,10 +24,14 @@ use super::{
     friction::{Friction, LEAST_FREE},
     kernel::{OfFace, Wall},
     symmetric::Symmetric,
+    volume::Taken,
 };
 
 /// Curvatures, in units of 1/h, are cut off here: the series behind the correction does not hold beyond.
 const MOST_CURVED: f64 = 0.4;
+
+/// Parts of a kernel below this are nothing.
+const LEAST_TAKEN: f64 = 1e-9;
 
 /// Integrals of a kernel over the walls near a particle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -136,10 +140,15 @@ impl<F: Friction> Coverage<F> {
         if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
     }
 
+    /// The coverage with another friction.
+    pub fn with_friction<G>(self, friction: G) -> Coverage<G> {
+        let Self { part, filled, gradient, spread, sweep, barrier, friction: _ } = self;
+        Coverage { part, filled, gradient, spread, sweep, barrier, friction }
+    }
+
     /// The coverage without its friction.
     pub fn without_friction(self) -> Coverage {
-        let Self { part, filled, gradient, spread, sweep, barrier, friction: _ } = self;
-        Coverage { part, filled, gradient, spread, sweep, barrier, friction: () }
+        self.with_friction(())
     }
 
     /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
@@ -169,6 +178,40 @@ impl<F: Friction> Coverage<F> {
             barrier: self.barrier.joined(&other.barrier, part, [da, db], [self.part, other.part]),
             friction: self.friction.joined(&other.friction, da, db),
         }
+    }
+}
+
+impl Coverage {
+    /// Adds bodies whose volume is known to these walls of the box, which are `continuous` if they are not in layers.
+    ///
+    /// The bodies take the part b of what the box leaves. What else a wall has follows from its distance. That of the
+    /// bodies is the distance of a plane which takes as much; its gradient along the way is that of b.
+    pub fn with_bodies(&self, wall: &Wall, continuous: &Self, taken: &Taken) -> Self {
+        let left = 1.0 - continuous.part;
+        let part = (taken.part / left).min(1.0);
+        if part < LEAST_TAKEN {
+            return *self;
+        }
+        let gradient = (taken.gradient + part * continuous.gradient) / left;
+        let delta = wall.distance_of(part);
+        let plane = wall.of_face(delta, 0.0);
+        // how much faster than λ of a continuous wall the others grow
+        let slope = wall.kernel.slope(delta);
+        let of_part = if wall.layer.is_some() { plane.area / slope } else { 1.0 };
+        let of_barrier = if wall.layer.is_some() { plane.barrier_area / slope } else { 0.0 };
+        let bodies = Self {
+            part: if wall.layer.is_some() { plane.part } else { part },
+            filled: plane.filled,
+            gradient: of_part * gradient,
+            spread: of_part * (taken.moment - taken.part * Symmetric::IDENTITY),
+            sweep: 0.0,
+            barrier: Barrier { part: plane.barrier, gradient: of_barrier * gradient, sweep: 0.0 },
+            friction: (),
+        };
+        let (da, db) = (1.0 - bodies.part, 1.0 - self.part);
+        let whole = self.joined(&bodies, self.part + db * bodies.part, da, db);
+        // K of bodies in the box adds to that of the box
+        Self { spread: self.spread + bodies.spread, ..whole }
     }
 }
 

@@ -29,6 +29,9 @@ const NEAREST: f64 = 0.1;
 /// The friction of the faces near a particle, a part of [`super::Coverage`]. It is `()` for a fluid without
 /// viscosity.
 pub(in crate::sph) trait Friction: Copy + Default {
+    /// Whether there is none.
+    const IS_NONE: bool = false;
+
     /// The friction of one face whose ∇λ has the length `area`, 1/m, with the kernel Wendland C2.
     fn of_face(face: &Face, area: f64, h: f64) -> Self;
 
@@ -47,6 +50,8 @@ pub(in crate::sph) trait Friction: Copy + Default {
 }
 
 impl Friction for () {
+    const IS_NONE: bool = true;
+
     fn of_face(_: &Face, _: f64, _: f64) -> Self {}
 
     fn joined(&self, (): &Self, _: f64, _: f64) -> Self {}

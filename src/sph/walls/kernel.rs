@@ -157,6 +157,9 @@ pub(in crate::sph) struct OfFace {
     pub barrier_area: f64,
 }
 
+/// Most steps in search of a distance.
+const MOST_STEPS: usize = 30;
+
 /// λ on a flat face.
 const ON_FACE: f64 = 0.5;
 
@@ -174,6 +177,32 @@ impl Wall {
         let mut wall = Self { layer: Some(spacing / h), ..Self::new(kernel, h, spacing) };
         wall.at_rest = wall.filled_by(0.5 * wall.spacing, 0.0);
         wall
+    }
+
+    /// The distance δ = d/h of a plane that takes the part λ of a kernel. λ is between 0 and 1.
+    pub fn distance_of(&self, part: f64) -> f64 {
+        let small = part.min(1.0 - part);
+        if small <= 0.0 {
+            return if part > 0.5 { -1.0 } else { 1.0 };
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        // λ falls as about (1 − δ)⁶ at the end of the support, and in proportion to ½ − δ·A(0) at the wall
+        let mut delta = (1.0 - (2.0 * small).powf(1.0 / 6.0)).clamp(low, high);
+        for _ in 0..MOST_STEPS {
+            let off = self.kernel.covered(delta) - small;
+            let step = off / self.kernel.slope(delta);
+            if step.abs() < 1e-14 {
+                break;
+            }
+            if off > 0.0 {
+                low = delta
+            } else {
+                high = delta
+            }
+            let next = delta + step;
+            delta = if next > low && next < high { next } else { 0.5 * (low + high) };
+        }
+        if part > 0.5 { -delta } else { delta }
     }
 
     /// The part of a face at the distance δ = d/h with the mean curvature H·h.

@@ -1,7 +1,8 @@
 //! Walls without wall particles: what they add to sums over neighbours, and how they stop particles.
 //!
 //! ```text
-//! Field::faces ─▶ Coverage: λ, ∇λ, K in closed form ─▶ density, pressure, viscosity
+//! Field::omega ─▶ Maps: λ, ∇λ, K of obstacles by their volume ─▶ Coverage ─▶ density, pressure
+//! Field::faces ─▶ Coverage: λ, ∇λ, K of faces in closed form ─▶ viscosity, and obstacles that change their shape
 //! Field::first_entry ─▶ Contact ─▶ Boundary::collide: position and velocity
 //! ```
 
@@ -11,6 +12,7 @@ mod coverage;
 mod friction;
 mod kernel;
 mod symmetric;
+mod volume;
 mod way_out;
 
 pub use boundary::Obstacle;
@@ -21,3 +23,4 @@ pub(super) use coverage::Coverage;
 pub(super) use friction::{Friction, WallDrag};
 pub(super) use kernel::Wall;
 pub use kernel::WallKernel;
+pub(super) use volume::Maps;

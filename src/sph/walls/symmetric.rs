@@ -16,6 +16,11 @@ pub(in crate::sph) struct Symmetric {
 impl Symmetric {
     pub const IDENTITY: Self = Self { diagonal: DVec3::ONE, beside: DVec3::ZERO };
 
+    /// The tensor with the components xx, yy, zz and yz, zx, xy.
+    pub fn new(diagonal: DVec3, beside: DVec3) -> Self {
+        Self { diagonal, beside }
+    }
+
     /// The tensor n⊗n.
     pub fn square(n: DVec3) -> Self {
         Self { diagonal: n * n, beside: DVec3::new(n.y * n.z, n.z * n.x, n.x * n.y) }
@@ -23,6 +28,15 @@ impl Symmetric {
 
     pub fn trace(&self) -> f64 {
         self.diagonal.element_sum()
+    }
+
+    /// R·S·Rᵀ: the tensor of what has been turned.
+    pub fn turned(self, rotation: &DMat3) -> Self {
+        let turned = *rotation * self.to_matrix() * rotation.transpose();
+        Self {
+            diagonal: DVec3::new(turned.x_axis.x, turned.y_axis.y, turned.z_axis.z),
+            beside: DVec3::new(turned.y_axis.z, turned.z_axis.x, turned.x_axis.y),
+        }
     }
 
     pub fn to_matrix(self) -> DMat3 {
@@ -77,5 +91,8 @@ mod tests {
         assert_eq!(tensor.to_matrix(), matrix);
         assert_eq!(tensor * v, matrix * v);
         assert_eq!(tensor.trace(), matrix.diagonal().element_sum());
+        let rotation = DMat3::from_rotation_x(0.3) * DMat3::from_rotation_z(1.1);
+        let turned = Symmetric::square(rotation * n).to_matrix();
+        assert!(Symmetric::square(n).turned(&rotation).to_matrix().abs_diff_eq(turned, 1e-12));
     }
 }

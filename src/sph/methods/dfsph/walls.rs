@@ -30,7 +30,12 @@ impl Walls {
         let n = core.particles.len();
         self.found.clear();
         self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
-            let wall: WallsNear = core.coverage(i)?;
+            // without viscosity nothing asks for friction
+            let wall: WallsNear = if core.parameters.viscosity > 0.0 {
+                core.coverage(i)?
+            } else {
+                core.coverage::<()>(i)?.with_friction(WallDrag::default())
+            };
             Some((i as u32, wall, wall.completion()))
         }));
         self.place.clear();

@@ -1,0 +1,225 @@
+//! Motion without deformation, read off a formula.
+//!
+//! A solid that is moved and turned has x, y and z in its formula only through linear functions of them, whose
+//! coefficients depend on time: x cos 2πt + y sin 2πt. Each is the distance from a plane, times a factor. If one rotation
+//! and one translation bring all of these planes from where they are at the time 0 to where they are now, they bring the
+//! solid there.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::geom::Placement;
+use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::interpreter::{Given, Interpreter};
+use crate::ir::op::{Binary, Unary};
+
+/// Relative difference between numbers that count as equal.
+const SAME: f64 = 1e-10;
+
+/// Least angle, rad, between planes that count as independent.
+const INDEPENDENT: f64 = 1e-3;
+
+/// How a formula depends on the place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Degree {
+    Constant,
+    Linear,
+    Other,
+}
+
+impl Degree {
+    fn of(expr: Expr, known: &[Self]) -> Self {
+        let degree = |node: Node| known[node.index()];
+        match expr {
+            Expr::Coordinate(Axis::X | Axis::Y | Axis::Z) => Self::Linear,
+            Expr::Coordinate(Axis::T) | Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_) => {
+                Self::Constant
+            }
+            Expr::Unary(Unary::Neg, a) => degree(a),
+            Expr::Binary(Binary::Add | Binary::Sub, a, b) => degree(a).max(degree(b)),
+            Expr::Binary(Binary::Mul, a, b) if degree(a).min(degree(b)) == Self::Constant => {
+                degree(a).max(degree(b))
+            }
+            Expr::Binary(Binary::Div, a, b) if degree(b) == Self::Constant => degree(a),
+            Expr::Unary(..) | Expr::Binary(..) => {
+                if expr.operands().all(|operand| degree(operand) == Self::Constant) {
+                    Self::Constant
+                } else {
+                    Self::Other
+                }
+            }
+        }
+    }
+}
+
+/// The linear function p ↦ normal·p + offset.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+/// A formula that may move without deformation.
+#[derive(Debug)]
+pub struct RigidMotion {
+    interpreter: Interpreter,
+    count: usize,
+    /// The planes at the time 0.
+    at_start: Vec<Plane>,
+}
+
+impl RigidMotion {
+    /// What a formula shows of its motion; `None` if it has no value at the time 0.
+    pub fn of(graph: &Graph, root: Node) -> Option<Self> {
+        let mut degrees = vec![Degree::Other; root.index() + 1];
+        let mut planes = Vec::new();
+        let cone = graph.cone(root);
+        for &node in &cone {
+            degrees[node.index()] = Degree::of(graph.expr(node), &degrees);
+        }
+        let ends = |node: Node| degrees[node.index()] != Degree::Other;
+        let used = cone.iter().filter(|&&node| !ends(node)).flat_map(|&node| graph.expr(node).operands());
+        for node in used.chain([root]).filter(|&node| ends(node)) {
+            if !planes.contains(&node) && !matches!(graph.expr(node), Expr::Constant(_)) {
+                planes.push(node);
+            }
+        }
+        let interpreter = Interpreter::new(graph, &planes);
+        let mut motion = Self { interpreter, count: planes.len(), at_start: Vec::new() };
+        motion.at_start = motion.planes(0.0)?;
+        Some(motion)
+    }
+
+    /// Where the solid is at a time, s, seen from where it is at the time 0; `None` if it has another shape.
+    pub fn placement(&self, time: f64) -> Option<Placement> {
+        let now = self.planes(time)?;
+        let frame = Frame::of(&self.at_start);
+        let rotation = frame.rotation(&now);
+        let translation = frame.translation(&self.at_start, &now, rotation);
+        let placement = Placement { rotation, translation };
+        let is_one = |(start, now): (&Plane, &Plane)| {
+            let normal = rotation * start.normal;
+            let offset = start.offset - now.normal.dot(translation);
+            let length = start.normal.length();
+            (normal - now.normal).length() <= SAME * length
+                && (offset - now.offset).abs()
+                    <= SAME * (start.offset.abs() + now.offset.abs() + length * translation.length())
+        };
+        let is_turn = (rotation.determinant() - 1.0).abs() < SAME;
+        (is_turn && self.at_start.iter().zip(&now).all(is_one)).then_some(placement)
+    }
+
+    fn planes(&self, time: f64) -> Option<Vec<Plane>> {
+        let mut at = |point: DVec3| {
+            let mut values = vec![0.0; self.count];
+            self.interpreter.eval_given(Given { time, ..Given::point(point.to_array()) }, &mut values);
+            values
+        };
+        let [origin, x, y, z] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(&mut at);
+        let plane = |k: usize| {
+            let offset = origin[k];
+            Plane { normal: DVec3::new(x[k], y[k], z[k]) - offset, offset }
+        };
+        let planes: Vec<_> = (0..self.count).map(plane).collect();
+        planes.iter().all(|plane| plane.normal.is_finite() && plane.offset.is_finite()).then_some(planes)
+    }
+}
+
+/// Up to three independent planes, made orthonormal one after the other.
+struct Frame {
+    /// Their numbers, and the lengths of their normals.
+    chosen: Vec<(usize, f64)>,
+    axes: Vec<DVec3>,
+}
+
+impl Frame {
+    fn of(planes: &[Plane]) -> Self {
+        let mut frame = Self { chosen: Vec::new(), axes: Vec::new() };
+        for (k, plane) in planes.iter().enumerate() {
+            let length = plane.normal.length();
+            let unit = plane.normal / length;
+            let rest = frame.axes.iter().fold(unit, |rest, &axis| rest - unit.dot(axis) * axis);
+            if length > 0.0 && rest.length() > INDEPENDENT && frame.axes.len() < 3 {
+                frame.chosen.push((k, length));
+                frame.axes.push(rest.normalize());
+            }
+        }
+        frame
+    }
+
+    /// The rotation that brings the axes to where they are among these planes.
+    fn rotation(&self, now: &[Plane]) -> DMat3 {
+        let there = Self::of(&self.chosen.iter().map(|&(k, _)| now[k]).collect::<Vec<_>>());
+        if there.axes.len() < self.axes.len() {
+            return DMat3::ZERO; // planes have become parallel: no rotation
+        }
+        let matrix = |axes: &[DVec3]| match *axes {
+            [a, b] => DMat3::from_cols(a, b, a.cross(b)),
+            [a, b, c] => DMat3::from_cols(a, b, c),
+            _ => DMat3::IDENTITY,
+        };
+        match (&self.axes[..], &there.axes[..]) {
+            (&[from], &[to]) => DMat3::from_quat(DQuat::from_rotation_arc(from, to)),
+            (from, to) => matrix(to) * matrix(from).transpose(),
+        }
+    }
+
+    /// The translation, in the directions in which the planes tell it.
+    fn translation(&self, start: &[Plane], now: &[Plane], rotation: DMat3) -> DVec3 {
+        let mut translation = DVec3::ZERO;
+        for (&(k, length), &axis) in self.chosen.iter().zip(&self.axes) {
+            let axis = rotation * axis;
+            let (wanted, normal) = ((start[k].offset - now[k].offset) / length, now[k].normal / length);
+            translation += (wanted - normal.dot(translation)) / normal.dot(axis) * axis;
+        }
+        translation
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Program, Solid};
+
+    fn solid(text: &str) -> Solid {
+        let program = Program::from_source("moving.rfm", format!("rfm 1\nsolid s = {text}")).unwrap();
+        program.solid("s").unwrap()
+    }
+
+    fn motion(solid: &Solid) -> RigidMotion {
+        let (graph, root) = solid.formula();
+        RigidMotion::of(graph, root).unwrap()
+    }
+
+    /// The solid now is that at the start, moved.
+    #[test]
+    fn turned_and_moved_solids_are_found() {
+        for text in [
+            "box([-1,-2,-3],[1,2,3]).move([t, 0, 2*t])",
+            "sphere(1).move([0, sin(t), 0])",
+            "(cylinder(0.1, 2) or box([0,0,0],[1,0.1,1]).rotate_x(30 deg)).move([1,0,0]).rotate_z(1.5*t).move([0, t^2, 3])",
+            "x <= t",
+            "x + 2*y <= t and z >= 0",
+            "cylinder(1, 2).rotate_y(t).rotate_z(2*t)",
+        ] {
+            let solid = solid(text);
+            let motion = motion(&solid);
+            for time in [0.0, 0.3, 1.7, 100.0] {
+                let placement = motion.placement(time).unwrap_or_else(|| panic!("{text} at {time}"));
+                for p in [DVec3::new(0.3, -0.2, 0.5), DVec3::new(-1.0, 2.0, 0.1)] {
+                    let (now, then) = (solid.at(time).omega(p), solid.at(0.0).omega(placement.back(p)));
+                    assert!((now - then).abs() < 1e-9 * (1.0 + now.abs()), "{text} at {time}: {now} {then}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn solids_that_change_their_shape_are_not() {
+        for text in
+            ["sphere(1 + t)", "x^2 + (1 + t)*y^2 + z^2 <= 1", "x <= t or x >= 1", "sphere(1) and x <= t"]
+        {
+            let motion = motion(&solid(text));
+            assert!(motion.placement(0.0).is_some() && motion.placement(0.5).is_none(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Maps against integrals in closed form.
+
+use std::f64::consts::PI;
+
+use super::*;
+use crate::sph::{
+    scenes::{half_space, pawn, random_cloud, sphere},
+    walls::{Wall, WallKernel},
+};
+
+const H: f64 = 0.26;
+
+const KERNEL: WallKernel = WallKernel::WendlandC2;
+
+fn map(body: Arc<dyn Walls>, domain: Aabb) -> VolumeMap {
+    VolumeMap::new(vec![body], &domain, H).unwrap()
+}
+
+fn cube(side: f64) -> Aabb {
+    Aabb::new(DVec3::splat(-0.5 * side), DVec3::splat(0.5 * side))
+}
+
+/// λ, ∇λ and K at a plane differ from the closed forms by as much as the module says.
+#[test]
+fn planes_have_their_closed_forms() {
+    let (mut of_part, mut of_gradient, mut of_moment): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    for normal in [DVec3::Z, DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.3, -0.5, 0.7)] {
+        let normal = normal.normalize();
+        let map = map(half_space(DVec3::new(0.01, 0.02, 0.03), normal), cube(2.0));
+        for place in random_cloud(300, 0.6).iter() {
+            let delta = (place - DVec3::new(0.01, 0.02, 0.03)).dot(normal) / H;
+            if !(0.0..1.0).contains(&delta) {
+                continue;
+            }
+            let nothing = Taken { part: 0.0, gradient: DVec3::ZERO, moment: Symmetric::default() };
+            let taken = map.at(place).unwrap_or(nothing);
+            let (part, slope) = (KERNEL.covered(delta), KERNEL.slope(delta));
+            let moment = part * Symmetric::IDENTITY + delta * slope * Symmetric::square(normal);
+            of_part = of_part.max((taken.part - part).abs());
+            of_gradient = of_gradient.max((taken.gradient * H + slope * normal).length());
+            let off = (taken.moment - moment).to_matrix();
+            of_moment = of_moment.max(off.to_cols_array().into_iter().fold(0.0, |m, x| m.max(x.abs())));
+        }
+    }
+    println!("λ {of_part:.5}, ∇λ {of_gradient:.4}, K {of_moment:.4}");
+    assert!(of_part < 0.003 && of_gradient < 0.023 && of_moment < 0.02);
+}
+
+/// λ of a ball of radius `ball` at the distance `away` from its middle: shell by shell of the kernel, whose caps inside
+/// the ball have the areas of Archimedes.
+fn of_ball(ball: f64, away: f64) -> f64 {
+    let steps = 4000;
+    let shell = |k: usize| {
+        let r = (k as f64 + 0.5) / steps as f64 * H;
+        let q = r / H;
+        let weight = 21.0 / (2.0 * PI * H.powi(3)) * (1.0 - q).powi(4) * (1.0 + 4.0 * q);
+        let cosine = ((away * away + r * r - ball * ball) / (2.0 * away * r)).clamp(-1.0, 1.0);
+        weight * 2.0 * PI * r * r * (1.0 - cosine) * H / steps as f64
+    };
+    (0..steps).map(shell).sum()
+}
+
+/// Balls larger and smaller than the kernel. Closed forms for curved faces miss the smallest by far.
+#[test]
+fn balls_have_their_integrals() {
+    for ball in [2.0 * H, H, 0.3 * H] {
+        let mut worst: f64 = 0.0;
+        let centre = DVec3::new(0.013, -0.02, 0.04);
+        let map = map(sphere(centre, ball), cube(2.0));
+        for direction in random_cloud(40, 1.0).iter().map(DVec3::normalize) {
+            for delta in [0.01, 0.3, 0.7] {
+                let away = ball + delta * H;
+                let found = map.at(centre + away * direction).unwrap().part;
+                let exact = of_ball(ball, away);
+                // chords of a ball hold less than its arcs
+                worst = worst.max((found - exact).abs());
+            }
+        }
+        println!("{:.1} h: {worst:.4}", ball / H);
+        assert!(worst < 0.005, "{ball}: {worst}");
+    }
+}
+
+/// ∇λ is the derivative of λ, even at the rim of the pawn's collar, which is sharper than the kernel.
+#[test]
+fn gradients_are_derivatives() {
+    let body = pawn();
+    let map = map(body.clone(), Aabb::new(DVec3::ZERO, DVec3::splat(3.0)));
+    let middle = DVec3::new(1.5, 1.5, 1.0);
+    let part = |p: DVec3| map.at(p).map_or(0.0, |taken| taken.part);
+    let mut seen = 0;
+    for place in random_cloud(2000, 1.2).iter().map(|p| middle + p).filter(|p| body.omega(*p) < 0.0) {
+        let Some(taken) = map.at(place) else { continue };
+        let e = 1e-5 * H;
+        let slope = |axis: DVec3| (part(place + e * axis) - part(place - e * axis)) / (2.0 * e);
+        let derivative = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
+        // splines are smooth but for their third derivatives
+        assert!((derivative - taken.gradient).length() * H < 1e-6, "{place}: {taken:?} {derivative}");
+        seen += 1;
+    }
+    assert!(seen > 500, "{seen}");
+}
+
+#[test]
+fn what_is_far_or_outside_the_box_takes_nothing() {
+    let floor = map(half_space(DVec3::ZERO, DVec3::Z), Aabb::new(DVec3::ZERO, DVec3::ONE));
+    // the body fills all below the box and nothing in it
+    assert!(floor.at(DVec3::splat(0.1)).is_none_or(|taken| taken.part < 1e-6));
+    let ball = map(sphere(DVec3::ZERO, 0.2), cube(4.0));
+    assert!(ball.at(DVec3::splat(1.5)).is_none());
+    assert!(ball.at(DVec3::new(0.2 + 1.5 * H, 0.0, 0.0)).is_none_or(|taken| taken.part < 1e-9));
+}
+
+/// At the end of the support λ is small enough that nobody notices whether it counts.
+#[test]
+fn nothing_is_left_beyond_the_support() {
+    let map = map(half_space(DVec3::ZERO, DVec3::new(0.6, 0.0, 0.8)), cube(2.0));
+    for along in [0.0, 0.03, 0.07] {
+        let place = DVec3::new(0.6, 0.0, 0.8) * H + along * DVec3::new(0.8, 0.0, -0.6);
+        let part = map.at(place).map_or(0.0, |taken| taken.part);
+        assert!(part < 1e-5, "{part}");
+    }
+}
+
+#[test]
+fn distances_take_their_parts() {
+    for kernel in WallKernel::ALL {
+        let wall = Wall::new(kernel, H, H / 2.6);
+        for k in 1..100 {
+            let part = f64::from(k) / 100.0;
+            let delta = wall.distance_of(part);
+            assert!((kernel.covered(delta) - part).abs() < 1e-12, "{kernel:?} {part} {delta}");
+        }
+        for part in [1e-9, 1e-6, 1e-4] {
+            let delta = wall.distance_of(part);
+            assert!((kernel.covered(delta) / part - 1.0).abs() < 1e-9, "{kernel:?} {part} {delta}");
+        }
+        assert_eq!((wall.distance_of(0.0), wall.distance_of(1.0)), (1.0, -1.0));
+    }
+}
