@@ -122,6 +122,11 @@ impl Experiment {
         &self.bodies
     }
 
+    /// The shape of the fluid at the start.
+    pub fn fluid(&self) -> &Solid {
+        &self.fluid
+    }
+
     /// Warnings about the scene. They do not prevent a run.
     pub fn warnings(&self) -> Diagnostics {
         self.diagnostics(self.warnings.clone())

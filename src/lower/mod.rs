@@ -24,7 +24,8 @@ use std::sync::OnceLock;
 
 pub use module::{Module, NamedSolid, ParamValue};
 pub use scene::{
-    Bounce, Container, Fluid, Gravity, Measured, Obstacle, Probe, Run, Scene, Skin, Solver, Tolerance, Truth,
+    Bounce, Container, Fluid, Gravity, Measured, Obstacle, Opening, Picture, Probe, Run, Scene, Skin, Solver,
+    Tolerance, Truth,
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};

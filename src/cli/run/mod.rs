@@ -10,6 +10,7 @@ mod folder;
 mod forecast;
 mod frames;
 mod goal;
+mod pictures;
 mod probes;
 mod stop;
 mod summary;

@@ -11,8 +11,8 @@ use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
 /// Keys that open a block; all others have a value.
-const BLOCKS: [&str; 9] =
-    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux"];
+const BLOCKS: [&str; 10] =
+    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux", "picture"];
 
 /// The entries of a block. Unknown and repeated keys have been reported.
 pub(in crate::lower) struct Block<'a> {
@@ -263,6 +263,7 @@ fn block_form(key: &str) -> String {
         "flux" => "flux { point: [0.5, 0.5, 0.5], normal: [1, 0, 0] }".into(),
         "box" => "box { min: [0, 0, 0], max: [1, 1, 1] }".into(),
         "run" => "run { until: 2 s }".into(),
+        "picture" => "picture { camera: [0, -1, 0.3], cut: y <= 0 }".into(),
         key => format!("{key} {{ … }}"),
     }
 }
