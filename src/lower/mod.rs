@@ -305,7 +305,9 @@ impl<'a> Lowering<'a> {
     }
 
     fn definition(&mut self, definition: &'a Definition) {
+        self.in_let = true;
         let value = self.expr(&definition.value);
+        self.in_let = false;
         if self.may_define(&definition.name) {
             self.remember_units(&definition.name, &definition.value);
             self.names.define(self.scope.source, &definition.name, Kind::Value(value));

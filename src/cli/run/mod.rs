@@ -11,6 +11,7 @@ mod forecast;
 mod frames;
 mod goal;
 mod pictures;
+mod probe_plot;
 mod probes;
 mod stop;
 mod summary;
