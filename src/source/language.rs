@@ -17,7 +17,7 @@ pub(super) struct Language {
     pub single_suffix: &'static str,
     /// A number that is finite in the precision.
     pub finite: fn(f64, Precision) -> String,
-    /// ∞, −∞ and NaN; `None` where the language cannot write them.
+    /// NaN, ∞ and −∞; `None` where the language cannot write them.
     pub non_finite: Option<fn(Precision) -> [String; 3]>,
     /// The declaration of a constant: type, name, value.
     pub declare: fn(&str, &str, &str) -> String,

@@ -70,7 +70,9 @@ impl Pictures {
         let camera = camera(options, experiment, Camera::SIZE)?;
         let opened = opened(options, experiment, meshes)?;
         let title = title(options, experiment, &opened);
-        let fastest = (FASTEST * experiment.typical_speed()).max(f64::MIN_POSITIVE);
+        // a fall is stopped on its way, what drives a fluid otherwise is not
+        let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
+        let fastest = share * experiment.speed_scale();
         let body = |(solid, drawn): (&Solid, Drawn)| {
             let near = (!solid.moves() && solid.has_many_leaves()).then(|| solid.surface(domain));
             Body { solid: solid.clone(), drawn, near }
