@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn forces_and_torques_have_axes_of_their_own() {
-        let probe = Probe::Force { body: 0, about: glam::DVec3::ZERO };
+        let probe = Probe::Force { obstacle: 0, about: glam::DVec3::ZERO };
         let svg = drawn("f", &probe, "time\n0,1,2,3,1e-3,0,nan\n1,4,5,6,2e-3,0,nan\n");
         assert_eq!(paths(&svg).len(), 4);
         for says in

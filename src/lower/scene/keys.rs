@@ -14,6 +14,14 @@ use crate::syntax::foreign;
 const BLOCKS: [&str; 10] =
     ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux", "picture"];
 
+/// Keys that are often looked for one block too far out.
+const INNER: [(&str, &[&str]); 4] = [
+    ("picture", &["camera", "cut", "hide"]),
+    ("run", &["until", "save_every", "checkpoint_every", "dt"]),
+    ("fluid", &["density", "viscosity", "spacing", "particles", "shape", "surface_tension"]),
+    ("solver", &["precision"]),
+];
+
 /// The entries of a block. Unknown and repeated keys have been reported.
 pub(in crate::lower) struct Block<'a> {
     pub entries: &'a [Entry],
@@ -56,9 +64,14 @@ impl<'a> Lowering<'a> {
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
                 let elsewhere = foreign::key(&key.text).filter(|own| known.contains(own));
-                self.report(match elsewhere {
-                    Some(own) => diagnostic.help(format!("`{}` is called `{own}` here", key.text)),
-                    None => diagnostic,
+                let inner = INNER
+                    .iter()
+                    .find(|(block, keys)| known.contains(block) && keys.contains(&key.text.as_str()));
+                self.report(match (elsewhere, inner) {
+                    (Some(own), _) => diagnostic.help(format!("`{}` is called `{own}` here", key.text)),
+                    (None, Some((block, _))) => diagnostic
+                        .help(format!("it is a key of `{block}`: write `{block} {{ {}: … }}`", key.text)),
+                    (None, None) => diagnostic,
                 });
             } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
                 let (is, form) = match entry {
