@@ -119,9 +119,12 @@ fn most(scene: &Scene, value: impl Fn(DVec3) -> f64) -> f64 {
 /// take it along, or of a fall through the box under a force that depends on the place. 1 m/s if nothing is known.
 pub(super) fn driven_speed(program: &Program, scene: &Scene) -> f64 {
     let until = scene.run.until;
+    // formulas may have poles where there is no fluid
+    let fluid = vector_field(program, &[scene.fluid.shape; 3]);
     let fastest = |nodes: &[Node; 3]| {
         let vector = vector_field(program, nodes);
-        let at = |time: f64| most(scene, |p| vector(p, time).length());
+        let inside = |p: DVec3, time: f64| if fluid(p, 0.0).x > 0.0 { vector(p, time).length() } else { 0.0 };
+        let at = |time: f64| most(scene, |p| inside(p, time));
         [0.0, 0.25, 0.5, 1.0].map(|part| at(part * until)).into_iter().fold(0.0, f64::max)
     };
     let container = scene.container.iter().map(|c| c.skin);

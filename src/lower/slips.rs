@@ -158,7 +158,7 @@ impl Lowering<'_> {
             ExprKind::Quantity { .. } | ExprKind::Call { .. } | ExprKind::Text(_) => false,
             ExprKind::Name(name) => {
                 let local = self.scope.locals.iter().rev().find(|local| local.name == *name);
-                local.map_or(self.bare.contains(name), |local| local.bare)
+                local.map_or(name == "t" || self.bare.contains(name), |local| local.bare)
             }
             _ => expr.children().into_iter().all(|part| self.is_bare(part)),
         }

@@ -507,6 +507,47 @@ fn unwritable_places_are_refused_and_nothing_is_left() {
 }
 
 #[test]
+fn what_killed_commands_leave_is_removed_and_what_others_write_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("post.rfm"), SMALL).unwrap();
+    for name in [".rfm-p.stl-a1b2c3", ".rfm-other.svg-d4e5f6", ".rfm-busy.stl-g7h8i9"] {
+        std::fs::write(here.join(name), "half a file").unwrap();
+    }
+    // a command that still runs holds a lock on what it writes
+    let busy = std::fs::File::open(here.join(".rfm-busy.stl-g7h8i9")).unwrap();
+    busy.lock().unwrap();
+    rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
+    assert_eq!(files(here), [".rfm-busy.stl-g7h8i9", "p.stl", "post.rfm"]);
+    drop(busy);
+    rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
+    assert_eq!(files(here), ["p.stl", "post.rfm"]);
+}
+
+#[test]
+fn meshes_are_in_the_unit_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("post.rfm"), SMALL).unwrap();
+    let largest = |unit: &str| {
+        let arguments = ["mesh", "post.rfm", "-o", "p.stl", "--ascii", "--cells", "16", "--unit", unit];
+        let outcome = rfm(here, &arguments).expect(0);
+        let text = std::fs::read_to_string(here.join("p.stl")).unwrap();
+        let numbers = text.lines().filter_map(|line| line.strip_prefix("vertex ")).flat_map(|v| v.split(' '));
+        (outcome.stdout, numbers.map(|x| x.parse::<f64>().unwrap()).fold(0.0, f64::max))
+    };
+    for (unit, plural, expected) in
+        [("m", "metres", 0.6), ("mm", "millimetres", 600.0), ("in", "inches", 0.6 / 0.0254)]
+    {
+        let (told, found) = largest(unit);
+        assert!(told.contains(&format!("in {plural}")), "{told}");
+        assert!((found / expected - 1.0).abs() < 1e-6, "{unit}: {found}");
+    }
+    let plain = rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
+    assert!(plain.stdout.contains("in metres; most programs read .stl as millimetres: --unit mm"));
+}
+
+#[test]
 fn a_closed_pipe_is_no_error() {
     use std::process::{Command, Stdio};
     let mut child = Command::new(env!("CARGO_BIN_EXE_rfm"))

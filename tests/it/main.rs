@@ -20,6 +20,7 @@ mod mesh_properties;
 mod meshes;
 mod mistakes;
 mod moving;
+mod mutations;
 mod numbers;
 mod pictures;
 mod pipeline;

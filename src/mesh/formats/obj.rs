@@ -1,5 +1,8 @@
 //! Wavefront OBJ, as text.
 //!
+//! Vertices are shared, so programs see a closed mesh; normals have numbers of their own, as the format provides. Readers
+//! that demand as many normals as vertices should be given PLY.
+//!
 //! Invariant: every number is written with the fewest digits that read back to the same `f64`.
 
 use std::io::{self, Write};
