@@ -137,7 +137,7 @@ impl Lowering<'_> {
 
     /// Warns of a number above a whole turn in an angle that depends on t, as in `.rotate_z(45*t)`.
     pub fn warn_of_fast_turn(&mut self, expr: &Expr) {
-        let Some((rate, at)) = large_number(expr).filter(|_| self.is_bare(expr)) else { return };
+        let Some((rate, at)) = large_number(expr).filter(|_| self.has_no_unit(expr)) else { return };
         if expr.span.source != SourceId::File {
             return;
         }
@@ -154,13 +154,19 @@ impl Lowering<'_> {
 
     /// Whether a value is made of numbers without units and without π.
     pub fn is_bare(&self, expr: &Expr) -> bool {
+        let is_call = matches!(expr.kind, ExprKind::Call { .. });
+        !is_call && self.has_no_unit(expr) && expr.children().into_iter().all(|part| self.is_bare(part))
+    }
+
+    /// Whether neither a unit nor π stands in a value, nor in the arguments of its functions.
+    fn has_no_unit(&self, expr: &Expr) -> bool {
         match &expr.kind {
-            ExprKind::Quantity { .. } | ExprKind::Call { .. } | ExprKind::Text(_) => false,
+            ExprKind::Quantity { .. } | ExprKind::Text(_) => false,
             ExprKind::Name(name) => {
                 let local = self.scope.locals.iter().rev().find(|local| local.name == *name);
                 local.map_or(name == "t" || self.bare.contains(name), |local| local.bare)
             }
-            _ => expr.children().into_iter().all(|part| self.is_bare(part)),
+            _ => expr.children().into_iter().all(|part| self.has_no_unit(part)),
         }
     }
 

@@ -103,10 +103,10 @@ fn obstacles_that_hide_little_stay_whole() {
 fn a_run_says_what_its_pictures_miss() {
     let folder = tempfile::tempdir().unwrap();
     let text = "rfm 1
-solid plate = box([0.2, 0.2, 0.3], [0.8, 0.8, 0.3001]) or box([0.2, 0.2, 0.1], [0.8, 0.8, 0.2])
+solid plate = ball([0.5, 0.5, 0.3], 0.25) or box([0.1, 0.1, 0.3], [0.9, 0.9, 0.3001])
 scene drop {
   box { max: [1, 1, 1] }
-  fluid { shape: ball([0.5, 0.5, 0.7], 0.1), spacing: 5 cm }
+  fluid { shape: ball([0.5, 0.5, 0.8], 0.1), spacing: 5 cm }
   obstacle { solid: plate }
   method: wcsph
   run { until: 1 ms, save_every: 1 ms }

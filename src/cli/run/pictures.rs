@@ -33,6 +33,9 @@ const SMALL: (u32, u32) = (320, 240);
 /// long before.
 const FASTEST: f64 = 0.6;
 
+/// Most obstacles that a title names; of more it gives the number.
+const NAMED: usize = 3;
+
 /// What all pictures of a run share.
 pub(super) struct Pictures {
     /// The scene that is drawn, with the box, the obstacles and the legend.
@@ -274,20 +277,26 @@ fn title(options: &Run, experiment: &Experiment, drawn: &[Drawn]) -> String {
     };
     let mut parts = vec![file, scene.name.clone(), scene.method.name().to_string()];
     let names = experiment.bodies().iter().map(|body| body.solid.name());
-    let mut seen: Vec<String> = Vec::new();
+    let mut done: Vec<(String, Vec<&str>)> = Vec::new();
     for (name, drawn) in names.zip(drawn) {
         let what = match drawn {
             Drawn::Whole => continue,
-            Drawn::Hidden => format!("without {name}"),
+            Drawn::Hidden => "left out".to_string(),
             Drawn::Open(cut) => {
                 let axis = cut.normal.abs().max_position();
-                format!("{name} cut at {} = {}", ["x", "y", "z"][axis], cut.offset * cut.normal[axis] + 0.0)
+                format!("cut at {} = {}", ["x", "y", "z"][axis], cut.offset * cut.normal[axis] + 0.0)
             }
         };
-        if !seen.contains(&what) {
-            seen.push(what);
+        match done.iter_mut().find(|(known, _)| *known == what) {
+            Some((_, names)) if names.contains(&name) => {}
+            Some((_, names)) => names.push(name),
+            None => done.push((what, vec![name])),
         }
     }
-    parts.extend(seen);
+    for (what, names) in done {
+        let few = names.len() <= NAMED;
+        let who = if few { names.join(", ") } else { format!("{} obstacles", names.len()) };
+        parts.push(format!("{who} {what}"));
+    }
     parts.join(" · ")
 }

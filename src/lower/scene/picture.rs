@@ -20,20 +20,7 @@ impl<'a> Lowering<'a> {
             return Some(Picture::default());
         };
         let block = self.block(entries, "a picture", span, &PICTURE_KEYS, &[]);
-        let camera = match block.setting("camera") {
-            Some((_, value)) => {
-                let camera = self.vector_key(&block, "camera", Dimension::NONE, DVec3::ZERO)?;
-                if camera == DVec3::ZERO {
-                    let message = "`camera` must have a length, found [0, 0, 0]";
-                    self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message).help(
-                        "it is the direction from the scene to the eye: `camera: [0, -1, 0]` looks along y",
-                    ));
-                    return None;
-                }
-                Some(camera)
-            }
-            None => None,
-        };
+        let camera = self.camera(&block)?;
         let cut = match block.setting("cut") {
             Some((_, value)) => self.opening(value)?,
             None => Opening::default(),
@@ -50,6 +37,25 @@ impl<'a> Lowering<'a> {
             }
         }
         Some(Picture { camera, cut, hide })
+    }
+
+    /// Reads the direction to the eye. The outer option is `None` if it is wrong, which is reported; the inner one if it is
+    /// not stated.
+    fn camera(&mut self, block: &Block<'_>) -> Option<Option<DVec3>> {
+        let Some((_, value)) = block.setting("camera") else { return Some(None) };
+        let help = "it is the direction from the scene to the eye: write `camera: [0, -1, 0.5]`";
+        if let ExprKind::Number(_) | ExprKind::Quantity { .. } = value.kind {
+            let message = "`camera` is a vector `[x, y, z]`, found a number";
+            self.report(Diagnostic::error(Code::WRONG_TYPE, value.span, message).help(help));
+            return None;
+        }
+        let camera = self.vector_key(block, "camera", Dimension::NONE, DVec3::ZERO)?;
+        if camera == DVec3::ZERO {
+            let message = "`camera` must have a length, found [0, 0, 0]";
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message).help(help));
+            return None;
+        }
+        Some(Some(camera))
     }
 
     /// Reads what is taken away of obstacles: a word, or a comparison of one coordinate with a number.
