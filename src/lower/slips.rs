@@ -231,7 +231,7 @@ fn large_number(expr: &Expr) -> Option<(f64, &Expr)> {
         return expr.children().into_iter().find_map(large_number);
     };
     let halves = 2.0 * number / std::f64::consts::PI;
-    let is_of_pi = (halves - halves.round()).abs() < 1e-3 * halves;
+    let is_of_pi = (halves - halves.round()).abs() < 1e-4 * halves;
     (number > std::f64::consts::TAU && !is_of_pi).then_some((number, expr))
 }
 

@@ -103,7 +103,7 @@ fn obstacles_that_hide_little_stay_whole() {
 fn a_run_says_what_its_pictures_miss() {
     let folder = tempfile::tempdir().unwrap();
     let text = "rfm 1
-solid plate = ball([0.5, 0.5, 0.3], 0.25) or box([0.1, 0.1, 0.3], [0.9, 0.9, 0.3001])
+solid plate = ball([0.5, 0.5, 0.3], 0.3) or box([0.1, 0.1, 0.3], [0.9, 0.9, 0.3001])
 scene drop {
   box { max: [1, 1, 1] }
   fluid { shape: ball([0.5, 0.5, 0.8], 0.1), spacing: 5 cm }
