@@ -142,7 +142,6 @@ const VALUES: &[&str] = &[
     "let a = 1/0\nsolid s = a - x",
     "solid s = box().rotate_z(45*t)",
     "solid s = box().rotate([0, 0, 1], 360*sin(t))",
-    "param turns = 90\nsolid s = box().rotate_x(turns*t)",
     "solid s = sphere(1) - sphere(0.5)",
     "solid a = sphere(1)\nsolid s = a + box()",
     "solid s = sphere(1)*box()",
