@@ -6,14 +6,15 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::mesh::{ascii_help, format_name, output_help};
+use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
+pub(super) use super::values::CutFlag;
 use super::values::{
-    Definition, Frames, Tolerance, aabb, count, definition, frames, length, plane, point, seconds, threads,
-    tolerance, window,
+    Definition, Frames, Tolerance, aabb, count, cut, definition, direction, frames, length, plane, point,
+    seconds, threads, tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
-use rfm::mesh::Format;
+use rfm::mesh::{Format, LengthUnit};
 use rfm::precision::Precision;
 use rfm::slice::Plane;
 use rfm::source::Target;
@@ -212,6 +213,9 @@ pub(super) struct Mesh {
     /// Measure the mesh against the surface and the surface against the mesh: takes longer than meshing
     #[arg(long)]
     pub quality: bool,
+    // the unit of the file's numbers; the help names those that there are
+    #[arg(long, value_parser = unit_name(), value_name = "UNIT", help = unit_help())]
+    pub unit: Option<LengthUnit>,
     // whether to write text; the help names the formats that can
     #[arg(long, help = ascii_help())]
     pub ascii: bool,
@@ -343,6 +347,16 @@ pub(super) struct Run {
     /// Refuse scenes with more obstacles than this: many parts are better joined with `or` into one solid
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub most_obstacles: usize,
+    /// Direction from the scene to the eye in pictures [default: the scene's, or 0.48,-1,0.46]
+    #[arg(long, help_heading = "Pictures", value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
+    pub camera: Option<DVec3>,
+    /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of the
+    /// fluid, `none` none [default: the scene's, or auto]
+    #[arg(long, help_heading = "Pictures", value_name = "AXIS=VALUE|auto|none", value_parser = cut)]
+    pub cut: Option<CutFlag>,
+    /// Do not draw an obstacle; may be repeated
+    #[arg(long, help_heading = "Pictures", value_name = "NAME", value_delimiter = ',')]
+    pub hide: Vec<String>,
     /// Write no pictures
     #[arg(long)]
     pub no_pictures: bool,

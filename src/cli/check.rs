@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime};
 use serde::Serialize;
 
 use super::args::{Check, Deny, Shared};
-use super::failure::{Failure, complain, note};
+use super::failure::{Failure, complain, note, warn};
 use super::mesh::hidden;
 use super::{choose, input, output, section};
 use crate::cli::output::Shown;
@@ -190,8 +190,14 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
                 }
                 document.solids.extend(facts);
                 if let Some(plane) = options.slice {
-                    let meets = section::plot(shared, options, &program, plane)?;
-                    document.ok &= meets || options.deny.is_none();
+                    let list = section::plot(shared, options, &program, plane)?;
+                    document.ok &= list.is_empty() || options.deny.is_none();
+                    if shared.json {
+                        show(shared, &mut document, &Diagnostics { list, ..diagnostics });
+                    } else {
+                        // they are about the flag, so no place in the file is shown
+                        list.into_iter().for_each(|warning| warn(warning.code, warning.message));
+                    }
                 }
             }
         }

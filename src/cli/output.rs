@@ -2,8 +2,10 @@
 //! its target and then renamed, so it is whole or not there.
 
 use std::borrow::Cow;
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use serde::Serialize;
 
@@ -36,13 +38,35 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let prefix = format!("{TEMPORARY}{name}-");
+    remove_temporaries(folder);
     let temporary = tempfile::Builder::new().prefix(&prefix).tempfile_in(folder).map_err(failed)?;
+    // a folder that cannot be locked keeps what killed commands leave
+    let _ = temporary.as_file().try_lock();
     let mut writer = BufWriter::new(temporary);
     fill(&mut writer).map_err(failed)?;
     let temporary = writer.into_inner().map_err(|e| failed(e.into_error()))?;
     readable_by_others(temporary.as_file()).map_err(failed)?;
     temporary.persist(path).map_err(|e| failed(e.error))?;
     Ok(())
+}
+
+/// Removes temporary files that killed commands have left in a folder, once for each folder. Those that another command is
+/// writing are locked, by a lock that ends with its process.
+fn remove_temporaries(folder: &Path) {
+    static SEEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+    let Ok(mut seen) = SEEN.lock() else { return };
+    if seen.iter().any(|known| known == folder) {
+        return;
+    }
+    seen.push(folder.to_path_buf());
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_ours = entry.file_name().to_string_lossy().starts_with(TEMPORARY);
+        let is_left = || File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
+        if is_ours && is_left() {
+            // one that cannot be removed harms nobody
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// A path as a message shows it: on one line, and without characters that a terminal would obey.

@@ -3,13 +3,13 @@
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::args::{Check, Shared};
-use super::failure::{Failure, warn};
+use super::failure::Failure;
 use super::output::Shown;
 use super::{choose, output};
-use rfm::diagnostic::Code;
+use rfm::diagnostic::{Code, Diagnostic};
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::slice::{self, Plane, Window};
@@ -19,56 +19,121 @@ use rfm::{Program, Solid};
 /// Points along each side of the window at which a section is sought.
 const SOUGHT: usize = 200;
 
-/// Plots a solid in a plane. Returns whether the plane meets the solid; if not, this has been said.
+/// How far beside its plane a section is looked at, as a part of the window: less than a pixel.
+const BESIDE: f64 = 1e-5;
+
+/// A plane that shares more than this part of the window with a face of the solid lies within that face.
+const OF_A_FACE: f64 = 2e-3;
+
+/// Plots a solid in a plane. Returns warnings about what the plot shows.
 pub(super) fn plot(
     shared: &Shared,
     options: &Check,
     program: &Program,
     plane: Plane,
-) -> Result<bool, Failure> {
+) -> Result<Vec<Diagnostic>, Failure> {
     let solid = choose::solid(shared, program, options.solid.as_deref())?.at(options.time);
     let window = match options.window {
         Some([u0, v0, u1, v1]) => Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)),
         None => plane.window(&around(&solid)?),
     };
-    let meets = meets(&solid, plane, window);
+    let aside = out_of_a_face(&solid, plane, window);
+    let shown = Plane::new(plane.axis, plane.value + aside.unwrap_or(0.0));
+    let found = match aside {
+        Some(_) => Some((Code::SECTION_IN_FACE, in_a_face(&solid, plane))),
+        None => meets(&solid, plane, window).map(|message| (Code::NO_SECTION, message)),
+    };
+    let named = program.module().solids.iter().find(|named| named.name == solid.name());
+    let warnings: Vec<Diagnostic> = found
+        .zip(named)
+        .map(|((code, message), named)| Diagnostic::warning(code, named.span, message))
+        .into_iter()
+        .collect();
     // if no program keeps the tolerance, which was reported, the solid's own ω is drawn
     let chosen = program.within_tolerance(&solid).and_then(Result::ok);
     let field: &dyn Field = chosen.as_ref().map_or(&solid as &dyn Field, |chosen| chosen);
+    let beside = Beside { field, by: shown.point(DVec2::ZERO) - plane.point(DVec2::ZERO) };
+    let (field, title): (&dyn Field, String) = match aside {
+        Some(_) => (&beside, format!("{}, just outside its face", solid.name())),
+        None => (field, solid.name().to_string()),
+    };
     if options.term {
         // drawn to memory first, so that a reader who leaves early is no error of the drawing
         let mut drawing = Vec::new();
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        slice::terminal::draw(field, solid.name(), plane, window, 78, colour, &mut drawing)
+        slice::terminal::draw(field, &title, plane, window, 78, colour, &mut drawing)
             .map_err(Failure::usage)?;
         let mut out = anstream::stdout();
         out.write_all(&drawing)?;
         out.flush()?;
         if options.output.is_none() {
-            return Ok(meets);
+            return Ok(warnings);
         }
     }
     let path = match &options.output {
         Some(path) => path.clone(),
         None => PathBuf::from(format!("{}.{}.svg", solid.name(), plane.to_string().replace(' ', ""))),
     };
-    let picture = picture(field, solid.name(), plane, window, &path)?;
+    let picture = picture(field, &title, plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
     if !shared.json {
         say!("slice {plane} of {} written to {}", solid.name(), path.shown());
     }
-    Ok(meets)
+    Ok(warnings)
 }
 
-/// Whether a plot shows any of the solid. If not, warns and says where the solid is.
-fn meets(solid: &Solid, plane: Plane, window: Window) -> bool {
+/// A field as it is a little beside each place.
+struct Beside<'a> {
+    field: &'a dyn Field,
+    by: DVec3,
+}
+
+impl Field for Beside<'_> {
+    fn omega(&self, p: DVec3) -> f64 {
+        self.field.omega(p + self.by)
+    }
+
+    fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+        self.field.omega_grad(p + self.by)
+    }
+}
+
+/// The points at which a section is sought.
+fn sought(plane: Plane, window: Window) -> impl Iterator<Item = DVec3> {
     let cell = window.size() / SOUGHT as f64;
-    let at = |k: usize| {
+    (0..SOUGHT * SOUGHT).map(move |k| {
         let place = DVec2::new((k % SOUGHT) as f64 + 0.5, (k / SOUGHT) as f64 + 0.5);
         plane.point(window.min + cell * place)
-    };
-    if (0..SOUGHT * SOUGHT).any(|k| solid.omega(at(k)) > 0.0) {
-        return true;
+    })
+}
+
+/// If a plane lies within a face of a solid, how far beside it the section is drawn: on the side with less of the solid.
+fn out_of_a_face(solid: &Solid, plane: Plane, window: Window) -> Option<f64> {
+    let aside = BESIDE * window.size().max_element();
+    let step = DVec3::AXES[plane.axis.index()] * aside;
+    let (mut within, mut before, mut behind) = (0, 0, 0);
+    for p in sought(plane, window) {
+        let [on, low, high] = [p, p - step, p + step].map(|p| solid.omega(p));
+        // the rounding of ω is far below what it is at this distance from a face
+        within += usize::from(on.abs() < 1e-3 * low.abs().max(high.abs()));
+        before += usize::from(low > 0.0);
+        behind += usize::from(high > 0.0);
+    }
+    let is_within = within as f64 > OF_A_FACE * (SOUGHT * SOUGHT) as f64;
+    is_within.then_some(if before < behind { -aside } else { aside })
+}
+
+fn in_a_face(solid: &Solid, plane: Plane) -> String {
+    format!(
+        "the plane {plane} lies within a face of `{}`: the section just outside of that face is drawn",
+        solid.name()
+    )
+}
+
+/// What to say of a plot that shows nothing of the solid; `None` if it shows some.
+fn meets(solid: &Solid, plane: Plane, window: Window) -> Option<String> {
+    if sought(plane, window).any(|p| solid.omega(p) > 0.0) {
+        return None;
     }
     let name = solid.name();
     let axis = plane.axis.index();
@@ -82,15 +147,13 @@ fn meets(solid: &Solid, plane: Plane, window: Window) -> bool {
         }
     };
     let corners = [window.min, window.max].map(|corner| plane.point(corner));
-    let message = if solid.range(&Aabb::new(corners[0], corners[1])).hi < 0.0 {
+    Some(if solid.range(&Aabb::new(corners[0], corners[1])).hi < 0.0 {
         format!("the plane {plane} does not meet `{name}` in the picture: {where_it_is}")
     } else {
         format!(
             "the section of `{name}` by {plane} is thinner than a pixel, or outside the picture: {where_it_is}"
         )
-    };
-    warn(Code::NO_SECTION, message);
-    false
+    })
 }
 
 fn picture(

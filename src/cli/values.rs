@@ -25,6 +25,17 @@ pub(super) struct Frames {
     pub end: Option<usize>,
 }
 
+/// What is cut away of obstacles in pictures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum CutFlag {
+    /// The front half of those that hide much of the fluid.
+    Auto,
+    /// Nothing.
+    None,
+    /// What lies between this plane and the eye.
+    Plane(Plane),
+}
+
 /// A param that the command line sets.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Definition {
@@ -117,6 +128,25 @@ pub(super) fn frames(text: &str) -> Result<Frames, String> {
 
 pub(super) fn point(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text).map(DVec3::from_array)
+}
+
+/// Three numbers that are not all zero.
+pub(super) fn direction(text: &str) -> Result<DVec3, String> {
+    let found = point(text)?;
+    if found.is_finite() && found != DVec3::ZERO {
+        Ok(found)
+    } else {
+        Err("the direction has no length".into())
+    }
+}
+
+/// A plane, `auto` or `none`.
+pub(super) fn cut(text: &str) -> Result<CutFlag, String> {
+    match text.trim() {
+        "auto" => Ok(CutFlag::Auto),
+        "none" => Ok(CutFlag::None),
+        other => plane(other).map(CutFlag::Plane).map_err(|reason| format!("{reason}; or `auto`, or `none`")),
+    }
 }
 
 pub(super) fn window(text: &str) -> Result<[f64; 4], String> {

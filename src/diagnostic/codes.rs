@@ -174,6 +174,9 @@ DIVISION_BY_ZERO = "W0412":
 NO_SECTION = "W0413":
 "The plane of a slice does not meet the solid, or its section is thinner than a pixel: the picture shows the outside only.
 The message says between which coordinates the solid lies.";
+SECTION_IN_FACE = "W0414":
+"The plane of a slice lies within a face of the solid, where ω is zero all over and rounding would decide what is inside. The
+picture shows the section just outside of that face; a plane a little further in shows the other side.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";

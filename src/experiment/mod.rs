@@ -122,6 +122,20 @@ impl Experiment {
         &self.bodies
     }
 
+    /// A speed that the fluid may reach, m/s, for the scale of pictures: [`Experiment::typical_speed`], or if this is 0 that of
+    /// what drives the fluid. Always positive.
+    pub fn speed_scale(&self) -> f64 {
+        match self.typical_speed() {
+            speed if speed > 0.0 => speed,
+            _ => parameters::driven_speed(&self.program, &self.scene),
+        }
+    }
+
+    /// The shape of the fluid at the start.
+    pub fn fluid(&self) -> &Solid {
+        &self.fluid
+    }
+
     /// Warnings about the scene. They do not prevent a run.
     pub fn warnings(&self) -> Diagnostics {
         self.diagnostics(self.warnings.clone())

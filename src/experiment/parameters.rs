@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{vector_field, velocities};
 use crate::Program;
 use crate::diagnostic::{Code, Diagnostic};
+use crate::ir::Node;
 use crate::lower::{Gravity, Scene};
 use crate::sph::Parameters;
 
@@ -100,13 +101,41 @@ fn at_start(program: &Program, gravity: &Gravity) -> DVec3 {
 
 /// The greatest speed at the start, m/s, of the points of a grid over the box.
 fn fastest(program: &Program, scene: &Scene) -> f64 {
-    const SIDE: usize = 16;
     let velocities = velocities(program, &scene.fluid);
-    let mut most: f64 = 0.0;
-    for k in 0..SIDE.pow(3) {
+    most(scene, |p| velocities(p, 0.0).length())
+}
+
+/// The greatest value at the points of a grid over the box; at least 0.
+fn most(scene: &Scene, value: impl Fn(DVec3) -> f64) -> f64 {
+    const SIDE: usize = 16;
+    let at = |k: usize| {
         let part = DVec3::new((k % SIDE) as f64, (k / SIDE % SIDE) as f64, (k / SIDE / SIDE) as f64);
-        let p = scene.domain.min + scene.domain.size() * part / (SIDE - 1) as f64;
-        most = most.max(velocities(p, 0.0).length());
+        scene.domain.min + scene.domain.size() * part / (SIDE - 1) as f64
+    };
+    (0..SIDE.pow(3)).map(|k| value(at(k))).filter(|v| v.is_finite()).fold(0.0, f64::max)
+}
+
+/// A speed that the fluid reaches where it neither falls nor moves at the start: that of its known solution, of surfaces that
+/// take it along, or of a fall through the box under a force that depends on the place. 1 m/s if nothing is known.
+pub(super) fn driven_speed(program: &Program, scene: &Scene) -> f64 {
+    let until = scene.run.until;
+    // formulas may have poles where there is no fluid
+    let fluid = vector_field(program, &[scene.fluid.shape; 3]);
+    let fastest = |nodes: &[Node; 3]| {
+        let vector = vector_field(program, nodes);
+        let inside = |p: DVec3, time: f64| if fluid(p, 0.0).x > 0.0 { vector(p, time).length() } else { 0.0 };
+        let at = |time: f64| most(scene, |p| inside(p, time));
+        [0.0, 0.25, 0.5, 1.0].map(|part| at(part * until)).into_iter().fold(0.0, f64::max)
+    };
+    let container = scene.container.iter().map(|c| c.skin);
+    let skins = container.chain(scene.obstacles.iter().map(|o| o.skin));
+    let stated = scene.truth.iter().filter_map(|truth| truth.velocity);
+    let stated = stated.chain(skins.filter_map(|skin| skin.velocity)).map(|nodes| fastest(&nodes));
+    let force = scene.gravity.formulas().map_or(0.0, &fastest);
+    let fall = (2.0 * force * scene.domain.size().max_element()).sqrt();
+    match stated.fold(0.0, f64::max) {
+        speed if speed > 0.0 => speed,
+        _ if fall > 0.0 => fall,
+        _ => 1.0,
     }
-    most
 }

@@ -29,6 +29,8 @@ pub(super) struct Lowering<'a> {
     pub text: Arc<str>,
     /// Whether the value of a solid is being evaluated, where only lengths and angles have units.
     pub in_shape: bool,
+    /// Whether the value of a `let` is read.
+    pub in_let: bool,
     /// Dimensions of the params and names that are defined as one number with a unit.
     pub dimensions: HashMap<String, Dimension>,
     /// Params and names whose value has neither a unit nor π in it.
@@ -84,6 +86,7 @@ impl Lowering<'_> {
             scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
             text,
             in_shape: false,
+            in_let: false,
             dimensions: HashMap::new(),
             bare: HashSet::new(),
             method: None,

@@ -24,7 +24,8 @@ use std::sync::OnceLock;
 
 pub use module::{Module, NamedSolid, ParamValue};
 pub use scene::{
-    Bounce, Container, Fluid, Gravity, Measured, Obstacle, Probe, Run, Scene, Skin, Solver, Tolerance, Truth,
+    Bounce, Container, Fluid, Gravity, Measured, Obstacle, Opening, Picture, Probe, Run, Scene, Skin, Solver,
+    Tolerance, Truth,
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
@@ -304,7 +305,9 @@ impl<'a> Lowering<'a> {
     }
 
     fn definition(&mut self, definition: &'a Definition) {
+        self.in_let = true;
         let value = self.expr(&definition.value);
+        self.in_let = false;
         if self.may_define(&definition.name) {
             self.remember_units(&definition.name, &definition.value);
             self.names.define(self.scope.source, &definition.name, Kind::Value(value));

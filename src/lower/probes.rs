@@ -164,7 +164,13 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reads a name, and returns its index among those that are known.
-    fn one_of(&mut self, value: &Expr, key: &str, known: &[&str], what: &str) -> Option<usize> {
+    pub(in crate::lower) fn one_of(
+        &mut self,
+        value: &Expr,
+        key: &str,
+        known: &[&str],
+        what: &str,
+    ) -> Option<usize> {
         let ExprKind::Name(name) = &value.kind else {
             let message = format!("`{key}` needs a name: that of the {what}");
             self.report(Diagnostic::error(Code::WRONG_TYPE, value.span, message));

@@ -57,7 +57,7 @@ impl Lowering<'_> {
     pub fn warn_of_zero(&mut self, divisor: Node, expr: &Expr) {
         let is_zero = self.known_value(divisor) == Some(0.0);
         // elsewhere a value that is not finite is an error of its own
-        if is_zero && self.in_shape && expr.span.source == SourceId::File {
+        if is_zero && (self.in_shape || self.in_let) && expr.span.source == SourceId::File {
             self.report(
                 Diagnostic::warning(Code::DIVISION_BY_ZERO, expr.span, "the divisor is zero")
                     .help("is another divisor meant? what depends on this value is infinite or no number"),
@@ -135,15 +135,38 @@ impl Lowering<'_> {
         self.report(warning.help(help));
     }
 
+    /// Warns of a number above a whole turn in an angle that depends on t, as in `.rotate_z(45*t)`.
+    pub fn warn_of_fast_turn(&mut self, expr: &Expr) {
+        let Some((rate, at)) = large_number(expr).filter(|_| self.has_no_unit(expr)) else { return };
+        if expr.span.source != SourceId::File {
+            return;
+        }
+        let written = self.written(at).unwrap_or("…").to_string();
+        let message =
+            format!("in an angle that depends on t, {rate} rad is {:.1} turns", rate / std::f64::consts::TAU);
+        let help = format!(
+            "are degrees meant? write `{}`, or `{}` for radians",
+            with_unit(&written, "deg"),
+            with_unit(&written, "rad")
+        );
+        self.report(Diagnostic::warning(Code::LARGE_ANGLE, at.span, message).help(help));
+    }
+
     /// Whether a value is made of numbers without units and without π.
     pub fn is_bare(&self, expr: &Expr) -> bool {
+        let is_call = matches!(expr.kind, ExprKind::Call { .. });
+        !is_call && self.has_no_unit(expr) && expr.children().into_iter().all(|part| self.is_bare(part))
+    }
+
+    /// Whether neither a unit nor π stands in a value, nor in the arguments of its functions.
+    fn has_no_unit(&self, expr: &Expr) -> bool {
         match &expr.kind {
-            ExprKind::Quantity { .. } | ExprKind::Call { .. } | ExprKind::Text(_) => false,
+            ExprKind::Quantity { .. } | ExprKind::Text(_) => false,
             ExprKind::Name(name) => {
                 let local = self.scope.locals.iter().rev().find(|local| local.name == *name);
-                local.map_or(self.bare.contains(name), |local| local.bare)
+                local.map_or(name == "t" || self.bare.contains(name), |local| local.bare)
             }
-            _ => expr.children().into_iter().all(|part| self.is_bare(part)),
+            _ => expr.children().into_iter().all(|part| self.has_no_unit(part)),
         }
     }
 
@@ -200,6 +223,16 @@ impl Lowering<'_> {
             _ => format!(".{method}(45 deg)"),
         }
     }
+}
+
+/// The first number above a whole turn in an expression, and its place. Whole and half multiples of π stand for turns.
+fn large_number(expr: &Expr) -> Option<(f64, &Expr)> {
+    let ExprKind::Number(number) = expr.kind else {
+        return expr.children().into_iter().find_map(large_number);
+    };
+    let halves = 2.0 * number / std::f64::consts::PI;
+    let is_of_pi = (halves - halves.round()).abs() < 1e-4 * halves;
+    (number > std::f64::consts::TAU && !is_of_pi).then_some((number, expr))
 }
 
 /// A value with an angle's unit behind it: behind its last number if that is its last factor.

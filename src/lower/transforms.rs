@@ -104,10 +104,11 @@ impl Lowering<'_> {
                 if !self.no_length(&argument.value) {
                     return Value::Failed;
                 }
-                if let Value::Number(node) = &value
-                    && let Some(angle) = self.known_value(*node)
-                {
-                    self.warn_of_large_angle(angle, &argument.value);
+                if let Value::Number(node) = &value {
+                    match self.known_value(*node) {
+                        Some(angle) => self.warn_of_large_angle(angle, &argument.value),
+                        None => self.warn_of_fast_turn(&argument.value),
+                    }
                 }
             }
             values[slot] = Some((value, argument.value.span));

@@ -28,7 +28,7 @@
 //! let surface = mesh::marching_cubes(&ball, &grid, &|_share_done| ())?;
 //! let report = mesh::check(&surface, &ball);
 //! assert!(report.closed && report.manifold && report.max_distance < 1e-12);
-//! mesh::stl::write(&surface, &mut Vec::new())?;
+//! mesh::stl::write(&surface, mesh::LengthUnit::MILLIMETRE, &mut Vec::new())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

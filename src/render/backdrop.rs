@@ -34,25 +34,24 @@ pub struct Backdrop {
     still: Vec<u8>,
     title: Layer,
     bar: Layer,
-    /// The number of triangles of the mesh that are not drawn because a corner is not finite, lies behind the
+    /// The number of triangles of the meshes that are not drawn because a corner is not finite, lies behind the
     /// eye, or does not exist.
     pub skipped_triangles: usize,
 }
 
 impl Backdrop {
-    /// Draws what does not move: the box with the corners of `bounds` in metres, and the mesh, which may
-    /// be empty.
+    /// Draws what does not move: the box with the corners of `bounds` in metres, and the meshes.
     ///
     /// # Errors
     /// [`RenderError::Legend`], which is a bug of ours.
     pub fn new(
         camera: Camera,
         bounds: &Aabb,
-        mesh: &MeshView<'_>,
+        meshes: &[MeshView<'_>],
         legend: &Legend<'_>,
     ) -> Result<Self, RenderError> {
         let (width, height) = camera.subpixels();
-        let facets = Facets::new(mesh, &camera);
+        let facets: Vec<Facets> = meshes.iter().map(|mesh| Facets::new(mesh, &camera)).collect();
         let edges = edges(bounds, &camera);
         let floor = floor(bounds, &camera);
         let mut canvas = Canvas::new(width, height, PAPER);
@@ -60,7 +59,7 @@ impl Backdrop {
             for corners in &floor {
                 band.triangle(corners, |_| FLOOR);
             }
-            facets.draw(band);
+            facets.iter().for_each(|facets| facets.draw(band));
         });
         let mut finished = canvas.clone();
         finished.draw(|band| draw_edges(&edges, band));
@@ -73,7 +72,7 @@ impl Backdrop {
             still,
             title: overlay::title(legend.title, f64::from(camera.width) / scale, scale)?,
             bar: overlay::bar(legend, scale)?,
-            skipped_triangles: facets.skipped,
+            skipped_triangles: facets.iter().map(|facets| facets.skipped).sum(),
             camera,
         })
     }
@@ -188,9 +187,9 @@ mod tests {
     }
 
     /// A view of the cube along −x, with y to the right and z up.
-    fn scene(mesh: &MeshView<'_>) -> Backdrop {
+    fn scene(mesh: MeshView<'_>) -> Backdrop {
         let camera = Camera::new(&cube(), DVec3::X, (320, 240)).unwrap();
-        Backdrop::new(camera, &cube(), mesh, &LEGEND).unwrap()
+        Backdrop::new(camera, &cube(), &[mesh], &LEGEND).unwrap()
     }
 
     fn frame(scene: &Backdrop, points: &[DVec3], speeds: &[f64]) -> Image {
@@ -209,7 +208,7 @@ mod tests {
 
     #[test]
     fn the_nearer_particle_hides_the_farther_whatever_the_order() {
-        let scene = scene(&MeshView::default());
+        let scene = scene(MeshView::default());
         let (near, far) = (DVec3::X * 0.5, DVec3::X * -0.5);
         for (points, speeds) in [([near, far], [1.0, 0.0]), ([far, near], [0.0, 1.0])] {
             assert!(is_red(centre(&frame(&scene, &points, &speeds), &scene)));
@@ -221,7 +220,7 @@ mod tests {
     fn the_mesh_hides_what_is_behind_it_and_is_drawn_from_both_sides() {
         let vertices = [(-0.9, -0.9), (0.9, -0.9), (0.0, 0.9)].map(|(y, z)| DVec3::new(0.0, y, z));
         for triangles in [[[0, 1, 2]], [[0, 2, 1]]] {
-            let scene = scene(&MeshView { vertices: &vertices, normals: &[], triangles: &triangles });
+            let scene = scene(MeshView { vertices: &vertices, triangles: &triangles, ..MeshView::default() });
             assert!(is_red(centre(&frame(&scene, &[DVec3::X * 0.5], &[1.0]), &scene)));
             let [r, g, b] = centre(&frame(&scene, &[DVec3::X * -0.5], &[1.0]), &scene);
             assert!(r.abs_diff(b) < 40 && (100..230).contains(&g), "the mesh is grey: {r} {g} {b}");
@@ -231,11 +230,8 @@ mod tests {
     #[test]
     fn bad_positions_speeds_and_triangles_are_skipped_and_counted() {
         let vertices = [DVec3::ZERO, DVec3::Y, DVec3::NAN];
-        let scene = scene(&MeshView {
-            vertices: &vertices,
-            normals: &[],
-            triangles: &[[0, 1, 2], [0, 1, 9], [1, 1, 1]],
-        });
+        let triangles = [[0, 1, 2], [0, 1, 9], [1, 1, 1]];
+        let scene = scene(MeshView { vertices: &vertices, triangles: &triangles, ..MeshView::default() });
         assert_eq!(scene.skipped_triangles, 2);
         let points = [DVec3::NAN, DVec3::X * 1e9, DVec3::ZERO, DVec3::new(0.0, f64::INFINITY, 0.0)];
         let image = frame(&scene, &points, &[0.0, 0.0, f64::NAN]);
@@ -246,7 +242,7 @@ mod tests {
 
     #[test]
     fn no_particles_and_odd_radii_make_a_picture() {
-        let scene = scene(&MeshView::default());
+        let scene = scene(MeshView::default());
         assert_eq!(frame(&scene, &[], &[]).pixels.len(), 3 * 320 * 240);
         for radius in [f64::NAN, -1.0, 0.0, 1e300] {
             let one = [0.0];
@@ -257,7 +253,7 @@ mod tests {
 
     #[test]
     fn particles_beside_the_picture_leave_it_as_it_is() {
-        let scene = scene(&MeshView::default());
+        let scene = scene(MeshView::default());
         let nothing = frame(&scene, &[], &[]).pixels;
         let far = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         for z in [-1.0, 0.0, 1.0] {
@@ -278,7 +274,8 @@ mod tests {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let scene = scene(&MeshView { vertices: &vertices, normals: &[], triangles: &[[0, 1, 2]] });
+                let scene =
+                    scene(MeshView { vertices: &vertices, triangles: &[[0, 1, 2]], ..MeshView::default() });
                 frame(&scene, &points, &speeds)
             })
         };

@@ -5,7 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::RenderError;
+use super::{Cut, RenderError};
 use crate::geom::Aabb;
 
 /// Sub-pixels per pixel in each direction.
@@ -100,6 +100,26 @@ impl Camera {
         let nearness = 1.0 / -d.dot(self.back);
         let at = self.centre + self.focal * nearness * DVec2::new(d.dot(self.right), -d.dot(self.up));
         (nearness > 0.0 && at.abs().max_element() < 1e6).then_some(Seen { at, nearness })
+    }
+
+    /// The nearness of a plane as a function of the place on the screen: n = a + b·x + c·y. `None` if the eye lies in the
+    /// plane.
+    pub(super) fn nearness_of(&self, plane: &Cut) -> Option<[f64; 3]> {
+        let ahead = plane.offset - plane.normal.dot(self.eye);
+        let normal = self.turn(plane.normal) / ahead;
+        let slope = DVec2::new(normal.x, -normal.y) / self.focal;
+        let found = [-normal.z - slope.dot(self.centre), slope.x, slope.y];
+        found.iter().all(|part| part.is_finite()).then_some(found)
+    }
+
+    /// Whether the eye lies on the side of a plane that is cut away.
+    pub fn is_beyond(&self, plane: &Cut) -> bool {
+        plane.normal.dot(self.eye) > plane.offset
+    }
+
+    /// The direction from the scene to the eye, of length 1.
+    pub fn towards_eye(&self) -> DVec3 {
+        self.back
     }
 
     /// A direction in the camera's frame: x to the right, y up, z towards the eye.

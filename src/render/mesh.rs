@@ -3,7 +3,9 @@
 use glam::DVec3;
 
 use super::{
+    Cut, Rgb,
     camera::{Camera, Seen},
+    cut::SeenCut,
     raster::{Band, Corner},
     shade,
 };
@@ -17,22 +19,43 @@ pub struct MeshView<'a> {
     pub normals: &'a [DVec3],
     /// Three indices of vertices for each triangle. Both sides are drawn.
     pub triangles: &'a [[u32; 3]],
+    /// The plane that cuts the mesh open, which must then be closed.
+    pub cut: Option<Cut>,
 }
 
 /// Triangles on the screen.
 #[derive(Debug)]
 pub struct Facets {
     facets: Vec<Facet>,
+    cut: Option<SeenCut>,
     /// The number of triangles with a bad index or a corner that the camera cannot see.
     pub skipped: usize,
 }
 
+/// A triangle on the screen.
 #[derive(Debug)]
-struct Facet {
-    corners: [Corner; 3],
+pub(super) struct Facet {
+    pub corners: [Corner; 3],
     rows: (i64, i64),
     /// The normals in the camera's frame, towards the side that is seen.
     normals: [[f32; 3]; 3],
+    /// How far the corners lie beyond the cut, times their nearness: this changes evenly over the screen.
+    beyond: [f32; 3],
+}
+
+impl Facet {
+    /// The colour at the place that has these weights of the corners.
+    pub fn colour(&self, [u, v, w]: [f32; 3]) -> Rgb {
+        let [a, b, c] = self.normals;
+        let n: [f32; 3] = std::array::from_fn(|i| u * a[i] + v * b[i] + w * c[i]);
+        let length = shade::dot(n, n).sqrt();
+        shade::stone(n.map(|x| x / length))
+    }
+
+    /// Whether the place that has these weights of the corners is cut away.
+    pub fn is_beyond(&self, weights: [f32; 3]) -> bool {
+        shade::dot(weights, self.beyond) > 0.0
+    }
 }
 
 impl Facets {
@@ -52,23 +75,24 @@ impl Facets {
                 let n = n.try_normalize().or_else(|| outward.try_normalize()).unwrap_or(DVec3::Z);
                 camera.turn(side * n).as_vec3().to_array()
             });
+            let beyond =
+                |i: usize| mesh.cut.map_or(-1.0, |cut| (corners[i].nearness * cut.beyond(points[i])) as f32);
+            let beyond = [0, 1, 2].map(beyond);
             let corners = corners.map(Corner::new);
-            Some(Facet { corners, rows: Corner::rows(&corners), normals })
+            Some(Facet { corners, rows: Corner::rows(&corners), normals, beyond })
         };
         let facets: Vec<_> = mesh.triangles.iter().filter_map(facet).collect();
         let skipped = mesh.triangles.len() - facets.len();
-        Self { facets, skipped }
+        let cut = mesh.cut.and_then(|cut| SeenCut::new(&cut, camera));
+        Self { facets, cut, skipped }
     }
 
     pub fn draw(&self, band: &mut Band<'_>) {
         let (top, bottom) = (band.top as i64, band.bottom() as i64);
-        for facet in self.facets.iter().filter(|facet| facet.rows.0 < bottom && facet.rows.1 >= top) {
-            let [a, b, c] = facet.normals;
-            band.triangle(&facet.corners, |[u, v, w]| {
-                let n: [f32; 3] = std::array::from_fn(|i| u * a[i] + v * b[i] + w * c[i]);
-                let length = shade::dot(n, n).sqrt();
-                shade::stone(n.map(|x| x / length))
-            });
+        let here = self.facets.iter().filter(|facet| facet.rows.0 < bottom && facet.rows.1 >= top);
+        match &self.cut {
+            Some(cut) => cut.draw(&here.collect::<Vec<_>>(), band),
+            None => here.for_each(|facet| band.triangle(&facet.corners, |weights| facet.colour(weights))),
         }
     }
 }

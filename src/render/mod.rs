@@ -14,6 +14,7 @@
 mod backdrop;
 mod camera;
 mod colour;
+mod cut;
 mod image;
 mod mesh;
 mod overlay;
@@ -27,6 +28,7 @@ use self::colour::Rgb;
 pub use self::{
     backdrop::Backdrop,
     camera::Camera,
+    cut::{Cut, hidden},
     image::Image,
     mesh::MeshView,
     overlay::{Caption, Legend},

@@ -130,6 +130,34 @@ impl Band<'_> {
 
     /// Draws a triangle. `colour` takes the weights of the corners, whose sum is one.
     pub fn triangle(&mut self, corners: &[Corner; 3], colour: impl Fn([f32; 3]) -> Rgb) {
+        let frame = self.frame();
+        frame.fragments(corners, |at, near, weights| {
+            if near > self.nearness[at] {
+                self.nearness[at] = near;
+                self.colour[at] = colour(weights);
+            }
+        });
+    }
+
+    /// Where the band lies.
+    pub fn frame(&self) -> Frame {
+        Frame { left: self.left, top: self.top, width: self.width, bottom: self.bottom() }
+    }
+}
+
+/// The place of a band in the picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    left: usize,
+    top: usize,
+    width: usize,
+    bottom: usize,
+}
+
+impl Frame {
+    /// Gives every sub-pixel of a triangle to `fragment`: the index at which the band stores it, its nearness, and the
+    /// weights of the corners, whose sum is one.
+    pub fn fragments(self, corners: &[Corner; 3], mut fragment: impl FnMut(usize, f32, [f32; 3])) {
         let [a, b, mut c] = *corners;
         let mut b = b;
         let area = edge(a, b, (c.x, c.y));
@@ -148,8 +176,8 @@ impl Band<'_> {
             (ends.0 as f64 / STEPS as f64 - 0.5, ends.1 as f64 / STEPS as f64 - 0.5)
         };
         let ((left, right), (top, bottom)) = (span([a.x, b.x, c.x]), span([a.y, b.y, c.y]));
-        let columns = self.columns(left.ceil(), right.floor());
-        for y in self.rows(top.ceil(), bottom.floor()) {
+        let columns = clip(left.ceil(), right.floor(), self.left, self.left + self.width);
+        for y in clip(top.ceil(), bottom.floor(), self.top, self.bottom) {
             let start = (centre(columns.start), centre(y));
             let mut w = [edge(b, c, start), edge(c, a, start), edge(a, b, start)];
             let step = [(b, c), (c, a), (a, b)].map(|(p, q)| -STEPS * (q.y - p.y));
@@ -157,12 +185,9 @@ impl Band<'_> {
                 if (0..3).all(|i| w[i] >= bias[i]) {
                     let weight = w.map(|w| w as f32 * scale);
                     let near = weight[0] * a.nearness + weight[1] * b.nearness + weight[2] * c.nearness;
-                    let at = self.index(x, y);
-                    if near > self.nearness[at] {
-                        self.nearness[at] = near;
-                        let [u, v, w] = weight;
-                        self.colour[at] = colour(if turned { [u, w, v] } else { [u, v, w] });
-                    }
+                    let [u, v, w] = weight;
+                    let weight = if turned { [u, w, v] } else { weight };
+                    fragment((y - self.top) * self.width + (x - self.left), near, weight);
                 }
                 for i in 0..3 {
                     w[i] += step[i];
@@ -188,6 +213,12 @@ impl Corner {
         // the camera shows nothing beyond a million sub-pixels, so products below stay within 62 bits
         let snap = |v: f64| (v * STEPS as f64).round() as i64;
         Self { x: snap(seen.at.x), y: snap(seen.at.y), nearness: seen.nearness as f32 }
+    }
+
+    /// Whether a triangle shows the eye the side from which its corners run counter-clockwise.
+    pub fn is_front(corners: &[Self; 3]) -> bool {
+        let [a, b, c] = *corners;
+        edge(a, b, (c.x, c.y)) < 0
     }
 
     /// The first and last row of sub-pixels that a triangle can touch.

@@ -14,12 +14,21 @@ const DIFFUSE: f32 = 0.58;
 /// The obstacle's colour: a neutral warm grey.
 const STONE: [f32; 3] = [203.0, 195.0, 184.0];
 
+/// The colour of faces that a cut has opened: that of brick.
+const SECTION: [f32; 3] = [214.0, 170.0, 146.0];
+
 /// The colour of a point of the obstacle's surface.
 pub fn stone(normal: [f32; 3]) -> Rgb {
     // some light depends on the height of the normal, so that undersides keep their shape
     let light = AMBIENT + 0.06 * normal[1] + DIFFUSE * dot(normal, LAMP).max(0.0);
     let gleam = 14.0 * power_16(dot(normal, GLEAM));
     STONE.map(|channel| byte(channel * light + gleam))
+}
+
+/// The colour of a face that a cut has opened. It is flat, so nobody takes it for a surface of the obstacle.
+pub fn section(normal: [f32; 3]) -> Rgb {
+    let light = 0.78 + 0.22 * dot(normal, LAMP).max(0.0);
+    SECTION.map(|channel| byte(channel * light))
 }
 
 /// The colour of a point of a particle. The rim is darker, so that neighbours of one colour stay apart.

@@ -1,7 +1,8 @@
-//! The colours of ω: bands between the levels 1, 2, 5 · 10ⁿ, orange inside and blue outside.
+//! The colours of ω: bands between round levels, orange inside and blue outside.
 //!
 //! Levels that shrink by decades keep detail near the surface. Values far from it, often a hundred times
-//! larger, share the outermost bands and do not wash the picture out. Each side has its own largest level
+//! larger, share the outermost bands and do not wash the picture out. Where that would leave most of a side in one band, as
+//! in a solid that is thick everywhere, the levels are evenly spaced instead. Each side has its own largest level
 //! because ω is not a distance: an obstacle may reach +0.2 where its surroundings reach −20. Both ramps
 //! darken away from the surface and differ only in hue, so colour-blind people can read the plot too. The
 //! pale ends stay apart on paper because the line ω = 0 lies between them.
@@ -32,20 +33,20 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The levels that suit a slice. On each side the highest is the largest 1, 2 or 5 · 10ⁿ up to the 98th
-    /// percentile of |ω| there.
+    /// The levels that suit a slice. On each side they are a series 1, 2, 5 · 10ⁿ or evenly spaced, whichever divides the
+    /// samples better, and reach up to the 98th percentile of |ω| there.
     pub fn for_samples(samples: &Samples) -> Self {
         let side = |sign: f64| {
             let magnitudes = samples.omega.iter().map(|w| w * sign).filter(|w| *w > 0.0 && w.is_finite());
-            let mut level = Decimal::below(percentile_98(magnitudes.collect()));
-            let mut levels = Vec::new();
-            while let Some(top) = level
-                && levels.len() < LEVELS_PER_SIDE
-            {
-                levels.push(top);
-                level = Some(top.smaller());
-            }
-            levels
+            let mut magnitudes: Vec<f64> = magnitudes.collect();
+            magnitudes.sort_unstable_by(f64::total_cmp);
+            let Some(top) = Decimal::below(percentile_98(&magnitudes)) else { return Vec::new() };
+            let series: Vec<Decimal> = std::iter::successors(Some(top), |level| Some(level.smaller()))
+                .take(LEVELS_PER_SIDE)
+                .collect();
+            let even = evenly(percentile_98(&magnitudes));
+            let share = |levels: &[Decimal]| largest_band(levels, &magnitudes);
+            if share(&even) < share(&series) { even } else { series }
         };
         let (outside, inside) = (side(-1.0), side(1.0));
         let zero = outside.len();
@@ -97,12 +98,34 @@ impl Scale {
     }
 }
 
-fn percentile_98(mut magnitudes: Vec<f64>) -> f64 {
-    if magnitudes.is_empty() {
-        return 0.0;
+/// The 98th percentile of sorted numbers; 0 without any.
+fn percentile_98(sorted: &[f64]) -> f64 {
+    sorted.get(sorted.len().saturating_sub(1) * 98 / 100).copied().unwrap_or_default()
+}
+
+/// The multiples of a round number up to `top`, the largest first.
+fn evenly(top: f64) -> Vec<Decimal> {
+    let Some(mut step) = Decimal::below(top / LEVELS_PER_SIDE as f64) else { return Vec::new() };
+    while top / step.value() >= (LEVELS_PER_SIDE + 1) as f64 {
+        step = step.larger();
     }
-    let rank = (magnitudes.len() - 1) * 98 / 100;
-    *magnitudes.select_nth_unstable_by(rank, f64::total_cmp).1
+    let multiple = |k: i64| Decimal { mantissa: k * step.mantissa, ..step };
+    let mut levels: Vec<Decimal> =
+        (1..=LEVELS_PER_SIDE as i64).map(multiple).take_while(|level| level.value() <= top).collect();
+    levels.reverse();
+    levels
+}
+
+/// The part of sorted numbers in the band that holds most of them. The levels descend.
+fn largest_band(levels: &[Decimal], sorted: &[f64]) -> usize {
+    let mut end = sorted.len();
+    let mut largest = 0;
+    for level in levels {
+        let start = sorted.partition_point(|w| *w < level.value());
+        largest = largest.max(end - start);
+        end = start;
+    }
+    largest.max(end)
 }
 
 /// A piecewise linear ramp at t in [0, 1].
@@ -133,6 +156,15 @@ mod tests {
     fn each_side_has_its_own_round_levels() {
         let scale = scale(&[-7.0, 0.16]);
         assert_eq!(scale.levels(), [-5.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.005, 0.01, 0.02, 0.05, 0.1]);
+    }
+
+    #[test]
+    fn a_thick_inside_has_evenly_spaced_levels() {
+        let thick: Vec<f64> = (0..100).map(|k| 0.4 + 0.006 * f64::from(k)).collect();
+        assert_eq!(scale(&thick).levels(), [0.0, 0.2, 0.4, 0.6, 0.8]);
+        // values over decades keep the series
+        let wide: Vec<f64> = (0..100).map(|k| 10f64.powf(-0.05 * f64::from(k))).collect();
+        assert_eq!(scale(&wide).levels(), [0.0, 0.02, 0.05, 0.1, 0.2, 0.5]);
     }
 
     #[test]

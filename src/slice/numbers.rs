@@ -37,7 +37,8 @@ impl Decimal {
         Some(best)
     }
 
-    fn larger(self) -> Self {
+    /// The next larger number in the series 1, 2, 5.
+    pub fn larger(self) -> Self {
         match self.mantissa {
             1 => Self { mantissa: 2, ..self },
             2 => Self { mantissa: 5, ..self },

@@ -20,8 +20,10 @@ use crate::field::Field;
 const LEFT: f64 = 72.0;
 const TOP: f64 = 44.0;
 const BELOW: f64 = 52.0;
-/// The colour bar: the gap before it, its width, the room for its numbers and for its title.
-const BAR: [f64; 4] = [26.0, 16.0, 52.0, 22.0];
+/// The colour bar: the gap before it, its width, and the room for its title.
+const BAR: [f64; 3] = [26.0, 16.0, 22.0];
+/// The room for the numbers of the colour bar: that around them, and for each character.
+const NUMBERS: [f64; 2] = [18.0, 6.8];
 /// The largest height of a band in the colour bar, and the least for a legible number.
 const BAND: [f64; 2] = [26.0, 15.0];
 
@@ -30,7 +32,7 @@ pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
     let frame = PlotFrame::new(samples.window, DVec2::new(LEFT, TOP));
     let scale = Scale::for_samples(samples);
     let bar = Bar::new(&frame, &scale);
-    let width = frame.right() + BAR.iter().sum::<f64>() + 8.0;
+    let width = frame.right() + BAR.iter().sum::<f64>() + bar.numbers + 8.0;
     let height = frame.bottom().max(bar.bottom) + BELOW;
 
     let mut out = format!(
@@ -166,6 +168,8 @@ struct Bar {
     left: f64,
     band: f64,
     bottom: f64,
+    /// The room for the numbers beside it.
+    numbers: f64,
 }
 
 impl Bar {
@@ -174,7 +178,10 @@ impl Bar {
         let band = (frame.size.y / bands).clamp(BAND[1], BAND[0]).floor();
         // centred beside the plot, or from the plot's upper edge down if the plot is lower than the bar
         let top = frame.origin.y + (0.5 * (frame.size.y - bands * band)).max(0.0).round();
-        Self { left: frame.right() + BAR[0], band, bottom: top + bands * band }
+        let widest =
+            scale.decimals().iter().map(|level| level.to_string().chars().count()).max().unwrap_or(1);
+        let numbers = NUMBERS[0] + NUMBERS[1] * widest as f64;
+        Self { left: frame.right() + BAR[0], band, bottom: top + bands * band, numbers }
     }
 
     /// The lower border of a band.
@@ -216,7 +223,7 @@ impl Bar {
                 y + 4.0
             );
         }
-        let x = right + BAR[2] + 4.0;
+        let x = right + self.numbers + 4.0;
         for (y, text) in
             [(0.5 * (zero + tip), "inside, ω &gt; 0"), (0.5 * (zero + tail), "outside, ω &lt; 0")]
         {

@@ -18,7 +18,7 @@ pub(super) enum Flavour {
     Unit,
     /// A header with everything in it.
     Header,
-    /// The same for host and device.
+    /// A file whose functions are compiled for the processor and for the graphics card.
     Cuda,
 }
 

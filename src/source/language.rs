@@ -17,8 +17,8 @@ pub(super) struct Language {
     pub single_suffix: &'static str,
     /// A number that is finite in the precision.
     pub finite: fn(f64, Precision) -> String,
-    /// ∞, −∞ and NaN; `None` where the language cannot write them.
-    pub infinite: Option<fn(f64, Precision) -> String>,
+    /// NaN, ∞ and −∞; `None` where the language cannot write them.
+    pub non_finite: Option<fn(Precision) -> [String; 3]>,
     /// The declaration of a constant: type, name, value.
     pub declare: fn(&str, &str, &str) -> String,
     /// The head of a function: type of its result, name, parameters of one type.
@@ -90,7 +90,14 @@ impl Language {
             let text = (self.finite)(rounded, precision);
             return Some(if rounded.is_sign_negative() { format!("({text})") } else { text });
         }
-        self.infinite.map(|write| write(rounded, precision))
+        let [nan, plus, minus] = self.non_finite?(precision);
+        Some(if rounded.is_nan() {
+            nan
+        } else if rounded.is_sign_positive() {
+            plus
+        } else {
+            minus
+        })
     }
 }
 
@@ -115,11 +122,7 @@ pub(super) static C: Language = Language {
     truth: "int",
     single_suffix: "f",
     finite: |value, precision| digits(value, precision) + pair(["", "f"], precision),
-    infinite: Some(|value, _| match value {
-        v if v.is_nan() => "NAN".into(),
-        v if v > 0.0 => "INFINITY".into(),
-        _ => "(-INFINITY)".into(),
-    }),
+    non_finite: Some(|_| ["NAN", "INFINITY", "(-INFINITY)"].map(String::from)),
     declare: |kind, name, value| format!("const {kind} {name} = {value};"),
     head: |head| {
         let operands: Vec<String> =
@@ -153,13 +156,8 @@ pub(super) static RUST: Language = Language {
     truth: "bool",
     single_suffix: "_f32",
     finite: |value, precision| digits(value, precision) + pair(["_f64", "_f32"], precision),
-    infinite: Some(|value, precision| {
-        let kind = precision.name();
-        match value {
-            v if v.is_nan() => format!("{kind}::NAN"),
-            v if v > 0.0 => format!("{kind}::INFINITY"),
-            _ => format!("{kind}::NEG_INFINITY"),
-        }
+    non_finite: Some(|precision| {
+        ["NAN", "INFINITY", "NEG_INFINITY"].map(|name| format!("{}::{name}", precision.name()))
     }),
     declare: |kind, name, value| format!("let {name}: {kind} = {value};"),
     head: |head| {
@@ -202,7 +200,7 @@ pub(super) static WGSL: Language = Language {
     truth: "bool",
     single_suffix: "",
     finite: |value, precision| digits(value, precision) + "f",
-    infinite: None,
+    non_finite: None,
     declare: |_, name, value| format!("let {name} = {value};"),
     head: |head| {
         let operands: Vec<String> =
@@ -230,7 +228,7 @@ pub(super) static GLSL: Language = Language {
     truth: "bool",
     single_suffix: "",
     finite: digits,
-    infinite: None,
+    non_finite: None,
     declare: |kind, name, value| format!("{kind} {name} = {value};"),
     head: |head| {
         let operands: Vec<String> =

@@ -282,7 +282,8 @@ fn open_params<'a>(programs: &[Program], options: &'a Options) -> Vec<OpenParam<
 impl File<'_> {
     /// How a text names a param.
     fn field(&self, number: u32) -> &str {
-        self.params.iter().find(|open| open.number == number).map_or("", |open| open.field.as_str())
+        let open = self.params.iter().find(|open| open.number == number);
+        open.map_or_else(|| unreachable!("param {number} is a constant"), |open| open.field.as_str())
     }
 
     /// The first lines of every file, without the signs of a comment.

@@ -23,10 +23,12 @@ pub(super) fn fields(params: &[Param]) -> Vec<String> {
     let mut fields: Vec<String> = Vec::with_capacity(params.len());
     for (i, param) in params.iter().enumerate() {
         let own = param.name.as_str();
-        let name = match own {
-            _ if !is_plain(own) || own.starts_with("gl_") => format!("param_{i}"),
-            _ if TAKEN.split_whitespace().any(|word| word == own) => format!("{own}_param"),
-            _ => own.to_string(),
+        let name = if !is_plain(own) || own.starts_with("gl_") {
+            format!("param_{i}")
+        } else if TAKEN.split_whitespace().any(|word| word == own) {
+            format!("{own}_param")
+        } else {
+            own.to_string()
         };
         fields.push(if fields.contains(&name) { format!("{name}_{i}") } else { name });
     }

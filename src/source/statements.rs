@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use super::language::{Function, Language};
 use super::operations::{Junction, Names, Operation};
 use super::{Math, SourceError};
-use crate::ir::{Axis, Binary, BinaryFunction, Expr, Forms, Graph, Node, Unary};
+use crate::ir::{Axis, Binary, BinaryFunction, Expr, Forms, Graph, Node, R0, Unary};
 use crate::precision::Precision;
 
 /// How a graph is written.
@@ -192,10 +192,10 @@ impl State<'_> {
             let value = self.operation(Operation::Weighted(junction, style), &operands);
             self.declare(&names.joint(language, precision), &joint, &value);
         }
-        let field = match op {
-            Binary::AndWeight | Binary::OrWeight if u == first => "by_u",
-            Binary::AndWeight | Binary::OrWeight => "by_v",
-            _ => "value",
+        let field = match r0 {
+            R0::AndWeight | R0::OrWeight if u == first => "by_u",
+            R0::AndWeight | R0::OrWeight => "by_v",
+            R0::And | R0::Or => "value",
         };
         format!("{joint}.{field}")
     }

@@ -208,6 +208,10 @@ pub fn key(word: &str) -> Option<&'static str> {
         "shape" | "name" => "solid",
         "region" | "geometry" | "block" => "shape",
         "sensor" | "gauge" | "measure" => "probe",
+        "eye" | "view" | "look_from" | "viewpoint" => "camera",
+        "section" | "clip" | "slice" | "opening" => "cut",
+        "invisible" | "hidden" | "without" => "hide",
+        "render" | "image" | "pictures" | "plot" => "picture",
         _ => return None,
     })
 }

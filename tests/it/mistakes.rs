@@ -139,6 +139,9 @@ const VALUES: &[&str] = &[
     "solid s = 5",
     "solid s = -1",
     "solid s = 1/0 - x",
+    "let a = 1/0\nsolid s = a - x",
+    "solid s = box().rotate_z(45*t)",
+    "solid s = box().rotate([0, 0, 1], 360*sin(t))",
     "solid s = sphere(1) - sphere(0.5)",
     "solid a = sphere(1)\nsolid s = a + box()",
     "solid s = sphere(1)*box()",
@@ -191,6 +194,21 @@ const SCENES: &[&str] = &[
     "probe g { height: [0.5, 0.5, 0] }",
     "probe g { flux: [0.5, 0.5, 0.5] }",
     "probe g { energy: air }",
+    "run { until: 1 s, checkpoint_every: 5 s }",
+    "picture { camera: [0, 0, 0] }",
+    "picture { camera: 45 deg }",
+    "picture { cut: 0.5 }",
+    "picture { cut: y <= x }",
+    "picture { cut: 0.2 <= y <= 0.5 }",
+    "picture { cut: y <= 5 kg }",
+    "picture { cut: y == 0.5 }",
+    "picture { cut: half }",
+    "picture { hide: pots }",
+    "picture { hide: [post, 3] }",
+    "picture { view: [0, -1, 0] }",
+    "picture: [0, -1, 0]",
+    "camera: [0, -1, 0]",
+    "until: 1 s",
 ];
 
 fn program(text: &str) -> Result<Program, Diagnostics> {
@@ -252,6 +270,10 @@ fn is_accepted(code: &str) -> bool {
             }
             "height" | "pressure" | "flux" => {
                 text.replace("  fluid", &format!("  probe p {{ {entries} }}\n  fluid"))
+            }
+            "picture" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
+            "camera" | "cut" | "hide" => {
+                text.replace("  fluid", &format!("  picture {{ {entries} }}\n  fluid"))
             }
             _ => text.replace("0.2) }", &format!("0.2), {entries} }}")),
         }
@@ -362,11 +384,19 @@ const COMMANDS: &[(&[&str], i32)] = &[
     (&["mesh", "post.rfm", "-s", "post", "--cells", "1", "-o", "p.stl"], 2),
     (&["mesh", "post.rfm", "-s", "post", "--cell", "1nm", "-o", "p.stl"], 2),
     (&["mesh", "post.rfm", "-s", "post", "--cell", "10 deg", "-o", "p.stl"], 2),
+    (&["mesh", "post.rfm", "-s", "post", "--unit", "furlong", "-o", "p.stl"], 2),
+    (&["mesh", "post.rfm", "-s", "post", "--unit", "mm", "-o", "p.glb"], 2),
     (&["mesh", "post.rfm", "-s", "nothing", "-o", "p.stl"], 1),
     (&["mesh", "post.rfm", "-s", "post", "--box", "2,2,2,3,3,3", "-o", "p.stl"], 1),
     (&["mesh", "post.rfm", "-s", "nothing", "--json"], 1),
     (&["run", "post.rfm", "--until", "5 kg"], 2),
     (&["run", "post.rfm", "--until", "soon"], 2),
+    (&["run", "post.rfm", "--camera", "0,0,0"], 2),
+    (&["run", "post.rfm", "--camera", "above"], 2),
+    (&["run", "post.rfm", "--cut", "0.5"], 2),
+    (&["run", "post.rfm", "--cut", "half"], 2),
+    (&["run", "post.rfm", "--hide", "pots", "-o", "hidden"], 2),
+    (&["check", "post.rfm", "-s", "post", "--slice", "z=0", "-o", "s.svg"], 0),
     (&["run", "post.rfm", "--until", "10ms", "--no-pictures"], 0),
     (&["run", "post.rfm", "--until", "20ms", "--no-pictures"], 2),
     (&["run", "post.rfm", "--until", "20ms", "--no-pictures", "--force", "--resume"], 2),

@@ -16,7 +16,7 @@ use super::super::{output, progress};
 use super::format;
 use crate::cli::output::Shown;
 use rfm::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
-use rfm::mesh::{WriteMesh, is_closed_manifold, shells, vtp};
+use rfm::mesh::{LengthUnit, WriteMesh, is_closed_manifold, shells, vtp};
 use rfm::sph;
 
 /// The JSON document. Lengths are in metres, volumes in cubic metres.
@@ -72,13 +72,14 @@ struct ParticleScale {
 
 pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let format = options.format.unwrap_or(vtp::FORMAT);
+    let unit = format::unit_fits(format, options.unit)?;
     let write = format::writer(format, options.ascii)?;
     let folder = options.file.as_path();
     let entries = chosen(collection(folder)?, options.frames)?;
     let scale = ParticleScale::new(folder, options)?;
     check_frames(folder, &entries)?;
     let target = options.output.clone().unwrap_or_else(|| folder.join("surface"));
-    let job = Job { folder, target, ending: format.ending, write, scale };
+    let job = Job { folder, target, ending: format.ending, write, unit, scale };
     let started = Instant::now();
     let surfaces = job.surfaces(&entries)?;
     let left_out: usize = surfaces.iter().map(|surface| surface.left_out).sum();
@@ -203,6 +204,7 @@ struct Job<'a> {
     /// The ending of their files.
     ending: &'static str,
     write: WriteMesh,
+    unit: LengthUnit,
     scale: ParticleScale,
 }
 
@@ -241,7 +243,7 @@ impl Job<'_> {
         let mesh = self.scale.surface.mesh(&finite).map_err(|error| failed(error.to_string()))?;
         create(&self.target)?;
         let file = format!("surface_{frame:06}.{}", self.ending);
-        output::write(&self.target.join(&file), |out| (self.write)(&mesh, out))?;
+        output::write(&self.target.join(&file), |out| (self.write)(&mesh, self.unit, out))?;
         let parts = shells(&mesh);
         let volume = parts.iter().fold(0.0, |sum, shell| sum + shell.volume);
         let particle_volume = finite.len() as f64 * self.scale.particle_volume;

@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::super::failure::Failure;
 use crate::cli::output::Shown;
-use rfm::mesh::{FORMATS, Format, WriteMesh};
+use rfm::mesh::{FORMATS, Format, LengthUnit, WriteMesh};
 
 /// The parser of a format's name, which is the ending of its files.
 pub(in crate::cli) fn format_name() -> impl TypedValueParser<Value = Format> {
@@ -14,6 +14,37 @@ pub(in crate::cli) fn format_name() -> impl TypedValueParser<Value = Format> {
     let unknown = "clap lets only the names of formats through";
     PossibleValuesParser::new(names)
         .try_map(move |name| FORMATS.iter().find(|format| format.ending == name).copied().ok_or(unknown))
+}
+
+/// The parser of a unit's name.
+pub(in crate::cli) fn unit_name() -> impl TypedValueParser<Value = LengthUnit> {
+    let names = LengthUnit::ALL.map(|unit| PossibleValue::new(unit.name).help(unit.plural));
+    let unknown = "clap lets only the names of units through";
+    PossibleValuesParser::new(names).try_map(move |name| LengthUnit::named(&name).ok_or(unknown))
+}
+
+/// The help of `--unit`.
+pub(in crate::cli) fn unit_help() -> String {
+    let (open, fixed): (Vec<&Format>, Vec<&Format>) = FORMATS.iter().partition(|format| !format.only_metres);
+    format!(
+        "Unit of the numbers in {} files [default: m]; {} files are in metres. Programs for printers take the numbers of \
+         .stl for mm",
+        endings(open).join(" "),
+        endings(fixed).join(" ")
+    )
+}
+
+/// Refuses another unit than metres for a format that knows no other.
+pub(super) fn unit_fits(format: Format, unit: Option<LengthUnit>) -> Result<LengthUnit, Failure> {
+    let unit = unit.unwrap_or(LengthUnit::METRE);
+    if format.only_metres && unit != LengthUnit::METRE {
+        let open = one_of(FORMATS.iter().filter(|format| !format.only_metres));
+        return Err(Failure::usage(format!(
+            "--unit {}: .{} files are always in metres; {open} files may be in another unit",
+            unit.name, format.ending
+        )));
+    }
+    Ok(unit)
 }
 
 /// The format that a path's ending names.

@@ -6,18 +6,19 @@ mod format;
 mod simplified;
 mod summary;
 
+use std::path::Path;
 use std::time::Instant;
 
 use super::args::{Mesh as Options, MeshMethod, Shared};
 use super::failure::{Failure, complain, note};
 use super::{choose, input, output, progress};
 use crate::cli::output::Shown;
-pub(super) use format::{ascii_help, format_name, output_help};
+pub(super) use format::{ascii_help, format_name, output_help, unit_help, unit_name};
 use rfm::Solid;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::mesh::{
-    self, Grid, GridError, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh,
+    self, Grid, GridError, LengthUnit, Mesh, MeshError, Quality, Reference, Resolution, ThinCells, WriteMesh,
     dual_contouring, marching_cubes,
 };
 use rfm::solid::{Bounds, Depth};
@@ -51,7 +52,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     if options.fluid {
         return fluid::run(shared, options);
     }
-    let write = writer(shared, options)?;
+    let (write, unit) = writer(shared, options)?;
     let program = input::program(shared, &options.file)?;
     let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let grid = grid(&solid, options)?;
@@ -86,7 +87,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     if let (Some(path), Some(write)) = (&options.output, write) {
         let started = Instant::now();
-        output::write(path, |out| write(&mesh, out))?;
+        output::write(path, |out| write(&mesh, unit, out))?;
         times.writing = milliseconds(started);
     }
     let names = (solid.name(), options.method.name());
@@ -96,7 +97,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     }
     summary.print();
     if let Some(path) = &options.output {
-        say!("written to {}", path.shown());
+        say!("written to {}, in {}{}", path.shown(), unit.plural, unit_hint(path, options));
     }
     Ok(())
 }
@@ -123,8 +124,14 @@ fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-/// The writer that the options ask for; `None` if only figures are wanted.
-fn writer(shared: &Shared, options: &Options) -> Result<Option<WriteMesh>, Failure> {
+/// What is said of a unit that other programs take for another one.
+fn unit_hint(path: &Path, options: &Options) -> &'static str {
+    let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(mesh::stl::FORMAT.ending));
+    if is_stl && options.unit.is_none() { "; most programs read .stl as millimetres: --unit mm" } else { "" }
+}
+
+/// The writer that the options ask for, `None` if only figures are wanted; and the unit.
+fn writer(shared: &Shared, options: &Options) -> Result<(Option<WriteMesh>, LengthUnit), Failure> {
     if options.file.is_dir() {
         let folder = options.file.shown();
         return Err(Failure::usage(format!(
@@ -132,9 +139,13 @@ fn writer(shared: &Shared, options: &Options) -> Result<Option<WriteMesh>, Failu
         )));
     }
     match &options.output {
-        Some(path) => format::writer(format::of_path(path)?, options.ascii).map(Some),
+        Some(path) => {
+            let format = format::of_path(path)?;
+            let unit = format::unit_fits(format, options.unit)?;
+            Ok((Some(format::writer(format, options.ascii)?), unit))
+        }
         None if options.ascii => Err(format::no_text()),
-        None if shared.json || options.quality => Ok(None),
+        None if shared.json || options.quality => Ok((None, LengthUnit::METRE)),
         None => Err(format::no_output()),
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::super::args::MeshMethod;
 use super::super::failure::Failure;
 use super::super::mesh::no_grid;
-use super::super::plot::{self, LogAxis};
+use super::super::plot::{self, Labels, Legend, LogAxis};
 use super::super::progress;
 use rfm::Solid;
 use rfm::mesh::{self, Grid, Quality, Resolution};
@@ -147,41 +147,39 @@ pub(super) fn draw(solid: &str, rows: &[MeshFigures], path: &Path) -> Result<Vec
         .map(|row| (row, row.quality.hausdorff()))
         .filter(|(_, error)| *error > 0.0 && error.is_finite())
         .collect();
+    let mut out = plot::begin(&format!("{solid}: error of its meshes"));
+    if marks.is_empty() {
+        plot::sentence(&mut out, "no mesh has an error that can be plotted");
+        return plot::end(out, path);
+    }
     let x =
         LogAxis::over(marks.iter().map(|(row, _)| row.cells as f64), plot::LEFT, plot::WIDTH - plot::RIGHT);
     let y = LogAxis::over(marks.iter().map(|(_, error)| *error), plot::HEIGHT - plot::BOTTOM, plot::TOP);
-    let mut out = plot::begin(&format!("{solid}: error of its meshes"));
-    plot::grid(&mut out, &x, &y, ["cells along the longest side", "Hausdorff distance"]);
-    let legend = plot::WIDTH - plot::RIGHT + 22.0;
-    for (i, (method, name, colour)) in
-        [("mc", "marching cubes", "#1b6ca8"), ("dc", "dual contouring", "#c05621")].into_iter().enumerate()
-    {
-        let own = || marks.iter().filter(|(row, _)| row.method == method);
-        let points: Vec<String> =
-            own().map(|(row, error)| format!("{:.1},{:.1}", x.at(row.cells as f64), y.at(*error))).collect();
+    plot::grid(&mut out, &x, &y, ["cells along the longest side", "Hausdorff distance, m"]);
+    let methods = [("mc", "marching cubes", "#1b6ca8"), ("dc", "dual contouring", "#c05621")];
+    let own = |method: &str| {
+        let rows = marks.iter().filter(|(row, _)| row.method == method);
+        rows.map(|(row, error)| ((x.at(row.cells as f64), y.at(*error)), row.milliseconds))
+            .collect::<Vec<_>>()
+    };
+    let lines = methods.map(|(method, ..)| own(method).into_iter().map(|(at, _)| at).collect::<Vec<_>>());
+    let mut legend = Legend::new();
+    for ((_, name, colour), line) in methods.iter().zip(&lines) {
+        let points: Vec<String> = line.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
         // writing to a String cannot fail
         let _ = write!(
             out,
             r##"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="2"/>"##,
             points.join(" ")
         );
-        for (row, error) in own() {
-            let (x, y) = (x.at(row.cells as f64), y.at(*error));
-            let _ = write!(
-                out,
-                r##"<circle cx="{x:.1}" cy="{y:.1}" r="4.5" fill="{colour}"/><text x="{:.1}" y="{:.1}" font-size="11">{:.1} ms</text>"##,
-                x + 7.0,
-                y - 6.0,
-                row.milliseconds
-            );
-        }
-        let at = plot::TOP + 12.0 + 21.0 * i as f64;
-        let _ = write!(
-            out,
-            r##"<rect x="{legend:.1}" y="{:.1}" width="11" height="11" fill="{colour}"/><text x="{:.1}" y="{at:.1}">{name}</text>"##,
-            at - 10.0,
-            legend + 18.0
-        );
+        line.iter().for_each(|(x, y)| plot::dot(&mut out, *x, *y, colour));
+        legend.entry(&mut out, name, |out, x, y| plot::line_sample(out, (x, y), colour, "none", true));
     }
+    let mut labels = Labels::beside(&lines);
+    for (at, milliseconds) in methods.iter().flat_map(|(method, ..)| own(method)) {
+        labels.write(&mut out, at, &format!("{milliseconds:.1} ms"));
+    }
+    legend.gap();
+    legend.remark(&mut out, "numbers: time of meshing");
     plot::end(out, path)
 }

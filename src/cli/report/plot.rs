@@ -4,11 +4,37 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::super::failure::Failure;
-use super::super::plot::{BOTTOM, HEIGHT, LEFT, LogAxis, RIGHT, TOP, WIDTH, begin, end, grid};
+use super::super::plot::{
+    BOTTOM, HEIGHT, LEFT, Legend, LogAxis, RIGHT, TOP, WIDTH, begin, end, grid, sentence,
+};
 use super::programs::ProgramFigures;
 
 /// Smaller errors are drawn at this one, because an exact answer has no place on a logarithmic axis.
 const LEAST_ERROR: f64 = 1e-17;
+
+/// The colours of programs by their precision.
+const PROGRAMS: [(&str, &str, &str); 8] = [
+    ("value", "f64", "#1b6ca8"),
+    ("value", "f32", "#63b3ed"),
+    ("gradient", "f64", "#c05621"),
+    ("gradient", "f32", "#f6ad55"),
+    ("sign", "f64", "#2f855a"),
+    ("sign", "f32", "#8fd6a8"),
+    ("range", "f64", "#6b46c1"),
+    ("range", "f32", "#b794f4"),
+];
+
+/// The shapes of marks by the form of the program, as paths around the place.
+const FORMS: [(&str, &str); 5] = [
+    ("stable", "m-5.5 0a5.5 5.5 0 1 0 11 0a5.5 5.5 0 1 0 -11 0z"),
+    ("guarded", "m0 -7l6 7l-6 7l-6 -7z"),
+    ("textbook", "m0 -7l6 11h-12z"),
+    ("scaled", "m-5 -5h10v10h-10z"),
+    ("twin", "m-6 -3h12l-6 10z"),
+];
+
+/// The outline of programs for one point; those for columns are outlined in their own colour.
+const ONE_POINT: &str = "#111111";
 
 /// The plot as SVG or PNG, by the ending of the path.
 pub(super) fn draw(solid: &str, rows: &[ProgramFigures], path: &Path) -> Result<Vec<u8>, Failure> {
@@ -16,90 +42,95 @@ pub(super) fn draw(solid: &str, rows: &[ProgramFigures], path: &Path) -> Result<
 }
 
 fn svg(solid: &str, rows: &[ProgramFigures]) -> String {
-    let marks: Vec<(&ProgramFigures, f64)> = rows
-        .iter()
-        .filter_map(|row| Some((row, row.max_rel_error?.max(LEAST_ERROR))))
-        .filter(|(_, error)| error.is_finite())
-        .collect();
-    let x = LogAxis::over(marks.iter().map(|(row, _)| row.ns_per_point), LEFT, WIDTH - RIGHT);
-    let y = LogAxis::over(marks.iter().map(|(_, error)| *error), HEIGHT - BOTTOM, TOP);
+    let marks: Vec<Mark> = rows.iter().filter_map(Mark::of).collect();
     let mut out = begin(&format!("{solid}: speed against error"));
-    grid(&mut out, &x, &y, ["ns per point, one thread", "largest relative error"]);
-    for (row, error) in &marks {
-        mark(&mut out, row, x.at(row.ns_per_point), y.at(*error));
+    if marks.is_empty() {
+        sentence(&mut out, "no program has an error that can be plotted");
+        return out;
+    }
+    let x = LogAxis::over(marks.iter().map(|mark| mark.row.ns_per_point), LEFT, WIDTH - RIGHT);
+    let y = LogAxis::over(marks.iter().map(|mark| mark.error), HEIGHT - BOTTOM, TOP);
+    grid(&mut out, &x, &y, ["time per point on one thread, ns", "largest relative error (no unit)"]);
+    for mark in &marks {
+        mark.draw(&mut out, x.at(mark.row.ns_per_point), y.at(mark.error));
     }
     legend(&mut out, &marks);
     out
 }
 
-/// Draws a mark. Its colour stands for the program, its shape for the form, and interpreters are hollow.
-fn mark(out: &mut String, row: &ProgramFigures, x: f64, y: f64) {
-    let colour = colour(row);
-    let fill = if row.engine == "interp" { "#ffffff" } else { colour };
-    let style = format!(r##"fill="{fill}" stroke="{colour}" stroke-width="1.6""##);
-    let _ = match row.form {
-        "textbook" => write!(out, r##"<path d="M{x:.1} {:.1}l6 11h-12z" {style}/>"##, y - 7.0),
-        "scaled" => {
-            write!(out, r##"<rect x="{:.1}" y="{:.1}" width="10" height="10" {style}/>"##, x - 5.0, y - 5.0)
-        }
-        _ => write!(out, r##"<circle cx="{x:.1}" cy="{y:.1}" r="5.5" {style}/>"##),
-    };
+/// A program with a place in the plot.
+struct Mark<'a> {
+    row: &'a ProgramFigures,
+    error: f64,
+    colour: &'static str,
+    shape: &'static str,
 }
 
-fn colour(row: &ProgramFigures) -> &'static str {
-    match (row.program, row.precision, row.shape) {
-        ("value", "f64", "many") => "#1b6ca8",
-        ("value", "f64", _) => "#0b3c5d",
-        ("value", ..) => "#63b3ed",
-        ("gradient", "f64", "many") => "#c05621",
-        ("gradient", "f64", _) => "#7b341e",
-        _ => "#f6ad55",
-    }
-}
-
-fn legend(out: &mut String, marks: &[(&ProgramFigures, f64)]) {
-    let x = WIDTH - RIGHT + 22.0;
-    let mut y = TOP + 12.0;
-    let mut seen: Vec<&'static str> = Vec::new();
-    for (row, _) in marks {
-        let colour = colour(row);
-        if seen.contains(&colour) {
-            continue;
-        }
-        seen.push(colour);
-        let shape = if row.shape == "one" { ", one point" } else { "" };
-        let _ = write!(
-            out,
-            r##"<rect x="{x:.1}" y="{:.1}" width="11" height="11" fill="{colour}"/><text x="{:.1}" y="{:.1}">{} {}{shape}</text>"##,
-            y - 10.0,
-            x + 18.0,
-            y,
-            row.program,
-            row.precision
-        );
-        y += 21.0;
-    }
-    y += 10.0;
-    for form in ["stable", "textbook", "scaled"] {
-        let _ = match form {
-            "textbook" => {
-                write!(out, r##"<path d="M{:.1} {:.1}l6 11h-12z" fill="#666666"/>"##, x + 5.5, y - 11.0)
-            }
-            "scaled" => write!(
-                out,
-                r##"<rect x="{x:.1}" y="{:.1}" width="10" height="10" fill="#666666"/>"##,
-                y - 10.0
-            ),
-            _ => write!(out, r##"<circle cx="{:.1}" cy="{:.1}" r="5.5" fill="#666666"/>"##, x + 5.5, y - 5.0),
+impl<'a> Mark<'a> {
+    /// `None` for a program without a finite error.
+    fn of(row: &'a ProgramFigures) -> Option<Self> {
+        let error = row.max_rel_error?.max(LEAST_ERROR);
+        let is_own = |(program, precision, _): &&(&str, &str, &str)| {
+            *program == row.program && *precision == row.precision
         };
-        let _ = write!(out, r##"<text x="{:.1}" y="{y:.1}">{form}</text>"##, x + 18.0);
-        y += 21.0;
+        let (.., colour) = PROGRAMS.iter().find(is_own)?;
+        let (_, shape) = FORMS.iter().find(|(form, _)| *form == row.form)?;
+        error.is_finite().then_some(Self { row, error, colour, shape })
     }
+
+    fn is_interpreted(&self) -> bool {
+        self.row.engine == "interp"
+    }
+
+    fn is_of_one_point(&self) -> bool {
+        self.row.shape == "one"
+    }
+
+    fn draw(&self, out: &mut String, x: f64, y: f64) {
+        let fill = if self.is_interpreted() { "#ffffff" } else { self.colour };
+        let stroke = if self.is_of_one_point() { ONE_POINT } else { self.colour };
+        shape(out, (x, y), self.shape, fill, stroke);
+    }
+}
+
+fn shape(out: &mut String, (x, y): (f64, f64), path: &str, fill: &str, stroke: &str) {
+    // writing to a String cannot fail
     let _ = write!(
         out,
-        r##"<circle cx="{:.1}" cy="{:.1}" r="5.5" fill="#ffffff" stroke="#666666" stroke-width="1.6"/><text x="{:.1}" y="{y:.1}">interpreter</text>"##,
-        x + 5.5,
-        y - 5.0,
-        x + 18.0
+        r##"<path d="M{x:.1} {y:.1}{path}" fill="{fill}" stroke="{stroke}" stroke-width="1.6"/>"##
     );
+}
+
+/// Explains every colour, shape and outline that occurs.
+fn legend(out: &mut String, marks: &[Mark<'_>]) {
+    const GREY: &str = "#888888";
+    let mut legend = Legend::new();
+    let (_, circle) = FORMS[0];
+    for (program, precision, colour) in PROGRAMS {
+        if marks.iter().any(|mark| mark.colour == colour) {
+            let text = format!("{program}, {precision}");
+            legend.entry(out, &text, |out, x, y| {
+                let _ = write!(
+                    out,
+                    r##"<rect x="{:.1}" y="{:.1}" width="11" height="11" fill="{colour}"/>"##,
+                    x - 5.5,
+                    y - 5.5
+                );
+            });
+        }
+    }
+    legend.gap();
+    for (form, path) in FORMS {
+        if marks.iter().any(|mark| mark.shape == path) {
+            legend.entry(out, form, |out, x, y| shape(out, (x, y), path, GREY, GREY));
+        }
+    }
+    legend.gap();
+    if marks.iter().any(Mark::is_interpreted) {
+        legend.entry(out, "interpreter", |out, x, y| shape(out, (x, y), circle, "#ffffff", GREY));
+    }
+    if marks.iter().any(Mark::is_of_one_point) {
+        legend.entry(out, "for one point", |out, x, y| shape(out, (x, y), circle, GREY, ONE_POINT));
+        legend.remark(out, "without outline: for columns");
+    }
 }

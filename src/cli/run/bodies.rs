@@ -1,10 +1,11 @@
-//! The obstacles of a run as meshes: one mesh if all stand still, one for every frame if any of them moves.
+//! The obstacles of a run as sharp meshes: one for each body if all stand still, one for every frame and body if any of
+//! them moves.
 
 use super::super::args::Run;
-use super::super::mesh::no_grid;
+use super::super::mesh::{hidden, no_grid};
 use super::super::{Failure, note};
 use rfm::geom::Aabb;
-use rfm::mesh::{Grid, Mesh, Resolution, marching_cubes};
+use rfm::mesh::{self, Grid, Mesh, Resolution, dual_contouring};
 use rfm::{Experiment, Solid};
 
 /// The solids of a scene.
@@ -30,29 +31,39 @@ impl Bodies {
         self.solids.iter().any(Solid::moves)
     }
 
-    /// The mesh of all solids at the start. Notes which of them have no surface in the box.
-    pub fn mesh_at_start(&self) -> Result<Mesh, Failure> {
-        let mut all = Mesh::default();
-        for solid in &self.solids {
-            let mesh = self.mesh_of(solid)?;
-            if mesh.triangles.is_empty() {
-                note(format!("the obstacle `{}` has no surface in the box", solid.name()));
+    /// The mesh of each solid at the start. Notes which of them have no surface in the box, and what their meshes miss.
+    pub fn meshes_at_start(&self) -> Result<Vec<Mesh>, Failure> {
+        let meshes = self.meshes_at(0.0)?;
+        for (solid, mesh) in self.solids.iter().zip(&meshes) {
+            let name = solid.name();
+            let grid = self.grid(solid)?;
+            let surface = solid.surface(*grid.bounds());
+            let thin = mesh::thin_cells(&*surface, &grid).map_err(Failure::usage)?;
+            if thin.count > 0 {
+                note(format!(
+                    "the fluid meets all of the obstacle `{name}`, but its mesh and its pictures miss what is thinner than a \
+                     cell {}; --mesh-cells sets how many there are",
+                    hidden(&thin, &grid)
+                ));
+            } else if mesh.triangles.is_empty() {
+                note(format!("the obstacle `{name}` has no surface in the box"));
             }
-            join(&mut all, mesh);
         }
-        Ok(all)
+        Ok(meshes)
     }
 
-    /// The mesh of all solids at a time, s, cut off at the box.
-    pub fn mesh_at(&self, time: f64) -> Result<Mesh, Failure> {
-        let mut all = Mesh::default();
-        for solid in &self.solids {
-            join(&mut all, self.mesh_of(&solid.at(time))?);
-        }
-        Ok(all)
+    /// The mesh of each solid at a time, s, cut off at the box.
+    pub fn meshes_at(&self, time: f64) -> Result<Vec<Mesh>, Failure> {
+        self.solids.iter().map(|solid| self.mesh_of(&solid.at(time))).collect()
     }
 
     fn mesh_of(&self, solid: &Solid) -> Result<Mesh, Failure> {
+        let grid = self.grid(solid)?;
+        let surface = solid.surface(*grid.bounds());
+        dual_contouring(&*surface, &grid, &|_| {}).map_err(Failure::usage)
+    }
+
+    fn grid(&self, solid: &Solid) -> Result<Grid, Failure> {
         let bounds = solid.bounds().aabb().unwrap_or(self.domain);
         let inside = self.domain.grown(1e-3 * self.domain.size().max_element());
         let over = bounds.intersection(&inside);
@@ -61,15 +72,18 @@ impl Bodies {
         } else {
             Grid::filling(&over, Resolution::Cells(self.cells))
         };
-        let grid = grid.map_err(|error| no_grid(&error, "--mesh-cells", self.cells))?;
-        let surface = solid.surface(*grid.bounds());
-        marching_cubes(&*surface, &grid, &|_| {}).map_err(Failure::usage)
+        grid.map_err(|error| no_grid(&error, "--mesh-cells", self.cells))
     }
 }
 
-fn join(all: &mut Mesh, mesh: Mesh) {
-    let first = all.positions.len() as u32;
-    all.positions.extend(mesh.positions);
-    all.normals.extend(mesh.normals);
-    all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+/// All meshes as one.
+pub(super) fn joined(meshes: &[Mesh]) -> Mesh {
+    let mut all = Mesh::default();
+    for mesh in meshes {
+        let first = all.positions.len() as u32;
+        all.positions.extend(&mesh.positions);
+        all.normals.extend(&mesh.normals);
+        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    all
 }

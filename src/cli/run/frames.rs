@@ -6,18 +6,18 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use glam::DVec3;
-
 use super::super::args::Run;
 use super::super::{Failure, output};
-use super::bodies::Bodies;
+use super::bodies::{Bodies, joined};
+use super::pictures::Pictures;
 use super::{checkpoints, folder, probes};
 use crate::cli::output::Shown;
 use rfm::Experiment;
-use rfm::geom::Aabb;
-use rfm::mesh::{self, Mesh};
-use rfm::render;
+use rfm::mesh;
 use rfm::sph::{self, Checkpoint, Simulation};
+
+/// Meshes of a run are in the unit of its frames.
+const METRE: mesh::LengthUnit = mesh::LengthUnit::METRE;
 
 /// Name of the frames' times in a checkpoint.
 const TIMES: &str = "frames";
@@ -34,18 +34,6 @@ pub(super) struct Frames {
     last_time: f64,
 }
 
-/// What all pictures share.
-struct Pictures {
-    /// The scene that is drawn, with the box, the obstacles and the legend.
-    scene: render::Backdrop,
-    title: String,
-    domain: Aabb,
-    /// The speed that is drawn red, m/s.
-    fastest: f64,
-    radius: f64,
-    count: usize,
-}
-
 impl Frames {
     /// Prepares the folder of a run that begins, or that goes on from a checkpoint.
     pub fn new(
@@ -57,9 +45,9 @@ impl Frames {
         let write_frames = !options.no_frames;
         // all that can fail comes before the first change to the folder
         let bodies = Bodies::new(options, experiment);
-        let obstacle = if write_frames { bodies.mesh_at_start()? } else { Mesh::default() };
+        let meshes = if write_frames { bodies.meshes_at_start()? } else { Vec::new() };
         let pictures = if write_frames && !options.no_pictures {
-            Some(Pictures::new(experiment, &obstacle)?)
+            Some(Pictures::new(options, experiment, &meshes)?)
         } else {
             None
         };
@@ -74,8 +62,13 @@ impl Frames {
             create(&folder.join("pictures"))?;
         }
         if write_frames && !bodies.is_empty() {
-            output::write(&folder.join("obstacle.stl"), |mut out| mesh::stl::write(&obstacle, &mut out))?;
-            output::write(&folder.join("obstacle.vtp"), |mut out| mesh::vtp::write(&obstacle, &mut out))?;
+            let obstacle = joined(&meshes);
+            output::write(&folder.join("obstacle.stl"), |mut out| {
+                mesh::stl::write(&obstacle, METRE, &mut out)
+            })?;
+            output::write(&folder.join("obstacle.vtp"), |mut out| {
+                mesh::vtp::write(&obstacle, METRE, &mut out)
+            })?;
         }
         let (count, last_time) = (0, 0.0);
         let mut frames = Self { folder, saved: Vec::new(), write_frames, bodies, pictures, count, last_time };
@@ -152,16 +145,16 @@ impl Frames {
         let name = frame_name(self.count);
         output::write(&self.folder.join(&name), |mut out| sph::write_vtp(&mut out, simulation.particles()))?;
         let moved =
-            if self.bodies.move_about() { Some(self.bodies.mesh_at(simulation.time())?) } else { None };
-        if let Some(mesh) = &moved {
+            if self.bodies.move_about() { Some(self.bodies.meshes_at(simulation.time())?) } else { None };
+        if let Some(meshes) = &moved {
             let path = self.folder.join(obstacle_name(self.count));
-            output::write(&path, |mut out| mesh::vtp::write(mesh, &mut out))?;
+            output::write(&path, |mut out| mesh::vtp::write(&joined(meshes), METRE, &mut out))?;
         }
         self.saved.push((simulation.time(), name));
         self.write_collections()?;
         if let Some(pictures) = &mut self.pictures {
-            if let Some(mesh) = &moved {
-                pictures.show(mesh)?;
+            if let Some(meshes) = &moved {
+                pictures.show(meshes)?;
             }
             pictures.save(&self.folder.join(format!("pictures/frame_{:06}.png", self.count)), simulation)?;
         }
@@ -215,20 +208,20 @@ impl FrameCost {
         let started = Instant::now();
         let mut bodies = Bodies::new(options, experiment);
         bodies.cells = Self::CELLS.min(options.mesh_cells);
-        let mesh = bodies.mesh_at(0.0)?;
+        let meshes = bodies.meshes_at(0.0)?;
         let finer = (options.mesh_cells as f64 / bodies.cells as f64).powi(2);
         let (mut seconds, mut bytes) = (0.0, 0.0);
         if bodies.move_about() {
-            mesh::vtp::write(&mesh, &mut out)?;
+            mesh::vtp::write(&joined(&meshes), METRE, &mut out)?;
             seconds += finer * started.elapsed().as_secs_f64();
             bytes += finer * out.len() as f64;
             out.clear();
         }
         if !options.no_pictures {
-            let mut pictures = Pictures::new(experiment, &mesh)?;
+            let mut pictures = Pictures::new(options, experiment, &meshes)?;
             let started = Instant::now();
             if bodies.move_about() {
-                pictures.show(&mesh)?;
+                pictures.show(&meshes)?;
             }
             pictures.image(simulation).write_png(&mut out)?;
             seconds += started.elapsed().as_secs_f64();
@@ -250,63 +243,6 @@ pub(super) fn checkpoint_bytes(simulation: &Simulation) -> f64 {
     // writing to memory cannot fail
     let _ = simulation.checkpoint().write(&mut out);
     out.len() as f64
-}
-
-impl Pictures {
-    /// The speed that is drawn red, as a part of the speed of a fall through the whole box: obstacles stop
-    /// most particles long before.
-    const FASTEST: f64 = 0.6;
-
-    fn new(experiment: &Experiment, obstacle: &Mesh) -> Result<Self, Failure> {
-        let (domain, title) = (experiment.domain(), experiment.scene().name.clone());
-        let fastest = (Self::FASTEST * experiment.typical_speed()).max(f64::MIN_POSITIVE);
-        Ok(Self {
-            scene: drawn(&domain, &title, fastest, obstacle)?,
-            title,
-            domain,
-            fastest,
-            radius: 0.5 * experiment.parameters().spacing(),
-            count: 0,
-        })
-    }
-
-    /// Puts the obstacles where they are now.
-    fn show(&mut self, obstacle: &Mesh) -> Result<(), Failure> {
-        self.scene = drawn(&self.domain, &self.title, self.fastest, obstacle)?;
-        Ok(())
-    }
-
-    fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
-        let image = self.image(simulation);
-        output::write(path, |mut out| image.write_png(&mut out))?;
-        self.count += 1;
-        Ok(())
-    }
-
-    fn image(&self, simulation: &Simulation) -> render::Image {
-        let particles = simulation.particles();
-        let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
-        self.scene.frame(
-            &render::ParticlesView {
-                positions: particles.position.points(),
-                speeds: &speeds,
-                radius: self.radius,
-            },
-            &render::Caption { time: simulation.time(), step: simulation.steps() },
-        )
-    }
-}
-
-/// The scene of a picture without its particles: the box, the obstacles, the legend.
-fn drawn(domain: &Aabb, title: &str, fastest: f64, obstacle: &Mesh) -> Result<render::Backdrop, Failure> {
-    let camera = render::Camera::three_quarter(domain, render::Camera::SIZE).map_err(Failure::usage)?;
-    let mesh = render::MeshView {
-        vertices: &obstacle.positions,
-        normals: &obstacle.normals,
-        triangles: &obstacle.triangles,
-    };
-    let legend = render::Legend { title, fastest };
-    render::Backdrop::new(camera, domain, &mesh, &legend).map_err(Failure::usage)
 }
 
 /// Beginnings of the names of frames.

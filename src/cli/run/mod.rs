@@ -10,6 +10,8 @@ mod folder;
 mod forecast;
 mod frames;
 mod goal;
+mod pictures;
+mod probe_plot;
 mod probes;
 mod stop;
 mod summary;

@@ -8,12 +8,12 @@ use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, RIGHT, TOP, WIDTH};
+use super::super::plot;
 use super::super::{Failure, output};
+use super::probe_plot::drawn;
 use crate::cli::output::Shown;
 use rfm::experiment::{Every, probe_column, probe_of};
 use rfm::lower::Scene;
-use rfm::slice;
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
 
 const FOLDER: &str = "probes";
@@ -21,9 +21,6 @@ const FOLDER: &str = "probes";
 /// A resumed run takes over samples up to this relative tolerance after the checkpoint's time. Times are
 /// written with twelve digits, so these are the samples before the checkpoint.
 const ROUNDING: f64 = 1e-10;
-
-/// Most points of a line of a plot.
-const MOST_POINTS: usize = 2000;
 
 /// The probes of a run.
 pub(super) struct Probes(Vec<Recorder>);
@@ -164,49 +161,6 @@ fn not_written(path: &Path, error: &std::io::Error) -> Failure {
     Failure::usage(format!("cannot write `{}`: {error}", path.shown()))
 }
 
-/// A plot with a line for each column over time. A line is interrupted where a value is missing.
-fn drawn(name: &str, probe: &Probe, table: &str) -> String {
-    const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
-    let rows: Vec<Vec<f64>> = table
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
-        .collect();
-    let columns = probe.columns();
-    let value = |row: &[f64], column: usize| row.get(column).copied().unwrap_or(f64::NAN);
-    let stride = rows.len().div_ceil(MOST_POINTS).max(1);
-    let shown = || rows.iter().step_by(stride);
-    let times = rows.iter().map(|row| value(row, 0));
-    let values = rows.iter().flat_map(|row| row.iter().skip(1).copied());
-    let x = EvenAxis::over(times, LEFT, WIDTH - RIGHT);
-    let y = EvenAxis::over(values, HEIGHT - plot::BOTTOM, TOP);
-    let units: std::collections::BTreeSet<&str> = columns.iter().map(|(_, unit)| *unit).collect();
-    let units = units.into_iter().collect::<Vec<_>>().join(", ");
-    let mut out = plot::begin(name);
-    plot::even_grid(&mut out, &x, &y, ["time, s", &units]);
-    for (k, ((name, unit), colour)) in columns.iter().zip(COLOURS).enumerate() {
-        let mut path = String::new();
-        let mut pen_down = false;
-        for row in shown() {
-            let (t, v) = (value(row, 0), value(row, 1 + k));
-            if t.is_finite() && v.is_finite() {
-                let _ = write!(path, "{}{:.1} {:.1}", if pen_down { 'L' } else { 'M' }, x.at(t), y.at(v));
-            }
-            pen_down = v.is_finite();
-        }
-        let at = TOP + 12.0 + 21.0 * k as f64;
-        let legend = WIDTH - RIGHT + 22.0;
-        let _ = write!(
-            out,
-            r##"<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.6"/><rect x="{legend:.1}" y="{:.1}" width="11" height="11" fill="{colour}"/><text x="{:.1}" y="{at:.1}">{}, {unit}</text>"##,
-            at - 10.0,
-            legend + 18.0,
-            slice::escaped(name),
-        );
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -227,18 +181,5 @@ mod tests {
         check("", "");
         check("time [s],height [m]\n0,nan\nx,2\n0.05,1\n", "0,nan\n");
         assert_eq!(lines_until(&folder.path().join("none"), &header, 1.0), "");
-    }
-
-    #[test]
-    fn a_plot_is_interrupted_where_values_are_missing() {
-        let probe = Probe::Velocity { at: glam::DVec3::ZERO };
-        let table = "time [s],…\n0,nan,1,2\n1,2,nan,3\n2,3,1,4\n3,4,1,5\n";
-        let svg = drawn("a<b", &probe, table);
-        let paths: Vec<&str> =
-            svg.split("<path d=\"").skip(1).map(|p| p.split('"').next().unwrap()).collect();
-        let moves: Vec<(usize, usize)> =
-            paths.iter().map(|p| (p.matches('M').count(), p.matches('L').count())).collect();
-        assert_eq!(moves, [(1, 2), (2, 1), (1, 3)]);
-        assert!(svg.contains("a&lt;b"));
     }
 }

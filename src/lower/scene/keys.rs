@@ -11,8 +11,16 @@ use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
 /// Keys that open a block; all others have a value.
-const BLOCKS: [&str; 9] =
-    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux"];
+const BLOCKS: [&str; 10] =
+    ["box", "container", "fluid", "obstacle", "solver", "run", "truth", "probe", "flux", "picture"];
+
+/// Keys that are often looked for one block too far out.
+const INNER: [(&str, &[&str]); 4] = [
+    ("picture", &["camera", "cut", "hide"]),
+    ("run", &["until", "save_every", "checkpoint_every", "dt"]),
+    ("fluid", &["density", "viscosity", "spacing", "particles", "shape", "surface_tension"]),
+    ("solver", &["precision"]),
+];
 
 /// The entries of a block. Unknown and repeated keys have been reported.
 pub(in crate::lower) struct Block<'a> {
@@ -56,9 +64,14 @@ impl<'a> Lowering<'a> {
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
                 let elsewhere = foreign::key(&key.text).filter(|own| known.contains(own));
-                self.report(match elsewhere {
-                    Some(own) => diagnostic.help(format!("`{}` is called `{own}` here", key.text)),
-                    None => diagnostic,
+                let inner = INNER
+                    .iter()
+                    .find(|(block, keys)| known.contains(block) && keys.contains(&key.text.as_str()));
+                self.report(match (elsewhere, inner) {
+                    (Some(own), _) => diagnostic.help(format!("`{}` is called `{own}` here", key.text)),
+                    (None, Some((block, _))) => diagnostic
+                        .help(format!("it is a key of `{block}`: write `{block} {{ {}: … }}`", key.text)),
+                    (None, None) => diagnostic,
                 });
             } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
                 let (is, form) = match entry {
@@ -263,6 +276,7 @@ fn block_form(key: &str) -> String {
         "flux" => "flux { point: [0.5, 0.5, 0.5], normal: [1, 0, 0] }".into(),
         "box" => "box { min: [0, 0, 0], max: [1, 1, 1] }".into(),
         "run" => "run { until: 2 s }".into(),
+        "picture" => "picture { camera: [0, -1, 0.3], cut: y <= 0 }".into(),
         key => format!("{key} {{ … }}"),
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! Invariant: after this stage every number is finite and in SI units, and every size is positive.
 //!
-//! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, and [`keys`]
-//! what a key may hold.
+//! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, [`picture`] how it is
+//! drawn, and [`keys`] what a key may hold.
 
 mod fluid;
 mod keys;
+mod picture;
 mod read;
 
 use glam::DVec3;
@@ -73,6 +74,8 @@ pub struct Scene {
     pub truth: Option<Truth>,
     /// What is measured during the run.
     pub probes: Vec<Probe>,
+    /// How its pictures are drawn.
+    pub picture: Picture,
     /// The largest error of ω that is accepted for the obstacles in the box, if it is stated.
     pub tolerance: Option<Tolerance>,
 }
@@ -241,6 +244,36 @@ pub enum Measured {
     Energy,
     /// Excess of the fluid's energy, change of its volume, its compression, and the greatest speed, m/s.
     Audit,
+}
+
+/// How the pictures of a scene are drawn.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Picture {
+    /// The direction from the scene to the eye, of any length above 0; `None`: from the front, right and above.
+    pub camera: Option<DVec3>,
+    /// What is taken away of obstacles.
+    pub cut: Opening,
+    /// The names of obstacles that are not drawn.
+    pub hide: Vec<String>,
+}
+
+/// What is taken away of obstacles in pictures, so that they do not hide the fluid.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Opening {
+    /// The front half of each obstacle that would hide much of the fluid.
+    #[default]
+    Automatic,
+    /// Nothing.
+    None,
+    /// The half of space on one side of a plane across an axis, of all obstacles.
+    Half {
+        /// The axis: 0, 1 or 2.
+        axis: usize,
+        /// Where the plane meets the axis, m.
+        at: f64,
+        /// Whether the part at smaller coordinates is taken away.
+        below: bool,
+    },
 }
 
 /// The largest |computed ω − exact ω| that is accepted; positive.

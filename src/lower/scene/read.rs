@@ -13,7 +13,7 @@ use crate::quantity::{Bound, Dimension};
 use crate::sph::Slip;
 use crate::syntax::ast::{self, Entry, Expr, ExprKind};
 
-const SCENE_KEYS: [&str; 13] = [
+const SCENE_KEYS: [&str; 14] = [
     "units",
     "box",
     "container",
@@ -26,6 +26,7 @@ const SCENE_KEYS: [&str; 13] = [
     "run",
     "truth",
     "probe",
+    "picture",
     "tolerance",
 ];
 const TRUTH_KEYS: [&str; 4] = ["pressure", "velocity", "front", "from"];
@@ -59,10 +60,11 @@ impl<'a> Lowering<'a> {
         let gravity = self.gravity(&block);
         let truth = self.truth(&block);
         let run = self.run(&block);
+        let container_name = container.iter().map(|c| &c.name[..]);
+        let bodies: Vec<&str> = container_name.chain(obstacles.iter().map(|o| &o.name[..])).collect();
+        let picture = self.picture(&block, &bodies);
         let probes = match (&domain, &fluid) {
             (Some((domain, ..)), Some(FluidAndMethod { fluid, .. })) => {
-                let container = container.iter().map(|c| &c.name[..]);
-                let bodies = container.chain(obstacles.iter().map(|o| &o.name[..])).collect();
                 self.probes(&block, &Surroundings { domain: *domain, bodies, fluid: &fluid.name })
             }
             _ => Vec::new(),
@@ -89,6 +91,7 @@ impl<'a> Lowering<'a> {
             run: run?,
             truth: truth?,
             probes,
+            picture: picture?,
             tolerance,
         })
     }
@@ -268,6 +271,15 @@ impl<'a> Lowering<'a> {
             save_every: save?,
             checkpoint_every: checkpoint_every?,
         };
+        if let (Some(every), Some((_, value))) = (run.checkpoint_every, block.setting("checkpoint_every"))
+            && every > run.until
+        {
+            let [until, every] = [run.until, every].map(seconds_as_written);
+            let message = format!("a checkpoint every {every} in a run of {until}: only its end is saved");
+            let help =
+                "a run that is interrupted saves one too; without this key there is one with every frame";
+            self.report(Diagnostic::warning(Code::FRAMES, value.span, message).help(help));
+        }
         let stated =
             block.setting("save_every").or(block.setting("until")).map_or(span, |(_, value)| value.span);
         self.frames_fit(&run, stated).then_some(run)

@@ -1,4 +1,5 @@
-//! Binary glTF 2.0, for viewers and game engines: one mesh of indexed triangles with normals, all in `f32`.
+//! Binary glTF 2.0, for viewers and game engines: one mesh of indexed triangles with normals, all in `f32`, and a plain
+//! material. Vertices at creases are doubled, so that edges look sharp.
 //!
 //! glTF has y up. The one node of the file is turned so that our z points up there.
 //!
@@ -10,7 +11,9 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::super::Mesh;
-use super::format::Format;
+use super::creases::split_creases;
+use super::format::{Format, in_metres};
+use super::unit::LengthUnit;
 
 const MAGIC: &[u8; 4] = b"glTF";
 const VERSION: u32 = 2;
@@ -22,13 +25,15 @@ const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// The entry of the table of formats.
 pub const FORMAT: Format =
-    Format { ending: "glb", purpose: "For viewers and browsers", write, write_text: None };
+    Format { ending: "glb", purpose: "For viewers and browsers", only_metres: true, write, write_text: None };
 
-/// Writes a mesh as GLB.
+/// Writes a mesh as GLB, in metres as glTF demands.
 ///
 /// # Errors
 /// Those of the stream, and [`io::ErrorKind::FileTooLarge`] beyond the 4 GiB of the format.
-pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
+    in_metres(unit)?;
+    let mesh = &split_creases(mesh);
     let mut binary = Vec::with_capacity(24 * mesh.positions.len() + 12 * mesh.triangles.len());
     for vectors in [&mesh.positions, &mesh.normals] {
         binary.extend(vectors.iter().flat_map(|v| v.as_vec3().to_array()).flat_map(f32::to_le_bytes));
@@ -72,7 +77,12 @@ fn document(mesh: &Mesh) -> Value {
         "scene": 0,
         "scenes": [{ "nodes": [0] }],
         "nodes": [{ "mesh": 0, "rotation": [-half_turn, 0.0, 0.0, half_turn] }],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "NORMAL": 1 }, "indices": 2 }] }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "NORMAL": 1 }, "indices": 2, "material": 0 }] }],
+        // the grey of our own pictures, without gloss
+        "materials": [{
+            "name": "stone",
+            "pbrMetallicRoughness": { "baseColorFactor": [0.6, 0.55, 0.48, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.8 },
+        }],
         "buffers": [{ "byteLength": 24 * vertices + 4 * indices }],
         "bufferViews": [
             { "buffer": 0, "byteOffset": 0, "byteLength": 12 * vertices, "target": ARRAY_BUFFER },
@@ -97,7 +107,10 @@ mod tests {
     fn glb_reads_back() {
         let mesh = pawn_mesh();
         let mut bytes = Vec::new();
-        write(&mesh, &mut bytes).unwrap();
+        write(&mesh, LengthUnit::METRE, &mut bytes).unwrap();
+        let creased = pawn_mesh().positions.len();
+        let mesh = split_creases(&mesh);
+        assert!(mesh.positions.len() > creased, "the pawn has creases");
         // the reader validates the whole document
         let read = gltf::Gltf::from_slice(&bytes).unwrap();
         let binary = read.blob.clone().unwrap();
@@ -110,6 +123,7 @@ mod tests {
         assert_eq!((positions.len(), normals.len()), (mesh.positions.len(), mesh.positions.len()));
         let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
         assert_eq!(indices, mesh.triangles.concat());
+        assert_eq!(primitive.material().pbr_metallic_roughness().metallic_factor(), 0.0);
         // z points up, to y
         let (_, rotation, _) = read.nodes().next().unwrap().transform().decomposed();
         let up = glam::Quat::from_array(rotation) * Vec3::Z;
@@ -119,7 +133,8 @@ mod tests {
     #[test]
     fn nothing_is_a_file_without_a_scene() {
         let mut bytes = Vec::new();
-        write(&Mesh::default(), &mut bytes).unwrap();
+        write(&Mesh::default(), LengthUnit::METRE, &mut bytes).unwrap();
+        assert!(write(&Mesh::default(), LengthUnit::MILLIMETRE, &mut Vec::new()).is_err());
         assert_eq!(gltf::Gltf::from_slice(&bytes).unwrap().meshes().count(), 0);
     }
 }

@@ -1,31 +1,42 @@
 //! Wavefront OBJ, as text.
 //!
+//! Vertices are shared, so programs see a closed mesh; normals have numbers of their own, as the format provides. Readers
+//! that demand as many normals as vertices should be given PLY.
+//!
 //! Invariant: every number is written with the fewest digits that read back to the same `f64`.
 
 use std::io::{self, Write};
 
 use super::super::Mesh;
+use super::creases::split_creases;
 use super::format::Format;
+use super::unit::LengthUnit;
 
 /// The entry of the table of formats.
-pub const FORMAT: Format =
-    Format { ending: "obj", purpose: "Shared vertices with normals, text", write, write_text: None };
+pub const FORMAT: Format = Format {
+    ending: "obj",
+    purpose: "Shared vertices with normals, text",
+    only_metres: false,
+    write,
+    write_text: None,
+};
 
-/// Writes a mesh as OBJ with one normal for each vertex.
+/// Writes a mesh as OBJ. A vertex at a crease has a normal for each of the faces that meet there.
 ///
 /// # Errors
 /// Those of the stream.
-pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "# rfm, metres, outward normals")?;
-    for p in &mesh.positions {
+pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "# rfm, {}, outward normals", unit.plural)?;
+    for p in mesh.positions.iter().map(|p| unit.per_metre * p) {
         writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
     }
-    for n in &mesh.normals {
+    let split = split_creases(mesh);
+    for n in &split.normals {
         writeln!(out, "vn {} {} {}", n.x, n.y, n.z)?;
     }
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|v| v + 1);
-        writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}")?;
+    for (places, normals) in mesh.triangles.iter().zip(&split.triangles) {
+        let ([a, b, c], [k, l, m]) = (places.map(|v| v + 1), normals.map(|v| v + 1));
+        writeln!(out, "f {a}//{k} {b}//{l} {c}//{m}")?;
     }
     Ok(())
 }
@@ -38,10 +49,25 @@ mod tests {
     use crate::mesh::tests::pawn_mesh;
 
     #[test]
+    fn numbers_are_in_the_unit_that_is_asked_for() {
+        let mesh = Mesh::from_triangles(vec![DVec3::new(0.5, 0.25, 0.127); 3], vec![[0, 1, 2]]);
+        for (unit, expected) in [
+            ("m", "v 0.5 0.25 0.127"),
+            ("mm", "v 500 250 127"),
+            ("in", "v 19.68503937007874 9.84251968503937 5\n"),
+        ] {
+            let mut text = Vec::new();
+            write(&mesh, LengthUnit::named(unit).unwrap(), &mut text).unwrap();
+            let text = String::from_utf8(text).unwrap();
+            assert!(text.contains(expected), "{text}");
+        }
+    }
+
+    #[test]
     fn obj_text_reads_back_exactly() {
         let mesh = pawn_mesh();
         let mut bytes = Vec::new();
-        write(&mesh, &mut bytes).unwrap();
+        write(&mesh, LengthUnit::METRE, &mut bytes).unwrap();
         let load = tobj::load_obj_buf(&mut &bytes[..], &tobj::LoadOptions::default(), |_| {
             Ok((Vec::new(), Default::default()))
         });
@@ -50,10 +76,15 @@ mod tests {
         // the reader numbers vertices in the order of faces
         let corner = |flat: &[f64], index: u32| DVec3::from_slice(&flat[3 * index as usize..]);
         assert_eq!(model.mesh.indices.len(), 3 * mesh.triangles.len());
+        let split = split_creases(&mesh);
+        assert!(split.normals.len() > mesh.normals.len(), "the pawn has creases");
         for (i, v) in mesh.triangles.iter().flatten().enumerate() {
             let (place, normal) = (model.mesh.indices[i], model.mesh.normal_indices[i]);
             assert_eq!(corner(&model.mesh.positions, place), mesh.positions[*v as usize]);
-            assert_eq!(corner(&model.mesh.normals, normal), mesh.normals[*v as usize]);
+            assert_eq!(
+                corner(&model.mesh.normals, normal),
+                split.normals[split.triangles[i / 3][i % 3] as usize]
+            );
         }
     }
 }

@@ -10,28 +10,36 @@ use std::io::{self, Write};
 
 use super::super::Mesh;
 use super::format::Format;
+use super::unit::LengthUnit;
 
 /// The entry of the table of formats.
-pub const FORMAT: Format =
-    Format { ending: "ply", purpose: "Shared vertices with normals, binary", write, write_text: None };
+pub const FORMAT: Format = Format {
+    ending: "ply",
+    purpose: "Shared vertices with normals, binary",
+    only_metres: false,
+    write,
+    write_text: None,
+};
 
 /// Writes a mesh as PLY.
 ///
 /// # Errors
 /// Those of the stream.
-pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
     write!(
         out,
-        "ply\nformat binary_little_endian 1.0\ncomment rfm, metres, outward normals\n\
+        "ply\nformat binary_little_endian 1.0\ncomment rfm, {}, outward normals\n\
          element vertex {}\n\
          property double x\nproperty double y\nproperty double z\n\
          property float nx\nproperty float ny\nproperty float nz\n\
          element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        unit.plural,
         mesh.positions.len(),
         mesh.triangles.len()
     )?;
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
         let mut record = [0; 36];
+        let position = unit.per_metre * position;
         let (doubles, floats) = record.split_at_mut(24);
         for axis in 0..3 {
             doubles[8 * axis..][..8].copy_from_slice(&position[axis].to_le_bytes());
@@ -62,7 +70,7 @@ mod tests {
         };
         let mesh = pawn_mesh();
         let mut bytes = Vec::new();
-        write(&mesh, &mut bytes).unwrap();
+        write(&mesh, LengthUnit::METRE, &mut bytes).unwrap();
         let read = Parser::<DefaultElement>::new().read_ply(&mut std::io::Cursor::new(bytes)).unwrap();
         let (vertices, faces) = (&read.payload["vertex"], &read.payload["face"]);
         assert_eq!((vertices.len(), faces.len()), (mesh.positions.len(), mesh.triangles.len()));

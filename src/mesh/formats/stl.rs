@@ -9,20 +9,22 @@ use glam::DVec3;
 
 use super::super::{Mesh, normals::unit};
 use super::format::Format;
+use super::unit::LengthUnit;
 
 /// The entry of the table of formats.
 pub const FORMAT: Format = Format {
     ending: "stl",
     purpose: "Triangles as records, for nearly every program",
+    only_metres: false,
     write,
     write_text: Some(write_ascii),
 };
 
-/// Writes a mesh as binary STL.
+/// Writes a mesh as binary STL. Nothing in the file tells the unit.
 ///
 /// # Errors
 /// Those of the stream.
-pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
     // a header that began with "solid" would be taken for the text form
     let mut header = [b' '; 80];
     let title = b"binary STL by rfm";
@@ -32,7 +34,7 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     out.write_all(&count.to_le_bytes())?;
     for triangle in &mesh.triangles {
         let mut record = [0; 50];
-        let numbers = facet(mesh, *triangle).into_iter().flat_map(|v: DVec3| v.to_array());
+        let numbers = facet(mesh, unit, *triangle).into_iter().flat_map(|v: DVec3| v.to_array());
         for (bytes, number) in record.chunks_exact_mut(4).zip(numbers) {
             bytes.copy_from_slice(&(number as f32).to_le_bytes());
         }
@@ -45,10 +47,10 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
 ///
 /// # Errors
 /// Those of the stream.
-pub fn write_ascii(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+pub fn write_ascii(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "solid rfm")?;
     for triangle in &mesh.triangles {
-        let [n, a, b, c] = facet(mesh, *triangle).map(|v| v.as_vec3());
+        let [n, a, b, c] = facet(mesh, unit, *triangle).map(|v| v.as_vec3());
         writeln!(out, "facet normal {:e} {:e} {:e}\nouter loop", n.x, n.y, n.z)?;
         for p in [a, b, c] {
             writeln!(out, "vertex {:e} {:e} {:e}", p.x, p.y, p.z)?;
@@ -59,9 +61,11 @@ pub fn write_ascii(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// The normal and the corners of a triangle.
-fn facet(mesh: &Mesh, triangle: [u32; 3]) -> [DVec3; 4] {
+fn facet(mesh: &Mesh, length: LengthUnit, triangle: [u32; 3]) -> [DVec3; 4] {
     let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
-    [unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO), a, b, c]
+    let normal = unit((b - a).cross(c - a)).unwrap_or(DVec3::ZERO);
+    let [a, b, c] = [a, b, c].map(|p| length.per_metre * p);
+    [normal, a, b, c]
 }
 
 #[cfg(test)]
@@ -73,11 +77,11 @@ mod tests {
     fn stl_reads_back() {
         let mesh = pawn_mesh();
         let mut bytes = Vec::new();
-        write(&mesh, &mut bytes).unwrap();
+        write(&mesh, LengthUnit::METRE, &mut bytes).unwrap();
         assert_eq!(bytes.len(), 84 + 50 * mesh.triangles.len());
         same_when_read(&mesh, bytes);
         let mut text = Vec::new();
-        write_ascii(&mesh, &mut text).unwrap();
+        write_ascii(&mesh, LengthUnit::METRE, &mut text).unwrap();
         assert!(text.starts_with(b"solid rfm\nfacet normal "));
         same_when_read(&mesh, text);
     }

@@ -1,4 +1,4 @@
-//! 3MF, for printers: a zip archive with the triangles as XML, in metres.
+//! 3MF, for printers: a zip archive with the triangles as XML, which tells their unit.
 //!
 //! Invariant: every number is written with the fewest digits that read back to the same `f64`. Equal meshes
 //! give equal bytes, because the archive holds no date.
@@ -9,6 +9,7 @@ use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 use super::super::Mesh;
 use super::format::Format;
+use super::unit::LengthUnit;
 
 const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
@@ -19,13 +20,14 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 "#;
 
 /// The entry of the table of formats.
-pub const FORMAT: Format = Format { ending: "3mf", purpose: "For printers", write, write_text: None };
+pub const FORMAT: Format =
+    Format { ending: "3mf", purpose: "For printers", only_metres: false, write, write_text: None };
 
 /// Writes a mesh as 3MF. A mesh without triangles becomes a model without objects.
 ///
 /// # Errors
 /// Those of the stream.
-pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
     for (name, text) in [("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONSHIPS)] {
@@ -33,18 +35,18 @@ pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         archive.write_all(text.as_bytes())?;
     }
     archive.start_file("3D/3dmodel.model", options.large_file(mesh.triangles.len() > 1 << 25))?;
-    model(mesh, &mut io::BufWriter::new(&mut archive))?;
+    model(mesh, unit, &mut io::BufWriter::new(&mut archive))?;
     out.write_all(archive.finish()?.get_ref())
 }
 
-fn model(mesh: &Mesh, out: &mut impl Write) -> io::Result<()> {
+fn model(mesh: &Mesh, unit: LengthUnit, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, r#"<?xml version="1.0" encoding="UTF-8"?>"#)?;
-    write!(out, r#"<model unit="meter" xml:lang="en-US" "#)?;
+    write!(out, r#"<model unit="{}" xml:lang="en-US" "#, unit.in_3mf)?;
     writeln!(out, r#"xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>"#)?;
     let is_empty = mesh.triangles.is_empty();
     if !is_empty {
         writeln!(out, r#"<object id="1" type="model"><mesh><vertices>"#)?;
-        for p in &mesh.positions {
+        for p in mesh.positions.iter().map(|p| unit.per_metre * p) {
             writeln!(out, r#"<vertex x="{}" y="{}" z="{}"/>"#, p.x, p.y, p.z)?;
         }
         writeln!(out, "</vertices><triangles>")?;
@@ -76,7 +78,7 @@ mod tests {
     fn threemf_reads_back() {
         let mesh = pawn_mesh();
         let mut bytes = Vec::new();
-        write(&mesh, &mut bytes).unwrap();
+        write(&mesh, LengthUnit::METRE, &mut bytes).unwrap();
         // from the package's root to the model, as a reader does
         let relations = part(&bytes, "_rels/.rels");
         let relations = roxmltree::Document::parse(&relations).unwrap();
@@ -102,9 +104,10 @@ mod tests {
     #[test]
     fn nothing_is_a_model_without_objects() {
         let mut bytes = Vec::new();
-        write(&Mesh::default(), &mut bytes).unwrap();
+        write(&Mesh::default(), LengthUnit::MILLIMETRE, &mut bytes).unwrap();
         let model = part(&bytes, "3D/3dmodel.model");
         let model = roxmltree::Document::parse(&model).unwrap();
+        assert_eq!(model.root_element().attribute("unit"), Some("millimeter"));
         assert!(!model.descendants().any(|n| n.tag_name().name() == "object"));
     }
 }

@@ -10,16 +10,19 @@ use base64::prelude::BASE64_STANDARD;
 use base64::write::EncoderWriter;
 
 use super::super::Mesh;
-use super::format::Format;
+use super::format::{Format, in_metres};
+use super::unit::LengthUnit;
 
 /// The entry of the table of formats.
-pub const FORMAT: Format = Format { ending: "vtp", purpose: "For ParaView", write, write_text: None };
+pub const FORMAT: Format =
+    Format { ending: "vtp", purpose: "For ParaView", only_metres: true, write, write_text: None };
 
-/// Writes a mesh as VTP with one normal for each vertex.
+/// Writes a mesh as VTP with one normal for each vertex, in metres as the frames of runs are.
 ///
 /// # Errors
 /// Those of the stream.
-pub fn write(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
+    in_metres(unit)?;
     let (points, polys) = (mesh.positions.len(), mesh.triangles.len());
     write!(
         out,
@@ -75,7 +78,7 @@ mod tests {
     fn vtp_reads_back() {
         for mesh in [pawn_mesh(), Mesh::default()] {
             let mut bytes = Vec::new();
-            write(&mesh, &mut bytes).unwrap();
+            write(&mesh, LengthUnit::METRE, &mut bytes).unwrap();
             let vtk = vtkio::Vtk::parse_xml(&bytes[..]).unwrap();
             let DataSet::PolyData { pieces, .. } = vtk.data else { panic!("another kind of data") };
             let piece = pieces.into_iter().next().unwrap().into_loaded_piece_data(None).unwrap();

@@ -43,6 +43,6 @@ fn _rfm(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::PySimulation>()?;
     module.add_function(wrap_pyfunction!(program::load, module)?)?;
     module.add_function(wrap_pyfunction!(program::program_from_pickle, module)?)?;
-    module.add_function(wrap_pyfunction!(solid::solid_from_pickle, module)?)?;
+    module.add_function(wrap_pyfunction!(program::solid_from_pickle, module)?)?;
     Ok(())
 }

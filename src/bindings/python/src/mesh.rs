@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use rfm::field::Field;
 use rfm::glam::DVec3;
-use rfm::mesh::{self, FORMATS, Grid, Mesh, MeshError, Report, dual_contouring, marching_cubes};
+use rfm::mesh::{self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, dual_contouring, marching_cubes};
 
 use crate::error::{not_read, refused};
 
@@ -156,8 +156,14 @@ impl PyMesh {
     /// path : str or path
     /// ascii : bool
     ///     Write .stl as text.
-    #[pyo3(signature = (path, *, ascii=false))]
-    fn save(&self, py: Python<'_>, path: PathBuf, ascii: bool) -> PyResult<()> {
+    /// unit : str
+    ///     Unit of the numbers in the file: m, cm, mm, um, in or ft. Files .vtp and .glb are in metres.
+    #[pyo3(signature = (path, *, ascii=false, unit="m"))]
+    fn save(&self, py: Python<'_>, path: PathBuf, ascii: bool, unit: &str) -> PyResult<()> {
+        let Some(unit) = LengthUnit::named(unit) else {
+            let known = LengthUnit::ALL.map(|unit| unit.name).join(" ");
+            return Err(PyValueError::new_err(format!("unknown unit `{unit}`: it must be one of {known}")));
+        };
         let ending =
             path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let Some(format) = FORMATS.iter().find(|format| format.ending == ending) else {
@@ -173,7 +179,10 @@ impl PyMesh {
             (true, Some(write)) => write,
             (true, None) => return Err(PyValueError::new_err(format!(".{ending} files have no text form"))),
         };
-        py.detach(|| write_file(&path, |out| write(&self.mesh, out)))
+        if format.only_metres && unit != LengthUnit::METRE {
+            return Err(PyValueError::new_err(format!(".{ending} files are always in metres")));
+        }
+        py.detach(|| write_file(&path, |out| write(&self.mesh, unit, out)))
     }
 
     /// The mesh as a ``trimesh.Trimesh``. The package ``trimesh`` must be installed.

@@ -265,3 +265,15 @@ pub fn program_from_pickle(
 ) -> PyResult<PyProgram> {
     PyProgram::check(py, Source::file(name, text), params)
 }
+
+/// A solid of a program by its name, at a stretch of time; for pickles.
+#[pyfunction(name = "_solid")]
+pub fn solid_from_pickle(
+    program: &Bound<'_, PyProgram>,
+    name: &str,
+    from: f64,
+    to: f64,
+) -> PyResult<PySolid> {
+    let solid = program.get().compiled(program.py(), name)?;
+    PySolid::new(program, solid, [from, to])
+}

@@ -3,7 +3,7 @@
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyTuple, PyType};
+use pyo3::types::{PyDict, PyTuple, PyType};
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
@@ -536,29 +536,15 @@ impl PySolid {
     }
 
     /// The solid as functions for a WGSL shader, in single precision. Parameters as in `to_c`.
-    #[pyo3(signature = (*, sign=false, distance=false, prefix=None, open_params=false))]
-    fn to_wgsl(
-        &self,
-        py: Python<'_>,
-        sign: bool,
-        distance: bool,
-        prefix: Option<String>,
-        open_params: bool,
-    ) -> PyResult<String> {
-        text(py, (&self.program, &self.solid), Target::Wgsl, Asked { sign, distance, prefix, open_params })
+    #[pyo3(signature = (**asked), text_signature = "($self, *, sign=False, distance=False, prefix=None, open_params=False)")]
+    fn to_wgsl(&self, py: Python<'_>, asked: Option<&Bound<'_, PyDict>>) -> PyResult<String> {
+        text(py, (&self.program, &self.solid), Target::Wgsl, Asked::of(asked)?)
     }
 
     /// The solid as functions for a GLSL ES 3.0 shader, in single precision. Parameters as in `to_c`.
-    #[pyo3(signature = (*, sign=false, distance=false, prefix=None, open_params=false))]
-    fn to_glsl(
-        &self,
-        py: Python<'_>,
-        sign: bool,
-        distance: bool,
-        prefix: Option<String>,
-        open_params: bool,
-    ) -> PyResult<String> {
-        text(py, (&self.program, &self.solid), Target::Glsl, Asked { sign, distance, prefix, open_params })
+    #[pyo3(signature = (**asked), text_signature = "($self, *, sign=False, distance=False, prefix=None, open_params=False)")]
+    fn to_glsl(&self, py: Python<'_>, asked: Option<&Bound<'_, PyDict>>) -> PyResult<String> {
+        text(py, (&self.program, &self.solid), Target::Glsl, Asked::of(asked)?)
     }
 
     /// A picture for notebooks: the slice across y through the middle of the scene's box or of the bounds.
@@ -600,16 +586,4 @@ impl PySolid {
 
 fn unbounded(solid: &Solid) -> String {
     format!("`{}` could not be proven to end anywhere: state the box to mesh", solid.name())
-}
-
-/// A solid of a program by its name, at a stretch of time; for pickles.
-#[pyfunction(name = "_solid")]
-pub fn solid_from_pickle(
-    program: &Bound<'_, PyProgram>,
-    name: &str,
-    from: f64,
-    to: f64,
-) -> PyResult<PySolid> {
-    let solid = program.get().compiled(program.py(), name)?;
-    PySolid::new(program, solid, [from, to])
 }

@@ -1,6 +1,8 @@
 //! Solids as source text.
 
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rfm::Solid;
 use rfm::source::{self, Options, Param, Target};
 
@@ -13,6 +15,26 @@ pub struct Asked {
     pub distance: bool,
     pub prefix: Option<String>,
     pub open_params: bool,
+}
+
+impl Asked {
+    /// Reads the keywords of a call.
+    ///
+    /// # Errors
+    /// `TypeError` for a keyword that there is not, or a value of another type.
+    pub fn of(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut asked = Self { sign: false, distance: false, prefix: None, open_params: false };
+        for (name, value) in keywords.into_iter().flatten() {
+            match name.extract::<String>()?.as_str() {
+                "sign" => asked.sign = value.extract()?,
+                "distance" => asked.distance = value.extract()?,
+                "prefix" => asked.prefix = value.extract()?,
+                "open_params" => asked.open_params = value.extract()?,
+                other => return Err(PyTypeError::new_err(format!("unexpected keyword argument `{other}`"))),
+            }
+        }
+        Ok(asked)
+    }
 }
 
 /// The text of a solid of a program in a language.

@@ -1,88 +1,76 @@
-//! The common parts of all plots: the ground with its title, the margins, the axes, and SVG or PNG at
-//! the end.
+//! The axes of plots, logarithmic and even, with their lines and numbers.
 
 use std::fmt::Write;
-use std::path::Path;
 
-use super::failure::Failure;
-use super::output;
-use rfm::slice;
+use super::{BOTTOM, HEIGHT, LEFT, RIGHT, SECOND_AXIS, TOP, WIDTH};
 
-pub(super) const WIDTH: f64 = 760.0;
-pub(super) const HEIGHT: f64 = 520.0;
-pub(super) const LEFT: f64 = 80.0;
-pub(super) const RIGHT: f64 = 190.0;
-pub(super) const TOP: f64 = 50.0;
-pub(super) const BOTTOM: f64 = 60.0;
+/// If an axis covers at most this many powers of ten there is room for lines between them.
+const FEW: f64 = 3.0;
 
-/// If an axis has at most this many powers of ten there is room for lines between them.
-const FEW: i32 = 3;
+/// Most powers of ten that have a line of their own.
+const MANY: i32 = 8;
 
-/// The beginning of a plot: the white ground and the title.
-pub(super) fn begin(title: &str) -> String {
-    format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="Ubuntu" font-size="13"><rect width="100%" height="100%" fill="#ffffff"/><text x="{LEFT}" y="28" font-size="17">{}</text>"##,
-        slice::escaped(title)
-    )
-}
+/// The room beyond the outermost marks of a logarithmic axis, as a factor.
+const MARGIN: f64 = 1.12;
 
-/// The finished plot as SVG or PNG, by the ending of the path.
-pub(super) fn end(mut svg: String, path: &Path) -> Result<Vec<u8>, Failure> {
-    svg.push_str("</svg>\n");
-    match output::Picture::of(path)? {
-        output::Picture::Svg => Ok(svg.into_bytes()),
-        output::Picture::Png => {
-            let mut bytes = Vec::new();
-            slice::rasterise(&svg, 2.0, &mut bytes).map_err(Failure::usage)?;
-            Ok(bytes)
-        }
-    }
-}
-
-/// A logarithmic axis over whole powers of ten.
-pub(super) struct LogAxis {
-    low: i32,
-    high: i32,
+/// A logarithmic axis, from one number 1, 2 or 5 times a power of ten to another.
+pub(in crate::cli) struct LogAxis {
+    /// Logarithms of the ends.
+    low: f64,
+    high: f64,
     from: f64,
     to: f64,
 }
 
 impl LogAxis {
+    /// An axis that just holds the values, which must be positive.
     pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        let (mut low, mut high) = (i32::MAX, i32::MIN);
-        for value in values {
-            low = low.min(value.log10().floor() as i32);
-            high = high.max(value.log10().ceil() as i32);
+        let (least, most) =
+            values.fold((f64::INFINITY, 0.0_f64), |(least, most), value| (least.min(value), most.max(value)));
+        if !(least > 0.0 && least <= most && most.is_finite()) {
+            return Self { low: 0.0, high: 1.0, from, to };
         }
-        if low >= high {
-            (low, high) = if low == i32::MAX { (0, 1) } else { (low, low + 1) };
-        }
-        Self { low, high, from, to }
+        let decade = (least / MARGIN).log10().floor() as i32;
+        let steps = || (0..).flat_map(|k| [1.0, 2.0, 5.0].map(|factor| number(factor, decade + k)));
+        let low = steps().take_while(|step| *step <= least / MARGIN).last().unwrap_or(least);
+        let high = steps().find(|step| *step >= most * MARGIN).unwrap_or(most);
+        Self { low: low.log10(), high: high.log10(), from, to }
     }
 
     /// The values to mark, each with its text: powers of ten, and if there are few of them also their double
     /// and fivefold.
-    fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
-        let factors: &[f64] = if self.high - self.low <= FEW { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        (self.low..=self.high)
-            .flat_map(move |power| factors.iter().map(move |factor| (factor, power)))
-            .filter(|&(factor, power)| power < self.high || *factor == 1.0)
-            .map(|(factor, power)| {
-                let digits = (-power).max(0) as usize;
-                let value = factor * 10f64.powi(power);
-                (value, format!("{value:.digits$}"))
-            })
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let span = self.high - self.low;
+        let factors: &[f64] = if span <= FEW { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let (first, last) = (self.low.floor() as i32, self.high.ceil() as i32);
+        let stride = (1 + (last - first) / MANY).max(1);
+        let is_within = |value: f64| value.log10() > self.low - 1e-9 && value.log10() < self.high + 1e-9;
+        let plain = first >= -4 && last <= 6;
+        let text = |factor: f64, power: i32| {
+            let digits = (-power).max(0) as usize;
+            if plain { format!("{:.digits$}", number(factor, power)) } else { format!("{factor}e{power}") }
+        };
+        (first..=last)
+            .filter(|power| power.rem_euclid(stride) == 0)
+            .flat_map(|power| factors.iter().map(move |factor| (*factor, power)))
+            .filter(|(factor, power)| is_within(number(*factor, *power)))
+            .map(|(factor, power)| (number(factor, power), text(factor, power)))
+            .collect()
     }
 
     pub fn at(&self, value: f64) -> f64 {
-        let share = (value.log10() - f64::from(self.low)) / f64::from(self.high - self.low);
+        let share = (value.log10() - self.low) / (self.high - self.low);
         self.from + share * (self.to - self.from)
     }
 }
 
+fn number(factor: f64, power: i32) -> f64 {
+    factor * 10f64.powi(power)
+}
+
 /// An axis on which equal differences are equally long. Its ticks are whole multiples of 1, 2 or 5 times a
 /// power of ten.
-pub(super) struct EvenAxis {
+pub(in crate::cli) struct EvenAxis {
     low: f64,
     high: f64,
     tick: f64,
@@ -131,31 +119,44 @@ impl EvenAxis {
 }
 
 /// Draws lines at the ticks, and the names of the axes.
-pub(super) fn grid(out: &mut String, x: &LogAxis, y: &LogAxis, names: [&str; 2]) {
-    for (value, text) in x.ticks() {
-        across(out, x.at(value), &text);
-    }
-    if y.high - y.low <= FEW {
-        for (value, text) in y.ticks() {
-            along(out, y.at(value), &text);
-        }
-    } else {
-        for power in (y.low..=y.high).filter(|p| (p - y.low) % 2 == 0) {
-            along(out, y.at(10f64.powi(power)), &format!("1e{power}"));
-        }
-    }
-    axis_names(out, names);
-}
-
-/// Draws lines at the ticks, and the names of the axes.
-pub(super) fn even_grid(out: &mut String, x: &EvenAxis, y: &EvenAxis, names: [&str; 2]) {
+pub(in crate::cli) fn grid(out: &mut String, x: &LogAxis, y: &LogAxis, names: [&str; 2]) {
     for (value, text) in x.ticks() {
         across(out, x.at(value), &text);
     }
     for (value, text) in y.ticks() {
-        along(out, y.at(value), &text);
+        along(out, y.at(value), &text, WIDTH - RIGHT);
     }
     axis_names(out, names);
+}
+
+/// Draws lines at the ticks, and the names of the axes. The plot ends at x = `right`.
+pub(in crate::cli) fn even_grid(out: &mut String, x: &EvenAxis, y: &EvenAxis, names: [&str; 2], right: f64) {
+    for (value, text) in x.ticks() {
+        across(out, x.at(value), &text);
+    }
+    for (value, text) in y.ticks() {
+        along(out, y.at(value), &text, right);
+    }
+    axis_names(out, names);
+}
+
+/// Draws the numbers and the name of a second axis to the right of the plot, which ends at x = `right`.
+pub(in crate::cli) fn right_axis(out: &mut String, y: &EvenAxis, name: &str, right: f64) {
+    for (value, text) in y.ticks() {
+        let at = y.at(value);
+        let _ = write!(
+            out,
+            r##"<line x1="{right:.1}" y1="{at:.1}" x2="{:.1}" y2="{at:.1}" stroke="#888888"/><text x="{:.1}" y="{:.1}">{text}</text>"##,
+            right + 5.0,
+            right + 8.0,
+            at + 4.5
+        );
+    }
+    let (x, middle) = (right + SECOND_AXIS - 6.0, 0.5 * (TOP + HEIGHT - BOTTOM));
+    let _ = write!(
+        out,
+        r##"<text x="{x:.1}" y="{middle:.1}" text-anchor="middle" transform="rotate(-90 {x:.1} {middle:.1})">{name}</text>"##
+    );
 }
 
 /// Draws an upright line of the grid, with its value below. Writing to a String cannot fail.
@@ -169,11 +170,10 @@ fn across(out: &mut String, at: f64, text: &str) {
 }
 
 /// Draws a level line of the grid, with its value to the left.
-fn along(out: &mut String, at: f64, text: &str) {
+fn along(out: &mut String, at: f64, text: &str, right: f64) {
     let _ = write!(
         out,
-        r##"<line x1="{LEFT}" y1="{at:.1}" x2="{:.1}" y2="{at:.1}" stroke="#dddddd"/><text x="{:.1}" y="{:.1}" text-anchor="end">{text}</text>"##,
-        WIDTH - RIGHT,
+        r##"<line x1="{LEFT}" y1="{at:.1}" x2="{right:.1}" y2="{at:.1}" stroke="#dddddd"/><text x="{:.1}" y="{:.1}" text-anchor="end">{text}</text>"##,
         LEFT - 8.0,
         at + 4.5
     );
@@ -194,12 +194,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn few_powers_of_ten_are_divided() {
+    fn logarithmic_axes_just_hold_their_values_and_few_powers_are_divided() {
         let texts = |low: f64, high: f64| -> Vec<String> {
-            LogAxis::over([low, high].into_iter(), 0.0, 1.0).ticks().map(|tick| tick.1).collect()
+            let axis = LogAxis::over([low, high].into_iter(), 0.0, 1.0);
+            assert!(axis.at(low) > 0.0 && axis.at(high) < 1.0);
+            axis.ticks().into_iter().map(|tick| tick.1).collect()
         };
-        assert_eq!(texts(0.03, 0.4), ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"]);
-        assert_eq!(texts(1e-3, 20.0), ["0.001", "0.01", "0.1", "1", "10", "100"]);
+        assert_eq!(texts(0.03, 0.4), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
+        assert_eq!(texts(2.0, 3.0), ["1", "2", "5"]);
+        assert_eq!(texts(3e-3, 15.0), ["0.01", "0.1", "1", "10"]);
+        assert_eq!(texts(3e-17, 2e-5).len(), 6);
+        assert_eq!(texts(3e-17, 2e-5)[0], "1e-16");
+        assert_eq!(LogAxis::over(std::iter::empty(), 0.0, 1.0).ticks().len(), 4);
     }
 
     #[test]

@@ -1,0 +1,302 @@
+//! The pictures of a run: from where it is seen, and which obstacles are cut open or left out so that they do not hide
+//! the fluid.
+//!
+//! Invariant: what is cut or left out is found from the scene at its start and not from particles, so all pictures of a
+//! run agree, resumed or not.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::super::args::{CutFlag, Run};
+use super::super::{Failure, note, output};
+use crate::cli::output::Shown;
+use rfm::field::Walls;
+use rfm::geom::Aabb;
+use rfm::lower::Opening;
+use rfm::mesh::{Mesh, split_creases};
+use rfm::render::{self, Camera, Cut, MeshView};
+use rfm::sph::Simulation;
+use rfm::{Experiment, Solid};
+
+/// An obstacle that hides more than this part of the fluid at its start is in the way.
+const MOST_HIDDEN: f64 = 0.35;
+
+/// Points along each side of the fluid's bounds that stand for the fluid.
+const SAMPLES: usize = 14;
+
+/// Size of the picture in which hidden points are sought.
+const SMALL: (u32, u32) = (320, 240);
+
+/// The speed that is drawn red, as a part of the speed of a fall through the whole box: obstacles stop most particles
+/// long before.
+const FASTEST: f64 = 0.6;
+
+/// Most obstacles that a title names; of more it gives the number.
+const NAMED: usize = 3;
+
+/// What all pictures of a run share.
+pub(super) struct Pictures {
+    /// The scene that is drawn, with the box, the obstacles and the legend.
+    scene: render::Backdrop,
+    camera: Camera,
+    title: String,
+    domain: Aabb,
+    /// The speed that is drawn red, m/s.
+    fastest: f64,
+    radius: f64,
+    bodies: Vec<Body>,
+    pub(super) count: usize,
+}
+
+/// An obstacle in pictures.
+struct Body {
+    solid: Solid,
+    drawn: Drawn,
+    /// Its surface where it stands still and has so many faces that it pays to ask first whether one is near.
+    near: Option<Box<dyn Walls>>,
+}
+
+/// How an obstacle is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Drawn {
+    Whole,
+    Open(Cut),
+    Hidden,
+}
+
+impl Pictures {
+    /// Prepares the pictures. `meshes` are those of the bodies at the start.
+    pub fn new(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Self, Failure> {
+        let domain = experiment.domain();
+        let camera = camera(options, experiment, Camera::SIZE)?;
+        let opened = opened(options, experiment, meshes)?;
+        let title = title(options, experiment, &opened);
+        // a fall is stopped on its way, what drives a fluid otherwise is not
+        let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
+        let fastest = share * experiment.speed_scale();
+        let body = |(solid, drawn): (&Solid, Drawn)| {
+            let near = (!solid.moves() && solid.has_many_leaves()).then(|| solid.surface(domain));
+            Body { solid: solid.clone(), drawn, near }
+        };
+        let solids = experiment.bodies().iter().map(|body| &body.solid);
+        let bodies: Vec<Body> = solids.zip(opened).map(body).collect();
+        Ok(Self {
+            scene: backdrop(&camera, &domain, (&title, fastest), &bodies, meshes)?,
+            camera,
+            title,
+            domain,
+            fastest,
+            radius: 0.5 * experiment.parameters().spacing(),
+            bodies,
+            count: 0,
+        })
+    }
+
+    /// Puts the obstacles where they are now.
+    pub fn show(&mut self, meshes: &[Mesh]) -> Result<(), Failure> {
+        let legend = (self.title.as_str(), self.fastest);
+        self.scene = backdrop(&self.camera, &self.domain, legend, &self.bodies, meshes)?;
+        Ok(())
+    }
+
+    pub fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
+        let image = self.image(simulation);
+        output::write(path, |mut out| image.write_png(&mut out))?;
+        self.count += 1;
+        Ok(())
+    }
+
+    pub fn image(&self, simulation: &Simulation) -> render::Image {
+        let particles = simulation.particles();
+        let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
+        let places: Vec<DVec3> = particles.position.iter().collect();
+        let [x, y, z] = columns(&self.lifted(places, simulation.time()));
+        self.scene.frame(
+            &render::ParticlesView {
+                positions: rfm::field::Points::new(&x, &y, &z),
+                speeds: &speeds,
+                radius: self.radius,
+            },
+            &render::Caption { time: simulation.time(), step: simulation.steps() },
+        )
+    }
+
+    /// The places with every ball in front of the walls: a particle is a point and may touch them, and half of its ball
+    /// would then be sunk.
+    fn lifted(&self, mut places: Vec<DVec3>, time: f64) -> Vec<DVec3> {
+        let r = self.radius;
+        for body in &self.bodies {
+            let solid = body.solid.at(time);
+            places.par_iter_mut().filter(|p| p.is_finite()).for_each(|p| {
+                if body.near.as_ref().is_some_and(|near| near.clearance(*p, r) >= r) {
+                    return;
+                }
+                let contact = solid.contact(*p);
+                // an estimate that is far off must not throw a ball about
+                let lift = (r - contact.distance).clamp(0.0, 2.0 * r);
+                if lift > 0.0 && contact.normal.is_finite() {
+                    *p += lift * contact.normal;
+                }
+            });
+        }
+        let (low, high) = (self.domain.min + r, self.domain.max - r);
+        if low.cmple(high).all() {
+            let is_near = |p: DVec3| self.domain.grown(r).contains(p);
+            places.iter_mut().filter(|p| is_near(**p)).for_each(|p| *p = p.clamp(low, high));
+        }
+        places
+    }
+}
+
+fn columns(places: &[DVec3]) -> [Vec<f64>; 3] {
+    [0, 1, 2].map(|axis| places.iter().map(|p| p[axis]).collect())
+}
+
+/// The scene of a picture without its particles: the box, the obstacles, the legend.
+fn backdrop(
+    camera: &Camera,
+    domain: &Aabb,
+    (title, fastest): (&str, f64),
+    bodies: &[Body],
+    meshes: &[Mesh],
+) -> Result<render::Backdrop, Failure> {
+    let shown = bodies.iter().zip(meshes).filter(|(body, _)| body.drawn != Drawn::Hidden);
+    let sharp: Vec<(Drawn, Mesh)> = shown.map(|(body, mesh)| (body.drawn, split_creases(mesh))).collect();
+    let views: Vec<MeshView<'_>> = sharp.iter().map(|(drawn, mesh)| view(mesh, *drawn)).collect();
+    let legend = render::Legend { title, fastest };
+    render::Backdrop::new(camera.clone(), domain, &views, &legend).map_err(Failure::usage)
+}
+
+fn view(mesh: &Mesh, drawn: Drawn) -> MeshView<'_> {
+    let cut = match drawn {
+        Drawn::Open(cut) => Some(cut),
+        Drawn::Whole | Drawn::Hidden => None,
+    };
+    MeshView { vertices: &mesh.positions, normals: &mesh.normals, triangles: &mesh.triangles, cut }
+}
+
+/// The camera that the flags or the scene ask for.
+fn camera(options: &Run, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
+    let domain = experiment.domain();
+    let camera = match options.camera.or(experiment.scene().picture.camera) {
+        Some(towards_eye) => Camera::new(&domain, towards_eye, size),
+        None => Camera::three_quarter(&domain, size),
+    };
+    camera.map_err(Failure::usage)
+}
+
+/// How each body is drawn.
+fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec<Drawn>, Failure> {
+    let names: Vec<&str> = experiment.bodies().iter().map(|body| body.solid.name()).collect();
+    let stated = &experiment.scene().picture;
+    if let Some(unknown) = options.hide.iter().find(|name| !names.contains(&name.as_str())) {
+        let there = if names.is_empty() { "none".into() } else { names.join(", ") };
+        return Err(Failure::usage(format!(
+            "--hide {unknown}: the scene `{}` has no such obstacle; there is {there}",
+            experiment.scene().name
+        )));
+    }
+    let is_hidden = |name: &str| stated.hide.iter().chain(&options.hide).any(|hidden| hidden == name);
+    let small = camera(options, experiment, SMALL)?;
+    let fixed = match (&options.cut, stated.cut) {
+        (Some(CutFlag::Plane(plane)), _) => {
+            let axis = DVec3::AXES[plane.axis.index()];
+            Some(Some(half(axis, plane.value, axis.dot(small.towards_eye()) < 0.0)))
+        }
+        (Some(CutFlag::None), _) | (None, Opening::None) => Some(None),
+        (None, Opening::Half { axis, at, below }) => Some(Some(half(DVec3::AXES[axis], at, below))),
+        (Some(CutFlag::Auto), _) | (None, Opening::Automatic) => None,
+    };
+    let samples = if fixed.is_none() { fluid_samples(experiment) } else { Vec::new() };
+    let drawn = |(name, mesh): (&&str, &Mesh)| match fixed {
+        _ if is_hidden(name) => Drawn::Hidden,
+        Some(None) => Drawn::Whole,
+        Some(Some(cut)) => Drawn::Open(cut),
+        None => out_of_the_way(&small, name, mesh, &samples),
+    };
+    Ok(names.iter().zip(meshes).map(drawn).collect())
+}
+
+/// The cut that takes away one side of a plane across an axis.
+fn half(axis: DVec3, at: f64, below: bool) -> Cut {
+    if below { Cut { normal: -axis, offset: -at } } else { Cut { normal: axis, offset: at } }
+}
+
+/// How a body is drawn without hiding much of the fluid, for which the samples stand: whole, without its front half, or
+/// not at all.
+fn out_of_the_way(camera: &Camera, name: &str, mesh: &Mesh, samples: &[DVec3]) -> Drawn {
+    let hides = |drawn| render::hidden(camera, &view(mesh, drawn), samples) > MOST_HIDDEN;
+    if !hides(Drawn::Whole) {
+        return Drawn::Whole;
+    }
+    let towards_eye = camera.towards_eye();
+    let axis = towards_eye.abs().max_position();
+    let bounds = samples.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
+    let at = rounded(bounds.centre()[axis], bounds.size()[axis]);
+    let open = Drawn::Open(half(DVec3::AXES[axis], at, towards_eye[axis] < 0.0));
+    if !hides(open) {
+        return open;
+    }
+    note(format!(
+        "pictures leave out the obstacle `{name}`, which hides the fluid even when it is cut in half: --cut none draws it"
+    ));
+    Drawn::Hidden
+}
+
+/// A coordinate with as many digits as tell parts of a size apart.
+fn rounded(at: f64, size: f64) -> f64 {
+    let step = 10f64.powf(size.log10().floor() - 2.0);
+    let found = (at / step).round() * step;
+    // read back from digits, so that a title shows no others
+    format!("{found:.9}").parse().ok().filter(|x: &f64| x.is_finite() && size > 0.0).unwrap_or(at)
+}
+
+/// Points of the fluid as it is at the start.
+fn fluid_samples(experiment: &Experiment) -> Vec<DVec3> {
+    let fluid = experiment.fluid();
+    let domain = experiment.domain();
+    let over = fluid.bounds().aabb().map_or(domain, |bounds| bounds.intersection(&domain));
+    let cell = over.size() / SAMPLES as f64;
+    let at = |k: usize| {
+        let index = [k % SAMPLES, k / SAMPLES % SAMPLES, k / SAMPLES / SAMPLES];
+        over.min + cell * DVec3::from_array(index.map(|i| i as f64 + 0.5))
+    };
+    let is_free = |p: &DVec3| experiment.bodies().iter().all(|body| body.solid.sign(*p) < 0.0);
+    let points = (0..SAMPLES.pow(3)).into_par_iter().map(at);
+    points.filter(|p| fluid.sign(*p) > 0.0 && is_free(p)).collect()
+}
+
+/// What is seen: the file, the scene, the method, and what was done to the obstacles.
+fn title(options: &Run, experiment: &Experiment, drawn: &[Drawn]) -> String {
+    let scene = experiment.scene();
+    let file = match options.file.file_name() {
+        Some(name) if options.file.as_os_str() != "-" => Path::new(name).shown(),
+        _ => "standard input".into(),
+    };
+    let mut parts = vec![file, scene.name.clone(), scene.method.name().to_string()];
+    let names = experiment.bodies().iter().map(|body| body.solid.name());
+    let mut done: Vec<(String, Vec<&str>)> = Vec::new();
+    for (name, drawn) in names.zip(drawn) {
+        let what = match drawn {
+            Drawn::Whole => continue,
+            Drawn::Hidden => "left out".to_string(),
+            Drawn::Open(cut) => {
+                let axis = cut.normal.abs().max_position();
+                format!("cut at {} = {}", ["x", "y", "z"][axis], cut.offset * cut.normal[axis] + 0.0)
+            }
+        };
+        match done.iter_mut().find(|(known, _)| *known == what) {
+            Some((_, names)) if names.contains(&name) => {}
+            Some((_, names)) => names.push(name),
+            None => done.push((what, vec![name])),
+        }
+    }
+    for (what, names) in done {
+        let few = names.len() <= NAMED;
+        let who = if few { names.join(", ") } else { format!("{} obstacles", names.len()) };
+        parts.push(format!("{who} {what}"));
+    }
+    parts.join(" · ")
+}

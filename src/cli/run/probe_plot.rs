@@ -1,0 +1,199 @@
+//! The plot of a probe: its columns over time, with an axis for each unit.
+
+use std::fmt::Write as _;
+
+use super::super::plot::{self, EvenAxis, HEIGHT, LEFT, Legend, RIGHT, SECOND_AXIS, TOP, WIDTH};
+use rfm::sph::Probe;
+
+const COLOURS: [&str; 6] = ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b7791f", "#4a5568"];
+
+/// Dashes of lines that belong to the axis on the left, and on the right.
+const DASHES: [&str; 2] = ["none", "6 3"];
+
+/// Most points of a line.
+const MOST_POINTS: usize = 2000;
+
+/// A column of the probe's table.
+struct Series {
+    name: String,
+    unit: &'static str,
+    colour: &'static str,
+    values: Vec<f64>,
+}
+
+impl Series {
+    fn is_empty(&self) -> bool {
+        !self.values.iter().any(|v| v.is_finite())
+    }
+
+    /// Whether it has values, and all of them are zero.
+    fn is_zero(&self) -> bool {
+        !self.is_empty() && self.values.iter().all(|v| *v == 0.0 || v.is_nan())
+    }
+}
+
+/// A plot with a line for each column over time. A line is interrupted where a value is missing. Without anything to show
+/// the plot is a sentence.
+pub(super) fn drawn(name: &str, probe: &Probe, table: &str) -> String {
+    let (times, series) = columns(probe, table);
+    let mut out = plot::begin(name);
+    if series.iter().all(Series::is_empty) {
+        plot::sentence(&mut out, "no values: there was never any fluid where this probe measures");
+        return out;
+    }
+    if series.iter().all(|s| s.is_zero() || s.is_empty()) {
+        let what: Vec<&str> = series.iter().map(|s| s.name.as_str()).collect();
+        plot::sentence(&mut out, &format!("zero at all times: {}", what.join(", ")));
+        return out;
+    }
+    let shown = |s: &&Series| !s.is_zero() && !s.is_empty();
+    let mut units: Vec<&str> = Vec::new();
+    for s in series.iter().filter(shown) {
+        if !units.contains(&s.unit) {
+            units.push(s.unit);
+        }
+    }
+    let right = WIDTH - RIGHT - if units.len() > 1 { SECOND_AXIS } else { 0.0 };
+    let x = EvenAxis::over(times.iter().copied(), LEFT, right);
+    let axes: Vec<EvenAxis> = units
+        .iter()
+        .map(|unit| {
+            let own = series.iter().filter(shown).filter(|s| s.unit == *unit);
+            EvenAxis::over(own.flat_map(|s| s.values.iter().copied()), HEIGHT - plot::BOTTOM, TOP)
+        })
+        .collect();
+    plot::even_grid(&mut out, &x, &axes[0], ["time, s", &axis_name(&series, units[0])], right);
+    if let Some(second) = axes.get(1) {
+        plot::right_axis(&mut out, second, &axis_name(&series, units[1]), right);
+    }
+    let mut legend = Legend::new();
+    for s in series.iter().filter(shown) {
+        let axis = usize::from(s.unit != units[0]);
+        let path = path(&times, &s.values, &x, &axes[axis]);
+        // writing to a String cannot fail
+        let _ = write!(
+            out,
+            r##"<path d="{path}" fill="none" stroke="{}" stroke-width="1.6" stroke-dasharray="{}"/>"##,
+            s.colour, DASHES[axis]
+        );
+        legend.entry(&mut out, &s.name, |out, x, y| {
+            plot::line_sample(out, (x, y), s.colour, DASHES[axis], false);
+        });
+    }
+    legend.gap();
+    if axes.len() > 1 {
+        legend.remark(&mut out, "dashed: axis on the right");
+    }
+    for s in series.iter().filter(|s| !shown(s)) {
+        let what = if s.is_zero() { "zero at all times" } else { "no values" };
+        legend.remark(&mut out, &format!("{}: {what}", s.name));
+    }
+    out
+}
+
+/// The times and the columns of a table. Energies that depend on where heights are measured from are counted from the
+/// start: their own size would flatten all others.
+fn columns(probe: &Probe, table: &str) -> (Vec<f64>, Vec<Series>) {
+    let rows: Vec<Vec<f64>> = table
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
+        .collect();
+    let stride = rows.len().div_ceil(MOST_POINTS).max(1);
+    let column = |k: usize| -> Vec<f64> {
+        let shown = rows.iter().step_by(stride);
+        shown.map(|row| row.get(k).copied().unwrap_or(f64::NAN)).collect()
+    };
+    let series = probe.columns().iter().zip(COLOURS.into_iter().cycle()).enumerate();
+    let series = series.map(|(k, ((name, unit), colour))| {
+        let mut values = column(k + 1);
+        let from_start = *probe == Probe::Energy && ["potential", "total"].contains(name);
+        let start = values.iter().copied().find(|v| v.is_finite()).unwrap_or_default();
+        if from_start {
+            values.iter_mut().for_each(|v| *v -= start);
+        }
+        let name = if from_start { format!("{name} − start") } else { (*name).to_string() };
+        Series { name, unit, colour, values }
+    });
+    (column(0), series.collect())
+}
+
+/// What an axis measures: the common words of its columns, and their unit.
+fn axis_name(series: &[Series], unit: &str) -> String {
+    let own: Vec<&str> = series.iter().filter(|s| s.unit == unit).map(|s| s.name.as_str()).collect();
+    let first = own.first().and_then(|name| name.split(' ').next()).unwrap_or_default();
+    let what = match &own[..] {
+        [only] => (*only).to_string(),
+        all if all.iter().all(|name| name.split(' ').next() == Some(first)) => first.to_string(),
+        _ if unit == "J" => "energy".into(),
+        _ => "value".into(),
+    };
+    match unit {
+        "1" => format!("{what} (no unit)"),
+        unit => format!("{what}, {}", unit.replace(' ', "·")),
+    }
+}
+
+fn path(times: &[f64], values: &[f64], x: &EvenAxis, y: &EvenAxis) -> String {
+    let mut path = String::new();
+    let mut pen_down = false;
+    for (t, v) in times.iter().zip(values) {
+        if t.is_finite() && v.is_finite() {
+            let _ = write!(path, "{}{:.1} {:.1}", if pen_down { 'L' } else { 'M' }, x.at(*t), y.at(*v));
+        }
+        pen_down = v.is_finite();
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The number of strokes of each line, and of the pieces that they consist of.
+    fn paths(svg: &str) -> Vec<(usize, usize)> {
+        let paths = svg.split("<path d=\"").skip(1).map(|p| p.split('"').next().unwrap());
+        paths.map(|p| (p.matches('M').count(), p.matches('L').count())).collect()
+    }
+
+    #[test]
+    fn a_plot_is_interrupted_where_values_are_missing() {
+        let probe = Probe::Velocity { at: glam::DVec3::ZERO };
+        let table = "time [s],…\n0,nan,1,2\n1,2,nan,3\n2,3,1,4\n3,4,1,5\n";
+        let svg = drawn("a<b", &probe, table);
+        assert_eq!(paths(&svg), [(1, 2), (2, 1), (1, 3)]);
+        assert!(svg.contains("a&lt;b") && svg.contains(">velocity, m/s<"));
+    }
+
+    #[test]
+    fn without_values_a_plot_is_a_sentence() {
+        let probe = Probe::Pressure { at: glam::DVec3::ZERO };
+        for (table, says) in [
+            ("time [s],pressure [Pa]\n0,nan\n1,nan\n", "no values"),
+            ("time [s],pressure [Pa]\n", "no values"),
+            ("time [s],pressure [Pa]\n0,0\n1,nan\n2,0\n", "zero at all times: pressure"),
+        ] {
+            let svg = drawn("p", &probe, table);
+            assert!(svg.contains(says) && paths(&svg).is_empty() && !svg.contains("<line"), "{svg}");
+        }
+    }
+
+    #[test]
+    fn forces_and_torques_have_axes_of_their_own() {
+        let probe = Probe::Force { obstacle: 0, about: glam::DVec3::ZERO };
+        let svg = drawn("f", &probe, "time\n0,1,2,3,1e-3,0,nan\n1,4,5,6,2e-3,0,nan\n");
+        assert_eq!(paths(&svg).len(), 4);
+        for says in
+            [">force, N<", ">torque, N·m<", "0.0020", "torque y: zero at all times", "torque z: no values"]
+        {
+            assert!(svg.contains(says), "{says}: {svg}");
+        }
+    }
+
+    #[test]
+    fn energies_are_counted_from_the_start_where_only_differences_mean_anything() {
+        let svg = drawn("e", &Probe::Energy, "time\n0,0,1000,0,1000\n1,5,995,0,1000\n2,8,991,0,999\n");
+        assert!(svg.contains("potential − start") && svg.contains(">energy, J<"), "{svg}");
+        assert!(!svg.contains("1000"), "{svg}");
+    }
+}

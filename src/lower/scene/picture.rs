@@ -1,0 +1,109 @@
+//! Reads how the pictures of a run are drawn.
+
+use glam::DVec3;
+
+use super::super::lowering::Lowering;
+use super::{Block, Opening, Picture};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::quantity::Dimension;
+use crate::syntax::ast::{Comparison, Expr, ExprKind};
+
+const PICTURE_KEYS: [&str; 3] = ["camera", "cut", "hide"];
+const AXES: [&str; 3] = ["x", "y", "z"];
+const CUT_HELP: &str =
+    "write `cut: y <= 0.5` for the part of the obstacles that is taken away, `cut: auto` or `cut: none`";
+
+impl<'a> Lowering<'a> {
+    /// Reads the block `picture` of a scene with these bodies.
+    pub(super) fn picture(&mut self, scene: &Block<'a>, bodies: &[&str]) -> Option<Picture> {
+        let Some((_, entries, span)) = scene.blocks("picture").next() else {
+            return Some(Picture::default());
+        };
+        let block = self.block(entries, "a picture", span, &PICTURE_KEYS, &[]);
+        let camera = self.camera(&block)?;
+        let cut = match block.setting("cut") {
+            Some((_, value)) => self.opening(value)?,
+            None => Opening::default(),
+        };
+        let mut hide = Vec::new();
+        if let Some((_, value)) = block.setting("hide") {
+            let names = match &value.kind {
+                ExprKind::Vector(names) => names.as_slice(),
+                _ => std::slice::from_ref(value),
+            };
+            for name in names {
+                let found = self.one_of(name, "hide", bodies, "obstacle of this scene")?;
+                hide.push(bodies[found].to_string());
+            }
+        }
+        Some(Picture { camera, cut, hide })
+    }
+
+    /// Reads the direction to the eye. The outer option is `None` if it is wrong, which is reported; the inner one if it is
+    /// not stated.
+    fn camera(&mut self, block: &Block<'_>) -> Option<Option<DVec3>> {
+        let Some((_, value)) = block.setting("camera") else { return Some(None) };
+        let help = "it is the direction from the scene to the eye: write `camera: [0, -1, 0.5]`";
+        if let ExprKind::Number(_) | ExprKind::Quantity { .. } = value.kind {
+            let message = "`camera` is a vector `[x, y, z]`, found a number";
+            self.report(Diagnostic::error(Code::WRONG_TYPE, value.span, message).help(help));
+            return None;
+        }
+        let camera = self.vector_key(block, "camera", Dimension::NONE, DVec3::ZERO)?;
+        if camera == DVec3::ZERO {
+            let message = "`camera` must have a length, found [0, 0, 0]";
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message).help(help));
+            return None;
+        }
+        Some(Some(camera))
+    }
+
+    /// Reads what is taken away of obstacles: a word, or a comparison of one coordinate with a number.
+    fn opening(&mut self, value: &Expr) -> Option<Opening> {
+        match &value.kind {
+            ExprKind::Name(word) if word == "auto" => return Some(Opening::Automatic),
+            ExprKind::Name(word) if word == "none" => return Some(Opening::None),
+            ExprKind::Compare { first, rest } => {
+                if let [(comparison, _, second)] = &rest[..]
+                    && let Some(less) = is_less(*comparison)
+                {
+                    let (axis, number, below) = match (axis(first), axis(second)) {
+                        (Some(axis), None) => (axis, second, less),
+                        (None, Some(axis)) => (axis, &**first, !less),
+                        (Some(_), Some(_)) | (None, None) => return self.no_opening(value),
+                    };
+                    let at = self.quantity_expr(number, Dimension::LENGTH, "cut")?;
+                    return if at.is_finite() {
+                        Some(Opening::Half { axis, at, below })
+                    } else {
+                        self.no_opening(value)
+                    };
+                }
+            }
+            _ => {}
+        }
+        self.no_opening(value)
+    }
+
+    fn no_opening(&mut self, value: &Expr) -> Option<Opening> {
+        self.report(Diagnostic::error(Code::SCENE_KEY, value.span, "unknown value of `cut`").help(CUT_HELP));
+        None
+    }
+}
+
+/// The number of the coordinate that a name stands for.
+fn axis(expr: &Expr) -> Option<usize> {
+    match &expr.kind {
+        ExprKind::Name(name) => AXES.iter().position(|axis| axis == name),
+        _ => None,
+    }
+}
+
+/// Whether the left side is the smaller one; `None` for signs that are no inequality.
+fn is_less(comparison: Comparison) -> Option<bool> {
+    match comparison {
+        Comparison::LessEqual | Comparison::Less => Some(true),
+        Comparison::GreaterEqual | Comparison::Greater => Some(false),
+        Comparison::Equal | Comparison::NotEqual => None,
+    }
+}
