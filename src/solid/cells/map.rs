@@ -8,11 +8,12 @@
 //! jumps between cells. A map with a reach also answers for distance, normal and curvature up to that
 //! distance from the surface.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use super::grid::{Cell, Cells, Found, SIDE};
+use super::values::LocalValues;
 use crate::field::{Entry, Faces, Field, Normals, Path, Points, Sheet, Walls, clearance_by_ranges};
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -54,6 +55,8 @@ pub struct CellMap {
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
     /// still right.
     margin: f64,
+    /// What the value of the whole tree takes, made when it is first asked for.
+    values: OnceLock<LocalValues>,
 }
 
 /// Counts of a cell map.
@@ -117,7 +120,8 @@ impl CellMap {
     /// A map of cells that are right for the solid's stretch of time, and were grown by [`margin`].
     pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
         let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
-        Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin })
+        let values = OnceLock::new();
+        Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin, values })
     }
 
     /// How the box was divided.
@@ -198,6 +202,13 @@ impl CellMap {
     #[inline]
     fn run(&self, program: u32, p: DVec3) -> (f64, (u32, bool)) {
         self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
+    }
+
+    /// The value of the whole tree at a point, and the leaf that decides.
+    fn decide(&self, p: DVec3) -> (f64, (u32, bool)) {
+        let values = self.values.get_or_init(|| LocalValues::new(&self.parts, self.cells.domain));
+        let leaves = &self.parts.leaves;
+        values.decide(leaves, p).unwrap_or_else(|| leaves.decide(&self.parts.words, &mut 0, p))
     }
 
     /// The value of a program at up to [`RUN`] points.
@@ -377,16 +388,17 @@ impl Field for CellMap {
     }
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let Some(Found { cell: Cell::Near(program), .. }) = self.cells.find(p) else {
-            return self.twin.omega_grad(p);
+        let (value, (leaf, negated)) = match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Near(program)) => self.run(program, p),
+            Some(_) => self.decide(p),
+            None => return self.twin.omega_grad(p),
         };
-        let (value, (leaf, negated)) = self.run(program, p);
         let gradient = self.parts.leaves.gradient(leaf, p).1;
         (value, if negated { -gradient } else { gradient })
     }
 
     fn continuous(&self, p: DVec3) -> f64 {
-        self.twin.omega(p)
+        self.decide(p).0
     }
 
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {

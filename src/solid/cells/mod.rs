@@ -4,3 +4,4 @@
 pub mod grid;
 pub mod map;
 pub mod moving;
+pub mod values;
