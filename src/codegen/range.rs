@@ -37,8 +37,8 @@ const R0_MARGIN: f64 = 16.0 * ULP;
 /// root of what is lost.
 const R0_UNDERFLOW: f64 = 1e-147;
 
-/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the
-/// root out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
+/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of each
+/// output out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
 /// there are any.
 pub(super) fn emit(
     builder: &mut FunctionBuilder<'_>,
@@ -81,13 +81,15 @@ pub(super) fn emit(
             Instruction::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
             Instruction::Unary(op, a) => ranges.unary(op, ranges.values[&a]),
             Instruction::Binary(op, a, b) => ranges.binary(op, a, b),
+            Instruction::Share => ranges.pair(0.0, 1.0),
             Instruction::Divide(a, number) => ranges.divide(ranges.values[&a], ranges.numbers[&number]),
         };
         ranges.values.insert(node, value);
     }
-    let root = ranges.values[&request.outputs[0]];
-    let root = ranges.flip(root, BoundLane::Low);
-    ranges.emitter.builder.ins().store(MemFlagsData::new(), root, output, 0);
+    for (i, node) in request.outputs.iter().enumerate() {
+        let range = ranges.flip(ranges.values[node], BoundLane::Low);
+        ranges.emitter.builder.ins().store(MemFlagsData::new(), range, output, 16 * i as i32);
+    }
     ranges.emitter.builder.ins().return_(&[]);
 }
 

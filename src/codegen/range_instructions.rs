@@ -44,6 +44,8 @@ pub(super) enum Instruction {
     Binary(RangeBinary, Node, Node),
     /// By a constant or a parameter.
     Divide(Node, Node),
+    /// From 0 to 1: a derivative of the smaller or larger of two numbers.
+    Share,
 }
 
 /// The operations on one range.
@@ -93,6 +95,7 @@ impl Instruction {
                 let by_number = matches!(graph.expr(b), Expr::Constant(_) | Expr::Parameter(_));
                 by_number.then_some(Self::Divide(a, b))?
             }
+            RangeRule::Plain(Expr::Binary(Binary::MinWeight | Binary::MaxWeight, ..)) => Self::Share,
             RangeRule::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
         })
     }
