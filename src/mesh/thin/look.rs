@@ -45,6 +45,9 @@ const STEPS_ACROSS: usize = 64;
 
 type Normals = SmallVec<[DVec3; 16]>;
 
+/// What a face's gradient may be in a box.
+type Slopes = [Interval; 3];
+
 pub(super) fn is_decided(range: Interval) -> bool {
     range.lo > 0.0 || range.hi <= 0.0
 }
@@ -118,7 +121,7 @@ struct Foot {
 impl Look<'_> {
     /// The cell, if it holds a surface that the grid does not know.
     pub fn into_cell(self) -> ThinCells {
-        if self.is_crossed && is_one_sheet(self.field, &self.bounds) {
+        if self.is_crossed && self.shows_all() {
             return ThinCells::NONE;
         }
         let seen = self.seen();
@@ -150,6 +153,46 @@ impl Look<'_> {
             }
         }
         ThinCells::NONE
+    }
+
+    /// Whether the cell holds one face, or only faces that its own edges show. Most cells do, and need no look
+    /// around.
+    fn shows_all(&self) -> bool {
+        let mut faces: SmallVec<[(Slopes, Option<DVec3>); 8]> = SmallVec::new();
+        let all = self.field.sheets(&self.bounds, &mut |sheet| faces.push((sheet.slopes, middle(&sheet))));
+        if !all {
+            return false;
+        }
+        let is_even = |(slopes, way): &(Slopes, Option<DVec3>)| way.is_some_and(|w| agrees(slopes, w, KNOWN));
+        if faces.len() <= 1 && faces.iter().all(is_even) {
+            return true;
+        }
+        let own = self.own_normals();
+        let mut ways: Normals = SmallVec::new();
+        for (slopes, way) in &faces {
+            if !own.iter().any(|normal| agrees(slopes, *normal, KNOWN)) {
+                return false;
+            }
+            ways.extend(*way);
+        }
+        !has_opposed(&ways, if self.is_undecided { &[] } else { &own })
+    }
+
+    /// The normals where the surface crosses the edges of this cell.
+    fn own_normals(&self) -> Normals {
+        let Self { field, lattice, low, .. } = *self;
+        let mut edges = self.edges.borrow_mut();
+        let node = |corner: usize| [0, 1, 2].map(|axis: usize| low[axis] + (corner >> axis & 1));
+        let inside: [bool; 8] = std::array::from_fn(|c| edges.is_inside((field, lattice), node(c)));
+        let mut own: Normals = SmallVec::new();
+        for corner in 0..8 {
+            for axis in (0..3).filter(|axis| corner >> axis & 1 == 0) {
+                if inside[corner] != inside[corner | 1 << axis] {
+                    own.extend(edges.normal((field, lattice), node(corner), (axis, inside[corner])));
+                }
+            }
+        }
+        own
     }
 
     /// Divides a box until its faces are proven to be known, or are one or several parallel ones, or as often as

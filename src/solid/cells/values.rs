@@ -15,10 +15,11 @@ use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
 use crate::solid::leaves::words::{PAYLOAD, Word, leaf_count};
 
 /// Parts with no more leaves than this are not divided further.
-const FEW_LEAVES: usize = 6;
+const FEW_LEAVES: usize = 16;
 
-/// The box is halved along each axis so many times at most.
-const MAX_DEPTH: u32 = 7;
+/// The box is halved along each axis so many times at most. Few points are asked for: the values in the cells
+/// of a mesh that signs leave open.
+const MAX_DEPTH: u32 = 5;
 
 /// Ranges of leaves asked for while a box is divided; the parts that are left then stay as they are.
 const MOST_RANGES: usize = 1 << 23;
