@@ -151,52 +151,6 @@ fn leaves_of_one_shape_share_a_program_and_far_cells_need_none() {
 }
 
 /// Every distance of [`Solid::contact`] below the reach is found, from the same surface, and no other.
-/// A union of turned parts of several kinds, and the number of them.
-fn mixed(count: usize) -> String {
-    let mut random = Random(5);
-    let mut text = "rfm 1\nsolid mixed = sphere(0.01)".to_string();
-    for i in 0..count {
-        let p = random.point(&Aabb::new(DVec3::splat(0.2), DVec3::splat(2.8)));
-        let [a, b] = [(); 2].map(|()| 6.0 * random.unit() - 3.0);
-        let r = 0.05 + 0.05 * random.unit();
-        let part = match i % 5 {
-            0 => format!("cylinder({r}, {})", 2.0 * r),
-            1 => format!("box([{0}, {0}, {0}], [{r}, {r}, {r}])", -r),
-            2 => format!("cone({r}, {})", 1.5 * r),
-            3 => format!("torus({r}, {})", 0.3 * r),
-            _ => format!("capsule({}, {r})", 0.5 * r),
-        };
-        let _ = write!(text, "\n or {part}.rotate_x({a}).rotate_z({b}).move([{}, {}, {}])", p.x, p.y, p.z);
-    }
-    text + "\n"
-}
-
-#[test]
-fn values_of_the_whole_come_from_the_leaves_that_can_decide_them() {
-    for (text, name) in [(mixed(150), "mixed"), (many(150), "many")] {
-        let solid = solid(&text, name, Engine::Auto);
-        let (map, twin) = (CellMap::new(&solid, domain()).unwrap(), solid.twin());
-        let mut random = Random(17);
-        for _ in 0..4000 {
-            let p = random.point(&domain());
-            assert_eq!(map.continuous(p).to_bits(), twin.omega(p).to_bits(), "{name} at {p}");
-            if map.place_of(p) != Place::Near {
-                // where two leaves are equal the twin has the mean of their gradients
-                let (found, expected) = (map.omega_grad(p).1, twin.omega_grad(p).1);
-                assert!((found - expected).length() <= 1e-12 * expected.length(), "{name} at {p}");
-            }
-        }
-    }
-}
-
-#[test]
-fn turned_parts_of_one_kind_share_a_shape() {
-    let solid = solid(&mixed(500), "mixed", Engine::Auto);
-    let stats = CellMap::new(&solid, domain()).unwrap().stats();
-    // 100 of each kind with one to three leaves; all the signs of their angles would make hundreds
-    assert!(stats.leaves > 900 && stats.shapes <= 40, "{stats:?}");
-}
-
 #[test]
 fn contacts_are_those_of_the_solid() {
     let example = |name: &str| {

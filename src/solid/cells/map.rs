@@ -8,12 +8,11 @@
 //! jumps between cells. A map with a reach also answers for distance, normal and curvature up to that
 //! distance from the surface.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::grid::{Cell, Cells, Found, SIDE};
-use super::values::LocalValues;
 use crate::field::{Entry, Faces, Field, Normals, Path, Points, Sheet, Walls, clearance_by_ranges};
 use crate::geom::Aabb;
 use crate::interval::Interval;
@@ -55,8 +54,6 @@ pub struct CellMap {
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
     /// still right.
     margin: f64,
-    /// What the value of the whole tree takes, made when it is first asked for.
-    values: OnceLock<LocalValues>,
 }
 
 /// Counts of a cell map.
@@ -120,8 +117,7 @@ impl CellMap {
     /// A map of cells that are right for the solid's stretch of time, and were grown by [`margin`].
     pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
         let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
-        let values = OnceLock::new();
-        Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin, values })
+        Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin })
     }
 
     /// How the box was divided.
@@ -202,20 +198,6 @@ impl CellMap {
     #[inline]
     fn run(&self, program: u32, p: DVec3) -> (f64, (u32, bool)) {
         self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
-    }
-
-    /// Whether a point lies in the box or beside it.
-    fn is_near(&self, p: DVec3) -> bool {
-        let Aabb { min, max } = self.cells.domain;
-        let size = max - min;
-        Aabb::new(min - size, max + size).contains(p)
-    }
-
-    /// The value of the whole tree at a point, and the leaf that decides.
-    fn decide(&self, p: DVec3) -> (f64, (u32, bool)) {
-        let values = self.values.get_or_init(|| LocalValues::new(&self.parts, self.cells.domain));
-        let leaves = &self.parts.leaves;
-        values.decide(leaves, p).unwrap_or_else(|| leaves.decide(&self.parts.words, &mut 0, p))
     }
 
     /// The value of a program at up to [`RUN`] points.
@@ -395,19 +377,16 @@ impl Field for CellMap {
     }
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let (value, (leaf, negated)) = match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Near(program)) => self.run(program, p),
-            Some(_) => self.decide(p),
-            // a few points lie a little outside; a gradient of the whole twin takes long to compile
-            None if self.is_near(p) => self.decide(p),
-            None => return self.twin.omega_grad(p),
+        let Some(Found { cell: Cell::Near(program), .. }) = self.cells.find(p) else {
+            return self.twin.omega_grad(p);
         };
+        let (value, (leaf, negated)) = self.run(program, p);
         let gradient = self.parts.leaves.gradient(leaf, p).1;
         (value, if negated { -gradient } else { gradient })
     }
 
     fn continuous(&self, p: DVec3) -> f64 {
-        self.decide(p).0
+        self.twin.omega(p)
     }
 
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {

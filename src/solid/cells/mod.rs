@@ -4,4 +4,3 @@
 pub mod grid;
 pub mod map;
 pub mod moving;
-pub mod values;
