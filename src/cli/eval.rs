@@ -1,21 +1,31 @@
 //! `rfm eval`: ω and related values at points, as CSV with 17 significant digits.
 
 use std::cell::OnceCell;
+use std::fmt::Write as _;
 use std::io::{self, BufRead, BufWriter, Read, Write};
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::args::{Eval, Shared, What};
 use super::failure::Failure;
 use super::{choose, input, output};
 use crate::cli::output::Shown;
+use rfm::field::Points;
 use rfm::ir::Unary;
-use rfm::solid::{Chosen, Distance, Distances};
+use rfm::solid::{CellMap, Chosen, Distance, Distances};
 use rfm::{Field, Precision, Solid};
 
 /// Points that are evaluated at a time, so that memory stays small for any number of points.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 1 << 15;
+
+/// Points that one thread evaluates together.
+const BLOCK: usize = 1 << 11;
+
+/// So many points at a time make it worthwhile to divide space into cells before their signs are asked for.
+const MANY_POINTS: usize = 1 << 12;
 
 pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
     if options.at.is_empty() && options.points.is_none() {
@@ -95,26 +105,79 @@ struct Document {
 
 /// The table of results. Rows are written as soon as they are known.
 struct Table {
+    rows: Rows,
+    /// The rows for JSON, which are collected because they are one document.
+    json: Option<Vec<serde_json::Value>>,
+    out: BufWriter<io::Stdout>,
+}
+
+/// How rows are computed.
+struct Rows {
     solid: Solid,
     /// The program that keeps the file's tolerance. It computes ω where no gradient is needed.
     chosen: Option<Chosen>,
     what: Vec<What>,
     precision: Precision,
-    /// The rows for JSON, which are collected because they are one document.
-    json: Option<Vec<serde_json::Value>>,
     names: Vec<&'static str>,
     /// Made when a distance is first asked for.
-    distances: OnceCell<Distances>,
-    out: BufWriter<io::Stdout>,
+    distances: OnceLock<Distances>,
+    /// Made when many signs are first asked for; `None` where the twin answers as fast.
+    cells: OnceLock<Option<CellMap>>,
+}
+
+/// What is computed for all points of a block together; empty columns where nothing is asked for.
+#[derive(Default)]
+struct Columns {
+    omega: Vec<f64>,
+    gradient: [Vec<f64>; 3],
+    sign: Vec<f64>,
 }
 
 impl Table {
     fn new(solid: Solid, chosen: Option<Chosen>, options: &Eval, json: bool) -> Result<Self, Failure> {
-        let mut asked = options.what.clone();
-        asked.sort_unstable();
-        asked.dedup();
+        let rows = Rows::new(solid, chosen, options);
+        let mut out = BufWriter::new(io::stdout());
+        if !json {
+            writeln!(out, "{}", rows.names.join(","))?;
+        }
+        Ok(Self { rows, json: json.then(Vec::new), out })
+    }
+
+    fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {
+        let Self { rows, json, out } = self;
+        if points.len() >= MANY_POINTS && rows.needs_only_signs() {
+            rows.cells(); // not in a thread of the pool: others would wait for it
+        }
+        let blocks = points.par_chunks(BLOCK);
+        match json {
+            None => {
+                let texts: Vec<String> = blocks.map(|points| rows.as_csv(points)).collect();
+                texts.iter().try_for_each(|text| out.write_all(text.as_bytes()))?;
+            }
+            Some(all) => {
+                let found: Vec<Vec<serde_json::Value>> = blocks.map(|points| rows.as_json(points)).collect();
+                all.extend(found.into_iter().flatten());
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<(), Failure> {
+        self.out.flush()?;
+        match self.json {
+            Some(points) => output::json(&Document { schema: 1, points }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Rows {
+    fn new(solid: Solid, chosen: Option<Chosen>, options: &Eval) -> Self {
+        let mut what = options.what.clone();
+        what.sort_unstable();
+        what.dedup();
         let mut names = vec!["x", "y", "z"];
-        for what in &asked {
+        for what in &what {
             names.extend(match what {
                 What::Value => &["omega"][..],
                 What::Gradient => &["gx", "gy", "gz"],
@@ -124,75 +187,158 @@ impl Table {
                 What::Normal => &["nx", "ny", "nz"],
             });
         }
-        let mut out = BufWriter::new(io::stdout());
-        if !json {
-            writeln!(out, "{}", names.join(","))?;
-        }
         let precision = options.precision.unwrap_or(Precision::F64);
-        Ok(Self {
-            solid,
-            chosen,
-            what: asked,
-            precision,
-            json: json.then(Vec::new),
-            names,
-            distances: OnceCell::new(),
-            out,
-        })
+        let (distances, cells) = (OnceLock::new(), OnceLock::new());
+        Self { solid, chosen, what, precision, names, distances, cells }
     }
 
-    fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {
-        for &p in points {
-            let values = self.values(p);
-            match &mut self.json {
-                None => {
-                    let cells: Vec<String> = values.iter().map(|&v| number(v)).collect();
-                    writeln!(self.out, "{}", cells.join(","))?;
+    fn as_csv(&self, points: &[DVec3]) -> String {
+        let mut text = String::with_capacity(points.len() * self.names.len() * 24);
+        self.each(points, |row| {
+            for (i, &value) in row.iter().enumerate() {
+                if i > 0 {
+                    text.push(',');
                 }
-                Some(rows) => {
-                    let row: serde_json::Map<String, serde_json::Value> = std::iter::zip(&self.names, values)
-                        .map(|(name, value)| ((*name).to_string(), serde_json::Value::from(value)))
-                        .collect();
-                    rows.push(row.into());
-                }
+                push_number(&mut text, value);
             }
+            text.push('\n');
+        });
+        text
+    }
+
+    fn as_json(&self, points: &[DVec3]) -> Vec<serde_json::Value> {
+        let mut rows = Vec::with_capacity(points.len());
+        self.each(points, |row| {
+            let row: serde_json::Map<String, serde_json::Value> = std::iter::zip(&self.names, row)
+                .map(|(name, &value)| ((*name).to_string(), serde_json::Value::from(value)))
+                .collect();
+            rows.push(row.into());
+        });
+        rows
+    }
+
+    /// Visits the rows of some points.
+    fn each(&self, points: &[DVec3], mut visit: impl FnMut(&[f64])) {
+        let columns = self.columns(points);
+        let mut row = Vec::with_capacity(self.names.len());
+        for (i, &p) in points.iter().enumerate() {
+            row.clear();
+            row.extend(p.to_array());
+            self.push_row(p, &columns, i, &mut row);
+            visit(&row);
         }
-        Ok(())
     }
 
-    fn values(&self, p: DVec3) -> Vec<f64> {
-        let needs_gradient = self.what.iter().any(|w| matches!(w, What::Gradient | What::Normal));
-        let (omega, gradient) = match (self.precision, needs_gradient) {
-            (Precision::F64, true) => self.solid.omega_grad(p),
-            (Precision::F64, false) => {
-                let omega = self.chosen.as_ref().map_or_else(|| self.solid.omega(p), |c| c.omega(p));
-                (omega, DVec3::NAN)
-            }
-            (Precision::F32, true) => {
-                let (omega, gradient) = self.solid.omega_grad_f32(p.as_vec3());
-                (omega.into(), gradient.as_dvec3())
-            }
-            (Precision::F32, false) => (self.solid.omega_f32(p.as_vec3()).into(), DVec3::NAN),
-        };
+    fn push_row(&self, p: DVec3, columns: &Columns, i: usize, row: &mut Vec<f64>) {
         let found = OnceCell::new();
         let distance = || *found.get_or_init(|| self.distances().at(p));
-        let mut row = p.to_array().to_vec();
+        let gradient = || DVec3::from_array(columns.gradient.each_ref().map(|column| column[i]));
         for what in &self.what {
             match what {
-                What::Value => row.push(omega),
-                What::Gradient => row.extend(gradient.to_array()),
-                // a tolerance holds for values only; the sign comes from the twin
-                What::Sign if self.chosen.is_some() => row.push(self.solid.sign(p)),
-                What::Sign => row.push(Unary::Sign.eval(omega)),
+                What::Value => row.push(columns.omega[i]),
+                What::Gradient => row.extend(gradient().to_array()),
+                What::Sign => row.push(columns.sign[i]),
                 What::Distance => row.push(match self.precision {
                     Precision::F64 => distance().estimate,
                     Precision::F32 => self.solid.distance_f32(p.as_vec3()).into(),
                 }),
                 What::Clearance => row.push(distance().clearance),
-                What::Normal => row.extend(self.normal(p, gradient).to_array()),
+                What::Normal => row.extend(self.normal(p, gradient()).to_array()),
             }
         }
-        row
+    }
+
+    fn asks_for(&self, any: &[What]) -> bool {
+        self.what.iter().any(|what| any.contains(what))
+    }
+
+    /// Whether signs are asked for, and nothing from which they follow.
+    fn needs_only_signs(&self) -> bool {
+        let has_omega = self.asks_for(&[What::Value, What::Gradient, What::Normal]);
+        // a tolerance holds for values only; the sign comes from the twin
+        let by_twin = self.chosen.is_some() || self.precision == Precision::F64 && !has_omega;
+        self.asks_for(&[What::Sign]) && by_twin
+    }
+
+    fn columns(&self, points: &[DVec3]) -> Columns {
+        let axes: [Vec<f64>; 3] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect());
+        let at = axes.each_ref().map(|column| &column[..]);
+        let mut columns = Columns::default();
+        let by_twin = self.needs_only_signs();
+        if self.asks_for(&[What::Gradient, What::Normal]) {
+            self.fill_gradients(at, &mut columns);
+        } else if self.asks_for(&[What::Value]) || self.asks_for(&[What::Sign]) && !by_twin {
+            columns.omega = self.values(at, points);
+        }
+        if by_twin {
+            columns.sign = self.signs(at, points);
+        } else if self.asks_for(&[What::Sign]) {
+            columns.sign = columns.omega.iter().map(|&omega| Unary::Sign.eval(omega)).collect();
+        }
+        columns
+    }
+
+    fn values(&self, at: [&[f64]; 3], points: &[DVec3]) -> Vec<f64> {
+        if let (Some(chosen), Precision::F64) = (&self.chosen, self.precision) {
+            return points.iter().map(|&p| chosen.omega(p)).collect();
+        }
+        match self.precision {
+            Precision::F64 => {
+                let mut omega = vec![0.0; points.len()];
+                self.solid.omega_many(at, &mut omega);
+                omega
+            }
+            Precision::F32 => {
+                let single = at.map(in_single);
+                let mut omega = vec![0.0; points.len()];
+                self.solid.omega_many(single.each_ref().map(|column| &column[..]), &mut omega);
+                in_double(&omega)
+            }
+        }
+    }
+
+    fn fill_gradients(&self, at: [&[f64]; 3], columns: &mut Columns) {
+        let count = at[0].len();
+        let [omega, x, y, z] = match self.precision {
+            Precision::F64 => {
+                let mut found = [(); 4].map(|()| vec![0.0; count]);
+                self.solid.omega_grad_many(at, found.each_mut().map(|column| &mut column[..]));
+                found
+            }
+            Precision::F32 => {
+                let single = at.map(in_single);
+                let mut found = [(); 4].map(|()| vec![0.0_f32; count]);
+                let out = found.each_mut().map(|column| &mut column[..]);
+                self.solid.omega_grad_many(single.each_ref().map(|column| &column[..]), out);
+                found.map(|column| in_double(&column))
+            }
+        };
+        (columns.omega, columns.gradient) = (omega, [x, y, z]);
+    }
+
+    /// The signs of the solid, through its cells if there are some.
+    fn signs(&self, at: [&[f64]; 3], points: &[DVec3]) -> Vec<f64> {
+        let mut sign = vec![0.0; points.len()];
+        match self.cells.get() {
+            Some(Some(cells)) => cells.sign_many(Points::new(at[0], at[1], at[2]), &mut sign),
+            Some(None) | None => self.solid.sign_many(at, &mut sign),
+        }
+        if self.chosen.is_none() {
+            // so far from the origin that the twin has no answer, ω may still have one
+            let unknown = std::iter::zip(&mut sign, points).filter(|(sign, _)| sign.is_nan());
+            unknown.for_each(|(sign, &p)| *sign = Unary::Sign.eval(self.solid.omega(p)));
+        }
+        sign
+    }
+
+    /// Divides the space in and around the solid into cells, if it has many parts.
+    fn cells(&self) -> Option<&CellMap> {
+        let make = || {
+            let bounds = self.solid.bounds().aabb()?;
+            let around = bounds.grown(0.25 * bounds.size().max_element());
+            self.solid.has_many_leaves().then(|| CellMap::new(&self.solid, around)).flatten()
+        };
+        self.cells.get_or_init(make).as_ref()
     }
 
     /// The outward unit normal. Where ω has no gradient, as at centres, it points away from the nearest point of
@@ -209,43 +355,65 @@ impl Table {
     fn distances(&self) -> &Distances {
         self.distances.get_or_init(|| Distances::new(&self.solid))
     }
-
-    fn finish(mut self) -> Result<(), Failure> {
-        self.out.flush()?;
-        match self.json {
-            Some(points) => output::json(&Document { schema: 1, points }),
-            None => Ok(()),
-        }
-    }
 }
 
-/// The number with 17 significant digits, which read back to the same number. NaN is `nan`, infinities are
+fn in_single(column: &[f64]) -> Vec<f32> {
+    column.iter().map(|&value| value as f32).collect()
+}
+
+fn in_double(column: &[f32]) -> Vec<f64> {
+    column.iter().map(|&value| value.into()).collect()
+}
+
+/// Appends a number with 17 significant digits, which read back to the same number. NaN is `nan`, infinities are
 /// `inf` and `-inf`.
-fn number(value: f64) -> String {
+fn push_number(text: &mut String, value: f64) {
     if value.is_nan() {
-        return "nan".into();
+        return text.push_str("nan");
     }
     if value.is_infinite() {
-        return if value > 0.0 { "inf".into() } else { "-inf".into() };
+        return text.push_str(if value > 0.0 { "inf" } else { "-inf" });
     }
     if value == 0.0 {
-        return "0".into();
+        return text.push('0');
     }
-    let scientific = format!("{value:.16e}");
-    let exponent: i32 = scientific.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
-    if (-5..16).contains(&exponent) { format!("{value:.*}", (16 - exponent) as usize) } else { scientific }
+    let start = text.len();
+    let _ = write!(text, "{value:.16e}"); // writing to a string does not fail
+    let Some(e) = text[start..].find('e') else { return };
+    let exponent: i32 = text[start + e + 1..].parse().unwrap_or(0);
+    if !(-5..16).contains(&exponent) {
+        return;
+    }
+    // the same digits without an exponent: d.ddd becomes ddd.d or 0.00ddd
+    text.truncate(start + e);
+    let first = start + usize::from(value < 0.0);
+    text.remove(first + 1);
+    match exponent {
+        0.. => text.insert(first + 1 + exponent as usize, '.'),
+        ..0 => text.insert_str(first, &"0.0000"[..1 + exponent.unsigned_abs() as usize]),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn number(value: f64) -> String {
+        let mut text = String::new();
+        push_number(&mut text, value);
+        text
+    }
+
     #[test]
     fn numbers_have_seventeen_digits_and_read_back() {
         assert_eq!(number(0.1), "0.10000000000000001");
         assert_eq!(number(-1.5), "-1.5000000000000000");
         assert_eq!(number(f64::NAN), "nan");
-        for value in [1.0 / 3.0, 1e-300, -2.5e17, 123456.789, 5e-324, f64::MAX] {
+        assert_eq!(number(-0.000012345), format!("{:.21}", -0.000012345));
+        assert_eq!(number(1234567890123456.0), "1234567890123456.0");
+        for value in
+            [1.0 / 3.0, 1e-5, 9.9e-6, 1e15, 1e16, -12.5, 1e-300, -2.5e17, 123456.789, 5e-324, f64::MAX]
+        {
             assert_eq!(number(value).parse::<f64>(), Ok(value));
         }
     }

@@ -6,31 +6,20 @@
 //! after each operation. The rules are those of `ir::bounds::range`. Bounds may be wider by a few ulp, those
 //! of R₀ by a few ulp of its larger operand.
 //!
-//! Only graphs are taken whose every node is finite over [`REACH`], and so small that no square overflows.
-//! Then neither infinity nor NaN can arise for a box within it, and min and max need not look for them.
-//! For other graphs and boxes the interpreter answers.
+//! Only graphs and boxes are taken for which `range_instructions` has shown that neither infinity nor NaN can
+//! arise: min and max need not look for them. For others the interpreter answers.
 
 use std::collections::HashMap;
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
 use cranelift_frontend::FunctionBuilder;
-use glam::DVec3;
 
 use super::emitter::{Emitter, Hosts};
+use super::range_instructions::{Instruction, Instructions, RangeBinary, RangeUnary};
 use super::request::{Request, Rounding, pointers};
-use crate::geom::Aabb;
-use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeRule, Region, Unary};
+use crate::ir::{Affine, Node};
 use crate::precision::Precision;
-
-/// Boxes within this distance of the origin are answered by machine code.
-pub const REACH: f64 = 1e9;
-
-/// Values beyond this might overflow in a product or in the bound of one.
-const LARGEST: f64 = 1e300;
-
-/// Operands of R₀ beyond this might have squares that do.
-const LARGEST_OPERAND: f64 = 1e150;
 
 /// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
 const ULP: f64 = f64::EPSILON;
@@ -48,164 +37,8 @@ const R0_MARGIN: f64 = 16.0 * ULP;
 /// root of what is lost.
 const R0_UNDERFLOW: f64 = 1e-147;
 
-/// Whether machine code can answer for this graph.
-pub fn supports(graph: &Graph, root: Node) -> bool {
-    knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), Region::of(&Aabb::EMPTY))
-}
-
-/// Whether every operation of a graph is one that range programs have.
-pub fn knows(graph: &Graph) -> bool {
-    Instructions::of(graph).is_some()
-}
-
-/// What a range program does for one node.
-#[derive(Clone, Copy)]
-enum Instruction {
-    Constant(f64),
-    /// The range of x, y or z: its number.
-    Coordinate(usize),
-    Parameter(u32),
-    Uniform(u32),
-    Square(Node),
-    Slab {
-        of: Node,
-        first: Affine,
-        second: Affine,
-    },
-    Unary(RangeUnary, Node),
-    Binary(RangeBinary, Node, Node),
-    /// By a constant or a parameter.
-    Divide(Node, Node),
-}
-
-/// The operations on one range.
-#[derive(Clone, Copy)]
-enum RangeUnary {
-    Neg,
-    Abs,
-    Sqrt,
-}
-
-/// The operations on two ranges.
-#[derive(Clone, Copy)]
-enum RangeBinary {
-    Add,
-    Sub,
-    Mul,
-    Min,
-    Max,
-    And,
-    Or,
-}
-
-/// The instructions for all nodes of a graph, in its order.
-#[derive(Default)]
-pub(super) struct Instructions(Vec<Instruction>);
-
-impl Instructions {
-    /// `None` if the graph has an operation that range programs do not have.
-    pub fn of(graph: &Graph) -> Option<Self> {
-        graph.nodes().map(|(_, expr)| Instruction::of(graph, expr)).collect::<Option<_>>().map(Self)
-    }
-}
-
-impl Instruction {
-    fn of(graph: &Graph, expr: Expr) -> Option<Self> {
-        Some(match RangeRule::of(graph, expr) {
-            RangeRule::Square(a) => Self::Square(a),
-            RangeRule::Slab { of, first, second } => Self::Slab { of, first, second },
-            RangeRule::Plain(Expr::Constant(bits)) => Self::Constant(f64::from_bits(bits)),
-            RangeRule::Plain(Expr::Coordinate(axis)) => {
-                Self::Coordinate(Axis::SPACE.into_iter().position(|place| place == axis)?)
-            }
-            RangeRule::Plain(Expr::Parameter(i)) => Self::Parameter(i),
-            RangeRule::Plain(Expr::Uniform(i)) => Self::Uniform(i),
-            RangeRule::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
-            RangeRule::Plain(Expr::Binary(Binary::Div, a, b)) => {
-                let by_number = matches!(graph.expr(b), Expr::Constant(_) | Expr::Parameter(_));
-                by_number.then_some(Self::Divide(a, b))?
-            }
-            RangeRule::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
-        })
-    }
-}
-
-impl RangeUnary {
-    fn of(op: Unary) -> Option<Self> {
-        match op {
-            Unary::Neg => Some(Self::Neg),
-            Unary::Abs => Some(Self::Abs),
-            Unary::Sqrt => Some(Self::Sqrt),
-            Unary::Sign | Unary::Call(_) => None,
-        }
-    }
-}
-
-impl RangeBinary {
-    fn of(op: Binary) -> Option<Self> {
-        match op {
-            Binary::Add => Some(Self::Add),
-            Binary::Sub => Some(Self::Sub),
-            Binary::Mul => Some(Self::Mul),
-            Binary::Min | Binary::PlainMin => Some(Self::Min),
-            Binary::Max | Binary::PlainMax => Some(Self::Max),
-            Binary::And => Some(Self::And),
-            Binary::Or => Some(Self::Or),
-            Binary::Div
-            | Binary::DivOrZero
-            | Binary::MinWeight
-            | Binary::MaxWeight
-            | Binary::AndWeight
-            | Binary::OrWeight
-            | Binary::Call(_) => None,
-        }
-    }
-}
-
-/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by
-/// zero is not finite.
-pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
-    let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
-    let ranges = evaluator.all_with(&Region { space: &space, ..numbers });
-    let within = |node: Node, limit: f64| {
-        let range = ranges[node.index()];
-        range.lo > -limit && range.hi < limit
-    };
-    graph.nodes().all(|(node, expr)| {
-        let operands_fit = match expr {
-            Expr::Binary(Binary::And | Binary::Or, a, b) => {
-                within(a, LARGEST_OPERAND) && within(b, LARGEST_OPERAND)
-            }
-            // all others overflow only where their result does
-            Expr::Constant(_)
-            | Expr::Coordinate(_)
-            | Expr::Parameter(_)
-            | Expr::Uniform(_)
-            | Expr::Unary(..)
-            | Expr::Binary(
-                Binary::Add
-                | Binary::Sub
-                | Binary::Mul
-                | Binary::Div
-                | Binary::DivOrZero
-                | Binary::Min
-                | Binary::Max
-                | Binary::PlainMin
-                | Binary::PlainMax
-                | Binary::MinWeight
-                | Binary::MaxWeight
-                | Binary::Call(_)
-                | Binary::AndWeight
-                | Binary::OrWeight,
-                ..,
-            ) => true,
-        };
-        operands_fit && within(node, LARGEST)
-    })
-}
-
-/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of the
-/// root out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
+/// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of each
+/// output out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
 /// there are any.
 pub(super) fn emit(
     builder: &mut FunctionBuilder<'_>,
@@ -248,13 +81,15 @@ pub(super) fn emit(
             Instruction::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
             Instruction::Unary(op, a) => ranges.unary(op, ranges.values[&a]),
             Instruction::Binary(op, a, b) => ranges.binary(op, a, b),
+            Instruction::Share => ranges.pair(0.0, 1.0),
             Instruction::Divide(a, number) => ranges.divide(ranges.values[&a], ranges.numbers[&number]),
         };
         ranges.values.insert(node, value);
     }
-    let root = ranges.values[&request.outputs[0]];
-    let root = ranges.flip(root, BoundLane::Low);
-    ranges.emitter.builder.ins().store(MemFlagsData::new(), root, output, 0);
+    for (i, node) in request.outputs.iter().enumerate() {
+        let range = ranges.flip(ranges.values[node], BoundLane::Low);
+        ranges.emitter.builder.ins().store(MemFlagsData::new(), range, output, 16 * i as i32);
+    }
     ranges.emitter.builder.ins().return_(&[]);
 }
 

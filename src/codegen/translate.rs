@@ -14,6 +14,7 @@ use super::host_functions::{HostFunction, Library};
 use super::machine::{CodegenError, target};
 use super::memory::Code;
 use super::range;
+use super::range_instructions::Instructions;
 use super::request::{Request, Shape, pointers};
 use crate::ir::{Axis, Expr, Node};
 use crate::precision::Precision;
@@ -94,9 +95,9 @@ pub(super) fn define(
         return Err(CodegenError::Bug("time is in the graph of a program".into()));
     }
     let instructions = match request.shape {
-        Shape::Range(_) => range::Instructions::of(request.graph)
+        Shape::Range(_) => Instructions::of(request.graph)
             .ok_or_else(|| CodegenError::Bug("a range program of this formula".into()))?,
-        Shape::Point | Shape::Batch => range::Instructions::default(),
+        Shape::Point | Shape::Batch => Instructions::default(),
     };
     let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
     let mut context = module.make_context();

@@ -13,8 +13,11 @@
 //! Invariant: a cell that is not counted is proven to hold what the grid says, or it was searched down to an
 //! eighth of a cell without a witness.
 
+mod edges;
 mod found;
 mod look;
+
+use std::cell::RefCell;
 
 use rayon::prelude::*;
 
@@ -26,6 +29,7 @@ use super::{
     signs::{Brick, Signs, crossed_cells},
 };
 use crate::{field::Field, geom::Aabb};
+use edges::BrickEdges;
 use look::Look;
 
 pub use found::ThinCells;
@@ -50,7 +54,8 @@ pub fn thin_cells(field: &dyn Field, grid: &Grid) -> Result<ThinCells, MeshError
             let crossed = std::array::from_fn(|z| crossed_cells(&around.corners(z)));
             let undecided = std::array::from_fn(|z| undecided_cells(&around.corners(z)));
             let low = brick.at.map(|b| b * BRICK);
-            Search { field, lattice: &lattice, low, cells, crossed, undecided }.count([0; 3], BRICK)
+            let edges = RefCell::new(BrickEdges::new(low));
+            Search { field, lattice: &lattice, low, cells, crossed, undecided, edges }.count([0; 3], BRICK)
         })
         .collect();
     Ok(parts.into_iter().fold(ThinCells::NONE, ThinCells::and))
@@ -66,6 +71,7 @@ struct Search<'a> {
     cells: [usize; 3],
     crossed: Signs,
     undecided: Signs,
+    edges: RefCell<BrickEdges>,
 }
 
 impl Search<'_> {
@@ -88,8 +94,8 @@ impl Search<'_> {
             }
             let holds = |cells: &Signs| cells[first[2]] >> (BRICK * first[1] + first[0]) & 1 == 1;
             let (is_crossed, is_undecided) = (holds(&self.crossed), holds(&self.undecided));
-            let Self { field, lattice, .. } = *self;
-            return Look { field, lattice, low, bounds, is_crossed, is_undecided }.into_cell();
+            let Self { field, lattice, ref edges, .. } = *self;
+            return Look { field, lattice, edges, low, bounds, is_crossed, is_undecided }.into_cell();
         }
         if self.any_crossed(first, size) && look::is_one_sheet(self.field, &bounds) {
             return ThinCells::NONE;

@@ -1,10 +1,12 @@
 //! The values of a solid: ω and its gradient, its sign, its range, the surface near a point.
 
+use std::cell::OnceCell;
+
 use glam::{DVec3, Vec3};
 
 use super::construction::Solid;
 use super::engine::ProgramKind;
-use super::nearest::Distance;
+use super::nearest::{Distance, Distances};
 use super::programs::on_demand::Lane;
 use crate::field::{Field, GradientsMut, Points};
 use crate::geom::Aabb;
@@ -85,10 +87,15 @@ impl Solid {
     /// Distance, normal and curvature of the surface as seen from a point: accurate near the surface, an
     /// estimate far away, but never 0 off the surface.
     pub fn contact(&self, p: DVec3) -> Contact {
+        self.contact_or_search(p, &OnceCell::new())
+    }
+
+    /// The contact at a point. `distances` are prepared when a search is first needed.
+    fn contact_or_search(&self, p: DVec3, distances: &OnceCell<Distances>) -> Contact {
         let contact = self.estimated_contact(p);
         let is_lost = contact.distance == 0.0 || contact.distance.is_nan();
         if is_lost && self.sign(p).abs() == 1.0 {
-            self.searched_contact(p).unwrap_or(contact)
+            searched_contact(distances.get_or_init(|| Distances::new(self)), p).unwrap_or(contact)
         } else {
             contact
         }
@@ -100,14 +107,6 @@ impl Solid {
         self.evaluate(ProgramKind::Contact, p.to_array(), &mut out);
         let [distance, nx, ny, nz, mean_curvature] = out;
         Contact { distance, normal: DVec3::new(nx, ny, nz), mean_curvature }
-    }
-
-    /// The contact with the nearest point of the surface; `None` if there is no surface. Nothing is known of
-    /// its curvature.
-    fn searched_contact(&self, p: DVec3) -> Option<Contact> {
-        let Distance { estimate, nearest, .. } = self.distance(p);
-        let normal = (p - nearest) / estimate;
-        normal.is_finite().then_some(Contact { distance: estimate, normal, mean_curvature: 0.0 })
     }
 
     /// The velocity of the surface near a point, along its normal, in lengths per second: that of the face
@@ -136,11 +135,12 @@ impl Solid {
     pub fn contact_many<T: Lane>(&self, points: [&[T]; 3], out: [&mut [T]; 5]) {
         let [distance, nx, ny, nz, curvature] = out;
         self.evaluate_many(ProgramKind::Contact, points, [distance, nx, ny, nz, curvature]);
+        let distances = OnceCell::new();
         for i in 0..distance.len() {
             let found = distance[i].to_f64();
             if found == 0.0 || found.is_nan() {
                 let p = DVec3::from_array(points.map(|column| column[i].to_f64()));
-                let Contact { distance: d, normal, mean_curvature } = self.contact(p);
+                let Contact { distance: d, normal, mean_curvature } = self.contact_or_search(p, &distances);
                 let row = [d, normal.x, normal.y, normal.z, mean_curvature].map(T::from_f64);
                 [distance[i], nx[i], ny[i], nz[i], curvature[i]] = row;
             }
@@ -170,6 +170,14 @@ impl Solid {
     pub fn range(&self, over: &Aabb) -> Interval {
         self.inner.omega.range(self.inner.engine, over, &self.moment, false)
     }
+}
+
+/// The contact with the nearest point of the surface; `None` if there is no surface. Nothing is known of its
+/// curvature.
+fn searched_contact(distances: &Distances, p: DVec3) -> Option<Contact> {
+    let Distance { estimate, nearest, .. } = distances.at(p);
+    let normal = (p - nearest) / estimate;
+    normal.is_finite().then_some(Contact { distance: estimate, normal, mean_curvature: 0.0 })
 }
 
 impl Field for Solid {

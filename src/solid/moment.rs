@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::bounds::extent::Bounds;
+use super::bounds::find::FoundBounds;
 use super::engine::ProgramKind;
 use super::leaves::leaf_set::LeafTree;
 use super::programs::number::UniformValues;
@@ -18,7 +18,7 @@ pub(super) struct Moment {
     omega_ranges: OnceLock<UniformRanges>,
     twin_ranges: OnceLock<UniformRanges>,
     parts: OnceLock<Option<Arc<LeafTree>>>,
-    bounds: OnceLock<Bounds>,
+    bounds: OnceLock<FoundBounds>,
 }
 
 impl Moment {
@@ -56,7 +56,7 @@ impl Moment {
         self.parts.get_or_init(|| find(self.from, self.to)).clone()
     }
 
-    pub fn bounds(&self, find: impl FnOnce() -> Bounds) -> &Bounds {
+    pub fn bounds(&self, find: impl FnOnce() -> FoundBounds) -> &FoundBounds {
         self.bounds.get_or_init(find)
     }
 }

@@ -4,13 +4,13 @@
 //! ones. From below it is bounded by the nearest cell that may hold such a point, see `bounds::contraction`.
 //! Neither needs a gradient, so axes, medial surfaces and places without a normal are like any others.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::bounds::contraction::Tree;
+use super::bounds::queue::Queued;
 use super::bounds::search::{Effort, SEARCH_RADIUS, Shrink};
 use super::bounds::whole::WholeFormula;
 use super::construction::Solid;
@@ -109,9 +109,11 @@ impl Distances {
         let Some(known) = target.shrink(&target.everything(), &mut around, Effort::Large) else {
             return (best.distance, best.distance, best.point);
         };
-        let mut queue = BinaryHeap::from([Cell { distance: distance_to(&around, p), space: around, known }]);
+        // the nearest box comes first
+        let mut queue = BinaryHeap::from([Queued { rank: -distance_to(&around, p), space: around, known }]);
         let (mut cells, mut work) = (0, MOST_WORK);
-        while let Some(Cell { distance, space, known }) = queue.pop() {
+        while let Some(Queued { rank, space, known }) = queue.pop() {
+            let distance = -rank;
             if distance >= (1.0 - GAP) * best.distance || cells == MOST_CELLS || work == 0 {
                 return (distance.min(best.distance), best.distance, best.point);
             }
@@ -122,7 +124,7 @@ impl Distances {
                 let Some((known, beyond)) = target.shrink_from(&known, &mut half, p) else { continue };
                 let distance = distance_to(&half, p).max(beyond);
                 if distance < best.distance {
-                    queue.push(Cell { distance, space: half, known });
+                    queue.push(Queued { rank: -distance, space: half, known });
                 }
             }
         }
@@ -212,31 +214,4 @@ impl Best<'_> {
 /// A bound of the distance from a box, rounded downwards.
 fn distance_to(space: &Aabb, p: DVec3) -> f64 {
     (p.clamp(space.min, space.max) - p).length() * (1.0 - 4.0 * f64::EPSILON)
-}
-
-/// A cell with its order in the queue: the nearest first.
-struct Cell<K> {
-    distance: f64,
-    space: Aabb,
-    known: K,
-}
-
-impl<K> PartialEq for Cell<K> {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl<K> Eq for Cell<K> {}
-
-impl<K> PartialOrd for Cell<K> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<K> Ord for Cell<K> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.distance.total_cmp(&self.distance)
-    }
 }

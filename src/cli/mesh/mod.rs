@@ -216,15 +216,21 @@ fn measured(
     grid: &Grid,
     options: &Options,
 ) -> Result<(Option<Quality>, Option<Simplified>), Failure> {
-    let spinner = progress::spinner("measuring");
     let depth = Depth(solid);
-    let reference = Reference::new(surface, &depth, grid).map_err(Failure::usage)?;
+    let spinner = progress::spinner("a finer mesh");
+    let reference = Reference::new(surface, &depth, grid);
+    spinner.finish_and_clear();
+    let reference = reference.map_err(Failure::usage)?;
     let found = options.simplify.map(|tolerance| simplified(mesh, tolerance, &depth, &reference));
     let quality = match &found {
         Some(found) => found.quality,
-        None => reference.measure(mesh),
+        None => {
+            let spinner = progress::spinner("measuring");
+            let quality = reference.measure(mesh);
+            spinner.finish_and_clear();
+            quality
+        }
     };
-    spinner.finish_and_clear();
     Ok((options.quality.then_some(quality), found))
 }
 

@@ -4,7 +4,9 @@
 use std::time::Instant;
 
 use super::super::failure::note;
+use super::super::progress;
 use super::super::values::Tolerance;
+use super::milliseconds;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, Quality, Reference, simplify};
@@ -16,7 +18,10 @@ pub(super) struct Simplified {
     pub from: usize,
     /// In metres.
     pub tolerance: f64,
-    pub milliseconds: f64,
+    /// The time to contract edges.
+    pub simplifying: f64,
+    /// The time to measure what came of it.
+    pub measuring: f64,
 }
 
 impl Tolerance {
@@ -44,22 +49,28 @@ pub(super) fn simplified(
     reference: &Reference<'_>,
 ) -> Simplified {
     let tolerance = tolerance.of(mesh);
-    let started = Instant::now();
     let from = mesh.triangles.len();
-    let found = |quality: Quality| {
-        let milliseconds = started.elapsed().as_secs_f64() * 1e3;
-        Simplified { quality, from, tolerance, milliseconds }
+    let (mut simplifying, mut measuring) = (0.0, 0.0);
+    let measure = |mesh: &Mesh, time: &mut f64| {
+        let (started, bar) = (Instant::now(), progress::spinner("measuring"));
+        let quality = reference.measure(mesh);
+        bar.finish_and_clear();
+        *time += milliseconds(started);
+        quality
     };
     let mut own = None;
     for aim in AIMS {
         let mut less = mesh.clone();
+        let (started, bar) = (Instant::now(), progress::spinner("simplifying"));
         simplify(&mut less, distance, aim * tolerance);
-        let quality = reference.measure(&less);
+        bar.finish_and_clear();
+        simplifying += milliseconds(started);
+        let quality = measure(&less, &mut measuring);
         if quality.hausdorff() <= tolerance {
             *mesh = less;
-            return found(quality);
+            return Simplified { quality, from, tolerance, simplifying, measuring };
         }
-        let own: &Quality = own.get_or_insert_with(|| reference.measure(mesh));
+        let own: &Quality = own.get_or_insert_with(|| measure(mesh, &mut measuring));
         if own.hausdorff() > tolerance {
             note(format!(
                 "before it is simplified the mesh is already {:.2e} m from the surface, more than the \
@@ -67,9 +78,10 @@ pub(super) fn simplified(
                 own.hausdorff()
             ));
             *mesh = less;
-            return found(quality);
+            return Simplified { quality, from, tolerance, simplifying, measuring };
         }
     }
     note("no simplified mesh was found to be near enough to the surface: all triangles are kept");
-    found(own.unwrap_or_else(|| reference.measure(mesh)))
+    let quality = own.unwrap_or_else(|| measure(mesh, &mut measuring));
+    Simplified { quality, from, tolerance, simplifying, measuring }
 }

@@ -140,10 +140,9 @@ impl RangeEvaluator {
         values.clear();
         for &rule in &self.rules {
             // a coordinate is always a number, even if nothing else is known of it
-            let unknown = |node: Node| {
-                let is_coordinate = matches!(self.rules[node.index()], RangeRule::Plain(Expr::Coordinate(_)));
-                values[node.index()] == Interval::ALL && !is_coordinate
-            };
+            let is_coordinate =
+                |node: Node| matches!(self.rules[node.index()], RangeRule::Plain(Expr::Coordinate(_)));
+            let unknown = |node: Node| values[node.index()] == Interval::ALL && !is_coordinate(node);
             let value = match rule {
                 RangeRule::Square(a) | RangeRule::Slab { of: a, .. } if unknown(a) => Interval::ALL,
                 RangeRule::Square(a) => values[a.index()].square(),
@@ -151,7 +150,8 @@ impl RangeEvaluator {
                     let number = |affine: Affine| affine.number(|node| values[node.index()]);
                     slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
                 }
-                RangeRule::Plain(expr) if expr.operands().any(unknown) => Interval::ALL,
+                RangeRule::Plain(Expr::Unary(_, a)) if unknown(a) => Interval::ALL,
+                RangeRule::Plain(Expr::Binary(_, a, b)) if unknown(a) || unknown(b) => Interval::ALL,
                 RangeRule::Plain(expr) => plain(expr, values, region),
             };
             values.push(value);

@@ -128,10 +128,11 @@ impl Contractor {
             let is_open = rule.operands().zip(self.needs[i]).any(|(node, needed)| !needed && unknown(node));
             let found = numbers(rule, |node| values[node.index()], region);
             let fails = found.may_fail || rule.operands().any(unknown);
-            let value = match found.range {
-                Some(range) if !is_open => range,
-                None if self.needed[i] && !is_open => return None,
-                _ => Interval::ALL,
+            let value = match (found.range, is_open) {
+                (Some(range), false) => range,
+                (None, false) if self.needed[i] => return None,
+                // undefined where nobody asks for it, or made of what is undefined: nothing is known
+                (None, false) | (Some(_) | None, true) => Interval::ALL,
             };
             let value = match known.next_if(|(node, _)| node.index() == i) {
                 Some((_, range)) => meet(value, *range)?,

@@ -96,12 +96,13 @@ impl Rule {
             rule if rule.operands().all(|node| of(node) == Number) => Number,
             Self::Plain(Expr::Unary(crate::ir::Unary::Neg, a)) => of(a),
             Self::Plain(Expr::Binary(Binary::Add | Binary::Sub, a, b)) => match (of(a), of(b)) {
-                (Other, _) | (_, Other) => Other,
-                _ => Linear,
+                (Other, Number | Linear | Other) | (Number | Linear, Other) => Other,
+                (Number | Linear, Number | Linear) => Linear,
             },
             Self::Plain(Expr::Binary(Binary::Mul, a, b)) => match (of(a), of(b)) {
                 (Number, Linear) | (Linear, Number) => Linear,
-                _ => Other,
+                (Number, Number) => Number,
+                (Linear | Other, Linear | Other) | (Number, Other) | (Other, Number) => Other,
             },
             Self::Plain(Expr::Binary(Binary::Div, a, b)) if of(a) == Linear && of(b) == Number => Linear,
             Self::Plain(_) | Self::Power { .. } | Self::Slab { .. } => Other,

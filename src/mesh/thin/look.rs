@@ -1,9 +1,12 @@
 //! A closer look into one cell: which faces it holds, and whether the grid knows them.
 
+use std::cell::RefCell;
+
 use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::super::{normals::unit, prune::Lattice};
+use super::edges::BrickEdges;
 use super::found::ThinCells;
 use crate::field::{Field, Sheet};
 use crate::geom::Aabb;
@@ -33,11 +36,17 @@ const ON_FACE: f64 = 1e-8;
 /// A face that agrees more than this (cosine) with the way to it ends a thickness.
 const BACK: f64 = 0.5;
 
+/// Bisections of a way to the surface. They leave a millionth of it.
+pub(super) const HALVED: usize = 20;
+
 /// The longest way in cells over which a thickness is measured, and its steps.
 const THICKEST: f64 = 2.0;
 const STEPS_ACROSS: usize = 64;
 
 type Normals = SmallVec<[DVec3; 16]>;
+
+/// What a face's gradient may be in a box.
+type Slopes = [Interval; 3];
 
 pub(super) fn is_decided(range: Interval) -> bool {
     range.lo > 0.0 || range.hi <= 0.0
@@ -72,6 +81,8 @@ fn agrees(slopes: &[Interval; 3], way: DVec3, cosine: f64) -> bool {
 pub(super) struct Look<'a> {
     pub field: &'a dyn Field,
     pub lattice: &'a Lattice,
+    /// What is known of the edges in and around its brick.
+    pub edges: &'a RefCell<BrickEdges>,
     /// The extended indices of its low corner.
     pub low: [usize; 3],
     pub bounds: Aabb,
@@ -110,7 +121,7 @@ struct Foot {
 impl Look<'_> {
     /// The cell, if it holds a surface that the grid does not know.
     pub fn into_cell(self) -> ThinCells {
-        if self.is_crossed && is_one_sheet(self.field, &self.bounds) {
+        if self.is_crossed && self.shows_all() {
             return ThinCells::NONE;
         }
         let seen = self.seen();
@@ -142,6 +153,46 @@ impl Look<'_> {
             }
         }
         ThinCells::NONE
+    }
+
+    /// Whether the cell holds one face, or only faces that its own edges show. Most cells do, and need no look
+    /// around.
+    fn shows_all(&self) -> bool {
+        let mut faces: SmallVec<[(Slopes, Option<DVec3>); 8]> = SmallVec::new();
+        let all = self.field.sheets(&self.bounds, &mut |sheet| faces.push((sheet.slopes, middle(&sheet))));
+        if !all {
+            return false;
+        }
+        let is_even = |(slopes, way): &(Slopes, Option<DVec3>)| way.is_some_and(|w| agrees(slopes, w, KNOWN));
+        if faces.len() <= 1 && faces.iter().all(is_even) {
+            return true;
+        }
+        let own = self.own_normals();
+        let mut ways: Normals = SmallVec::new();
+        for (slopes, way) in &faces {
+            if !own.iter().any(|normal| agrees(slopes, *normal, KNOWN)) {
+                return false;
+            }
+            ways.extend(*way);
+        }
+        !has_opposed(&ways, if self.is_undecided { &[] } else { &own })
+    }
+
+    /// The normals where the surface crosses the edges of this cell.
+    fn own_normals(&self) -> Normals {
+        let Self { field, lattice, low, .. } = *self;
+        let mut edges = self.edges.borrow_mut();
+        let node = |corner: usize| [0, 1, 2].map(|axis: usize| low[axis] + (corner >> axis & 1));
+        let inside: [bool; 8] = std::array::from_fn(|c| edges.is_inside((field, lattice), node(c)));
+        let mut own: Normals = SmallVec::new();
+        for corner in 0..8 {
+            for axis in (0..3).filter(|axis| corner >> axis & 1 == 0) {
+                if inside[corner] != inside[corner | 1 << axis] {
+                    own.extend(edges.normal((field, lattice), node(corner), (axis, inside[corner])));
+                }
+            }
+        }
+        own
     }
 
     /// Divides a box until its faces are proven to be known, or are one or several parallel ones, or as often as
@@ -251,14 +302,14 @@ impl Look<'_> {
     /// The normals where the surface crosses the edges of this cell and of those around it.
     fn seen(&self) -> Seen {
         let mut seen = Seen { around: SmallVec::new(), own: SmallVec::new() };
-        // nodes from one below the cell to one above it, those of the ring outside
+        let Self { field, lattice, .. } = *self;
+        // nodes from one below the cell to one above it
         let node = |i: [usize; 3]| [0, 1, 2].map(|axis: usize| self.low[axis] + i[axis] - 1);
-        let place = |i: [usize; 3]| self.lattice.position(node(i));
+        let mut edges = self.edges.borrow_mut();
         let mut inside = [false; 64];
         for (number, inside) in inside.iter_mut().enumerate() {
             let i = [number % 4, number / 4 % 4, number / 16];
-            let is_ring = (0..3).any(|axis| self.lattice.is_ring(axis, node(i)[axis]));
-            *inside = !is_ring && self.field.omega(place(i)) > 0.0;
+            *inside = edges.is_inside((field, lattice), node(i));
         }
         for number in 0..64 {
             let i = [number % 4, number / 4 % 4, number / 16];
@@ -266,13 +317,9 @@ impl Look<'_> {
                 if i[axis] == 3 || inside[number] == inside[number + step] {
                     continue;
                 }
-                let mut other = i;
-                other[axis] += 1;
-                let mut ends = [place(i), place(other)];
-                if inside[number] {
-                    ends.reverse();
-                }
-                let Some(normal) = self.normal_between(ends) else { continue };
+                let Some(normal) = edges.normal((field, lattice), node(i), (axis, inside[number])) else {
+                    continue;
+                };
                 let beside = [(axis + 1) % 3, (axis + 2) % 3];
                 if i[axis] == 1 && beside.iter().all(|&axis| i[axis] == 1 || i[axis] == 2) {
                     seen.own.push(normal);
@@ -284,19 +331,7 @@ impl Look<'_> {
         }
         seen
     }
-
-    /// The outward normal where ω changes its sign between a point outside and one inside.
-    fn normal_between(&self, [mut outside, mut inside]: [DVec3; 2]) -> Option<DVec3> {
-        for _ in 0..HALVED {
-            let middle = outside.midpoint(inside);
-            if self.field.omega(middle) > 0.0 { inside = middle } else { outside = middle }
-        }
-        unit(-self.field.omega_grad(inside).1)
-    }
 }
-
-/// Bisections of an edge. They leave a millionth of it.
-const HALVED: usize = 20;
 
 /// The surface of a face by Newton's method. `None` if it leaves the box or does not settle.
 fn descend(at: &dyn Fn(DVec3) -> (f64, DVec3), start: DVec3, within: &Aabb, size: f64) -> Option<Foot> {

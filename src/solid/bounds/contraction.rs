@@ -104,7 +104,6 @@ impl Tree {
         let mut distance: f64 = 0.0;
         for _ in 0..rounds {
             let before = *space;
-            let (left, forms) = (Vec::new(), Vec::new());
             let mut pass = Pass {
                 leaves: &self.parts.leaves,
                 words: &words,
@@ -112,8 +111,8 @@ impl Tree {
                 from,
                 origin: space.centre(),
                 distance: 0.0,
-                left,
-                forms,
+                left: Vec::new(),
+                forms: Vec::new(),
             };
             match pass.tree(&mut 0, space) {
                 Contracted::Nowhere => return None,

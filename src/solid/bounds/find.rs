@@ -7,13 +7,31 @@ use super::whole::WholeFormula;
 use crate::geom::Aabb;
 use crate::solid::construction::Solid;
 
+/// The bounds of a solid, and the sides to which no end of it was found.
+pub struct FoundBounds {
+    pub bounds: Bounds,
+    pub open: Vec<Side>,
+}
+
 impl Solid {
     /// Where the solid is; found on first use, then kept.
     pub fn bounds(&self) -> &Bounds {
-        self.moment.bounds(|| match self.hull() {
-            None => Bounds::Empty,
-            Some(hull) if Side::all().any(|side| side.is_open(&hull)) => Bounds::Unbounded,
-            Some(hull) => Bounds::Within(hull),
+        &self.found_bounds().bounds
+    }
+
+    /// The sides to which no end of the solid was found.
+    pub(super) fn open_sides(&self) -> &[Side] {
+        &self.found_bounds().open
+    }
+
+    fn found_bounds(&self) -> &FoundBounds {
+        self.moment.bounds(|| {
+            let Some(hull) = self.hull() else {
+                return FoundBounds { bounds: Bounds::Empty, open: Vec::new() };
+            };
+            let open: Vec<Side> = Side::all().filter(|side| side.is_open(&hull)).collect();
+            let bounds = if open.is_empty() { Bounds::Within(hull) } else { Bounds::Unbounded };
+            FoundBounds { bounds, open }
         })
     }
 
@@ -23,11 +41,5 @@ impl Solid {
             Some(parts) => search(&Tree { words: parts.words.clone(), parts }),
             None => search(&WholeFormula::of(self, false)),
         }
-    }
-
-    /// The sides to which no end of the solid was found.
-    pub(super) fn open_sides(&self) -> Vec<Side> {
-        let hull = if *self.bounds() == Bounds::Unbounded { self.hull() } else { None };
-        hull.map_or(Vec::new(), |hull| Side::all().filter(|side| side.is_open(&hull)).collect())
     }
 }

@@ -6,12 +6,14 @@
 //! | `contraction` | boxes around trees of leaves, made smaller from all conjuncts together |
 //! | `whole` | the same for solids that are too large to be taken apart |
 //! | `search` | contraction first, then subdivision from each side |
+//! | `queue` | boxes that wait for it |
 //! | `find` | the bounds of a solid |
 //! | `unbounded` | which operand has no box, and to which sides |
 
 pub mod contraction;
 pub mod extent;
-mod find;
+pub mod find;
+pub mod queue;
 pub mod search;
 pub mod unbounded;
 pub mod whole;

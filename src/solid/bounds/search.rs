@@ -4,11 +4,11 @@
 //! two, until a point of the solid is known to be as far out as the farthest cell. Whenever the search ends, all
 //! cells together still hold the solid, so the box is right and can only be too large.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
+use super::queue::Queued;
 use crate::geom::Aabb;
 
 /// Half the side of the cube in which solids are looked for. Programs answer no signs farther out than 2²⁵⁶.
@@ -48,7 +48,8 @@ pub trait Shrink {
     fn everything(&self) -> Self::Known;
     /// What is known of the smaller box; `None` if it is proven to be outside. `known` holds of a larger one.
     fn shrink(&self, known: &Self::Known, space: &mut Aabb, effort: Effort) -> Option<Self::Known>;
-    /// As for a cell, with a bound from below of the distance between a point and all that is left.
+    /// What [`Shrink::shrink`] finds with [`Effort::Cell`], and a distance: every point of the solid in the
+    /// smaller box is at least that far from `p`.
     fn shrink_from(&self, known: &Self::Known, space: &mut Aabb, p: DVec3) -> Option<(Self::Known, f64)>;
     /// What a call costs, in units that `WORK_OF_SIDE` knows.
     fn work(&self, known: &Self::Known) -> usize;
@@ -103,7 +104,7 @@ pub fn search<S: Shrink>(solid: &S) -> Option<Aabb> {
     // a solid that does not end on one side need not be measured on the others
     let (open, closed): (Vec<Side>, Vec<Side>) = Side::all().partition(|side| side.is_open(&hull));
     for side in open.into_iter().chain(closed) {
-        let mut faces = Faces { solid, side, cells: Vec::new(), hull };
+        let faces = Faces { solid, side, hull };
         let reach;
         (reach, cells) = faces.find(cells)?;
         side.set(&mut hull, reach);
@@ -114,38 +115,10 @@ pub fn search<S: Shrink>(solid: &S) -> Option<Aabb> {
     Some(hull)
 }
 
-/// A cell with its order in the queue.
-struct Cell<K> {
-    reach: f64,
-    space: Aabb,
-    known: K,
-}
-
-impl<K> PartialEq for Cell<K> {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl<K> Eq for Cell<K> {}
-
-impl<K> PartialOrd for Cell<K> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<K> Ord for Cell<K> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.reach.total_cmp(&other.reach)
-    }
-}
-
 /// The search for one side.
 struct Faces<'a, S: Shrink> {
     solid: &'a S,
     side: Side,
-    cells: Vec<Cell<S::Known>>,
     hull: Aabb,
 }
 
@@ -154,25 +127,25 @@ type Reach<K> = (f64, Vec<(Aabb, K)>);
 
 impl<S: Shrink> Faces<'_, S> {
     /// How far the solid reaches, and cells that hold it; `None` if there is no part of it.
-    fn find(&mut self, parts: Vec<(Aabb, S::Known)>) -> Option<Reach<S::Known>> {
+    fn find(&self, parts: Vec<(Aabb, S::Known)>) -> Option<Reach<S::Known>> {
         let (side, hull) = (self.side, self.hull);
         let cell = |(space, known): (Aabb, S::Known)| {
             let space = space.intersection(&hull);
-            (!space.is_empty()).then(|| Cell { reach: side.of(&space), space, known })
+            (!space.is_empty()).then(|| Queued { rank: side.of(&space), space, known })
         };
-        let mut queue: BinaryHeap<Cell<S::Known>> = parts.into_iter().filter_map(cell).collect();
-        self.cells.clear();
+        // the rank is how far out a box reaches
+        let mut queue: BinaryHeap<Queued<S::Known>> = parts.into_iter().filter_map(cell).collect();
         // how far out a point of the solid is known
         let mut found = f64::NEG_INFINITY;
         let (mut cells, mut work) = (0, WORK_OF_SIDE);
         loop {
             let farthest = queue.pop()?;
             let goal = self.goal(&farthest, cells);
-            if farthest.reach - found > goal {
+            if farthest.rank - found > goal {
                 found = found.max(self.farthest_point(&farthest, goal));
             }
-            if farthest.reach - found <= goal || cells == CELLS_OF_SIDE || work == 0 {
-                let reach = farthest.reach;
+            if farthest.rank - found <= goal || cells == CELLS_OF_SIDE || work == 0 {
+                let reach = farthest.rank;
                 queue.push(farthest);
                 return Some((reach, queue.into_iter().map(|cell| (cell.space, cell.known)).collect()));
             }
@@ -180,13 +153,13 @@ impl<S: Shrink> Faces<'_, S> {
             work = work.saturating_sub(self.solid.work(&farthest.known));
             for mut half in halves(&farthest.space) {
                 if let Some(known) = self.solid.shrink(&farthest.known, &mut half, Effort::Cell) {
-                    queue.push(Cell { reach: side.of(&half), space: half, known });
+                    queue.push(Queued { rank: side.of(&half), space: half, known });
                 }
             }
         }
     }
 
-    fn goal(&self, cell: &Cell<S::Known>, cells: usize) -> f64 {
+    fn goal(&self, cell: &Queued<S::Known>, cells: usize) -> f64 {
         if self.side.is_open(&cell.space) {
             return 0.0;
         }
@@ -196,14 +169,14 @@ impl<S: Shrink> Faces<'_, S> {
     }
 
     /// How far out a point of the solid is known in a cell.
-    fn farthest_point(&self, cell: &Cell<S::Known>, goal: f64) -> f64 {
+    fn farthest_point(&self, cell: &Queued<S::Known>, goal: f64) -> f64 {
         if S::is_inside(&cell.known) {
-            return cell.reach;
+            return cell.rank;
         }
         let mut face = cell.space.centre();
         let inwards = 0.5 * goal;
         let sign = if self.side.upper { 1.0 } else { -1.0 };
-        face[self.side.axis] = sign * (cell.reach - inwards);
+        face[self.side.axis] = sign * (cell.rank - inwards);
         // the point of the side that is nearest to the origin: unbounded solids are often seen there
         let mut near = DVec3::ZERO.clamp(cell.space.min, cell.space.max);
         near[self.side.axis] = face[self.side.axis];

@@ -43,9 +43,9 @@ impl Solid {
         let operand = self.unbounded_operand(graph, root);
         let part = if operand == root { None } else { self.operand(graph, operand) };
         let open = part.as_ref().unwrap_or(self).open_sides();
-        let sides = open
-            .into_iter()
-            .map(|Side { axis, upper }| [["-x", "+x"], ["-y", "+y"], ["-z", "+z"]][axis][usize::from(upper)]);
+        let sides = open.iter().map(|&Side { axis, upper }| {
+            [["-x", "+x"], ["-y", "+y"], ["-z", "+z"]][axis][usize::from(upper)]
+        });
         Some(Unbounded { operand: graph.span(operand), is_whole: operand == root, sides: sides.collect() })
     }
 

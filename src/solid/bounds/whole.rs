@@ -11,6 +11,10 @@ use glam::DVec3;
 /// Leaves that get a box of their own. Solids that cannot be taken apart have few: they use each often.
 const MOST_LEAVES: usize = 50_000;
 
+/// Walks over all nodes that a cell takes: forwards, backwards and with slopes, for two halves and some points. A
+/// tree of leaves visits the few that are left in the cell.
+const WALKS_OF_CELL: usize = 8;
+
 /// The formula of a solid as one.
 pub struct WholeFormula {
     contractor: Contractor,
@@ -74,7 +78,7 @@ impl Shrink for WholeFormula {
     }
 
     fn work(&self, _: &bool) -> usize {
-        1 + self.contractor.len() / NODES_PER_WORK
+        1 + WALKS_OF_CELL * self.contractor.len() / NODES_PER_WORK
     }
 
     fn parts(&self, space: &Aabb) -> Vec<(Aabb, bool)> {

@@ -35,6 +35,8 @@ pub struct LeafStore {
     leaves: Vec<Leaf>,
     constants: Vec<f64>,
     uniforms: usize,
+    /// For each leaf, whether machine code may answer for its slopes.
+    tame_slopes: OnceLock<Vec<bool>>,
 }
 
 /// The leaves during a stretch of time: values are those at its end, ranges hold all of it.
@@ -70,7 +72,7 @@ impl LeafStore {
     pub fn new(engine: Engine, graph: &Graph, nodes: &[Node]) -> Self {
         let mut known: HashMap<Vec<Expr>, u32> = HashMap::new();
         let (shapes, leaves, constants) = (Vec::new(), Vec::new(), Vec::new());
-        let mut out = Self { engine, shapes, leaves, constants, uniforms: 0 };
+        let mut out = Self { engine, shapes, leaves, constants, uniforms: 0, tame_slopes: OnceLock::new() };
         for &node in nodes {
             let (shape, root, constants) = graph.parametrised(node);
             let next = out.shapes.len() as u32;
@@ -95,6 +97,15 @@ impl LeafStore {
         let shape = &self.shapes[leaf.shape as usize];
         let first = leaf.first as usize;
         (shape, &self.constants[first..first + shape.parameters])
+    }
+
+    fn has_tame_slopes(&self, leaf: u32) -> bool {
+        let is_tame = |leaf: u32| {
+            let (shape, constants) = self.of(leaf);
+            shape.motion.is_none() && shape.slopes(self.engine).is_tame(constants)
+        };
+        let all = || (0..self.leaves.len() as u32).map(is_tame).collect();
+        self.tame_slopes.get_or_init(all)[leaf as usize]
     }
 
     /// The leaves that move, with their shapes and constants.
@@ -194,12 +205,18 @@ impl Leaves {
     /// Enclosures of the leaf's derivatives over a box, at all times of the stretch.
     pub fn slopes(&self, leaf: u32, over: &Aabb) -> [Interval; 3] {
         let (shape, constants, own) = self.of(leaf);
+        let evaluator = shape.slopes(self.store.engine);
         if own.is_empty() {
-            return shape.slopes().over(&Region { parameters: constants, ..Region::of(over) });
+            if self.store.has_tame_slopes(leaf)
+                && let Some(slopes) = evaluator.by_code(over, constants)
+            {
+                return slopes;
+            }
+            return evaluator.over(&Region { parameters: constants, ..Region::of(over) });
         }
         let first = self.store.leaves[leaf as usize].first_uniform as usize;
         let uniforms = &self.ranges().uniforms[first..first + own.len()];
-        shape.slopes().over(&Region { parameters: constants, uniforms, ..Region::of(over) })
+        evaluator.over(&Region { parameters: constants, uniforms, ..Region::of(over) })
     }
 
     /// Visits the faces of a tree in prefix form that may be part of its surface in a box, those of leaves

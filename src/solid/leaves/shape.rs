@@ -43,16 +43,34 @@ pub struct Shape {
 
 /// Ranges of a shape's derivatives.
 pub struct SlopeEvaluator {
+    graph: Graph,
     ranges: RangeEvaluator,
     derivatives: [Node; 3],
+    /// `None` for few leaves, and where only the interpreter knows the operations.
+    code: Option<RangeProgram>,
 }
 
 impl SlopeEvaluator {
-    fn new(graph: &Graph, root: Node) -> Self {
-        let mut graph = graph.clone();
-        let derivatives = ir::gradient(&mut graph, root);
+    fn new(shape: &Shape, engine: Engine) -> Self {
+        let mut graph = shape.graph.clone();
+        let derivatives = ir::gradient(&mut graph, shape.root);
         let (graph, roots, _) = simplify(&graph, &derivatives);
-        Self { ranges: RangeEvaluator::new(&graph, roots[0]), derivatives: [roots[0], roots[1], roots[2]] }
+        let derivatives = [roots[0], roots[1], roots[2]];
+        let ranges = RangeEvaluator::new(&graph, roots[0]);
+        let pays = engine != Engine::Interpreter && shape.leaves >= MANY_LEAVES && shape.motion.is_none();
+        let code = pays.then(|| RangeProgram::of_all(&graph, &derivatives, shape.parameters).ok()).flatten();
+        Self { graph, ranges, derivatives, code }
+    }
+
+    /// Whether machine code may answer for a leaf at rest with these numbers.
+    pub fn is_tame(&self, parameters: &[f64]) -> bool {
+        let numbers = Region { parameters, ..Region::of(&Aabb::EMPTY) };
+        self.code.is_some() && codegen::range_stays_finite(&self.graph, &self.ranges, numbers)
+    }
+
+    /// Enclosures of the derivatives of a tame leaf over a box; `None` if it reaches too far out.
+    pub fn by_code(&self, over: &Aabb, parameters: &[f64]) -> Option<[Interval; 3]> {
+        self.code.as_ref()?.call_all(over, parameters, &[])
     }
 
     /// Enclosures of the derivatives over a region.
@@ -182,8 +200,8 @@ impl Shape {
     }
 
     /// Ranges of the derivatives.
-    pub fn slopes(&self) -> &SlopeEvaluator {
-        self.slopes.get_or_init(|| SlopeEvaluator::new(&self.graph, self.root))
+    pub fn slopes(&self, engine: Engine) -> &SlopeEvaluator {
+        self.slopes.get_or_init(|| SlopeEvaluator::new(self, engine))
     }
 
     /// What makes boxes smaller around the points where a leaf is positive.

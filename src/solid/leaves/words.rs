@@ -49,10 +49,10 @@ pub fn encode(logic: &Logic, out: &mut Vec<u32>) {
 
 /// The tree of the complement: leaves change their signs, "all of" and "any of" their places.
 pub fn opposite(words: &[u32]) -> Vec<u32> {
-    let other = |&word: &u32| match word >> KIND_SHIFT {
-        LEAF => word ^ 1,
-        ALL => ANY << KIND_SHIFT | word & PAYLOAD,
-        _ => ALL << KIND_SHIFT | word & PAYLOAD,
+    let other = |&word: &u32| match Word::read(word) {
+        Word::Leaf { .. } => word ^ 1,
+        Word::All(parts) => ANY << KIND_SHIFT | parts,
+        Word::Any(parts) => ALL << KIND_SHIFT | parts,
     };
     words.iter().map(other).collect()
 }

@@ -1,7 +1,7 @@
 //! How a graph is evaluated over a block of points: the steps, their order, and the columns of their results.
 //!
-//! R₀ is a step of its own, a *junction*; in solids of many leaves so are min and max, and sums and products
-//! of what junctions give. What is left falls apart into pieces of plain arithmetic, each of which is
+//! R₀ is a step of its own, a *junction*; in solids of many leaves so are min and max, and sums, products
+//! and quotients of what junctions give. What is left falls apart into pieces of plain arithmetic, each of which is
 //! compiled into one program. Where many pieces have one shape and differ in their constants alone, they
 //! share a program: ten thousand balls are compiled as one.
 //!
@@ -108,7 +108,7 @@ fn is_step(graph: &Graph, expr: Expr, many: bool, is_junction: &[bool]) -> bool 
             let is_number = |node| matches!(graph.expr(node), Expr::Constant(_) | Expr::Uniform(_));
             !is_number(a) && !is_number(b)
         }
-        Expr::Binary(Binary::Add | Binary::Sub | Binary::Mul, a, b) => {
+        Expr::Binary(Binary::Add | Binary::Sub | Binary::Mul | Binary::Div | Binary::DivOrZero, a, b) => {
             is_junction[a.index()] || is_junction[b.index()]
         }
         Expr::Unary(Unary::Neg, a) => is_junction[a.index()],

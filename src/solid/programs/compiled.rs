@@ -265,7 +265,7 @@ impl RangeProgram {
         if !codegen::range_is_supported(graph, root) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        Self::new(graph, root, rounding, None)
+        Self::new(graph, &[root], rounding, None)
     }
 
     /// A program of a graph with uniforms. It may be called with those for which
@@ -277,7 +277,7 @@ impl RangeProgram {
         if !codegen::range_is_known(graph) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        Self::new(graph, root, ROUNDING, None)
+        Self::new(graph, &[root], ROUNDING, None)
     }
 
     /// A program that takes its constants as parameters. It may be called with those for which
@@ -286,15 +286,23 @@ impl RangeProgram {
     /// # Errors
     /// Those of [`RangeProgram::compile`].
     pub fn with_parameters(graph: &Graph, root: Node, parameters: usize) -> Result<Self, CodegenError> {
+        Self::of_all(graph, &[root], parameters)
+    }
+
+    /// A program as of [`RangeProgram::with_parameters`] for several nodes, see [`RangeProgram::call_all`].
+    ///
+    /// # Errors
+    /// Those of [`RangeProgram::compile`].
+    pub(crate) fn of_all(graph: &Graph, outputs: &[Node], parameters: usize) -> Result<Self, CodegenError> {
         if !codegen::range_is_known(graph) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        Self::new(graph, root, ROUNDING, Some(parameters))
+        Self::new(graph, outputs, ROUNDING, Some(parameters))
     }
 
     fn new(
         graph: &Graph,
-        root: Node,
+        outputs: &[Node],
         rounding: Rounding,
         parameters: Option<usize>,
     ) -> Result<Self, CodegenError> {
@@ -307,7 +315,7 @@ impl RangeProgram {
             return Err(CodegenError::Unsupported("rounding upwards".into()));
         }
         let (precision, shape, forms) = (Precision::F64, Shape::Range(rounding), &Forms::all(Form::Stable));
-        let (outputs, with_parameters) = (&[root], parameters.is_some());
+        let with_parameters = parameters.is_some();
         let uniforms = uniforms_of(graph);
         let request = Request {
             graph,
@@ -328,6 +336,21 @@ impl RangeProgram {
     /// If there are not as many parameters or uniforms as the program has.
     #[inline]
     pub fn call(&self, over: &Aabb, parameters: &[f64], uniforms: &[[f64; 2]]) -> Option<Interval> {
+        self.call_all(over, parameters, uniforms).map(|[range]| range)
+    }
+
+    /// The ranges of all outputs, as [`RangeProgram::call`].
+    ///
+    /// # Panics
+    /// If there are not as many outputs, parameters or uniforms as the program has.
+    #[inline]
+    pub(crate) fn call_all<const N: usize>(
+        &self,
+        over: &Aabb,
+        parameters: &[f64],
+        uniforms: &[[f64; 2]],
+    ) -> Option<[Interval; N]> {
+        assert_eq!(N, self.code.outputs, "outputs of the range program");
         assert_eq!(parameters.len(), self.parameters.unwrap_or(0), "parameters of the range program");
         assert!(uniforms.len() >= self.uniforms, "uniforms of the range program");
         // those that a program has come first
@@ -344,34 +367,35 @@ impl RangeProgram {
         }
         let (min, max) = (over.min, over.max);
         let input = [min.x, min.y, min.z, max.x, max.y, max.z];
-        let mut out = [0.0; 2];
+        let mut ranges = [[0.0; 2]; N];
+        let out = ranges.as_flattened_mut();
         match self.rounding {
             Rounding::Nearest => {
                 type Entry = unsafe extern "C" fn(*const f64, *mut f64, *const f64, *const f64);
                 // SAFETY: `new` asked for a range program, whose entry has this signature (the last arguments
                 // are unused without parameters and uniforms), and `self.code` keeps it mapped while it runs.
                 let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.code.entry()) };
-                // SAFETY: the program reads six numbers its parameters and uniforms, checked above, and
-                // writes two.
+                // SAFETY: the program reads six numbers, its parameters and its uniforms, checked above, and
+                // writes two for each output, of which there are N.
                 unsafe { entry(input.as_ptr(), out.as_mut_ptr(), third, fourth) };
             }
-            Rounding::Upward => self.call_rounding_upwards(&input, &mut out, [third, fourth]),
+            Rounding::Upward => self.call_rounding_upwards(&input, out, [third, fourth]),
         }
-        Some(Interval::new(out[0], out[1]))
+        Some(ranges.map(|[lo, hi]| Interval::new(lo, hi)))
     }
 
     /// The call as one block of assembly, so that no code of Rust runs in a rounding mode that it does not
     /// expect.
     #[cfg(all(target_arch = "x86_64", unix))]
     #[inline]
-    fn call_rounding_upwards(&self, input: &[f64; 6], out: &mut [f64; 2], numbers: [*const f64; 2]) {
+    fn call_rounding_upwards(&self, input: &[f64; 6], out: &mut [f64], numbers: [*const f64; 2]) {
         /// The state at the start of every program (all exceptions masked), but rounding towards +∞ (bits 13,
         /// 14).
         static UPWARDS: u32 = 0x1f80 | 0x4000;
         // SAFETY: `new` asked for a range program, whose entry follows the C convention of this system with
         // these four pointers (the last are unused without parameters and uniforms); `self.code` keeps it
         // mapped while it runs; it reads six numbers, its parameters and its uniforms, checked by the caller,
-        // writes two, and calls nothing. The stack is aligned at the start of the block, stays so, and is put
+        // writes two for each output, for which the caller has made room, and calls nothing. The stack is aligned at the start of the block, stays so, and is put
         // back, as is the control register, before its end.
         unsafe {
             std::arch::asm!(
@@ -394,8 +418,8 @@ impl RangeProgram {
 
     /// Never called here: `new` refuses such programs.
     #[cfg(not(all(target_arch = "x86_64", unix)))]
-    fn call_rounding_upwards(&self, _: &[f64; 6], out: &mut [f64; 2], _: [*const f64; 2]) {
-        *out = [f64::NEG_INFINITY, f64::INFINITY];
+    fn call_rounding_upwards(&self, _: &[f64; 6], out: &mut [f64], _: [*const f64; 2]) {
+        out.fill(f64::NAN);
     }
 }
 

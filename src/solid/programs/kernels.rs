@@ -50,6 +50,8 @@ mod plain {
     plain!(add, Binary::Add);
     plain!(sub, Binary::Sub);
     plain!(mul, Binary::Mul);
+    plain!(div, Binary::Div);
+    plain!(div_or_zero, Binary::DivOrZero);
     plain!(min_weight, Binary::MinWeight);
     plain!(max_weight, Binary::MaxWeight);
     plain!(min, Binary::Min);
@@ -146,6 +148,8 @@ macro_rules! wide {
             value!(add, $t, plain::add);
             value!(sub, $t, plain::sub);
             value!(mul, $t, plain::mul);
+            value!(div, $t, plain::div);
+            value!(div_or_zero, $t, plain::div_or_zero);
             value!(min_weight, $t, plain::min_weight);
             value!(max_weight, $t, plain::max_weight);
             value!(min, $t, plain::min);
@@ -176,6 +180,8 @@ macro_rules! wide {
                     (Binary::Add, _) => $module::add,
                     (Binary::Sub, _) => $module::sub,
                     (Binary::Mul, _) => $module::mul,
+                    (Binary::Div, _) => $module::div,
+                    (Binary::DivOrZero, _) => $module::div_or_zero,
                     (Binary::MinWeight, _) => $module::min_weight,
                     (Binary::MaxWeight, _) => $module::max_weight,
                     (Binary::Min, _) => $module::min,
@@ -236,7 +242,8 @@ mod tests {
         let (u, v) = operands::<T>(least, largest);
         let mut out = vec![T::from_f64(0.0); u.len()];
         let joins = [Binary::And, Binary::Or, Binary::Min, Binary::Max, Binary::PlainMin, Binary::PlainMax];
-        let plain = [Binary::Add, Binary::Sub, Binary::Mul, Binary::MinWeight, Binary::MaxWeight];
+        let sums = [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::DivOrZero];
+        let plain = sums.into_iter().chain([Binary::MinWeight, Binary::MaxWeight]);
         for op in joins.into_iter().chain(plain) {
             T::kernel(op, Form::Stable).unwrap()(&u, &v, &mut out);
             for ((&u, &v), &found) in u.iter().zip(&v).zip(&out) {

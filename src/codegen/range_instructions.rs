@@ -1,0 +1,176 @@
+//! What range programs can compute: an instruction for each node of a graph, and whether all of them stay finite.
+//!
+//! Only graphs are taken whose every node is finite over [`REACH`], and so small that no square overflows.
+
+use glam::DVec3;
+
+use crate::geom::Aabb;
+use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeRule, Region, Unary};
+
+/// Boxes within this distance of the origin are answered by machine code.
+pub const REACH: f64 = 1e9;
+
+/// Values beyond this might overflow in a product or in the bound of one.
+const LARGEST: f64 = 1e300;
+
+/// Operands of R₀ beyond this might have squares that do.
+const LARGEST_OPERAND: f64 = 1e150;
+
+/// Whether machine code can answer for this graph.
+pub fn supports(graph: &Graph, root: Node) -> bool {
+    knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), Region::of(&Aabb::EMPTY))
+}
+
+/// Whether every operation of a graph is one that range programs have.
+pub fn knows(graph: &Graph) -> bool {
+    Instructions::of(graph).is_some()
+}
+
+/// What a range program does for one node.
+#[derive(Clone, Copy)]
+pub(super) enum Instruction {
+    Constant(f64),
+    /// The range of x, y or z: its number.
+    Coordinate(usize),
+    Parameter(u32),
+    Uniform(u32),
+    Square(Node),
+    Slab {
+        of: Node,
+        first: Affine,
+        second: Affine,
+    },
+    Unary(RangeUnary, Node),
+    Binary(RangeBinary, Node, Node),
+    /// By a constant or a parameter.
+    Divide(Node, Node),
+    /// From 0 to 1: a derivative of the smaller or larger of two numbers.
+    Share,
+}
+
+/// The operations on one range.
+#[derive(Clone, Copy)]
+pub(super) enum RangeUnary {
+    Neg,
+    Abs,
+    Sqrt,
+}
+
+/// The operations on two ranges.
+#[derive(Clone, Copy)]
+pub(super) enum RangeBinary {
+    Add,
+    Sub,
+    Mul,
+    Min,
+    Max,
+    And,
+    Or,
+}
+
+/// The instructions for all nodes of a graph, in its order.
+#[derive(Default)]
+pub(super) struct Instructions(pub Vec<Instruction>);
+
+impl Instructions {
+    /// `None` if the graph has an operation that range programs do not have.
+    pub fn of(graph: &Graph) -> Option<Self> {
+        graph.nodes().map(|(_, expr)| Instruction::of(graph, expr)).collect::<Option<_>>().map(Self)
+    }
+}
+
+impl Instruction {
+    fn of(graph: &Graph, expr: Expr) -> Option<Self> {
+        Some(match RangeRule::of(graph, expr) {
+            RangeRule::Square(a) => Self::Square(a),
+            RangeRule::Slab { of, first, second } => Self::Slab { of, first, second },
+            RangeRule::Plain(Expr::Constant(bits)) => Self::Constant(f64::from_bits(bits)),
+            RangeRule::Plain(Expr::Coordinate(axis)) => {
+                Self::Coordinate(Axis::SPACE.into_iter().position(|place| place == axis)?)
+            }
+            RangeRule::Plain(Expr::Parameter(i)) => Self::Parameter(i),
+            RangeRule::Plain(Expr::Uniform(i)) => Self::Uniform(i),
+            RangeRule::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
+            RangeRule::Plain(Expr::Binary(Binary::Div, a, b)) => {
+                let by_number = matches!(graph.expr(b), Expr::Constant(_) | Expr::Parameter(_));
+                by_number.then_some(Self::Divide(a, b))?
+            }
+            RangeRule::Plain(Expr::Binary(Binary::MinWeight | Binary::MaxWeight, ..)) => Self::Share,
+            RangeRule::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
+        })
+    }
+}
+
+impl RangeUnary {
+    fn of(op: Unary) -> Option<Self> {
+        match op {
+            Unary::Neg => Some(Self::Neg),
+            Unary::Abs => Some(Self::Abs),
+            Unary::Sqrt => Some(Self::Sqrt),
+            Unary::Sign | Unary::Call(_) => None,
+        }
+    }
+}
+
+impl RangeBinary {
+    fn of(op: Binary) -> Option<Self> {
+        match op {
+            Binary::Add => Some(Self::Add),
+            Binary::Sub => Some(Self::Sub),
+            Binary::Mul => Some(Self::Mul),
+            Binary::Min | Binary::PlainMin => Some(Self::Min),
+            Binary::Max | Binary::PlainMax => Some(Self::Max),
+            Binary::And => Some(Self::And),
+            Binary::Or => Some(Self::Or),
+            Binary::Div
+            | Binary::DivOrZero
+            | Binary::MinWeight
+            | Binary::MaxWeight
+            | Binary::AndWeight
+            | Binary::OrWeight
+            | Binary::Call(_) => None,
+        }
+    }
+}
+
+/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by
+/// zero is not finite.
+pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
+    let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
+    let ranges = evaluator.all_with(&Region { space: &space, ..numbers });
+    let within = |node: Node, limit: f64| {
+        let range = ranges[node.index()];
+        range.lo > -limit && range.hi < limit
+    };
+    graph.nodes().all(|(node, expr)| {
+        let operands_fit = match expr {
+            Expr::Binary(Binary::And | Binary::Or, a, b) => {
+                within(a, LARGEST_OPERAND) && within(b, LARGEST_OPERAND)
+            }
+            // all others overflow only where their result does
+            Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Unary(..)
+            | Expr::Binary(
+                Binary::Add
+                | Binary::Sub
+                | Binary::Mul
+                | Binary::Div
+                | Binary::DivOrZero
+                | Binary::Min
+                | Binary::Max
+                | Binary::PlainMin
+                | Binary::PlainMax
+                | Binary::MinWeight
+                | Binary::MaxWeight
+                | Binary::Call(_)
+                | Binary::AndWeight
+                | Binary::OrWeight,
+                ..,
+            ) => true,
+        };
+        operands_fit && within(node, LARGEST)
+    })
+}
