@@ -20,6 +20,8 @@ pub(crate) struct Cut {
     pub inside: f64,
     /// The integral of the place over that volume, m⁴.
     pub places: DVec3,
+    /// The integrals of xx, yy, zz, yz, zx, xy over it, m⁵. Places count from the middle of the box.
+    pub squares: [f64; 6],
 }
 
 /// ω = 0 counts as inside, as it does where particles meet obstacles.
@@ -31,7 +33,7 @@ pub(crate) fn is_inside(omega: f64) -> bool {
 /// there.
 pub(crate) fn cut(corners: &[DVec3; 8], values: &[f64; 8], omega: &dyn Fn(DVec3) -> f64) -> Cut {
     let (mut area, mut moment, mut whole) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-    let mut filled = Filled::default();
+    let mut filled = Filled { from: 0.5 * (corners[0] + corners[7]), ..Filled::default() };
     for tetrahedron in TETRAHEDRA {
         let place = |k: usize| corners[k];
         let crossing = |i: usize, o: usize| crossing((corners[i], values[i]), (corners[o], values[o]), omega);
@@ -75,7 +77,7 @@ pub(crate) fn cut(corners: &[DVec3; 8], values: &[f64; 8], omega: &dyn Fn(DVec3)
         }
     }
     let middle = if whole > 0.0 { moment / whole } else { DVec3::ZERO };
-    Cut { area, middle, inside: filled.volume, places: filled.places }
+    Cut { area, middle, inside: filled.volume, places: filled.places, squares: filled.squares }
 }
 
 /// A sum of tetrahedra.
@@ -84,13 +86,25 @@ struct Filled {
     volume: f64,
     /// The integral of the place.
     places: DVec3,
+    /// Where squares count from.
+    from: DVec3,
+    /// The integrals of the products of coordinates.
+    squares: [f64; 6],
 }
 
 impl Filled {
     fn add(&mut self, factor: f64, [a, b, c, d]: [DVec3; 4]) {
         let volume = factor * (b - a).cross(c - a).dot(d - a).abs() / 6.0;
         self.volume += volume;
-        self.places += 0.25 * volume * (a + b + c + d);
+        let sum = a + b + c + d;
+        self.places += 0.25 * volume * sum;
+        // over a tetrahedron ∫ p⊗p is V/20·(Σ v⊗v + Σ v ⊗ Σ v)
+        let square = |p: DVec3| [p.x * p.x, p.y * p.y, p.z * p.z, p.y * p.z, p.z * p.x, p.x * p.y];
+        for p in [a, b, c, d].map(|corner| corner - self.from).into_iter().chain([sum - 4.0 * self.from]) {
+            for (total, of_one) in self.squares.iter_mut().zip(square(p)) {
+                *total += volume / 20.0 * of_one;
+            }
+        }
     }
 }
 

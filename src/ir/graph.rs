@@ -338,7 +338,7 @@ impl Graph {
 }
 
 /// A node of a graph, with the signs of constants left to the constants. Each of these has the bits of the node:
-/// a − c is a + (−c), and −(k·b) is (−k)·b.
+/// a − c is a + (−c), −(k·b) is (−k)·b, and k·b is b·k.
 #[derive(Clone, Copy)]
 enum SignedTerm {
     Plain(Expr),
@@ -371,7 +371,8 @@ impl SignedTerm {
                 Some((number, b)) => Self::Product(-number, b),
                 None => Self::Plain(graph.expr(node)),
             },
-            expr => Self::Plain(expr),
+            // products commute to the bit
+            expr => product(node).map_or(Self::Plain(expr), |(number, b)| Self::Product(number, b)),
         }
     }
 

@@ -173,11 +173,15 @@ impl fmt::Display for StepError {
                 );
             }
             Self::EnergyDoubled { step, excess, id, speed } => {
+                let grown = if *excess < 10.0 {
+                    format!("{:.0} % above that at the start", 100.0 * excess)
+                } else {
+                    format!("{:.0e} times that at the start", 1.0 + excess)
+                };
                 return write!(
                     f,
-                    "step {step}: without any work the energy is {:.0} % above that at the start, which no fluid does; \
-                     particle {id} is the fastest, with {speed:.2e} m/s",
-                    100.0 * excess
+                    "step {step}: without any work the energy is {grown}, which no fluid does; particle {id} is the \
+                     fastest, with {speed:.2e} m/s"
                 );
             }
             Self::Stalled { step, dt, id, speed } => {

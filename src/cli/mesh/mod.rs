@@ -4,6 +4,7 @@
 mod fluid;
 mod format;
 mod simplified;
+mod stopwatch;
 mod summary;
 
 use std::path::Path;
@@ -23,6 +24,7 @@ use rfm::mesh::{
 };
 use rfm::solid::{Bounds, Depth};
 use simplified::{Simplified, simplified};
+use stopwatch::milliseconds;
 use summary::{MeshSummary, Times};
 
 impl MeshMethod {
@@ -118,10 +120,6 @@ fn nothing_to_write(
         complain("the mesh is empty");
     }
     Err(Failure::Findings)
-}
-
-fn milliseconds(since: Instant) -> f64 {
-    since.elapsed().as_secs_f64() * 1e3
 }
 
 /// What is said of a unit that other programs take for another one.

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::super::failure::note;
 use super::super::progress;
 use super::super::values::Tolerance;
-use super::milliseconds;
+use super::stopwatch::milliseconds;
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, Quality, Reference, simplify};

@@ -24,10 +24,13 @@ pub(super) struct Filled {
     pub part: f32,
     /// That part times the way from the cell's middle to its own, m.
     pub moment: [f32; 3],
+    /// The mean over the cell of (z − c)⊗(z − c) where it is filled, less what a whole cell has in proportion, m²: xx, yy,
+    /// zz, yz, zx, xy.
+    pub square: [f32; 6],
 }
 
 impl Filled {
-    const WHOLE: Self = Self { part: 1.0, moment: [0.0; 3] };
+    pub const WHOLE: Self = Self { part: 1.0, moment: [0.0; 3], square: [0.0; 6] };
 }
 
 /// Cells of a tile.
@@ -102,19 +105,12 @@ impl Fractions {
             }
             return;
         }
-        let filled = if range.lo > 0.0 {
-            Filled::WHOLE
-        } else {
-            let (volume, moment) = self.part(&within, DEEPER);
-            let whole = within.volume();
-            let moment = (moment - volume * within.centre()) / whole;
-            Filled { part: (volume / whole) as f32, moment: moment.to_array().map(|m| m as f32) }
-        };
+        let filled = if range.lo > 0.0 { Filled::WHOLE } else { self.part(&within, DEEPER).within(&within) };
         cells[at[0] + TILE * (at[1] + TILE * at[2])] = filled;
     }
 
-    /// The filled volume of a box, and the integral of the place over it.
-    fn part(&self, within: &Aabb, deeper: u32) -> (f64, DVec3) {
+    /// What is filled of a box.
+    fn part(&self, within: &Aabb, deeper: u32) -> Part {
         let corners = within.corners();
         let omega = |p: DVec3| self.bodies.iter().map(|body| body.omega(p)).fold(f64::NEG_INFINITY, f64::max);
         let values = corners.map(omega);
@@ -126,16 +122,22 @@ impl Fractions {
         };
         if deeper == 0 && is_cut {
             let cut = cut(&corners, &values, &omega);
-            return (cut.inside, cut.places);
+            let middle = within.centre();
+            return Part {
+                volume: cut.inside,
+                moment: cut.places - cut.inside * middle,
+                squares: cut.squares,
+            };
         }
         if !is_cut && (deeper == 0 || !may_be_cut()) {
-            let volume = if inside[0] { within.volume() } else { 0.0 };
-            return (volume, volume * within.centre());
+            return if inside[0] { Part::whole(within) } else { Part::default() };
         }
-        let centre = within.centre();
-        let parts =
-            corners.map(|corner| self.part(&Aabb::new(corner.min(centre), corner.max(centre)), deeper - 1));
-        parts.into_iter().fold((0.0, DVec3::ZERO), |(volume, places), (v, p)| (volume + v, places + p))
+        let middle = within.centre();
+        let parts = corners.map(|corner| {
+            let part = Aabb::new(corner.min(middle), corner.max(middle));
+            self.part(&part, deeper - 1).seen_from(part.centre() - middle)
+        });
+        parts.into_iter().fold(Part::default(), Part::plus)
     }
 
     fn range(&self, over: &Aabb) -> Interval {
@@ -143,5 +145,55 @@ impl Fractions {
         ranges.fold(Interval::new(f64::NEG_INFINITY, f64::NEG_INFINITY), |all, range| {
             Interval::new(all.lo.max(range.lo), all.hi.max(range.hi))
         })
+    }
+}
+
+/// What is filled of a box: integrals over it, of places from its middle.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    volume: f64,
+    moment: DVec3,
+    /// xx, yy, zz, yz, zx, xy.
+    squares: [f64; 6],
+}
+
+impl Part {
+    fn whole(within: &Aabb) -> Self {
+        let (volume, size) = (within.volume(), within.size());
+        let [x, y, z] = (volume / 12.0 * size * size).to_array();
+        Self { volume, moment: DVec3::ZERO, squares: [x, y, z, 0.0, 0.0, 0.0] }
+    }
+
+    /// The same if its middle lies at a place `by` from where places count.
+    fn seen_from(self, by: DVec3) -> Self {
+        let Self { volume, moment, squares } = self;
+        let product = |i: usize, j: usize| moment[i] * by[j] + by[i] * moment[j] + volume * by[i] * by[j];
+        let shifts =
+            [product(0, 0), product(1, 1), product(2, 2), product(1, 2), product(2, 0), product(0, 1)];
+        Self {
+            volume,
+            moment: moment + volume * by,
+            squares: std::array::from_fn(|k| squares[k] + shifts[k]),
+        }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            volume: self.volume + other.volume,
+            moment: self.moment + other.moment,
+            squares: std::array::from_fn(|k| self.squares[k] + other.squares[k]),
+        }
+    }
+
+    /// How far it fills a cell.
+    fn within(self, cell: &Aabb) -> Filled {
+        let whole = Self::whole(cell);
+        let part = self.volume / whole.volume;
+        let square = |k: usize| (self.squares[k] - part * whole.squares[k]) / whole.volume;
+        Filled {
+            part: part as f32,
+            moment: (self.moment / whole.volume).to_array().map(|m| m as f32),
+            square: std::array::from_fn(|k| square(k) as f32),
+        }
     }
 }

@@ -9,7 +9,7 @@
 //! pawn, whose rim is sharper than the kernel.) A spline through the true values, as here, is known for the signed
 //! distance as a density map (Koschier & Bender 2017).
 //!
-//! Errors at a plane: 0.003 of λ, 1.5 % of the largest ∇λ.
+//! Errors at a plane: 0.001 of λ, 0.6 % of the largest ∇λ.
 //!
 //! Nodes lie in bricks that are made when a particle first comes near. Nothing that is not asked for costs time or memory.
 
@@ -32,9 +32,9 @@ use glam::{DMat3, DVec3};
 
 pub(in crate::sph) use self::maps::{Known, Maps};
 use self::{
-    fractions::{Filled, Fractions, TILE, Tile},
+    fractions::{Fractions, TILE, Tile},
     sparse::Sparse,
-    stencil::{REACH, Stencil},
+    stencil::{REACH, Row, SIDE, Stencil},
 };
 use super::symmetric::Symmetric;
 use crate::{field::Walls, geom::Aabb};
@@ -181,35 +181,25 @@ impl VolumeMap {
     fn make(&self, at: [usize; 3]) -> Option<Box<Brick>> {
         // the first cell that its first node depends on, which may lie before the lattice
         let first = at.map(|n| (n * BRICK) as isize - (BEFORE + REACH) as isize);
-        let cells = self.block(first)?;
+        let rows = self.block(first)?;
         self.bytes.fetch_add(size_of::<Brick>(), Ordering::Relaxed);
         let mut brick = Box::new(Brick { part: [0.0; 64], moment: [[0.0; 8]; 64] });
         for node in 0..BRICK * BRICK * BRICK {
             let [i, j, k] = [node % BRICK, node / BRICK % BRICK, node / BRICK / BRICK];
             let mut sums = [0.0f32; 8];
-            let mut slopes = 0.0f32;
-            for (offset, weight) in &self.stencil.weights {
-                let [a, b, c] = offset.map(usize::from);
-                let cell = &cells[i + a + BLOCK * (j + b + BLOCK * (k + c))];
-                if cell.part == 0.0 {
-                    continue;
+            for c in 0..SIDE {
+                for b in 0..SIDE {
+                    self.stencil.add([b, c], i, &rows[j + b + BLOCK * (k + c)], &mut sums);
                 }
-                for (sum, w) in sums.iter_mut().zip(&weight.sums) {
-                    *sum += cell.part * w;
-                }
-                let [x, y, z] = cell.moment;
-                slopes += x * weight.slope[0] + y * weight.slope[1] + z * weight.slope[2];
             }
-            brick.part[node] = f64::from(sums[0] + slopes);
+            brick.part[node] = f64::from(sums[0]);
             brick.moment[node][..6].copy_from_slice(&sums[1..7]);
         }
         Some(brick)
     }
 
-    /// How far the cells of a block from `first` on are filled; `None` if all are empty.
-    fn block(&self, first: [isize; 3]) -> Option<Vec<Filled>> {
-        let mut cells = vec![Filled::default(); BLOCK * BLOCK * BLOCK];
-        let mut is_empty = true;
+    /// How far the cells of a block from `first` on are filled, in rows along x; `None` if all are empty.
+    fn block(&self, first: [isize; 3]) -> Option<Vec<Row>> {
         let spans: [_; 3] = std::array::from_fn(|axis| {
             let low = first[axis].max(0) as usize;
             let high = (first[axis] + BLOCK as isize).clamp(0, self.lattice.cells[axis] as isize) as usize;
@@ -219,18 +209,20 @@ impl VolumeMap {
         let tiles = |span: &Range<usize>| span.start / TILE..span.end.div_ceil(TILE);
         let within =
             |span: &Range<usize>, tile: usize| span.start.max(tile * TILE)..span.end.min((tile + 1) * TILE);
+        let mut rows = Vec::new();
+        // tiles that follow one another along x do so in the order in which rows are filled
         for [ti, tj, tk] in places(tiles(&is), tiles(&js), tiles(&ks)) {
             let tile = self.fractions.tile(&self.lattice, [ti, tj, tk]);
             if matches!(tile, Tile::Empty) {
                 continue;
             }
-            is_empty = false;
+            rows.resize_with(BLOCK * BLOCK, Row::default);
             for at in places(within(&is, ti), within(&js, tj), within(&ks, tk)) {
                 let [a, b, c] = [0, 1, 2].map(|axis| (at[axis] as isize - first[axis]) as usize);
-                cells[a + BLOCK * (b + BLOCK * c)] = tile.cell(at.map(|n| n % TILE));
+                rows[b + BLOCK * c].push(a, tile.cell(at.map(|n| n % TILE)));
             }
         }
-        (!is_empty).then_some(cells)
+        (!rows.is_empty()).then_some(rows)
     }
 }
 

@@ -43,7 +43,7 @@ fn planes_have_their_closed_forms() {
         }
     }
     println!("λ {of_part:.5}, ∇λ {of_gradient:.4}, K {of_moment:.4}");
-    assert!(of_part < 0.003 && of_gradient < 0.023 && of_moment < 0.02);
+    assert!(of_part < 0.001 && of_gradient < 0.012 && of_moment < 0.02);
 }
 
 /// λ of a ball of radius `ball` at the distance `away` from its middle: shell by shell of the kernel, whose caps inside
@@ -118,7 +118,7 @@ fn nothing_is_left_beyond_the_support() {
     for along in [0.0, 0.03, 0.07] {
         let place = DVec3::new(0.6, 0.0, 0.8) * H + along * DVec3::new(0.8, 0.0, -0.6);
         let part = map.at(place).map_or(0.0, |taken| taken.part);
-        assert!(part < 1e-5, "{part}");
+        assert!(part < 3e-5, "{part}");
     }
 }
 
