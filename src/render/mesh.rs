@@ -3,11 +3,11 @@
 use glam::DVec3;
 
 use super::{
-    Cut, Rgb,
+    Cut,
     camera::{Camera, Seen},
-    cut::SeenCut,
+    facet::Facet,
     raster::{Band, Corner},
-    shade,
+    section::SeenCut,
 };
 
 /// A triangle mesh by reference.
@@ -30,32 +30,6 @@ pub struct Facets {
     cut: Option<SeenCut>,
     /// The number of triangles with a bad index or a corner that the camera cannot see.
     pub skipped: usize,
-}
-
-/// A triangle on the screen.
-#[derive(Debug)]
-pub(super) struct Facet {
-    pub corners: [Corner; 3],
-    rows: (i64, i64),
-    /// The normals in the camera's frame, towards the side that is seen.
-    normals: [[f32; 3]; 3],
-    /// How far the corners lie beyond the cut, times their nearness: this changes evenly over the screen.
-    beyond: [f32; 3],
-}
-
-impl Facet {
-    /// The colour at the place that has these weights of the corners.
-    pub fn colour(&self, [u, v, w]: [f32; 3]) -> Rgb {
-        let [a, b, c] = self.normals;
-        let n: [f32; 3] = std::array::from_fn(|i| u * a[i] + v * b[i] + w * c[i]);
-        let length = shade::dot(n, n).sqrt();
-        shade::stone(n.map(|x| x / length))
-    }
-
-    /// Whether the place that has these weights of the corners is cut away.
-    pub fn is_beyond(&self, weights: [f32; 3]) -> bool {
-        shade::dot(weights, self.beyond) > 0.0
-    }
 }
 
 impl Facets {

@@ -15,11 +15,14 @@ mod backdrop;
 mod camera;
 mod colour;
 mod cut;
+mod facet;
+mod hidden;
 mod image;
 mod mesh;
 mod overlay;
 mod particles;
 mod raster;
+mod section;
 mod shade;
 
 use std::{fmt, io};
@@ -28,7 +31,8 @@ use self::colour::Rgb;
 pub use self::{
     backdrop::Backdrop,
     camera::Camera,
-    cut::{Cut, hidden},
+    cut::Cut,
+    hidden::hidden,
     image::Image,
     mesh::MeshView,
     overlay::{Caption, Legend},

@@ -7,8 +7,10 @@ use super::super::{
     normals::unit,
     prune::{BRICK, Lattice},
 };
-use super::look::HALVED;
 use crate::field::Field;
+
+/// Bisections of a way to the surface. They leave a millionth of it.
+pub(super) const HALVED: usize = 20;
 
 /// Nodes along a side: those of the brick's cells, and one more on both sides.
 const SIDE: usize = BRICK + 3;

@@ -6,7 +6,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::super::{normals::unit, prune::Lattice};
-use super::edges::BrickEdges;
+use super::edges::{BrickEdges, HALVED};
 use super::found::ThinCells;
 use crate::field::{Field, Sheet};
 use crate::geom::Aabb;
@@ -35,9 +35,6 @@ const ON_FACE: f64 = 1e-8;
 
 /// A face that agrees more than this (cosine) with the way to it ends a thickness.
 const BACK: f64 = 0.5;
-
-/// Bisections of a way to the surface. They leave a millionth of it.
-pub(super) const HALVED: usize = 20;
 
 /// The longest way in cells over which a thickness is measured, and its steps.
 const THICKEST: f64 = 2.0;

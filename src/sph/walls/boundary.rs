@@ -127,7 +127,7 @@ impl Boundary {
         self.during.clear();
         self.during
             .extend(self.obstacles.iter().map(|o| o.moving.as_ref().map(|moving| moving.during(from, to))));
-        self.maps.move_to(&self.obstacles, to);
+        self.maps.move_to(to);
     }
 
     /// The field of an obstacle during the present step.
@@ -225,7 +225,9 @@ impl Boundary {
 
     /// Prepares the maps of what obstacles take of kernels with the support radius h, m.
     pub fn map_obstacles(&mut self, h: f64) {
-        self.maps = Maps::new(&self.obstacles, &self.domain, h, self.time);
+        let obstacles: Vec<_> =
+            self.obstacles.iter().map(|obstacle| (&obstacle.field, obstacle.moving.as_ref())).collect();
+        self.maps = Maps::new(&obstacles, &self.domain, h, self.time);
     }
 
     /// What the box and the obstacles take of the kernel of a particle; `None` if they are farther away than

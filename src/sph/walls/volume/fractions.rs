@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Lattice, sparse::Sparse};
+use super::{lattice::Lattice, sparse::Sparse};
 use crate::{
     field::{Walls, cut, is_inside},
     geom::Aabb,

@@ -1,15 +1,20 @@
 //! The maps of all obstacles of a scene: one of those at rest, and one of each that moves without deformation.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
-use super::{Taken, VolumeMap};
+use super::map::{Taken, VolumeMap};
 use crate::{
+    field::{Moving, Walls},
     geom::{Aabb, Placement},
-    sph::walls::Obstacle,
 };
 
 /// How far beyond the box the map of a moving body reaches, in diagonals of the box. Bodies turn about places outside.
 const BEYOND: f64 = 2.0;
+
+/// An obstacle: its field at the time 0, and its motion.
+pub(in crate::sph) type Obstacle<'a> = (&'a Arc<dyn Walls>, Option<&'a Arc<dyn Moving>>);
 
 /// What obstacles take of kernels.
 #[derive(Default)]
@@ -23,7 +28,7 @@ enum Body {
     /// In the map of all that are at rest.
     AtRest,
     /// In a map of its own, made where it is at the time 0. It is elsewhere now; `None` if it has another shape.
-    Moving(Box<VolumeMap>, Option<Placement>),
+    Moving { map: Box<VolumeMap>, motion: Arc<dyn Moving>, placement: Option<Placement> },
     /// Nowhere.
     Unknown,
 }
@@ -40,18 +45,20 @@ pub(in crate::sph) enum Known {
 }
 
 impl Maps {
-    /// The maps of obstacles in a box, for a support radius, m. Moving ones are where they are at a time, s.
-    pub fn new(obstacles: &[Obstacle], domain: &Aabb, h: f64, time: f64) -> Self {
-        let at_rest = obstacles.iter().filter(|obstacle| obstacle.moving.is_none());
-        let at_rest = VolumeMap::new(at_rest.map(|obstacle| obstacle.field.clone()).collect(), domain, h);
+    /// The maps of obstacles in a box, for a support radius, m: of each its field at the time 0, and its motion. They are
+    /// where they are at a time, s.
+    pub fn new(obstacles: &[Obstacle<'_>], domain: &Aabb, h: f64, time: f64) -> Self {
+        let at_rest = obstacles.iter().filter(|(_, motion)| motion.is_none());
+        let at_rest = VolumeMap::new(at_rest.map(|&(field, _)| field.clone()).collect(), domain, h);
         let around = domain.grown(BEYOND * domain.size().length());
-        let body = |obstacle: &Obstacle| match &obstacle.moving {
+        let body = |&(field, motion): &Obstacle<'_>| match motion {
             None if at_rest.is_some() => Body::AtRest,
-            Some(moving) if moving.placement(0.0).is_some() => {
-                match VolumeMap::new(vec![obstacle.field.clone()], &around, h) {
-                    Some(map) => Body::Moving(Box::new(map), moving.placement(time)),
-                    None => Body::Unknown,
-                }
+            Some(motion) if motion.placement(0.0).is_some() => {
+                VolumeMap::new(vec![field.clone()], &around, h).map_or(Body::Unknown, |map| Body::Moving {
+                    map: Box::new(map),
+                    motion: motion.clone(),
+                    placement: motion.placement(time),
+                })
             }
             None | Some(_) => Body::Unknown,
         };
@@ -59,10 +66,10 @@ impl Maps {
     }
 
     /// Moves the bodies to where they are at a time, s.
-    pub fn move_to(&mut self, obstacles: &[Obstacle], time: f64) {
-        for (body, obstacle) in self.bodies.iter_mut().zip(obstacles) {
-            if let (Body::Moving(_, placement), Some(moving)) = (body, &obstacle.moving) {
-                *placement = moving.placement(time);
+    pub fn move_to(&mut self, time: f64) {
+        for body in &mut self.bodies {
+            if let Body::Moving { motion, placement, .. } = body {
+                *placement = motion.placement(time);
             }
         }
     }
@@ -70,7 +77,7 @@ impl Maps {
     /// Memory of the maps, bytes.
     pub fn bytes(&self) -> usize {
         let moving = self.bodies.iter().map(|body| match body {
-            Body::Moving(map, _) => map.bytes(),
+            Body::Moving { map, .. } => map.bytes(),
             Body::AtRest | Body::Unknown => 0,
         });
         self.at_rest.as_ref().map_or(0, VolumeMap::bytes) + moving.sum::<usize>()
@@ -85,14 +92,14 @@ impl Maps {
     pub fn of(&self, k: usize, p: DVec3) -> Known {
         match self.bodies.get(k) {
             Some(Body::AtRest) => Known::AtRest,
-            Some(Body::Moving(map, Some(placement))) => {
+            Some(Body::Moving { map, placement: Some(placement), .. }) => {
                 let there = placement.back(p);
                 if !map.reaches(there) {
                     return Known::ByFaces;
                 }
                 map.at(there).map_or(Known::Nothing, |taken| Known::Taken(taken.turned(&placement.rotation)))
             }
-            Some(Body::Moving(_, None) | Body::Unknown) | None => Known::ByFaces,
+            Some(Body::Moving { placement: None, .. } | Body::Unknown) | None => Known::ByFaces,
         }
     }
 }

@@ -6,7 +6,10 @@
 
 use glam::DVec3;
 
-use super::{CELLS, Lattice, fractions::Filled};
+use super::{
+    fractions::Filled,
+    lattice::{CELLS, Lattice},
+};
 
 /// Cells from a node to the farthest that adds to it, on each side: its support, a cell for its own width, and two for
 /// the differences.
@@ -156,7 +159,7 @@ fn sharpen(raw: &mut [[f64; TERMS]], stride: usize) {
     }
 }
 
-/// The integrals of W, of y ⊗ ∇W (as in [`super::Taken`]) and of the derivatives of W over a cell whose middle lies at
+/// The integrals of W, of y ⊗ ∇W (as in [`super::map::Taken`]) and of the derivatives of W over a cell whose middle lies at
 /// `from` the node, by Gauss' rule with three points along each axis.
 fn averaged(from: DVec3, step: DVec3, h: f64) -> [f64; TERMS] {
     const POINTS: [(f64, f64); 3] =

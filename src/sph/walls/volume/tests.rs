@@ -1,12 +1,15 @@
 //! Maps against integrals in closed form.
 
-use std::f64::consts::PI;
+use std::{f64::consts::PI, sync::Arc};
 
-use super::*;
+use glam::DVec3;
+
+use super::map::{Taken, VolumeMap};
 use crate::sph::{
     scenes::{half_space, pawn, random_cloud, sphere},
-    walls::{Wall, WallKernel},
+    walls::{Wall, WallKernel, symmetric::Symmetric},
 };
+use crate::{field::Walls, geom::Aabb};
 
 const H: f64 = 0.26;
 
