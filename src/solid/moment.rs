@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::bounds::find::FoundBounds;
+use super::bounds::found::FoundBounds;
 use super::engine::ProgramKind;
 use super::leaves::leaf_set::LeafTree;
 use super::programs::number::UniformValues;

@@ -2,16 +2,11 @@
 
 use super::contraction::Tree;
 use super::extent::Bounds;
+use super::found::FoundBounds;
 use super::search::{Side, search};
 use super::whole::WholeFormula;
 use crate::geom::Aabb;
 use crate::solid::construction::Solid;
-
-/// The bounds of a solid, and the sides to which no end of it was found.
-pub struct FoundBounds {
-    pub bounds: Bounds,
-    pub open: Vec<Side>,
-}
 
 impl Solid {
     /// Where the solid is; found on first use, then kept.

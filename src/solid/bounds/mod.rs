@@ -7,12 +7,13 @@
 //! | `whole` | the same for solids that are too large to be taken apart |
 //! | `search` | contraction first, then subdivision from each side |
 //! | `queue` | boxes that wait for it |
-//! | `find` | the bounds of a solid |
+//! | `find`, `found` | the bounds of a solid, and the sides to which no end was found |
 //! | `unbounded` | which operand has no box, and to which sides |
 
 pub mod contraction;
 pub mod extent;
 pub mod find;
+pub mod found;
 pub mod queue;
 pub mod search;
 pub mod unbounded;
