@@ -18,9 +18,9 @@ pub(crate) struct Cut {
     pub middle: DVec3,
     /// The volume where ω ≥ 0, m³.
     pub inside: f64,
-    /// The integral of the place over that volume, m⁴.
+    /// The integral of the place over that volume, m⁴. Places count from the middle of the box.
     pub places: DVec3,
-    /// The integrals of xx, yy, zz, yz, zx, xy over it, m⁵. Places count from the middle of the box.
+    /// The integrals of xx, yy, zz, yz, zx, xy over it, m⁵.
     pub squares: [f64; 6],
 }
 
@@ -84,10 +84,10 @@ pub(crate) fn cut(corners: &[DVec3; 8], values: &[f64; 8], omega: &dyn Fn(DVec3)
 #[derive(Default)]
 struct Filled {
     volume: f64,
+    /// Where places count from.
+    from: DVec3,
     /// The integral of the place.
     places: DVec3,
-    /// Where squares count from.
-    from: DVec3,
     /// The integrals of the products of coordinates.
     squares: [f64; 6],
 }
@@ -96,11 +96,12 @@ impl Filled {
     fn add(&mut self, factor: f64, [a, b, c, d]: [DVec3; 4]) {
         let volume = factor * (b - a).cross(c - a).dot(d - a).abs() / 6.0;
         self.volume += volume;
-        let sum = a + b + c + d;
+        let corners = [a, b, c, d].map(|corner| corner - self.from);
+        let sum: DVec3 = corners.iter().sum();
         self.places += 0.25 * volume * sum;
         // over a tetrahedron ∫ p⊗p is V/20·(Σ v⊗v + Σ v ⊗ Σ v)
         let square = |p: DVec3| [p.x * p.x, p.y * p.y, p.z * p.z, p.y * p.z, p.z * p.x, p.x * p.y];
-        for p in [a, b, c, d].map(|corner| corner - self.from).into_iter().chain([sum - 4.0 * self.from]) {
+        for p in corners.into_iter().chain([sum]) {
             for (total, of_one) in self.squares.iter_mut().zip(square(p)) {
                 *total += volume / 20.0 * of_one;
             }

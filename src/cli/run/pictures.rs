@@ -273,7 +273,7 @@ fn title(options: &Run, experiment: &Experiment, drawn: &[Drawn]) -> String {
     let scene = experiment.scene();
     let file = match options.file.file_name() {
         Some(name) if options.file.as_os_str() != "-" => Path::new(name).shown(),
-        _ => "standard input".into(),
+        Some(_) | None => "standard input".into(),
     };
     let mut parts = vec![file, scene.name.clone(), scene.method.name().to_string()];
     let names = experiment.bodies().iter().map(|body| body.solid.name());

@@ -149,17 +149,15 @@ impl Frame {
     /// The rotation that brings the axes to where they are among these planes.
     fn rotation(&self, now: &[Plane]) -> DMat3 {
         let there = Self::of(&self.chosen.iter().map(|&(k, _)| now[k]).collect::<Vec<_>>());
-        if there.axes.len() < self.axes.len() {
-            return DMat3::ZERO; // planes have become parallel: no rotation
-        }
-        let matrix = |axes: &[DVec3]| match *axes {
-            [a, b] => DMat3::from_cols(a, b, a.cross(b)),
-            [a, b, c] => DMat3::from_cols(a, b, c),
-            _ => DMat3::IDENTITY,
-        };
+        let between = |from: DMat3, to: DMat3| to * from.transpose();
+        let completed = |a: DVec3, b: DVec3| DMat3::from_cols(a, b, a.cross(b));
         match (&self.axes[..], &there.axes[..]) {
+            ([], _) => DMat3::IDENTITY,
             (&[from], &[to]) => DMat3::from_quat(DQuat::from_rotation_arc(from, to)),
-            (from, to) => matrix(to) * matrix(from).transpose(),
+            (&[a, b], &[c, d]) => between(completed(a, b), completed(c, d)),
+            (&[a, b, c], &[d, e, f]) => between(DMat3::from_cols(a, b, c), DMat3::from_cols(d, e, f)),
+            // planes that have become parallel: no rotation makes them so
+            (_, _) => DMat3::ZERO,
         }
     }
 

@@ -122,12 +122,7 @@ impl Fractions {
         };
         if deeper == 0 && is_cut {
             let cut = cut(&corners, &values, &omega);
-            let middle = within.centre();
-            return Part {
-                volume: cut.inside,
-                moment: cut.places - cut.inside * middle,
-                squares: cut.squares,
-            };
+            return Part { volume: cut.inside, moment: cut.places, squares: cut.squares };
         }
         if !is_cut && (deeper == 0 || !may_be_cut()) {
             return if inside[0] { Part::whole(within) } else { Part::default() };
@@ -164,7 +159,7 @@ impl Part {
         Self { volume, moment: DVec3::ZERO, squares: [x, y, z, 0.0, 0.0, 0.0] }
     }
 
-    /// The same if its middle lies at a place `by` from where places count.
+    /// The same integrals if the middle of the box lies `by` from where places count.
     fn seen_from(self, by: DVec3) -> Self {
         let Self { volume, moment, squares } = self;
         let product = |i: usize, j: usize| moment[i] * by[j] + by[i] * moment[j] + volume * by[i] * by[j];

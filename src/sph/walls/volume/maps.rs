@@ -14,7 +14,7 @@ use crate::{
 const BEYOND: f64 = 2.0;
 
 /// An obstacle: its field at the time 0, and its motion.
-pub(in crate::sph) type Obstacle<'a> = (&'a Arc<dyn Walls>, Option<&'a Arc<dyn Moving>>);
+pub(in crate::sph) type Mapped<'a> = (&'a Arc<dyn Walls>, Option<&'a Arc<dyn Moving>>);
 
 /// What obstacles take of kernels.
 #[derive(Default)]
@@ -47,11 +47,11 @@ pub(in crate::sph) enum Known {
 impl Maps {
     /// The maps of obstacles in a box, for a support radius, m: of each its field at the time 0, and its motion. They are
     /// where they are at a time, s.
-    pub fn new(obstacles: &[Obstacle<'_>], domain: &Aabb, h: f64, time: f64) -> Self {
+    pub fn new(obstacles: &[Mapped<'_>], domain: &Aabb, h: f64, time: f64) -> Self {
         let at_rest = obstacles.iter().filter(|(_, motion)| motion.is_none());
         let at_rest = VolumeMap::new(at_rest.map(|&(field, _)| field.clone()).collect(), domain, h);
         let around = domain.grown(BEYOND * domain.size().length());
-        let body = |&(field, motion): &Obstacle<'_>| match motion {
+        let body = |&(field, motion): &Mapped<'_>| match motion {
             None if at_rest.is_some() => Body::AtRest,
             Some(motion) if motion.placement(0.0).is_some() => {
                 VolumeMap::new(vec![field.clone()], &around, h).map_or(Body::Unknown, |map| Body::Moving {
