@@ -252,13 +252,16 @@ impl Boundary {
                 Known::ByFaces => whole = self.with_faces(wall, p, whole, k),
             }
         }
+        if whole.part <= 0.0 {
+            return None;
+        }
         // friction is a matter of faces
         let friction = if F::IS_NONE {
             F::default()
         } else {
             (0..self.obstacles.len()).fold(of_box, |whole, k| self.with_faces(wall, p, whole, k)).friction
         };
-        (whole.part > 0.0).then(|| whole.with_friction(friction))
+        Some(whole.with_friction(friction))
     }
 
     /// What the walls of the box take of the kernel of a particle.

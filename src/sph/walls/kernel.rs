@@ -113,6 +113,18 @@ impl WallKernel {
         }
     }
 
+    /// About the distance δ at which λ is `part`, at most ½.
+    fn near_distance_of(self, part: f64) -> f64 {
+        // λ falls as about (1 − δ)⁶ at the end of the support, and in proportion to ½ − δ·A(0) at the wall
+        let u = f64::from((2.0 * part as f32).powf(1.0 / 6.0));
+        let left = match self {
+            // a fit, right to 0.003·u
+            Self::WendlandC2 => u * horner(&[0.493_516, -0.657_066, 0.372_764, 0.063_965, 0.724_114], u),
+            Self::Poly6 | Self::Spiky | Self::CubicSpline => u,
+        };
+        (1.0 - left).clamp(0.0, 1.0)
+    }
+
     /// λ of a curved wall. `curvature` is H·h, the mean curvature in units of 1/h, positive where the wall is
     /// convex. For balls and cavities the error is at most 0.026·(h/R)², which at h/R = 0.4 is a tenth of the
     /// plane's error.
@@ -160,6 +172,9 @@ pub(in crate::sph) struct OfFace {
 /// Most steps in search of a distance.
 const MOST_STEPS: usize = 30;
 
+/// A step of that search, as a part of 1 − δ, whose square is rounding.
+const NEWTON_STEP: f64 = 1e-8;
+
 /// λ on a flat face.
 const ON_FACE: f64 = 0.5;
 
@@ -186,12 +201,13 @@ impl Wall {
             return if part > 0.5 { -1.0 } else { 1.0 };
         }
         let (mut low, mut high) = (0.0, 1.0);
-        // λ falls as about (1 − δ)⁶ at the end of the support, and in proportion to ½ − δ·A(0) at the wall
-        let mut delta = (1.0 - (2.0 * small).powf(1.0 / 6.0)).clamp(low, high);
+        let mut delta = self.kernel.near_distance_of(small);
         for _ in 0..MOST_STEPS {
             let off = self.kernel.covered(delta) - small;
             let step = off / self.kernel.slope(delta);
-            if step.abs() < 1e-14 {
+            // Newton's error is the square of its step, which counts by what is left to the end of the support
+            if step.abs() < NEWTON_STEP * (1.0 - delta) {
+                delta += step;
                 break;
             }
             if off > 0.0 {

@@ -14,9 +14,6 @@ use crate::{
 /// Cells along the side of a tile.
 pub(super) const TILE: usize = 8;
 
-/// Halvings of a cell that the surface cuts, or may cut: for curved surfaces and thin parts.
-const DEEPER: u32 = 1;
-
 /// How far a cell is filled, and with what.
 #[derive(Clone, Copy, Default, PartialEq)]
 pub(super) struct Filled {
@@ -105,34 +102,32 @@ impl Fractions {
             }
             return;
         }
-        let filled = if range.lo > 0.0 { Filled::WHOLE } else { self.part(&within, DEEPER).within(&within) };
+        let filled = if range.lo > 0.0 { Filled::WHOLE } else { self.part(&within, range).within(&within) };
         cells[at[0] + TILE * (at[1] + TILE * at[2])] = filled;
     }
 
-    /// What is filled of a box.
-    fn part(&self, within: &Aabb, deeper: u32) -> Part {
-        let corners = within.corners();
+    /// What is filled of a cell whose range is not of one sign: of its eight parts one by one, for curved surfaces and
+    /// thin parts.
+    fn part(&self, within: &Aabb, range: Interval) -> Part {
         let omega = |p: DVec3| self.bodies.iter().map(|body| body.omega(p)).fold(f64::NEG_INFINITY, f64::max);
-        let values = corners.map(omega);
-        let inside = values.map(is_inside);
-        let is_cut = inside.iter().any(|is| *is != inside[0]);
-        let may_be_cut = || {
-            let range = self.range(within);
-            range != Interval::ALL && range.lo <= 0.0 && range.hi >= 0.0
-        };
-        if deeper == 0 && is_cut {
-            let cut = cut(&corners, &values, &omega);
-            return Part { volume: cut.inside, moment: cut.places, squares: cut.squares };
+        if range == Interval::ALL {
+            let inside = within.corners().map(|corner| is_inside(omega(corner)));
+            if inside.iter().all(|is| *is == inside[0]) {
+                return if inside[0] { Part::whole(within) } else { Part::default() };
+            }
         }
-        if !is_cut && (deeper == 0 || !may_be_cut()) {
-            return if inside[0] { Part::whole(within) } else { Part::default() };
-        }
-        let middle = within.centre();
-        let parts = corners.map(|corner| {
-            let part = Aabb::new(corner.min(middle), corner.max(middle));
-            self.part(&part, deeper - 1).seen_from(part.centre() - middle)
+        let along = [within.min, within.centre(), within.max];
+        let place = |[i, j, k]: [usize; 3]| DVec3::new(along[i].x, along[j].y, along[k].z);
+        let values: [f64; 27] = std::array::from_fn(|n| omega(place([n % 3, n / 3 % 3, n / 9])));
+        let parts = (0..8).map(|n| {
+            let [i, j, k] = [n & 1, n >> 1 & 1, n >> 2];
+            let part = Aabb::new(place([i, j, k]), place([i + 1, j + 1, k + 1]));
+            // in the order of the box's corners
+            let values =
+                std::array::from_fn(|c| values[i + (c & 1) + 3 * (j + (c >> 1 & 1)) + 9 * (k + (c >> 2))]);
+            Part::of(&part, &values, &omega).seen_from(part.centre() - within.centre())
         });
-        parts.into_iter().fold(Part::default(), Part::plus)
+        parts.fold(Part::default(), Part::plus)
     }
 
     fn range(&self, over: &Aabb) -> Interval {
@@ -153,6 +148,19 @@ struct Part {
 }
 
 impl Part {
+    /// What is filled of a box, by ω at its corners.
+    fn of(within: &Aabb, values: &[f64; 8], omega: &dyn Fn(DVec3) -> f64) -> Self {
+        let inside = values.map(is_inside);
+        match () {
+            () if inside.iter().any(|is| *is != inside[0]) => {
+                let cut = cut(&within.corners(), values, omega);
+                Self { volume: cut.inside, moment: cut.places, squares: cut.squares }
+            }
+            () if inside[0] => Self::whole(within),
+            () => Self::default(),
+        }
+    }
+
     fn whole(within: &Aabb) -> Self {
         let (volume, size) = (within.volume(), within.size());
         let [x, y, z] = (volume / 12.0 * size * size).to_array();

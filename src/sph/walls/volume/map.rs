@@ -8,14 +8,14 @@ use std::{
     },
 };
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3, Vec4};
 
 use super::{
     super::symmetric::Symmetric,
     fractions::{Fractions, TILE, Tile},
     lattice::Lattice,
     sparse::Sparse,
-    stencil::{REACH, Row, SIDE, Stencil},
+    stencil::{Added, REACH, Row, Stencil},
 };
 use crate::{field::Walls, geom::Aabb};
 
@@ -47,14 +47,27 @@ impl Taken {
     }
 }
 
+/// Nodes of a brick.
+const NODES: usize = BRICK * BRICK * BRICK;
+
 /// Coefficients of the spline.
+#[repr(align(64))]
 struct Brick {
-    part: [f64; BRICK * BRICK * BRICK],
-    moment: [[f32; 8]; BRICK * BRICK * BRICK],
+    /// x runs first.
+    nodes: [Node; NODES],
+}
+
+/// Coefficients at a node.
+#[derive(Clone, Copy, Default)]
+struct Node {
+    /// xx, yy and zz of K, and λ.
+    diagonal: Vec4,
+    /// yz, zx and xy of K.
+    others: Vec4,
 }
 
 /// A brick without bodies near.
-static NOTHING: Brick = Brick { part: [0.0; 64], moment: [[0.0; 8]; 64] };
+static NOTHING: Brick = Brick { nodes: [Node { diagonal: Vec4::ZERO, others: Vec4::ZERO }; NODES] };
 
 /// A map of λ and K.
 pub(super) struct VolumeMap {
@@ -113,16 +126,14 @@ impl VolumeMap {
         if !is_near {
             return None;
         }
-        let t = [0, 1, 2].map(|axis| weights(u[axis] - cell[axis] as f64));
-        let sums = Sums::over(&bricks, cell.map(|n| n % BRICK), &t);
+        let weights = [0, 1, 2].map(|axis| Weights::at(u[axis] - cell[axis] as f64));
+        let sums = Sums::over(&bricks, cell.map(|n| n % BRICK), &weights);
+        let Sums { diagonal, others, slopes } = sums;
         // a spline overshoots where it fades away
-        (sums.part > 0.0).then(|| {
-            let [xx, yy, zz, yz, zx, xy, ..] = sums.moment.map(f64::from);
-            Taken {
-                part: sums.part,
-                gradient: DVec3::from_array(sums.gradient) / *step,
-                moment: Symmetric::new(DVec3::new(xx, yy, zz), DVec3::new(yz, zx, xy)),
-            }
+        (diagonal.w > 0.0).then(|| Taken {
+            part: f64::from(diagonal.w),
+            gradient: slopes.as_dvec3() / *step,
+            moment: Symmetric::new(diagonal.truncate().as_dvec3(), others.truncate().as_dvec3()),
         })
     }
 
@@ -136,17 +147,21 @@ impl VolumeMap {
         let first = at.map(|n| (n * BRICK) as isize - (BEFORE + REACH) as isize);
         let rows = self.block(first)?;
         self.bytes.fetch_add(size_of::<Brick>(), Ordering::Relaxed);
-        let mut brick = Box::new(Brick { part: [0.0; 64], moment: [[0.0; 8]; 64] });
-        for node in 0..BRICK * BRICK * BRICK {
-            let [i, j, k] = [node % BRICK, node / BRICK % BRICK, node / BRICK / BRICK];
-            let mut sums = [0.0f32; 8];
-            for c in 0..SIDE {
-                for b in 0..SIDE {
-                    self.stencil.add([b, c], i, &rows[j + b + BLOCK * (k + c)], &mut sums);
+        let mut brick = Box::new(Brick { nodes: [Node::default(); NODES] });
+        for (line, nodes) in brick.nodes.chunks_mut(BRICK).enumerate() {
+            let [j, k] = [line % BRICK, line / BRICK];
+            let mut added = [Added::default(); BRICK];
+            for line in self.stencil.lines() {
+                let [b, c] = line.at;
+                let row = &rows[j + b + BLOCK * (k + c)];
+                if !row.is_empty() {
+                    self.stencil.add(line, row, &mut added);
                 }
             }
-            brick.part[node] = f64::from(sums[0]);
-            brick.moment[node][..6].copy_from_slice(&sums[1..7]);
+            for (node, added) in nodes.iter_mut().zip(added) {
+                let [part, xx, yy, zz, yz, zx, xy] = added.total();
+                *node = Node { diagonal: Vec4::new(xx, yy, zz, part), others: Vec4::new(yz, zx, xy, 0.0) };
+            }
         }
         Some(brick)
     }
@@ -187,60 +202,66 @@ fn places(is: Range<usize>, js: Range<usize>, ks: Range<usize>) -> impl Iterator
     })
 }
 
-/// The cubic B-spline of the four nodes around a place t between the second and the third, and its derivative.
-fn weights(t: f64) -> [(f64, f64); 4] {
-    let s = 1.0 - t;
-    let inner = |t: f64| 2.0 / 3.0 - t * t + 0.5 * t * t * t;
-    let slope = |t: f64| -2.0 * t + 1.5 * t * t;
-    [
-        (s.powi(3) / 6.0, -0.5 * s * s),
-        (inner(t), slope(t)),
-        (inner(s), -slope(s)),
-        (t.powi(3) / 6.0, 0.5 * t * t),
-    ]
+/// The cubic B-spline of four nodes and its derivative at a place.
+struct Weights {
+    values: [f32; 4],
+    slopes: [f32; 4],
+}
+
+impl Weights {
+    /// At t between the second and the third node.
+    #[inline]
+    fn at(t: f64) -> Self {
+        let s = 1.0 - t;
+        let inner = |t: f64| 2.0 / 3.0 - t * t + 0.5 * t * t * t;
+        let slope = |t: f64| -2.0 * t + 1.5 * t * t;
+        let single = |weights: [f64; 4]| weights.map(|weight| weight as f32);
+        Self {
+            values: single([s * s * s / 6.0, inner(t), inner(s), t * t * t / 6.0]),
+            slopes: single([-0.5 * s * s, slope(t), -slope(s), 0.5 * t * t]),
+        }
+    }
 }
 
 /// Sums over the 64 nodes around a place.
 #[derive(Default)]
 struct Sums {
-    part: f64,
-    /// By cells.
-    gradient: [f64; 3],
-    moment: [f32; 8],
+    diagonal: Vec4,
+    others: Vec4,
+    /// The derivatives of λ, by cells.
+    slopes: Vec3,
 }
 
 impl Sums {
     /// The sums over nodes in two by two by two bricks, which begin at `at` in the first of them.
-    fn over(bricks: &[&Brick; 8], at: [usize; 3], [x, y, z]: &[[(f64, f64); 4]; 3]) -> Self {
+    #[inline]
+    fn over(bricks: &[&Brick; 8], at: [usize; 3], [x, y, z]: &[Weights; 3]) -> Self {
         let mut sums = Self::default();
-        for (k, (wz, dz)) in z.iter().enumerate() {
-            for (j, (wy, dy)) in y.iter().enumerate() {
-                let (j, k) = (at[1] + j, at[2] + k);
-                let corner = 2 * (j / BRICK) + 4 * (k / BRICK);
-                let row = BRICK * (j % BRICK + BRICK * (k % BRICK));
+        let mut of_slopes = [Vec4::ZERO; 3];
+        for k in 0..4 {
+            let in_z = at[2] + k;
+            for j in 0..4 {
+                let in_y = at[1] + j;
+                let corner = 2 * (in_y / BRICK) + 4 * (in_z / BRICK);
+                let row = BRICK * (in_y % BRICK + BRICK * (in_z % BRICK));
                 // along x first
-                let (mut value, mut slope, mut moment) = (0.0, 0.0, [0.0f32; 8]);
-                for (i, (wx, dx)) in x.iter().enumerate() {
-                    let i = at[0] + i;
-                    let (brick, node) = (bricks[corner + i / BRICK], row + i % BRICK);
-                    value += wx * brick.part[node];
-                    slope += dx * brick.part[node];
-                    let wx = *wx as f32;
-                    for (sum, m) in moment.iter_mut().zip(&brick.moment[node]) {
-                        *sum += wx * m;
-                    }
+                let [mut diagonal, mut others, mut slope] = [Vec4::ZERO; 3];
+                for i in 0..4 {
+                    let in_x = at[0] + i;
+                    let node = &bricks[corner + in_x / BRICK].nodes[row + in_x % BRICK];
+                    diagonal += x.values[i] * node.diagonal;
+                    others += x.values[i] * node.others;
+                    slope += x.slopes[i] * node.diagonal;
                 }
-                let w = wy * wz;
-                sums.part += w * value;
-                sums.gradient[0] += w * slope;
-                sums.gradient[1] += dy * wz * value;
-                sums.gradient[2] += wy * dz * value;
-                let w = w as f32;
-                for (sum, m) in sums.moment.iter_mut().zip(&moment) {
-                    *sum += w * m;
-                }
+                let weight = y.values[j] * z.values[k];
+                sums.diagonal += weight * diagonal;
+                sums.others += weight * others;
+                of_slopes[0] += weight * slope;
+                of_slopes[1] += y.slopes[j] * z.values[k] * diagonal;
+                of_slopes[2] += y.values[j] * z.slopes[k] * diagonal;
             }
         }
+        sums.slopes = Vec3::from_array(of_slopes.map(|sum| sum.w));
         sums
     }
 }

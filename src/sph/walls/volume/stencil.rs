@@ -4,7 +4,9 @@
 //! the second difference, it has the values f at the nodes but for Δ⁶f/216. Since f is a sum over cells, the differences
 //! are taken of what each cell adds.
 
-use glam::DVec3;
+use std::ops::Range;
+
+use glam::{DVec3, Vec4};
 
 use super::{
     fractions::Filled,
@@ -21,35 +23,42 @@ const TERMS: usize = 16;
 /// Cells along an axis that a node sees.
 pub(super) const SIDE: usize = 2 * REACH;
 
+/// Numbers that are added in one go.
+type Lanes = [Vec4; 2];
+
 /// What a cell adds to λ and K of a node.
 struct Weight {
-    /// λ, then K: xx, yy, zz, yz, zx, xy.
-    sums: [f32; 8],
-    /// The derivative of λ by the place of what fills the cell, 1/m.
-    slope: [f32; 4],
-    /// Half of its second derivatives, 1/m², twice for those beside the diagonal: xx, yy, zz, yz, zx, xy.
-    bend: [f32; 8],
+    /// λ, then K: xx, yy, zz, yz, zx, xy; last the derivative of λ by the z of what fills the cell, 1/m.
+    sums: Lanes,
+    /// Half of the second derivatives of λ by that place, 1/m², twice for those beside the diagonal: xx, yy, zz, yz, zx,
+    /// xy; then its derivatives by x and y, 1/m.
+    bends: Lanes,
 }
 
 impl Weight {
     fn of(terms: &[f64; TERMS]) -> Self {
-        let from = |first: usize| move |k: usize| terms.get(first + k).map_or(0.0, |term| *term as f32);
         Self {
-            sums: single(terms),
-            slope: [terms[7] as f32, terms[8] as f32, terms[9] as f32, 0.0],
-            bend: std::array::from_fn(from(10)),
+            sums: lanes([0, 1, 2, 3, 4, 5, 6, 9].map(|k| terms[k] as f32)),
+            bends: lanes([10, 11, 12, 13, 14, 15, 7, 8].map(|k| terms[k] as f32)),
         }
     }
+}
 
-    /// Adds what a cell adds.
-    #[inline]
-    fn add(&self, filled: &Filled, sums: &mut [f32; 8]) {
-        for (sum, weight) in sums.iter_mut().zip(&self.sums) {
-            *sum += filled.part * weight;
-        }
-        let [x, y, z] = filled.moment;
-        let bends = filled.square.iter().zip(&self.bend).map(|(square, bend)| square * bend);
-        sums[0] += x * self.slope[0] + y * self.slope[1] + z * self.slope[2] + bends.sum::<f32>();
+/// What cells add to a node, in the order of [`Weight`].
+#[derive(Clone, Copy, Default)]
+pub(super) struct Added {
+    sums: Lanes,
+    bends: Lanes,
+}
+
+impl Added {
+    /// λ and K: xx, yy, zz, yz, zx, xy.
+    pub fn total(&self) -> [f32; 7] {
+        let [first, second] = self.sums;
+        let bent = (self.bends[0] + self.bends[1]).element_sum();
+        let [yz, zx, xy, slope] = second.to_array();
+        let [part, xx, yy, zz] = first.to_array();
+        [part + slope + bent, xx, yy, zz, yz, zx, xy]
     }
 }
 
@@ -58,7 +67,17 @@ pub(super) struct Stencil {
     /// x runs first.
     weights: Vec<Weight>,
     /// The weights of each row along x, summed up from its beginning: one more than it has cells.
-    sums: Vec<[f32; 8]>,
+    sums: Vec<Lanes>,
+    /// The rows that add anything.
+    lines: Vec<Line>,
+}
+
+/// A row of weights along x.
+pub(super) struct Line {
+    /// Its indices along y and z.
+    pub at: [usize; 2],
+    /// The weights that are not zero.
+    span: Range<usize>,
 }
 
 impl Stencil {
@@ -74,8 +93,11 @@ impl Stencil {
             sharpen(&mut raw, stride);
         }
         let mut sums = Vec::with_capacity(SIDE * SIDE * (SIDE + 1));
-        for row in raw.chunks(SIDE) {
+        let mut lines = Vec::new();
+        for (line, row) in raw.chunks(SIDE).enumerate() {
             let mut sum = [0.0; 7];
+            let single =
+                |sum: &[f64; 7]| lanes(std::array::from_fn(|k| sum.get(k).map_or(0.0, |sum| *sum as f32)));
             for terms in row {
                 sums.push(single(&sum));
                 for (sum, term) in sum.iter_mut().zip(terms) {
@@ -83,28 +105,62 @@ impl Stencil {
                 }
             }
             sums.push(single(&sum));
+            let adds = |terms: &[f64; TERMS]| terms.iter().any(|term| *term != 0.0);
+            if let (Some(first), Some(last)) = (row.iter().position(adds), row.iter().rposition(adds)) {
+                lines.push(Line { at: [line % SIDE, line / SIDE], span: first..last + 1 });
+            }
         }
-        Self { weights: raw.iter().map(Weight::of).collect(), sums }
+        Self { weights: raw.iter().map(Weight::of).collect(), sums, lines }
     }
 
-    /// Adds to `sums` what a row of cells adds to a node. `row` is the place of the row beside the node, `from` the first of
-    /// its cells that the node sees.
+    /// The rows of weights that add anything.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// Adds what a row of cells adds to nodes one after another along x. The first node sees the cells from the first of the
+    /// row on.
     #[inline]
-    pub fn add(&self, [b, c]: [usize; 2], from: usize, row: &Row, sums: &mut [f32; 8]) {
-        let line = b + SIDE * c;
+    pub fn add(&self, line: &Line, row: &Row, nodes: &mut [Added]) {
+        let at = line.at[0] + SIDE * line.at[1];
+        let summed = &self.sums[at * (SIDE + 1)..][..=SIDE];
         let (low, high) = row.whole;
-        let (low, high) = (low.clamp(from, from + SIDE) - from, high.clamp(from, from + SIDE) - from);
         if low < high {
-            let summed = &self.sums[line * (SIDE + 1)..][..=SIDE];
-            for ((sum, high), low) in sums.iter_mut().zip(&summed[high]).zip(&summed[low]) {
-                *sum += high - low;
+            for (from, node) in nodes.iter_mut().enumerate() {
+                let (low, high) = (low.clamp(from, from + SIDE) - from, high.clamp(from, from + SIDE) - from);
+                let (low, high) = (&summed[low], &summed[high]);
+                for half in 0..2 {
+                    node.sums[half] += high[half] - low[half];
+                }
             }
         }
-        let weights = &self.weights[line * SIDE..][..SIDE];
-        for (at, filled) in &row.others {
-            if let Some(weight) = at.checked_sub(from).and_then(|at| weights.get(at)) {
-                weight.add(filled, sums);
+        let weights = &self.weights[at * SIDE..][..SIDE];
+        for (at, cell) in &row.others {
+            for (from, node) in nodes.iter_mut().enumerate() {
+                let Some(k) = at.checked_sub(from).filter(|k| line.span.contains(k)) else { continue };
+                let weight = &weights[k];
+                for half in 0..2 {
+                    node.sums[half] += cell.sums[half] * weight.sums[half];
+                    node.bends[half] += cell.bends[half] * weight.bends[half];
+                }
             }
+        }
+    }
+}
+
+/// A cell that is filled in part, in the order of [`Weight`].
+struct Cell {
+    /// Its filled part seven times, and the z of what fills it.
+    sums: Lanes,
+    bends: Lanes,
+}
+
+impl Cell {
+    fn of(filled: &Filled) -> Self {
+        let Filled { part, moment: [x, y, z], square: [xx, yy, zz, yz, zx, xy] } = *filled;
+        Self {
+            sums: lanes([part, part, part, part, part, part, part, z]),
+            bends: lanes([xx, yy, zz, yz, zx, xy, x, y]),
         }
     }
 }
@@ -113,9 +169,9 @@ impl Stencil {
 #[derive(Default)]
 pub(super) struct Row {
     /// A stretch of cells that are filled, from the first to the one behind the last.
-    pub whole: (usize, usize),
+    whole: (usize, usize),
     /// The other cells that are not empty.
-    pub others: Vec<(usize, Filled)>,
+    others: Vec<(usize, Cell)>,
 }
 
 impl Row {
@@ -126,14 +182,18 @@ impl Row {
             Filled::WHOLE if low == high => self.whole = (at, at + 1),
             Filled::WHOLE if high == at => self.whole = (low, at + 1),
             filled if filled == Filled::default() => {}
-            filled => self.others.push((at, filled)),
+            filled => self.others.push((at, Cell::of(&filled))),
         }
+    }
+
+    /// Whether all of its cells are empty.
+    pub fn is_empty(&self) -> bool {
+        self.whole.0 == self.whole.1 && self.others.is_empty()
     }
 }
 
-/// The first seven numbers in single precision.
-fn single(terms: &[f64]) -> [f32; 8] {
-    std::array::from_fn(|k| if k < 7 { terms[k] as f32 } else { 0.0 })
+fn lanes([a, b, c, d, e, f, g, h]: [f32; 8]) -> Lanes {
+    [Vec4::new(a, b, c, d), Vec4::new(e, f, g, h)]
 }
 
 /// Takes f to f − Δ²f/6 + Δ⁴f/36 along an axis. Beyond the ends there is nothing.
