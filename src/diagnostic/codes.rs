@@ -183,6 +183,10 @@ run starts.";
 FLUID_OUTSIDE_BOX = "W0504":
 "Part of the fluid's shape lies outside the scene's box. The fluid is filled into the part within the box, so there is
 less of it than the shape says. Make the box larger, move the shape, or cut the shape where the box ends.";
+FLUID_LIGHTER = "W0507":
+"A fluid that fills its vessel has no surface to which it could give way. Methods that keep it from being compressed (dfsph)
+pack its particles at the start, and make them lighter as far as those at curved walls would be too dense otherwise. Forces
+and momentum are smaller by as much. More particles leave smaller gaps; `method: wcsph` keeps all of the mass.";
 FRAMES = "W0505":
 "Frames are saved so rarely that none lies between the start and the end of the run, or so often that they fill a disk.
 `save_every` is the simulated time between two of them, `until` that of the whole run.";

@@ -5,8 +5,8 @@
 //! their number times their volume is that of the fluid. What is left of the difference goes into the mass of the
 //! particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
 //!
-//! A fluid that must not be compressed and has no free surface gets the lattice as it is, less what is too near to a
-//! body: with all of its mass it would not fit between walls that take a little more than their volume.
+//! A fluid without a surface that must not be compressed is packed once it is placed, and loses some of its mass: see
+//! [`Parameters::fills_vessel`](crate::sph::Parameters::fills_vessel).
 //!
 //! A scene that states how many particles there are and how large each is has no such freedom. It is filled as it
 //! says, from below or from the middle.
@@ -50,6 +50,8 @@ pub(super) struct Filling {
     pub mass: f64,
     /// Volume of the fluid's shape in the box and outside all bodies, m³; `None` if it does not count.
     pub volume: Option<f64>,
+    /// Whether that is all the room that there is.
+    pub fills_vessel: bool,
 }
 
 /// The mass of a particle, kg, for a scene that states a number of them and not how large they are; `None` for
@@ -71,23 +73,21 @@ impl Experiment {
         let fluid = &self.scene.fluid;
         let mass = self.parameters.particle_mass;
         let within = self.reach()?.intersection(&self.scene.domain);
-        let as_stated = |volume| {
+        let as_stated = || {
             let (particles, carved) = self.place(obstacles, None, fluid.particles)?;
-            Ok(Filling { particles, carved, mass, volume })
+            Ok(Filling { particles, carved, mass, volume: None, fills_vessel: false })
         };
         if fluid.particles.is_some() && fluid.size_span.is_some() {
-            return as_stated(None);
+            return as_stated();
         }
         let bodies = self.bodies.iter().map(|body| &body.solid as &dyn Field).collect();
         let volume = Region { shape: &self.fluid, bodies, within }.volume();
         let is_measured = volume > 0.0 && volume.is_finite();
         if !is_measured {
             // a shape too thin for its volume to be found may still hold sites of a lattice
-            return as_stated(None);
+            return as_stated();
         }
-        if self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume {
-            return as_stated(Some(volume));
-        }
+        let fills_vessel = self.free_volume(0.0) < LEAST_ROOM * volume;
         let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume)?;
         if let Some(number) = fluid.particles {
             particles.truncate(number);
@@ -99,7 +99,7 @@ impl Experiment {
             || (fitted / (fluid.density * cell.element_product()) - 1.0).abs() < TOO_FAR;
         let is_same = (fitted / mass - 1.0).abs() < SAME;
         let mass = if is_lattice && !is_same { fitted } else { mass };
-        Ok(Filling { particles, carved, mass, volume: Some(volume) })
+        Ok(Filling { particles, carved, mass, volume: Some(volume), fills_vessel })
     }
 
     /// Places particles on the lattice that fits the shape best. Returns them, what was carved, and the size of the
@@ -221,8 +221,7 @@ impl Experiment {
         let mut particles = block.seed(&self.parameters, *domain).map_err(|e| self.no_fluid(&e))?;
         let spacing = cell.map_or(self.parameters.spacing(), |cell| cell.element_product().cbrt());
         let mut clearance = CLEARANCE * spacing;
-        let is_fitted = cell.is_some();
-        if self.parameters.makes_room_at_start() && (is_fitted || !self.parameters.keeps_density()) {
+        if self.parameters.makes_room_at_start() {
             // particles that are too near may move; only those that find no place are removed
             make_room(&mut particles, domain, obstacles, clearance);
             clearance *= 0.5;
@@ -231,10 +230,24 @@ impl Experiment {
         Ok((particles, carved))
     }
 
+    /// A warning if the fluid has become lighter than it was placed, from the mass, kg, of its particles now.
+    pub(super) fn lightening(&self, filling: &Filling, mass: f64) -> Option<Diagnostic> {
+        let part = 1.0 - mass / filling.mass;
+        (part > GOOD_ENOUGH).then(|| {
+            let message = format!(
+                "the fluid is {:.1} % lighter than its shape: it fills its vessel, and particles that may not be \
+                 compressed leave gaps at the walls",
+                100.0 * part
+            );
+            Diagnostic::warning(Code::FLUID_LIGHTER, self.scene.fluid.shape_span, message)
+                .help("more particles leave less; `method: wcsph` keeps all of the mass")
+        })
+    }
+
     /// A warning if obstacles took particles, with the part of the fluid that this was.
     pub(super) fn carving(
         &self,
-        Filling { carved, mass, volume, particles }: &Filling,
+        Filling { carved, mass, volume, particles, fills_vessel: _ }: &Filling,
     ) -> Option<Diagnostic> {
         let lost = carved.inside + carved.too_close + carved.outside_box;
         if lost == 0 {

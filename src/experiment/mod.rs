@@ -148,11 +148,12 @@ impl Experiment {
     pub fn start(&self) -> Result<Start, Error> {
         let fluid = &self.scene.fluid;
         let obstacles = self.obstacles();
-        let filling = self.fill(&obstacles)?;
-        let warning = self.carving(&filling);
-        let filling::Filling { mut particles, carved, mass, .. } = filling;
+        let mut filling = self.fill(&obstacles)?;
+        let carving = self.carving(&filling);
+        let mut particles = std::mem::take(&mut filling.particles);
         self.set_in_motion(&mut particles);
-        let parameters = Parameters { particle_mass: mass, ..self.parameters.clone() };
+        let filling::Filling { carved, mass, fills_vessel, .. } = filling;
+        let parameters = Parameters { particle_mass: mass, fills_vessel, ..self.parameters.clone() };
         put_under_pressure(&parameters, &mut particles);
         let simulation = Simulation::new(parameters, particles, self.scene.domain, obstacles);
         let mut simulation = simulation.map_err(|e| {
@@ -161,7 +162,8 @@ impl Experiment {
         })?;
         self.set_gravity(&mut simulation);
         let outside = self.reach().ok().and_then(|bounds| self.outside(&bounds));
-        let warnings = self.diagnostics(outside.into_iter().chain(warning).collect());
+        let lightening = self.lightening(&filling, simulation.parameters().particle_mass);
+        let warnings = self.diagnostics(outside.into_iter().chain(carving).chain(lightening).collect());
         let carved = carved.inside + carved.too_close + carved.outside_box;
         Ok(Start { simulation, carved, warnings })
     }

@@ -46,6 +46,8 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
         expected_speed: typical_speed,
         method: scene.method,
         slip: scene.slip,
+        // known once the particles are placed
+        fills_vessel: false,
         precision: scene.solver.precision.unwrap_or(method.precision),
     }
 }

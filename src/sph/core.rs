@@ -103,6 +103,12 @@ impl Core {
         }
     }
 
+    /// Multiplies the mass of all particles by a factor. The walls follow their spacing.
+    pub fn scale_masses(&mut self, factor: f64) {
+        self.parameters.particle_mass *= factor;
+        self.wall = self.parameters.method.numerics().wall(&self.parameters.scales());
+    }
+
     /// Moves the obstacles to the coming step.
     pub fn move_obstacles(&mut self, dt: f64) {
         self.boundary.move_to(self.time, self.time + dt);

@@ -48,6 +48,9 @@ pub struct Parameters {
     /// Coefficient of friction μ of the container's walls: when a particle hits a wall, its speed along the
     /// wall falls by μ times the change of its velocity normal to the wall. Zero: no friction.
     pub wall_friction: f64,
+    /// Whether the fluid fills all room that the box and the obstacles leave, so that it has no surface. `dfsph` then packs
+    /// the particles at the start and makes them lighter, as far as they would be too dense otherwise.
+    pub fills_vessel: bool,
     /// Precision of the sums over neighbours. State and motion are always in `f64`. `f32` has seven digits,
     /// relative to a few support radii.
     pub precision: Precision,
@@ -69,6 +72,7 @@ impl Default for Parameters {
             method: Method::default(),
             slip: Slip::Free,
             wall_friction: 0.0,
+            fills_vessel: false,
             precision: Precision::F64,
         }
     }
@@ -140,11 +144,6 @@ impl Parameters {
     /// particles at the rest density.
     pub fn density_at_start(&self, pressure: f64) -> Option<f64> {
         self.method.numerics().density_at_start(&self.scales(), pressure)
-    }
-
-    /// Whether the method keeps the fluid from being compressed, at any cost.
-    pub fn keeps_density(&self) -> bool {
-        self.method.numerics().kept_compression().is_some()
     }
 
     /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.

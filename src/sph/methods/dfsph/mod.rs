@@ -3,6 +3,7 @@
 mod passes;
 mod scheme;
 mod solver;
+mod start;
 mod walls;
 
 pub(super) use scheme::DivergenceFree;

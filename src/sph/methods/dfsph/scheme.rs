@@ -82,7 +82,7 @@ const NOMINAL_SOUND: f64 = 10.0;
 
 /// The scheme. It keeps the pressures, and what is owed, between steps; the rest is working memory.
 pub struct DivergenceFree {
-    numbers: Dfsph,
+    pub(super) numbers: Dfsph,
     /// Finds pressures that change velocities; its answer is p/ρ².
     forces: Solver,
     /// Finds pressures that displace particles.
@@ -97,14 +97,14 @@ pub struct DivergenceFree {
     free: Vec<f64>,
     tension: Tension,
     /// Displacements of this step that are not part of the velocity, m.
-    displacement: Vectors,
+    pub(super) displacement: Vectors,
     /// Velocities with what displaces besides, m/s.
     drift: Vectors,
     /// Densities with the barriers of the walls, kg/m³: what must not exceed that at rest.
-    loaded: Vec<f64>,
-    walls: Walls,
+    pub(super) loaded: Vec<f64>,
+    pub(super) walls: Walls,
     /// Iterations of the last step's solvers.
-    iterations: u32,
+    pub(super) iterations: u32,
 }
 
 impl Scheme for DivergenceFree {
@@ -182,42 +182,13 @@ impl DivergenceFree {
         };
         scheme.settle(core, &mut []);
         if is_new {
-            scheme.relax(core);
+            scheme.settle_in(core);
         }
         scheme
     }
 
-    /// Moves the particles of a start apart where they are too dense, above all at walls, to which the
-    /// lattice does not fit: otherwise the first step would give them speeds. Their velocities stay.
-    fn relax(&mut self, core: &mut Core) {
-        /// Most rounds; the compression that is left then is small.
-        const ROUNDS: usize = 40;
-        let mut velocity = core.particles.velocity.clone();
-        let speed = std::mem::take(&mut core.speed);
-        for _ in 0..ROUNDS {
-            let rest = core.parameters.rest_density;
-            let worst = self.loaded.iter().fold(0.0, |worst: f64, rho| worst.max(rho / rest - 1.0));
-            if worst < 2.0 * self.numbers.tolerance {
-                break;
-            }
-            core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
-            // walls that move do not sweep before the first step
-            self.find_displacements(core, 0.0);
-            // the first step will report a place at which an obstacle has no value
-            if core.drift(1.0, Some((&self.displacement, 1.0))).is_err() {
-                break;
-            }
-            let [x, y, z] = velocity.components_mut();
-            self.settle(core, &mut [x, y, z]);
-        }
-        (core.particles.velocity, core.speed) = (velocity, speed);
-        core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
-        core.particles.pressure.fill(0.0);
-        self.iterations = 0;
-    }
-
     /// Finds the order, walls, densities and factors for the present positions.
-    fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
+    pub(super) fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
         let mut columns: SmallVec<[&mut Vec<f64>; 8]> = smallvec![&mut self.forces.s, &mut self.debt];
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
@@ -305,7 +276,7 @@ impl DivergenceFree {
 
     /// Finds the displacements of a step of the length dt: by shifting, and those that keep densities at the
     /// new places from exceeding that at rest.
-    fn find_displacements(&mut self, core: &Core, dt: f64) {
+    pub(super) fn find_displacements(&mut self, core: &Core, dt: f64) {
         self.drift.clone_from(&core.particles.velocity);
         if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
             add_scaled(&mut self.drift, crowding, factor);
