@@ -187,6 +187,49 @@ fn a_deep_column_does_not_burst() {
     assert!(speed < 2.0 && top < 1.1, "{speed} m/s, {top} m");
 }
 
+/// The flow of `couette`, five spacings across, for a method without compression.
+const ENCLOSED: &str = "rfm 1
+let spacing = 0.1
+let r2 = x^2 + y^2
+let turn = 2*(1/r2 - 1)/3
+solid drum = cylinder(0.5, 2).move([0, 0, -1])
+solid vessel = cylinder(1, 2).move([0, 0, -1])
+scene enclosed {
+  box       { min: [-1.1, -1.1, 0], max: [1.1, 1.1, 0.4] }
+  container { solid: vessel, walls: no_slip, restitution: 0 }
+  obstacle  { solid: drum, walls: no_slip, surface_velocity: [-2*y, 2*x, 0], restitution: 0 }
+  fluid oil { shape: 0.25 <= r2 <= 1, density: 1000, spacing: spacing, viscosity: 100 }
+  gravity: [0, 0, 0]
+  method: dfsph
+  run       { until: 2 s, save_every: 0.1 s }
+  truth     { velocity: [-y*turn, x*turn, 0], from: 1.5 s }
+}";
+
+/// A fluid that fills its vessel is packed and becomes a little lighter, and says so. Particles that are left out at the
+/// walls instead leave gaps, and the flow deviates by 63 %.
+#[test]
+fn a_fluid_that_fills_its_vessel_is_packed() {
+    let program = Program::from_source("enclosed.rfm", ENCLOSED).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, "enclosed", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let start = experiment.start().unwrap_or_else(|e| panic!("{e}"));
+    let said: Vec<_> = start.warnings.list.iter().map(|warning| warning.code.0).collect();
+    assert_eq!((said, start.carved), (vec!["W0507"], 0));
+    let mut simulation = start.simulation;
+    let mass = simulation.parameters().particle_mass * simulation.particles().len() as f64;
+    let whole = 1000.0 * std::f64::consts::PI * 0.75 * 0.4;
+    println!("{} particles, {:.1} % of the mass", simulation.particles().len(), 100.0 * mass / whole);
+    assert!((0.93..1.0).contains(&(mass / whole)), "{mass} of {whole}");
+    let mut deviations = Deviations::default();
+    for frame in 1..=20 {
+        let reached = simulation.advance(f64::from(frame) * 0.1, |_| ControlFlow::Continue(()));
+        reached.unwrap_or_else(|e| panic!("{e}"));
+        deviations.look(&experiment, &simulation);
+    }
+    let velocity = deviations.total().velocity;
+    println!("enclosed: {velocity:?}");
+    assert!(velocity.is_some_and(|velocity| velocity < 0.15), "{velocity:?}");
+}
+
 #[test]
 fn a_block_falls_as_one() {
     // nothing acts but gravity; this allows for rounding in f32, and for what is left of the lattice's own

@@ -97,11 +97,12 @@ fn gradients_are_derivatives() {
     let mut seen = 0;
     for place in random_cloud(2000, 1.2).iter().map(|p| middle + p).filter(|p| body.omega(*p) < 0.0) {
         let Some(taken) = map.at(place) else { continue };
-        let e = 1e-5 * H;
+        // λ is known to seven digits, so the difference is taken over a part of a cell
+        let e = 3e-3 * H;
         let slope = |axis: DVec3| (part(place + e * axis) - part(place - e * axis)) / (2.0 * e);
         let derivative = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
-        // splines are smooth but for their third derivatives
-        assert!((derivative - taken.gradient).length() * H < 1e-6, "{place}: {taken:?} {derivative}");
+        // the difference is off by e²/6 times a third derivative of some 100/H³
+        assert!((derivative - taken.gradient).length() * H < 5e-4, "{place}: {taken:?} {derivative}");
         seen += 1;
     }
     assert!(seen > 500, "{seen}");
