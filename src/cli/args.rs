@@ -95,6 +95,12 @@ pub(super) enum Command {
     Report(Report),
     /// Explain a message, or show what a stage of the compiler makes of a file
     Explain(Explain),
+    /// Write a file to begin with: an obstacle, an experiment or a validation
+    Init(super::init::Init),
+    /// Print what a shell needs to complete commands and options
+    Completions(super::manual::Completions),
+    /// Print the manual page, or write one for each command
+    Man(super::manual::Man),
 }
 
 #[derive(Debug, Args)]

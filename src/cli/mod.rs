@@ -15,7 +15,9 @@ mod choose;
 mod eval;
 mod explain;
 mod failure;
+mod init;
 mod input;
+mod manual;
 mod mesh;
 mod output;
 mod plot;
@@ -78,5 +80,8 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         args::Command::Run(options) => run::run(&shared, &options),
         args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),
+        args::Command::Init(options) => init::run(&options),
+        args::Command::Completions(options) => manual::completions(&options),
+        args::Command::Man(options) => manual::man(&options),
     }
 }

@@ -199,11 +199,15 @@ impl Coverage {
         let slope = wall.kernel.slope(delta);
         let of_part = if wall.layer.is_some() { plane.area / slope } else { 1.0 };
         let of_barrier = if wall.layer.is_some() { plane.barrier_area / slope } else { 0.0 };
+        // K of layers differs from that of a continuous wall along the normal; for a plane this is exact
+        let of_layers = plane.spread - of_part * delta * slope;
+        let normal = gradient.normalize_or_zero();
         let bodies = Self {
             part: if wall.layer.is_some() { plane.part } else { part },
             filled: plane.filled,
             gradient: of_part * gradient,
-            spread: of_part * (taken.moment - taken.part * Symmetric::IDENTITY),
+            spread: of_part * (taken.moment - taken.part * Symmetric::IDENTITY)
+                + of_layers * Symmetric::square(normal),
             sweep: 0.0,
             barrier: Barrier { part: plane.barrier, gradient: of_barrier * gradient, sweep: 0.0 },
             friction: (),
