@@ -49,6 +49,18 @@ pub(super) struct Running {
     lattice: Lattice,
 }
 
+/// How fine a mesh is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Detail {
+    /// It is shown while a slider moves.
+    Passing,
+    /// It stays.
+    Lasting,
+}
+
+/// Most cells along the longest side of a mesh that is shown while a slider moves.
+const PASSING_CELLS: usize = 40;
+
 /// What tells one state of a file from another one.
 pub(super) type Stamp = Option<(SystemTime, u64)>;
 
@@ -100,11 +112,11 @@ impl Subject {
         Ok(Checked { program, scene, solid: self.solid.clone() })
     }
 
-    /// The block of the mesh of all that stands in the fluid's way at a time, s, or of the solid. And its box.
+    /// The block of the mesh of all that stands in the fluid's way at the start, or of the solid. And its box.
     ///
     /// # Errors
     /// Why there is no mesh.
-    pub fn mesh(&self, checked: &Checked, time: f64, run: u64) -> Result<(Vec<u8>, Aabb), String> {
+    pub fn mesh(&self, checked: &Checked, detail: Detail, run: u64) -> Result<(Vec<u8>, Aabb), String> {
         let (solids, domain) = match &checked.scene {
             Some(scene) => (self.solids_of(checked, scene)?, scene.domain),
             None => {
@@ -118,7 +130,11 @@ impl Subject {
                 (vec![solid], bounds.grown(1e-3 * bounds.size().max_element()))
             }
         };
-        let meshes = Bodies::of(solids, domain, self.cells).meshes_at(time).map_err(message)?;
+        let cells = match detail {
+            Detail::Passing => self.cells.min(PASSING_CELLS),
+            Detail::Lasting => self.cells,
+        };
+        let meshes = Bodies::of(solids, domain, cells).meshes_at(0.0).map_err(message)?;
         Ok((pack_mesh(&split_creases(&joined(&meshes)), run), domain))
     }
 

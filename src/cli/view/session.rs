@@ -14,7 +14,7 @@ use super::super::args::{Shared, View};
 use super::super::failure::Failure;
 use super::board::{Board, Status, Topic};
 use super::command::{Command, settled};
-use super::model::{Checked, Running, Stamp, Subject};
+use super::model::{Checked, Detail, Running, Stamp, Subject};
 use rfm::geom::Aabb;
 
 /// Time between looks at the file, and the longest time for which a command waits while nothing runs.
@@ -137,7 +137,7 @@ impl Session {
             Command::Try { name, value } if self.may_set(&name, value) => {
                 let mut values = self.values.clone();
                 values.insert(name, value);
-                self.show_mesh(&values);
+                self.show_mesh(&values, Detail::Passing);
             }
             Command::Set { name, value } if self.may_set(&name, value) => {
                 self.values.insert(name, value);
@@ -183,10 +183,10 @@ impl Session {
 
     /// Checks the file with values for params and shows its obstacles. `None` if that is not possible; the reason is
     /// told then.
-    fn show_mesh(&mut self, values: &BTreeMap<String, f64>) -> Option<(Checked, Aabb)> {
+    fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<(Checked, Aabb)> {
         let began = Instant::now();
         let made = self.subject.checked(values).and_then(|checked| {
-            let made = self.subject.mesh(&checked, 0.0, self.run)?;
+            let made = self.subject.mesh(&checked, detail, self.run)?;
             Ok((checked, made))
         });
         match made {
@@ -209,7 +209,7 @@ impl Session {
         self.status.text = "starting".into();
         self.tell();
         let values = self.values.clone();
-        let Some((checked, bounds)) = self.show_mesh(&values) else {
+        let Some((checked, bounds)) = self.show_mesh(&values, Detail::Lasting) else {
             // a file that was never right has no picture that could remain
             self.status.playing &= self.running.is_some();
             return;

@@ -23,7 +23,7 @@ class Camera {
   home() {
     this.look(FIRST_DIRECTION);
     this.target = this.centre;
-    this.distance = (this.reach / Math.sin(HALF_ANGLE)) * 0.98;
+    this.distance = (this.reach / Math.sin(HALF_ANGLE)) * 1.02;
     this.turn = NO_TURN;
   }
 
@@ -53,16 +53,24 @@ class Camera {
     return times(look, turnMatrix(this.turn, this.centre));
   }
 
-  projection(aspect) {
+  /** The matrix from the eye to a page of so many pixels, whose middle is that of what the controls leave free. */
+  projection([width, height], free) {
+    const [w, h] = [Math.max(width - free.left - free.right, 60), Math.max(height - free.top - free.bottom, 60)];
+    const aspect = w / h;
     // a narrow window keeps the whole box in its width
     const tangent = Math.tan(HALF_ANGLE) / Math.min(aspect, 1);
     const reach = this.reach * 3 + norm(sub(this.target, this.centre));
-    const [far, near] = [this.distance + reach, Math.max(this.distance - reach, 0.003 * this.distance)];
+    let lens;
     if (this.parallel) {
       const half = tangent * this.distance;
-      return new Float32Array([1 / (half * aspect), 0, 0, 0, 0, 1 / half, 0, 0, 0, 0, -2 / (far + reach - (this.distance - reach)), 0, 0, 0, -(far + reach + this.distance - reach) / (far + reach - (this.distance - reach)), 1]);
+      lens = [1 / (half * aspect), 0, 0, 0, 0, 1 / half, 0, 0, 0, 0, -1 / reach, 0, 0, 0, -this.distance / reach, 1];
+    } else {
+      const [far, near] = [this.distance + reach, Math.max(this.distance - reach, 0.003 * this.distance)];
+      lens = [1 / (tangent * aspect), 0, 0, 0, 0, 1 / tangent, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
     }
-    return new Float32Array([1 / (tangent * aspect), 0, 0, 0, 0, 1 / tangent, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0]);
+    const [x, y] = [(2 * free.left + w) / width - 1, 1 - (2 * free.top + h) / height];
+    const place = new Float32Array([w / width, 0, 0, 0, 0, h / height, 0, 0, 0, 0, 1, 0, x, y, 0, 1]);
+    return times(place, lens);
   }
 
   orbit(dx, dy) {

@@ -16,14 +16,14 @@ class Viewer {
     this.stats = { draws: 0, milliseconds: 0 };
     this.look = {
       colours: sceneColours(), obstacle: "opaque", particles: true, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
-      cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true, panel: innerWidth > 720,
+      cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
     };
     this.take(setting);
     this.camera.frame(this.look.boxBounds);
     this.scene.setMap(this.look.map);
     this.scene.restored = () => { this.scene.setMap(this.look.map); this.scene.setBox(this.look.boxBounds); this.changed(); };
     this.listen();
-    this.showPanel(this.look.panel);
+    this.showPanel(innerWidth > 720);
     byId("transport").hidden = setting.arrays.length === 0;
     byId("record").hidden = !window.MediaRecorder || setting.arrays.length === 0;
     if (setting.live) this.live = new Live((kind, content) => this.told(kind, content));
@@ -41,7 +41,11 @@ class Viewer {
     byId("facts").textContent = setting.facts;
     this.scene.setBox(setting.box);
     this.plots.set(setting.plots ?? []);
-    buildPanel(byId("panel"), this);
+    // controls in use stay as they are: only another set of them is built anew
+    const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name)]);
+    if (kind !== this.kind) buildPanel(byId("panel"), this);
+    else showParams(setting.params);
+    this.kind = kind;
     this.changed();
   }
 
@@ -117,10 +121,6 @@ class Viewer {
 
   send(command) {
     this.live?.send(command);
-  }
-
-  param(what, name, value) {
-    this.send({ do: what, name, value });
   }
 
   // ---- time
@@ -211,6 +211,7 @@ class Viewer {
     const sign = flipped ? -1 : 1;
     look.cut = k < 0 ? NO_CUT : [0, 1, 2].map((i) => (i === k ? sign : 0)).concat(sign * at);
     [look.cutSolid, look.cutFluid] = [look.cutting.solid, look.cutting.fluid];
+    look.free = this.free();
     if (byId("cut-value")) byId("cut-value").textContent = k < 0 ? "" : `${shown(at)} m`;
     look.parallel = camera.parallel;
     look.gravity = setting.gravity;
@@ -222,6 +223,17 @@ class Viewer {
     }
   }
 
+  /** What the controls leave free of the page, as distances from its edges. */
+  free() {
+    const [panel, transport] = [byId("panel"), byId("transport")];
+    const bottom = transport.hidden ? 10 : innerHeight - transport.getBoundingClientRect().top;
+    const free = { left: 0, right: 0, top: 30, bottom };
+    if (panel.hidden) return free;
+    if (innerWidth > 720) free.right = innerWidth - panel.getBoundingClientRect().left;
+    else free.bottom = innerHeight - panel.getBoundingClientRect().top;
+    return free;
+  }
+
   showRange() {
     for (const [id, value] of [["low", this.look.range.low], ["high", this.look.range.high]]) {
       const input = byId(id);
@@ -229,19 +241,20 @@ class Viewer {
     }
   }
 
-  draw() {
+  draw(whole = null) {
     const began = performance.now();
     const { canvas, overlay, look, camera, timeline, scene } = this;
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const size = [Math.max(Math.round(canvas.clientWidth * ratio), 1), Math.max(Math.round(canvas.clientHeight * ratio), 1)];
     for (const target of [canvas, overlay]) if (target.width !== size[0] || target.height !== size[1]) [target.width, target.height] = size;
     this.settle();
+    if (whole) look.free = whole;
     const frames = timeline.shown(look.blend && !this.live);
     scene.moving = this.dragging || timeline.playing;
     scene.setMesh(this.meshes[frames?.from.mesh ?? 0] ?? null);
     const view = camera.view();
-    const projection = camera.projection(size[0] / size[1]);
-    if (frames && this.setting.arrays.length === 0) throw new Error("frames without arrays");
+    const page = size.map((x) => x / ratio);
+    const projection = camera.projection(page, look.free);
     scene.draw(look, view, projection, frames);
     const seen = { view, all: times(projection, view) };
     drawOverlay(overlay.getContext("2d"), size, ratio, look, camera, seen, null);
@@ -253,7 +266,8 @@ class Viewer {
 
   /** The picture with its legend and title on a canvas of its own. */
   composed() {
-    this.draw();
+    const whole = { left: 0, right: 0, top: 20, bottom: 10 };
+    this.draw(whole);
     const { canvas, look, camera, timeline } = this;
     const picture = element("canvas", { width: canvas.width, height: canvas.height });
     const context = picture.getContext("2d");
@@ -261,10 +275,11 @@ class Viewer {
     const ratio = canvas.width / canvas.clientWidth;
     const labels = element("canvas", { width: canvas.width, height: canvas.height });
     const view = camera.view();
-    const seen = { view, all: times(camera.projection(canvas.width / canvas.height), view) };
+    const seen = { view, all: times(camera.projection([canvas.width / ratio, canvas.height / ratio], whole), view) };
     const caption = [this.setting.title].concat(timeline.frames.length ? [`t = ${timeline.time.toFixed(3)} s`] : []);
-    drawOverlay(labels.getContext("2d"), [canvas.width, canvas.height], ratio, { ...look, panel: false }, camera, seen, caption);
+    drawOverlay(labels.getContext("2d"), [canvas.width, canvas.height], ratio, look, camera, seen, caption);
     context.drawImage(labels, 0, 0);
+    this.changed();
     return picture;
   }
 
@@ -311,7 +326,6 @@ class Viewer {
   }
 
   showPanel(on) {
-    this.look.panel = on && innerWidth > 720;
     byId("panel").hidden = !on;
     byId("show-panel").setAttribute("aria-expanded", String(on));
     this.changed();

@@ -18,12 +18,9 @@ function drawOverlay(context, size, ratio, look, camera, seen, caption) {
   }
 }
 
-/** Room at the lower edge for the transport bar. */
-const FOOT = 66;
-
 function drawLegend(context, page, look) {
   const [width, height] = [14, Math.min(190, page[1] * 0.34)];
-  const [left, top] = [18, page[1] - FOOT - height - 8];
+  const [left, top] = [18, page[1] - look.free.bottom - height - 12];
   const { low, high } = look.range;
   for (let y = 0; y < height; y++) {
     const [r, g, b] = colourAt(look.map, 1 - (y + 0.5) / height);
@@ -87,7 +84,7 @@ function drawLengths(context, page, look, seen) {
 
 /** The axes and gravity, in the corner. */
 function drawAxes(context, page, look, camera, seen) {
-  const [x, y, length] = [page[0] - (look.panel ? 318 : 58), page[1] - FOOT - 44, 26];
+  const [x, y, length] = [page[0] - look.free.right - 48, page[1] - look.free.bottom - 46, 26];
   const arms = [0, 1, 2].map((axis) => ({ d: [seen.view[4 * axis], seen.view[4 * axis + 1], seen.view[4 * axis + 2]], text: "xyz"[axis], colour: ["#cc4b42", "#4c9a52", "#4777c8"][axis] }));
   if (look.gravity && norm(look.gravity) > 0) {
     const g = unit(look.gravity);

@@ -91,26 +91,41 @@ function cutGroup(viewer) {
       viewer.setting.arrays.length ? check("cut-fluid", "fluid", cut.fluid, (value) => { cut.fluid = value; viewer.changed(); }) : null));
 }
 
+/** How the slider of a param goes: its ends, and by powers where the range has several of ten. */
+function scaleOf(param) {
+  const [low, high] = param.range ?? (param.value > 0 ? [param.value / 4, param.value * 4] : param.value < 0 ? [param.value * 4, param.value / 4] : [-1, 1]);
+  const powers = low > 0 && high / low >= 500;
+  return { low, high, powers, to: powers ? Math.log : (x) => x, from: powers ? Math.exp : (x) => x };
+}
+
+const inUnit = (param, value) => Number((value / param.factor).toPrecision(6));
+
+/** Shows the values of params in the controls that there are, but not in one that is being used. */
+function showParams(params) {
+  for (const param of params) {
+    const { low, high, to } = scaleOf(param);
+    const [number, track] = [byId(`value-${param.name}`), byId(`param-${param.name}`)];
+    if (number !== document.activeElement) number.value = inUnit(param, param.value);
+    track.value = to(clamp(param.value, low, high));
+  }
+}
+
 /** The params of the file. A drag moves the obstacle at once; the run starts again when the slider is let go. */
 function paramsGroup(viewer) {
   const rows = viewer.setting.params.map((param) => {
-    const { factor } = param;
-    const [low, high] = param.range ?? (param.value > 0 ? [param.value / 4, param.value * 4] : param.value < 0 ? [param.value * 4, param.value / 4] : [-1, 1]);
-    // a range of several powers of ten is walked by powers
-    const powers = low > 0 && high / low >= 500;
-    const [to, from] = powers ? [Math.log, Math.exp] : [(x) => x, (x) => x];
-    const number = element("input", { type: "number", step: "any", value: Number((param.value / factor).toPrecision(6)), ariaLabel: param.name, id: `value-${param.name}`,
-      onchange: (event) => { if (event.target.value !== "") tell("set", Number(event.target.value) * factor); } });
+    const { low, high, powers, to, from } = scaleOf(param);
     const tell = (what, value) => {
-      number.value = Number((value / factor).toPrecision(6));
+      number.value = inUnit(param, value);
       track.value = to(clamp(value, low, high));
-      viewer.param(what, param.name, value);
+      viewer.send({ do: what, name: param.name, value });
     };
     const rounded = (value) => {
       // three digits of the range are as fine as a slider is
       const step = 10 ** (Math.floor(Math.log10(powers ? value : high - low)) - 2);
       return clamp(Math.round(value / step) * step, low, high);
     };
+    const number = element("input", { type: "number", step: "any", value: inUnit(param, param.value), ariaLabel: param.name, id: `value-${param.name}`,
+      onchange: (event) => { if (event.target.value !== "") tell("set", Number(event.target.value) * param.factor); } });
     const track = element("input", { type: "range", min: to(low), max: to(high), step: "any", value: to(clamp(param.value, low, high)), ariaLabel: `${param.name}, slider`, id: `param-${param.name}`,
       oninput: (event) => tell("try", rounded(from(Number(event.target.value)))),
       onchange: (event) => tell("set", rounded(from(Number(event.target.value)))) });

@@ -13,7 +13,8 @@ use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
 /// Programs that are looked for, in this order.
-const PROGRAMS: [&str; 5] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
+const PROGRAMS: [&str; 5] =
+    ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
 
 /// The longest wait for anything.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -32,7 +33,8 @@ pub struct Browser {
 /// The path of a browser that is installed.
 pub fn installed() -> Option<PathBuf> {
     let named = std::env::var_os("RFM_BROWSER").map(PathBuf::from);
-    let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
+    let folders: Vec<PathBuf> =
+        std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
     let found = PROGRAMS.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
     named.into_iter().chain(found).find(|path| path.is_file())
 }
@@ -43,7 +45,12 @@ impl Browser {
         let profile = tempfile::tempdir().unwrap();
         let mut child = Command::new(program)
             .args(["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run"])
-            .args(["--disable-background-networking", "--disable-extensions", "--hide-scrollbars", "--mute-audio"])
+            .args([
+                "--disable-background-networking",
+                "--disable-extensions",
+                "--hide-scrollbars",
+                "--mute-audio",
+            ])
             .args(["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
             .args(["--force-device-scale-factor=1", "--remote-debugging-port=0"])
             .arg(format!("--window-size={width},{height}"))
@@ -119,7 +126,9 @@ impl Browser {
                 let details = &parameters["exceptionDetails"];
                 self.complaints.push(format!("{} {}", details["text"], details["exception"]["description"]));
             }
-            Some("Runtime.consoleAPICalled") if ["error", "warning"].contains(&parameters["type"].as_str().unwrap_or("")) => {
+            Some("Runtime.consoleAPICalled")
+                if ["error", "warning"].contains(&parameters["type"].as_str().unwrap_or("")) =>
+            {
                 self.complaints.push(parameters["args"].to_string());
             }
             Some("Log.entryAdded") if parameters["entry"]["level"] == "error" => {
@@ -137,7 +146,9 @@ impl Browser {
 
     pub fn open(&mut self, address: &str) {
         self.call("Page.navigate", json!({ "url": address }));
-        self.wait_for("document.readyState === 'complete' && (window.viewer !== undefined || document.body !== null)");
+        self.wait_for(
+            "document.readyState === 'complete' && (window.viewer !== undefined || document.body !== null)",
+        );
     }
 
     /// The value of an expression; a promise is waited for.
@@ -169,8 +180,7 @@ impl Browser {
     /// Presses the left button at a place, moves to another one in steps, and lets go.
     pub fn drag(&mut self, from: (f64, f64), to: (f64, f64)) {
         let mut mouse = |kind: &str, (x, y): (f64, f64), buttons: u32| {
-            let event =
-                json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
+            let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
             self.call("Input.dispatchMouseEvent", event);
         };
         mouse("mousePressed", from, 1);

@@ -17,7 +17,8 @@ fn main() -> ExitCode {
         return ExitCode::from(77);
     };
     let chosen: Vec<String> = std::env::args().skip(1).collect();
-    let shots = std::env::var_os("RFM_SHOTS").map_or_else(|| std::env::temp_dir().join("rfm-viewer"), PathBuf::from);
+    let shots =
+        std::env::var_os("RFM_SHOTS").map_or_else(|| std::env::temp_dir().join("rfm-viewer"), PathBuf::from);
     std::fs::create_dir_all(&shots).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut room = cases::Room::prepare(&program, folder.path(), &shots);
