@@ -12,6 +12,7 @@
 //! which threads finish; they are put in order here.
 
 mod collection;
+mod error;
 mod frame;
 mod storage;
 
@@ -25,7 +26,8 @@ use crate::geom::Aabb;
 use crate::mesh::Mesh;
 
 pub use collection::{CollectionError, FrameEntry, read_collection};
-pub use frame::{FrameError, PointArray, read_arrays, read_mesh, read_points};
+pub use error::FrameError;
+pub use frame::{PointArray, read_arrays, read_mesh, read_points};
 
 /// The parameters of a surface. Lengths are in metres and absolute.
 #[derive(Debug, Clone, Copy, PartialEq)]

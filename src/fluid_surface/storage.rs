@@ -10,7 +10,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use roxmltree::Node;
 
-use super::frame::FrameError;
+use super::error::FrameError;
 
 /// A number that an element states.
 pub(super) fn number<T: std::str::FromStr>(node: Node<'_, '_>, name: &'static str) -> Result<T, FrameError> {

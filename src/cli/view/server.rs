@@ -84,7 +84,7 @@ impl Server {
             let place = Place::taken(&open);
             let (server, content) = (Arc::clone(&server), Arc::clone(&content));
             let spawned = thread::Builder::new().name("rfm-page".into()).spawn(move || {
-                if place.number > MOST_CONNECTIONS {
+                if place.is_beyond_the_last() {
                     // who is refused may have gone already
                     let _ = request::refuse(&mut stream, Refusal::CROWDED);
                     return;
@@ -152,6 +152,10 @@ impl Place {
     fn taken(open: &Arc<AtomicUsize>) -> Self {
         let number = open.fetch_add(1, Ordering::Relaxed) + 1;
         Self { open: Arc::clone(open), number }
+    }
+
+    fn is_beyond_the_last(&self) -> bool {
+        self.number > MOST_CONNECTIONS
     }
 }
 

@@ -76,9 +76,11 @@ function drawLengths(context, page, look, seen) {
     const out = unit([(edge.p[0] + edge.q[0]) / 2 - middle[0], (edge.p[1] + edge.q[1]) / 2 - middle[1], 0]);
     const label = (p, text) => context.fillText(text, p[0] + out[0] * 17, p[1] + out[1] * 13);
     const along = (t) => [edge.p[0] + (edge.q[0] - edge.p[0]) * t, edge.p[1] + (edge.q[1] - edge.p[1]) * t];
-    label(along(0.06), shown(min[axis]));
+    // what rounding has left of 0 is 0
+    const rounded = (x) => (Math.abs(x) < 1e-9 * (max[axis] - min[axis]) ? 0 : x);
+    label(along(0.06), shown(rounded(min[axis])));
     label(along(0.5), `${"xyz"[axis]}, m`);
-    label(along(0.94), shown(max[axis]));
+    label(along(0.94), shown(rounded(max[axis])));
   }
 }
 

@@ -34,7 +34,7 @@ function buildPanel(place, viewer) {
   if (setting.params?.length) groups.push(paramsGroup(viewer));
   if (setting.live) groups.push(boxGroup(viewer));
   if (setting.arrays.length) groups.push(colourGroup(viewer));
-  groups.push(group("Obstacle", true, choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); })));
+  groups.push(group(setting.arrays.length ? "Obstacle" : "Solid", true, choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); })));
   groups.push(cutGroup(viewer));
   const direction = (name, d) => element("button", { title: `look along ${name[1]}`, onclick: () => { camera.look(d); again(); } }, name);
   groups.push(group("View", true,
@@ -87,7 +87,7 @@ function cutGroup(viewer) {
   return group("Cut", true,
     row("across", axis, element("button", { id: "cut-side", title: "take away the other side", onclick: () => { cut.flipped = !cut.flipped; viewer.changed(); } }, "⇄")),
     row("at", place, element("output", { id: "cut-value" })),
-    row("", check("cut-solid", "obstacle", cut.solid, (value) => { cut.solid = value; viewer.changed(); }),
+    row("", check("cut-solid", viewer.setting.arrays.length ? "obstacle" : "solid", cut.solid, (value) => { cut.solid = value; viewer.changed(); }),
       viewer.setting.arrays.length ? check("cut-fluid", "fluid", cut.fluid, (value) => { cut.fluid = value; viewer.changed(); }) : null));
 }
 
