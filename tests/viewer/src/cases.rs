@@ -24,6 +24,7 @@ type Case = fn(&mut Room);
 pub const ALL: &[(&str, Case)] = &[
     ("a saved page opens from a file and plays", saved),
     ("a person turns, zooms, cuts and colours", handled),
+    ("pictures and videos are saved", files),
     ("a page of a mesh", mesh),
     ("a page of moving obstacles and probes", moving),
     ("small windows and both themes", windows),
@@ -149,7 +150,9 @@ fn handled(room: &mut Room) {
     room.browser.choose("#obstacle", "transparent");
     room.shot("handled-transparent");
     room.browser.choose("#obstacle", "hidden");
-    assert!(Picture::of(&room.scene()).difference(&whole) > 0.5);
+    let without = Picture::of(&room.scene()).difference(&whole);
+    println!("  a hidden obstacle changes a channel by {without:.2} of 255 on average");
+    assert!(without > 0.5, "{without}");
     room.browser.choose("#obstacle", "opaque");
 
     for array in ["density", "pressure"] {
@@ -176,6 +179,31 @@ fn handled(room: &mut Room) {
     let composed = room.browser.eval("viewer.composed().toDataURL('image/png')");
     let composed = composed.as_str().unwrap().split_once(',').unwrap().1.to_string();
     std::fs::write(room.shots.join("composed.png"), BASE64_STANDARD.decode(composed).unwrap()).unwrap();
+}
+
+/// What is handed to the user as a file: its ending and its length.
+fn handed_over(room: &mut Room, begin: &str, end: &str) -> (String, f64) {
+    room.browser.eval(
+        "(viewer.save = (blob, ending) => (window.handed = [ending, blob.size]), window.handed = null, 0)",
+    );
+    room.browser.key(begin);
+    if !end.is_empty() {
+        // a second of video
+        std::thread::sleep(Duration::from_secs(1));
+        room.browser.key(end);
+    }
+    room.browser.wait_for("window.handed");
+    let ending = room.browser.eval("window.handed[0]").as_str().unwrap().to_string();
+    (ending, room.browser.number("window.handed[1]"))
+}
+
+fn files(room: &mut Room) {
+    room.open_saved("pawn");
+    room.browser.eval("viewer.play(true)");
+    let (ending, bytes) = handed_over(room, "s", "");
+    assert!(ending == "png" && bytes > 10_000.0, "{ending}: {bytes} bytes");
+    let (ending, bytes) = handed_over(room, "v", "v");
+    assert!(ending == "webm" && bytes > 10_000.0, "{ending}: {bytes} bytes");
 }
 
 fn mesh(room: &mut Room) {
