@@ -181,9 +181,9 @@ impl Viewer {
     fn ask(&self, request: &str) -> (String, String) {
         let mut stream = TcpStream::connect(self.at).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-        stream.write_all(request.as_bytes()).unwrap();
+        // a server that refuses may have closed before all of it is sent
+        let _ = stream.write_all(request.as_bytes());
         let mut answer = Vec::new();
-        // a server that refuses while more arrives may reset the connection behind its answer
         let _ = stream.read_to_end(&mut answer);
         let answer = String::from_utf8_lossy(&answer).into_owned();
         (answer.lines().next().unwrap_or_default().to_string(), answer)

@@ -3,7 +3,7 @@
 //! Invariant: what is read is limited in length and time, and nothing in it is trusted.
 
 use std::io::{self, Read, Write};
-use std::net::{IpAddr, TcpStream};
+use std::net::{IpAddr, Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
 /// The longest head of a request, bytes.
@@ -11,6 +11,10 @@ const LONGEST_HEAD: usize = 16 << 10;
 
 /// The longest time for a head to arrive.
 const PATIENCE: Duration = Duration::from_secs(5);
+
+/// The longest wait for more of a request that is refused, and the most parts of it that are read.
+const FAREWELL: Duration = Duration::from_millis(200);
+const MOST_PARTS: usize = 32;
 
 /// A request: a path, and those of its headers that the viewer needs.
 #[derive(Debug, PartialEq, Eq)]
@@ -153,9 +157,19 @@ pub(super) fn answer(stream: &mut TcpStream, status: &str, kind: &str, body: &[u
     stream.flush()
 }
 
-/// Answers that a request is refused.
+/// Answers that a request is refused, and reads what still arrives of it: a connection that is closed before loses the
+/// answer.
 pub(super) fn refuse(stream: &mut TcpStream, refusal: Refusal) -> io::Result<()> {
-    answer(stream, refusal.status, "text/plain", format!("{}\n", refusal.reason).as_bytes())
+    answer(stream, refusal.status, "text/plain", format!("{}\n", refusal.reason).as_bytes())?;
+    stream.shutdown(Shutdown::Write)?;
+    stream.set_read_timeout(Some(FAREWELL))?;
+    let mut part = [0; 4096];
+    for _ in 0..MOST_PARTS {
+        if stream.read(&mut part)? == 0 {
+            break;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
