@@ -47,21 +47,6 @@ impl Room {
             "rfm 1\nparam r = 5 cm in 1 cm .. 20 cm \"radius\"\nsolid hoop = torus(0.3, r)\n",
         )
         .unwrap();
-        rfm(folder, &["run", "pawn.rfm", "-D", "particles=4000", "--until", "1", "--no-pictures"]);
-        rfm(
-            folder,
-            &[
-                "run",
-                "paddle.rfm",
-                "-D",
-                "particles=1500",
-                "--until",
-                "0.3",
-                "--no-pictures",
-                "--mesh-cells",
-                "48",
-            ],
-        );
         Self { browser: Browser::start(program, SIZE), folder: folder.into(), shots: shots.into() }
     }
 
@@ -81,6 +66,12 @@ impl Room {
     fn open_saved(&mut self, run: &str) {
         let page = self.folder.join(format!("{run}.html"));
         if !page.exists() {
+            let (particles, until) =
+                if run == "pawn" { ("particles=4000", "1") } else { ("particles=1500", "0.3") };
+            let file = format!("{run}.rfm");
+            let words =
+                ["run", &file, "-D", particles, "--until", until, "--no-pictures", "--mesh-cells", "48"];
+            rfm(&self.folder, &words);
             rfm(&self.folder, &["view", &format!("{run}.out"), "--save", &format!("{run}.html")]);
         }
         self.browser.open(&format!("file://{}", page.display()));
