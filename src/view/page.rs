@@ -76,6 +76,9 @@ impl<'a> Page<'a> {
 }
 
 /// A document without blocks, as a server sends it.
+///
+/// # Errors
+/// [`io::Error`] if the setting has no form in JSON.
 pub fn document(setting: &Setting) -> io::Result<Vec<u8>> {
     let mut out = Vec::new();
     Page::begin(&mut out, setting)?.end()?;
