@@ -20,6 +20,7 @@
 //! | [`Program`], [`Solid`], [`solid`] | a file, compiled; ω, ∇ω, signs, contacts, ranges, paths, cell maps |
 //! | [`field`] | the traits [`Field`] and [`field::Walls`], which closures may implement as well |
 //! | [`mesh`], [`mod@slice`], [`render`], [`fluid_surface`] | meshes, plots, pictures, surfaces of fluids |
+//! | [`view`] | a page for a browser that shows particles and meshes |
 //! | [`source`] | a solid as source text: C, CUDA, Rust, WGSL, GLSL |
 //! | [`Experiment`], [`experiment`], [`sph`] | scenes, and the fluid solver without them |
 //! | [`diagnostic`] | messages with their places in a file |
@@ -46,6 +47,7 @@ pub mod slice;
 pub mod solid;
 pub mod source;
 pub mod sph;
+pub mod view;
 
 mod lettering;
 

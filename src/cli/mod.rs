@@ -24,8 +24,10 @@ mod plot;
 mod progress;
 mod report;
 mod run;
+mod saved;
 mod section;
 mod values;
+mod view;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -78,6 +80,7 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         args::Command::Mesh(options) => mesh::run(&shared, &options),
         args::Command::Build(options) => build::run(&shared, &options),
         args::Command::Run(options) => run::run(&shared, &options),
+        args::Command::View(options) => view::run(&shared, &options),
         args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),
         args::Command::Init(options) => init::run(&options),

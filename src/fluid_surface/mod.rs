@@ -1,6 +1,7 @@
 //! Closed triangle meshes around the particles of a fluid, frame by frame.
 //!
-//! [`read_collection`] lists the frames of a run, [`read_points`] reads the positions of one, and
+//! [`read_collection`] lists the frames of a run, [`read_points`] reads the positions of one ([`read_arrays`] and
+//! [`read_mesh`] what else a frame has), and
 //! [`Reconstruction::mesh`] lays a surface around them with the crate `splashsurf_lib`. A kernel sum gives
 //! the density over the rest density, which marching cubes mesh at a threshold, as Löschner, Böttcher,
 //! Jeske and Bender describe ("Weighted Laplacian Smoothing for Surface Reconstruction of Particle-based
@@ -11,7 +12,9 @@
 //! which threads finish; they are put in order here.
 
 mod collection;
+mod error;
 mod frame;
+mod storage;
 
 use std::fmt;
 
@@ -23,7 +26,8 @@ use crate::geom::Aabb;
 use crate::mesh::Mesh;
 
 pub use collection::{CollectionError, FrameEntry, read_collection};
-pub use frame::{FrameError, read_points};
+pub use error::FrameError;
+pub use frame::{PointArray, read_arrays, read_mesh, read_points};
 
 /// The parameters of a surface. Lengths are in metres and absolute.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -142,7 +142,7 @@ fn broken_frames_are_told_apart() {
     assert_eq!(frame("", "NumberOfPoints=\"1\">"), FrameError::Missing("positions"));
     assert_eq!(frame("", "><Points/>"), FrameError::Missing("NumberOfPoints"));
     assert_eq!(frame("", &array("type=\"Float32\"", "1 2")), FrameError::Count { expected: 3, found: 2 });
-    assert_eq!(frame("", &array("type=\"Float32\"", "1 2 x")), FrameError::Malformed("a coordinate"));
+    assert_eq!(frame("", &array("type=\"Float32\"", "1 2 x")), FrameError::Malformed("a number"));
     assert_eq!(
         frame("", &array("type=\"Int32\"", "1 2 3")),
         FrameError::Unsupported("positions of the type Int32".into())

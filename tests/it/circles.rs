@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use crate::tool::root;
 
 /// Rooms without circles of files.
-const ROOMS: [&str; 15] = [
+const ROOMS: [&str; 16] = [
     "cli",
     "codegen",
     "diagnostic",
@@ -25,6 +25,7 @@ const ROOMS: [&str; 15] = [
     "solid",
     "sph",
     "syntax",
+    "view",
 ];
 
 type Segments = Vec<String>;

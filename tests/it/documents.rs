@@ -2,13 +2,14 @@
 
 use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 9] = [
+const DOCUMENTS: [&str; 10] = [
     "README.md",
     "CHANGELOG.md",
     "examples/README.md",
     "examples/validation/README.md",
     "tests/bench/README.md",
     "tests/peers/README.md",
+    "tests/viewer/README.md",
     "src/sph/methods/README.md",
     "src/bindings/python/README.md",
     "src/bindings/c/README.md",

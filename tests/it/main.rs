@@ -36,4 +36,5 @@ mod tidy;
 mod tolerance;
 mod tool;
 mod validation;
+mod view;
 mod walls;

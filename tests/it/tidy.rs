@@ -34,6 +34,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("sph", &["field", "geom", "interval", "precision", "quantity"]),
     ("experiment", &["compile", "diagnostic", "field", "geom", "ir", "lower", "solid", "sph", "precision"]),
     ("render", &["field", "geom", "lettering"]),
+    ("view", &["geom", "mesh"]),
     ("cli", &["*"]),
     ("lib", &["*"]),
     ("main", &["*"]),

@@ -7,15 +7,15 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::super::args::{Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
-use super::super::values::Frames;
+use super::super::saved::{self, RunFigures};
 use super::super::{output, progress};
 use super::format;
 use crate::cli::output::Shown;
-use rfm::fluid_surface::{FrameEntry, Reconstruction, read_collection, read_points};
+use rfm::fluid_surface::{FrameEntry, Reconstruction, read_points};
 use rfm::mesh::{LengthUnit, WriteMesh, is_closed_manifold, shells, vtp};
 use rfm::sph;
 
@@ -56,13 +56,6 @@ struct FrameSurface {
     milliseconds: f64,
 }
 
-/// The part of a run's `summary.json` that is needed here.
-#[derive(Debug, Deserialize)]
-struct RunFigures {
-    particle_mass: f64,
-    rest_density: f64,
-}
-
 /// How large the particles are.
 struct ParticleScale {
     surface: Reconstruction,
@@ -75,9 +68,9 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let unit = format::unit_fits(format, options.unit)?;
     let write = format::writer(format, options.ascii)?;
     let folder = options.file.as_path();
-    let entries = chosen(collection(folder)?, options.frames)?;
+    let entries = saved::chosen(collection(folder)?, options.frames)?;
     let scale = ParticleScale::new(folder, options)?;
-    check_frames(folder, &entries)?;
+    saved::check_frames(folder, &entries)?;
     let target = options.output.clone().unwrap_or_else(|| folder.join("surface"));
     let job = Job { folder, target, ending: format.ending, write, unit, scale };
     let started = Instant::now();
@@ -105,7 +98,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The frames of a run, from its `particles.pvd`.
+/// The frames of a run.
 fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
     let shown = folder.shown();
     if !folder.exists() {
@@ -120,56 +113,14 @@ fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
             run.shown()
         )));
     }
-    let path = folder.join("particles.pvd");
-    if !path.is_file() {
-        return Err(Failure::usage(format!(
-            "there are no frames in `{shown}`: `rfm run` lists them in particles.pvd, unless it is told --no-frames"
-        )));
-    }
-    let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
-    let text = std::fs::read_to_string(&path).map_err(|error| failed(error.to_string()))?;
-    let entries = read_collection(&text).map_err(|error| failed(error.to_string()))?;
-    if entries.is_empty() {
-        return Err(failed("it lists no frames".into()));
-    }
-    Ok(entries)
-}
-
-/// Refuses frames whose file is missing.
-fn check_frames(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<(), Failure> {
-    for (_, entry) in entries {
-        let file = folder.join(&entry.file);
-        if !file.is_file() {
-            let lost =
-                format!("the frame `{}` is missing; `rfm run` writes it again, or choose", file.shown());
-            return Err(Failure::usage(format!("{lost} others with --frames A..B")));
-        }
-    }
-    Ok(())
-}
-
-/// The entries that are asked for, with their numbers.
-fn chosen(entries: Vec<FrameEntry>, frames: Option<Frames>) -> Result<Vec<(usize, FrameEntry)>, Failure> {
-    let count = entries.len();
-    let Frames { first, end } = frames.unwrap_or_default();
-    let end = end.unwrap_or(count);
-    if first >= end || end > count {
-        return Err(Failure::usage(format!(
-            "--frames {first}..{end}: there are {count} frames, from 0 to {}; B is the first that is left out",
-            count - 1
-        )));
-    }
-    Ok(entries.into_iter().enumerate().take(end).skip(first).collect())
+    saved::collection(folder)
 }
 
 impl ParticleScale {
     /// The scale that the flags give, and otherwise the one in the run's summary.
     fn new(folder: &Path, options: &Options) -> Result<Self, Failure> {
         let path = folder.join("summary.json");
-        let figures = std::fs::read_to_string(&path)
-            .map_err(|error| error.to_string())
-            .and_then(|text| serde_json::from_str::<RunFigures>(&text).map_err(|error| error.to_string()))
-            .map(|figures| figures.particle_mass / figures.rest_density);
+        let figures = RunFigures::read(&path).map(|figures| figures.particle_volume());
         let usable = |length: f64| length.is_finite() && length > 0.0;
         let particle_volume = match (options.radius, figures) {
             (_, Ok(volume)) if usable(volume) => volume,

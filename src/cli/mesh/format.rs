@@ -53,11 +53,16 @@ pub(super) fn of_path(path: &Path) -> Result<Format, Failure> {
     let found = FORMATS.iter().find(|format| format.ending == ending);
     found.copied().ok_or_else(|| {
         Failure::usage(format!(
-            "cannot tell the mesh format of `{}`: the ending must be {}",
+            "cannot tell the mesh format of `{}`: the ending must be {}, or .html for a page that shows it",
             path.shown(),
             one_of(FORMATS)
         ))
     })
+}
+
+/// Whether a path names a page for a browser, which is no format for other programs.
+pub(super) fn is_page(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
 }
 
 /// The writer of a format: that of its text form if `ascii` is set.
@@ -82,7 +87,7 @@ pub(super) fn no_output() -> Failure {
 /// The help of `--output`.
 pub(in crate::cli) fn output_help() -> String {
     format!(
-        "Where the mesh goes; the ending chooses the format: {}. With --fluid a folder [default: surface/ in that of \
+        "Where the mesh goes; the ending chooses the format: {}, or .html for a page that shows it. With --fluid a folder [default: surface/ in that of \
          the run]",
         endings(FORMATS).join(" ")
     )

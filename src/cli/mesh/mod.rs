@@ -23,6 +23,7 @@ use rfm::mesh::{
     dual_contouring, marching_cubes,
 };
 use rfm::solid::{Bounds, Depth};
+use rfm::view;
 use simplified::{Simplified, simplified};
 use stopwatch::milliseconds;
 use summary::{MeshSummary, Times};
@@ -54,7 +55,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     if options.fluid {
         return fluid::run(shared, options);
     }
-    let (write, unit) = writer(shared, options)?;
+    let (writer, unit) = writer(shared, options)?;
     let program = input::program(shared, &options.file)?;
     let solid = choose::solid_at(shared, &program, options.solid.as_deref(), options.time)?;
     let grid = grid(&solid, options)?;
@@ -87,9 +88,12 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     if mesh.triangles.is_empty() {
         return nothing_to_write(shared, options, (&solid, &report, thin.count, &times));
     }
-    if let (Some(path), Some(write)) = (&options.output, write) {
+    if let (Some(path), Some(writer)) = (&options.output, writer) {
         let started = Instant::now();
-        output::write(path, |out| write(&mesh, unit, out))?;
+        output::write(path, |out| match writer {
+            Writer::File(write) => write(&mesh, unit, out),
+            Writer::Page => view::solid(&format!("{} · {}", solid.name(), title(options)), &mesh, out),
+        })?;
         times.writing = milliseconds(started);
     }
     let names = (solid.name(), options.method.name());
@@ -128,8 +132,20 @@ fn unit_hint(path: &Path, options: &Options) -> &'static str {
     if is_stl && options.unit.is_none() { "; most programs read .stl as millimetres: --unit mm" } else { "" }
 }
 
+/// How a mesh is written.
+enum Writer {
+    File(WriteMesh),
+    /// A page that shows it in a browser.
+    Page,
+}
+
+/// The name of the file that a mesh is made of.
+fn title(options: &Options) -> String {
+    options.file.file_name().map_or_else(|| options.file.shown(), |name| Path::new(name).shown())
+}
+
 /// The writer that the options ask for, `None` if only figures are wanted; and the unit.
-fn writer(shared: &Shared, options: &Options) -> Result<(Option<WriteMesh>, LengthUnit), Failure> {
+fn writer(shared: &Shared, options: &Options) -> Result<(Option<Writer>, LengthUnit), Failure> {
     if options.file.is_dir() {
         let folder = options.file.shown();
         return Err(Failure::usage(format!(
@@ -137,10 +153,16 @@ fn writer(shared: &Shared, options: &Options) -> Result<(Option<WriteMesh>, Leng
         )));
     }
     match &options.output {
+        Some(path) if format::is_page(path) => match options.unit {
+            None | Some(LengthUnit::METRE) if !options.ascii => Ok((Some(Writer::Page), LengthUnit::METRE)),
+            _ => Err(Failure::usage(
+                "a page shows the mesh in metres: --unit and --ascii are for other formats",
+            )),
+        },
         Some(path) => {
             let format = format::of_path(path)?;
             let unit = format::unit_fits(format, options.unit)?;
-            Ok((Some(format::writer(format, options.ascii)?), unit))
+            Ok((Some(Writer::File(format::writer(format, options.ascii)?)), unit))
         }
         None if options.ascii => Err(format::no_text()),
         None if shared.json || options.quality => Ok((None, LengthUnit::METRE)),

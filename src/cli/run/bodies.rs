@@ -9,7 +9,7 @@ use rfm::mesh::{self, Grid, Mesh, Resolution, dual_contouring};
 use rfm::{Experiment, Solid};
 
 /// The solids of a scene.
-pub(super) struct Bodies {
+pub(in crate::cli) struct Bodies {
     solids: Vec<Solid>,
     domain: Aabb,
     /// Number of mesh cells along the longest side of each solid.
@@ -19,7 +19,12 @@ pub(super) struct Bodies {
 impl Bodies {
     pub fn new(options: &Run, experiment: &Experiment) -> Self {
         let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
-        Self { solids, domain: experiment.domain(), cells: options.mesh_cells }
+        Self::of(solids, experiment.domain(), options.mesh_cells)
+    }
+
+    /// Solids in a box, to be meshed with so many cells along the longest side of each.
+    pub fn of(solids: Vec<Solid>, domain: Aabb, cells: usize) -> Self {
+        Self { solids, domain, cells }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -77,7 +82,7 @@ impl Bodies {
 }
 
 /// All meshes as one.
-pub(super) fn joined(meshes: &[Mesh]) -> Mesh {
+pub(in crate::cli) fn joined(meshes: &[Mesh]) -> Mesh {
     let mut all = Mesh::default();
     for mesh in meshes {
         let first = all.positions.len() as u32;

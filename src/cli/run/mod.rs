@@ -3,7 +3,7 @@
 //! A scene becomes an experiment, and this a simulation. It takes steps, with a frame, a checkpoint and
 //! samples of probes at their times, and ends with a summary.
 
-mod bodies;
+pub(super) mod bodies;
 mod checkpoints;
 mod findings;
 mod folder;
@@ -122,8 +122,7 @@ fn conclude(
     stopped: Option<Stop>,
 ) -> Result<(), Failure> {
     let Recording { frames, probes, watch, experiment, .. } = recording;
-    let name = &experiment.scene().name;
-    let summary = Summary::of(watch, name, simulation, frames.count(), stopped.is_none());
+    let summary = Summary::of(watch, experiment, simulation, frames.count(), stopped.is_none());
     output::write(&folder.join("summary.json"), |out| {
         serde_json::to_writer_pretty(&mut *out, &summary)?;
         writeln!(out)

@@ -7,6 +7,7 @@ use super::frames::Frames;
 use super::probes::Probes;
 use super::watch::Watch;
 use crate::cli::output::Shown;
+use rfm::Experiment;
 use rfm::experiment::Deviation;
 use rfm::sph::{Pass, Simulation};
 
@@ -60,6 +61,9 @@ pub(super) struct Summary {
     #[serde(skip_serializing_if = "Option::is_none")]
     front_error: Option<f64>,
     passes: Vec<&'static str>,
+    /// The lowest and the highest corner of the scene's box, m.
+    #[serde(rename = "box")]
+    domain: [[f64; 3]; 2],
     threads: usize,
     frames: usize,
     finished: bool,
@@ -67,13 +71,20 @@ pub(super) struct Summary {
 
 impl Summary {
     /// The summary of a run that has ended.
-    pub fn of(watch: &Watch, scene: &str, simulation: &Simulation, frames: usize, finished: bool) -> Self {
+    pub fn of(
+        watch: &Watch,
+        experiment: &Experiment,
+        simulation: &Simulation,
+        frames: usize,
+        finished: bool,
+    ) -> Self {
+        let domain = experiment.domain();
         let steps = simulation.steps();
         let deviation = watch.deviations.total();
         let (audit, compression) = (simulation.audit(), simulation.audit().compression());
         Self {
             schema: 1,
-            scene: scene.to_string(),
+            scene: experiment.scene().name.clone(),
             steps,
             simulated_seconds: simulation.time(),
             time_step: simulation.time() / steps.max(1) as f64,
@@ -106,6 +117,7 @@ impl Summary {
             velocity_error: deviation.velocity,
             front_error: deviation.front,
             passes: pass_names(simulation),
+            domain: [domain.min.to_array(), domain.max.to_array()],
             threads: rayon::current_num_threads(),
             frames,
             finished,

@@ -1,0 +1,77 @@
+//! What a page may ask of the simulation.
+
+use serde::Deserialize;
+
+/// A command of a page, as JSON: `{"do": "set", "name": "cx", "value": 1.2}`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(tag = "do", rename_all = "lowercase")]
+pub(super) enum Command {
+    /// Go on.
+    Play,
+    /// Stay at this instant.
+    Pause,
+    /// Take one step.
+    Step,
+    /// Begin again.
+    Restart,
+    /// Give params the values of the file.
+    Reset,
+    /// Show the obstacle with another value of a param, in SI units; the run goes on as it is.
+    Try { name: String, value: f64 },
+    /// Begin again with another value of a param.
+    Set { name: String, value: f64 },
+    /// Let gravity act in this direction from now on, m/s².
+    Gravity { vector: [f64; 3] },
+    /// Show so many simulated seconds in a second, if the machine is fast enough.
+    Speed { value: f64 },
+    /// The page has taken a message and is ready for another one.
+    Seen,
+}
+
+/// Leaves out commands that later ones undo: a slider sends many values, and only the last one counts.
+pub(super) fn settled(commands: Vec<Command>) -> Vec<Command> {
+    let is_undone = |command: &Command, later: &[Command]| {
+        later.iter().any(|other| match (command, other) {
+            (
+                Command::Try { name, .. },
+                Command::Try { name: again, .. } | Command::Set { name: again, .. },
+            )
+            | (Command::Set { name, .. }, Command::Set { name: again, .. }) => name == again,
+            (Command::Gravity { .. }, Command::Gravity { .. })
+            | (Command::Speed { .. }, Command::Speed { .. }) => true,
+            _ => false,
+        })
+    };
+    let kept = commands.iter().enumerate().filter(|(i, command)| !is_undone(command, &commands[i + 1..]));
+    kept.map(|(_, command)| command.clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_read_or_refused() {
+        let read = |text: &str| serde_json::from_str::<Command>(text).ok();
+        assert_eq!(read(r#"{"do":"play"}"#), Some(Command::Play));
+        let set = Command::Set { name: "cx".into(), value: 1.5 };
+        assert_eq!(read(r#"{"do":"set","name":"cx","value":1.5}"#), Some(set));
+        for text in [
+            "",
+            "{}",
+            r#"{"do":"erase"}"#,
+            r#"{"do":"set","name":"cx"}"#,
+            r#"{"do":"set","name":1,"value":"x"}"#,
+        ] {
+            assert_eq!(read(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn of_a_slider_the_last_value_counts() {
+        let tried = |value| Command::Try { name: "a".into(), value };
+        let set = |name: &str, value| Command::Set { name: name.into(), value };
+        let list = vec![tried(1.0), Command::Play, tried(2.0), set("b", 1.0), set("a", 3.0), Command::Play];
+        assert_eq!(settled(list), [Command::Play, set("b", 1.0), set("a", 3.0), Command::Play]);
+    }
+}

@@ -1,0 +1,104 @@
+//! `rfm view`: a page in the browser that shows a run while it is computed, or one that is saved; or that page as a
+//! file.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `folder` | the folder of a run → a page with its frames |
+//! | `server`, `request`, `stream` | the page and its stream at an address with a token |
+//! | `board` | the newest of everything that pages are told |
+//! | `session`, `model`, `command` | the simulation on its own thread, and what pages ask of it |
+
+mod board;
+mod browser;
+mod command;
+mod folder;
+mod model;
+mod request;
+mod server;
+mod session;
+mod stream;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::args::{Shared, View};
+use super::failure::{Failure, note};
+use super::{input, output};
+use crate::cli::output::Shown;
+use board::Board;
+use folder::SavedRun;
+use server::{Content, Server};
+use session::Session;
+
+pub(super) fn run(shared: &Shared, options: &View) -> Result<(), Failure> {
+    let path = options.subject.as_path();
+    if path.is_dir() {
+        let run = SavedRun::open(path, options)?;
+        return match &options.save {
+            Some(target) => save(shared, &run, target),
+            None => {
+                let mut page = Vec::new();
+                run.write(&mut page)?;
+                serve(shared, options, Content::Page(page))
+            }
+        };
+    }
+    if options.save.is_some() {
+        let folder = path.with_extension("out");
+        let (file, folder) = (path.shown(), folder.shown());
+        return Err(Failure::usage(format!(
+            "--save writes a run, and `{file}` is a file: `rfm run {file}`, then `rfm view {folder} --save PAGE.html`; a \
+             solid alone is written by `rfm mesh {file} -o PAGE.html`"
+        )));
+    }
+    if path == Path::new("-") {
+        return Err(Failure::usage(
+            "the viewer reads its file again when it changes: standard input cannot be viewed",
+        ));
+    }
+    // a file that cannot be read is an error here, one with mistakes is shown with them until it is mended
+    drop(input::read(path)?);
+    let board = Arc::new(Board::default());
+    let commands = Session::start(shared, options, Arc::clone(&board))?;
+    serve(shared, options, Content::Live { board, commands })
+}
+
+/// Writes the page of a run.
+fn save(shared: &Shared, run: &SavedRun, target: &Path) -> Result<(), Failure> {
+    output::write(target, |out| run.write(out))?;
+    let bytes = std::fs::metadata(target).map(|file| file.len())?;
+    let (frames, particles) = (run.frames(), run.particles());
+    if shared.json {
+        return output::json(&serde_json::json!({
+            "schema": 1, "file": target.display().to_string(), "frames": frames, "bytes": bytes,
+            "bytes_per_particle_and_frame": bytes as f64 / particles.max(1) as f64,
+        }));
+    }
+    say!(
+        "{frames} frames, {:.2} MB, {:.1} bytes per particle and frame",
+        bytes as f64 / 1e6,
+        bytes as f64 / particles.max(1) as f64
+    );
+    say!("written to {}: it opens in any browser, without a network", target.shown());
+    Ok(())
+}
+
+fn serve(shared: &Shared, options: &View, content: Content) -> Result<(), Failure> {
+    let server = Server::bind(&options.host, options.port)?;
+    let address = server.address();
+    if shared.json {
+        output::json(&serde_json::json!({ "schema": 1, "address": address }))?;
+    } else {
+        say!("{address}");
+    }
+    if server.is_open_to_others() {
+        note(
+            "whoever can reach this machine and has the address sees the page and can change the run; it is not encrypted",
+        );
+    }
+    if !options.no_open && !browser::open(&address) {
+        note("no browser could be opened: open the address yourself");
+    }
+    note("Ctrl-C ends the viewer");
+    server.serve(content)
+}

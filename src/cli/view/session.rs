@@ -1,0 +1,346 @@
+//! The simulation on its own thread: it takes commands, goes on, and puts what is new on the board.
+//!
+//! Invariant: an error of the file leaves the last good run as it is; it is told beside it until the file is mended.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use super::super::args::{Shared, View};
+use super::super::failure::Failure;
+use super::board::{Board, Status, Topic};
+use super::command::{Command, settled};
+use super::model::{Checked, Detail, Running, Stamp, Subject};
+use rfm::geom::Aabb;
+
+/// Time between looks at the file, and the longest time for which a command waits while nothing runs.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Time of the clock between frames.
+const FRAME: Duration = Duration::from_millis(33);
+
+/// Pause of a simulation that is ahead of the clock.
+const BREATH: Duration = Duration::from_millis(4);
+
+/// Most particles of a scene that begins to run by itself.
+const MOST_AT_ONCE: usize = 200_000;
+
+/// A file that is viewed.
+pub(super) struct Session {
+    subject: Subject,
+    board: Arc<Board>,
+    /// Values of params that pages have set.
+    values: BTreeMap<String, f64>,
+    stamp: Stamp,
+    checked: Option<Checked>,
+    running: Option<Running>,
+    status: Status,
+    /// Gravity in the box, m/s², if a page has turned it.
+    gravity: Option<DVec3>,
+    pace: Pace,
+    /// The number of the present run.
+    run: u64,
+}
+
+/// How the simulated time follows the clock.
+struct Pace {
+    /// An instant of the clock and the simulated time then, s.
+    from: (Instant, f64),
+    seconds_per_step: f64,
+    /// When the last mesh of a moving obstacle was made, and how long that took.
+    mesh: (Instant, Duration),
+}
+
+impl Session {
+    /// Reads the file for the first time, and starts the thread. Its end of the channel takes commands.
+    pub fn start(shared: &Shared, options: &View, board: Arc<Board>) -> Result<Sender<Command>, Failure> {
+        let now = Instant::now();
+        let session = Self {
+            subject: Subject::new(shared, options),
+            board,
+            values: BTreeMap::new(),
+            stamp: None,
+            checked: None,
+            running: None,
+            status: Status { speed: 1.0, ..Status::default() },
+            gravity: None,
+            pace: Pace { from: (now, 0.0), seconds_per_step: 0.0, mesh: (now, Duration::ZERO) },
+            run: 0,
+        };
+        // a page that is asked for before the first run needs something to show
+        let checked = session.subject.checked(&session.values).ok();
+        let scene = checked.as_ref().and_then(|checked| checked.scene.as_ref());
+        let bounds = scene.map_or(Aabb::new(DVec3::ZERO, DVec3::ONE), |scene| scene.domain);
+        session.board.set_setting(session.subject.setting(checked.as_ref(), &bounds, None));
+        let (send, receive) = channel();
+        thread::Builder::new()
+            .name("rfm-simulation".into())
+            .spawn(move || session.go(&receive))
+            .map_err(|error| Failure::usage(format!("cannot start a thread: {error}")))?;
+        Ok(send)
+    }
+
+    /// Runs until nobody can send commands any more.
+    fn go(mut self, commands: &Receiver<Command>) {
+        self.stamp = self.subject.stamp();
+        self.load();
+        let particles = self.running.as_ref().map_or(0, |running| running.simulation.particles().len());
+        self.status.playing = (1..=MOST_AT_ONCE).contains(&particles);
+        self.tell();
+        let mut looked = Instant::now();
+        loop {
+            let ahead = self.is_ahead();
+            let wait = match self.status.playing {
+                true if ahead => BREATH,
+                true => Duration::ZERO,
+                false => LOOK,
+            };
+            let first = match commands.recv_timeout(wait) {
+                Ok(command) => Some(command),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => return,
+            };
+            let list: Vec<Command> = first.into_iter().chain(commands.try_iter()).collect();
+            for command in settled(list) {
+                self.obey(command);
+            }
+            if looked.elapsed() >= LOOK {
+                looked = Instant::now();
+                self.reload_if_changed();
+            }
+            if self.status.playing && !self.is_ahead() {
+                self.advance();
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::Play => {
+                self.status.playing = self.running.is_some();
+                self.follow_clock();
+            }
+            Command::Pause => self.status.playing = false,
+            Command::Step => {
+                self.status.playing = false;
+                self.steps(|_| true);
+            }
+            Command::Restart => self.restart(),
+            Command::Reset => {
+                self.values.clear();
+                self.load();
+            }
+            Command::Try { name, value } if self.may_set(&name, value) => {
+                let mut values = self.values.clone();
+                values.insert(name, value);
+                self.show_mesh(&values, Detail::Passing);
+            }
+            Command::Set { name, value } if self.may_set(&name, value) => {
+                self.values.insert(name, value);
+                self.load();
+            }
+            // a page that has not yet heard of a change of the file
+            Command::Try { .. } | Command::Set { .. } => {}
+            Command::Gravity { vector } => {
+                let gravity = DVec3::from_array(vector);
+                if gravity.is_finite() {
+                    self.gravity = Some(gravity);
+                    self.running.iter_mut().for_each(|running| running.set_gravity(gravity));
+                }
+            }
+            Command::Speed { value } => {
+                if value.is_finite() && value > 0.0 {
+                    self.status.speed = value;
+                    self.follow_clock();
+                }
+            }
+            Command::Seen => {}
+        }
+        self.tell();
+    }
+
+    fn may_set(&self, name: &str, value: f64) -> bool {
+        value.is_finite() && self.checked.as_ref().is_some_and(|checked| checked.has_param(name))
+    }
+
+    fn reload_if_changed(&mut self) {
+        let stamp = self.subject.stamp();
+        // an editor may have taken the file away for a moment
+        if stamp.is_none() || stamp == self.stamp {
+            return;
+        }
+        self.stamp = stamp;
+        if let Ok(plain) = self.subject.checked(&BTreeMap::new()) {
+            self.values.retain(|name, _| plain.has_param(name));
+        }
+        self.load();
+        self.tell();
+    }
+
+    /// Checks the file with values for params and shows its obstacles. `None` if that is not possible; the reason is
+    /// told then.
+    fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<(Checked, Aabb)> {
+        let began = Instant::now();
+        let made = self.subject.checked(values).and_then(|checked| {
+            let made = self.subject.mesh(&checked, detail, self.run)?;
+            Ok((checked, made))
+        });
+        match made {
+            Ok((checked, (mesh, bounds))) => {
+                self.board.set_block(Topic::Mesh, mesh);
+                self.status.error = None;
+                self.status.latency =
+                    Some(format!("the obstacle followed in {:.0} ms", began.elapsed().as_secs_f64() * 1e3));
+                Some((checked, bounds))
+            }
+            Err(error) => {
+                self.status.error = Some(error);
+                None
+            }
+        }
+    }
+
+    /// Reads the file and begins a run; if that is not possible, the last one remains.
+    fn load(&mut self) {
+        self.status.text = "starting".into();
+        self.tell();
+        let values = self.values.clone();
+        let Some((checked, bounds)) = self.show_mesh(&values, Detail::Lasting) else {
+            // a file that was never right has no picture that could remain
+            self.status.playing &= self.running.is_some();
+            return;
+        };
+        let running = checked.scene.as_ref().map(|scene| self.subject.start(&checked, scene)).transpose();
+        match running {
+            Ok(running) => {
+                self.running = running;
+                self.checked = Some(checked);
+                self.begin(&bounds);
+            }
+            Err(error) => {
+                self.status.error = Some(error);
+                // its params must be within reach, so that they can be set otherwise
+                if self.checked.is_none() {
+                    self.board.set_setting(self.subject.setting(Some(&checked), &bounds, None));
+                    self.checked = Some(checked);
+                }
+            }
+        }
+    }
+
+    /// Begins the present experiment again.
+    fn restart(&mut self) {
+        let Some(running) = &mut self.running else { return };
+        match running.experiment.start() {
+            Ok(start) => {
+                running.simulation = start.simulation;
+                self.status.error = None;
+                let bounds = running.experiment.domain();
+                self.begin(&bounds);
+            }
+            Err(error) => self.status.error = Some(error.to_string()),
+        }
+    }
+
+    /// Shows the first instant of a run.
+    fn begin(&mut self, bounds: &Aabb) {
+        self.run += 1;
+        self.board.set_setting(self.subject.setting(self.checked.as_ref(), bounds, self.running.as_ref()));
+        if let (Some(running), Some(gravity)) = (&mut self.running, self.gravity) {
+            running.set_gravity(gravity);
+        }
+        self.pace.seconds_per_step = 0.0;
+        self.follow_clock();
+        self.show_frame();
+    }
+
+    fn follow_clock(&mut self) {
+        let time = self.running.as_ref().map_or(0.0, |running| running.simulation.time());
+        self.pace.from = (Instant::now(), time);
+    }
+
+    /// The simulated time that belongs to the present instant of the clock, s.
+    fn due(&self) -> f64 {
+        let (since, time) = self.pace.from;
+        time + since.elapsed().as_secs_f64() * self.status.speed
+    }
+
+    fn is_ahead(&self) -> bool {
+        self.running.as_ref().is_none_or(|running| running.simulation.time() >= self.due())
+    }
+
+    /// Goes on for as long as a frame lasts.
+    fn advance(&mut self) {
+        let began = Instant::now();
+        let due = self.due();
+        self.steps(|time| began.elapsed() >= FRAME || time >= due);
+        let time = self.running.as_ref().map_or(0.0, |running| running.simulation.time());
+        if time < due {
+            // what could not be computed in time is not made up for later
+            self.follow_clock();
+        }
+        self.tell();
+    }
+
+    /// Takes steps, at least one, until `is_enough` of the simulated time, and shows the instant.
+    fn steps(&mut self, is_enough: impl Fn(f64) -> bool) {
+        let Some(running) = &mut self.running else { return };
+        loop {
+            let began = Instant::now();
+            if let Err(error) = running.simulation.step() {
+                self.status.error =
+                    Some(format!("the run has ended at {:.4} s: {error}", running.simulation.time()));
+                self.status.playing = false;
+                break;
+            }
+            let spent = began.elapsed().as_secs_f64();
+            let mean = &mut self.pace.seconds_per_step;
+            *mean = if *mean > 0.0 { 0.9 * *mean + 0.1 * spent } else { spent };
+            if is_enough(running.simulation.time()) {
+                break;
+            }
+        }
+        self.show_frame();
+    }
+
+    fn show_frame(&mut self) {
+        let Some(running) = &self.running else { return };
+        // meshes of what moves may take as much time as frames do
+        let (at, took) = self.pace.mesh;
+        if running.moves() && at.elapsed() > 2 * took {
+            let began = Instant::now();
+            match running.mesh(self.run) {
+                Ok(mesh) => self.board.set_block(Topic::Mesh, mesh),
+                Err(error) => self.status.error = Some(error),
+            }
+            self.pace.mesh = (Instant::now(), began.elapsed());
+        }
+        self.board.set_block(Topic::Frame, running.frame(self.run));
+    }
+
+    fn tell(&mut self) {
+        let state = match &self.running {
+            None => String::new(),
+            Some(running) => {
+                let milliseconds = 1e3 * self.pace.seconds_per_step;
+                let speed = if milliseconds > 0.0 {
+                    format!(" · {milliseconds:.1} ms per step")
+                } else {
+                    String::new()
+                };
+                let state = if self.status.playing { "running" } else { "paused" };
+                let found = running.simulation.findings();
+                let found = found.last().map_or_else(String::new, |(_, message)| format!(" · {message}"));
+                format!("{state} · step {}{speed}{found}", running.simulation.steps())
+            }
+        };
+        if self.running.is_some() || self.status.error.is_some() {
+            self.status.text = state;
+        }
+        self.board.set_status(&self.status);
+    }
+}

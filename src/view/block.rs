@@ -1,0 +1,141 @@
+//! Frames and meshes as blocks of bytes.
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::levels::{Lattice, Levels};
+use crate::geom::Aabb;
+use crate::mesh::Mesh;
+
+/// An instant of the particles in few bits.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Frame {
+    /// The sites of the particles on a [`Lattice`].
+    pub sites: Vec<[u16; 3]>,
+    /// For each array the levels of the particles on its [`Levels`].
+    pub levels: Vec<Vec<u8>>,
+}
+
+/// What the head of a frame says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FrameHead {
+    /// The simulated time, s.
+    pub time: f64,
+    /// The number of steps, if it is known.
+    pub step: Option<u64>,
+    /// The range of each array.
+    pub ranges: Vec<Levels>,
+    /// The number of the obstacles' mesh at this time, in the order in which meshes are given.
+    pub mesh: Option<usize>,
+    /// The number of the run that the frame belongs to; a page that is told of a new run forgets frames of older ones.
+    pub run: u64,
+}
+
+#[derive(Serialize)]
+struct Head<'a, T> {
+    kind: &'static str,
+    count: usize,
+    /// Whether numbers are differences from the frame before.
+    follows: bool,
+    #[serde(flatten)]
+    rest: &'a T,
+}
+
+/// The block of a frame. If `before` has as many particles, numbers are differences from it: whoever reads the
+/// block must have it.
+pub fn pack_frame(head: &FrameHead, frame: &Frame, before: Option<&Frame>) -> Vec<u8> {
+    let fits = |before: &&Frame| {
+        before.sites.len() == frame.sites.len() && before.levels.len() == frame.levels.len()
+    };
+    let before = before.filter(fits);
+    let count = frame.sites.len();
+    let head = Head { kind: "frame", count, follows: before.is_some(), rest: head };
+    let mut out = begin(&head);
+    out.reserve(count * (6 + frame.levels.len()));
+    for axis in 0..3 {
+        let differences: Vec<u16> = match before {
+            Some(before) => {
+                let pairs = frame.sites.iter().zip(&before.sites);
+                pairs.map(|(now, then)| folded(now[axis].wrapping_sub(then[axis]))).collect()
+            }
+            None => frame.sites.iter().map(|site| site[axis]).collect(),
+        };
+        planes(&mut out, &differences);
+    }
+    for (k, levels) in frame.levels.iter().enumerate() {
+        match before {
+            Some(before) => {
+                out.extend(levels.iter().zip(&before.levels[k]).map(|(now, then)| now.wrapping_sub(*then)));
+            }
+            None => out.extend(levels),
+        }
+    }
+    out
+}
+
+/// What the head of a mesh says.
+#[derive(Serialize)]
+struct MeshHead {
+    triangles: usize,
+    min: [f64; 3],
+    max: [f64; 3],
+    run: u64,
+}
+
+/// The block of a mesh: positions and normals with 16 bits for each coordinate, then the corners of triangles. `run`
+/// is the number of the run that the mesh belongs to.
+pub fn pack_mesh(mesh: &Mesh, run: u64) -> Vec<u8> {
+    let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
+    let bounds = if mesh.positions.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ONE) } else { bounds };
+    let lattice = Lattice::new(&bounds);
+    let (min, max) = (lattice.bounds().min.to_array(), lattice.bounds().max.to_array());
+    let rest = MeshHead { triangles: mesh.triangles.len(), min, max, run };
+    let head = Head { kind: "mesh", count: mesh.positions.len(), follows: false, rest: &rest };
+    let mut out = begin(&head);
+    let unit = Lattice::new(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE));
+    for (lattice, vectors) in [(lattice, &mesh.positions), (unit, &mesh.normals)] {
+        let sites: Vec<[u16; 3]> = vectors.iter().map(|v| lattice.site(*v)).collect();
+        for axis in 0..3 {
+            let mut last = 0;
+            let differences: Vec<u16> = sites
+                .iter()
+                .map(|site| folded(site[axis].wrapping_sub(std::mem::replace(&mut last, site[axis]))))
+                .collect();
+            planes(&mut out, &differences);
+        }
+    }
+    // corners are near each other, and the first of a triangle is near that of the triangle before
+    let mut last = 0u32;
+    let corners: Vec<u32> = mesh
+        .triangles
+        .iter()
+        .flatten()
+        .map(|&corner| {
+            let difference = corner.wrapping_sub(std::mem::replace(&mut last, corner));
+            (difference << 1) ^ ((difference as i32 >> 31) as u32)
+        })
+        .collect();
+    for byte in 0..4 {
+        out.extend(corners.iter().map(|corner| (corner >> (8 * byte)) as u8));
+    }
+    out
+}
+
+fn begin(head: &impl Serialize) -> Vec<u8> {
+    // numbers, names and texts: all of it has a form in JSON
+    let head = serde_json::to_vec(head).unwrap_or_default();
+    let mut out = (head.len() as u32).to_le_bytes().to_vec();
+    out.extend(head);
+    out
+}
+
+/// A difference with its sign in the lowest bit, so that small ones of either sign are small numbers.
+fn folded(difference: u16) -> u16 {
+    (difference << 1) ^ ((difference as i16 >> 15) as u16)
+}
+
+/// The low bytes of all numbers, then the high ones.
+fn planes(out: &mut Vec<u8>, numbers: &[u16]) {
+    out.extend(numbers.iter().map(|x| *x as u8));
+    out.extend(numbers.iter().map(|x| (x >> 8) as u8));
+}

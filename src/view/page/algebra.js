@@ -1,0 +1,80 @@
+// Vectors are arrays of three numbers; matrices are columns one after another, as WebGL takes them.
+
+const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const norm = (a) => Math.hypot(a[0], a[1], a[2]);
+const unit = (a) => (norm(a) > 0 ? scale(a, 1 / norm(a)) : a);
+const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+/** The product a·b of two 4 × 4 matrices. */
+function times(a, b) {
+  const c = new Float32Array(16);
+  for (let column = 0; column < 4; column++)
+    for (let row = 0; row < 4; row++)
+      for (let k = 0; k < 4; k++) c[4 * column + row] += a[4 * k + row] * b[4 * column + k];
+  return c;
+}
+
+/** A point through a 4 × 4 matrix, with four coordinates. */
+function transformed(m, p) {
+  return [0, 1, 2, 3].map((row) => m[row] * p[0] + m[4 + row] * p[1] + m[8 + row] * p[2] + m[12 + row]);
+}
+
+/** Rotations as quaternions [x, y, z, w]. */
+const NO_TURN = [0, 0, 0, 1];
+
+function turnAbout(axis, angle) {
+  const s = Math.sin(angle / 2);
+  return [axis[0] * s, axis[1] * s, axis[2] * s, Math.cos(angle / 2)];
+}
+
+function afterTurn(a, b) {
+  const [v, w] = [a.slice(0, 3), b.slice(0, 3)];
+  const xyz = add(add(scale(w, a[3]), scale(v, b[3])), cross(v, w));
+  const q = [...xyz, a[3] * b[3] - dot(v, w)];
+  const length = Math.hypot(...q);
+  return q.map((x) => x / length);
+}
+
+function turned(q, p) {
+  const v = q.slice(0, 3);
+  const t = scale(cross(v, p), 2);
+  return add(add(p, scale(t, q[3])), cross(v, t));
+}
+
+const back = (q) => [-q[0], -q[1], -q[2], q[3]];
+
+/** The matrix that turns points about a centre. */
+function turnMatrix(q, centre) {
+  const columns = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => turned(q, axis));
+  const rest = sub(centre, turned(q, centre));
+  return new Float32Array([...columns[0], 0, ...columns[1], 0, ...columns[2], 0, ...rest, 1]);
+}
+
+/** A number for people: three or four digits, and a power of ten where it is far from 1. */
+function shown(x, digits = 3) {
+  if (!Number.isFinite(x)) return "–";
+  if (x === 0) return "0";
+  const size = Math.abs(x);
+  if (size >= 1e5 || size < 1e-3) {
+    const [mantissa, power] = x.toExponential(digits - 1).split("e");
+    const small = [...String(Number(power))].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)])).join("");
+    const factor = String(Number(mantissa));
+    return (factor === "1" ? "" : factor === "-1" ? "−" : factor.replace("-", "−") + "·") + "10" + small;
+  }
+  return String(Number(x.toPrecision(Math.max(digits, Math.ceil(Math.log10(size)))))).replace("-", "−");
+}
+
+/** Round numbers between two values, about so many. */
+function ticks(low, high, about = 5) {
+  const width = high - low;
+  if (!(width > 0) || !Number.isFinite(width)) return [low];
+  const power = 10 ** Math.floor(Math.log10(width / about));
+  const step = [1, 2, 2.5, 5, 10].map((k) => k * power).find((s) => width / s <= about * 1.01) ?? 10 * power;
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * width; k++) found.push(Number((k * step).toPrecision(12)));
+  return found;
+}

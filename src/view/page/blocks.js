@@ -1,0 +1,81 @@
+// Frames and meshes from blocks: the length of a head, the head as JSON, planes of bytes.
+
+const unfold = (x) => (x >>> 1) ^ -(x & 1);
+
+/** Numbers of 16 bits from a plane of low bytes and one of high bytes. */
+class Planes {
+  constructor(bytes) {
+    this.bytes = bytes;
+    this.at = 0;
+  }
+  take(count) {
+    if (this.at + count > this.bytes.length) throw new Error("a block of data is cut off");
+    return this.bytes.subarray(this.at, (this.at += count));
+  }
+}
+
+/** The head and the planes of a block. */
+function opened(bytes) {
+  const length = new DataView(bytes.buffer, bytes.byteOffset).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
+  return [head, new Planes(bytes.subarray(4 + length))];
+}
+
+/** A frame; one that follows holds differences from the frame before. */
+function frameOf(head, planes, before) {
+  const n = head.count;
+  const sites = new Uint16Array(3 * n);
+  if (head.follows && before?.count !== n) throw new Error("a frame is missing");
+  for (let axis = 0; axis < 3; axis++) {
+    const [low, high] = [planes.take(n), planes.take(n)];
+    if (head.follows) {
+      const then = before.sites;
+      for (let i = 0, j = axis; i < n; i++, j += 3) sites[j] = then[j] + unfold(low[i] | (high[i] << 8));
+    } else {
+      for (let i = 0, j = axis; i < n; i++, j += 3) sites[j] = low[i] | (high[i] << 8);
+    }
+  }
+  const levels = head.ranges.map((_, k) => {
+    const plane = planes.take(n);
+    if (!head.follows) return plane.slice();
+    const then = before.levels[k];
+    return plane.map((x, i) => x + then[i]);
+  });
+  return { ...head, sites, levels };
+}
+
+/** A mesh: positions and normals as floats, corners as indices. */
+function meshOf(head, planes) {
+  const n = head.count;
+  const vectors = (low, high) => {
+    const out = new Float32Array(3 * n);
+    for (let axis = 0; axis < 3; axis++) {
+      const [lower, upper] = [planes.take(n), planes.take(n)];
+      const step = (high[axis] - low[axis]) / 65534;
+      for (let i = 0, site = 0; i < n; i++) {
+        site = (site + unfold(lower[i] | (upper[i] << 8))) & 65535;
+        out[3 * i + axis] = low[axis] + site * step;
+      }
+    }
+    return out;
+  };
+  const positions = vectors(head.min, head.max);
+  const normals = vectors([-1, -1, -1], [1, 1, 1]);
+  const m = 3 * head.triangles;
+  const bytes = [0, 1, 2, 3].map(() => planes.take(m));
+  const corners = new Uint32Array(m);
+  for (let i = 0, corner = 0; i < m; i++) {
+    corner = (corner + unfold((bytes[0][i] | (bytes[1][i] << 8) | (bytes[2][i] << 16) | (bytes[3][i] << 24)) >>> 0)) >>> 0;
+    corners[i] = corner;
+  }
+  return { ...head, positions, normals, corners };
+}
+
+/** The bytes of a block of a saved page. */
+async function inflated(base64) {
+  const text = atob(base64.trim());
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}

@@ -1,0 +1,418 @@
+// Brings everything together: what is shown, the controls, the keys, and where frames come from.
+
+const byId = (id) => document.getElementById(id);
+
+class Viewer {
+  constructor(setting) {
+    this.canvas = byId("view");
+    this.overlay = byId("overlay");
+    this.scene = new Scene(this.canvas);
+    this.camera = new Camera();
+    this.timeline = new Timeline();
+    this.plots = new Plots(byId("plots"));
+    this.meshes = [];
+    this.errors = [];
+    this.run = { number: 0, playing: false, speed: 1 };
+    this.stats = { draws: 0, milliseconds: 0 };
+    this.look = {
+      colours: sceneColours(), obstacle: "opaque", particles: true, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
+      cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
+    };
+    this.take(setting);
+    this.camera.frame(this.look.boxBounds);
+    this.scene.setMap(this.look.map);
+    this.scene.restored = () => { this.scene.setMap(this.look.map); this.scene.setBox(this.look.boxBounds); this.changed(); };
+    this.listen();
+    this.showPanel(innerWidth > 720);
+    byId("transport").hidden = setting.arrays.length === 0;
+    byId("record").hidden = !window.MediaRecorder || setting.arrays.length === 0;
+    if (setting.live) this.live = new Live((kind, content) => this.told(kind, content));
+  }
+
+  /** Takes what is told of a scene besides its frames. */
+  take(setting) {
+    this.setting = setting;
+    const { look } = this;
+    look.boxBounds = setting.box;
+    look.lattice = setting.lattice ?? setting.box;
+    look.radius = setting.radius || 0;
+    look.array = Math.min(look.array, Math.max(setting.arrays.length - 1, 0));
+    byId("title").textContent = document.title = setting.title;
+    byId("facts").textContent = setting.facts;
+    this.scene.setBox(setting.box);
+    this.plots.set(setting.plots ?? []);
+    // controls in use stay as they are: only another set of them is built anew
+    const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name)]);
+    if (kind !== this.kind) buildPanel(byId("panel"), this);
+    else showParams(setting.params);
+    this.kind = kind;
+    this.changed();
+  }
+
+  /** Reads the blocks of a saved page, one after another. */
+  async read() {
+    const blocks = [...document.querySelectorAll('script[type="application/octet-stream"]')];
+    let before = null;
+    for (const [number, block] of blocks.entries()) {
+      const [head, planes] = opened(await inflated(block.textContent));
+      block.remove();
+      if (head.kind === "mesh") this.meshes.push(meshOf(head, planes));
+      else {
+        before = frameOf(head, planes, before);
+        this.timeline.add(before);
+      }
+      if (number % 8 === 0 || number === blocks.length - 1) {
+        this.state(number < blocks.length - 1 ? `reading ${number + 1} of ${blocks.length}` : "");
+        this.timelineChanged();
+        this.changed();
+      }
+    }
+    this.timeline.speed = this.timeline.natural();
+    this.showSpeed();
+    if (this.timeline.last > 0 && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.play(true);
+  }
+
+  /** Takes a message of a simulation that runs. */
+  told(kind, content) {
+    const { timeline } = this;
+    switch (kind) {
+      case "setting":
+        this.take(content);
+        break;
+      case "frame": {
+        if (content.run < this.run.number) return;
+        if (content.run > this.run.number || content.time < (timeline.frames[timeline.last]?.time ?? 0)) timeline.clear();
+        this.run.number = content.run;
+        const following = timeline.place >= timeline.last;
+        timeline.add(content);
+        timeline.thin();
+        if (following) timeline.place = timeline.last;
+        this.timelineChanged();
+        break;
+      }
+      case "mesh":
+        this.meshes = [content];
+        break;
+      case "status":
+        Object.assign(this.run, { playing: content.playing, speed: content.speed });
+        this.notice(content.error);
+        this.state(content.text);
+        if (byId("latency")) byId("latency").textContent = content.latency ?? "";
+        this.showPlaying();
+        break;
+      case "connection":
+        if (!content) this.state("no connection: the program has ended, or is out of reach");
+        break;
+      default:
+        throw new Error(`a message of an unknown kind: ${kind}`);
+    }
+    this.changed();
+  }
+
+  state(text) {
+    byId("state").textContent = text;
+  }
+
+  /** Shows an error over the last good picture; nothing if there is none. */
+  notice(text) {
+    byId("notice").hidden = !text;
+    byId("notice").textContent = text ?? "";
+  }
+
+  send(command) {
+    this.live?.send(command);
+  }
+
+  // ---- time
+
+  play(on) {
+    if (this.live) this.send({ do: on ? "play" : "pause" });
+    else this.timeline.playing = on;
+    if (this.live && on) this.timeline.place = this.timeline.last;
+    this.before = null;
+    this.showPlaying();
+    this.changed();
+  }
+
+  get playing() {
+    return this.live ? this.run.playing : this.timeline.playing;
+  }
+
+  step(by) {
+    const { timeline } = this;
+    this.play(false);
+    if (this.live && by > 0 && timeline.place >= timeline.last) this.send({ do: "step" });
+    else timeline.step(by);
+    this.timelineChanged();
+    this.changed();
+  }
+
+  restart() {
+    if (this.live) this.send({ do: "restart" });
+    else this.timeline.place = 0;
+    this.timelineChanged();
+    this.changed();
+  }
+
+  showPlaying() {
+    byId("play").textContent = this.playing ? "❚❚" : "▶";
+    byId("play").setAttribute("aria-pressed", String(this.playing));
+  }
+
+  showSpeed() {
+    byId("speed").value = String(this.timeline.speed);
+  }
+
+  timelineChanged() {
+    const { timeline } = this;
+    const scrub = byId("scrub");
+    scrub.max = timeline.last;
+    scrub.value = timeline.place;
+    const frames = timeline.frames.length;
+    byId("time").textContent = frames ? `${timeline.time.toFixed(timeline.duration < 1 ? 4 : 3)} s · ${Math.floor(timeline.place + 1e-9) + 1}/${frames}` : "";
+  }
+
+  // ---- the picture
+
+  /** Asks for a new picture. */
+  changed() {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame((now) => {
+      this.asked = false;
+      if (this.timeline.pass(this.before ? Math.min((now - this.before) / 1000, 0.25) : 0)) {
+        this.timelineChanged();
+        this.changed();
+      }
+      this.before = now;
+      this.draw();
+    });
+  }
+
+  /** Settles the range of the colours and the plane of the cut. */
+  settle() {
+    const { look, setting, timeline, camera } = this;
+    const array = setting.arrays[look.array];
+    if (array) {
+      // most arrays of a run that goes on have no range of their own: that of its frames
+      if (array.range) look.range = look.fixed ?? array.range;
+      else {
+        const ranges = timeline.frames.map((frame) => frame.ranges[look.array]);
+        const range = { low: Math.min(...ranges.map((r) => r.low)), high: Math.max(...ranges.map((r) => r.high)) };
+        look.range = look.fixed ?? (ranges.length ? range : { low: 0, high: 1 });
+      }
+      look.legend = look.particles && timeline.frames.length ? array : null;
+      this.showRange();
+    }
+    const { axis, part, flipped } = look.cutting;
+    const k = "xyz".indexOf(axis);
+    const { min, max } = look.boxBounds;
+    const at = k < 0 ? 0 : min[k] + part * (max[k] - min[k]);
+    const sign = flipped ? -1 : 1;
+    look.cut = k < 0 ? NO_CUT : [0, 1, 2].map((i) => (i === k ? sign : 0)).concat(sign * at);
+    [look.cutSolid, look.cutFluid] = [look.cutting.solid, look.cutting.fluid];
+    look.free = this.free();
+    if (byId("cut-value")) byId("cut-value").textContent = k < 0 ? "" : `${shown(at)} m`;
+    look.parallel = camera.parallel;
+    look.gravity = setting.gravity;
+    if (setting.live && setting.gravity) {
+      look.gravity = look.gravityInRoom ? turned(back(camera.turn), setting.gravity) : setting.gravity;
+      const text = look.gravity.map((g) => g.toFixed(4)).join();
+      if (this.gravity !== undefined && this.gravity !== text) this.send({ do: "gravity", vector: look.gravity });
+      this.gravity = text;
+    }
+  }
+
+  /** What the controls leave free of the page, as distances from its edges. */
+  free() {
+    const [panel, transport] = [byId("panel"), byId("transport")];
+    const bottom = transport.hidden ? 10 : innerHeight - transport.getBoundingClientRect().top;
+    const free = { left: 0, right: 0, top: 30, bottom };
+    if (panel.hidden) return free;
+    if (innerWidth > 720) free.right = innerWidth - panel.getBoundingClientRect().left;
+    else free.bottom = innerHeight - panel.getBoundingClientRect().top;
+    return free;
+  }
+
+  showRange() {
+    for (const [id, value] of [["low", this.look.range.low], ["high", this.look.range.high]]) {
+      const input = byId(id);
+      if (input && input !== document.activeElement) input.value = Number(value.toPrecision(4));
+    }
+  }
+
+  draw(whole = null) {
+    const began = performance.now();
+    const { canvas, overlay, look, camera, timeline, scene } = this;
+    const ratio = Math.min(devicePixelRatio || 1, 2);
+    const size = [Math.max(Math.round(canvas.clientWidth * ratio), 1), Math.max(Math.round(canvas.clientHeight * ratio), 1)];
+    for (const target of [canvas, overlay]) if (target.width !== size[0] || target.height !== size[1]) [target.width, target.height] = size;
+    this.settle();
+    if (whole) look.free = whole;
+    const frames = timeline.shown(look.blend && !this.live);
+    scene.moving = this.dragging || timeline.playing;
+    scene.setMesh(this.meshes[frames?.from.mesh ?? 0] ?? null);
+    const view = camera.view();
+    const page = size.map((x) => x / ratio);
+    const projection = camera.projection(page, look.free);
+    scene.draw(look, view, projection, frames);
+    const seen = { view, all: times(projection, view) };
+    drawOverlay(overlay.getContext("2d"), size, ratio, look, camera, seen, null);
+    this.plots.draw(timeline.time, look.colours, ratio);
+    this.film?.add(canvas, overlay);
+    this.stats.draws++;
+    this.stats.milliseconds = performance.now() - began;
+  }
+
+  /** The picture with its legend and title on a canvas of its own. */
+  composed() {
+    const whole = { left: 0, right: 0, top: 20, bottom: 10 };
+    this.draw(whole);
+    const { canvas, look, camera, timeline } = this;
+    const picture = element("canvas", { width: canvas.width, height: canvas.height });
+    const context = picture.getContext("2d");
+    context.drawImage(canvas, 0, 0);
+    const ratio = canvas.width / canvas.clientWidth;
+    const labels = element("canvas", { width: canvas.width, height: canvas.height });
+    const view = camera.view();
+    const seen = { view, all: times(camera.projection([canvas.width / ratio, canvas.height / ratio], whole), view) };
+    const caption = [this.setting.title].concat(timeline.frames.length ? [`t = ${timeline.time.toFixed(3)} s`] : []);
+    drawOverlay(labels.getContext("2d"), [canvas.width, canvas.height], ratio, look, camera, seen, caption);
+    context.drawImage(labels, 0, 0);
+    this.changed();
+    return picture;
+  }
+
+  screenshot() {
+    this.composed().toBlob((blob) => this.save(blob, "png"), "image/png");
+  }
+
+  save(blob, ending) {
+    const name = this.setting.title.replace(/[^\p{L}\p{N}._-]+/gu, "-").replace(/^[-.]+|[-.]+$/g, "") || "rfm";
+    const link = element("a", { href: URL.createObjectURL(blob), download: `${name}.${ending}` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  }
+
+  /** Begins or ends a video of what is shown. */
+  record() {
+    if (this.film) {
+      this.film.recorder.stop();
+      this.film = null;
+    } else {
+      const canvas = element("canvas", { width: this.canvas.width & ~1, height: this.canvas.height & ~1 });
+      const context = canvas.getContext("2d");
+      const recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: "video/webm", videoBitsPerSecond: 12e6 });
+      const parts = [];
+      recorder.ondataavailable = ({ data }) => parts.push(data);
+      recorder.onstop = () => this.save(new Blob(parts, { type: "video/webm" }), "webm");
+      recorder.start();
+      this.film = { recorder, add: (...layers) => layers.forEach((layer) => context.drawImage(layer, 0, 0)) };
+      this.changed();
+    }
+    byId("record").setAttribute("aria-pressed", String(!!this.film));
+  }
+
+  copyCamera() {
+    const towards = turned(back(this.camera.turn), this.camera.axes().towards);
+    const text = `picture { camera: [${towards.map((x) => Number(x.toFixed(3))).join(", ")}] }`;
+    const copied = navigator.clipboard?.writeText(text) ?? Promise.reject();
+    copied.then(() => this.state(`copied: ${text}`), () => this.state(text));
+  }
+
+  home() {
+    this.camera.home();
+    this.changed();
+  }
+
+  showPanel(on) {
+    byId("panel").hidden = !on;
+    byId("show-panel").setAttribute("aria-expanded", String(on));
+    this.changed();
+  }
+
+  // ---- controls
+
+  listen() {
+    const { canvas, camera, look, timeline } = this;
+    listenToPointers(canvas, camera, {
+      changed: () => this.changed(),
+      begun: () => (this.dragging = true),
+      ended: () => { this.dragging = false; this.changed(); },
+      turns: () => look.turns,
+    });
+    addEventListener("resize", () => this.changed());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { look.colours = sceneColours(); this.changed(); });
+    const clicks = { play: () => this.play(!this.playing), back: () => this.step(-1), forward: () => this.step(1), restart: () => this.restart(),
+      home: () => this.home(), screenshot: () => this.screenshot(), record: () => this.record(), "show-help": () => byId("help").showModal(),
+      "show-panel": () => this.showPanel(byId("panel").hidden) };
+    for (const [id, act] of Object.entries(clicks)) byId(id).addEventListener("click", act);
+    byId("scrub").addEventListener("input", (event) => {
+      if (!this.live) this.play(false);
+      timeline.place = Number(event.target.value);
+      if (this.live || !look.blend) timeline.place = Math.round(timeline.place);
+      this.timelineChanged();
+      this.changed();
+    });
+    byId("speed").append(...SPEEDS.map((speed) => element("option", { value: String(speed) }, `${speed}×`)));
+    this.showSpeed();
+    byId("speed").addEventListener("change", (event) => {
+      timeline.speed = Number(event.target.value);
+      this.send({ do: "speed", value: timeline.speed });
+    });
+    this.listenToKeys();
+  }
+
+  listenToKeys() {
+    const towards = (d) => () => { this.camera.look(d); this.changed(); };
+    const keys = [
+      [[" "], "space", "play or pause", clicked("play")],
+      [["ArrowLeft"], "←", "one frame back", clicked("back")],
+      [["ArrowRight"], "→", "one frame on", clicked("forward")],
+      [["0"], "0", "back to the start", clicked("restart")],
+      [["h"], "h", "the view of the beginning", clicked("home")],
+      [["x"], "x", "look along the x axis", towards([1, 0, 0])],
+      [["y"], "y", "look along the y axis", towards([0, -1, 0])],
+      [["z"], "z", "look along the z axis", towards([0, 0, 1])],
+      [["p"], "p", "parallel projection", clicked("parallel")],
+      [["o"], "o", "obstacle: opaque, transparent, hidden", () => { nextOf("obstacle"); }],
+      [["c"], "c", "cut across x, y, z, or not", () => { nextOf("cut-axis"); }],
+      [["s"], "s", "save the picture", clicked("screenshot")],
+      [["v"], "v", "begin or end a video", clicked("record")],
+      [["m"], "m", "show or hide the controls", clicked("show-panel")],
+      [["?"], "?", "this list", clicked("show-help")],
+    ];
+    const mouse = [["drag", "turn the view, or the box"], ["right drag, shift", "move the view"], ["wheel, pinch", "nearer or farther"]];
+    byId("keys").append(...[...keys.map(([, name, what]) => [name, what]), ...mouse].flatMap(([name, what]) => [element("dt", {}, name), element("dd", {}, what)]));
+    addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey || byId("help").open) return;
+      const { tagName, type } = event.target;
+      const types = tagName === "SELECT" || (tagName === "INPUT" && type !== "checkbox");
+      // a button that has the focus takes the space for itself
+      if (types || (event.key === " " && (tagName === "BUTTON" || tagName === "INPUT" || tagName === "SUMMARY"))) return;
+      const key = keys.find(([names]) => names.includes(event.key));
+      if (!key) return;
+      event.preventDefault();
+      key[3]();
+    });
+  }
+}
+
+const clicked = (id) => () => byId(id)?.click();
+
+/** Goes on to the next of a list of choices. */
+function nextOf(id) {
+  const list = byId(id);
+  list.selectedIndex = (list.selectedIndex + 1) % list.options.length;
+  list.dispatchEvent(new Event("change"));
+}
+
+try {
+  // tests look at it
+  window.viewer = new Viewer(JSON.parse(byId("setting").textContent));
+  window.viewer.read().catch((error) => window.viewer.notice(`the data of this page cannot be read: ${error.message}`));
+} catch (error) {
+  byId("notice").hidden = false;
+  byId("notice").textContent = error.message;
+  throw error;
+}

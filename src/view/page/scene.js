@@ -1,0 +1,206 @@
+// What is drawn: particles, obstacles, the edges of the box. It knows WebGL and nothing of time or controls.
+
+/** The most particles that are drawn while the picture moves. */
+const MOST_WHILE_MOVING = 250_000;
+
+class Scene {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.moving = false;
+    this.drawn = 0;
+    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    canvas.addEventListener("webglcontextrestored", () => { this.prepare(); this.restored?.(); });
+    this.prepare();
+  }
+
+  prepare() {
+    const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: true, powerPreference: "high-performance" });
+    if (!gl) throw new Error("this browser has no WebGL 2, which the picture needs");
+    this.gl = gl;
+    this.points = this.program(POINTS_VERTEX, POINTS_FRAGMENT);
+    this.mesh = this.program(MESH_VERTEX, MESH_FRAGMENT);
+    this.lines = this.program(LINES_VERTEX, LINES_FRAGMENT);
+    this.map = gl.createTexture();
+    this.buffers = { from: gl.createBuffer(), to: gl.createBuffer(), level: gl.createBuffer(), edges: gl.createBuffer() };
+    this.pointsArray = gl.createVertexArray();
+    this.edgesArray = gl.createVertexArray();
+    this.solid = null;
+    this.shown = {};
+    this.edges = 0;
+  }
+
+  program(vertex, fragment) {
+    const gl = this.gl;
+    const program = gl.createProgram();
+    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) throw new Error(gl.getShaderInfoLog(shader));
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(gl.getProgramInfoLog(program));
+    const places = new Map();
+    return {
+      program,
+      /** Sets a uniform by its name. */
+      set(kind, name, ...values) {
+        if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
+        gl["uniform" + kind](places.get(name), ...values);
+      },
+    };
+  }
+
+  /** Gives the box: lowest and highest corner. */
+  setBox({ min, max }) {
+    const gl = this.gl;
+    const corner = (i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? max : min)[axis]);
+    const lines = [];
+    for (let i = 0; i < 8; i++) for (let axis = 0; axis < 3; axis++) if (!((i >> axis) & 1)) lines.push(...corner(i), ...corner(i | (1 << axis)));
+    gl.bindVertexArray(this.edgesArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.edges);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(lines), gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+    gl.bindVertexArray(null);
+    this.edges = lines.length / 3;
+  }
+
+  setMap(name) {
+    const gl = this.gl;
+    gl.bindTexture(gl.TEXTURE_2D, this.map);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, mapTexels(name));
+    for (const [key, value] of [[gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]])
+      gl.texParameteri(gl.TEXTURE_2D, key, value);
+  }
+
+  /** Gives the mesh that is shown; nothing is done if it is shown already. */
+  setMesh(mesh) {
+    if (this.shown.mesh === mesh) return;
+    this.shown.mesh = mesh;
+    const gl = this.gl;
+    if (this.solid) {
+      gl.deleteVertexArray(this.solid.array);
+      this.solid.buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+      this.solid = null;
+    }
+    if (!mesh || mesh.corners.length === 0) return;
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    const buffers = [mesh.positions, mesh.normals].map((data, place) => {
+      const buffer = gl.createBuffer();
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 0, 0);
+      return buffer;
+    });
+    const corners = gl.createBuffer();
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, corners);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.corners, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    this.solid = { array, buffers: [...buffers, corners], count: mesh.corners.length };
+  }
+
+  fill(name, owner, data) {
+    if (this.shown[name] === owner) return;
+    this.shown[name] = owner;
+    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffers[name]);
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, data, this.gl.DYNAMIC_DRAW);
+  }
+
+  /** Draws everything. `look` says how; `frames` are the two between which the time lies. */
+  draw(look, view, projection, frames) {
+    const gl = this.gl;
+    const [width, height] = [this.canvas.width, this.canvas.height];
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(...look.colours.back, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+    if (this.solid && look.obstacle === "opaque") this.drawMesh(look, view, projection, 1);
+    if (frames && look.particles) this.drawPoints(look, view, projection, frames);
+    this.drawLines(look, view, projection);
+    if (this.solid && look.obstacle === "transparent") this.drawMesh(look, view, projection, 0.3);
+  }
+
+  drawLines(look, view, projection) {
+    const gl = this.gl;
+    gl.useProgram(this.lines.program);
+    this.lines.set("Matrix4fv", "view", false, view);
+    this.lines.set("Matrix4fv", "projection", false, projection);
+    this.lines.set("4f", "paint", ...look.colours.edges, 1);
+    gl.bindVertexArray(this.edgesArray);
+    if (look.box) gl.drawArrays(gl.LINES, 0, this.edges);
+  }
+
+  drawMesh(look, view, projection, opacity) {
+    const gl = this.gl;
+    const { mesh } = this;
+    gl.useProgram(mesh.program);
+    mesh.set("Matrix4fv", "view", false, view);
+    mesh.set("Matrix4fv", "projection", false, projection);
+    mesh.set("3f", "base", ...look.colours.solid);
+    mesh.set("3f", "section", ...look.colours.section);
+    mesh.set("1f", "opacity", opacity);
+    mesh.set("1f", "parallel", look.parallel ? 1 : 0);
+    mesh.set("4f", "cut", ...(look.cutSolid ? look.cut : NO_CUT));
+    gl.bindVertexArray(this.solid.array);
+    const draw = () => gl.drawElements(gl.TRIANGLES, this.solid.count, gl.UNSIGNED_INT, 0);
+    if (opacity === 1) return draw();
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(false);
+    gl.enable(gl.CULL_FACE);
+    gl.cullFace(gl.FRONT);
+    draw();
+    gl.cullFace(gl.BACK);
+    draw();
+    gl.disable(gl.CULL_FACE);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+
+  drawPoints(look, view, projection, { from, to, part }) {
+    const gl = this.gl;
+    const { points } = this;
+    // frames with other particles cannot be blended
+    const next = to.count === from.count ? to : from;
+    this.fill("from", from, from.sites);
+    if (next !== from) this.fill("to", next, next.sites);
+    this.fill("level", from.levels[look.array], from.levels[look.array]);
+    const skip = this.moving ? Math.ceil(from.count / MOST_WHILE_MOVING) : 1;
+    gl.bindVertexArray(this.pointsArray);
+    for (const [place, buffer, size, kind, bytes] of [
+      [0, "from", 3, gl.UNSIGNED_SHORT, 6],
+      [1, next === from ? "from" : "to", 3, gl.UNSIGNED_SHORT, 6],
+      [2, "level", 1, gl.UNSIGNED_BYTE, 1],
+    ]) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[buffer]);
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, size, kind, true, bytes * skip, 0);
+    }
+    gl.useProgram(points.program);
+    points.set("Matrix4fv", "view", false, view);
+    points.set("Matrix4fv", "projection", false, projection);
+    points.set("3f", "low", ...look.lattice.min);
+    points.set("3f", "size", ...sub(look.lattice.max, look.lattice.min));
+    points.set("1f", "part", next === from ? 0 : part);
+    points.set("1f", "radius", look.radius);
+    points.set("1f", "height", this.canvas.height);
+    points.set("4f", "cut", ...(look.cutFluid ? look.cut : NO_CUT));
+    const range = from.ranges[look.array];
+    const width = look.range.high - look.range.low || 1;
+    points.set("2f", "tone", (range.high - range.low) / width, (range.low - look.range.low) / width);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.map);
+    points.set("1i", "map", 0);
+    this.drawn = Math.floor(from.count / skip);
+    gl.drawArrays(gl.POINTS, 0, this.drawn);
+  }
+}
+
+/** A plane that leaves nothing out. */
+const NO_CUT = [0, 0, 0, 1];

@@ -1,0 +1,379 @@
+//! `rfm view`: what a saved page holds, and how the server treats browsers, other pages and nonsense. What the page does
+//! with it is tested in a browser, by `tests/viewer`.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use rfm::fluid_surface::read_points;
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::view::Lattice;
+use tungstenite::client::IntoClientRequest;
+use tungstenite::{Message, WebSocket};
+
+use crate::tool::rfm;
+
+const SCENE: &str = "rfm 1
+param r = 0.2 in 0.1 .. 0.4
+solid post = cylinder(r, 0.5).move([0.5, 0.5, 0])
+scene drop {
+  box { min: [0, 0, 0], max: [1, 1, 1.5] }
+  fluid { shape: ball([0.5, 0.5, 1], 0.25), particles: 800, fill: middle }
+  obstacle { solid: post }
+  run { until: 0.2 s, save_every: 0.02 s }
+}
+";
+
+fn scene(folder: &Path) {
+    std::fs::write(folder.join("drop.rfm"), SCENE).unwrap();
+}
+
+fn run(folder: &Path) {
+    scene(folder);
+    rfm(folder, &["run", "drop.rfm", "--no-pictures"]).expect(0);
+}
+
+/// The blocks of a page: the head and the planes of each.
+fn blocks(page: &str) -> Vec<(serde_json::Value, Vec<u8>)> {
+    let parts = page.split("<script type=\"application/octet-stream\">").skip(1);
+    parts
+        .map(|part| {
+            let base64 = part.split("</script>").next().unwrap();
+            let deflated = BASE64_STANDARD.decode(base64).unwrap();
+            let mut block = Vec::new();
+            flate2::read::DeflateDecoder::new(&deflated[..]).read_to_end(&mut block).unwrap();
+            let length = u32::from_le_bytes(block[..4].try_into().unwrap()) as usize;
+            let head = serde_json::from_slice(&block[4..4 + length]).unwrap();
+            (head, block[4 + length..].to_vec())
+        })
+        .collect()
+}
+
+/// The sites of a frame, which may be stated by differences from the frame before.
+fn sites(head: &serde_json::Value, planes: &[u8], before: &[[u16; 3]]) -> Vec<[u16; 3]> {
+    let n = head["count"].as_u64().unwrap() as usize;
+    let number = |axis: usize, i: usize| {
+        u16::from_le_bytes([planes[2 * axis * n + i], planes[(2 * axis + 1) * n + i]])
+    };
+    let unfolded = |x: u16| (x >> 1) ^ 0u16.wrapping_sub(x & 1);
+    let site = |i: usize| {
+        std::array::from_fn(|axis| match head["follows"].as_bool().unwrap() {
+            true => before[i][axis].wrapping_add(unfolded(number(axis, i))),
+            false => number(axis, i),
+        })
+    };
+    (0..n).map(site).collect()
+}
+
+#[test]
+fn a_saved_page_holds_every_position_in_few_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    let summary = rfm(here, &["view", "drop.out", "--save", "drop.html", "--json"]).expect(0).json();
+    let page = std::fs::read_to_string(here.join("drop.html")).unwrap();
+    assert_eq!((summary["frames"].as_u64(), summary["bytes"].as_u64()), (Some(11), Some(page.len() as u64)));
+    let setting = page.split("id=\"setting\">").nth(1).unwrap().split("</script>").next().unwrap();
+    let setting: serde_json::Value = serde_json::from_str(setting).unwrap();
+    assert_eq!(setting["box"]["max"], serde_json::json!([1.0, 1.0, 1.5]));
+    let names: Vec<_> = setting["arrays"].as_array().unwrap().iter().map(|array| &array["name"]).collect();
+    assert_eq!(names, ["speed", "density", "pressure"]);
+
+    let blocks = blocks(&page);
+    let frames = || blocks.iter().filter(|(head, _)| head["kind"] == "frame");
+    assert_eq!((frames().count(), blocks.len()), (11, 12));
+    let lattice = Lattice::new(&Aabb::new(DVec3::ZERO, DVec3::new(1.0, 1.0, 1.5)));
+    let rounding = lattice.rounding() + DVec3::splat(1e-7);
+    let (mut before, mut particles) = (Vec::new(), 0);
+    for (k, (head, planes)) in frames().enumerate() {
+        let file = std::fs::read(here.join(format!("drop.out/frames/particles_{k:06}.vtp"))).unwrap();
+        let points = read_points(&file).unwrap();
+        before = sites(head, planes, &before);
+        assert_eq!(before.len(), points.len());
+        for (site, point) in before.iter().zip(&points) {
+            let off = (lattice.position(*site) - *point).abs();
+            assert!(off.cmple(rounding).all(), "frame {k}: {point} is {off} away");
+        }
+        assert!((head["time"].as_f64().unwrap() - 0.02 * k as f64).abs() < 1e-9);
+        particles += points.len();
+    }
+    let data = page.split("application/octet-stream\">").skip(2).map(|part| part.find("</script>").unwrap());
+    let bytes = data.sum::<usize>() as f64 / particles as f64;
+    assert!(bytes <= 10.0, "{bytes} bytes per particle and frame");
+}
+
+#[test]
+fn a_page_of_a_mesh_is_one_file() {
+    let folder = tempfile::tempdir().unwrap();
+    scene(folder.path());
+    rfm(folder.path(), &["mesh", "drop.rfm", "--cells", "24", "-o", "post.html"]).expect(0);
+    let page = std::fs::read_to_string(folder.path().join("post.html")).unwrap();
+    let [(head, planes)] = &blocks(&page)[..] else { panic!("one block") };
+    let (count, triangles) = (head["count"].as_u64().unwrap(), head["triangles"].as_u64().unwrap());
+    assert_eq!(planes.len() as u64, 12 * count + 12 * triangles);
+    assert!(triangles > 500);
+    for word in ["src=", "href=\"http", "url(", "@import"] {
+        assert!(!page.contains(word), "the page asks for something else: {word}");
+    }
+    let refused = rfm(folder.path(), &["mesh", "drop.rfm", "--unit", "mm", "-o", "post.html"]).expect(2);
+    assert!(refused.stderr.contains("in metres"), "{}", refused.stderr);
+}
+
+#[test]
+fn what_cannot_be_viewed_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    scene(here);
+    std::fs::create_dir(here.join("empty")).unwrap();
+    for (arguments, words) in [
+        (&["view", "drop.rfm", "--save", "a.html"][..], "rfm run drop.rfm"),
+        (&["view", "empty", "--save", "a.html"], "there are no frames in `empty`"),
+        (&["view", "none.rfm", "--no-open"], "cannot read `none.rfm`"),
+        (&["view", "-"], "standard input cannot be viewed"),
+        (&["view", "drop.rfm", "--host", "256.1.1.1", "--no-open"], "cannot serve at --host 256.1.1.1"),
+    ] {
+        let outcome = rfm(here, arguments).expect(2);
+        assert!(outcome.stderr.contains(words), "{arguments:?}: {}", outcome.stderr);
+    }
+    run(here);
+    let text = std::fs::read(here.join("drop.out/frames/particles_000003.vtp")).unwrap();
+    std::fs::write(here.join("drop.out/frames/particles_000003.vtp"), &text[..text.len() / 2]).unwrap();
+    let outcome = rfm(here, &["view", "drop.out", "--save", "a.html"]).expect(2);
+    assert!(outcome.stderr.contains("cut off"), "{}", outcome.stderr);
+    assert!(!here.join("a.html").exists());
+    rfm(here, &["view", "drop.out", "--save", "a.html", "--frames", "0..3"]).expect(0);
+}
+
+/// A server that ends with the test.
+struct Viewer {
+    child: Child,
+    at: SocketAddr,
+    /// `/TOKEN/`
+    path: String,
+    _folder: tempfile::TempDir,
+}
+
+impl Viewer {
+    fn start() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        scene(folder.path());
+        let mut child = Command::new(env!("CARGO_BIN_EXE_rfm"))
+            .args(["view", "drop.rfm", "--no-open", "--mesh-cells", "24"])
+            .current_dir(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+        let address = line.trim().strip_prefix("http://").unwrap();
+        let (at, token) = address.split_once('/').unwrap();
+        assert_eq!(token.len(), 33, "{line}");
+        Self { child, at: at.parse().unwrap(), path: format!("/{token}"), _folder: folder }
+    }
+
+    /// Sends bytes, and returns the first line of the answer and the whole.
+    fn ask(&self, request: &str) -> (String, String) {
+        let mut stream = TcpStream::connect(self.at).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        // a server that refuses may have closed before all of it is sent
+        let _ = stream.write_all(request.as_bytes());
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        let answer = String::from_utf8_lossy(&answer).into_owned();
+        (answer.lines().next().unwrap_or_default().to_string(), answer)
+    }
+
+    fn get(&self, path: &str, headers: &str) -> String {
+        self.ask(&format!("GET {path} HTTP/1.1\r\nHost: {}\r\n{headers}\r\n", self.at)).0
+    }
+
+    fn is_well(&self) {
+        assert_eq!(self.get(&self.path, ""), "HTTP/1.1 200 OK");
+    }
+
+    /// Connects to the stream as a page does.
+    fn follow(&self, origin: &str) -> Result<WebSocket<TcpStream>, String> {
+        let stream = TcpStream::connect(self.at).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let mut request = format!("ws://{}{}stream", self.at, self.path).into_client_request().unwrap();
+        request.headers_mut().insert("Origin", origin.parse().unwrap());
+        tungstenite::client(request, stream).map(|(socket, _)| socket).map_err(|error| error.to_string())
+    }
+
+    fn own_page(&self) -> WebSocket<TcpStream> {
+        self.follow(&format!("http://{}", self.at)).unwrap()
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Reads until a message of a kind comes, and answers those before it as a page does.
+fn until(socket: &mut WebSocket<TcpStream>, kind: &str) -> serde_json::Value {
+    for _ in 0..200 {
+        let head = match socket.read().unwrap() {
+            Message::Text(text) => serde_json::from_str(text.as_str()).unwrap(),
+            Message::Binary(block) => {
+                socket.send(Message::text(r#"{"do":"seen"}"#)).unwrap();
+                let length = u32::from_le_bytes(block[..4].try_into().unwrap()) as usize;
+                serde_json::from_slice::<serde_json::Value>(&block[4..4 + length]).unwrap()
+            }
+            other => panic!("{other:?}"),
+        };
+        if head["kind"] == kind {
+            return head;
+        }
+    }
+    panic!("no message of the kind {kind}");
+}
+
+#[test]
+fn only_the_page_itself_with_its_token_is_let_in() {
+    let viewer = Viewer::start();
+    viewer.is_well();
+    let (_, page) = viewer.ask(&format!("GET {} HTTP/1.1\r\nHost: localhost:1\r\n\r\n", viewer.path));
+    assert!(page.contains("<!doctype html>") && page.contains("\"live\":true") && page.contains("drop.rfm"));
+    for header in
+        ["X-Content-Type-Options: nosniff", "Referrer-Policy: no-referrer", "Cache-Control: no-store"]
+    {
+        assert!(page.contains(header), "{header}");
+    }
+    let forbidden = "HTTP/1.1 403 Forbidden";
+    let wrong = format!("/{}/", "0".repeat(32));
+    for path in ["/", "", "/stream", "//", &wrong, &viewer.path[..32], &format!("{}x", &viewer.path[..33])] {
+        assert_eq!(viewer.get(path, ""), forbidden, "{path}");
+    }
+    assert_eq!(viewer.get(&format!("{}other", viewer.path), ""), "HTTP/1.1 404 Not Found");
+    assert_eq!(viewer.get(&viewer.path, "Origin: http://evil.example\r\n"), forbidden);
+    for host in ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "localhost.evil.example"] {
+        let (line, answer) = viewer.ask(&format!("GET {} HTTP/1.1\r\nHost: {host}\r\n\r\n", viewer.path));
+        assert_eq!(line, forbidden, "{host}");
+        assert!(!answer.contains(&viewer.path));
+    }
+    for origin in ["http://evil.example", "null", "https://127.0.0.1", "http://localhost:1"] {
+        assert!(viewer.follow(origin).unwrap_err().contains("403"), "{origin}");
+    }
+    viewer.own_page();
+}
+
+#[test]
+fn nonsense_is_refused_and_survived() {
+    let viewer = Viewer::start();
+    let long = "a".repeat(40_000);
+    for (request, status) in [
+        ("\r\n\r\n".to_string(), "400"),
+        ("GET\r\n\r\n".into(), "400"),
+        ("GET / HTTP/3\r\nHost: localhost\r\n\r\n".into(), "400"),
+        ("GET / HTTP/1.1\r\nHost\r\n\r\n".into(), "400"),
+        ("GET / HTTP/1.1\r\n\r\n".into(), "400"),
+        ("\u{0}\u{1}ω\r\n\r\n".into(), "400"),
+        ("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\nx".into(), "405"),
+        (format!("GET /{long} HTTP/1.1\r\nHost: localhost\r\n\r\n"), "431"),
+    ] {
+        let (line, _) = viewer.ask(&request);
+        // the rest of a request that is too long may arrive after the answer, which is lost then
+        let is_cut = status == "431" && line.is_empty();
+        assert!(line.contains(status) || is_cut, "{line} for {:.40}", request);
+    }
+    drop(TcpStream::connect(viewer.at).unwrap());
+    // more connections than are served, which say nothing
+    let silent: Vec<TcpStream> = (0..40).map(|_| TcpStream::connect(viewer.at).unwrap()).collect();
+    let is_refused = |_| {
+        std::thread::sleep(Duration::from_millis(50));
+        viewer.get(&viewer.path, "").contains("503")
+    };
+    assert!((0..20).any(is_refused), "one connection more is served");
+    drop(silent);
+    std::thread::sleep(Duration::from_millis(200));
+    viewer.is_well();
+}
+
+#[test]
+fn a_page_follows_the_run_and_commands_it() {
+    let viewer = Viewer::start();
+    let mut page = viewer.own_page();
+    let setting = until(&mut page, "setting");
+    assert_eq!((&setting["live"], &setting["params"][0]["name"]), (&true.into(), &"r".into()));
+    let mesh = until(&mut page, "mesh");
+    assert!(mesh["triangles"].as_u64().unwrap() > 100);
+    let frame = until(&mut page, "frame");
+    assert!(frame["count"].as_u64().unwrap() > 700, "{frame}");
+    let first = frame["run"].as_u64().unwrap();
+    page.send(Message::text(r#"{"do":"set","name":"r","value":0.3}"#)).unwrap();
+    let mut last = frame;
+    for _ in 0..100 {
+        last = until(&mut page, "frame");
+        if last["run"].as_u64().unwrap() > first {
+            break;
+        }
+    }
+    assert_eq!(last["run"].as_u64().unwrap(), first + 1);
+    page.send(Message::text(r#"{"do":"pause"}"#)).unwrap();
+    while until(&mut page, "status")["playing"] == true {}
+    // values beyond the range, of unknown params, and no numbers at all change nothing
+    for command in [
+        r#"{"do":"set","name":"none","value":1}"#,
+        r#"{"do":"gravity","vector":[1e999,0,0]}"#,
+        r#"{"do":"speed","value":-1}"#,
+    ] {
+        let mut other = viewer.own_page();
+        other.send(Message::text(command)).unwrap();
+        until(&mut other, "status");
+    }
+    page.send(Message::text(r#"{"do":"set","name":"r","value":7}"#)).unwrap();
+    let error = loop {
+        if let Some(error) = until(&mut page, "status")["error"].as_str() {
+            break error.to_string();
+        }
+    };
+    assert!(error.contains("`r`") && error.contains("0.4"), "{error}");
+    page.send(Message::text(r#"{"do":"reset"}"#)).unwrap();
+    while !until(&mut page, "status")["error"].is_null() {}
+}
+
+#[test]
+fn a_page_that_misbehaves_or_goes_away_harms_nobody() {
+    let viewer = Viewer::start();
+    // oversized, of the wrong kind, no command
+    let messages = [
+        Message::text("x".repeat(1 << 20)),
+        Message::Binary(vec![0; 100].into()),
+        Message::text("{\"do\":\"erase\"}"),
+        Message::text("["),
+    ];
+    for message in messages {
+        let mut page = viewer.own_page();
+        // the server may close before all of it is sent
+        let _ = page.send(message);
+        let ended = (0..200).any(|_| page.read().is_err());
+        assert!(ended, "the connection goes on");
+    }
+    // closing in the middle of a frame, with and without a farewell
+    for _ in 0..4 {
+        let page = viewer.own_page();
+        let mut stream = page.into_inner();
+        let mut part = [0; 1000];
+        stream.read_exact(&mut part).unwrap();
+        drop(stream);
+        let mut page = viewer.own_page();
+        until(&mut page, "setting");
+        let _ = page.close(None);
+    }
+    // one that never takes anything does not hold up another one
+    let _silent = viewer.own_page();
+    let mut page = viewer.own_page();
+    for _ in 0..5 {
+        until(&mut page, "frame");
+    }
+    viewer.is_well();
+}
