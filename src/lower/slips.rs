@@ -6,7 +6,7 @@ use super::names::Kind;
 use crate::diagnostic::{Code, Diagnostic, SourceId};
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
-use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::ast::{Expr, ExprKind, Fold};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
@@ -104,9 +104,8 @@ impl Lowering<'_> {
                 let global = self.names.get(self.scope.source, name);
                 !is_local && global.is_some_and(|g| matches!(g.kind, Kind::Solid(_)))
             }
-            ExprKind::Method { .. } | ExprKind::Logic { .. } | ExprKind::Not(_) | ExprKind::Fold { .. } => {
-                true
-            }
+            ExprKind::Method { .. } | ExprKind::Logic { .. } | ExprKind::Not(_) => true,
+            ExprKind::Fold { op, .. } => matches!(op, Fold::Any | Fold::All),
             ExprKind::Number(_)
             | ExprKind::Quantity { .. }
             | ExprKind::Text(_)
@@ -116,6 +115,7 @@ impl Lowering<'_> {
             | ExprKind::Product { .. }
             | ExprKind::Negate(_)
             | ExprKind::Power { .. }
+            | ExprKind::Index { .. }
             | ExprKind::Component { .. } => false,
         }
     }

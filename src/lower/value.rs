@@ -9,6 +9,8 @@ pub(super) enum Value {
     Number(Node),
     /// Three numbers or fields.
     Vector([Node; 3]),
+    /// Numbers, vectors or lists in square brackets; three numbers are a vector.
+    List(Vec<Value>),
     /// A text in quotes.
     Text(String),
     /// No value: a part of the expression was wrong, and that was reported.
@@ -16,11 +18,21 @@ pub(super) enum Value {
 }
 
 impl Value {
+    /// The members of a list or of a vector; `None` for other values.
+    pub fn members(&self) -> Option<Vec<Self>> {
+        match self {
+            Self::List(members) => Some(members.clone()),
+            Self::Vector(parts) => Some(parts.map(Self::Number).to_vec()),
+            Self::Number(_) | Self::Text(_) | Self::Failed => None,
+        }
+    }
+
     /// The kind of the value with its article, for messages.
     pub fn describe(&self) -> &'static str {
         match self {
             Self::Number(_) => "a number",
             Self::Vector(_) => "a vector",
+            Self::List(_) => "a list",
             Self::Text(_) => "a text",
             Self::Failed => "nothing",
         }

@@ -2,9 +2,10 @@
 
 use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 9] = [
+const DOCUMENTS: [&str; 10] = [
     "README.md",
     "CHANGELOG.md",
+    "grammar/README.md",
     "examples/README.md",
     "examples/validation/README.md",
     "tests/bench/README.md",

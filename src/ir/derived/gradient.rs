@@ -41,12 +41,14 @@ pub fn gradient_and_rate(graph: &mut Graph, root: Node) -> [Node; 4] {
     partials.map(|partial| partial.unwrap_or_else(|| graph.constant(0.0)))
 }
 
-/// Constants need no adjoint: leaving them out keeps dead multiplications out of the graph.
+/// Constants need no adjoint, and neither do steps: leaving them out keeps dead multiplications out of the graph.
 fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> FxHashSet<Node> {
     let mut depends = FxHashSet::default();
     for &node in cone {
         let expr = graph.expr(node);
-        if matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends.contains(&o)) {
+        let is_step = matches!(expr, Expr::Unary(op, _) if op.is_step());
+        let is_varied = matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends.contains(&o));
+        if is_varied && !is_step {
             depends.insert(node);
         }
     }
@@ -98,7 +100,7 @@ fn unary(graph: &mut Graph, op: Unary, node: Node, a: Node, adjoint: Node) -> No
             let twice = graph.binary(Add, node, node);
             graph.binary(DivOrZero, adjoint, twice)
         }
-        Unary::Sign => graph.constant(0.0),
+        Unary::Sign | Unary::Floor | Unary::Round => graph.constant(0.0),
         Unary::Call(function) => function.derivative(graph, Chain { adjoint, operand: a, value: node }),
     }
 }
@@ -119,8 +121,8 @@ fn binary(
     adjoint: Node,
 ) -> Option<Node> {
     use Binary::{
-        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight,
-        PlainMax, PlainMin, Sub,
+        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, MulOrZero, Or,
+        OrWeight, PlainMax, PlainMin, Sub,
     };
     let first = side == Side::First;
     // (this operand, the other one)
@@ -139,6 +141,13 @@ fn binary(
             let product = graph.binary(Mul, adjoint, node);
             let quotient = graph.binary(op, product, b);
             graph.unary(Unary::Neg, quotient)
+        }
+        MulOrZero if first => graph.binary(MulOrZero, adjoint, b),
+        MulOrZero => {
+            let sign = graph.unary(Unary::Sign, b);
+            let counts = graph.unary(Unary::Abs, sign);
+            let counted = graph.binary(MulOrZero, a, counts);
+            graph.binary(Mul, adjoint, counted)
         }
         Min | PlainMin => weighted(graph, MinWeight),
         Max | PlainMax => weighted(graph, MaxWeight),
