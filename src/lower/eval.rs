@@ -219,9 +219,9 @@ impl Lowering<'_> {
                 Value::Vector(std::array::from_fn(|i| self.binary(op, a[i], b[i], span)))
             }
             (Value::Number(a), Value::Number(b)) => Value::Number(self.binary(op, *a, *b, span)),
-            (Value::List(a), Value::List(b)) if a.len() == b.len() => {
-                Value::List(std::iter::zip(a, b).map(|(a, b)| self.sum(op, a, b, span)).collect())
-            }
+            (Value::List(a), Value::List(b)) if a.len() == b.len() => Value::List(
+                std::iter::zip(a.iter(), b.iter()).map(|(a, b)| self.sum(op, a, b, span)).collect(),
+            ),
             _ => {
                 let span = self.user_span(span);
                 let message = format!("cannot add or subtract {} and {}", a.describe(), b.describe());

@@ -1,5 +1,7 @@
 //! Lists and folds: `[a, b, …]`, `list[i]`, `any i in 0..6: …`, `sum p in list: …`.
 
+use std::sync::Arc;
+
 use super::lowering::{Local, Lowering};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
@@ -9,6 +11,12 @@ use crate::syntax::ast::{Expr, Fold, Logic, Members, Name};
 /// The most members of a fold. The budget of nodes is checked after each member, so this only bounds folds
 /// whose members add no node.
 const LONGEST_FOLD: f64 = 1e7;
+
+/// The most numbers of a list with all lists in it.
+const MOST_NUMBERS: usize = 100_000;
+
+/// How deep lists may be nested.
+const DEEPEST_LIST: usize = 32;
 
 impl Lowering<'_> {
     /// Three numbers are a vector; anything else in square brackets is a list.
@@ -29,8 +37,22 @@ impl Lowering<'_> {
         }
         match values[..] {
             [Value::Number(a), Value::Number(b), Value::Number(c)] => Value::Vector([a, b, c]),
-            _ => Value::List(values),
+            _ => self.list(values, span),
         }
+    }
+
+    /// A list that is not too large: names may stand for lists of lists, which grow fast.
+    fn list(&mut self, members: Vec<Value>, span: Span) -> Value {
+        let list = Value::List(members.into());
+        let (count, depth) = list.extent();
+        if count > MOST_NUMBERS || depth > DEEPEST_LIST {
+            let span = self.user_span(span);
+            let message = format!("a list with {count} numbers, {depth} lists deep");
+            let diagnostic = Diagnostic::error(Code::TOO_LARGE, span, message);
+            return self
+                .fail(diagnostic.help(format!("at most {MOST_NUMBERS} numbers and {DEEPEST_LIST} lists")));
+        }
+        list
     }
 
     /// `v.x` of a vector, or of a list of two numbers.
@@ -61,7 +83,7 @@ impl Lowering<'_> {
     }
 
     /// The members of a list; a value without members is reported.
-    fn list_members(&mut self, value: &Value, written: &Expr) -> Option<Vec<Value>> {
+    fn list_members(&mut self, value: &Value, written: &Expr) -> Option<Arc<[Value]>> {
         let members = value.members();
         if members.is_none() && *value != Value::Failed {
             let span = self.user_span(self.origin(written));
@@ -82,7 +104,7 @@ impl Lowering<'_> {
         }
         let is_range = matches!(members, Members::Range(..));
         let mut results = Vec::new();
-        for value in values {
+        for value in values.iter().cloned() {
             let name = variable.text.clone();
             self.scope.locals.push(Local { name, value, span: variable.span, bare: is_range });
             let result = self.expr(body);
@@ -96,7 +118,7 @@ impl Lowering<'_> {
     }
 
     /// The numbers of a range `start..end`.
-    fn range(&mut self, op: Fold, start: &Expr, end: &Expr) -> Option<Vec<Value>> {
+    fn range(&mut self, op: Fold, start: &Expr, end: &Expr) -> Option<Arc<[Value]>> {
         let whole = start.span.to(end.span);
         let (start, end) = (
             self.constant_expr(start, "the start of a range"),
@@ -134,11 +156,11 @@ impl Lowering<'_> {
             numbers.push(Value::Number(self.constant(index)));
             index += 1.0;
         }
-        Some(numbers)
+        Some(numbers.into())
     }
 
     /// The members of the list that a fold goes through.
-    fn fold_list(&mut self, op: Fold, list: &Expr) -> Option<Vec<Value>> {
+    fn fold_list(&mut self, op: Fold, list: &Expr) -> Option<Arc<[Value]>> {
         let value = self.expr(list);
         if let (Value::Number(node), true) = (&value, self.known_value_of(&value).is_some()) {
             let end = self.known_value(*node).unwrap_or_default();

@@ -131,7 +131,32 @@ impl Lowering<'_> {
             let offset = self.binary(Binary::Mul, cell, distance, span);
             self.binary(Binary::Sub, p[i], offset, span)
         });
-        self.module.graph.substitute(shape, within)
+        let mut copies = self.module.graph.substitute(shape, within);
+        for i in (0..3).filter(|&i| counts[i] > 1.0) {
+            let (half, distance) = (0.5 * bounds.size()[i], step[i].abs());
+            // between the shape and the border of its cell
+            let limit = 0.5 * (half + 0.5 * distance);
+            if half < 0.499 * distance {
+                let strip = self.near_middles(p[i], (centre[i], distance), limit, span);
+                copies = self.binary(Binary::Min, copies, strip, span);
+            }
+        }
+        copies
+    }
+
+    /// Positive within `limit` of the middles of all cells along an axis. Ranges over a border between cells do not see
+    /// that both copies are away from it: this says so, for it jumps in the middles instead.
+    fn near_middles(&mut self, p: Node, (middle, distance): (f64, f64), limit: f64, span: Span) -> Node {
+        let [middle, distance, half, limit] =
+            [middle, distance, 0.5, limit - 0.5 * distance].map(|number| self.constant(number));
+        let ahead = self.binary(Binary::Sub, p, middle, span);
+        let cells = self.binary(Binary::Div, ahead, distance, span);
+        let whole = self.unary(Unary::Floor, cells, span);
+        let part = self.binary(Binary::Sub, cells, whole, span);
+        let from_border = self.binary(Binary::Sub, part, half, span);
+        let from_border = self.unary(Unary::Abs, from_border, span);
+        let length = self.binary(Binary::Mul, from_border, distance, span);
+        self.binary(Binary::Add, length, limit, span)
     }
 
     /// All copies joined. `None` if they are too many, which is reported.

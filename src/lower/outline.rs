@@ -1,9 +1,10 @@
 //! `polygon([[x, y], …])`: the field of a simple polygon in x and y.
 //!
-//! Rvachev's formula uses the line of each edge once, so ω has no zero off the outline. The lines of a convex
-//! polygon are joined by *and*. The hull of any other one has edges that are none of the polygon: behind each of
-//! them lies a chain of edges, whose own hull, seen from the other side, is joined by *or*; and so on. An edge's field
-//! is the distance from its line, positive to the left of a polygon that runs counter-clockwise.
+//! The formula uses the line of each edge once and without *not*, so ω has no zero off the outline: crossing a line
+//! at a point where it alone is zero changes the sign, and so crosses the outline. An edge's field is the distance from
+//! its line, positive to the left of a polygon that runs counter-clockwise.
+
+use std::cmp::Ordering;
 
 use super::lowering::Lowering;
 use super::value::Value;
@@ -58,10 +59,12 @@ impl Lowering<'_> {
         let outline = outline(points);
         let last = outline.len();
         let corner = |i: usize| outline[i % last];
-        let first = (0..last)
-            .min_by(|&a, &b| outline[a].partial_cmp(&outline[b]).unwrap_or(std::cmp::Ordering::Equal));
-        let first = first.unwrap_or(0);
-        let formula = chain(&|i| corner(first + i), 0, last, true);
+        let order = |a: &usize, b: &usize| outline[*a].partial_cmp(&outline[*b]).unwrap_or(Ordering::Equal);
+        // the leftmost corner and the rightmost one: edges from there go on to the left and to the right
+        let (Some(first), Some(second)) = ((0..last).min_by(order), (0..last).max_by(order)) else {
+            return Value::Failed;
+        };
+        let formula = whole(&|i| corner(first + i), (second + last - first) % last, last);
         let span = written.span;
         Value::Number(self.outlined(&formula, &|i| [corner(first + i), corner(first + i + 1)], span))
     }
@@ -78,8 +81,8 @@ impl Lowering<'_> {
         let mut points = Vec::with_capacity(members.len());
         for (i, member) in members.iter().enumerate() {
             let at = place_of(written, i);
-            let pair = member.members().unwrap_or_default();
-            let [Value::Number(x), Value::Number(y)] = pair[..] else {
+            let pair = member.members();
+            let Some([Value::Number(x), Value::Number(y)]) = pair.as_deref() else {
                 let span = self.user_span(at);
                 let message = format!("a corner has two coordinates, found {}", described(member));
                 let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
@@ -87,8 +90,8 @@ impl Lowering<'_> {
                 return None;
             };
             let (x, y) = (
-                self.as_constant(x, at, "a corner of a polygon"),
-                self.as_constant(y, at, "a corner of a polygon"),
+                self.as_constant(*x, at, "a corner of a polygon"),
+                self.as_constant(*y, at, "a corner of a polygon"),
             );
             let point = [x?, y?];
             if !point.iter().all(|c| c.is_finite()) {
@@ -245,27 +248,57 @@ fn outline(mut points: Vec<Point>) -> Vec<Point> {
     corners
 }
 
-/// The formula of the edges from one corner to a later one. The corners of their hull that are found are those from
-/// which all others lie to the left, or to the right.
-fn chain(corner: &impl Fn(usize) -> Point, from: usize, to: usize, left: bool) -> Chain {
-    let sign = if left { 1.0 } else { -1.0 };
-    let mut parts = Vec::new();
-    let mut at = from;
-    while at < to {
-        let mut next = at + 1;
-        for other in at + 2..=to {
-            if sign * side(corner(at), corner(next), corner(other)) < 0.0 {
-                next = other;
-            }
-        }
-        // only rounding could find the chain itself again
-        if (at, next) == (from, to) && !left {
-            next = at + 1;
-        }
-        parts.push(if next == at + 1 { Chain::Edge(at) } else { chain(corner, at, next, !left) });
-        at = next;
+/// The formula of a polygon whose corners 0 and `opposite` are its farthest to the left and to the right.
+fn whole(corner: &impl Fn(usize) -> Point, opposite: usize, count: usize) -> Chain {
+    joined(Logic::And, [chain(corner, 0, opposite), chain(corner, opposite, count)])
+}
+
+/// The formula of the edges from one corner to a later one. The first edge and the last one go on for ever, so that
+/// the chain parts the plane in two. At a corner of its hull it falls into two such chains (Dobkin, Guibas,
+/// Hershberger and Snoeyink 1988), which are joined by *and* where the outline turns left and by *or* where it turns
+/// right.
+fn chain(corner: &impl Fn(usize) -> Point, from: usize, to: usize) -> Chain {
+    if to - from == 1 {
+        return Chain::Edge(from);
     }
-    Chain::Joined(if left { Logic::And } else { Logic::Or }, parts)
+    let at = hull_corner(corner, from, to);
+    let is_left = side(corner(at - 1), corner(at), corner(at + 1)) > 0.0;
+    let op = if is_left { Logic::And } else { Logic::Or };
+    joined(op, [chain(corner, from, at), chain(corner, at, to)])
+}
+
+/// Two chains as one; what is joined by the same operation becomes one list.
+fn joined(op: Logic, chains: [Chain; 2]) -> Chain {
+    let mut parts = Vec::new();
+    for chain in chains {
+        match chain {
+            Chain::Joined(inner, all) if inner == op => parts.extend(all),
+            other => parts.push(other),
+        }
+    }
+    Chain::Joined(op, parts)
+}
+
+/// A corner of the hull of a chain whose first and last edge have no end: the farthest one against the direction
+/// halfway between theirs.
+fn hull_corner(corner: &impl Fn(usize) -> Point, from: usize, to: usize) -> usize {
+    let unit = |a: Point, b: Point| {
+        let (x, y) = (b[0] - a[0], b[1] - a[1]);
+        let length = libm::hypot(x, y);
+        [x / length, y / length]
+    };
+    let back = unit(corner(from + 1), corner(from));
+    let ahead = unit(corner(to - 1), corner(to));
+    let mut towards = [back[0] + ahead[0], back[1] + ahead[1]];
+    if libm::hypot(towards[0], towards[1]) < STRAIGHT {
+        towards = [-ahead[1], ahead[0]];
+    }
+    let place = |i: usize| {
+        let p = corner(i);
+        (towards[0] * p[0] + towards[1] * p[1], towards[0] * p[1] - towards[1] * p[0])
+    };
+    let order = |a: &usize, b: &usize| place(*a).partial_cmp(&place(*b)).unwrap_or(Ordering::Equal);
+    (from + 1..to).min_by(order).unwrap_or(from + 1)
 }
 
 #[cfg(test)]
@@ -275,7 +308,9 @@ mod tests {
     fn formula(points: &[Point]) -> Chain {
         let points = outline(points.to_vec());
         let n = points.len();
-        chain(&|i| points[i % n], 0, n, true)
+        let order = |a: &usize, b: &usize| points[*a].partial_cmp(&points[*b]).unwrap();
+        let (first, second) = ((0..n).min_by(order).unwrap(), (0..n).max_by(order).unwrap());
+        whole(&|i| points[(first + i) % n], (second + n - first) % n, n)
     }
 
     #[test]

@@ -220,6 +220,9 @@ impl Lowering<'_> {
             ("rotate", _) => ".rotate([0, 0, 1], 45 deg)".into(),
             ("scale", _) => ".scale(2)` or `.scale([1, 1, 2])".into(),
             ("mirror", _) => ".mirror([1, 0, 0])".into(),
+            ("at", _) => ".at([2*x, y, z])".into(),
+            ("turned", _) => ".turned(0.5*z)".into(),
+            ("repeat", _) => ".repeat([2, 0, 0], [6, 1, 1])".into(),
             _ => format!(".{method}(45 deg)"),
         }
     }

@@ -99,7 +99,8 @@ fn kinds_fit(parameters: &[&str], values: &[(Value, Span)]) -> bool {
     parameters.iter().zip(values).all(|(name, (value, _))| match (*name, value) {
         (_, Value::Failed) => true,
         ("by" | "axis" | "normal" | "about" | "point" | "place" | "step" | "counts", value) => {
-            matches!(value, Value::Vector(_))
+            // a list of another length has a message of its own
+            matches!(value, Value::Vector(_) | Value::List(_))
         }
         ("angle", value) => matches!(value, Value::Number(_)),
         _ => true, // a factor may be both, and has a message of its own

@@ -98,7 +98,7 @@ fn random_numbers_are_even_and_the_same_everywhere() {
     let text = "solid s = (sum i in 0..4000: random(1, i)) + x";
     let mean = compiled(text, Engine::Interpreter).omega(DVec3::ZERO) / 4000.0;
     assert!((mean - 0.5).abs() < 0.02, "{mean}");
-    assert_eq!(value("random(1, 2) + 0*x", [0.0; 3]), 0.744_049_001_263_096_8);
+    assert_eq!(value("random(1, 2) + 0*x", [0.0; 3]), 0.234_364_617_758_881_84);
     assert_ne!(value("random(1, 2) + 0*x", [0.0; 3]), value("random(2, 2) + 0*x", [0.0; 3]));
 }
 
@@ -124,7 +124,7 @@ fn maps_are_their_substitution() {
     let at = |q: [f64; 3]| value("ellipsoid(1, 2, 3)", q);
     assert_eq!(value("ellipsoid(1, 2, 3).at([y, z*2, x])", p), at([-0.7, 1.8, 0.3]));
     assert_eq!(value("ellipsoid(1, 2, 3).revolve()", p), at([0.3f64.hypot(0.7), 0.9, 0.0]));
-    same_sign("box().rotate([0, 0, 1], 90°, [1, 0, 0])", "box([1, -1, 0], [2, 0, 1])", cube(2.5));
+    same_sign("box().rotate([0, 0, 1], 90°, [1, 0, 0])", "box([0, -1, 0], [1, 0, 1])", cube(2.5));
     same_sign("box().mirror([1, 0, 0], [1, 0, 0])", "box([1, 0, 0], [2, 1, 1])", cube(2.5));
     same_sign("box().mirror([1, 0, 0])", "box([-1, 0, 0], [0, 1, 1])", cube(2.5));
     // a whole turn in each unit of length: at half of it everything is turned by half a turn

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 use glam::DVec3;
 
 use super::contractor::{Contractor, Wanted};
-use super::linear::contract_linear;
+use super::linear::{LinearForm, contract_linear};
 use super::sets::Contracted;
 use crate::geom::Aabb;
 use crate::ir::bounds::range::Region;
@@ -13,26 +13,50 @@ use crate::ir::derived::sign::SignRule;
 use crate::ir::graph::{Expr, Graph, Node};
 use crate::ir::op::Binary;
 
-/// Half the side of the cube that is looked at. A box that comes close to it has no end.
+/// Half the side of the cube that is looked at.
 const FARTHEST: f64 = 1e60;
+
+/// A box that reaches farther has no end that is of use.
+const OF_USE: f64 = 1e12;
 
 /// Formulas with more nodes are not looked at.
 const MOST_NODES: usize = 20_000;
 
 /// Rounds of contraction for each junction.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 6;
 
 /// A box around the points at which a root is positive at any time. `None` if no end was found on some side, or
 /// if there are no such points.
 pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
-    let (graph, root) = graph.extract_cone(root);
+    let (graph, root) = folded(graph, root);
     if graph.len() > MOST_NODES {
         return None;
     }
     let mut junctions = Junctions { graph: &graph, known: FxHashMap::default() };
     let found = junctions.above(root, false, 0.0);
     let ends = found.min.abs().max(found.max.abs()).max_element();
-    (!found.is_empty() && ends < 1e-3 * FARTHEST).then_some(found)
+    (!found.is_empty() && ends < OF_USE).then_some(found)
+}
+
+/// The graph of a root alone, with the values of what uses no coordinate: rules look for numbers.
+fn folded(graph: &Graph, root: Node) -> (Graph, Node) {
+    let mut out = Graph::default();
+    let mut image: FxHashMap<Node, Node> = FxHashMap::default();
+    for node in graph.cone(root) {
+        let expr = graph.expr(node).map(|operand| image[&operand]);
+        let number = |node: Node| out.as_constant(node);
+        let value = match expr {
+            Expr::Unary(op, a) => number(a).map(|a| op.eval(a)),
+            Expr::Binary(op, a, b) => number(a).zip(number(b)).map(|(a, b)| op.eval(a, b)),
+            Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => None,
+        };
+        let new = match value {
+            Some(value) => out.constant(value),
+            None => out.intern(expr, None),
+        };
+        image.insert(node, new);
+    }
+    (out, image[&root])
 }
 
 /// The boxes of nodes that decide a sign, and of their complements.
@@ -96,17 +120,19 @@ impl Junctions<'_> {
             root = graph.binary(Binary::Add, root, by);
         }
         let contractor = Contractor::new(&graph, root);
+        let mut given: Vec<LinearForm> = Vec::new();
         for _ in 0..ROUNDS {
             if space.is_empty() {
                 return Aabb::EMPTY;
             }
             let wanted = Wanted { region: Region::of(&Aabb::EMPTY), negated };
             let mut forms = Vec::new();
-            match contractor.contract(&wanted, &mut space, Some(&mut forms)) {
+            match contractor.contract_given(&given, &wanted, &mut space, Some(&mut forms)) {
                 Contracted::Nowhere => return Aabb::EMPTY,
                 Contracted::Everywhere => return space,
                 Contracted::Somewhere if !contract_linear(&forms, &mut space) => return Aabb::EMPTY,
-                Contracted::Somewhere => {}
+                // what one round finds of a form helps the next one with the others
+                Contracted::Somewhere => given = forms,
             }
         }
         space
