@@ -14,6 +14,8 @@ impl Emitter<'_, '_> {
             Unary::Abs => self.abs(a),
             Unary::Sqrt => self.builder.ins().sqrt(a),
             Unary::Sign => self.sign(a),
+            Unary::Floor => self.builder.ins().floor(a),
+            Unary::Round => self.builder.ins().nearest(a),
             Unary::Call(function) => self.call(HostFunction::Unary(function), &[a]),
         }
     }
@@ -29,6 +31,12 @@ impl Emitter<'_, '_> {
                 let is_zero = self.compare(FloatCC::Equal, b, zero);
                 let quotient = self.builder.ins().fdiv(a, b);
                 self.select(is_zero, zero, quotient)
+            }
+            Binary::MulOrZero => {
+                let zero = self.constant(0.0);
+                let is_zero = self.compare(FloatCC::Equal, b, zero);
+                let product = self.builder.ins().fmul(a, b);
+                self.select(is_zero, zero, product)
             }
             Binary::Min => self.ordered(FloatCC::LessThan, a, b),
             Binary::Max => self.ordered(FloatCC::GreaterThan, a, b),

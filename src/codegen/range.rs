@@ -18,7 +18,7 @@ use cranelift_frontend::FunctionBuilder;
 use super::emitter::{Emitter, Hosts};
 use super::range_instructions::{Instruction, Instructions, RangeBinary, RangeUnary};
 use super::request::{Request, Rounding, pointers};
-use crate::ir::{Affine, Node};
+use crate::ir::{Affine, Node, Unary};
 use crate::precision::Precision;
 
 /// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
@@ -121,6 +121,14 @@ impl Ranges<'_, '_> {
             RangeUnary::Neg => self.swap(a),
             RangeUnary::Abs => self.magnitudes(a),
             RangeUnary::Sqrt => self.sqrt(a),
+            RangeUnary::Sign => self.emitter.unary(Unary::Sign, a),
+            // −floor(lo) is the ceiling of −lo
+            RangeUnary::Floor => {
+                let low = self.emitter.builder.ins().ceil(a);
+                let high = self.emitter.builder.ins().floor(a);
+                self.lanes(low, high)
+            }
+            RangeUnary::Round => self.emitter.builder.ins().nearest(a),
         }
     }
 
@@ -140,6 +148,16 @@ impl Ranges<'_, '_> {
                 (_, Some(number)) => self.times(a, number),
                 _ => self.multiply(a, b),
             },
+            // the hull with 0, unless the second factor is one number
+            RangeBinary::MulOrZero => {
+                let product = self.multiply(a, b);
+                let zero = self.pair(0.0, 0.0);
+                let hull = self.emitter.max(product, zero);
+                let swapped = self.swap(b);
+                let width = self.fadd(b, swapped);
+                let is_number = self.emitter.compare(FloatCC::Equal, width, zero);
+                self.emitter.select(is_number, product, hull)
+            }
             RangeBinary::Min => {
                 // −min(lo) = max(−lo)
                 let (low, high) = (self.emitter.max(a, b), self.min(a, b));

@@ -54,6 +54,9 @@ pub(super) enum RangeUnary {
     Neg,
     Abs,
     Sqrt,
+    Sign,
+    Floor,
+    Round,
 }
 
 /// The operations on two ranges.
@@ -62,6 +65,7 @@ pub(super) enum RangeBinary {
     Add,
     Sub,
     Mul,
+    MulOrZero,
     Min,
     Max,
     And,
@@ -107,7 +111,10 @@ impl RangeUnary {
             Unary::Neg => Some(Self::Neg),
             Unary::Abs => Some(Self::Abs),
             Unary::Sqrt => Some(Self::Sqrt),
-            Unary::Sign | Unary::Call(_) => None,
+            Unary::Floor => Some(Self::Floor),
+            Unary::Round => Some(Self::Round),
+            Unary::Sign => Some(Self::Sign),
+            Unary::Call(_) => None,
         }
     }
 }
@@ -118,6 +125,7 @@ impl RangeBinary {
             Binary::Add => Some(Self::Add),
             Binary::Sub => Some(Self::Sub),
             Binary::Mul => Some(Self::Mul),
+            Binary::MulOrZero => Some(Self::MulOrZero),
             Binary::Min | Binary::PlainMin => Some(Self::Min),
             Binary::Max | Binary::PlainMax => Some(Self::Max),
             Binary::And => Some(Self::And),
@@ -159,6 +167,7 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
                 | Binary::Mul
                 | Binary::Div
                 | Binary::DivOrZero
+                | Binary::MulOrZero
                 | Binary::Min
                 | Binary::Max
                 | Binary::PlainMin

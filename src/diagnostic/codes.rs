@@ -99,6 +99,12 @@ then used for values of ω; `rfm check` prints which one.
 
     @tolerance(1e-6)
     solid post = x² + y² <= 0.25 and 0 <= z <= 1";
+OUTLINE = "E0215":
+"The corners of a polygon do not enclose an area: two edges cross or touch, a corner stands twice, or the outline turns
+back on itself. List the corners along the outline, each once, in either direction.
+
+    rfm 1
+    solid arrow = polygon([[0, 0], [2, 1], [0, 2], [0.5, 1]]).extrude(0, 1)";
 SCENE_KEY = "E0301":
 "The scene does not know this key, or this value of it, at this place. What it knows:
 

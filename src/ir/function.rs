@@ -100,6 +100,11 @@ functions! {
         Exp "exp" exp expf;
         /// The natural logarithm.
         Ln "ln" log logf;
+        Log2 "log2" log2 log2f;
+        Log10 "log10" log10 log10f;
+        Sinh "sinh" sinh sinhf;
+        Cosh "cosh" cosh coshf;
+        Tanh "tanh" tanh tanhf;
     }
 }
 

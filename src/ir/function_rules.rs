@@ -5,7 +5,7 @@
 
 use super::bounds::upper::{add, div, magnitude, mul, smallest_magnitude};
 use crate::interval::Interval;
-use crate::ir::exact::big::{Big, one};
+use crate::ir::exact::big::{Big, number, one};
 use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::graph::{Graph, Node};
 use crate::ir::op::{Binary, Unary};
@@ -57,6 +57,45 @@ impl UnaryFunction {
             }
             Self::Exp => graph.binary(Mul, adjoint, value),
             Self::Ln => graph.binary(Div, adjoint, a),
+            Self::Log2 | Self::Log10 => {
+                let quotient = graph.binary(Div, adjoint, a);
+                let factor = graph.constant(self.per_ln());
+                graph.binary(Mul, quotient, factor)
+            }
+            Self::Sinh => {
+                let cosh = graph.unary(Unary::Call(Self::Cosh), a);
+                graph.binary(Mul, adjoint, cosh)
+            }
+            Self::Cosh => {
+                let sinh = graph.unary(Unary::Call(Self::Sinh), a);
+                graph.binary(Mul, adjoint, sinh)
+            }
+            // 1 − tanh²
+            Self::Tanh => {
+                let one = graph.constant(1.0);
+                let square = graph.binary(Mul, value, value);
+                let factor = graph.binary(Sub, one, square);
+                graph.binary(Mul, adjoint, factor)
+            }
+        }
+    }
+
+    /// What a logarithm is per natural logarithm.
+    fn per_ln(self) -> f64 {
+        match self {
+            Self::Log2 => std::f64::consts::LOG2_E,
+            Self::Log10 => std::f64::consts::LOG10_E,
+            Self::Sin
+            | Self::Cos
+            | Self::Tan
+            | Self::Asin
+            | Self::Acos
+            | Self::Atan
+            | Self::Exp
+            | Self::Ln
+            | Self::Sinh
+            | Self::Cosh
+            | Self::Tanh => 1.0,
         }
     }
 
@@ -70,10 +109,15 @@ impl UnaryFunction {
             Self::Atan => a.increasing(libm::atan),
             Self::Exp => a.increasing(libm::exp),
             Self::Ln if a.lo > 0.0 => a.increasing(libm::log),
+            Self::Log2 if a.lo > 0.0 => a.increasing(libm::log2),
+            Self::Log10 if a.lo > 0.0 => a.increasing(libm::log10),
+            Self::Sinh => a.increasing(libm::sinh),
+            Self::Cosh => a.abs().increasing(libm::cosh),
+            Self::Tanh => a.increasing(libm::tanh),
             Self::Asin if a.lo >= -1.0 && a.hi <= 1.0 => a.increasing(libm::asin),
             Self::Acos if a.lo >= -1.0 && a.hi <= 1.0 => (-a).increasing(|x| libm::acos(-x)),
             Self::Tan if a.lo > -1.57 && a.hi < 1.57 => a.increasing(libm::tan),
-            Self::Ln | Self::Asin | Self::Acos | Self::Tan => Interval::ALL,
+            Self::Ln | Self::Log2 | Self::Log10 | Self::Asin | Self::Acos | Self::Tan => Interval::ALL,
         }
     }
 
@@ -94,9 +138,15 @@ impl UnaryFunction {
                 Some([slope, -(a * slope.square())])
             }
             Self::Exp => Some([value, half(value)]),
-            Self::Ln => {
-                let slope = one / a;
-                Some([slope, -half(slope.square())])
+            Self::Ln | Self::Log2 | Self::Log10 => {
+                let (slope, factor) = (one / a, Interval::point(self.per_ln()).widened(1));
+                Some([slope * factor, -half(slope.square()) * factor])
+            }
+            Self::Sinh => Some([Self::Cosh.range(a), half(value)]),
+            Self::Cosh => Some([Self::Sinh.range(a), half(value)]),
+            Self::Tanh => {
+                let slope = one - value.square();
+                Some([slope, -(value * slope)])
             }
             Self::Asin | Self::Acos => None,
         }
@@ -106,18 +156,23 @@ impl UnaryFunction {
     /// undefined or is too steep.
     pub(super) fn propagated(self, a: Interval, error: f64) -> Option<f64> {
         match self {
-            Self::Sin | Self::Cos | Self::Atan => Some(error),
+            Self::Sin | Self::Cos | Self::Atan | Self::Tanh => Some(error),
             Self::Tan if magnitude(a) < 1.57 => {
                 let steepest = magnitude(a.increasing(libm::tan));
                 Some(mul(error, add(1.0, mul(steepest, steepest))))
             }
             Self::Exp => Some(mul(error, a.increasing(libm::exp).hi)),
             Self::Ln if a.lo > 0.0 => Some(div(error, a.lo)),
+            Self::Log2 | Self::Log10 if a.lo > 0.0 => Some(mul(div(error, a.lo), self.per_ln().next_up())),
+            // beyond 88 they leave the range of single precision
+            Self::Sinh | Self::Cosh if magnitude(a) > 80.0 => None,
+            Self::Sinh => Some(mul(error, magnitude(Self::Cosh.range(a)))),
+            Self::Cosh => Some(mul(error, magnitude(Self::Sinh.range(a)))),
             Self::Asin | Self::Acos if magnitude(a) < 1.0 => {
                 let rest = (Interval::point(1.0) - a.square()).sqrt();
                 Some(div(error, rest.lo))
             }
-            Self::Tan | Self::Ln | Self::Asin | Self::Acos => None,
+            Self::Tan | Self::Ln | Self::Log2 | Self::Log10 | Self::Asin | Self::Acos => None,
         }
     }
 
@@ -133,7 +188,23 @@ impl UnaryFunction {
             Self::Atan => Some(a.atan()),
             Self::Exp => Some(a.exp()),
             Self::Ln if *a > Big::ZERO => Some(a.ln()),
-            Self::Asin | Self::Acos | Self::Ln => None,
+            Self::Log2 if *a > Big::ZERO => Some(a.ln() / number(2).ln()),
+            Self::Log10 if *a > Big::ZERO => Some(a.ln() / number(10).ln()),
+            Self::Sinh => {
+                let up = a.exp();
+                let down = one() / &up;
+                Some((up - down) / number(2))
+            }
+            Self::Cosh => {
+                let up = a.exp();
+                let down = one() / &up;
+                Some((up + down) / number(2))
+            }
+            Self::Tanh => {
+                let square = (a * number(2)).exp();
+                Some((&square - one()) / (&square + one()))
+            }
+            Self::Asin | Self::Acos | Self::Ln | Self::Log2 | Self::Log10 => None,
         }
     }
 }
@@ -188,7 +259,18 @@ impl BinaryFunction {
                 Interval::new(lo, hi).widened(4)
             }
             Self::Pow => Interval::ALL,
-            Self::Atan2 => Interval::new(-std::f64::consts::PI, std::f64::consts::PI).widened(1),
+            // around the origin, and at the cut behind it
+            Self::Atan2 if a.contains(0.0) && b.lo <= 0.0 => {
+                Interval::new(-std::f64::consts::PI, std::f64::consts::PI).widened(1)
+            }
+            // the corners have the extreme angles
+            Self::Atan2 => {
+                let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
+                let corners = corners.map(|(a, b)| libm::atan2(a, b));
+                let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
+                let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                Interval::new(lo.next_down(), hi.next_up()).widened(3)
+            }
         }
     }
 

@@ -38,7 +38,7 @@ pub use bounds::magnitude::Magnitudes;
 pub use bounds::range::RangeEvaluator;
 pub(crate) use bounds::range::{Affine, RangeRule, Region};
 pub(crate) use contraction::{
-    Contracted, Contractor, LinearForm, Wanted, contract_linear, contract_linear_around,
+    Contracted, Contractor, LinearForm, Wanted, contract_linear, contract_linear_around, reach,
 };
 pub(crate) use derived::contact::{contact, wall_velocity};
 pub use derived::gradient::gradient;

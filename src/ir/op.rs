@@ -19,6 +19,10 @@ pub enum Unary {
     Sqrt,
     /// −1, 0 or 1; the derivative of |a|, 0 at 0 by convention.
     Sign,
+    /// The largest whole number that is not above a.
+    Floor,
+    /// The nearest whole number; halfway between two the even one.
+    Round,
     /// A function of the mathematical library.
     Call(UnaryFunction),
 }
@@ -36,6 +40,8 @@ pub enum Binary {
     Div,
     /// a/b, and 0 where b = 0: derivatives of roots at their singular point, where the limit set contains 0.
     DivOrZero,
+    /// a·b, and 0 where b = 0 whatever a is, even if it is no number: b chooses whether a counts.
+    MulOrZero,
     /// The smaller operand; NaN if either is NaN.
     Min,
     /// The larger operand; NaN if either is NaN.
@@ -77,7 +83,7 @@ impl Unary {
     /// Every operation, for tests.
     pub fn all() -> impl Iterator<Item = Self> {
         let functions = UnaryFunction::ALL.iter().copied().map(Self::Call);
-        [Self::Neg, Self::Abs, Self::Sqrt, Self::Sign].into_iter().chain(functions)
+        [Self::Neg, Self::Abs, Self::Sqrt, Self::Sign, Self::Floor, Self::Round].into_iter().chain(functions)
     }
 
     /// Its name in dumps.
@@ -87,7 +93,17 @@ impl Unary {
             Self::Abs => "abs",
             Self::Sqrt => "sqrt",
             Self::Sign => "sign",
+            Self::Floor => "floor",
+            Self::Round => "round",
             Self::Call(function) => function.name(),
+        }
+    }
+
+    /// Whether it is constant between jumps: its derivative is taken to be 0.
+    pub fn is_step(self) -> bool {
+        match self {
+            Self::Sign | Self::Floor | Self::Round => true,
+            Self::Neg | Self::Abs | Self::Sqrt | Self::Call(_) => false,
         }
     }
 
@@ -98,6 +114,8 @@ impl Unary {
             Self::Abs => a.abs(),
             Self::Sqrt => a.sqrt(),
             Self::Sign => sign(a),
+            Self::Floor => a.floor(),
+            Self::Round => a.round_ties_even(),
             Self::Call(function) => a.call(function),
         }
     }
@@ -124,6 +142,7 @@ impl Binary {
             Self::Mul,
             Self::Div,
             Self::DivOrZero,
+            Self::MulOrZero,
             Self::Min,
             Self::Max,
             Self::PlainMin,
@@ -146,6 +165,7 @@ impl Binary {
             Self::Mul => "mul",
             Self::Div => "div",
             Self::DivOrZero => "div_or_zero",
+            Self::MulOrZero => "mul_or_zero",
             Self::Min => "min",
             Self::Max => "max",
             Self::PlainMin => "plain_min",
@@ -178,6 +198,7 @@ impl Binary {
             | Self::Mul
             | Self::Div
             | Self::DivOrZero
+            | Self::MulOrZero
             | Self::Min
             | Self::Max
             | Self::PlainMin
@@ -202,6 +223,13 @@ impl Binary {
                     zero
                 } else {
                     a / b
+                }
+            }
+            Self::MulOrZero => {
+                if b == zero {
+                    zero
+                } else {
+                    a * b
                 }
             }
             Self::Min => ordered(a < b, a, b),

@@ -28,6 +28,10 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// |a|
     fn abs(self) -> Self;
+    /// The largest whole number that is not above a.
+    fn floor(self) -> Self;
+    /// The nearest whole number; halfway between two the even one.
+    fn round_ties_even(self) -> Self;
     /// A function of the mathematical library.
     fn call(self, function: UnaryFunction) -> Self;
     /// A function of the mathematical library, of this operand and a second one.
@@ -52,6 +56,14 @@ macro_rules! real {
             #[inline]
             fn abs(self) -> Self {
                 <$t>::abs(self)
+            }
+            #[inline]
+            fn floor(self) -> Self {
+                <$t>::floor(self)
+            }
+            #[inline]
+            fn round_ties_even(self) -> Self {
+                <$t>::round_ties_even(self)
             }
             #[inline]
             fn call(self, function: UnaryFunction) -> Self {

@@ -5,7 +5,7 @@ use super::lowering::{Call, Local, Lowering, Scope};
 use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
-use crate::syntax::ast::{Argument, ExprKind, Function, Name};
+use crate::syntax::ast::{Argument, Expr, ExprKind, Function, Name};
 
 impl<'a> Lowering<'a> {
     pub fn call(&mut self, name: &Name, arguments: &[Argument], span: Span) -> Value {
@@ -40,6 +40,25 @@ impl<'a> Lowering<'a> {
                 self.fail(diagnostic)
             }
         }
+    }
+
+    /// The function that `.name(…)` calls.
+    pub fn function_of_shapes(&mut self, name: &str) -> Option<(&'a Function, SourceId)> {
+        self.names.function_of_shapes(self.scope.source, name)
+    }
+
+    /// `shape.name(…)` is `name(shape, …)`.
+    pub fn call_method(
+        &mut self,
+        function: &'a Function,
+        source: SourceId,
+        receiver: &Expr,
+        arguments: &[Argument],
+        span: Span,
+    ) -> Value {
+        let mut all = vec![Argument { name: None, value: receiver.clone() }];
+        all.extend_from_slice(arguments);
+        self.call_function(function, source, &all, span)
     }
 
     fn call_function(
@@ -86,7 +105,7 @@ impl<'a> Lowering<'a> {
         let standard = self.names.is_standard(name);
         for (position, argument) in arguments.iter().enumerate() {
             // no parameter of a standard solid is an angle
-            fits &= !standard || self.no_angle(&argument.value);
+            fits &= !standard || function.takes_a_shape() || self.no_angle(&argument.value);
             let value = self.expr(&argument.value);
             let parameter = match self.parameter(function, position, argument) {
                 Parameter::Known(parameter) => parameter,
@@ -114,7 +133,8 @@ impl<'a> Lowering<'a> {
             let bare = self.is_bare(&argument.value);
             bound.push(Local { name: parameter, value, span: at, bare });
         }
-        fits &= !standard || self.kinds_of_arguments_fit(function, arguments, &bound);
+        fits &=
+            !standard || function.takes_a_shape() || self.kinds_of_arguments_fit(function, arguments, &bound);
         for parameter in &function.parameters {
             let given = bound.iter().any(|local| local.name == parameter.name.text);
             if !given && parameter.default.is_none() && fits {

@@ -26,13 +26,15 @@ enum Meaning {
     NumberOfVectors(fn(&mut Lowering<'_>, &[[Node; 3]], Span) -> Node),
     /// Vectors become a vector.
     Vector(fn(&mut Lowering<'_>, &[[Node; 3]], Span) -> [Node; 3]),
+    /// Values of any kind become a value.
+    Value(fn(&mut Lowering<'_>, &[Value], &[Argument]) -> Value),
     /// The arguments are looked at before they are evaluated.
     Unevaluated(fn(&mut Lowering<'_>, &[Argument], Span) -> Value),
 }
 
 /// The builtins that are more than one operation on one number.
-const COMPOSED: [Builtin; 11] = {
-    use Meaning::{Number, NumberOfVectors, Vector};
+const COMPOSED: [Builtin; 21] = {
+    use Meaning::{Number, NumberOfVectors, Unevaluated, Value, Vector};
     const MANY: usize = usize::MAX;
     const fn builtin(name: &'static str, arity: (usize, usize), meaning: Meaning) -> Builtin {
         Builtin { name, arity, meaning }
@@ -51,6 +53,27 @@ const COMPOSED: [Builtin; 11] = {
         builtin("dot", (2, 2), NumberOfVectors(|l, v, span| l.dot(v[0], v[1], span))),
         builtin("cross", (2, 2), Vector(|l, v, span| l.cross(v[0], v[1], span))),
         builtin("length", (1, 1), NumberOfVectors(|l, v, span| l.length(v[0], span))),
+        builtin("ceil", (1, 1), Number(|l, a, span| l.ceiling(a[0], span))),
+        builtin("fract", (1, 1), Number(|l, a, span| l.fraction(a[0], span))),
+        builtin("mod", (2, 2), Number(|l, a, span| l.remainder(a[0], a[1], span))),
+        builtin(
+            "step",
+            (2, 2),
+            Number(|l, a, span| {
+                let above = l.binary(Binary::Sub, a[1], a[0], span);
+                l.step(above, span)
+            }),
+        ),
+        builtin(
+            "where",
+            (3, 3),
+            Unevaluated(|l, a, span| l.choose(&a[0].value, [&a[1].value, &a[2].value], span)),
+        ),
+        builtin("random", (2, 2), Value(|l, values, arguments| l.random(values, arguments))),
+        builtin("count", (1, 1), Value(|l, values, arguments| l.count(&values[0], &arguments[0].value))),
+        builtin("polygon", (1, 1), Value(|l, values, arguments| l.polygon(&values[0], &arguments[0].value))),
+        builtin("around", (2, 2), Number(|l, a, span| l.around(a[0], a[1], span))),
+        builtin("slope", (1, 1), Number(|l, a, span| l.slope(a[0], span))),
         builtin("normalise", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
         builtin("normalize", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
     ]
@@ -71,7 +94,7 @@ fn all() -> impl Iterator<Item = Builtin> {
     let instructions = [Unary::Sqrt, Unary::Abs].into_iter().map(operation);
     instructions
         .chain(functions)
-        .chain([operation(Unary::Sign)])
+        .chain([Unary::Sign, Unary::Floor, Unary::Round].map(operation))
         .chain(COMPOSED.iter().copied())
         .chain([POSITIVE])
 }
@@ -94,6 +117,9 @@ impl Lowering<'_> {
         let number = |node: Option<Node>| node.map_or(Value::Failed, Value::Number);
         match builtin.meaning {
             Meaning::Unevaluated(build) => build(self, arguments, span),
+            Meaning::Value(build) => {
+                self.values(arguments).map_or(Value::Failed, |values| build(self, &values, arguments))
+            }
             Meaning::Unary(op) => number(self.numbers(arguments).map(|a| self.unary(op, a[0], span))),
             Meaning::Number(build) => number(self.numbers(arguments).map(|a| build(self, &a, span))),
             Meaning::NumberOfVectors(build) => number(self.vectors(arguments).map(|v| build(self, &v, span))),
@@ -165,7 +191,7 @@ impl Lowering<'_> {
         self.unary(Unary::Sqrt, square, span)
     }
 
-    fn chain(&mut self, op: Binary, operands: &[Node], span: Span) -> Node {
+    pub fn chain(&mut self, op: Binary, operands: &[Node], span: Span) -> Node {
         let (first, rest) = (operands[0], &operands[1..]);
         rest.iter().fold(first, |so_far, &next| self.binary(op, so_far, next, span))
     }
@@ -195,6 +221,58 @@ impl Lowering<'_> {
         self.binary(Binary::DivOrZero, omega, root, span)
     }
 
+    /// −⌊−a⌋
+    fn ceiling(&mut self, a: Node, span: Span) -> Node {
+        let negative = self.unary(Unary::Neg, a, span);
+        let floor = self.unary(Unary::Floor, negative, span);
+        self.unary(Unary::Neg, floor, span)
+    }
+
+    /// a − ⌊a⌋
+    fn fraction(&mut self, a: Node, span: Span) -> Node {
+        let floor = self.unary(Unary::Floor, a, span);
+        self.binary(Binary::Sub, a, floor, span)
+    }
+
+    /// a − b·⌊a/b⌋, which has the sign of b.
+    fn remainder(&mut self, a: Node, b: Node, span: Span) -> Node {
+        let quotient = self.binary(Binary::Div, a, b, span);
+        let whole = self.unary(Unary::Floor, quotient, span);
+        let multiple = self.binary(Binary::Mul, b, whole, span);
+        self.binary(Binary::Sub, a, multiple, span)
+    }
+
+    /// |∇ω|
+    fn slope(&mut self, omega: Node, span: Span) -> Node {
+        let gradient = ir::gradient(&mut self.module.graph, omega);
+        self.length(gradient, span)
+    }
+
+    /// A number from 0 to 1, without 1, that looks like chance but is the same in every run.
+    fn random(&mut self, values: &[Value], arguments: &[Argument]) -> Value {
+        let mut state = 0_u64;
+        for (value, argument) in values.iter().zip(arguments) {
+            let span = argument.value.span;
+            let Some(node) = self.as_number(value, span) else { return Value::Failed };
+            let Some(number) = self.as_constant(node, span, "an argument of `random`") else {
+                return Value::Failed;
+            };
+            state = scrambled(state ^ (number + 0.0).to_bits());
+        }
+        Value::Number(self.constant((state >> 11) as f64 / (1_u64 << 53) as f64))
+    }
+
+    /// How many members a list has.
+    fn count(&mut self, value: &Value, written: &Expr) -> Value {
+        match value.members() {
+            Some(members) => Value::Number(self.constant(members.len() as f64)),
+            None => {
+                let message = format!("expected a list `[a, b, …]`, found {}", value.describe());
+                self.fail(Diagnostic::error(Code::WRONG_TYPE, self.user_span(written.span), message))
+            }
+        }
+    }
+
     /// The value itself; if it is known now and not positive, an error at the argument that it came from.
     fn positive(&mut self, value: &Expr, what: Option<&Expr>, span: Span) -> Value {
         let result = self.expr(value);
@@ -215,4 +293,12 @@ impl Lowering<'_> {
         let message = format!("{what} must be positive, found {number}");
         self.fail(Diagnostic::error(Code::OUT_OF_RANGE, at, message))
     }
+}
+
+/// One step of the generator SplitMix64 (Steele, Lea and Flood 2014): every bit of the result depends on all bits.
+fn scrambled(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }

@@ -2,17 +2,13 @@
 
 use super::builtins;
 use super::foreign;
-use super::lowering::{Local, Lowering};
+use super::lowering::Lowering;
 use super::names::Kind;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Axis, Binary, BinaryFunction, Node, Unary};
 use crate::quantity::{Dimension, parse_unit};
 use crate::syntax::ast::{AddOp, Comparison, Expr, ExprKind, Logic, MulOp, Name};
-
-/// The most members of a fold. The budget of nodes is checked after each member, so this only bounds folds
-/// whose members add no node.
-const LONGEST_FOLD: f64 = 1e7;
 
 /// The most expressions that are evaluated inside one another. With the limits of the parser it takes a chain
 /// of calls to get there.
@@ -86,14 +82,13 @@ impl Lowering<'_> {
             ExprKind::Call { function, arguments } => self.call(function, arguments, span),
             ExprKind::Component { vector, axis } => {
                 let value = self.expr(vector);
-                self.as_vector(&value, self.origin(vector)).map_or(Value::Failed, |v| Value::Number(v[*axis]))
+                self.component(&value, *axis, self.origin(vector))
             }
             ExprKind::Method { receiver, method, arguments } => {
                 self.method(receiver, method, arguments, span)
             }
-            ExprKind::Fold { op, variable, start, end, body } => {
-                self.fold(*op, variable, (start, end), body, span)
-            }
+            ExprKind::Index { list, index } => self.index(list, index, span),
+            ExprKind::Fold { op, variable, members, body } => self.fold(*op, variable, members, body, span),
         }
     }
 
@@ -205,25 +200,11 @@ impl Lowering<'_> {
         }
     }
 
-    fn vector(&mut self, parts: &[Expr], span: Span) -> Value {
-        if !parts.iter().all(|part| self.no_angle(part)) {
-            return Value::Failed;
-        }
-        let nodes: Vec<Option<Node>> = parts.iter().map(|part| self.field(part)).collect();
-        match nodes[..] {
-            [Some(a), Some(b), Some(c)] => Value::Vector([a, b, c]),
-            [_, _, _] => Value::Failed,
-            _ => {
-                let message = format!("a vector has three components, found {}", parts.len());
-                self.fail(Diagnostic::error(Code::WRONG_TYPE, span, message))
-            }
-        }
-    }
-
     pub fn negate(&mut self, value: &Value, span: Span) -> Value {
         match value {
             Value::Number(a) => Value::Number(self.unary(Unary::Neg, *a, span)),
             Value::Vector(v) => Value::Vector(v.map(|a| self.unary(Unary::Neg, a, span))),
+            Value::List(members) => Value::List(members.iter().map(|a| self.negate(a, span)).collect()),
             other => {
                 self.as_number(other, span);
                 Value::Failed
@@ -231,13 +212,16 @@ impl Lowering<'_> {
         }
     }
 
-    fn sum(&mut self, op: Binary, a: &Value, b: &Value, span: Span) -> Value {
+    pub fn sum(&mut self, op: Binary, a: &Value, b: &Value, span: Span) -> Value {
         match (a, b) {
             (Value::Failed, _) | (_, Value::Failed) => Value::Failed,
             (Value::Vector(a), Value::Vector(b)) => {
                 Value::Vector(std::array::from_fn(|i| self.binary(op, a[i], b[i], span)))
             }
             (Value::Number(a), Value::Number(b)) => Value::Number(self.binary(op, *a, *b, span)),
+            (Value::List(a), Value::List(b)) if a.len() == b.len() => Value::List(
+                std::iter::zip(a.iter(), b.iter()).map(|(a, b)| self.sum(op, a, b, span)).collect(),
+            ),
             _ => {
                 let span = self.user_span(span);
                 let message = format!("cannot add or subtract {} and {}", a.describe(), b.describe());
@@ -246,13 +230,19 @@ impl Lowering<'_> {
         }
     }
 
-    fn product(&mut self, op: Binary, a: &Value, b: &Value, span: Span) -> Value {
+    pub fn product(&mut self, op: Binary, a: &Value, b: &Value, span: Span) -> Value {
         match (a, b) {
             (Value::Failed, _) | (_, Value::Failed) => Value::Failed,
             (Value::Number(a), Value::Number(b)) => Value::Number(self.binary(op, *a, *b, span)),
             (Value::Vector(v), Value::Number(s)) => Value::Vector(v.map(|c| self.binary(op, c, *s, span))),
             (Value::Number(s), Value::Vector(v)) if op == Binary::Mul => {
                 Value::Vector(v.map(|c| self.binary(op, *s, c, span)))
+            }
+            (Value::List(list), Value::Number(_)) => {
+                Value::List(list.iter().map(|member| self.product(op, member, b, span)).collect())
+            }
+            (Value::Number(_), Value::List(list)) if op == Binary::Mul => {
+                Value::List(list.iter().map(|member| self.product(op, a, member, span)).collect())
             }
             _ => {
                 let span = self.user_span(span);
@@ -365,7 +355,7 @@ impl Lowering<'_> {
     }
 
     /// An n-ary operation as a balanced tree, the left half the larger one: a fold would let ω grow as 2ⁿ.
-    fn balanced(&mut self, op: Logic, nodes: &[Node], span: Span) -> Node {
+    pub fn balanced(&mut self, op: Logic, nodes: &[Node], span: Span) -> Node {
         match nodes {
             [only] => *only,
             _ => {
@@ -375,57 +365,5 @@ impl Lowering<'_> {
                 self.binary(op, a, b, span)
             }
         }
-    }
-
-    fn fold(&mut self, op: Logic, variable: &Name, range: (&Expr, &Expr), body: &Expr, span: Span) -> Value {
-        let start = self.constant_expr(range.0, "the start of a range");
-        let end = self.constant_expr(range.1, "the end of a range");
-        let (Some(start), Some(end)) = (start, end) else { return Value::Failed };
-        let whole = range.0.span.to(range.1.span);
-        if start.fract() != 0.0 || end.fract() != 0.0 {
-            let message = format!("a range goes from one whole number to another, found {start} .. {end}");
-            return self.fail(Diagnostic::error(Code::OUT_OF_RANGE, whole, message));
-        }
-        let word = if op == Logic::Or { "any" } else { "all" };
-        if start >= end {
-            let message = format!("`{word}` over the range {start} .. {end}, which has no member");
-            return self.fail(
-                Diagnostic::error(Code::OUT_OF_RANGE, whole, message)
-                    .help("a range a..b holds a, a+1, … b−1; a must be less than b"),
-            );
-        }
-        if end - start > LONGEST_FOLD {
-            let message = format!("a range with {} members", end - start);
-            return self.fail(Diagnostic::error(Code::TOO_LARGE, whole, message));
-        }
-        if end - start == 1.0 {
-            self.report(Diagnostic::warning(
-                Code::FOLD_OF_ONE,
-                whole,
-                format!("`{word}` over the single member {start}"),
-            ));
-        }
-        if !self.may_be_local(variable) {
-            return Value::Failed;
-        }
-        let mut members = Vec::new();
-        let mut index = start;
-        while index < end {
-            let value = Value::Number(self.constant(index));
-            self.scope.locals.push(Local {
-                name: variable.text.clone(),
-                value,
-                span: variable.span,
-                bare: true,
-            });
-            let member = self.field(body);
-            self.scope.locals.pop();
-            match member {
-                Some(member) => members.push(member),
-                None => return Value::Failed, // one message is enough
-            }
-            index += 1.0;
-        }
-        Value::Number(self.balanced(op, &members, span))
     }
 }

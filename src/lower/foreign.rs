@@ -99,20 +99,30 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
             [only] => written("`not` here", &format!("not {}", foreign::operand(only))),
             _ => written("`not` here", "not a"),
         },
-        "smooth_union" | "smin" | "opSmoothUnion" | "blend" | "smax" | "fillet" | "chamfer" | "round"
-        | "rounding" => words(
-            "edges cannot be rounded by a function here",
-            "write the rounded part as a shape: a `torus`, a `capsule` or a `sphere` joined by `or`",
+        "smooth_union" | "smin" | "opSmoothUnion" | "blend" | "fillet" | "rounding" => words(
+            "`blend` or `smooth_or` here",
+            "write `blend(a, b, 0.1)` for a fillet of radius 0.1, or `smooth_or(a, b, 0.1)`",
         ),
-        "hull" | "minkowski" | "offset" | "shell" | "dilate" | "erode" | "onion" | "thicken" | "elongate" => {
-            words(
-                "there is no such operation here",
-                "write the shape by inequalities; a hollow ball is `sphere(1) \\ sphere(0.9)`, a rod with round ends `capsule(0.1, 1)`",
-            )
+        "smax" | "smooth_intersection" | "opSmoothIntersection" => {
+            written("`smooth_and` here", "smooth_and(a, b, 0.1)")
         }
-        "repeat" | "array" | "pattern" | "for_each" | "polar_array" | "duplicate" => {
-            written("`any` here", "any i in 0..6: sphere(0.3).move([i, 0, 0])")
+        "smooth_difference" | "opSmoothSubtraction" => {
+            written("`smooth_without` here", "smooth_without(a, b, 0.1)")
         }
+        "bevel" | "chamfer" => written("`chamfer` here", "chamfer(a, b, 0.1)"),
+        "dilate" | "erode" | "inflate" => written("`.offset` here", "sphere(1).offset(0.1)"),
+        "onion" | "thicken" | "hollow" => written("`.shell` here", "sphere(1).shell(0.1)"),
+        "hull" | "minkowski" | "elongate" => words(
+            "there is no such operation here",
+            "write the shape by inequalities; a hollow ball is `sphere(1) \\ sphere(0.9)`, a rod with round ends `capsule(0.1, 1)`",
+        ),
+        "repeat" | "array" | "pattern" | "duplicate" | "grid" => {
+            written("`.repeat` here", "sphere(0.3).repeat([1, 0, 0], [6, 1, 1])")
+        }
+        "polar_array" | "circular_pattern" => {
+            written("`.polar_repeat` here", "sphere(0.3).move([1, 0, 0]).polar_repeat(6)")
+        }
+        "for_each" => written("`any` here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
         "color" | "colour" | "material" | "texture" | "pigment" => {
             words("shapes have no colour", "leave it out")
         }
@@ -173,18 +183,16 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
         "slab" => written("`layer(e, low, high)` here", "layer(z, 0, 1)"),
         "donut" | "doughnut" | "ring" | "sdTorus" => written("`torus(R, r)` here", "torus(1, 0.25)"),
         "pill" | "sdCapsule" | "sphylinder" => written("`capsule(r, h)` here", "capsule(0.2, 1)"),
-        "pyramid" | "prism" | "wedge" | "tetrahedron" | "octahedron" | "polyhedron" | "hexagon"
-        | "polygon" => words(
+        "pyramid" | "prism" | "wedge" | "tetrahedron" | "octahedron" | "polyhedron" | "hexagon" => words(
             "planes joined by `and` here",
             "write `(all i in 0..6: half_space([1, 0, 0], [1, 0, 0]).rotate_z(i*60 deg)) and 0 <= z <= 1`",
         ),
-        "linear_extrude" | "extrude" => {
-            words("a layer here", "write the outline and a layer: `x² + y² <= 1 and 0 <= z <= 2`")
+        "linear_extrude" => {
+            written("`.extrude(z0, z1)` here", "polygon([[0, 0], [2, 0], [1, 1]]).extrude(0, 2)")
         }
-        "rotate_extrude" | "revolve" | "lathe" | "sor" => words(
-            "a function of the radius here",
-            "write the outline in `let r = sqrt(x^2 + y^2)` and z: `(r - 1)^2 + z^2 <= 0.1`",
-        ),
+        "rotate_extrude" | "lathe" | "sor" => {
+            written("`.revolve()` here", "polygon([[1, 0], [2, 0], [1.5, 1]]).revolve()")
+        }
         "text" | "surface" | "heightfield" | "height_field" | "import" | "mesh" | "load" | "stl" => words(
             "nothing can be read from other files",
             "describe the shape by standard solids and inequalities",
@@ -198,16 +206,15 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
     let first = a.first().copied().unwrap_or("a");
     let call = |name: &str| format!("{name}({})", if a.is_empty() { "a, b".into() } else { a.join(", ") });
     match name {
-        "log" | "loge" => written("`ln` here", &format!("ln({first})")),
-        "log10" | "lg" => written("`ln` here", &format!("ln({first})/ln(10)")),
-        "log2" => written("`ln` here", &format!("ln({first})/ln(2)")),
+        "log" | "loge" => written("`ln` here, or `log10`", &format!("ln({first})")),
+        "lg" => written("`log10` here", &format!("log10({first})")),
         "exp2" => written("`^` here", &format!("2^({first})")),
-        "mod" | "fmod" | "rem" => words("there is no remainder", foreign::REMAINDER),
-        "fract" | "frac" | "floor" | "ceil" | "trunc" | "int" => {
-            words("fields have no steps", foreign::REMAINDER)
-        }
-        "if" | "select" | "ifelse" | "where" | "cond" | "step" | "smoothstep" => {
-            words("there are no conditions", foreign::CONDITION)
+        "fmod" | "rem" => written("`mod` here", &call("mod")),
+        "trunc" | "int" => written("`floor` here", &format!("floor({first})")),
+        "frac" => written("`fract` here", &format!("fract({first})")),
+        "if" | "select" | "ifelse" | "cond" => words("`where` here", foreign::CONDITION),
+        "smoothstep" => {
+            words("a formula here", "write `let s = clamp((e - a)/(b - a), 0, 1)` and `s^2*(3 - 2*s)`")
         }
         "min3" | "min2" | "min4" | "fmin" | "Min" | "minimum" => written("`min` here", &call("min")),
         "max3" | "max2" | "max4" | "fmax" | "Max" | "maximum" => written("`max` here", &call("max")),
@@ -226,26 +233,21 @@ fn number(name: &str, a: &[&str]) -> Option<Words> {
         "arccos" => written("`acos` here", &format!("acos({first})")),
         "arctan" => written("`atan` here", &format!("atan({first})")),
         "arctan2" => written("`atan2` here", &call("atan2")),
-        "sinh" => written("a formula here", &format!("(exp({first}) - exp(-({first})))/2")),
-        "cosh" => written("a formula here", &format!("(exp({first}) + exp(-({first})))/2")),
         "sec" => written("a formula here", &format!("1/cos({first})")),
         "cot" => written("a formula here", &format!("1/tan({first})")),
         "sgn" | "signum" => written("`sign` here", &format!("sign({first})")),
-        "rand" | "random" | "noise" | "rands" | "snoise" | "perlin" => {
-            words("nothing is random", "add waves: `0.05*sin(20*x)*sin(20*y)`")
-        }
+        "rand" | "rands" => written("`random(seed, i)` here", "random(1, i)"),
+        "noise" | "snoise" | "perlin" => words("there is no noise", "add waves: `0.05*sin(20*x)*sin(20*y)`"),
         "radians" | "deg2rad" | "deg" => written("a unit here", &format!("{first} deg")),
         "degrees" | "rad2deg" => written("a unit here", &format!("({first})*180/pi")),
-        "vec3" | "vec" | "vector" | "Vector" | "DVec3" | "float3" | "point" | "array" | "vec2" | "vec4" => {
-            match a {
-                [x, y, z] => written("`[a, b, c]` here", &format!("[{x}, {y}, {z}]")),
-                [one] => written("`[a, b, c]` here", &format!("[{one}, {one}, {one}]")),
-                _ => written("`[a, b, c]` here", "[1, 0, 0]"),
-            }
-        }
+        "vec3" | "vec" | "vector" | "Vector" | "DVec3" | "float3" | "point" | "vec2" | "vec4" => match a {
+            [x, y, z] => written("`[a, b, c]` here", &format!("[{x}, {y}, {z}]")),
+            [one] => written("`[a, b, c]` here", &format!("[{one}, {one}, {one}]")),
+            _ => written("`[a, b, c]` here", "[1, 0, 0]"),
+        },
         "range" | "linspace" => written("a fold here", "any i in 0..6: sphere(0.3).move([i, 0, 0])"),
-        "sum" | "total" => {
-            words("there is no sum over a range", "join shapes by `any i in 0..6: …`, or write the sum out")
+        "sum" | "product" | "total" => {
+            words("a fold here", "write `sum i in 0..6: e`, or `sum e in [1, 2, 3]: e`")
         }
         "gradient" | "grad" | "derivative" | "diff" => words(
             "∇ω is found for you",

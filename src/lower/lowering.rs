@@ -187,6 +187,12 @@ impl Lowering<'_> {
         match value {
             Value::Vector(parts) => Some(*parts),
             Value::Failed => None,
+            Value::List(members) => {
+                let span = self.user_span(span);
+                let message = format!("a vector has three components, found {}", members.len());
+                self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
+                None
+            }
             other => {
                 let span = self.user_span(span);
                 let message = format!("expected a vector `[a, b, c]`, found {}", other.describe());

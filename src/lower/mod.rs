@@ -8,11 +8,15 @@
 
 mod arguments;
 mod builtins;
+mod choice;
 mod eval;
 mod foreign;
+mod lists;
 mod lowering;
+mod maps;
 mod module;
 mod names;
+mod outline;
 mod probes;
 mod scene;
 mod slips;
@@ -385,7 +389,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// Reports a reserved name of a parameter or of a fold's variable.
-    fn may_be_local(&mut self, name: &Name) -> bool {
+    pub(super) fn may_be_local(&mut self, name: &Name) -> bool {
         let reserved = RESERVED.contains(&name.text.as_str());
         if reserved {
             let message = format!("`{}` has a fixed meaning and cannot be defined", name.text);

@@ -27,6 +27,16 @@ pub(super) struct Global<'a> {
     used: bool,
 }
 
+impl<'a> Global<'a> {
+    /// The function, if it may be called as a method of its first argument.
+    fn of_shapes(&self) -> Option<&'a Function> {
+        match self.kind {
+            Kind::Function(function) if function.takes_a_shape() => Some(function),
+            Kind::Function(_) | Kind::Value(_) | Kind::Solid(_) | Kind::Scene => None,
+        }
+    }
+}
+
 /// The items of the prelude and of the file. Those of the file shadow those of the prelude, but not inside
 /// the prelude itself.
 #[derive(Debug, Default)]
@@ -79,6 +89,29 @@ impl<'a> Names<'a> {
             return Some(global);
         }
         self.prelude.get(name)
+    }
+
+    /// A function whose first parameter is called `shape`, which may be called as a method; counts as a use.
+    pub fn function_of_shapes(&mut self, source: SourceId, name: &str) -> Option<(&'a Function, SourceId)> {
+        if source != SourceId::Prelude
+            && let Some(global) = self.file.get_mut(name)
+            && let Some(function) = global.of_shapes()
+        {
+            global.used = true;
+            return Some((function, global.source));
+        }
+        let global = self.prelude.get(name)?;
+        Some((global.of_shapes()?, global.source))
+    }
+
+    /// The names of functions that may be called as methods, in alphabetical order.
+    pub fn functions_of_shapes(&self) -> Vec<String> {
+        let all = self.file.iter().chain(&self.prelude);
+        let mut names: Vec<String> =
+            all.filter(|(_, g)| g.of_shapes().is_some()).map(|(name, _)| name.clone()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
     }
 
     /// Whether a name means a standard solid, which no item of the file shadows.

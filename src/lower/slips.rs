@@ -6,7 +6,7 @@ use super::names::Kind;
 use crate::diagnostic::{Code, Diagnostic, SourceId};
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
-use crate::syntax::ast::{Expr, ExprKind};
+use crate::syntax::ast::{Expr, ExprKind, Fold};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
@@ -104,9 +104,8 @@ impl Lowering<'_> {
                 let global = self.names.get(self.scope.source, name);
                 !is_local && global.is_some_and(|g| matches!(g.kind, Kind::Solid(_)))
             }
-            ExprKind::Method { .. } | ExprKind::Logic { .. } | ExprKind::Not(_) | ExprKind::Fold { .. } => {
-                true
-            }
+            ExprKind::Method { .. } | ExprKind::Logic { .. } | ExprKind::Not(_) => true,
+            ExprKind::Fold { op, .. } => matches!(op, Fold::Any | Fold::All),
             ExprKind::Number(_)
             | ExprKind::Quantity { .. }
             | ExprKind::Text(_)
@@ -116,6 +115,7 @@ impl Lowering<'_> {
             | ExprKind::Product { .. }
             | ExprKind::Negate(_)
             | ExprKind::Power { .. }
+            | ExprKind::Index { .. }
             | ExprKind::Component { .. } => false,
         }
     }
@@ -220,6 +220,9 @@ impl Lowering<'_> {
             ("rotate", _) => ".rotate([0, 0, 1], 45 deg)".into(),
             ("scale", _) => ".scale(2)` or `.scale([1, 1, 2])".into(),
             ("mirror", _) => ".mirror([1, 0, 0])".into(),
+            ("at", _) => ".at([2*x, y, z])".into(),
+            ("turned", _) => ".turned(0.5*z)".into(),
+            ("repeat", _) => ".repeat([2, 0, 0], [6, 1, 1])".into(),
             _ => format!(".{method}(45 deg)"),
         }
     }

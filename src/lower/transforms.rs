@@ -18,6 +18,12 @@ enum Transform {
     Rotate,
     Scale,
     Mirror,
+    /// Other coordinates in place of x, y and z.
+    At,
+    /// A turn about z by an angle that differs from point to point.
+    Turned,
+    /// Copies on a lattice.
+    Repeat,
 }
 
 /// A coordinate axis, by its number.
@@ -28,7 +34,7 @@ enum Axis3 {
     Z = 2,
 }
 
-const METHODS: [(&str, Transform); 7] = [
+const METHODS: [(&str, Transform); 10] = [
     ("move", Transform::Move),
     ("rotate_x", Transform::RotateAbout(Axis3::X)),
     ("rotate_y", Transform::RotateAbout(Axis3::Y)),
@@ -36,6 +42,9 @@ const METHODS: [(&str, Transform); 7] = [
     ("rotate", Transform::Rotate),
     ("scale", Transform::Scale),
     ("mirror", Transform::Mirror),
+    ("at", Transform::At),
+    ("turned", Transform::Turned),
+    ("repeat", Transform::Repeat),
 ];
 
 impl Transform {
@@ -44,9 +53,20 @@ impl Transform {
         match self {
             Self::Move => &["by"],
             Self::RotateAbout(_) => &["angle"],
-            Self::Rotate => &["axis", "angle"],
+            Self::Rotate => &["axis", "angle", "about"],
             Self::Scale => &["factor"],
-            Self::Mirror => &["normal"],
+            Self::Mirror => &["normal", "point"],
+            Self::At => &["place"],
+            Self::Turned => &["angle"],
+            Self::Repeat => &["step", "counts"],
+        }
+    }
+
+    /// How many of them must be given.
+    fn needed(self) -> usize {
+        match self {
+            Self::Rotate | Self::Repeat => 2,
+            Self::Move | Self::RotateAbout(_) | Self::Scale | Self::Mirror | Self::At | Self::Turned => 1,
         }
     }
 }
@@ -74,19 +94,37 @@ impl Turn {
     }
 }
 
-impl Lowering<'_> {
+/// Whether the arguments are vectors and numbers where the method takes these. A value that failed fits.
+fn kinds_fit(parameters: &[&str], values: &[(Value, Span)]) -> bool {
+    parameters.iter().zip(values).all(|(name, (value, _))| match (*name, value) {
+        (_, Value::Failed) => true,
+        ("by" | "axis" | "normal" | "about" | "point" | "place" | "step" | "counts", value) => {
+            // a list of another length has a message of its own
+            matches!(value, Value::Vector(_) | Value::List(_))
+        }
+        ("angle", value) => matches!(value, Value::Number(_)),
+        _ => true, // a factor may be both, and has a message of its own
+    })
+}
+
+impl<'a> Lowering<'a> {
     pub fn method(&mut self, receiver: &Expr, method: &Name, arguments: &[Argument], span: Span) -> Value {
         let shape = self.field(receiver);
         let known = METHODS.into_iter().find(|(name, _)| *name == method.text);
         let Some((_, transform)) = known else {
+            if let Some((function, source)) = self.function_of_shapes(&method.text) {
+                return self.call_method(function, source, receiver, arguments, span);
+            }
             if let Some(foreign) = self.foreign_method(receiver, method, arguments) {
                 return self.fail(foreign);
             }
-            let names = METHODS.map(|(name, _)| name);
+            let own = self.names.functions_of_shapes();
+            let names: Vec<&str> =
+                METHODS.iter().map(|(name, _)| *name).chain(own.iter().map(String::as_str)).collect();
             let message = format!("shapes have no method `{}`", method.text);
             let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, method.span, message)
                 .help(format!("they have {}", names.join(", ")))
-                .suggest(&method.text, names);
+                .suggest(&method.text, names.iter().copied());
             return self.fail(diagnostic);
         };
         let parameters = transform.parameters();
@@ -100,7 +138,7 @@ impl Lowering<'_> {
                 return self.fail(self.wrong_arguments(method, parameters, arguments, span));
             };
             let value = self.expr(&argument.value);
-            if parameters[slot] == "angle" {
+            if parameters[slot] == "angle" && transform != Transform::Turned {
                 if !self.no_length(&argument.value) {
                     return Value::Failed;
                 }
@@ -113,26 +151,19 @@ impl Lowering<'_> {
             }
             values[slot] = Some((value, argument.value.span));
         }
-        let Some(values) = values.into_iter().collect::<Option<Vec<_>>>() else {
-            return self.fail(self.wrong_arguments(method, parameters, arguments, span));
-        };
-        if !self.kinds_fit(transform, &values) {
-            return self.fail(self.wrong_arguments(method, parameters, arguments, span));
+        let given = values.iter().take_while(|value| value.is_some()).count();
+        let values: Vec<(Value, Span)> = values.into_iter().flatten().collect();
+        let gap = given < values.len();
+        if gap || given < transform.needed() || !kinds_fit(parameters, &values) {
+            return self.fail(self.wrong_arguments(
+                method,
+                &parameters[..transform.needed()],
+                arguments,
+                span,
+            ));
         }
         let Some(shape) = shape else { return Value::Failed };
         self.transformed(shape, transform, &values, span).map_or(Value::Failed, Value::Number)
-    }
-
-    /// Whether the arguments are vectors and numbers where the method takes these. A value that failed fits.
-    fn kinds_fit(&self, transform: Transform, values: &[(Value, Span)]) -> bool {
-        let is_number = |value: &Value| matches!(value, Value::Number(_) | Value::Failed);
-        let is_vector = |value: &Value| matches!(value, Value::Vector(_) | Value::Failed);
-        match (transform, values) {
-            (Transform::Move | Transform::Mirror, [(by, _)]) => is_vector(by),
-            (Transform::RotateAbout(_), [(angle, _)]) => is_number(angle),
-            (Transform::Rotate, [(axis, _), (angle, _)]) => is_vector(axis) && is_number(angle),
-            _ => true,
-        }
     }
 
     fn wrong_arguments(
@@ -173,6 +204,24 @@ impl Lowering<'_> {
                 q[k] = self.combination(&[(back, p[j]), (cos, p[k])], span);
                 Some(self.module.graph.substitute(shape, q))
             }
+            Transform::Rotate | Transform::Mirror if values.len() > transform.needed() => {
+                let (place, place_at) = &values[transform.needed()];
+                let place = self.as_vector(place, *place_at)?;
+                self.about(place, shape, transform, &values[..transform.needed()], span)
+            }
+            Transform::At => {
+                let place = self.as_vector(first, *at)?;
+                Some(self.module.graph.substitute(shape, place))
+            }
+            Transform::Turned => {
+                let angle = self.as_number(first, *at)?;
+                Some(self.turned(shape, angle, span))
+            }
+            Transform::Repeat => {
+                let step = self.constant_vector(first, *at, "the distance of copies")?;
+                let counts = self.constant_vector(&values[1].0, values[1].1, "a number of copies")?;
+                self.repeated(shape, (step, *at), (counts, values[1].1), span)
+            }
             Transform::Rotate => {
                 let axis = self.constant_vector(first, *at, "an axis")?;
                 let angle = self.angle(&values[1].0, values[1].1)?;
@@ -194,6 +243,23 @@ impl Lowering<'_> {
                 Some(self.module.graph.substitute(shape, q))
             }
         }
+    }
+
+    /// The same transformation with another place in the role of the origin.
+    fn about(
+        &mut self,
+        place: [Node; 3],
+        shape: Node,
+        transform: Transform,
+        values: &[(Value, Span)],
+        span: Span,
+    ) -> Option<Node> {
+        let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
+        let ahead = std::array::from_fn(|i| self.binary(Binary::Add, p[i], place[i], span));
+        let at_origin = self.module.graph.substitute(shape, ahead);
+        let transformed = self.transformed(at_origin, transform, values, span)?;
+        let back = std::array::from_fn(|i| self.binary(Binary::Sub, p[i], place[i], span));
+        Some(self.module.graph.substitute(transformed, back))
     }
 
     /// Scales about the origin. ω is scaled too (by the smallest factor), so that its gradient keeps its

@@ -33,6 +33,9 @@ pub(super) struct Language {
     /// The root and the magnitude.
     pub root: [&'static str; 2],
     pub magnitude: [&'static str; 2],
+    /// The largest whole number that is not above a number, and the nearest one, the even one of two.
+    pub floor: [&'static str; 2],
+    pub round: [&'static str; 2],
     /// The call of a function of the mathematical library.
     pub function: fn(Function, Precision, Math, &[&str]) -> String,
     /// How `pick` is defined for a type, under its full name.
@@ -141,6 +144,8 @@ pub(super) static C: Language = Language {
     },
     root: ["sqrt", "sqrtf"],
     magnitude: ["fabs", "fabsf"],
+    floor: ["floor", "floorf"],
+    round: ["rint", "rintf"],
     function: |function, precision, math, operands| {
         let library = match math {
             Math::System => "",
@@ -181,6 +186,8 @@ pub(super) static RUST: Language = Language {
     },
     root: ["f64::sqrt", "f32::sqrt"],
     magnitude: ["f64::abs", "f32::abs"],
+    floor: ["f64::floor", "f32::floor"],
+    round: ["f64::round_ties_even", "f32::round_ties_even"],
     function: |function, precision, math, operands| match math {
         Math::Rfm => {
             format!("libm::{}({})", c_name(function, precision), operands.join(", "))
@@ -215,6 +222,8 @@ pub(super) static WGSL: Language = Language {
     },
     root: ["sqrt", "sqrt"],
     magnitude: ["abs", "abs"],
+    floor: ["floor", "floor"],
+    round: ["round", "round"],
     function: |function, _, _, operands| shader_call(function, "atan2", operands),
     pick: |kind, name| {
         format!(
@@ -243,6 +252,8 @@ pub(super) static GLSL: Language = Language {
     },
     root: ["sqrt", "sqrt"],
     magnitude: ["abs", "abs"],
+    floor: ["floor", "floor"],
+    round: ["roundEven", "roundEven"],
     function: |function, _, _, operands| shader_call(function, "atan", operands),
     pick: |kind, name| {
         format!("{kind} {name}(bool condition, {kind} yes, {kind} no) {{ return condition ? yes : no; }}")
@@ -268,9 +279,12 @@ fn rust_name(function: Function) -> &'static str {
 /// Shaders have all functions under the names of C, but a power of negative numbers is undefined: a function of the
 /// file itself stands for it, see `operations`.
 fn shader_call(function: Function, atan2: &str, operands: &[&str]) -> String {
+    let operands = operands.join(", ");
     let name = match function {
         Function::Binary(BinaryFunction::Atan2) => atan2,
+        // log10 e, to the digits of an f32
+        Function::Unary(UnaryFunction::Log10) => return format!("(log({operands}) * 0.43429448)"),
         other => c_name(other, Precision::F64),
     };
-    format!("{name}({})", operands.join(", "))
+    format!("{name}({operands})")
 }

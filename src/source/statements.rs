@@ -212,6 +212,8 @@ impl State<'_> {
                 let other = self.pick(&format!("{a} < {zero}"), &minus, a);
                 self.pick(&format!("{a} > {zero}"), &one, &other)
             }
+            Unary::Floor => of(language.floor),
+            Unary::Round => of(language.round),
             Unary::Call(function) => {
                 self.made.functions.insert(Function::Unary(function));
                 (language.function)(Function::Unary(function), precision, math, &[a])
@@ -229,6 +231,10 @@ impl State<'_> {
             Binary::DivOrZero => {
                 let zero = self.constant(0.0)?;
                 self.pick(&format!("{b} == {zero}"), &zero, &format!("{a} / {b}"))
+            }
+            Binary::MulOrZero => {
+                let zero = self.constant(0.0)?;
+                self.pick(&format!("{b} == {zero}"), &zero, &format!("{a} * {b}"))
             }
             Binary::Min | Binary::Max => {
                 let sign = if op == Binary::Min { '<' } else { '>' };

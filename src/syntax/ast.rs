@@ -59,6 +59,13 @@ pub struct Function {
     pub body: Expr,
 }
 
+impl Function {
+    /// Whether it may be called as a method: its first parameter is called `shape`.
+    pub fn takes_a_shape(&self) -> bool {
+        self.parameters.first().is_some_and(|first| first.name.text == "shape")
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     pub name: Name,
@@ -141,12 +148,16 @@ pub enum ExprKind {
         method: Name,
         arguments: Vec<Argument>,
     },
-    /// `any i in start..end: body` (or) and `all …` (and).
+    /// `list[2]`
+    Index {
+        list: Box<Expr>,
+        index: Box<Expr>,
+    },
+    /// `any i in start..end: body`, `sum p in list: body` and so on.
     Fold {
-        op: Logic,
+        op: Fold,
         variable: Name,
-        start: Box<Expr>,
-        end: Box<Expr>,
+        members: Members,
         body: Box<Expr>,
     },
 }
@@ -163,6 +174,51 @@ pub enum Logic {
     Or,
     /// `a \ b`: in a and not in b.
     Minus,
+}
+
+/// What a fold makes of its members.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fold {
+    /// `any`: the members joined by *or*.
+    Any,
+    /// `all`: the members joined by *and*.
+    All,
+    Sum,
+    Product,
+    Min,
+    Max,
+}
+
+impl Fold {
+    /// Its word in files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Any => "any",
+            Self::All => "all",
+            Self::Sum => "sum",
+            Self::Product => "product",
+            Self::Min => "min",
+            Self::Max => "max",
+        }
+    }
+}
+
+/// What the variable of a fold stands for, one after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Members {
+    /// The whole numbers `start..end`, without the end.
+    Range(Box<Expr>, Box<Expr>),
+    List(Box<Expr>),
+}
+
+impl Members {
+    /// The expressions that say what the members are.
+    pub fn exprs(&self) -> Vec<&Expr> {
+        match self {
+            Self::Range(start, end) => vec![start, end],
+            Self::List(list) => vec![list],
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -256,7 +312,12 @@ impl Expr {
             ExprKind::Method { receiver, arguments, .. } => {
                 std::iter::once(&**receiver).chain(arguments.iter().map(|a| &a.value)).collect()
             }
-            ExprKind::Fold { start, end, body, .. } => vec![start, end, body],
+            ExprKind::Index { list, index } => vec![list, index],
+            ExprKind::Fold { members, body, .. } => {
+                let mut children = members.exprs();
+                children.push(body);
+                children
+            }
         }
     }
 }

@@ -8,8 +8,8 @@ use pest::iterators::{Pair, Pairs};
 use std::cell::Cell;
 
 use super::ast::{
-    AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Function, Item, Logic,
-    MulOp, Name, Param, Parameter, SceneItem,
+    AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Fold, Function, Item,
+    Logic, Members, MulOp, Name, Param, Parameter, SceneItem,
 };
 use super::grammar::{DEEPEST_TREE, EDITION, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
@@ -375,6 +375,9 @@ impl Builder {
                     _ => 2,
                 };
                 ExprKind::Component { vector: Box::new(result), axis }
+            } else if pair.as_rule() == Rule::index {
+                let index = Box::new(self.expr_or_zero(parts(pair).next()));
+                ExprKind::Index { list: Box::new(result), index }
             } else {
                 let mut inner = parts(pair);
                 let method = self.name(inner.next());
@@ -430,15 +433,23 @@ impl Builder {
     fn fold(&self, pair: Node<'_>) -> Expr {
         let span = self.span(&pair);
         let mut inner = parts(pair).filter(|p| p.as_rule() != Rule::kw_in);
-        let op = match inner.next().map(|p| p.as_rule()) {
-            Some(Rule::kw_all) => Logic::And,
-            _ => Logic::Or,
+        let op = match inner.next().as_ref().map(|word| word.as_str()) {
+            Some("all") => Fold::All,
+            Some("sum") => Fold::Sum,
+            Some("product") => Fold::Product,
+            Some("min") => Fold::Min,
+            Some("max") => Fold::Max,
+            _ => Fold::Any,
         };
         let variable = self.name(inner.next());
-        let mut bound = || inner.next().map_or_else(|| self.expr_or_zero(None), |p| self.sum(p));
-        let (start, end) = (Box::new(bound()), Box::new(bound()));
-        let body = Box::new(self.expr_or_zero(inner.next()));
-        Expr { kind: ExprKind::Fold { op, variable, start, end, body }, span }
+        let (bounds, body): (Vec<_>, Vec<_>) = inner.partition(|p| p.as_rule() == Rule::sum);
+        let mut bounds = bounds.into_iter().map(|p| Box::new(self.sum(p)));
+        let members = match (bounds.next(), bounds.next()) {
+            (Some(start), Some(end)) => Members::Range(start, end),
+            (list, _) => Members::List(list.unwrap_or_else(|| Box::new(self.expr_or_zero(None)))),
+        };
+        let body = Box::new(self.expr_or_zero(body.into_iter().next()));
+        Expr { kind: ExprKind::Fold { op, variable, members, body }, span }
     }
 }
 

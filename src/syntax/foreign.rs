@@ -1,10 +1,10 @@
 //! Words of OpenSCAD, POV-Ray, GLSL and Python, and what they are called here.
 
 /// What is written in place of a condition.
-pub const CONDITION: &str = "there are no conditions: `a and b`, `a or b`, `min(a, b)`, `max(a, b)`, `clamp(e, a, b)` and `sign(e)` choose";
+pub const CONDITION: &str = "write `where(x <= 1, a, b)`: a where the condition holds, b elsewhere; shapes are joined by `and` and `or`";
 
 /// What is written in place of a remainder.
-pub const REMAINDER: &str = "there is no remainder: repeat a shape by `any i in 0..6: shape.move([i, 0, 0])`";
+pub const REMAINDER: &str = "write `mod(a, b)`; shapes repeat by `shape.repeat([1, 0, 0], [6, 1, 1])`";
 
 /// What is written in place of an operator that is a word; `None` if the word is no operator elsewhere.
 pub(super) fn operator(word: &str) -> Option<&'static str> {
@@ -73,7 +73,7 @@ pub(super) fn item(word: &str) -> Option<&'static str> {
 pub fn method(name: &str) -> Option<&'static str> {
     Some(match name {
         "translate" | "translated" | "trans" | "shift" | "shifted" | "displace" | "moved" | "offset_by"
-        | "at" | "move" | "moveTo" | "transformed" => "move",
+        | "move" | "moveTo" | "transformed" => "move",
         "rotated" | "rotate" | "rot" | "turn" => "rotate",
         "rotateX" | "rotx" | "rotX" | "rot_x" | "rotate_X" | "rotateAboutX" => "rotate_x",
         "rotateY" | "roty" | "rotY" | "rot_y" | "rotate_Y" => "rotate_y",

@@ -247,7 +247,7 @@ impl Scan {
                         attributed = false;
                         scan.items.push(at);
                         nesting = Nesting::default(); // an unclosed bracket above is that item's error
-                    } else if word == "any" || word == "all" {
+                    } else if begins_a_fold(word, &text[at..]) {
                         nesting.fold();
                     }
                 }
@@ -259,6 +259,18 @@ impl Scan {
             line_blank &= c.is_whitespace();
         }
         scan
+    }
+}
+
+/// Whether a word begins a fold at this place. Those that are functions as well do so in front of a name.
+fn begins_a_fold(word: &str, from: &str) -> bool {
+    match word {
+        "any" | "all" => true,
+        "sum" | "product" | "min" | "max" => {
+            let rest = from[word.len()..].trim_start();
+            rest.starts_with(|c: char| c.is_alphabetic() || c == '_')
+        }
+        _ => false,
     }
 }
 
@@ -327,7 +339,7 @@ mod tests {
     #[test]
     fn ranges_methods_and_numbers_share_the_dot() {
         let text = tree("let a = any i in 0..6: ball(i).move([1., 0, .5])\nlet b = 2.move(1)");
-        assert!(text.contains("fold Or i\n    0\n    6\n"), "{text}");
+        assert!(text.contains("fold any i\n    0\n    6\n"), "{text}");
         assert!(text.contains("method move\n    2\n"), "{text}");
     }
 

@@ -137,9 +137,13 @@ impl Printer {
             ExprKind::Component { vector, axis } => {
                 self.nested(format_args!("component {axis}"), |p| p.expr(vector));
             }
-            ExprKind::Fold { op, variable, start, end, body } => {
-                self.nested(format_args!("fold {op:?} {}", variable.text), |p| {
-                    p.exprs([&**start, &**end, &**body])
+            ExprKind::Index { list, index } => {
+                self.nested(format_args!("index"), |p| p.exprs([&**list, &**index]));
+            }
+            ExprKind::Fold { op, variable, members, body } => {
+                self.nested(format_args!("fold {} {}", op.word(), variable.text), |p| {
+                    p.exprs(members.exprs());
+                    p.expr(body);
                 });
             }
         }

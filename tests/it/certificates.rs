@@ -40,6 +40,24 @@ fn build(steps: &[Step]) -> (Graph, Node) {
             }
             21 => graph.unary(UnaryFunction::Sin.into(), a),
             22 => graph.unary(UnaryFunction::Atan.into(), a),
+            24 => graph.unary(Unary::Floor, a),
+            25 => graph.unary(Unary::Round, a),
+            26 => graph.binary(Binary::MulOrZero, a, b),
+            27 => graph.unary(UnaryFunction::Tanh.into(), a),
+            28 => {
+                let square = graph.binary(Binary::Mul, a, a);
+                let one = graph.constant(1.0);
+                let sum = graph.binary(Binary::Add, square, one);
+                graph.unary(UnaryFunction::Log10.into(), sum)
+            }
+            29 => graph.unary(UnaryFunction::Sinh.into(), a),
+            30 => graph.unary(UnaryFunction::Cosh.into(), a),
+            31 => {
+                let square = graph.binary(Binary::Mul, a, a);
+                let one = graph.constant(1.0);
+                let sum = graph.binary(Binary::Add, square, one);
+                graph.unary(UnaryFunction::Log2.into(), sum)
+            }
             23 => {
                 let size = graph.unary(Unary::Abs, a);
                 let one = graph.constant(1.0);
@@ -91,7 +109,7 @@ fn homogeneous(steps: &[Step]) -> Vec<Step> {
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let constant = prop_oneof![-3.0..3.0f64, Just(0.0), Just(1.5), Just(-1e-3), Just(40.0)];
-    prop::collection::vec((0u8..25, 0usize..6, 0usize..9, constant), 1..24)
+    prop::collection::vec((0u8..33, 0usize..6, 0usize..9, constant), 1..24)
 }
 
 proptest! {

@@ -5,6 +5,7 @@ use crate::tool::{rfm, rfm_reading, root};
 const DOCUMENTS: [&str; 10] = [
     "README.md",
     "CHANGELOG.md",
+    "grammar/README.md",
     "examples/README.md",
     "examples/validation/README.md",
     "tests/bench/README.md",

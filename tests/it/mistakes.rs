@@ -38,11 +38,8 @@ const WORDS: &[&str] = &[
     "solid s = hull(sphere(1), box())",
     "solid s = smooth_union(sphere(1), box())",
     "solid s = log(x) <= 1",
-    "solid s = log10(1 + x^2) <= 1",
-    "solid s = mod(x, 1) <= 0.5",
     "solid s = x % 2 <= 1",
     "solid s = 5 mod 2 <= x",
-    "solid s = floor(x) <= 1",
     "solid s = min3(x, y, z) <= 1",
     "solid s = fmax(x, y) <= 1",
     "solid s = norm([x, y, z]) <= 1",
@@ -76,6 +73,43 @@ const WORDS: &[&str] = &[
     "import \"parts.rfm\"",
     "include <parts.scad>",
     "return sphere(1)",
+];
+
+/// Choices, lists, maps of space, profiles and joints.
+const SHAPES: &[&str] = &[
+    "solid s = where(x <= 0, 1)",
+    "solid s = sphere(1).move(where(x <= 0, [1, 2, 3], 1))",
+    "solid s = random(x, 1)",
+    "let l = [1, 2, 3, 4]\nsolid s = sphere(l[4])",
+    "let l = [1, 2, 3, 4]\nsolid s = sphere(l)",
+    "solid s = sphere([1, 2][x])",
+    "let r = 2\nsolid s = sphere(r[0])",
+    "solid s = sphere(count(3))",
+    "solid s = any i in 6: sphere(i)",
+    "solid s = any p in sphere(1): ball([p, 0, 0], 1)",
+    "solid s = max i in 0..0: x",
+    "solid s = min p in [[0, 1], [2, 3]]: p",
+    "let l = [[0, 0] [1, 1]]\nsolid s = polygon(l)",
+    "solid s = polygon([[0, 0], [1, 1], [1, 0], [0, 1]])",
+    "solid s = polygon([[0, 0], [2, 0], [2, 2], [1, 0], [0, 2]])",
+    "solid s = polygon([[0, 0], [1, 0]])",
+    "solid s = polygon([[0, 0, 1], [1, 0, 0], [0, 1, 0]])",
+    "solid s = polygon(3)",
+    "solid s = polygon([[0, 0], [1, 0], [1, 0], [0, 1]])",
+    "solid s = polygon([[0, 0], [1, 0], [0.5, 0], [0, 1]])",
+    "solid s = polygon([[0, 0], [x, 0], [0, 1]])",
+    "solid s = box().repeat([1, 1, 1], [0, 1, 1])",
+    "solid s = box().repeat([0, 1, 1], [2, 1, 1])",
+    "solid s = box().repeat(2)",
+    "solid s = box().at([x, y])",
+    "solid s = box().at(2*x)",
+    "solid s = box().turned([0, 0, 1])",
+    "solid s = box().twist()",
+    "solid s = box().twirl(2)",
+    "solid s = sphere(1).bend(0)",
+    "solid s = blend(sphere(1), box(), 0)",
+    "solid s = sphere(1).blend(box())",
+    "solid s = box().rotate([0, 0, 1], 45 deg, 2)",
 ];
 
 /// Signs that mean something elsewhere.
@@ -331,6 +365,11 @@ fn signs_of_other_languages() {
 #[test]
 fn arguments_angles_and_what_is_rarely_meant() {
     read("values", alone(VALUES));
+}
+
+#[test]
+fn choices_lists_maps_and_profiles() {
+    read("shapes", alone(SHAPES));
 }
 
 #[test]

@@ -45,12 +45,17 @@ pub fn expression() -> impl Strategy<Value = String> {
     ];
     leaf.prop_recursive(4, 24, 2, |inner| {
         let two = prop::sample::select(vec!["+", "-", "*", "/", "and", "or", "\\", "<=", ">="]);
-        let one = prop::sample::select(vec!["sqrt", "abs", "sin", "cos", "atan", "exp", "not ", "-"]);
+        let one = prop::sample::select(vec!["sqrt", "abs", "sin", "cos", "atan", "exp", "not ", "-", "floor", "round", "ceil", "fract",
+            "sinh", "cosh", "tanh", "log2", "log10"]);
         prop_oneof![
             4 => (inner.clone(), two, inner.clone()).prop_map(|(a, op, b)| format!("({a} {op} {b})")),
             2 => (one, inner.clone()).prop_map(|(f, a)| format!("({f}({a}))")),
             1 => (inner.clone(), inner.clone()).prop_map(|(a, b)| format!("min({a}, max({b}, z))")),
             1 => inner.clone().prop_map(|a| format!("({a}).move([0.5, 0, -1]).rotate_z(30 deg)")),
+            1 => inner.clone().prop_map(|a| format!("({a}).twist(0.2).repeat([1, 1, 1], [2, 1, 1])")),
+            1 => (inner.clone(), inner.clone(), inner.clone()).prop_map(|(c, a, b)| format!("where({c}, {a}, {b})")),
+            1 => (inner.clone(), inner.clone()).prop_map(|(a, b)| format!("mod({a}, {b})")),
+            1 => (inner.clone(), inner.clone()).prop_map(|(a, b)| format!("smooth_or({a}, blend({b}, x, 1), 0.5)")),
             1 => inner.prop_map(|a| format!("(0 <= {a} <= 1)")),
         ]
     })

@@ -94,7 +94,7 @@ fn exponent(graph: &Graph, expr: Expr, range: Interval, known: &[f64]) -> f64 {
     }
     let of = |node: Node| known[node.index()];
     match expr {
-        Expr::Unary(Unary::Neg | Unary::Abs, a) => of(a),
+        Expr::Unary(Unary::Neg | Unary::Abs | Unary::Floor | Unary::Round, a) => of(a),
         Expr::Unary(Unary::Sqrt, a) => 0.5 * of(a),
         Expr::Binary(op, a, b) => {
             let (ea, eb) = (of(a), of(b));
@@ -102,7 +102,7 @@ fn exponent(graph: &Graph, expr: Expr, range: Interval, known: &[f64]) -> f64 {
             let q = if large.is_finite() { (small - large).exp2() } else { 1.0 };
             match op {
                 Binary::Add | Binary::Sub => large + (1.0 + q).log2(),
-                Binary::Mul => ea + eb,
+                Binary::Mul | Binary::MulOrZero => ea + eb,
                 Binary::Div => graph.as_constant(b).map_or(f64::INFINITY, |c| ea - c.abs().log2()),
                 Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax => large,
                 // |M|·(1 + q + √(1 + q²))

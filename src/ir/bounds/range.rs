@@ -150,6 +150,10 @@ impl RangeEvaluator {
                     let number = |affine: Affine| affine.number(|node| values[node.index()]);
                     slab(values[of.index()], (first.slope, number(first)), (second.slope, number(second)))
                 }
+                // whatever the other operand is
+                RangeRule::Plain(Expr::Binary(Binary::MulOrZero, _, b)) if is_zero(values[b.index()]) => {
+                    Interval::point(0.0)
+                }
                 RangeRule::Plain(Expr::Unary(_, a)) if unknown(a) => Interval::ALL,
                 RangeRule::Plain(Expr::Binary(_, a, b)) if unknown(a) || unknown(b) => Interval::ALL,
                 RangeRule::Plain(expr) => plain(expr, values, region),
@@ -235,7 +239,7 @@ pub(in crate::ir) fn unary(op: Unary, a: Interval) -> Interval {
         Unary::Neg => -a,
         Unary::Abs => a.abs(),
         Unary::Sqrt => a.sqrt(),
-        Unary::Sign => Interval { lo: Unary::Sign.eval(a.lo), hi: Unary::Sign.eval(a.hi) },
+        Unary::Sign | Unary::Floor | Unary::Round => Interval { lo: op.eval(a.lo), hi: op.eval(a.hi) },
         Unary::Call(function) => function.range(a),
     }
 }
@@ -257,6 +261,9 @@ pub(in crate::ir) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
                 a / b
             }
         }
+        Binary::MulOrZero if is_zero(b) => Interval::point(0.0),
+        Binary::MulOrZero if b.contains(0.0) => binary(Binary::Mul, a, b).hull(Interval::point(0.0)),
+        Binary::MulOrZero => binary(Binary::Mul, a, b),
         Binary::Min | Binary::PlainMin => a.min(b),
         Binary::Max | Binary::PlainMax => a.max(b),
         Binary::And => conjunction(a, b),
@@ -267,6 +274,10 @@ pub(in crate::ir) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
         Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() },
         Binary::Call(function) => function.range(a, b),
     }
+}
+
+pub(in crate::ir) fn is_zero(a: Interval) -> bool {
+    a.lo == 0.0 && a.hi == 0.0
 }
 
 fn is_infinite(a: Interval) -> bool {

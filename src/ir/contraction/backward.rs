@@ -23,6 +23,10 @@ pub fn unary(op: Unary, value: Interval, a: Interval) -> Option<Interval> {
         Unary::Sign if value.lo > 0.0 => meet(a, POSITIVE),
         Unary::Sign if value.hi < 0.0 => meet(a, -POSITIVE),
         Unary::Sign => Some(a),
+        Unary::Floor => meet(a, Interval { lo: value.lo.ceil(), hi: (value.hi.floor() + 1.0).next_up() }),
+        Unary::Round => {
+            meet(a, Interval { lo: value.lo.ceil() - 0.5, hi: value.hi.floor() + 0.5 }.widened(1))
+        }
         Unary::Call(function) => call(function, value.widened(4), a),
     }
 }
@@ -56,11 +60,28 @@ fn call(function: UnaryFunction, value: Interval, a: Interval) -> Option<Interva
             let slack = 1e-14 * hi.abs().max(1.0);
             meet(a, Interval { lo: lo - 1e-14 * lo.abs().min(1e300), hi: hi + slack })
         }
-        UnaryFunction::Ln => {
-            let value = value.increasing(libm::exp);
-            meet(a, Interval { lo: value.lo.max(0.0) * (1.0 - 1e-12), hi: value.hi * (1.0 + 1e-12) })
+        UnaryFunction::Ln => logarithm(value.increasing(libm::exp), a),
+        UnaryFunction::Log2 => logarithm(value.increasing(libm::exp2), a),
+        UnaryFunction::Log10 => logarithm(value.increasing(libm::exp10), a),
+        UnaryFunction::Sinh => meet(a, value.increasing(libm::asinh).widened(64)),
+        UnaryFunction::Cosh => {
+            let value = meet(value, Interval { lo: 1.0, hi: f64::INFINITY })?;
+            // steep where the cosine is 1
+            let slack = |x: f64| 1e-7 + 1e-12 * x.min(1e300);
+            let (lo, hi) = (libm::acosh(value.lo), libm::acosh(value.hi));
+            either_sign(a, Interval { lo: (lo - slack(lo)).max(0.0), hi: hi + slack(hi) })
+        }
+        UnaryFunction::Tanh => {
+            let lo = if value.lo > -1.0 { libm::atanh(value.lo) } else { f64::NEG_INFINITY };
+            let hi = if value.hi < 1.0 { libm::atanh(value.hi) } else { f64::INFINITY };
+            meet(a, Interval::new(lo, hi).widened(64))
         }
     }
+}
+
+/// Positive numbers whose logarithm may be a value.
+fn logarithm(value: Interval, a: Interval) -> Option<Interval> {
+    meet(a, Interval { lo: value.lo.max(0.0) * (1.0 - 1e-12), hi: value.hi * (1.0 + 1e-12) })
 }
 
 /// The angles within an interval whose sine may be a value: one piece between a trough and a crest after the
@@ -97,7 +118,8 @@ pub fn binary(op: Binary, value: Interval, a: Interval, b: Interval) -> Option<[
             let a = meet(a, sum(rounded, b))?;
             Some([a, meet(b, sum(a, -rounded))?])
         }
-        Binary::Mul => {
+        Binary::MulOrZero if value.contains(0.0) && b.contains(0.0) => Some([a, b]),
+        Binary::Mul | Binary::MulOrZero => {
             let a = factor(rounded, b, a)?;
             Some([a, factor(rounded, a, b)?])
         }

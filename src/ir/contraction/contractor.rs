@@ -8,8 +8,9 @@ use super::rule::{Degree, Rule};
 use super::sets::meet;
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::bounds::range::{Affine, Region};
+use crate::ir::bounds::range::{Affine, Region, is_zero};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::op::Binary;
 
 /// A graph prepared for contraction.
 #[derive(Debug, Clone)]
@@ -128,6 +129,10 @@ impl Contractor {
             let is_open = rule.operands().zip(self.needs[i]).any(|(node, needed)| !needed && unknown(node));
             let found = numbers(rule, |node| values[node.index()], region);
             let fails = found.may_fail || rule.operands().any(unknown);
+            // a choice that is made leaves out what may be undefined
+            let is_left_out = matches!(*rule, Rule::Plain(Expr::Binary(Binary::MulOrZero, _, b))
+                if is_zero(values[b.index()]) && !unknown(b));
+            let (is_open, fails) = (is_open && !is_left_out, fails && !is_left_out);
             let value = match (found.range, is_open) {
                 (Some(range), false) => range,
                 (None, false) if self.needed[i] => return None,

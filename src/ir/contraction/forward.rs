@@ -69,21 +69,24 @@ fn coordinate(axis: Axis, region: &Region<'_>) -> Interval {
 
 fn unary(op: Unary, a: Interval) -> Numbers {
     match op {
-        Unary::Neg | Unary::Abs | Unary::Sign => range::unary(op, a).into(),
+        Unary::Neg | Unary::Abs | Unary::Sign | Unary::Floor | Unary::Round => range::unary(op, a).into(),
         Unary::Sqrt => partial(a, POSITIVE, Interval::sqrt),
         Unary::Call(function) => match function {
             UnaryFunction::Sin => a.sin().into(),
             UnaryFunction::Cos => a.cos().into(),
-            UnaryFunction::Tan | UnaryFunction::Atan => function.range(a).into(),
+            UnaryFunction::Tan
+            | UnaryFunction::Atan
+            | UnaryFunction::Sinh
+            | UnaryFunction::Cosh
+            | UnaryFunction::Tanh => function.range(a).into(),
             UnaryFunction::Exp => {
                 let range = function.range(a);
                 Interval { lo: range.lo.max(0.0), ..range }.into()
             }
-            UnaryFunction::Ln => partial(a, POSITIVE, |a| {
-                // the logarithm of 0 is −∞
-                let range = a.increasing(libm::log);
-                if range == Interval::ALL { Interval { hi: f64::INFINITY, ..range } } else { range }
-            }),
+            // the logarithm of 0 is −∞
+            UnaryFunction::Ln | UnaryFunction::Log2 | UnaryFunction::Log10 => {
+                partial(a, POSITIVE, |a| a.increasing(|x| function.in_f64(x)))
+            }
             UnaryFunction::Asin | UnaryFunction::Acos => partial(a, UP_TO_ONE, |a| function.range(a)),
         },
     }
@@ -97,6 +100,7 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Numbers {
         Binary::Div if b.contains(0.0) => Numbers { range: Some(Interval::ALL), may_fail: true },
         Binary::Div
         | Binary::DivOrZero
+        | Binary::MulOrZero
         | Binary::Min
         | Binary::Max
         | Binary::PlainMin
@@ -107,7 +111,7 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Numbers {
         Binary::Or => (-conjunction(-a, -b)).into(),
         Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() }.into(),
         Binary::Call(BinaryFunction::Pow) => general_power(a, b),
-        Binary::Call(BinaryFunction::Atan2) => angle(a, b).into(),
+        Binary::Call(function @ BinaryFunction::Atan2) => function.range(a, b).into(),
     }
 }
 
@@ -200,17 +204,4 @@ fn general_power(a: Interval, b: Interval) -> Numbers {
         let range = Interval::new(lo, hi).widened(4);
         Interval { lo: range.lo.max(0.0), ..range }
     })
-}
-
-/// The angles of the points (b, a). Unless they surround the origin or meet the cut behind it, the corners have
-/// the extreme ones.
-fn angle(a: Interval, b: Interval) -> Interval {
-    if a.contains(0.0) && b.lo <= 0.0 {
-        return BinaryFunction::Atan2.range(a, b);
-    }
-    let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
-    let corners = corners.map(|(a, b)| libm::atan2(a, b));
-    let lo = corners.into_iter().fold(f64::INFINITY, f64::min);
-    let hi = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    Interval::new(lo, hi).widened(4)
 }

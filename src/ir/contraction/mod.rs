@@ -24,10 +24,12 @@ mod forms;
 mod forward;
 mod hull;
 mod linear;
+mod reach;
 mod rule;
 mod sets;
 mod slopes;
 
 pub use contractor::{Contractor, Wanted};
 pub use linear::{LinearForm, contract_linear, contract_linear_around};
+pub use reach::reach;
 pub use sets::Contracted;

@@ -65,7 +65,7 @@ impl Rule {
         let (needs_first, needs_second) = match self {
             Self::Plain(Expr::Binary(op, a, b)) => match op {
                 Binary::Call(BinaryFunction::Pow) => (never(b, 0.0), never(a, 1.0)),
-                Binary::DivOrZero => (false, true),
+                Binary::DivOrZero | Binary::MulOrZero => (false, true),
                 Binary::MinWeight
                 | Binary::MaxWeight
                 | Binary::AndWeight

@@ -14,7 +14,7 @@ use super::rule::Rule;
 use super::sets::{Contracted, meet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::bounds::range::Region;
+use crate::ir::bounds::range::{Region, is_zero};
 use crate::ir::function::BinaryFunction;
 use crate::ir::graph::{Axis, Expr, Node};
 use crate::ir::op::{Binary, Unary};
@@ -150,8 +150,9 @@ fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval) -
                     hi: if a.hi <= 0.0 { -1.0 } else { 1.0 },
                 },
                 Unary::Sqrt => ONE / (TWO * value),
-                // it jumps
-                Unary::Sign => return constant_or_unknown(da),
+                // between their jumps they are constant
+                Unary::Sign | Unary::Floor | Unary::Round if value.lo == value.hi => return [ZERO; 3],
+                Unary::Sign | Unary::Floor | Unary::Round => return constant_or_unknown(da),
                 // a tangent jumps at its poles
                 Unary::Call(_) if !(value.lo.is_finite() && value.hi.is_finite()) => {
                     return constant_or_unknown(da);
@@ -174,7 +175,9 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
     match op {
         Binary::Add => std::array::from_fn(|i| da[i] + db[i]),
         Binary::Sub => std::array::from_fn(|i| da[i] - db[i]),
+        Binary::MulOrZero if is_zero(b) => [ZERO; 3],
         Binary::Mul => mixed(b, a),
+        Binary::MulOrZero if !b.contains(0.0) => mixed(b, a),
         Binary::Div if !b.contains(0.0) => mixed(ONE / b, -(value / b)),
         Binary::Min | Binary::PlainMin if a.hi < b.lo => da,
         Binary::Min | Binary::PlainMin if b.hi < a.lo => db,
@@ -199,6 +202,7 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
         }
         Binary::Div
         | Binary::DivOrZero
+        | Binary::MulOrZero
         | Binary::MinWeight
         | Binary::MaxWeight
         | Binary::AndWeight

@@ -19,15 +19,37 @@ pub fn gradient(graph: &mut Graph, root: Node) -> [Node; 3] {
 
 /// The gradient, and ∂root/∂t at a fixed place.
 pub fn gradient_and_rate(graph: &mut Graph, root: Node) -> [Node; 4] {
+    partials_within(graph, root, 0)
+}
+
+/// How deeply choices may be nested for what they leave out to be left out of the gradient as well.
+const DEEPEST_CHOICE: usize = 12;
+
+/// The partial derivatives of a root inside so many choices.
+fn partials_within(graph: &mut Graph, root: Node, choices: usize) -> [Node; 4] {
     let cone = graph.cone(root);
     let depends = depends_on_coordinates(graph, &cone);
     let mut adjoints: FxHashMap<Node, Node> = FxHashMap::default();
     adjoints.insert(root, graph.constant(1.0));
-    let mut partials = [None; 4];
+    let (mut partials, mut chosen) = ([None; 4], [None; 4]);
     for &node in cone.iter().rev() {
         let Some(&adjoint) = adjoints.get(&node) else { continue };
         if let Expr::Coordinate(axis) = graph.expr(node) {
             partials[axis as usize] = Some(adjoint);
+            continue;
+        }
+        if let Expr::Binary(Binary::MulOrZero, a, b) = graph.expr(node)
+            && !depends.contains(&b)
+            && choices < DEEPEST_CHOICE
+        {
+            // what is left out may have no derivative: a factor 0 further down would not make it one
+            for (sum, inner) in chosen.iter_mut().zip(partials_within(graph, a, choices + 1)) {
+                if graph.as_constant(inner) != Some(0.0) {
+                    let counted = graph.binary(Binary::MulOrZero, inner, b);
+                    let part = graph.binary(Binary::Mul, adjoint, counted);
+                    *sum = Some(sum.map_or(part, |so_far| graph.binary(Binary::Add, so_far, part)));
+                }
+            }
             continue;
         }
         for (operand, contribution) in contributions(graph, node, adjoint, &depends) {
@@ -38,15 +60,20 @@ pub fn gradient_and_rate(graph: &mut Graph, root: Node) -> [Node; 4] {
             adjoints.insert(operand, sum);
         }
     }
-    partials.map(|partial| partial.unwrap_or_else(|| graph.constant(0.0)))
+    std::array::from_fn(|i| match (partials[i], chosen[i]) {
+        (Some(a), Some(b)) => graph.binary(Binary::Add, a, b),
+        (one, other) => one.or(other).unwrap_or_else(|| graph.constant(0.0)),
+    })
 }
 
-/// Constants need no adjoint: leaving them out keeps dead multiplications out of the graph.
+/// Constants need no adjoint, and neither do steps: leaving them out keeps dead multiplications out of the graph.
 fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> FxHashSet<Node> {
     let mut depends = FxHashSet::default();
     for &node in cone {
         let expr = graph.expr(node);
-        if matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends.contains(&o)) {
+        let is_step = matches!(expr, Expr::Unary(op, _) if op.is_step());
+        let is_varied = matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends.contains(&o));
+        if is_varied && !is_step {
             depends.insert(node);
         }
     }
@@ -98,7 +125,7 @@ fn unary(graph: &mut Graph, op: Unary, node: Node, a: Node, adjoint: Node) -> No
             let twice = graph.binary(Add, node, node);
             graph.binary(DivOrZero, adjoint, twice)
         }
-        Unary::Sign => graph.constant(0.0),
+        Unary::Sign | Unary::Floor | Unary::Round => graph.constant(0.0),
         Unary::Call(function) => function.derivative(graph, Chain { adjoint, operand: a, value: node }),
     }
 }
@@ -119,8 +146,8 @@ fn binary(
     adjoint: Node,
 ) -> Option<Node> {
     use Binary::{
-        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight,
-        PlainMax, PlainMin, Sub,
+        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, MulOrZero, Or,
+        OrWeight, PlainMax, PlainMin, Sub,
     };
     let first = side == Side::First;
     // (this operand, the other one)
@@ -139,6 +166,13 @@ fn binary(
             let product = graph.binary(Mul, adjoint, node);
             let quotient = graph.binary(op, product, b);
             graph.unary(Unary::Neg, quotient)
+        }
+        MulOrZero if first => graph.binary(MulOrZero, adjoint, b),
+        MulOrZero => {
+            let sign = graph.unary(Unary::Sign, b);
+            let counts = graph.unary(Unary::Abs, sign);
+            let counted = graph.binary(MulOrZero, a, counts);
+            graph.binary(Mul, adjoint, counted)
         }
         Min | PlainMin => weighted(graph, MinWeight),
         Max | PlainMax => weighted(graph, MaxWeight),

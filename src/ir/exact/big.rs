@@ -15,6 +15,10 @@ pub(in crate::ir) fn big(x: f64) -> Option<Big> {
     Some(Big::try_from(x).ok()?.with_precision(PRECISION).value())
 }
 
+pub(in crate::ir) fn number(whole: u32) -> Big {
+    Big::from(whole).with_precision(PRECISION).value()
+}
+
 pub(in crate::ir) fn one() -> Big {
     Big::ONE.with_precision(PRECISION).value()
 }

@@ -4,7 +4,7 @@
 //! nothing, and it shares no formula with the programs that it judges. A point where an operation has no
 //! value, or where a derivative has no limit, has no truth.
 
-use super::big::{Big, PRECISION, big, one};
+use super::big::{Big, PRECISION, big, number, one};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::op::{Binary, Unary};
 
@@ -92,9 +92,20 @@ fn unary(op: Unary, a: &Big) -> Option<Big> {
                 -one()
             }
         }
+        Unary::Floor => a.floor(),
+        Unary::Round => nearest_whole(a),
         Unary::Sqrt => return None,
         Unary::Call(function) => function.exact(a)?,
     })
+}
+
+/// Halfway between two whole numbers it is the even one.
+fn nearest_whole(a: &Big) -> Big {
+    let half = one() / number(2);
+    let up = (a + &half).floor();
+    let is_halfway = &up - a == half;
+    let is_odd = (&up / number(2)).floor() * number(2) != up;
+    if is_halfway && is_odd { up - one() } else { up }
 }
 
 fn binary(op: Binary, a: &Big, b: &Big) -> Option<Big> {
@@ -115,6 +126,7 @@ fn binary(op: Binary, a: &Big, b: &Big) -> Option<Big> {
         Binary::Mul => a * b,
         Binary::Div | Binary::DivOrZero if *b != Big::ZERO => a / b,
         Binary::DivOrZero => Big::ZERO,
+        Binary::MulOrZero => a * b,
         Binary::Div => return None,
         Binary::Min | Binary::PlainMin => (if a < b { a } else { b }).clone(),
         Binary::Max | Binary::PlainMax => (if a > b { a } else { b }).clone(),

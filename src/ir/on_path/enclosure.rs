@@ -158,7 +158,7 @@ fn unary(op: Unary, a: Jet) -> Jet {
             let slope = half(one / root);
             Some([slope, -half(half(slope / a))])
         }),
-        Unary::Sign => {
+        Unary::Sign | Unary::Floor | Unary::Round => {
             let (at, over) = (value(a.at[0]), value(a.over[0]));
             if over.lo == over.hi { Jet::constant(over.lo) } else { Jet::rough(at, over) }
         }
@@ -168,8 +168,8 @@ fn unary(op: Unary, a: Jet) -> Jet {
 
 fn binary(op: Binary, a: Jet, b: Jet) -> Jet {
     use Binary::{
-        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, Or, OrWeight,
-        PlainMax, PlainMin, Sub,
+        Add, And, AndWeight, Call, Div, DivOrZero, Max, MaxWeight, Min, MinWeight, Mul, MulOrZero, Or,
+        OrWeight, PlainMax, PlainMin, Sub,
     };
     let (at, over) = (range::binary(op, a.at[0], b.at[0]), range::binary(op, a.over[0], b.over[0]));
     match op {
@@ -186,6 +186,8 @@ fn binary(op: Binary, a: Jet, b: Jet) -> Jet {
                 over: [over, a0 * b1 + a1 * b0, a0 * b2 + a1 * b1 + a2 * b0],
             }
         }
+        MulOrZero if over.lo == 0.0 && over.hi == 0.0 => Jet::constant(0.0),
+        MulOrZero if !b.over[0].contains(0.0) => binary(Mul, a, b),
         Div | DivOrZero => {
             // q·b = a, coefficient by coefficient
             let ([_, a1, a2], [b0, b1, b2]) = (a.over, b.over);
@@ -216,7 +218,7 @@ fn binary(op: Binary, a: Jet, b: Jet) -> Jet {
             }
         }
         // these jump, or nothing is known of their derivatives
-        MinWeight | MaxWeight | AndWeight | OrWeight | Call(_) => Jet::rough(at, over),
+        MulOrZero | MinWeight | MaxWeight | AndWeight | OrWeight | Call(_) => Jet::rough(at, over),
     }
 }
 

@@ -259,7 +259,7 @@ impl<'a> Lowering<'a> {
             ExprKind::Negate(inner) => self.quantity_expr(inner, expected, key).map(|v| -v),
             _ => {
                 let value = self.expr(expr);
-                if let Value::Text(_) | Value::Vector(_) = value {
+                if let Value::Text(_) | Value::Vector(_) | Value::List(_) = value {
                     self.as_number(&value, expr.span);
                     return None;
                 }

@@ -98,6 +98,66 @@ pub extern "C" fn rfm_math_logf(a: f32) -> f32 {
     UnaryFunction::Ln.in_f32(a)
 }
 
+/// The logarithm to base 2, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_log2(a: f64) -> f64 {
+    UnaryFunction::Log2.in_f64(a)
+}
+
+/// The logarithm to base 2, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_log2f(a: f32) -> f32 {
+    UnaryFunction::Log2.in_f32(a)
+}
+
+/// The logarithm to base 10, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_log10(a: f64) -> f64 {
+    UnaryFunction::Log10.in_f64(a)
+}
+
+/// The logarithm to base 10, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_log10f(a: f32) -> f32 {
+    UnaryFunction::Log10.in_f32(a)
+}
+
+/// The hyperbolic sine, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_sinh(a: f64) -> f64 {
+    UnaryFunction::Sinh.in_f64(a)
+}
+
+/// The hyperbolic sine, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_sinhf(a: f32) -> f32 {
+    UnaryFunction::Sinh.in_f32(a)
+}
+
+/// The hyperbolic cosine, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_cosh(a: f64) -> f64 {
+    UnaryFunction::Cosh.in_f64(a)
+}
+
+/// The hyperbolic cosine, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_coshf(a: f32) -> f32 {
+    UnaryFunction::Cosh.in_f32(a)
+}
+
+/// The hyperbolic tangent, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_tanh(a: f64) -> f64 {
+    UnaryFunction::Tanh.in_f64(a)
+}
+
+/// The hyperbolic tangent, with the bits that solids have.
+#[unsafe(no_mangle)]
+pub extern "C" fn rfm_math_tanhf(a: f32) -> f32 {
+    UnaryFunction::Tanh.in_f32(a)
+}
+
 /// A to the power b, with the bits that solids have.
 #[unsafe(no_mangle)]
 pub extern "C" fn rfm_math_pow(a: f64, b: f64) -> f64 {

@@ -4,6 +4,7 @@ use super::arithmetic::{Arithmetic, Error, FOLDING, Inputs};
 use super::weights::through_weights;
 use crate::interval::Interval;
 use crate::ir::bounds::float::FloatType;
+use crate::ir::bounds::range::is_zero;
 use crate::ir::bounds::upper::{add, compound, div, magnitude, mul, root, smallest_magnitude};
 use crate::ir::form::Form;
 use crate::ir::graph::{Expr, Node};
@@ -91,6 +92,7 @@ impl ErrorRules<'_> {
                     Binary::Sub
                     | Binary::Div
                     | Binary::DivOrZero
+                    | Binary::MulOrZero
                     | Binary::MinWeight
                     | Binary::MaxWeight
                     | Binary::And
@@ -187,6 +189,12 @@ impl ErrorRules<'_> {
             Unary::Sqrt => self.sqrt(a),
             Unary::Sign if reach.lo > 0.0 || reach.hi < 0.0 => Error::NONE,
             Unary::Sign => Error::absolute(2.0),
+            // a whole number has no error unless the operand may be on the other side of a jump
+            Unary::Floor | Unary::Round => match op.eval(reach.hi) - op.eval(reach.lo) {
+                0.0 => Error::NONE,
+                jump if jump.is_finite() => Error::absolute(jump),
+                _ => Error::UNKNOWN,
+            },
             Unary::Call(function) => self.host(function.propagated(reach, e)),
         }
     }
@@ -220,7 +228,10 @@ impl ErrorRules<'_> {
     fn binary(&self, op: Binary, a: Operand, b: Operand, form: Form) -> Error {
         match op {
             Binary::Add | Binary::Sub => self.sum(op, a, b),
-            Binary::Mul => self.product(a, b),
+            Binary::MulOrZero if is_zero(b.reach()) => Error::NONE,
+            // it is 0 here and not there, however small the error
+            Binary::MulOrZero if !b.is_exact() && b.reach().contains(0.0) => Error::UNKNOWN,
+            Binary::Mul | Binary::MulOrZero => self.product(a, b),
             Binary::Div | Binary::DivOrZero => self.quotient(a, b),
             Binary::Min | Binary::Max | Binary::PlainMin | Binary::PlainMax => Error {
                 absolute: a.error.absolute.max(b.error.absolute),

@@ -1,0 +1,166 @@
+//! A box around the points at which a formula is positive, from the formula alone.
+
+use rustc_hash::FxHashMap;
+
+use glam::DVec3;
+
+use super::contractor::{Contractor, Wanted};
+use super::linear::{LinearForm, contract_linear};
+use super::sets::Contracted;
+use crate::geom::Aabb;
+use crate::ir::bounds::range::Region;
+use crate::ir::derived::sign::SignRule;
+use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::op::Binary;
+
+/// Half the side of the cube that is looked at.
+const FARTHEST: f64 = 1e60;
+
+/// A box that reaches farther has no end that is of use.
+const OF_USE: f64 = 1e12;
+
+/// Formulas with more nodes are not looked at.
+const MOST_NODES: usize = 20_000;
+
+/// Rounds of contraction for each junction.
+const ROUNDS: usize = 6;
+
+/// A box around the points at which a root is positive at any time. `None` if no end was found on some side, or
+/// if there are no such points.
+pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
+    let (graph, root) = folded(graph, root);
+    if graph.len() > MOST_NODES {
+        return None;
+    }
+    let mut junctions = Junctions { graph: &graph, known: FxHashMap::default() };
+    let found = junctions.above(root, false, 0.0);
+    let ends = found.min.abs().max(found.max.abs()).max_element();
+    (!found.is_empty() && ends < OF_USE).then_some(found)
+}
+
+/// The graph of a root alone, with the values of what uses no coordinate: rules look for numbers.
+fn folded(graph: &Graph, root: Node) -> (Graph, Node) {
+    let mut out = Graph::default();
+    let mut image: FxHashMap<Node, Node> = FxHashMap::default();
+    for node in graph.cone(root) {
+        let expr = graph.expr(node).map(|operand| image[&operand]);
+        let number = |node: Node| out.as_constant(node);
+        let value = match expr {
+            Expr::Unary(op, a) => number(a).map(|a| op.eval(a)),
+            Expr::Binary(op, a, b) => number(a).zip(number(b)).map(|(a, b)| op.eval(a, b)),
+            Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => None,
+        };
+        let new = match value {
+            Some(value) => out.constant(value),
+            None => out.intern(expr, None),
+        };
+        image.insert(node, new);
+    }
+    (out, image[&root])
+}
+
+/// The boxes of nodes that decide a sign, and of their complements.
+struct Junctions<'g> {
+    graph: &'g Graph,
+    known: FxHashMap<(Node, bool, u64), Aabb>,
+}
+
+/// For u ∨ v > −c one of u and v is above −c times this: u ∨ v is at most (2 − √2)·max(u, v) where both are negative.
+const SHARE: f64 = 1.71;
+
+impl Junctions<'_> {
+    /// A box around the points at which a node, negated or not, is above −`depth`, which is not negative.
+    fn above(&mut self, node: Node, negated: bool, depth: f64) -> Aabb {
+        let key = (node, negated, depth.to_bits());
+        if let Some(&known) = self.known.get(&key) {
+            return known;
+        }
+        let found = match (SignRule::of(self.graph, node), negated) {
+            (SignRule::All(u, v), false) | (SignRule::Any(u, v), true) => {
+                let both = self.above(u, negated, depth).intersection(&self.above(v, negated, depth));
+                self.contracted(node, negated, depth, both)
+            }
+            (SignRule::All(u, v), true) | (SignRule::Any(u, v), false) => {
+                let depth = SHARE * depth;
+                self.above(u, negated, depth).union(&self.above(v, negated, depth))
+            }
+            (SignRule::Not(u), _) => self.above(u, !negated, depth),
+            (SignRule::Same(u), _) if depth == 0.0 => self.above(u, negated, depth),
+            (SignRule::Same(_) | SignRule::Leaf, _) => match self.shifted(node) {
+                Some((of, by)) => {
+                    let depth = depth + if negated { -by } else { by };
+                    self.above(of, negated, depth.max(0.0))
+                }
+                None => {
+                    let everywhere = Aabb::new(DVec3::splat(-FARTHEST), DVec3::splat(FARTHEST));
+                    self.contracted(node, negated, depth, everywhere)
+                }
+            },
+        };
+        self.known.insert(key, found);
+        found
+    }
+
+    /// A node that is another one and a number.
+    fn shifted(&self, node: Node) -> Option<(Node, f64)> {
+        let number = |node| self.graph.as_constant(node);
+        match self.graph.expr(node) {
+            Expr::Binary(Binary::Add, a, b) => {
+                number(a).map(|by| (b, by)).or_else(|| number(b).map(|by| (a, by)))
+            }
+            Expr::Binary(Binary::Sub, a, b) => number(b).map(|by| (a, -by)),
+            _ => None,
+        }
+    }
+
+    fn contracted(&self, node: Node, negated: bool, depth: f64, mut space: Aabb) -> Aabb {
+        let (mut graph, mut root) = self.graph.extract_cone(node);
+        if depth > 0.0 {
+            let by = graph.constant(if negated { -depth } else { depth });
+            root = graph.binary(Binary::Add, root, by);
+        }
+        let contractor = Contractor::new(&graph, root);
+        let mut given: Vec<LinearForm> = Vec::new();
+        for _ in 0..ROUNDS {
+            if space.is_empty() {
+                return Aabb::EMPTY;
+            }
+            let wanted = Wanted { region: Region::of(&Aabb::EMPTY), negated };
+            let mut forms = Vec::new();
+            match contractor.contract_given(&given, &wanted, &mut space, Some(&mut forms)) {
+                Contracted::Nowhere => return Aabb::EMPTY,
+                Contracted::Everywhere => return space,
+                Contracted::Somewhere if !contract_linear(&forms, &mut space) => return Aabb::EMPTY,
+                // what one round finds of a form helps the next one with the others
+                Contracted::Somewhere => given = forms,
+            }
+        }
+        space
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::Axis;
+
+    #[test]
+    fn a_turned_square_has_ends_and_half_of_space_has_none() {
+        let mut graph = Graph::default();
+        let [x, y, z] = [Axis::X, Axis::Y, Axis::Z].map(|axis| graph.coordinate(axis));
+        let one = graph.constant(1.0);
+        let band = |graph: &mut Graph, e: Node| {
+            let (low, high) = (graph.binary(Binary::Add, e, one), graph.binary(Binary::Sub, one, e));
+            graph.binary(Binary::Mul, low, high)
+        };
+        let (sum, difference) = (graph.binary(Binary::Add, x, y), graph.binary(Binary::Sub, x, y));
+        let bands = [sum, difference, z].map(|e| band(&mut graph, e));
+        let square = graph.binary(Binary::And, bands[0], bands[1]);
+        let cube = graph.binary(Binary::And, square, bands[2]);
+        let found = reach(&graph, cube).unwrap();
+        assert!((found.max - DVec3::ONE).abs().max_element() < 1e-9, "{found:?}");
+        assert!((found.min + DVec3::ONE).abs().max_element() < 1e-9, "{found:?}");
+        assert!(reach(&graph, square).is_none());
+        assert!(reach(&graph, x).is_none());
+    }
+}

@@ -1,0 +1,202 @@
+//! Lists and folds: `[a, b, …]`, `list[i]`, `any i in 0..6: …`, `sum p in list: …`.
+
+use std::sync::Arc;
+
+use super::lowering::{Local, Lowering};
+use super::value::Value;
+use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::ir::{Binary, Node};
+use crate::syntax::ast::{Expr, Fold, Logic, Members, Name};
+
+/// The most members of a fold. The budget of nodes is checked after each member, so this only bounds folds
+/// whose members add no node.
+const LONGEST_FOLD: f64 = 1e7;
+
+/// The most numbers of a list with all lists in it.
+const MOST_NUMBERS: usize = 100_000;
+
+/// How deep lists may be nested.
+const DEEPEST_LIST: usize = 32;
+
+impl Lowering<'_> {
+    /// Three numbers are a vector; anything else in square brackets is a list.
+    pub fn vector(&mut self, parts: &[Expr], span: Span) -> Value {
+        if !parts.iter().all(|part| self.no_angle(part)) {
+            return Value::Failed;
+        }
+        let values: Vec<Value> = parts.iter().map(|part| self.expr(part)).collect();
+        if values.contains(&Value::Failed) {
+            return Value::Failed;
+        }
+        if let Some(text) = values.iter().position(|value| matches!(value, Value::Text(_))) {
+            let message = "a list holds numbers, vectors and lists, found a text";
+            return self.fail(Diagnostic::error(Code::WRONG_TYPE, parts[text].span, message));
+        }
+        if self.over_budget(span) {
+            return Value::Failed;
+        }
+        match values[..] {
+            [Value::Number(a), Value::Number(b), Value::Number(c)] => Value::Vector([a, b, c]),
+            _ => self.list(values, span),
+        }
+    }
+
+    /// A list that is not too large: names may stand for lists of lists, which grow fast.
+    fn list(&mut self, members: Vec<Value>, span: Span) -> Value {
+        let list = Value::List(members.into());
+        let (count, depth) = list.extent();
+        if count > MOST_NUMBERS || depth > DEEPEST_LIST {
+            let span = self.user_span(span);
+            let message = format!("a list with {count} numbers, {depth} lists deep");
+            let diagnostic = Diagnostic::error(Code::TOO_LARGE, span, message);
+            return self
+                .fail(diagnostic.help(format!("at most {MOST_NUMBERS} numbers and {DEEPEST_LIST} lists")));
+        }
+        list
+    }
+
+    /// `v.x` of a vector, or of a list of two numbers.
+    pub fn component(&mut self, value: &Value, axis: usize, span: Span) -> Value {
+        if let Value::List(pair) = value
+            && let ([Value::Number(_), Value::Number(_)], Some(part)) = (&pair[..], pair.get(axis))
+        {
+            return part.clone();
+        }
+        self.as_vector(value, span).map_or(Value::Failed, |v| Value::Number(v[axis]))
+    }
+
+    /// `list[2]`, counted from 0.
+    pub fn index(&mut self, list: &Expr, index: &Expr, span: Span) -> Value {
+        let value = self.expr(list);
+        let Some(at) = self.constant_expr(index, "the index of a list") else { return Value::Failed };
+        let Some(members) = self.list_members(&value, list) else { return Value::Failed };
+        let whole = at.fract() == 0.0 && at >= 0.0;
+        match members.get(at as usize).filter(|_| whole) {
+            Some(member) => member.clone(),
+            None => {
+                let span = self.user_span(span);
+                let message = format!("a list with {} members has no member {at}", members.len());
+                let diagnostic = Diagnostic::error(Code::OUT_OF_RANGE, span, message);
+                self.fail(diagnostic.help(format!("members are counted from 0 to {}", members.len() - 1)))
+            }
+        }
+    }
+
+    /// The members of a list; a value without members is reported.
+    fn list_members(&mut self, value: &Value, written: &Expr) -> Option<Arc<[Value]>> {
+        let members = value.members();
+        if members.is_none() && *value != Value::Failed {
+            let span = self.user_span(self.origin(written));
+            let message = format!("expected a list `[a, b, …]`, found {}", value.describe());
+            self.report(Diagnostic::error(Code::WRONG_TYPE, span, message));
+        }
+        members
+    }
+
+    pub fn fold(&mut self, op: Fold, variable: &Name, members: &Members, body: &Expr, span: Span) -> Value {
+        let values = match members {
+            Members::Range(start, end) => self.range(op, start, end),
+            Members::List(list) => self.fold_list(op, list),
+        };
+        let Some(values) = values else { return Value::Failed };
+        if !self.may_be_local(variable) {
+            return Value::Failed;
+        }
+        let is_range = matches!(members, Members::Range(..));
+        let mut results = Vec::new();
+        for value in values.iter().cloned() {
+            let name = variable.text.clone();
+            self.scope.locals.push(Local { name, value, span: variable.span, bare: is_range });
+            let result = self.expr(body);
+            self.scope.locals.pop();
+            if result == Value::Failed {
+                return Value::Failed; // one message is enough
+            }
+            results.push(result);
+        }
+        self.folded(op, &results, (body, span))
+    }
+
+    /// The numbers of a range `start..end`.
+    fn range(&mut self, op: Fold, start: &Expr, end: &Expr) -> Option<Arc<[Value]>> {
+        let whole = start.span.to(end.span);
+        let (start, end) = (
+            self.constant_expr(start, "the start of a range"),
+            self.constant_expr(end, "the end of a range"),
+        );
+        let (start, end) = (start?, end?);
+        if start.fract() != 0.0 || end.fract() != 0.0 {
+            let message = format!("a range goes from one whole number to another, found {start} .. {end}");
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, whole, message));
+            return None;
+        }
+        if start >= end && !matches!(op, Fold::Sum | Fold::Product) {
+            let message = format!("`{}` over the range {start} .. {end}, which has no member", op.word());
+            self.report(
+                Diagnostic::error(Code::OUT_OF_RANGE, whole, message)
+                    .help("a range a..b holds a, a+1, … b−1; a must be less than b"),
+            );
+            return None;
+        }
+        if end - start > LONGEST_FOLD {
+            let message = format!("a range with {} members", end - start);
+            self.report(Diagnostic::error(Code::TOO_LARGE, whole, message));
+            return None;
+        }
+        if end - start == 1.0 && matches!(op, Fold::Any | Fold::All) {
+            self.report(Diagnostic::warning(
+                Code::FOLD_OF_ONE,
+                whole,
+                format!("`{}` over the single member {start}", op.word()),
+            ));
+        }
+        let mut numbers = Vec::new();
+        let mut index = start;
+        while index < end {
+            numbers.push(Value::Number(self.constant(index)));
+            index += 1.0;
+        }
+        Some(numbers.into())
+    }
+
+    /// The members of the list that a fold goes through.
+    fn fold_list(&mut self, op: Fold, list: &Expr) -> Option<Arc<[Value]>> {
+        let value = self.expr(list);
+        if let (Value::Number(node), true) = (&value, self.known_value_of(&value).is_some()) {
+            let end = self.known_value(*node).unwrap_or_default();
+            let span = self.user_span(list.span);
+            let message = format!("`{}` goes through a range or a list, found the number {end}", op.word());
+            let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
+            self.report(diagnostic.help(format!("write `{} i in 0..{end}: …`", op.word())));
+            return None;
+        }
+        self.list_members(&value, list)
+    }
+
+    fn known_value_of(&self, value: &Value) -> Option<f64> {
+        match value {
+            Value::Number(node) => self.known_value(*node),
+            Value::Vector(_) | Value::List(_) | Value::Text(_) | Value::Failed => None,
+        }
+    }
+
+    /// What a fold makes of its members.
+    fn folded(&mut self, op: Fold, results: &[Value], (body, span): (&Expr, Span)) -> Value {
+        let Some((first, rest)) = results.split_first() else {
+            return Value::Number(self.constant(if op == Fold::Product { 1.0 } else { 0.0 }));
+        };
+        if op == Fold::Sum {
+            return rest.iter().fold(first.clone(), |sum, next| self.sum(Binary::Add, &sum, next, span));
+        }
+        let nodes: Option<Vec<Node>> =
+            results.iter().map(|value| self.as_number(value, self.origin(body))).collect();
+        let Some(nodes) = nodes else { return Value::Failed };
+        Value::Number(match op {
+            Fold::Any => self.balanced(Logic::Or, &nodes, span),
+            Fold::All => self.balanced(Logic::And, &nodes, span),
+            Fold::Min => self.chain(Binary::Min, &nodes, span),
+            Fold::Max => self.chain(Binary::Max, &nodes, span),
+            Fold::Product | Fold::Sum => self.chain(Binary::Mul, &nodes, span),
+        })
+    }
+}

@@ -1,0 +1,276 @@
+//! What the language can say: numbers, choices, lists, maps of space, joints. Values against plain arithmetic, signs
+//! against the definition.
+
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::solid::Bounds;
+use rfm::{Engine, Program, Solid};
+
+fn compiled(text: &str, engine: Engine) -> Solid {
+    let program = Program::from_source("t.rfm", format!("rfm 1\n{text}"));
+    program.unwrap_or_else(|e| panic!("{text}: {e}")).solid_with("s", engine).unwrap()
+}
+
+fn solid(definition: &str) -> Solid {
+    compiled(&format!("solid s = {definition}"), Engine::Auto)
+}
+
+fn value(expression: &str, p: [f64; 3]) -> f64 {
+    compiled(&format!("solid s = {expression}"), Engine::Interpreter).omega(DVec3::from_array(p))
+}
+
+/// Places in a box, spread evenly but in no pattern.
+fn places(count: u32, over: Aabb) -> impl Iterator<Item = DVec3> {
+    (1..=count).map(move |i| {
+        let at = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3);
+        over.min + over.size() * (at * f64::from(i)).fract()
+    })
+}
+
+fn cube(half: f64) -> Aabb {
+    Aabb::new(DVec3::splat(-half), DVec3::splat(half))
+}
+
+/// Two descriptions have the same sign wherever neither is about zero.
+#[track_caller]
+fn same_sign(a: &str, b: &str, over: Aabb) {
+    let (first, second) = (solid(a), solid(b));
+    let mut inside = 0;
+    for p in places(20_000, over) {
+        let (u, v) = (first.omega(p), second.omega(p));
+        inside += u32::from(v > 0.0);
+        assert!(u.abs() < 1e-9 || v.abs() < 1e-9 || (u > 0.0) == (v > 0.0), "{a} at {p}: {u}; {b}: {v}");
+    }
+    assert!(inside > 20, "{b}: {inside} of 20 000 places");
+}
+
+#[test]
+fn numbers_of_steps_and_functions() {
+    for (expression, expected) in [
+        ("floor(-0.5)", -1.0),
+        ("floor(2)", 2.0),
+        ("ceil(1.2) + ceil(-1.2)", 1.0),
+        ("round(2.5) + 10*round(3.5)", 42.0),
+        ("round(0.49999999999999994)", 0.0),
+        ("fract(-0.25)", 0.75),
+        ("mod(-1, 3) + 10*mod(7, 3)", 12.0),
+        ("mod(7, -3)", -2.0),
+        ("log10(1000)", 3.0),
+        ("log2(1024)", 10.0),
+        ("sinh(0) + cosh(0) + tanh(0)", 1.0),
+        ("step(1, 0.5) + 2*step(1, 1)", 2.0),
+        ("where(3 >= 2, 1, 1/0)", 1.0),
+        ("where(2 == 3 or 1 != 1, 1, 2)", 2.0),
+        ("sum i in 1..5: i^2", 30.0),
+        ("product i in 1..6: i", 120.0),
+        ("sum i in 3..3: i", 0.0),
+        ("product i in 3..3: i", 1.0),
+        ("min i in 0..5: (i - 2)^2 + 1", 1.0),
+        ("max p in [[1, 2], [3, 4]]: p.x*p.y", 12.0),
+        ("sum e in [1, 2, 4]: e", 7.0),
+        ("(sum p in [[1, 2, 3], [4, 5, 6]]: p).y", 7.0),
+        ("[5, 6, 7, 8][2] + [5, 6, 7][0]", 12.0),
+        ("([[1, 2], [3, 4]][1]*2 + [1, 1]).y", 9.0),
+        ("count([[1, 2], [3, 4]]) + count([1, 2, 3])", 5.0),
+    ] {
+        assert_eq!(value(&format!("({expression}) + 0*x"), [0.0; 3]), expected, "{expression}");
+    }
+    for (expression, expected) in
+        [("sinh(x)", 0.7f64.sinh()), ("cosh(x)", 0.7f64.cosh()), ("tanh(x)", 0.7f64.tanh())]
+    {
+        assert!((value(expression, [0.7, 0.0, 0.0]) - expected).abs() < 1e-15, "{expression}");
+    }
+}
+
+#[test]
+fn a_choice_does_not_look_at_what_is_left_out() {
+    let chosen = solid("where(x >= 0, sqrt(x), -1 - x^2)");
+    assert_eq!(chosen.omega_grad(DVec3::new(0.25, 0.0, 0.0)), (0.5, DVec3::X));
+    assert_eq!(chosen.omega_grad(DVec3::new(-2.0, 0.0, 0.0)), (-5.0, 4.0 * DVec3::X));
+    let left = chosen.range(&Aabb::new(DVec3::new(-2.0, 0.0, 0.0), DVec3::new(-1.0, 1.0, 1.0)));
+    assert!(left.lo > -5.1 && left.hi < -1.9, "{left:?}");
+    let right = chosen.range(&Aabb::new(DVec3::new(1.0, 0.0, 0.0), DVec3::new(4.0, 1.0, 1.0)));
+    assert!(right.lo > 0.9 && right.hi < 2.1, "{right:?}");
+}
+
+#[test]
+fn random_numbers_are_even_and_the_same_everywhere() {
+    let text = "solid s = (sum i in 0..4000: random(1, i)) + x";
+    let mean = compiled(text, Engine::Interpreter).omega(DVec3::ZERO) / 4000.0;
+    assert!((mean - 0.5).abs() < 0.02, "{mean}");
+    assert_eq!(value("random(1, 2) + 0*x", [0.0; 3]), 0.234_364_617_758_881_84);
+    assert_ne!(value("random(1, 2) + 0*x", [0.0; 3]), value("random(2, 2) + 0*x", [0.0; 3]));
+}
+
+#[test]
+fn lists_hold_places_and_sizes() {
+    same_sign(
+        "any p in [[1, 0, 0], [0, 1, 0], [0, 0, 1]]: ball(p, 0.6)",
+        "ball([1, 0, 0], 0.6) or ball([0, 1, 0], 0.6) or ball([0, 0, 1], 0.6)",
+        cube(2.0),
+    );
+    let text = "let spots = [[0, 0.5], [1, 0.25], [2, 0.75]]\n\
+                solid s = any i in 0..count(spots): ball([spots[i].x, 0, 0], spots[i].y)";
+    let found = compiled(text, Engine::Auto);
+    for (x, radius) in [(0.0, 0.5), (1.0, 0.25), (2.0, 0.75)] {
+        assert!(found.omega(DVec3::new(x, 0.99 * radius, 0.0)) > 0.0);
+        assert!(found.omega(DVec3::new(x, 0.0, 1.01 * radius)) < 0.0 || x == 1.0);
+    }
+}
+
+#[test]
+fn maps_are_their_substitution() {
+    let p = [0.3, -0.7, 0.9];
+    let at = |q: [f64; 3]| value("ellipsoid(1, 2, 3)", q);
+    assert_eq!(value("ellipsoid(1, 2, 3).at([y, z*2, x])", p), at([-0.7, 1.8, 0.3]));
+    assert_eq!(value("ellipsoid(1, 2, 3).revolve()", p), at([0.3f64.hypot(0.7), 0.9, 0.0]));
+    same_sign("box().rotate([0, 0, 1], 90°, [1, 0, 0])", "box([0, -1, 0], [1, 0, 1])", cube(2.5));
+    same_sign("box().mirror([1, 0, 0], [1, 0, 0])", "box([1, 0, 0], [2, 1, 1])", cube(2.5));
+    same_sign("box().mirror([1, 0, 0])", "box([-1, 0, 0], [0, 1, 1])", cube(2.5));
+    // a whole turn in each unit of length: at half of it everything is turned by half a turn
+    let twisted = solid("box([0, -0.1, 0], [1, 0.1, 1]).twist(1)");
+    for (z, x, y) in [(0.01, 0.7, 0.05), (0.25, 0.0, 0.7), (0.5, -0.7, 0.0), (0.75, 0.0, -0.7)] {
+        assert!(twisted.omega(DVec3::new(x, y, z)) > 0.0, "{z}");
+        assert!(twisted.omega(DVec3::new(-x, -y, z)) < 0.0, "{z}");
+    }
+    let tapered = solid("box([-1, -1, 0], [1, 1, 2]).taper(2, 0.5)");
+    assert!(
+        tapered.omega(DVec3::new(0.74, 0.0, 1.0)) > 0.0 && tapered.omega(DVec3::new(0.76, 0.0, 1.0)) < 0.0
+    );
+    // a quarter of a circle of radius 2/π·1
+    let bent = solid("box([0, -0.1, -0.1], [1, 0.1, 0.1]).bend(2/pi)");
+    let radius = std::f64::consts::FRAC_2_PI;
+    assert!(bent.omega(DVec3::new(radius + 0.09, 0.0, radius - 0.01)) > 0.0);
+    assert!(bent.omega(DVec3::new(radius + 0.09, 0.0, radius + 0.01)) < 0.0);
+}
+
+#[test]
+fn bounds_of_mapped_shapes_are_found() {
+    for (definition, min, max) in [
+        ("box([-1, -0.2, 0], [1, 0.2, 3]).twist(0.5)", [-1.02, -1.02, 0.0], [1.02, 1.02, 3.0]),
+        ("sphere(0.3).repeat([1, 2, 3], [10, 20, 5])", [-0.3, -0.3, -0.3], [9.3, 38.3, 12.3]),
+        ("box([0, 0, 0], [2, 1, 1]).repeat([-1, 1, 1], [3, 1, 1])", [-2.0, 0.0, 0.0], [2.0, 1.0, 1.0]),
+        ("box([-1, -0.1, -0.1], [1, 0.1, 0.1]).bend(1)", [-0.93, -0.1, -0.1], [0.93, 0.1, 0.6]),
+        ("box([-1, -1, 0], [1, 1, 2]).taper(2, 0.5)", [-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]),
+        ("sphere(0.2).move([1, 0, 0]).polar_repeat(5)", [-1.1, -1.2, -0.2], [1.2, 1.2, 0.2]),
+        ("polygon([[1, 0], [2, 0], [1.5, 1]]).revolve()", [-2.0, -2.0, 0.0], [2.0, 2.0, 1.0]),
+        ("smooth_or(sphere(1), sphere(1).move([1, 0, 0]), 0.3)", [-1.1, -1.1, -1.1], [2.1, 1.1, 1.1]),
+        ("blend(sphere(1), box([0, 0, 0], [2, 1, 1]), 0.3)", [-1.1, -1.1, -1.1], [2.1, 1.1, 1.1]),
+        ("box().shell(0.1)", [0.0; 3], [1.0; 3]),
+    ] {
+        let found = solid(definition);
+        let Bounds::Within(bounds) = *found.bounds() else { panic!("{definition}: {:?}", found.bounds()) };
+        let allowed = Aabb::new(DVec3::from_array(min), DVec3::from_array(max)).grown(0.02);
+        assert!(allowed.union(&bounds) == allowed, "{definition}: {bounds:?}");
+        for p in places(20_000, allowed.grown(0.5)) {
+            assert!(found.omega(p) <= 0.0 || bounds.contains(p), "{definition}: {p} is outside {bounds:?}");
+        }
+    }
+}
+
+/// Whether copies are looked at one by one, or joined because they may reach into other cells: the sign is that of
+/// all copies.
+#[test]
+fn copies_are_whole_whatever_their_size() {
+    for (shape, step, counts) in [
+        ("sphere(0.4)", "[1, 1, 1]", [3, 2, 2]),
+        ("sphere(0.7)", "[1, 1, 1]", [3, 2, 2]),
+        ("box([0, 0, 0], [1, 1, 1])", "[1, 1, 1]", [2, 2, 2]),
+        ("sphere(0.4).move([5, 0, 0.3])", "[1, -1.5, 1]", [4, 2, 1]),
+        ("box([-0.4, -0.1, 0], [0.4, 0.1, 1]).twist(0.3)", "[0.6, 1, 1]", [3, 1, 2]),
+        ("(x + y <= 1 and x >= 0 and y >= 0 and 0 <= z <= 1)", "[1, 1, 1]", [2, 3, 1]),
+    ] {
+        let step_of = |axis: &str| format!("({step}.{axis})");
+        let [a, b, c] = counts;
+        let all = format!(
+            "any i in 0..{a}*{b}*{c}: {shape}.move([mod(i, {a})*{}, mod(floor(i/{a}), {b})*{}, floor(i/({a}*{b}))*{}])",
+            step_of("x"),
+            step_of("y"),
+            step_of("z")
+        );
+        let over = Aabb::new(DVec3::new(-2.0, -3.0, -1.5), DVec3::new(8.0, 4.0, 3.0));
+        same_sign(&format!("{shape}.repeat({step}, [{a}, {b}, {c}])"), &all, over);
+    }
+}
+
+#[test]
+fn joints_differ_from_the_plain_ones_near_the_edge_only() {
+    let (a, b) = ("(-x)", "(-y)"); // material below zero: a step whose inner edge is at the origin
+    let inside = |definition: &str, x: f64, y: f64| solid(definition).omega(DVec3::new(x, y, 0.0)) > 0.0;
+    // the fillet of radius 1 ends where the arc around [1, 1] does
+    let fillet = format!("blend({a}, {b}, 1)");
+    for (x, y, expected) in [(0.29, 0.29, true), (0.30, 0.30, false), (1.01, 0.01, false), (0.99, 1e-5, true)]
+    {
+        assert_eq!(inside(&fillet, x, y), expected, "{x} {y}");
+    }
+    let chamfer = format!("chamfer({a}, {b}, 1)");
+    for (x, y, expected) in [(0.49, 0.5, true), (0.51, 0.5, false), (1.01, 0.01, false)] {
+        assert_eq!(inside(&chamfer, x, y), expected, "{x} {y}");
+    }
+    for (joint, plain) in [
+        ("smooth_or(sphere(1), box([0, 0, 0], [1, 1, 1]), 1e-9)", "sphere(1) or box([0, 0, 0], [1, 1, 1])"),
+        ("smooth_and(sphere(1), box([0, 0, 0], [1, 1, 1]), 1e-9)", "sphere(1) and box([0, 0, 0], [1, 1, 1])"),
+        (
+            "smooth_without(sphere(1), box([0, 0, 0], [1, 1, 1]), 1e-9)",
+            "sphere(1) \\ box([0, 0, 0], [1, 1, 1])",
+        ),
+    ] {
+        same_sign(joint, plain, cube(1.5));
+    }
+}
+
+#[test]
+fn offsets_and_shells_keep_their_thickness_to_first_order() {
+    // of a ball (r² − d²)/2r + t·d/r the surface is t²/2r beyond r + t
+    let grown = solid("sphere(2).offset(0.1)");
+    let surface = 2.1 + 0.01 / 4.0;
+    assert!(grown.omega(DVec3::X * (surface - 1e-4)) > 0.0 && grown.omega(DVec3::X * (surface + 1e-4)) < 0.0);
+    let hollow = solid("sphere(2).shell(0.1)");
+    assert!(hollow.omega(DVec3::X * 1.95) > 0.0 && hollow.omega(DVec3::X * 1.89) < 0.0);
+    assert!(hollow.omega(DVec3::ZERO) < 0.0 && hollow.omega(DVec3::X * 2.01) < 0.0);
+}
+
+#[test]
+fn functions_of_a_shape_are_methods() {
+    let text = "fn twin(shape, by) = shape or shape.move([by, 0, 0])\nsolid s = sphere(1).twin(by = 2)";
+    let (found, plain) = (compiled(text, Engine::Auto), solid("sphere(1) or sphere(1).move([2, 0, 0])"));
+    for p in places(1000, cube(3.0)) {
+        assert_eq!(found.omega(p), plain.omega(p));
+    }
+}
+
+#[test]
+fn machine_code_is_the_interpreter_in_every_program() {
+    for definition in [
+        "box([-0.4, -0.1, 0], [0.4, 0.1, 1]).twist(0.3)",
+        "sphere(0.4).repeat([1, 1, 1], [3, 2, 2])",
+        "where(x >= 0.2, sphere(1), box() or y <= -1)",
+        "tanh(x) + sinh(y)*cosh(z) - log2(1.5 + z^2) + log10(2 + y^2) and round(3*x) <= 2 or fract(y) >= 0.3",
+        "blend(box(), sphere(0.7), 0.2) and mod(x, 0.4) <= 0.3",
+        "polygon([[0, 0], [2, 0], [2, 2], [1, 1], [0, 2]]).extrude(0, 1).shell(0.1)",
+    ] {
+        let text = format!("solid s = {definition}");
+        let (jit, interpreter) = (compiled(&text, Engine::Jit), compiled(&text, Engine::Interpreter));
+        for p in places(500, cube(2.0)) {
+            assert_eq!(jit.omega_grad(p), interpreter.omega_grad(p), "{definition} at {p}");
+            assert_eq!(jit.contact(p), interpreter.contact(p), "{definition} at {p}");
+            assert_eq!(jit.sign(p), interpreter.sign(p), "{definition} at {p}");
+            let (a, b) = (jit.omega_grad_f32(p.as_vec3()), interpreter.omega_grad_f32(p.as_vec3()));
+            assert_eq!(a, b, "{definition} at {p} in f32");
+        }
+        let corners: Vec<DVec3> = places(300, cube(2.0)).collect();
+        for pair in corners.chunks(2) {
+            let over = Aabb::new(pair[0].min(pair[1]), pair[0].max(pair[1]));
+            for solid in [&jit, &interpreter] {
+                let range = solid.range(&over);
+                for p in places(20, over) {
+                    let omega = solid.omega(p);
+                    assert!(
+                        range.contains(omega) || omega.is_nan(),
+                        "{definition}: {omega} not in {range:?}"
+                    );
+                }
+            }
+        }
+    }
+}
