@@ -164,8 +164,6 @@ impl UnaryFunction {
             Self::Exp => Some(mul(error, a.increasing(libm::exp).hi)),
             Self::Ln if a.lo > 0.0 => Some(div(error, a.lo)),
             Self::Log2 | Self::Log10 if a.lo > 0.0 => Some(mul(div(error, a.lo), self.per_ln().next_up())),
-            // beyond 88 they leave the range of single precision
-            Self::Sinh | Self::Cosh if magnitude(a) > 80.0 => None,
             Self::Sinh => Some(mul(error, magnitude(Self::Cosh.range(a)))),
             Self::Cosh => Some(mul(error, magnitude(Self::Sinh.range(a)))),
             Self::Asin | Self::Acos if magnitude(a) < 1.0 => {
@@ -174,6 +172,12 @@ impl UnaryFunction {
             }
             Self::Tan | Self::Ln | Self::Log2 | Self::Log10 | Self::Asin | Self::Acos => None,
         }
+    }
+
+    /// Whether a value close to the largest number may come out infinite: sinh and cosh are found from eᵃ, which is twice as
+    /// large.
+    pub(super) fn overflows_early(self) -> bool {
+        matches!(self, Self::Sinh | Self::Cosh)
     }
 
     /// The true value; `None` where there is none.

@@ -2,7 +2,7 @@
 
 use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 10] = [
+const DOCUMENTS: [&str; 11] = [
     "README.md",
     "CHANGELOG.md",
     "grammar/README.md",

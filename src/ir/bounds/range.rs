@@ -292,7 +292,9 @@ const SQUARES_UNDERFLOW: f64 = 3.0e-151; // 2⁻⁵⁰⁰
 
 /// The range of u ∧ v: exact at the ends, and what the half-angle form of `ir::r0` makes of extreme operands.
 fn conjunction(a: Interval, b: Interval) -> Interval {
-    let exact = Interval::new(r0::and_scaled(a.lo, b.lo), r0::and_scaled(a.hi, b.hi)).widened(4);
+    let (first, last) = (r0::and_scaled(a.lo, b.lo), r0::and_scaled(a.hi, b.hi));
+    // over a box of a few neighbouring numbers rounding may change their order
+    let exact = if last < first { Interval::new(last, first) } else { Interval::new(first, last) }.widened(4);
     let largest = [a.lo, a.hi, b.lo, b.hi].into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     if largest > SQUARES_OVERFLOW {
         // √(u² + v²) = ∞: the small branch gives the smaller operand, the other one −∞; ∞ − ∞ and ∞/∞ are NaN

@@ -195,6 +195,11 @@ impl ErrorRules<'_> {
                 jump if jump.is_finite() => Error::absolute(jump),
                 _ => Error::UNKNOWN,
             },
+            Unary::Call(function)
+                if function.overflows_early() && mul(4.0, magnitude(self.range)) >= self.float().largest =>
+            {
+                Error::UNKNOWN
+            }
             Unary::Call(function) => self.host(function.propagated(reach, e)),
         }
     }
