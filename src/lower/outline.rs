@@ -331,7 +331,7 @@ mod tests {
     fn flaws_are_found() {
         let bow = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
         assert_eq!(flaw(&bow), Some(Flaw::Touch(0, 2)));
-        assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [0.5, 0.0]]), Some(Flaw::TurnsBack(1)));
+        assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [0.5, 0.0]]), Some(Flaw::TurnsBack(0)));
         assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), Some(Flaw::Repeated(2)));
         assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), None);
     }

@@ -124,8 +124,9 @@ fn coarser(shared: &Shared, experiment: &Experiment, most: f64) -> Result<(Exper
     let found: Result<_, Error> =
         started(most).or_else(|_: Error| started(4.0 * most)).or_else(|_: Error| started(16.0 * most));
     let (smaller, mut start) = found.map_err(refused)?;
-    // warnings that count particles would mislead
-    start.warnings.list.retain(|warning| warning.code != Code::FLUID_IN_OBSTACLE);
+    // warnings that count particles, or depend on their size, would mislead
+    let misleads = [Code::FLUID_IN_OBSTACLE, Code::FLUID_LIGHTER];
+    start.warnings.list.retain(|warning| !misleads.contains(&warning.code));
     input::show(&start.warnings);
     Ok((smaller, start.simulation))
 }
