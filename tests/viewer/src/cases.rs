@@ -258,7 +258,6 @@ fn many(room: &mut Room) {
         "  100000 particles at {} × {}: {milliseconds:.0} ms per picture on the processor",
         SIZE.0, SIZE.1
     );
-    assert!(milliseconds < 2000.0, "{milliseconds}");
     assert_eq!(room.browser.number("viewer.scene.drawn"), 100_000.0);
 }
 
@@ -305,7 +304,6 @@ fn slider(room: &mut Room) {
     }
     times.sort_by(f64::total_cmp);
     println!("  from a slider to the picture: {:.0} ms, at most {:.0} ms", times[4], times[8]);
-    assert!(times[4] < 1000.0, "{times:?}");
     let run = room.browser.number("viewer.run.number");
     let (x, y) = room.browser.middle("#param-cx");
     room.browser.drag((x, y), (x + 40.0, y));
