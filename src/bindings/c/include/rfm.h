@@ -714,6 +714,36 @@ double rfm_math_log(double a);
 // The natural logarithm, with the bits that solids have.
 float rfm_math_logf(float a);
 
+// The logarithm to base 2, with the bits that solids have.
+double rfm_math_log2(double a);
+
+// The logarithm to base 2, with the bits that solids have.
+float rfm_math_log2f(float a);
+
+// The logarithm to base 10, with the bits that solids have.
+double rfm_math_log10(double a);
+
+// The logarithm to base 10, with the bits that solids have.
+float rfm_math_log10f(float a);
+
+// The hyperbolic sine, with the bits that solids have.
+double rfm_math_sinh(double a);
+
+// The hyperbolic sine, with the bits that solids have.
+float rfm_math_sinhf(float a);
+
+// The hyperbolic cosine, with the bits that solids have.
+double rfm_math_cosh(double a);
+
+// The hyperbolic cosine, with the bits that solids have.
+float rfm_math_coshf(float a);
+
+// The hyperbolic tangent, with the bits that solids have.
+double rfm_math_tanh(double a);
+
+// The hyperbolic tangent, with the bits that solids have.
+float rfm_math_tanhf(float a);
+
 // A to the power b, with the bits that solids have.
 double rfm_math_pow(double a, double b);
 
