@@ -169,7 +169,11 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
             say!("{what}: {:.2} % from what is known (relative L2 over the saved instants)", 100.0 * error);
         }
     }
-    let probes = if probes.count() > 0 { format!(", {} probes", probes.count()) } else { String::new() };
+    let probes = match probes.count() {
+        0 => String::new(),
+        1 => ", 1 probe".to_string(),
+        count => format!(", {count} probes"),
+    };
     say!("written to {}: {}{probes}", frames.folder().shown(), frames.describe());
 }
 
