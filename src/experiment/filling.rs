@@ -50,7 +50,7 @@ pub(super) struct Filling {
     pub mass: f64,
     /// Volume of the fluid's shape in the box and outside all bodies, m³; `None` if it does not count.
     pub volume: Option<f64>,
-    /// Whether that is all the room that there is.
+    /// Whether that is all the room that there is, for a fluid that must not be compressed.
     pub fills_vessel: bool,
 }
 
@@ -87,7 +87,8 @@ impl Experiment {
             // a shape too thin for its volume to be found may still hold sites of a lattice
             return as_stated();
         }
-        let fills_vessel = self.free_volume(0.0) < LEAST_ROOM * volume;
+        // other methods do not ask, and many bodies take time
+        let fills_vessel = self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume;
         let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume)?;
         if let Some(number) = fluid.particles {
             particles.truncate(number);

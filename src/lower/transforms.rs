@@ -245,7 +245,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// The same transformation with another place in the role of the origin.
+    /// The transformation about a place instead of the origin.
     fn about(
         &mut self,
         place: [Node; 3],

@@ -146,6 +146,11 @@ impl Parameters {
         self.method.numerics().density_at_start(&self.scales(), pressure)
     }
 
+    /// Whether the method keeps the fluid from being compressed, at any cost.
+    pub fn keeps_density(&self) -> bool {
+        self.method.numerics().kept_compression().is_some()
+    }
+
     /// Whether particles that start too near to an obstacle are moved away from it instead of being dropped.
     pub fn makes_room_at_start(&self) -> bool {
         self.method.numerics().makes_room_at_start()

@@ -190,6 +190,9 @@ pub enum Fold {
 }
 
 impl Fold {
+    /// All of them.
+    pub const ALL_FOLDS: [Self; 6] = [Self::Any, Self::All, Self::Sum, Self::Product, Self::Min, Self::Max];
+
     /// Its word in files.
     pub fn word(self) -> &'static str {
         match self {

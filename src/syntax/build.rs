@@ -433,14 +433,10 @@ impl Builder {
     fn fold(&self, pair: Node<'_>) -> Expr {
         let span = self.span(&pair);
         let mut inner = parts(pair).filter(|p| p.as_rule() != Rule::kw_in);
-        let op = match inner.next().as_ref().map(|word| word.as_str()) {
-            Some("all") => Fold::All,
-            Some("sum") => Fold::Sum,
-            Some("product") => Fold::Product,
-            Some("min") => Fold::Min,
-            Some("max") => Fold::Max,
-            _ => Fold::Any,
-        };
+        let word = inner.next();
+        let is_written = |fold: &Fold| word.as_ref().is_some_and(|word| word.as_str() == fold.word());
+        // the grammar has no other words
+        let op = Fold::ALL_FOLDS.into_iter().find(is_written).unwrap_or(Fold::Any);
         let variable = self.name(inner.next());
         let (bounds, body): (Vec<_>, Vec<_>) = inner.partition(|p| p.as_rule() == Rule::sum);
         let mut bounds = bounds.into_iter().map(|p| Box::new(self.sum(p)));

@@ -104,6 +104,38 @@ fn help_and_usage() {
     }
 }
 
+/// Each file to begin with passes its check, and the one with a known outcome is near it.
+#[test]
+fn a_new_user_begins_with_a_file_that_works() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for template in ["obstacle", "experiment", "validation"] {
+        let file = format!("{template}.rfm");
+        let made = rfm(here, &["init", "--template", template]).expect(0);
+        assert!(made.stdout.contains(&format!("written to {file}")), "{}", made.stdout);
+        assert_eq!(rfm(here, &["check", &file, "--deny", "warnings"]).expect(0).stderr, "");
+        assert!(!std::fs::read_to_string(here.join(&file)).unwrap().contains("FILE"), "{template}");
+        let again = rfm(here, &["init", "--template", template]).expect(2);
+        assert!(again.stderr.contains("--force"), "{}", again.stderr);
+    }
+    let run = rfm(here, &["run", "validation.rfm", "--json", "--no-frames"]).expect(0).json();
+    assert!(run["pressure_error"].as_f64().unwrap() < 0.15, "{run}");
+    rfm(here, &["run", "experiment.rfm", "--steps", "5", "--no-frames"]).expect(0);
+}
+
+#[test]
+fn shells_and_man_know_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let text = rfm(folder.path(), &["completions", shell]).expect(0).stdout;
+        assert!(text.contains("mesh-cells") && text.contains("init"), "{shell}");
+    }
+    assert!(rfm(folder.path(), &["man"]).expect(0).stdout.starts_with(".ie"));
+    rfm(folder.path(), &["man", "pages"]).expect(0);
+    let page = std::fs::read_to_string(folder.path().join("pages/rfm-run.1")).unwrap();
+    assert!(page.contains("Simulate"), "{page}");
+}
+
 #[test]
 fn check_prints_facts() {
     snapshot("cli", "check", &rfm(root(), &["check", PAWN, "examples/cube.rfm"]).expect(0).transcript());

@@ -73,7 +73,7 @@ impl DivergenceFree {
         let mut velocity = core.particles.velocity.clone();
         let speed = std::mem::take(&mut core.speed);
         core.particles.velocity.components_mut().into_iter().for_each(|column| column.fill(0.0));
-        if core.parameters.fills_vessel {
+        if core.parameters.fills_vessel && !core.particles.is_empty() {
             self.pack(core, &mut velocity);
         }
         self.move_apart(core, &mut velocity);

@@ -167,7 +167,7 @@ impl Part {
         Self { volume, moment: DVec3::ZERO, squares: [x, y, z, 0.0, 0.0, 0.0] }
     }
 
-    /// The same integrals if the middle of the box lies `by` from where places count.
+    /// The integrals with another origin, from which the middle of the box lies at `by`.
     fn seen_from(self, by: DVec3) -> Self {
         let Self { volume, moment, squares } = self;
         let product = |i: usize, j: usize| moment[i] * by[j] + by[i] * moment[j] + volume * by[i] * by[j];
