@@ -12,19 +12,26 @@
 //! # Ok::<(), rfm::Error>(())
 //! ```
 
-use std::collections::BTreeMap;
+mod folder;
+mod imports;
+
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
 use crate::codegen::CodegenError;
-use crate::diagnostic::{Code, Diagnostic, Diagnostics, Severity, Source, nearest};
+use crate::diagnostic::{Code, Diagnostic, Diagnostics, Label, Severity, Source, SourceId, Span, nearest};
 use crate::geom::Aabb;
 use crate::ir::Node;
-use crate::lower::{self, Module, OpenParams, Options, Scene, Tolerance};
+use crate::lower::{self, Imported, Module, OpenParams, Options, Scene, Tolerance};
 use crate::solid::{Bounds, Chosen, Engine, Solid};
 use crate::sph::Method;
 use crate::syntax::{self, Ast};
+
+pub use folder::files_beside;
+#[doc(hidden)]
+pub use folder::text_of;
 
 /// Why a file, a solid or a scene cannot be used.
 #[derive(Debug)]
@@ -89,15 +96,24 @@ impl From<CodegenError> for Error {
 #[derive(Debug, Clone)]
 pub struct Program {
     sources: Arc<[Source]>,
-    ast: Arc<Ast>,
-    syntax_messages: Arc<[Diagnostic]>,
+    texts: Arc<Texts>,
     options: Options,
     module: Arc<Module>,
     warnings: Vec<Diagnostic>,
 }
 
+/// The file and all that it imports, read and parsed.
+#[derive(Debug)]
+struct Texts {
+    ast: Ast,
+    imported: Vec<Imported>,
+    /// Where each of them is first imported.
+    places: HashMap<SourceId, Span>,
+    messages: Vec<Diagnostic>,
+}
+
 impl Program {
-    /// Reads and checks a file.
+    /// Reads and checks a file. It may name others in its folder and below.
     ///
     /// # Errors
     /// [`Error::File`] if the file cannot be read as UTF-8 text, [`Error::Diagnostics`] if it has mistakes.
@@ -106,10 +122,13 @@ impl Program {
         let text = std::fs::read(path.as_ref())
             .and_then(text_of)
             .map_err(|error| Error::File { path: name.clone(), error })?;
-        Self::from_source(name, text)
+        let files = files_beside(path, false);
+        Self::check(Source::file(name, text), Options { files, ..Options::default() })
+            .map_err(Error::Diagnostics)
     }
 
-    /// Checks a text. Its messages show `name` in place of a path.
+    /// Checks a text. Its messages show `name` in place of a path. It may not name other files: [`Program::check`]
+    /// takes a text with [`Files`](crate::files::Files).
     ///
     /// # Errors
     /// [`Error::Diagnostics`] if the text has mistakes.
@@ -122,29 +141,34 @@ impl Program {
     /// # Errors
     /// All messages, warnings included, if at least one of them is an error.
     pub fn check(source: Source, options: Options) -> Result<Self, Diagnostics> {
-        let (ast, syntax_messages) = syntax::parse(&source);
-        let sources = Arc::from([source, lower::prelude_source()]);
-        Self::lowered(sources, Arc::new(ast), syntax_messages.into(), options)
+        let (ast, mut messages) = syntax::parse(&source);
+        let imports::Imports { files: imported, messages: of_imports, places } =
+            imports::imports(&source, &ast, &options.files);
+        messages.extend(of_imports);
+        let mut sources = vec![source, lower::prelude_source()];
+        sources.extend(imported.iter().map(|file| file.source.clone()));
+        let texts = Texts { ast, imported, places, messages };
+        Self::lowered(sources.into(), Arc::new(texts), options)
     }
 
-    fn lowered(
-        sources: Arc<[Source]>,
-        ast: Arc<Ast>,
-        syntax_messages: Arc<[Diagnostic]>,
-        options: Options,
-    ) -> Result<Self, Diagnostics> {
-        let mut list = syntax_messages.to_vec();
+    fn lowered(sources: Arc<[Source]>, texts: Arc<Texts>, options: Options) -> Result<Self, Diagnostics> {
+        let mut list = texts.messages.clone();
         let broken = list.iter().any(|d| d.severity == Severity::Error);
-        let (module, messages) = lower::lower(&ast, &options);
+        let (module, messages) = lower::lower((&sources[0].name, &texts.ast), &texts.imported, &options);
         // names of items that do not parse are missing: what follows from that would mislead
         let follows = |d: &Diagnostic| {
             [Code::UNKNOWN_NAME, Code::OVERRIDE, Code::UNUSED, Code::SCENE_MISSING].contains(&d.code)
         };
         list.extend(messages.into_iter().filter(|d| !(broken && follows(d))));
+        for message in &mut list {
+            if let Some(&place) = texts.places.get(&message.primary.span.source) {
+                message.secondary.push(Label { span: place, text: "imported here".into() });
+            }
+        }
         if list.iter().any(|d| d.severity == Severity::Error) {
             return Err(Diagnostics { list, sources });
         }
-        Ok(Self { sources, ast, syntax_messages, options, module: Arc::new(module), warnings: list })
+        Ok(Self { sources, texts, options, module: Arc::new(module), warnings: list })
     }
 
     /// Checks the same file again with another value, in SI units, for one of its params.
@@ -192,8 +216,7 @@ impl Program {
     }
 
     fn lowered_again(&self, options: Options) -> Result<Self, Error> {
-        Self::lowered(self.sources.clone(), self.ast.clone(), self.syntax_messages.clone(), options)
-            .map_err(Error::Diagnostics)
+        Self::lowered(self.sources.clone(), self.texts.clone(), options).map_err(Error::Diagnostics)
     }
 
     /// The params that were set, with their values. Params with the value of the file are not among them.
@@ -307,7 +330,7 @@ impl Program {
 
     /// The syntax tree of the text.
     pub fn ast(&self) -> &Ast {
-        &self.ast
+        &self.texts.ast
     }
 
     /// The texts that spans point into: the file and the standard solids.
@@ -319,17 +342,4 @@ impl Program {
     pub fn warnings(&self) -> Diagnostics {
         Diagnostics { list: self.warnings.clone(), sources: self.sources.clone() }
     }
-}
-
-/// Converts bytes to text.
-///
-/// # Errors
-/// [`InvalidData`](std::io::ErrorKind::InvalidData) if the bytes are not UTF-8; the message says where.
-#[doc(hidden)]
-pub fn text_of(bytes: Vec<u8>) -> std::io::Result<String> {
-    String::from_utf8(bytes).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
-        let message = format!("it is not a UTF-8 text (byte {at} does not belong to a character)");
-        std::io::Error::new(std::io::ErrorKind::InvalidData, message)
-    })
 }

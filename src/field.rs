@@ -118,6 +118,13 @@ pub trait Field: Send + Sync {
         self.omega(p)
     }
 
+    /// [`continuous`](Self::continuous) at many points, written to `omega`, which is as long as `points`.
+    fn continuous_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        for (i, w) in omega.iter_mut().enumerate() {
+            *w = self.continuous(points.get(i));
+        }
+    }
+
     /// An interval that contains ω of every point of the box. The default knows nothing and returns
     /// [`Interval::ALL`].
     fn range(&self, _over: &Aabb) -> Interval {
@@ -150,6 +157,10 @@ impl<F: Field + ?Sized> Field for &F {
 
     fn continuous(&self, p: DVec3) -> f64 {
         (**self).continuous(p)
+    }
+
+    fn continuous_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        (**self).continuous_many(points, omega);
     }
 
     fn range(&self, over: &Aabb) -> Interval {

@@ -22,6 +22,7 @@
 //! | [`mesh`], [`mod@slice`], [`render`], [`fluid_surface`] | meshes, plots, pictures, surfaces of fluids |
 //! | [`view`] | a page for a browser that shows particles and meshes |
 //! | [`source`] | a solid as source text: C, CUDA, Rust, WGSL, GLSL |
+//! | [`files`] | where the files come from that a file names |
 //! | [`Experiment`], [`experiment`], [`sph`] | scenes, and the fluid solver without them |
 //! | [`diagnostic`] | messages with their places in a file |
 //! | [`geom`], [`interval`], [`precision`], [`quantity`] | boxes, guaranteed ranges, number types, units |
@@ -36,6 +37,7 @@ pub mod compile;
 pub mod diagnostic;
 pub mod experiment;
 pub mod field;
+pub mod files;
 pub mod fluid_surface;
 pub mod geom;
 pub mod interval;
@@ -49,7 +51,10 @@ pub mod source;
 pub mod sph;
 pub mod view;
 
+mod heights;
 mod lettering;
+mod table;
+mod triangles;
 
 #[doc(hidden)]
 pub mod codegen;

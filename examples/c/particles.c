@@ -16,10 +16,11 @@ typedef struct {
     int id;
 } Particle;
 
-static void stop(RfmStatus status, RfmError *error) {
+/* by address, because C may look at the second argument before it calls the function of the first */
+static void stop(RfmStatus status, RfmError **error) {
     if (status != RFM_OK) {
-        fprintf(stderr, "%s\n", rfm_error_message(error));
-        rfm_error_free(error);
+        fprintf(stderr, "%s\n", rfm_error_message(*error));
+        rfm_error_free(*error);
         exit(EXIT_FAILURE);
     }
 }
@@ -38,8 +39,8 @@ int main(int count, char **arguments) {
     int inside = 0;
     static Particle p[COUNT];
 
-    stop(rfm_load_file(count > 1 ? arguments[1] : "examples/pawn.rfm", params, 1, &program, &error), error);
-    stop(rfm_solid(program, "pawn", &pawn, &error), error);
+    stop(rfm_load_file(count > 1 ? arguments[1] : "examples/pawn.rfm", params, 1, &program, &error), &error);
+    stop(rfm_solid(program, "pawn", &pawn, &error), &error);
     rfm_program_free(program);
 
     for (int i = 0; i < COUNT; i++) {
@@ -59,10 +60,10 @@ int main(int count, char **arguments) {
             for (int axis = 0; axis < 3; axis++) p[i].x[axis] += dt * p[i].v[axis];
             if (p[i].x[2] < 0.0) p[i].x[2] = 0.0;
         }
-        stop(rfm_collide(pawn, COUNT, places, velocities, 0.5, 0.0, 0.5, &collisions, &error), error);
+        stop(rfm_collide(pawn, COUNT, places, velocities, 0.5, 0.0, 0.5, &collisions, &error), &error);
         hits += collisions.hits;
     }
-    stop(rfm_omega_many(pawn, COUNT, points, values, &error), error);
+    stop(rfm_omega_many(pawn, COUNT, points, values, &error), &error);
     for (int i = 0; i < COUNT; i++) inside += p[i].omega > 0.0;
     printf("%s, %d of %d particles inside the pawn\n", hits > 1000 ? "many hits" : "few hits", inside, COUNT);
     rfm_solid_free(pawn);

@@ -9,8 +9,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
 pub(super) use super::values::CutFlag;
 use super::values::{
-    Definition, Frames, Tolerance, aabb, count, cut, definition, direction, frames, length, plane, point,
-    seconds, threads, tolerance, window,
+    Definition, Deny, Frames, Tolerance, aabb, count, cut, definition, deny, direction, frames, length,
+    plane, point, seconds, threads, tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -45,12 +45,18 @@ pub(super) struct Shared {
     /// Set a param of the file, with a unit or in SI units (-D d=8mm, -D alpha="10 deg"); may be repeated
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = definition, global = true)]
     pub define: Vec<Definition>,
+    /// Set params from a TOML or JSON file: `d = "8 mm"`, `alpha = 0.5`; -D goes before it; may be repeated
+    #[arg(short = 'P', long, value_name = "FILE", global = true)]
+    pub params: Vec<PathBuf>,
     /// Threads to use [default: all processors]; results do not depend on it
     #[arg(long, value_name = "N", value_parser = threads, global = true)]
     pub threads: Option<NonZeroUsize>,
     /// Print one JSON document on standard output instead of text
     #[arg(long, global = true)]
     pub json: bool,
+    /// Let a file import and read files outside of its own folder
+    #[arg(long, global = true, hide_short_help = true)]
+    pub allow_outside: bool,
     /// Operations that a file may unroll to
     #[arg(long, value_name = "N", default_value_t = 1_000_000, global = true, hide_short_help = true)]
     pub max_nodes: usize,
@@ -97,6 +103,10 @@ pub(super) enum Command {
     Report(Report),
     /// Explain a message, or show what a stage of the compiler makes of a file
     Explain(Explain),
+    /// Lay out files: blanks, indentation, spelling of operators; lines end where they end
+    Fmt(super::fmt::Fmt),
+    /// Serve an editor: messages, layout, completion and more while you type
+    Lsp(super::lsp::Lsp),
     /// Write a file to begin with: an obstacle, an experiment or a validation
     Init(super::init::Init),
     /// Print what a shell needs to complete commands and options
@@ -134,14 +144,30 @@ pub(super) struct Check {
     /// Time after which no further solid of a file is measured, in seconds or with a unit
     #[arg(long, value_name = "TIME", default_value_t = 10.0, value_parser = seconds)]
     pub budget: f64,
-    /// Treat a kind of message as an error
-    #[arg(long, value_enum, value_name = "KIND")]
-    pub deny: Option<Deny>,
+    /// Treat warnings as errors: all of them (`warnings`), or those with a code (W0401); may be repeated
+    #[arg(long, value_name = "WHICH", value_parser = deny)]
+    pub deny: Vec<Deny>,
+    /// How messages are written; other forms than `human` go to standard output, in place of the solids
+    #[arg(long, value_enum, value_name = "FORM", default_value_t = MessageFormat::Human, conflicts_with = "json")]
+    pub message_format: MessageFormat,
+    /// Apply the fixes that do not change what a file means, then check it: `<` becomes `<=`, a missing `rfm 1` is added
+    #[arg(long)]
+    pub fix: bool,
 }
 
+/// How messages are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Deny {
-    Warnings,
+pub(super) enum MessageFormat {
+    /// With the lines of the file, for people
+    Human,
+    /// One line each: FILE:LINE:COLUMN: severity[CODE]: message
+    Short,
+    /// One JSON object on each line
+    Json,
+    /// One SARIF document, for services that show findings
+    Sarif,
+    /// Commands of GitHub Actions, which show findings in the changes
+    Github,
 }
 
 #[derive(Debug, Args)]

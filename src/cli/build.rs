@@ -190,6 +190,8 @@ fn advised(error: &source::SourceError, solid: &Solid) -> Failure {
         }
         SourceError::NoSuchPrecision(..) => format!("{error}; leave out --precision"),
         SourceError::NoSuchMath(..) => format!("{error}; leave out --math"),
-        SourceError::BadPrefix(_) | SourceError::NumberOutOfRange(_) => error.to_string(),
+        SourceError::BadPrefix(_) | SourceError::NumberOutOfRange(_) | SourceError::Table => {
+            error.to_string()
+        }
     })
 }

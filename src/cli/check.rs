@@ -1,17 +1,18 @@
 //! `rfm check`: messages about files, the solids with their bounds and volumes, and slices.
 
 use std::io::IsTerminal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use serde::Serialize;
 
-use super::args::{Check, Deny, Shared};
+use super::args::{Check, MessageFormat, Shared};
 use super::failure::{Failure, complain, note, warn};
+use super::findings::{self, Message, message};
 use super::mesh::hidden;
 use super::{choose, input, output, section};
 use crate::cli::output::Shown;
-use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Source};
+use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
@@ -31,19 +32,6 @@ struct Document {
     ok: bool,
     diagnostics: Vec<Message>,
     solids: Vec<Facts>,
-}
-
-#[derive(Serialize)]
-struct Message {
-    code: &'static str,
-    severity: String,
-    message: String,
-    file: String,
-    line: usize,
-    column: usize,
-    end_line: usize,
-    end_column: usize,
-    help: Option<String>,
 }
 
 /// Seconds for each operation of a solid of many leaves: of ten thousand parts a minute was seen.
@@ -135,65 +123,79 @@ pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
     if options.watch {
         return watch(shared, options);
     }
-    once(shared, options)
+    once(shared, options, &mut Vec::new())
 }
 
-/// Checks again whenever the time stamp of a file changes. It ends with the process.
+/// Checks again whenever the time stamp of a file changes, or that of a file that one of them names. It ends with the
+/// process.
 fn watch(shared: &Shared, options: &Check) -> Result<(), Failure> {
     if options.files.iter().any(|f| f == Path::new("-")) {
         return Err(Failure::usage("standard input cannot be watched"));
     }
-    let stamps = || -> Vec<Option<SystemTime>> {
-        options.files.iter().map(|f| std::fs::metadata(f).and_then(|m| m.modified()).ok()).collect()
+    let stamps = |named: &[PathBuf]| -> Vec<Option<SystemTime>> {
+        let all = options.files.iter().chain(named);
+        all.map(|f| std::fs::metadata(f).and_then(|m| m.modified()).ok()).collect()
     };
     loop {
-        let seen = stamps();
+        let (started, mut named) = (SystemTime::now(), Vec::new());
+        let before = stamps(&[]);
         if std::io::stdout().is_terminal() {
             anstream::print!("\x1b[2J\x1b[H");
         }
-        match once(shared, options) {
+        match once(shared, options, &mut named) {
             Ok(()) | Err(Failure::Findings) => {}
             Err(Failure::Usage(message)) => complain(&message), // the file may be back in a moment
             Err(other) => return Err(other),
         }
         note("watching; press Ctrl-C to end");
-        while stamps() == seen {
+        let mut seen = stamps(&named);
+        // what was written while the files were read may have been missed
+        let missed = seen[..before.len()] != before[..]
+            || seen[before.len()..].iter().flatten().any(|written| *written >= started);
+        if missed {
+            seen.clear();
+        }
+        while stamps(&named) == seen {
             std::thread::sleep(Duration::from_millis(100));
         }
     }
 }
 
-fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
+/// Checks all files. `named` receives the paths of those that they name.
+fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<(), Failure> {
     let mut document = Document { schema: 1, ok: true, diagnostics: Vec::new(), solids: Vec::new() };
     let mut usage = None;
     for path in &options.files {
+        if options.fix {
+            findings::fix(shared, path)?;
+        }
         let source = input::read(path)?;
         let file = source.name.to_string();
-        match input::check(shared, source) {
+        let files = input::files(shared, &source);
+        let checked = input::check(shared, source, files.clone());
+        named.extend(files.asked().into_iter().map(PathBuf::from));
+        match checked {
             Err(diagnostics) => {
                 document.ok = false;
                 if let Failure::Usage(message) = input::failure(&diagnostics) {
                     usage = Some(message);
                 }
-                show(shared, &mut document, &diagnostics);
+                show(shared, options, &mut document, &diagnostics);
             }
             Ok(program) => {
                 let mut diagnostics = program.warnings();
                 let facts = solids(shared, &program, &file, options, &mut diagnostics)?;
-                let denied = options.deny == Some(Deny::Warnings) && !diagnostics.list.is_empty();
-                if denied || diagnostics.has_errors() {
-                    document.ok = false;
-                }
-                show(shared, &mut document, &diagnostics);
-                if !shared.json {
+                document.ok &= !findings::fail(&diagnostics.list, &options.deny);
+                show(shared, options, &mut document, &diagnostics);
+                if is_for_people(shared, options) {
                     print(&file, &program, &facts);
                 }
                 document.solids.extend(facts);
                 if let Some(plane) = options.slice {
                     let list = section::plot(shared, options, &program, plane)?;
-                    document.ok &= list.is_empty() || options.deny.is_none();
-                    if shared.json {
-                        show(shared, &mut document, &Diagnostics { list, ..diagnostics });
+                    document.ok &= !findings::fail(&list, &options.deny);
+                    if !is_for_people(shared, options) {
+                        show(shared, options, &mut document, &Diagnostics { list, ..diagnostics });
                     } else {
                         // they are about the flag, so no place in the file is shown
                         list.into_iter().for_each(|warning| warn(warning.code, warning.message));
@@ -205,6 +207,7 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
     if shared.json {
         output::json(&document)?;
     }
+    findings::write(&document.diagnostics, options.message_format)?;
     match usage {
         Some(message) => Err(Failure::Usage(message)),
         None if document.ok => Ok(()),
@@ -212,34 +215,16 @@ fn once(shared: &Shared, options: &Check) -> Result<(), Failure> {
     }
 }
 
-fn show(shared: &Shared, document: &mut Document, diagnostics: &Diagnostics) {
-    if shared.json {
-        document.diagnostics.extend(diagnostics.list.iter().map(|d| message(d, diagnostics)));
-    } else {
-        input::show(diagnostics);
-    }
+/// Whether the solids are printed, and messages with the lines of the file.
+fn is_for_people(shared: &Shared, options: &Check) -> bool {
+    !shared.json && options.message_format == MessageFormat::Human
 }
 
-fn message(diagnostic: &Diagnostic, all: &Diagnostics) -> Message {
-    let span = diagnostic.primary.span;
-    let source = all.source(span.source);
-    let at = |byte: u32| {
-        source.map_or((1, 1), |s| {
-            let p = Source::position(s, byte as usize);
-            (p.line, p.column)
-        })
-    };
-    let ((line, column), (end_line, end_column)) = (at(span.start), at(span.end));
-    Message {
-        code: diagnostic.code.0,
-        severity: diagnostic.severity.to_string(),
-        message: diagnostic.message.clone(),
-        file: source.map_or_else(String::new, |s| s.name.to_string()),
-        line,
-        column,
-        end_line,
-        end_column,
-        help: diagnostic.help.clone(),
+fn show(shared: &Shared, options: &Check, document: &mut Document, diagnostics: &Diagnostics) {
+    if is_for_people(shared, options) {
+        input::show(diagnostics);
+    } else {
+        document.diagnostics.extend(diagnostics.list.iter().map(|d| message(d, diagnostics)));
     }
 }
 

@@ -8,8 +8,9 @@ use super::args::Shared;
 use super::failure::{Failure, note};
 use crate::cli::output::Shown;
 use rfm::Program;
-use rfm::compile::text_of;
+use rfm::compile::{files_beside, text_of};
 use rfm::diagnostic::{Code, Diagnostics, Source, Style, render};
+use rfm::files::Files;
 use rfm::lower::Options;
 
 /// The text of a file, with the name that messages give it.
@@ -28,18 +29,25 @@ pub(super) fn read(path: &Path) -> Result<Source, Failure> {
     Ok(Source::file(name, text))
 }
 
+/// The files that a source may name: those in its folder, or in the current one for standard input.
+pub(super) fn files(shared: &Shared, source: &Source) -> Files {
+    files_beside(&*source.name, shared.allow_outside)
+}
+
 /// Checks a source with the params of the command line.
-pub(super) fn check(shared: &Shared, source: Source) -> Result<Program, Diagnostics> {
+pub(super) fn check(shared: &Shared, source: Source, files: Files) -> Result<Program, Diagnostics> {
     let overrides = shared.define.iter().map(|given| (given.name.clone(), given.value)).collect();
     let dimensions =
         shared.define.iter().filter_map(|given| Some((given.name.clone(), given.dimension?))).collect();
-    let options = Options { overrides, dimensions, max_nodes: shared.max_nodes, ..Options::default() };
+    let options = Options { overrides, dimensions, max_nodes: shared.max_nodes, files, ..Options::default() };
     Program::check(source, options)
 }
 
 /// Reads and checks a file, and prints its messages.
 pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> {
-    match check(shared, read(path)?) {
+    let source = read(path)?;
+    let files = files(shared, &source);
+    match check(shared, source, files) {
         Ok(program) => {
             show(&program.warnings());
             Ok(program)

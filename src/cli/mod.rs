@@ -15,11 +15,15 @@ mod choose;
 mod eval;
 mod explain;
 mod failure;
+mod findings;
+mod fmt;
 mod init;
 mod input;
+mod lsp;
 mod manual;
 mod mesh;
 mod output;
+mod params;
 mod plot;
 mod progress;
 mod report;
@@ -73,7 +77,11 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global();
         pool.map_err(|e| Failure::usage(format!("cannot start {threads} threads: {e}")))?;
     }
-    let shared = arguments.shared;
+    let mut shared = arguments.shared;
+    // of two values for one param the later one is taken
+    let mut define = params::read(&shared.params)?;
+    define.append(&mut shared.define);
+    shared.define = define;
     match arguments.command {
         args::Command::Check(options) => check::run(&shared, &options),
         args::Command::Eval(options) => eval::run(&shared, &options),
@@ -83,6 +91,8 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         args::Command::View(options) => view::run(&shared, &options),
         args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),
+        args::Command::Fmt(options) => fmt::run(&shared, &options),
+        args::Command::Lsp(options) => lsp::run(&options),
         args::Command::Init(options) => init::run(&options),
         args::Command::Completions(options) => manual::completions(&options),
         args::Command::Man(options) => manual::man(&options),

@@ -50,6 +50,18 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     Ok(())
 }
 
+/// Puts a text in place of a file at once. A link stays a link, and who may read the file may still do so.
+pub(super) fn replace(path: &Path, text: &str) -> Result<(), Failure> {
+    let failed = |e: io::Error| Failure::usage(format!("cannot write `{}`: {e}", path.shown()));
+    let target = path.canonicalize().map_err(failed)?;
+    let permissions = target.metadata().map_err(failed)?.permissions();
+    if permissions.readonly() {
+        return Err(failed(io::ErrorKind::PermissionDenied.into()));
+    }
+    write(&target, |out| out.write_all(text.as_bytes()))?;
+    std::fs::set_permissions(&target, permissions).map_err(failed)
+}
+
 /// Removes temporary files that killed commands have left in a folder, once for each folder. Those that another command is
 /// writing are locked, by a lock that ends with its process.
 fn remove_temporaries(folder: &Path) {
@@ -131,6 +143,12 @@ pub(super) fn json(document: &impl Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(document).map_err(io::Error::from)?;
     writeln!(io::stdout().lock(), "{}", escaped(&text))?;
     Ok(())
+}
+
+/// A value as JSON on one line.
+pub(super) fn json_line(value: &impl Serialize) -> Result<String, Failure> {
+    let text = serde_json::to_string(value).map_err(io::Error::from)?;
+    Ok(escaped(&text).into_owned())
 }
 
 /// JSON in which hidden characters, which stand only in its texts, are escaped.

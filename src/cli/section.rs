@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3};
 
-use super::args::{Check, Shared};
+use super::args::{Check, MessageFormat, Shared};
 use super::failure::Failure;
 use super::output::Shown;
 use super::{choose, output};
@@ -76,7 +76,7 @@ pub(super) fn plot(
     };
     let picture = picture(field, &title, plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
-    if !shared.json {
+    if !shared.json && options.message_format == MessageFormat::Human {
         say!("slice {plane} of {} written to {}", solid.name(), path.shown());
     }
     Ok(warnings)

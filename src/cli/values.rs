@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 
 use glam::DVec3;
+use rfm::diagnostic::{Diagnostic, explain};
 use rfm::geom::Aabb;
 use rfm::quantity::{Dimension, parse_quantity};
 use rfm::slice::{Axis, Plane};
@@ -51,6 +52,33 @@ pub(super) fn definition(text: &str) -> Result<Definition, String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     let (value, dimension) = parse_quantity(value)?;
     Ok(Definition { name: name.trim().to_string(), value, dimension })
+}
+
+/// Which warnings count as errors.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Deny {
+    /// All.
+    Warnings,
+    /// Those with a code.
+    Code(String),
+}
+
+impl Deny {
+    pub fn covers(&self, diagnostic: &Diagnostic) -> bool {
+        match self {
+            Self::Warnings => true,
+            Self::Code(code) => diagnostic.code.0 == code,
+        }
+    }
+}
+
+/// Reads `warnings`, or the code of a message.
+pub(super) fn deny(text: &str) -> Result<Deny, String> {
+    match text {
+        "warnings" => Ok(Deny::Warnings),
+        code if explain(code).is_some() => Ok(Deny::Code(code.to_uppercase())),
+        _ => Err("write `warnings` for all, or a code such as W0401".to_string()),
+    }
 }
 
 /// Most threads. A larger number is a typing error, and starting the threads would take minutes.

@@ -5,14 +5,16 @@
 //! use vectors too; `fma` is never emitted, because results must not depend on the processor.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, types};
 use cranelift_frontend::FunctionBuilder;
 
 use super::host_functions::HostFunction;
-use crate::ir::{Binary, Expr, Forms, Graph, Node};
+use crate::ir::{Binary, Expr, Forms, Graph, Lookup, Node, Tables};
 use crate::precision::Precision;
+use crate::table::Table;
 
 /// Emits instructions into one function.
 pub(super) struct Emitter<'a, 'f> {
@@ -148,20 +150,35 @@ impl<'a, 'f> Emitter<'a, 'f> {
     /// # Panics
     /// If it was not declared: a bug of the caller.
     pub fn call(&mut self, function: HostFunction, operands: &[Value]) -> Value {
+        self.call_behind(function, &[], operands)
+    }
+
+    /// What a table has, lane by lane. The program then has the address of the table in it.
+    ///
+    /// # Panics
+    /// If its function was not declared: a bug of the caller.
+    pub fn lookup(&mut self, lookup: Lookup, tables: &Tables, at: [Value; 3]) -> Value {
+        let table: *const Arc<dyn Table> = &raw const tables[lookup.table as usize];
+        let address = self.builder.ins().iconst(types::I64, table.addr() as i64);
+        self.call_behind(HostFunction::Table(lookup.part), &[address], &at)
+    }
+
+    /// A host function, lane by lane, with arguments that all lanes share before the others.
+    fn call_behind(&mut self, function: HostFunction, shared: &[Value], operands: &[Value]) -> Value {
         let function = self.hosts[&function];
         let vector = self.vector_type();
-        let first = self.call_in_lane(function, operands, 0);
+        let first = self.call_in_lane(function, shared, operands, 0);
         let mut result = self.builder.ins().scalar_to_vector(vector, first);
         for lane in 1..self.precision.lanes() as u8 {
-            let value = self.call_in_lane(function, operands, lane);
+            let value = self.call_in_lane(function, shared, operands, lane);
             result = self.builder.ins().insertlane(result, value, lane);
         }
         result
     }
 
-    fn call_in_lane(&mut self, function: FuncRef, operands: &[Value], lane: u8) -> Value {
-        let arguments: Vec<Value> =
-            operands.iter().map(|&v| self.builder.ins().extractlane(v, lane)).collect();
+    fn call_in_lane(&mut self, function: FuncRef, shared: &[Value], operands: &[Value], lane: u8) -> Value {
+        let mut arguments = shared.to_vec();
+        arguments.extend(operands.iter().map(|&v| self.builder.ins().extractlane(v, lane)));
         let call = self.builder.ins().call(function, &arguments);
         self.builder.inst_results(call)[0]
     }

@@ -1,11 +1,14 @@
 //! Functions that have no machine instruction: called lane by lane, the same functions that the interpreter
-//! uses.
+//! uses. Tables of a graph are looked up by such functions too; they are told where the table is.
 
-use cranelift_codegen::ir::{AbiParam, Signature, types};
+use std::sync::Arc;
+
+use cranelift_codegen::ir::{AbiParam, Signature, Type, types};
 use cranelift_codegen::isa::CallConv;
 
-use crate::ir::{Binary, BinaryFunction, Expr, Unary, UnaryFunction};
+use crate::ir::{Binary, BinaryFunction, Expr, Lookup, Part, Unary, UnaryFunction};
 use crate::precision::Precision;
+use crate::table::Table;
 
 /// Whose functions of the mathematical library a program calls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,13 +24,16 @@ pub enum Library {
 pub(super) enum HostFunction {
     Unary(UnaryFunction),
     Binary(BinaryFunction),
+    /// What a table has at a point. Its first argument is the address of the table.
+    Table(Part),
 }
 
 impl HostFunction {
     /// All of them, to be registered with the linker: names are never looked up in the host's C library.
     pub fn all() -> impl Iterator<Item = Self> {
         let of_two = BinaryFunction::ALL.iter().copied().map(Self::Binary);
-        UnaryFunction::ALL.iter().copied().map(Self::Unary).chain(of_two)
+        let tables = Lookup::PARTS.into_iter().map(Self::Table);
+        UnaryFunction::ALL.iter().copied().map(Self::Unary).chain(of_two).chain(tables)
     }
 
     /// The function that an operation calls, if it calls one.
@@ -35,7 +41,13 @@ impl HostFunction {
         match expr {
             Expr::Unary(Unary::Call(function), _) => Some(Self::Unary(function)),
             Expr::Binary(Binary::Call(function), ..) => Some(Self::Binary(function)),
-            _ => None,
+            Expr::Lookup(lookup, _) => Some(Self::Table(lookup.part)),
+            Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Unary(..)
+            | Expr::Binary(..) => None,
         }
     }
 
@@ -44,6 +56,7 @@ impl HostFunction {
         let name = match self {
             Self::Unary(function) => function.c_name(precision),
             Self::Binary(function) => function.c_name(precision),
+            Self::Table(part) => return format!("rfm_{}_{}", table_name(part), precision.name()),
         };
         match library {
             Library::Rfm => format!("rfm_math_{name}"),
@@ -57,21 +70,74 @@ impl HostFunction {
             (Self::Unary(function), Precision::F64) => function.address_f64(),
             (Self::Binary(function), Precision::F32) => function.address_f32(),
             (Self::Binary(function), Precision::F64) => function.address_f64(),
+            (Self::Table(part), Precision::F64) => match part {
+                Part::Value => in_f64::value as *const u8,
+                Part::Slope(0) => in_f64::slope_x as *const u8,
+                Part::Slope(1) => in_f64::slope_y as *const u8,
+                Part::Slope(_) => in_f64::slope_z as *const u8,
+            },
+            (Self::Table(part), Precision::F32) => match part {
+                Part::Value => in_f32::value as *const u8,
+                Part::Slope(0) => in_f32::slope_x as *const u8,
+                Part::Slope(1) => in_f32::slope_y as *const u8,
+                Part::Slope(_) => in_f32::slope_z as *const u8,
+            },
         }
     }
 
-    pub fn signature(self, convention: CallConv, precision: Precision) -> Signature {
+    /// Its signature, with addresses of this type.
+    pub fn signature(self, convention: CallConv, precision: Precision, pointer: Type) -> Signature {
         let scalar = match precision {
             Precision::F32 => types::F32,
             Precision::F64 => types::F64,
         };
         let operands = match self {
-            Self::Unary(_) => 1,
-            Self::Binary(_) => 2,
+            Self::Unary(_) => vec![scalar],
+            Self::Binary(_) => vec![scalar; 2],
+            Self::Table(_) => vec![pointer, scalar, scalar, scalar],
         };
         let mut signature = Signature::new(convention);
-        signature.params = vec![AbiParam::new(scalar); operands];
+        signature.params = operands.into_iter().map(AbiParam::new).collect();
         signature.returns = vec![AbiParam::new(scalar)];
         signature
     }
+}
+
+fn table_name(part: Part) -> &'static str {
+    Lookup { table: 0, part }.name()
+}
+
+/// The functions that look up tables, for programs in one type of numbers.
+macro_rules! lookups {
+    ($module:ident, $t:ty: $($name:ident $part:expr;)+) => {
+        mod $module {
+            use super::{Arc, Part, Table};
+
+            $(
+                /// # Safety
+                /// `table` points to a table.
+                // SAFETY: see the one use of the pointer
+                pub unsafe extern "C" fn $name(table: *const Arc<dyn Table>, x: $t, y: $t, z: $t) -> $t {
+                    // SAFETY: programs hand over an address that `Emitter::lookup` wrote into them: that of a table
+                    // of their graph, which the `Code` that is running keeps alive and in its place.
+                    let table = unsafe { &**table };
+                    $part.of(table, [f64::from(x), f64::from(y), f64::from(z)]) as $t
+                }
+            )+
+        }
+    };
+}
+
+lookups! { in_f64, f64:
+    value Part::Value;
+    slope_x Part::Slope(0);
+    slope_y Part::Slope(1);
+    slope_z Part::Slope(2);
+}
+
+lookups! { in_f32, f32:
+    value Part::Value;
+    slope_x Part::Slope(0);
+    slope_y Part::Slope(1);
+    slope_z Part::Slope(2);
 }

@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use cranelift_jit::JITModule;
 
 use super::request::Shape;
+use crate::ir::Tables;
 use crate::precision::Precision;
 
 /// Machine code of one program, freed when this is dropped.
@@ -21,23 +22,26 @@ pub struct Code {
     pub size: usize,
     /// Owns the pages; taken out only to be freed.
     module: Mutex<Option<JITModule>>,
+    /// The code has their addresses in it.
+    _tables: Tables,
 }
 
 // SAFETY: `entry` points to finished code that nobody writes to again; it stays mapped until the drop of
-// `self`, and any number of threads may execute the same code. The module is behind a mutex.
+// `self`, and any number of threads may execute the same code. The module is behind a mutex. Tables may be looked up from
+// any thread.
 unsafe impl Send for Code {}
 // SAFETY: threads that share a `Code` only execute it, which is safe for the reasons above.
 unsafe impl Sync for Code {}
 
 impl Code {
     pub(super) fn new(
-        module: JITModule,
+        (module, tables): (JITModule, Tables),
         entry: *const u8,
         (precision, shape): (Precision, Shape),
         outputs: usize,
         size: usize,
     ) -> Self {
-        Self { entry, precision, shape, outputs, size, module: Mutex::new(Some(module)) }
+        Self { entry, precision, shape, outputs, size, module: Mutex::new(Some(module)), _tables: tables }
     }
 
     /// The start of the function; valid as long as `self`.

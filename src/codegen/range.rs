@@ -7,7 +7,8 @@
 //! of R₀ by a few ulp of its larger operand.
 //!
 //! Only graphs and boxes are taken for which `range_instructions` has shown that neither infinity nor NaN can
-//! arise: min and max need not look for them. For others the interpreter answers.
+//! arise: min and max need not look for them. For others the interpreter answers. Whether a divisor may vanish
+//! is found out by the program itself, which then answers NaN.
 
 use std::collections::HashMap;
 
@@ -16,7 +17,7 @@ use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
 use cranelift_frontend::FunctionBuilder;
 
 use super::emitter::{Emitter, Hosts};
-use super::range_instructions::{Instruction, Instructions, RangeBinary, RangeUnary};
+use super::range_instructions::{Instruction, Instructions, LEAST_DIVISOR, RangeBinary, RangeUnary};
 use super::request::{Request, Rounding, pointers};
 use crate::ir::{Affine, Node, Unary};
 use crate::precision::Precision;
@@ -55,7 +56,8 @@ pub(super) fn emit(
     let [parameters, uniforms] = pointers(request, &arguments[2..]);
     let hosts = Hosts::default(); // no instruction calls a function
     let emitter = Emitter::new(builder, Precision::F64, (request.graph, request.forms), &hosts);
-    let mut ranges = Ranges { emitter, rounding, numbers: HashMap::new(), values: HashMap::new() };
+    let (numbers, values) = (HashMap::new(), HashMap::new());
+    let mut ranges = Ranges { emitter, rounding, numbers, values, pole: None };
     // bound by bound: two numbers that were just written cannot be read as one vector before they reach the
     // cache
     let axes: [Value; 3] = std::array::from_fn(|i| {
@@ -81,13 +83,15 @@ pub(super) fn emit(
             Instruction::Slab { of, first, second } => ranges.slab(ranges.values[&of], first, second),
             Instruction::Unary(op, a) => ranges.unary(op, ranges.values[&a]),
             Instruction::Binary(op, a, b) => ranges.binary(op, a, b),
-            Instruction::Share => ranges.pair(0.0, 1.0),
+            Instruction::Share(a, b) => ranges.share(ranges.values[&a], ranges.values[&b]),
             Instruction::Divide(a, number) => ranges.divide(ranges.values[&a], ranges.numbers[&number]),
+            Instruction::Quotient(a, b) => ranges.quotient(ranges.values[&a], ranges.values[&b]),
         };
         ranges.values.insert(node, value);
     }
     for (i, node) in request.outputs.iter().enumerate() {
         let range = ranges.flip(ranges.values[node], BoundLane::Low);
+        let range = ranges.unless_at_a_pole(range);
         ranges.emitter.builder.ins().store(MemFlagsData::new(), range, output, 16 * i as i32);
     }
     ranges.emitter.builder.ins().return_(&[]);
@@ -113,6 +117,8 @@ struct Ranges<'a, 'f> {
     rounding: Rounding,
     numbers: HashMap<Node, RangeNumber>,
     values: HashMap<Node, Value>,
+    /// A mask: all ones if a divisor may be too near to 0. `None` if nothing is divided by.
+    pole: Option<Value>,
 }
 
 impl Ranges<'_, '_> {
@@ -285,6 +291,46 @@ impl Ranges<'_, '_> {
         let (v, magnitude) = self.turned(v, number);
         let quotient = self.emitter.builder.ins().fdiv(v, magnitude);
         self.up(quotient)
+    }
+
+    /// From 0 to 1, or one of them where the ranges do not overlap.
+    fn share(&mut self, a: Value, b: Value) -> Value {
+        let turned = self.swap(b);
+        // b.hi − a.lo and a.hi − b.lo, whose signs are exact
+        let gaps = self.fadd(a, turned);
+        let zero = self.emitter.constant(0.0);
+        let [b_is_less, a_is_less] = [BoundLane::Low, BoundLane::High].map(|lane| {
+            let gap = self.both(gaps, lane);
+            self.emitter.compare(FloatCC::LessThan, gap, zero)
+        });
+        let (any, all) = (self.pair(0.0, 1.0), self.pair(-1.0, 1.0));
+        let share = self.emitter.select(a_is_less, all, any);
+        self.emitter.select(b_is_less, zero, share)
+    }
+
+    /// By a range that is meant not to hold 0: times its reciprocals [−1/hi, 1/lo], which are
+    /// −1 over the bounds of −b.
+    fn quotient(&mut self, a: Value, b: Value) -> Value {
+        let turned = self.swap(b);
+        // −lo or hi is far below 0
+        let nearest = self.min(b, turned);
+        let limit = self.emitter.constant(-LEAST_DIVISOR);
+        let is_near = self.emitter.compare(FloatCC::GreaterThan, nearest, limit);
+        self.pole = Some(match self.pole {
+            Some(pole) => self.emitter.builder.ins().bor(pole, is_near),
+            None => is_near,
+        });
+        let minus_one = self.emitter.constant(-1.0);
+        let reciprocals = self.emitter.builder.ins().fdiv(minus_one, turned);
+        let reciprocals = self.up(reciprocals);
+        self.multiply(a, reciprocals)
+    }
+
+    /// A range, or NaN where a divisor may be too near to 0.
+    fn unless_at_a_pole(&mut self, range: Value) -> Value {
+        let Some(pole) = self.pole else { return range };
+        let unknown = self.emitter.constant(f64::NAN);
+        self.emitter.select(pole, unknown, range)
     }
 
     /// The largest of the four products of bounds, and of their negatives.

@@ -16,6 +16,9 @@ const LARGEST: f64 = 1e300;
 /// Operands of R₀ beyond this might have squares that do.
 const LARGEST_OPERAND: f64 = 1e150;
 
+/// Divisors nearer to 0 are left to the interpreter.
+pub(super) const LEAST_DIVISOR: f64 = 1e-60;
+
 /// Whether machine code can answer for this graph.
 pub fn supports(graph: &Graph, root: Node) -> bool {
     knows(graph) && stays_finite(graph, &RangeEvaluator::new(graph, root), Region::of(&Aabb::EMPTY))
@@ -44,8 +47,10 @@ pub(super) enum Instruction {
     Binary(RangeBinary, Node, Node),
     /// By a constant or a parameter.
     Divide(Node, Node),
-    /// From 0 to 1: a derivative of the smaller or larger of two numbers.
-    Share,
+    /// By a node that may vanish: where it is within [`LEAST_DIVISOR`] of 0 the program has no answer.
+    Quotient(Node, Node),
+    /// The share of the first in the smaller of both: a derivative.
+    Share(Node, Node),
 }
 
 /// The operations on one range.
@@ -95,12 +100,19 @@ impl Instruction {
             RangeRule::Plain(Expr::Parameter(i)) => Self::Parameter(i),
             RangeRule::Plain(Expr::Uniform(i)) => Self::Uniform(i),
             RangeRule::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
-            RangeRule::Plain(Expr::Binary(Binary::Div, a, b)) => {
-                let by_number = matches!(graph.expr(b), Expr::Constant(_) | Expr::Parameter(_));
-                by_number.then_some(Self::Divide(a, b))?
-            }
-            RangeRule::Plain(Expr::Binary(Binary::MinWeight | Binary::MaxWeight, ..)) => Self::Share,
+            RangeRule::Plain(Expr::Binary(Binary::Div, a, b)) => match graph.expr(b) {
+                Expr::Constant(_) | Expr::Parameter(_) => Self::Divide(a, b),
+                Expr::Coordinate(_)
+                | Expr::Uniform(_)
+                | Expr::Unary(..)
+                | Expr::Binary(..)
+                | Expr::Lookup(..) => Self::Quotient(a, b),
+            },
+            RangeRule::Plain(Expr::Binary(Binary::DivOrZero, a, b)) => Self::Quotient(a, b),
+            RangeRule::Plain(Expr::Binary(Binary::MinWeight, a, b)) => Self::Share(a, b),
+            RangeRule::Plain(Expr::Binary(Binary::MaxWeight, a, b)) => Self::Share(b, a),
             RangeRule::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
+            RangeRule::Plain(Expr::Lookup(..)) => return None,
         })
     }
 }
@@ -142,10 +154,10 @@ impl RangeBinary {
 }
 
 /// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by
-/// zero is not finite.
+/// a node that may vanish is as large as [`LEAST_DIVISOR`] allows; one by a number that is zero is not finite.
 pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
     let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
-    let ranges = evaluator.all_with(&Region { space: &space, ..numbers });
+    let ranges = evaluator.all_without_poles(&Region { space: &space, ..numbers }, LEAST_DIVISOR);
     let within = |node: Node, limit: f64| {
         let range = ranges[node.index()];
         range.lo > -limit && range.hi < limit
@@ -160,6 +172,7 @@ pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'
             | Expr::Coordinate(_)
             | Expr::Parameter(_)
             | Expr::Uniform(_)
+            | Expr::Lookup(..)
             | Expr::Unary(..)
             | Expr::Binary(
                 Binary::Add

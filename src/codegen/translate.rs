@@ -60,7 +60,9 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
     let Defined { id, size, listing } = define(&mut module, request, named, listing)?;
     module.finalize_definitions().map_err(|e| CodegenError::Unsupported(e.to_string()))?;
     let entry = module.get_finalized_function(id);
-    let code = Code::new(module, entry, (request.precision, request.shape), request.outputs.len(), size);
+    let tables = request.graph.tables().clone();
+    let code =
+        Code::new((module, tables), entry, (request.precision, request.shape), request.outputs.len(), size);
     Ok((code, listing))
 }
 
@@ -93,6 +95,9 @@ pub(super) fn define(
     let needed = needed(request);
     if needed.iter().any(|&node| request.graph.expr(node) == Expr::Coordinate(Axis::T)) {
         return Err(CodegenError::Bug("time is in the graph of a program".into()));
+    }
+    if named.linkage == Linkage::Export && request.graph.has_lookups(request.outputs) {
+        return Err(CodegenError::Unsupported("a table cannot be written into an object file".into()));
     }
     let instructions = match request.shape {
         Shape::Range(_) => Instructions::of(request.graph)
@@ -159,7 +164,8 @@ fn declare_hosts(
             continue;
         }
         let convention = module.target_config().default_call_conv;
-        let signature = host.signature(convention, request.precision);
+        let pointer = module.target_config().pointer_type();
+        let signature = host.signature(convention, request.precision, pointer);
         let id =
             module.declare_function(&host.symbol(request.precision, library), Linkage::Import, &signature)?;
         hosts.insert(host, module.declare_func_in_func(id, function));
@@ -269,6 +275,9 @@ fn nodes(
             Expr::Uniform(i) => emitter.parameter(uniforms, i),
             Expr::Unary(op, a) => emitter.unary(op, values[&a]),
             Expr::Binary(op, a, b) => emitter.binary(op, (a, values[&a]), (b, values[&b])),
+            Expr::Lookup(lookup, at) => {
+                emitter.lookup(lookup, request.graph.tables(), at.map(|node| values[&node]))
+            }
         };
         values.insert(node, value);
     }

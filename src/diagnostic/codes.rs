@@ -35,7 +35,7 @@ EMPTY_FILE = "E0003":
     solid ball = sphere(1)";
 SYNTAX = "E0101":
 "The text does not fit the grammar at the marked place. Items start with one of the words `param`, `let`, `fn`,
-`solid`, `scene`; an item ends where the next one begins.
+`solid`, `scene`, `import`; an item ends where the next one begins.
 
     rfm 1
     param r = 0.5
@@ -105,6 +105,26 @@ back on itself. List the corners along the outline, each once, in either directi
 
     rfm 1
     solid arrow = polygon([[0, 0], [2, 1], [0, 2], [0.5, 1]]).extrude(0, 1)";
+FILE = "E0216":
+"A file that this file names cannot be read, or is not what it is read as: a list of points, a map of heights. Paths begin
+at the folder of the file in which they are written, and lead to files in the folder of the file that is compiled or below
+it; --allow-outside lets them lead anywhere. A text that a program hands over has no folder: the program says where files
+come from.
+
+    rfm 1
+    import \"parts/chess.rfm\" as chess
+    solid piece = chess.pawn";
+MESH = "E0217":
+"A file of triangles must enclose a solid: each edge belongs to two triangles, which are wound the same way, and no part of
+the surface lies within the solid or on another part of it. STL, OBJ and PLY files are read, as text or as bytes; corners
+are the same only if their coordinates are, to the last digit. Bodies that overlap belong into files of their own, joined
+by `or`. The message says what is wrong, and where.
+
+    rfm 1
+    solid part = mesh(\"part.stl\", 1 mm)";
+IMPORT = "E0218":
+"An `import` takes the solids, functions, params and names of another file of this language. Files cannot import one
+another in a circle, and a mesh is read by `mesh(…)` instead.";
 SCENE_KEY = "E0301":
 "The scene does not know this key, or this value of it, at this place. What it knows:
 

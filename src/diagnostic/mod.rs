@@ -58,6 +58,21 @@ pub struct Diagnostic {
     pub secondary: Vec<Label>,
     /// What would be accepted, or what to do.
     pub help: Option<String>,
+    /// A change of the text that does what the help says.
+    pub edit: Option<Edit>,
+}
+
+/// A change of a text that removes the cause of a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Edit {
+    /// The place that is replaced; empty where something is inserted.
+    pub span: Span,
+    /// What stands there. The edit is for texts in which it does.
+    pub written: String,
+    /// What is written instead.
+    pub replacement: String,
+    /// Whether the file means the same afterwards, so that the edit can be made unseen.
+    pub is_safe: bool,
 }
 
 impl Diagnostic {
@@ -70,6 +85,7 @@ impl Diagnostic {
             primary: Label { span, text: String::new() },
             secondary: Vec::new(),
             help: None,
+            edit: None,
         }
     }
 
@@ -99,11 +115,35 @@ impl Diagnostic {
         self
     }
 
-    /// Adds the help "did you mean `name`?" if one of the candidates is near enough to what was written.
+    /// Adds the edit that replaces what is written at a place.
+    #[must_use]
+    pub fn edit(
+        mut self,
+        span: Span,
+        written: impl Into<String>,
+        replacement: impl Into<String>,
+        is_safe: bool,
+    ) -> Self {
+        self.edit = Some(Edit { span, written: written.into(), replacement: replacement.into(), is_safe });
+        self
+    }
+
+    /// The edit, if the text holds at its place what it replaces.
+    pub fn edit_of(&self, source: &Source) -> Option<&Edit> {
+        self.edit.as_ref().filter(|edit| {
+            edit.span.source == source.id && source.text.get(edit.span.range()) == Some(edit.written.as_str())
+        })
+    }
+
+    /// Adds the help "did you mean `name`?" and the edit that writes the name, if one of the candidates is near enough to
+    /// what was written.
     #[must_use]
     pub fn suggest<'a>(self, written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Self {
         match nearest(written, candidates) {
-            Some(name) => self.help(format!("did you mean `{name}`?")),
+            Some(name) => {
+                let span = self.primary.span;
+                self.help(format!("did you mean `{name}`?")).edit(span, written, name, false)
+            }
             None => self,
         }
     }

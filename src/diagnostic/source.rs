@@ -9,6 +9,18 @@ pub enum SourceId {
     Prelude,
     /// The user's file.
     File,
+    /// A file that the user's file imports, or one of those imports: its number.
+    Import(u16),
+}
+
+impl SourceId {
+    /// Whether it is a text that a user has written.
+    pub fn is_users(self) -> bool {
+        match self {
+            Self::Prelude => false,
+            Self::File | Self::Import(_) => true,
+        }
+    }
 }
 
 /// A range of bytes of one source text. Every node of every stage carries the span that it came from.

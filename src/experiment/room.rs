@@ -85,7 +85,10 @@ impl Experiment {
                 let span = fluid.size_span.unwrap_or(fluid.shape_span);
                 no_room(span, message).help(format!("write for example `spacing: {}`", length(fits)))
             }
-            SeedError::NothingLeft(carved) if carved.inside + carved.too_close + carved.outside_box == 0 => {
+            SeedError::NothingLeft(carved)
+                if carved.inside + carved.too_close + carved.outside_box == 0
+                    || spacing > self.size_of_shape().max_element() =>
+            {
                 self.too_coarse()
             }
             SeedError::NothingLeft(_) => {
@@ -100,11 +103,16 @@ impl Experiment {
         refuse(&self.program, diagnostic)
     }
 
+    /// The size of the box around the fluid's shape within the domain, m.
+    fn size_of_shape(&self) -> DVec3 {
+        self.reach().map_or(DVec3::ZERO, |bounds| bounds.intersection(&self.scene.domain).size())
+    }
+
     /// The message for a shape in which not one particle fits.
     fn too_coarse(&self) -> Diagnostic {
         let fluid = &self.scene.fluid;
         let spacing = self.parameters.spacing();
-        let size = self.reach().map_or(DVec3::ZERO, |bounds| bounds.intersection(&self.scene.domain).size());
+        let size = self.size_of_shape();
         let message = format!(
             "not one particle fits: they are {} apart, and the shape is only {} thick",
             length(spacing),

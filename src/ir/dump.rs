@@ -25,6 +25,11 @@ pub fn dump(graph: &Graph, roots: &[(&str, Node)], sources: &[Source]) -> String
             Expr::Parameter(i) => format!("%{number} = parameter {i}"),
             Expr::Unary(op, a) => format!("%{number} = {} %{}", op.name(), numbers[&a]),
             Expr::Binary(op, a, b) => format!("%{number} = {} %{} %{}", op.name(), numbers[&a], numbers[&b]),
+            Expr::Lookup(lookup, at) => {
+                let [x, y, z] = at.map(|node| numbers[&node]);
+                let table = graph.tables()[lookup.table as usize].fingerprint();
+                format!("%{number} = {} {table} %{x} %{y} %{z}", lookup.name())
+            }
         };
         let place = graph.span(node).and_then(|span| {
             let source = sources.iter().find(|s| s.id == span.source)?;

@@ -1,10 +1,14 @@
 //! The graph itself: interning, spans, substitution, extraction.
 
+use std::sync::Arc;
+
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
 use crate::diagnostic::Span;
+use crate::ir::lookup::{Lookup, Tables};
 use crate::ir::op::{Binary, Unary};
+use crate::table::Table;
 
 /// An operation of one graph; only that graph makes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -52,17 +56,20 @@ pub enum Expr {
     Unary(Unary, Node),
     /// An operation on two nodes.
     Binary(Binary, Node, Node),
+    /// What one of the graph's tables has at the place that three nodes are.
+    Lookup(Lookup, [Node; 3]),
 }
 
 impl Expr {
     /// The nodes that it is computed from, in order.
     pub fn operands(self) -> impl Iterator<Item = Node> {
-        let (a, b) = match self {
-            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) | Self::Uniform(_) => (None, None),
-            Self::Unary(_, a) => (Some(a), None),
-            Self::Binary(_, a, b) => (Some(a), Some(b)),
+        let all = match self {
+            Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) | Self::Uniform(_) => [None; 3],
+            Self::Unary(_, a) => [Some(a), None, None],
+            Self::Binary(_, a, b) => [Some(a), Some(b), None],
+            Self::Lookup(_, at) => at.map(Some),
         };
-        a.into_iter().chain(b)
+        all.into_iter().flatten()
     }
 
     /// The operation with its operands replaced.
@@ -71,6 +78,7 @@ impl Expr {
             Self::Constant(_) | Self::Coordinate(_) | Self::Parameter(_) | Self::Uniform(_) => self,
             Self::Unary(op, a) => Self::Unary(op, f(a)),
             Self::Binary(op, a, b) => Self::Binary(op, f(a), f(b)),
+            Self::Lookup(lookup, at) => Self::Lookup(lookup, at.map(f)),
         }
     }
 
@@ -89,9 +97,41 @@ pub struct Graph {
     exprs: Vec<Expr>,
     spans: Vec<Option<Span>>,
     interned: FxHashMap<Expr, Node>,
+    /// See [`Lookup`]. Graphs that are made of one another share them.
+    tables: Tables,
 }
 
 impl Graph {
+    /// A graph without nodes, for those of another one: it has the same tables.
+    pub fn like(other: &Self) -> Self {
+        Self { tables: other.tables.clone(), ..Self::default() }
+    }
+
+    /// The tables that [`Lookup`] numbers.
+    pub fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// The number of a table, which is added unless it is there.
+    pub fn table(&mut self, table: &Arc<dyn Table>) -> u32 {
+        let known = self.tables.iter().position(|known| Arc::ptr_eq(known, table));
+        let number = known.unwrap_or_else(|| {
+            self.tables = self.tables.iter().chain([table]).cloned().collect();
+            self.tables.len() - 1
+        });
+        number as u32
+    }
+
+    /// Whether some roots look up a table.
+    pub fn has_lookups(&self, roots: &[Node]) -> bool {
+        let is_lookup = |expr: &Expr| matches!(expr, Expr::Lookup(..));
+        // few graphs have tables, and the others need not be walked
+        !self.tables.is_empty() && {
+            let used = self.reachable(roots);
+            std::iter::zip(&self.exprs, used).any(|(expr, used)| used && is_lookup(expr))
+        }
+    }
+
     /// How many nodes there are.
     pub fn len(&self) -> usize {
         self.exprs.len()
@@ -166,7 +206,7 @@ impl Graph {
 
     /// A graph of its own for one root; the work grows with what the root uses, not with this graph.
     pub fn extract_cone(&self, root: Node) -> (Self, Node) {
-        let mut out = Self::default();
+        let mut out = Self::like(self);
         let mut image: FxHashMap<Node, Node> = FxHashMap::default();
         for node in self.cone(root) {
             let new = out.intern(self.expr(node).map(|operand| image[&operand]), self.span(node));
@@ -182,7 +222,7 @@ impl Graph {
     pub fn parametrised(&self, root: Node) -> (Self, Node, Vec<f64>) {
         let mut walk = Parametrisation {
             graph: self,
-            out: Self::default(),
+            out: Self::like(self),
             constants: Vec::new(),
             image: FxHashMap::default(),
         };
@@ -317,6 +357,7 @@ impl Graph {
                 Expr::Coordinate(_) | Expr::Uniform(_) => return None,
                 Expr::Unary(op, a) => op.eval(values[&a]),
                 Expr::Binary(op, a, b) => op.eval(values[&a], values[&b]),
+                Expr::Lookup(lookup, at) => lookup.eval(&self.tables, at.map(|node| values[&node])),
             };
             values.insert(node, value);
         }
@@ -326,7 +367,7 @@ impl Graph {
     /// A graph of its own for some roots, without what they do not use.
     pub fn extract(&self, roots: &[Node]) -> (Self, Vec<Node>) {
         let used = self.reachable(roots);
-        let mut out = Self::default();
+        let mut out = Self::like(self);
         let mut image: Vec<Option<Node>> = vec![None; self.len()];
         for (node, expr) in self.nodes().filter(|(node, _)| used[node.index()]) {
             let mapped = expr.map(|operand| image[operand.index()].unwrap_or(operand));

@@ -5,6 +5,7 @@ use std::cell::RefCell;
 
 use crate::ir::form::{Form, Forms};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::lookup::Tables;
 use crate::ir::real::Real;
 
 /// A graph with its outputs, evaluated operation by operation in `f64` or `f32`.
@@ -13,6 +14,7 @@ pub struct Interpreter {
     /// Operations, and the form of each in `f64` and in `f32`.
     steps: Vec<(Expr, [Form; 2])>,
     outputs: Vec<Node>,
+    tables: Tables,
 }
 
 /// The numbers that a graph is evaluated for.
@@ -54,7 +56,8 @@ impl Interpreter {
             Expr::Binary(_, a, b) => (expr, forms.map(|forms| forms.of(a, b))),
             expr => (expr, [Form::Stable; 2]),
         };
-        Self { steps: graph.nodes().map(|(_, expr)| step(expr)).collect(), outputs: outputs.to_vec() }
+        let steps = graph.nodes().map(|(_, expr)| step(expr)).collect();
+        Self { steps, outputs: outputs.to_vec(), tables: graph.tables().clone() }
     }
 
     /// All outputs at a point; `out` is as long as the outputs.
@@ -96,6 +99,7 @@ impl Interpreter {
                 Expr::Uniform(i) => number(given.uniforms, i),
                 Expr::Unary(op, a) => op.eval(values[a.index()]),
                 Expr::Binary(op, a, b) => forms[precision].eval(op, values[a.index()], values[b.index()]),
+                Expr::Lookup(lookup, at) => lookup.eval(&self.tables, at.map(|node| values[node.index()])),
             };
             values.push(value);
         }

@@ -7,6 +7,7 @@
 //! | file or folder | what it holds |
 //! |---|---|
 //! | `graph`, `op`, `function`, `r0`, `form` | the graph, its operations, the forms in which R₀ is computed |
+//! | `lookup` | fields that are looked up in a table |
 //! | `interpreter` | the meaning of a graph |
 //! | `derived` | graphs made of a graph: gradient, contact, sign twin, what depends on time alone; and its rigid motion |
 //! | `bounds` | ranges, magnitudes and rounding errors over boxes |
@@ -27,6 +28,7 @@ mod function;
 mod function_rules;
 mod graph;
 mod interpreter;
+mod lookup;
 mod on_path;
 mod op;
 pub mod r0;
@@ -38,7 +40,8 @@ pub use bounds::magnitude::Magnitudes;
 pub use bounds::range::RangeEvaluator;
 pub(crate) use bounds::range::{Affine, RangeRule, Region};
 pub(crate) use contraction::{
-    Contracted, Contractor, LinearForm, Wanted, contract_linear, contract_linear_around, reach,
+    Contracted, Contractor, LinearForm, SURFACE_ROUNDING, Wanted, contract_linear, contract_linear_around,
+    reach,
 };
 pub(crate) use derived::contact::{contact, wall_velocity};
 pub use derived::gradient::gradient;
@@ -53,6 +56,7 @@ pub use form::{Form, Forms};
 pub use function::{BinaryFunction, UnaryFunction};
 pub use graph::{Axis, Expr, Graph, Node};
 pub use interpreter::{Given, Interpreter};
+pub use lookup::{Lookup, Part, Tables};
 pub(crate) use on_path::enclosure::{Enclosure, EnclosureEvaluator};
 pub(crate) use on_path::polynomial::polynomial_on_path;
 pub(crate) use op::R0;

@@ -12,7 +12,9 @@ impl<'a> Lowering<'a> {
         match self.names.get(self.scope.source, &name.text).map(|g| (g.kind.clone(), g.source)) {
             Some((Kind::Function(function), source)) => self.call_function(function, source, arguments, span),
             Some((Kind::Value(value) | Kind::Solid(value), _)) if value == Value::Failed => Value::Failed,
-            Some((Kind::Value(_) | Kind::Solid(_) | Kind::Scene, _)) if !builtins::exists(&name.text) => {
+            Some((Kind::Value(_) | Kind::Solid(_) | Kind::Scene | Kind::Import(_), _))
+                if !builtins::exists(&name.text) =>
+            {
                 let message = format!("`{}` is not a function", name.text);
                 self.fail(
                     Diagnostic::error(Code::NOT_A_FUNCTION, name.span, message)
@@ -22,18 +24,18 @@ impl<'a> Lowering<'a> {
             }
             _ if builtins::exists(&name.text) => self.call_builtin(name, arguments, span),
             _ => {
-                if self.names.defined_later(&name.text).is_none()
+                if self.names.defined_later(self.scope.source, &name.text).is_none()
                     && let Some(foreign) = self.foreign_function(name, arguments)
                 {
                     return self.fail(foreign);
                 }
-                let mut candidates = self.names.candidates(true);
+                let mut candidates = self.names.candidates(self.scope.source, true);
                 candidates.extend(builtins::names().map(String::from));
                 let message = format!("unknown function or shape `{}`", name.text);
                 let diagnostic = Diagnostic::error(Code::UNKNOWN_NAME, name.span, message)
                     .at("not defined above")
                     .suggest(&name.text, candidates.iter().map(String::as_str));
-                let diagnostic = match self.names.defined_later(&name.text) {
+                let diagnostic = match self.names.defined_later(self.scope.source, &name.text) {
                     Some(later) => diagnostic.label(later, "defined here"),
                     None => diagnostic,
                 };
@@ -61,7 +63,7 @@ impl<'a> Lowering<'a> {
         self.call_function(function, source, &all, span)
     }
 
-    fn call_function(
+    pub fn call_function(
         &mut self,
         function: &'a Function,
         source: SourceId,
@@ -75,7 +77,7 @@ impl<'a> Lowering<'a> {
         if source == SourceId::Prelude && name == "box" && self.box_of_one_corner(arguments, span) {
             return Value::Failed;
         }
-        let Some(mut bound) = self.bind(function, arguments, span) else { return Value::Failed };
+        let Some(mut bound) = self.bind((function, source), arguments, span) else { return Value::Failed };
         let call = Call { function: name.clone(), source, span };
         let mut calls = self.scope.calls.clone();
         calls.push(call);
@@ -98,11 +100,16 @@ impl<'a> Lowering<'a> {
     }
 
     /// The arguments by the names of their parameters; what does not fit is reported.
-    fn bind(&mut self, function: &Function, arguments: &[Argument], span: Span) -> Option<Vec<Local>> {
+    fn bind(
+        &mut self,
+        (function, source): (&Function, SourceId),
+        arguments: &[Argument],
+        span: Span,
+    ) -> Option<Vec<Local>> {
         let name = &function.name.text;
         let mut bound: Vec<Local> = Vec::new();
         let mut fits = true;
-        let standard = self.names.is_standard(name);
+        let standard = !source.is_users();
         for (position, argument) in arguments.iter().enumerate() {
             // no parameter of a standard solid is an angle
             fits &= !standard || function.takes_a_shape() || self.no_angle(&argument.value);
@@ -125,7 +132,7 @@ impl<'a> Lowering<'a> {
                 fits = false;
                 continue;
             }
-            let at = if argument.value.span.source == SourceId::File {
+            let at = if argument.value.span.source.is_users() {
                 argument.value.span
             } else {
                 self.user_span(span)
@@ -214,7 +221,7 @@ impl<'a> Lowering<'a> {
         let diagnostic = Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many");
         let signature = signature(function);
         self.report(diagnostic.help(match example(&function.name.text) {
-            Some(example) if self.names.is_standard(&function.name.text) => {
+            Some(example) if self.names.is_standard(self.scope.source, &function.name.text) => {
                 format!("its parameters are {signature}: write for example `{example}`")
             }
             _ => format!("its parameters are {signature}"),

@@ -33,7 +33,7 @@ enum Meaning {
 }
 
 /// The builtins that are more than one operation on one number.
-const COMPOSED: [Builtin; 21] = {
+const COMPOSED: [Builtin; 24] = {
     use Meaning::{Number, NumberOfVectors, Unevaluated, Value, Vector};
     const MANY: usize = usize::MAX;
     const fn builtin(name: &'static str, arity: (usize, usize), meaning: Meaning) -> Builtin {
@@ -72,6 +72,9 @@ const COMPOSED: [Builtin; 21] = {
         builtin("random", (2, 2), Value(|l, values, arguments| l.random(values, arguments))),
         builtin("count", (1, 1), Value(|l, values, arguments| l.count(&values[0], &arguments[0].value))),
         builtin("polygon", (1, 1), Value(|l, values, arguments| l.polygon(&values[0], &arguments[0].value))),
+        builtin("mesh", (1, 2), Value(|l, values, arguments| l.mesh(values, arguments))),
+        builtin("height_map", (3, 4), Value(|l, values, arguments| l.height_map(values, arguments))),
+        builtin("points", (1, 1), Value(|l, values, arguments| l.points(values, arguments))),
         builtin("around", (2, 2), Number(|l, a, span| l.around(a[0], a[1], span))),
         builtin("slope", (1, 1), Number(|l, a, span| l.slope(a[0], span))),
         builtin("normalise", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),

@@ -123,6 +123,7 @@ impl Lowering<'_> {
             | ExprKind::Power { .. }
             | ExprKind::Call { .. }
             | ExprKind::Component { .. }
+            | ExprKind::Member { .. }
             | ExprKind::Method { .. }
             | ExprKind::Index { .. }
             | ExprKind::Fold { .. } => None,

@@ -84,6 +84,7 @@ impl Lowering<'_> {
                 let value = self.expr(vector);
                 self.component(&value, *axis, self.origin(vector))
             }
+            ExprKind::Member { of, name } => self.member(of, name),
             ExprKind::Method { receiver, method, arguments } => {
                 self.method(receiver, method, arguments, span)
             }
@@ -159,6 +160,7 @@ impl Lowering<'_> {
         }
         match self.names.get(self.scope.source, name).map(|global| global.kind.clone()) {
             Some(Kind::Value(value) | Kind::Solid(value)) => value,
+            Some(Kind::Import(_)) => self.file_as_value(name, span),
             Some(Kind::Scene) => {
                 let message = format!("`{name}` is a scene, not a value");
                 self.fail(Diagnostic::error(Code::WRONG_TYPE, span, message))
@@ -181,20 +183,22 @@ impl Lowering<'_> {
                 self.fail(Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`")))
             }
             None => {
-                let candidates = self.names.candidates(false);
+                let candidates = self.names.candidates(self.scope.source, false);
                 let locals: Vec<String> = self.scope.locals.iter().map(|l| l.name.clone()).collect();
                 let all =
                     candidates.iter().chain(&locals).map(String::as_str).chain(["x", "y", "z", "t", "pi"]);
                 let diagnostic =
                     Diagnostic::error(Code::UNKNOWN_NAME, span, format!("unknown name `{name}`"));
-                let diagnostic = match (self.names.defined_later(name), foreign::value(name)) {
-                    (Some(later), _) => diagnostic
-                        .at("not defined above")
-                        .label(later, "defined here")
-                        .help("a name means what was defined above it: move this line down, or that one up"),
-                    (None, Some(help)) => diagnostic.at("not defined above").help(help),
-                    (None, None) => diagnostic.at("not defined above").suggest(name, all),
-                };
+                let diagnostic =
+                    match (self.names.defined_later(self.scope.source, name), foreign::value(name)) {
+                        (Some(later), _) => {
+                            diagnostic.at("not defined above").label(later, "defined here").help(
+                                "a name means what was defined above it: move this line down, or that one up",
+                            )
+                        }
+                        (None, Some(help)) => diagnostic.at("not defined above").help(help),
+                        (None, None) => diagnostic.at("not defined above").suggest(name, all),
+                    };
                 self.fail(diagnostic)
             }
         }
@@ -314,7 +318,8 @@ impl Lowering<'_> {
                     let message = format!("`{}` means the same as `{}` here", orders.0, orders.1);
                     self.report(
                         Diagnostic::warning(Code::STRICT_COMPARISON, *at, message)
-                            .help(format!("write `{}`", orders.1)),
+                            .help(format!("write `{}`", orders.1))
+                            .edit(*at, orders.0, orders.1, true),
                     );
                 }
                 Comparison::LessEqual | Comparison::GreaterEqual => {}

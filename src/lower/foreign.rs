@@ -193,9 +193,16 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
         "rotate_extrude" | "lathe" | "sor" => {
             written("`.revolve()` here", "polygon([[1, 0], [2, 0], [1.5, 1]]).revolve()")
         }
-        "text" | "surface" | "heightfield" | "height_field" | "import" | "mesh" | "load" | "stl" => words(
-            "nothing can be read from other files",
-            "describe the shape by standard solids and inequalities",
+        "import" | "load" | "stl" | "obj" | "ply" => words(
+            "`mesh(…)` here, and `import` for a file of this language",
+            "write `mesh(\"part.stl\")`, or `import \"chess.rfm\" as chess` in front of the solids",
+        ),
+        "surface" | "heightfield" | "height_field" | "heightmap" => {
+            written("`height_map(…)` here", "height_map(\"terrain.csv\", [0, 0], [100, 80])")
+        }
+        "text" => words(
+            "there are no letters",
+            "write a letter as a polygon, or read a mesh of it by `mesh(\"letter.stl\")`",
         ),
         _ => None,
     }

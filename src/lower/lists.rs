@@ -42,7 +42,7 @@ impl Lowering<'_> {
     }
 
     /// A list that is not too large: names may stand for lists of lists, which grow fast.
-    fn list(&mut self, members: Vec<Value>, span: Span) -> Value {
+    pub fn list(&mut self, members: Vec<Value>, span: Span) -> Value {
         let list = Value::List(members.into());
         let (count, depth) = list.extent();
         if count > MOST_NUMBERS || depth > DEEPEST_LIST {

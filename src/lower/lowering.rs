@@ -7,6 +7,7 @@ use super::module::Module;
 use super::names::Names;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
+use crate::files::Files;
 use crate::ir::{Axis, Binary, Expr as Operation, Node, Unary};
 use crate::quantity::Dimension;
 use crate::sph::Method;
@@ -27,6 +28,13 @@ pub(super) struct Lowering<'a> {
     pub scope: Scope,
     /// The text of the file.
     pub text: Arc<str>,
+    /// Its name.
+    pub file_name: Arc<str>,
+    /// Names of the imported files that were read so far.
+    pub imported: Vec<(Arc<str>, SourceId)>,
+    /// What stands in front of the names of params: `chess.` in an imported file.
+    pub qualifier: String,
+    pub files: Files,
     /// Whether the value of a solid is being evaluated, where only lengths and angles have units.
     pub in_shape: bool,
     /// Whether the value of a `let` is read.
@@ -85,6 +93,10 @@ impl Lowering<'_> {
             names: Names::default(),
             scope: Scope { source: SourceId::Prelude, locals: Vec::new(), calls: Vec::new() },
             text,
+            file_name: "".into(),
+            imported: Vec::new(),
+            qualifier: String::new(),
+            files: Files::default(),
             in_shape: false,
             in_let: false,
             dimensions: HashMap::new(),
@@ -126,10 +138,10 @@ impl Lowering<'_> {
     /// The span in the user's file that an expression belongs to: its own, or that of the call that led into
     /// the standard solids.
     pub fn user_span(&self, span: Span) -> Span {
-        if span.source == SourceId::File {
+        if span.source.is_users() {
             return span;
         }
-        self.scope.calls.iter().rev().map(|c| c.span).find(|s| s.source == SourceId::File).unwrap_or(span)
+        self.scope.calls.iter().rev().map(|c| c.span).find(|s| s.source.is_users()).unwrap_or(span)
     }
 
     /// Whether the file has grown beyond its budget; reported once.

@@ -9,8 +9,10 @@
 mod arguments;
 mod builtins;
 mod choice;
+mod columns;
 mod eval;
 mod foreign;
+mod imports;
 mod lists;
 mod lowering;
 mod maps;
@@ -22,10 +24,12 @@ mod scene;
 mod slips;
 mod transforms;
 mod value;
+pub mod vocabulary;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 
+pub use imports::{Imported, unread};
 pub use module::{Module, NamedSolid, ParamValue};
 pub use scene::{
     Bounce, Container, Fluid, Gravity, Measured, Obstacle, Opening, Picture, Probe, Run, Scene, Skin, Solver,
@@ -33,6 +37,7 @@ pub use scene::{
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};
+use crate::files::Files;
 use crate::ir::Expr as Operation;
 use crate::quantity::{Dimension, Unit, in_unit, parse_unit};
 use crate::sph::Method;
@@ -57,6 +62,8 @@ pub struct Options {
     /// Params that stay open: solids have them as `Expr::Parameter` with their number in [`Module::params`]. No scene
     /// is read then. `None` if all params are constants.
     pub open: Option<OpenParams>,
+    /// The files that the file may name. By default there are none.
+    pub files: Files,
 }
 
 /// Which params stay open.
@@ -74,6 +81,7 @@ impl Default for Options {
             max_nodes: 1_000_000,
             method: None,
             open: None,
+            files: Files::default(),
         }
     }
 }
@@ -100,27 +108,41 @@ fn prelude() -> &'static Ast {
 /// stack the caller has.
 const STACK_BYTES: usize = 64 << 20;
 
-/// Lowers a file. The messages say which items failed; the module holds the others.
-pub fn lower(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
+/// Lowers a file of this name with the files that it imports, each of them after those that it imports itself. The
+/// messages say which items failed; the module holds the others.
+pub fn lower(
+    (name, ast): (&str, &Ast),
+    imported: &[Imported],
+    options: &Options,
+) -> (Module, Vec<Diagnostic>) {
     std::thread::scope(|scope| {
         let spawned = std::thread::Builder::new()
             .name("rfm-lower".into())
             .stack_size(STACK_BYTES)
-            .spawn_scoped(scope, || lower_here(ast, options));
+            .spawn_scoped(scope, || lower_here((name, ast), imported, options));
         match spawned.map(std::thread::ScopedJoinHandle::join) {
             Ok(Ok(lowered)) => lowered,
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => lower_here(ast, options), // no thread could be started
+            Err(_) => lower_here((name, ast), imported, options), // no thread could be started
         }
     })
 }
 
-fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
+fn lower_here(
+    (name, ast): (&str, &Ast),
+    imported: &[Imported],
+    options: &Options,
+) -> (Module, Vec<Diagnostic>) {
     let mut lowering = Lowering::new(ast.text.clone(), options.max_nodes);
     lowering.method = options.method;
     lowering.has_open_params = options.open.is_some();
     for item in &prelude().items {
         lowering.item(item, options);
+    }
+    lowering.file_name = name.into();
+    lowering.files = options.files.clone();
+    for file in imported {
+        lowering.imported_file(file, options);
     }
     lowering.scope.source = SourceId::File;
     lowering.names.announce(ast.items.iter().map(Item::name));
@@ -130,13 +152,30 @@ fn lower_here(ast: &Ast, options: &Options) -> (Module, Vec<Diagnostic>) {
     if !lowering.diagnostics.iter().any(|d| d.severity == Severity::Error) {
         lowering.unused(); // an item that failed may contain the use
     }
-    lowering.unknown_overrides(ast, options);
+    lowering.unknown_overrides((ast, imported), options);
     (lowering.module, lowering.diagnostics)
 }
 
 impl<'a> Lowering<'a> {
+    /// Reads the items of an imported file. Its scenes are its own, and so are its solids: they have names there alone.
+    fn imported_file(&mut self, file: &'a Imported, options: &Options) {
+        self.scope.source = file.source.id;
+        self.qualifier = format!("{}.", file.qualified);
+        self.names.announce(file.ast.items.iter().map(Item::name));
+        self.imported.push((file.source.name.clone(), file.source.id));
+        let solids = self.module.solids.len();
+        for item in file.ast.items.iter().filter(|item| !matches!(item, Item::Scene(_))) {
+            self.item(item, options);
+        }
+        self.module.solids.truncate(solids);
+        self.qualifier.clear();
+        self.dimensions.clear();
+        self.bare.clear();
+    }
+
     fn item(&mut self, item: &'a Item, options: &Options) {
         match item {
+            Item::Import(import) => self.import(import),
             Item::Param(param) => self.param(param, options),
             Item::Let(definition) => self.definition(definition),
             Item::Function(function) => {
@@ -179,20 +218,15 @@ impl<'a> Lowering<'a> {
             _ => None,
         };
         self.remember_units(&param.name, &param.value);
-        let overridden = options.overrides.get(&param.name.text).copied();
+        let qualified = format!("{}{}", self.qualifier, param.name.text);
+        let overridden = options.overrides.get(&qualified).copied();
         let Some(value) = overridden.or(value) else {
             self.names.define(self.scope.source, &param.name, Kind::Value(Value::Failed));
             return;
         };
         let unit = unit_of(&param.value).map(|(unit, text)| (unit, text.to_string()));
-        let given = ParamValue {
-            name: param.name.text.clone(),
-            value,
-            range,
-            unit,
-            doc: param.doc.clone(),
-            span: param.name.span,
-        };
+        let given =
+            ParamValue { name: qualified, value, range, unit, doc: param.doc.clone(), span: param.name.span };
         let fits = (overridden.is_none() || self.override_fits(&given, options))
             && self.param_fits(param, &given, overridden.is_some());
         let is_open = options.open.as_ref().is_some_and(|open| !open.fixed.contains(&given.name));
@@ -274,7 +308,7 @@ impl<'a> Lowering<'a> {
             let [first, last] = [low, high].map(|end| given.shown(end));
             let diagnostic = if overridden {
                 let message =
-                    format!("-D sets `{}` to {shown}, outside its range {first} .. {last}", param.name.text);
+                    format!("-D sets `{}` to {shown}, outside its range {first} .. {last}", given.name);
                 let diagnostic =
                     Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here");
                 match given
@@ -284,7 +318,7 @@ impl<'a> Lowering<'a> {
                 {
                     Some((_, unit)) => diagnostic.help(format!(
                         "numbers without a unit are in SI units: write -D {}=\"{value} {unit}\"",
-                        param.name.text
+                        given.name
                     )),
                     None => diagnostic,
                 }
@@ -422,25 +456,27 @@ impl<'a> Lowering<'a> {
         for (name, kind, span) in unused {
             self.report(
                 Diagnostic::warning(Code::UNUSED, span, format!("{kind} `{name}` is never used"))
-                    .help(format!("remove it, or write `_{name}`")),
+                    .help(format!("remove it, or write `_{name}`"))
+                    .edit(span, &name, format!("_{name}"), false),
             );
         }
     }
 
-    fn unknown_overrides(&mut self, ast: &Ast, options: &Options) {
-        let declared: Vec<&str> = ast
-            .items
-            .iter()
-            .filter_map(|item| match item {
-                Item::Param(param) => Some(param.name.text.as_str()),
-                _ => None,
+    fn unknown_overrides(&mut self, (ast, imported): (&Ast, &[Imported]), options: &Options) {
+        let files = imported.iter().map(|file| (format!("{}.", file.qualified), &file.ast));
+        let all = std::iter::once((String::new(), ast)).chain(files);
+        let params = all.flat_map(|(qualifier, ast)| {
+            ast.items.iter().filter_map(move |item| match item {
+                Item::Param(param) => Some(format!("{qualifier}{}", param.name.text)),
+                Item::Import(_) | Item::Let(_) | Item::Function(_) | Item::Solid(_) | Item::Scene(_) => None,
             })
-            .collect();
-        for name in options.overrides.keys().filter(|name| !declared.contains(&name.as_str())) {
+        });
+        let declared: Vec<String> = params.collect();
+        for name in options.overrides.keys().filter(|name| !declared.contains(name)) {
             let span = Span::new(SourceId::File, 0, 0);
             let message = format!("-D sets `{name}`, but the file declares no such param");
             let mut diagnostic = Diagnostic::error(Code::OVERRIDE, span, message);
-            diagnostic = match crate::diagnostic::nearest(name, declared.iter().copied()) {
+            diagnostic = match crate::diagnostic::nearest(name, declared.iter().map(String::as_str)) {
                 Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
                 None if declared.is_empty() => diagnostic.help("the file declares no params"),
                 None => diagnostic.help(format!("declared params: {}", declared.join(", "))),

@@ -16,6 +16,8 @@ pub(super) enum Kind<'a> {
     Solid(Value),
     Function(&'a Function),
     Scene,
+    /// Another file.
+    Import(SourceId),
 }
 
 /// A name that an item defines.
@@ -32,18 +34,22 @@ impl<'a> Global<'a> {
     fn of_shapes(&self) -> Option<&'a Function> {
         match self.kind {
             Kind::Function(function) if function.takes_a_shape() => Some(function),
-            Kind::Function(_) | Kind::Value(_) | Kind::Solid(_) | Kind::Scene => None,
+            Kind::Function(_) | Kind::Value(_) | Kind::Solid(_) | Kind::Scene | Kind::Import(_) => None,
         }
     }
 }
 
-/// The items of the prelude and of the file. Those of the file shadow those of the prelude, but not inside
-/// the prelude itself.
+/// The items of one text.
+type Table<'a> = HashMap<String, Global<'a>>;
+
+/// The items of all texts. Those of a file shadow those of the prelude, but not inside the prelude itself; files see one
+/// another through their imports alone.
 #[derive(Debug, Default)]
 pub(super) struct Names<'a> {
-    prelude: HashMap<String, Global<'a>>,
-    file: HashMap<String, Global<'a>>,
-    /// All names of the file, for messages about a name that is used too early.
+    prelude: Table<'a>,
+    file: Table<'a>,
+    imports: HashMap<u16, Table<'a>>,
+    /// All names of the file that is being read, for messages about a name that is used too early.
     all: HashMap<String, Span>,
 }
 
@@ -55,36 +61,81 @@ impl<'a> Names<'a> {
 
     /// Makes the names of a file known, before any of them is defined.
     pub fn announce(&mut self, names: impl IntoIterator<Item = &'a Name>) {
+        self.all.clear();
         for name in names {
             self.all.entry(name.text.clone()).or_insert(name.span);
         }
     }
 
     /// Where a name that is not defined yet will be.
-    pub fn defined_later(&self, name: &str) -> Option<Span> {
-        self.all.get(name).copied().filter(|_| !self.file.contains_key(name))
+    pub fn defined_later(&self, source: SourceId, name: &str) -> Option<Span> {
+        let later = self.all.get(name).copied().filter(|later| later.source == source);
+        later.filter(|_| self.of(source, name).is_none())
     }
 
-    fn table(&mut self, source: SourceId) -> &mut HashMap<String, Global<'a>> {
+    fn table(&mut self, source: SourceId) -> &mut Table<'a> {
         match source {
             SourceId::Prelude => &mut self.prelude,
             SourceId::File => &mut self.file,
+            SourceId::Import(number) => self.imports.entry(number).or_default(),
+        }
+    }
+
+    /// An item of one text.
+    pub fn of(&self, source: SourceId, name: &str) -> Option<&Global<'a>> {
+        match source {
+            SourceId::Prelude => self.prelude.get(name),
+            SourceId::File => self.file.get(name),
+            SourceId::Import(number) => self.imports.get(&number)?.get(name),
+        }
+    }
+
+    /// The items that code of a source can name, those of the prelude last.
+    fn known(&self, source: SourceId) -> impl Iterator<Item = (&String, &Global<'a>)> {
+        let own = match source {
+            SourceId::Prelude => None,
+            SourceId::File => Some(&self.file),
+            SourceId::Import(number) => self.imports.get(&number),
+        };
+        own.into_iter().flatten().chain(&self.prelude)
+    }
+
+    /// The names of one text that others may use, in alphabetical order.
+    pub fn offered(&self, source: SourceId) -> Vec<String> {
+        let table = match source {
+            SourceId::Prelude => Some(&self.prelude),
+            SourceId::File => Some(&self.file),
+            SourceId::Import(number) => self.imports.get(&number),
+        };
+        let is_offered = |global: &Global<'a>| match global.kind {
+            Kind::Value(_) | Kind::Solid(_) | Kind::Function(_) => true,
+            Kind::Scene | Kind::Import(_) => false,
+        };
+        let all = table.into_iter().flatten().filter(|(_, global)| is_offered(global));
+        let mut names: Vec<String> = all.map(|(name, _)| name.clone()).collect();
+        names.sort_unstable();
+        names
+    }
+
+    /// The file that a name stands for, if it is that of an import; counts as a use.
+    pub fn import(&mut self, source: SourceId, name: &str) -> Option<SourceId> {
+        match self.table(source).get_mut(name)? {
+            Global { kind: Kind::Import(of), used, .. } => {
+                *used = true;
+                Some(*of)
+            }
+            Global { kind: Kind::Value(_) | Kind::Solid(_) | Kind::Function(_) | Kind::Scene, .. } => None,
         }
     }
 
     pub fn defined_at(&self, source: SourceId, name: &str) -> Option<Span> {
-        match source {
-            SourceId::Prelude => self.prelude.get(name),
-            SourceId::File => self.file.get(name),
-        }
-        .map(|global| global.span)
+        self.of(source, name).map(|global| global.span)
     }
 
     /// What a name means in code of a source; counts as a use.
     pub fn get(&mut self, source: SourceId, name: &str) -> Option<&Global<'a>> {
-        if source == SourceId::File
-            && let Some(global) = self.file.get_mut(name)
-        {
+        if source.is_users() && self.of(source, name).is_some() {
+            let global = self.table(source).get_mut(name)?;
             global.used = true;
             return Some(global);
         }
@@ -93,8 +144,8 @@ impl<'a> Names<'a> {
 
     /// A function whose first parameter is called `shape`, which may be called as a method; counts as a use.
     pub fn function_of_shapes(&mut self, source: SourceId, name: &str) -> Option<(&'a Function, SourceId)> {
-        if source != SourceId::Prelude
-            && let Some(global) = self.file.get_mut(name)
+        if source.is_users()
+            && let Some(global) = self.table(source).get_mut(name)
             && let Some(function) = global.of_shapes()
         {
             global.used = true;
@@ -105,8 +156,8 @@ impl<'a> Names<'a> {
     }
 
     /// The names of functions that may be called as methods, in alphabetical order.
-    pub fn functions_of_shapes(&self) -> Vec<String> {
-        let all = self.file.iter().chain(&self.prelude);
+    pub fn functions_of_shapes(&self, source: SourceId) -> Vec<String> {
+        let all = self.known(source);
         let mut names: Vec<String> =
             all.filter(|(_, g)| g.of_shapes().is_some()).map(|(name, _)| name.clone()).collect();
         names.sort_unstable();
@@ -114,19 +165,19 @@ impl<'a> Names<'a> {
         names
     }
 
-    /// Whether a name means a standard solid, which no item of the file shadows.
-    pub fn is_standard(&self, name: &str) -> bool {
-        !self.file.contains_key(name) && self.prelude.contains_key(name)
+    /// Whether a name means a standard solid in a text, and none of its items shadows it.
+    pub fn is_standard(&self, source: SourceId, name: &str) -> bool {
+        (!source.is_users() || self.of(source, name).is_none()) && self.prelude.contains_key(name)
     }
 
-    /// Names that can be written in the file, functions or values.
-    pub fn candidates(&self, functions: bool) -> Vec<String> {
+    /// Names that can be written in a text, functions or values.
+    pub fn candidates(&self, source: SourceId, functions: bool) -> Vec<String> {
         let fits = |g: &Global<'_>| match g.kind {
             Kind::Function(_) => functions,
             Kind::Value(_) | Kind::Solid(_) => !functions,
-            Kind::Scene => false,
+            Kind::Scene | Kind::Import(_) => false,
         };
-        let all = self.file.iter().chain(&self.prelude);
+        let all = self.known(source);
         let mut names: Vec<String> = all.filter(|(_, g)| fits(g)).map(|(name, _)| name.clone()).collect();
         names.sort_unstable();
         names
@@ -142,6 +193,7 @@ impl<'a> Names<'a> {
             .filter_map(|(name, global)| match global.kind {
                 Kind::Value(_) => Some((name.clone(), "the name", global.span)),
                 Kind::Function(_) => Some((name.clone(), "the function", global.span)),
+                Kind::Import(_) => Some((name.clone(), "the import", global.span)),
                 Kind::Solid(_) | Kind::Scene => None,
             })
             .collect();

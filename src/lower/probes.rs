@@ -12,9 +12,9 @@ use crate::quantity::{Bound, Dimension};
 use crate::syntax::ast::{Entry, Expr, ExprKind};
 
 const MEASURED: [&str; 7] = ["height", "pressure", "velocity", "force", "flux", "energy", "audit"];
-const PROBE_KEYS: [&str; 9] =
+pub(in crate::lower) const PROBE_KEYS: [&str; 9] =
     ["height", "pressure", "velocity", "force", "flux", "energy", "audit", "about", "every"];
-const FLUX_KEYS: [&str; 2] = ["point", "normal"];
+pub(in crate::lower) const FLUX_KEYS: [&str; 2] = ["point", "normal"];
 
 /// What the probes of a scene may refer to.
 pub(super) struct Surroundings<'a> {

@@ -116,7 +116,8 @@ impl Lowering<'_> {
             | ExprKind::Negate(_)
             | ExprKind::Power { .. }
             | ExprKind::Index { .. }
-            | ExprKind::Component { .. } => false,
+            | ExprKind::Component { .. }
+            | ExprKind::Member { .. } => false,
         }
     }
 

@@ -71,6 +71,11 @@ impl Transform {
     }
 }
 
+/// The methods of shapes, each with the names of its parameters.
+pub(super) fn methods() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
+    METHODS.into_iter().map(|(name, transform)| (name, transform.parameters()))
+}
+
 /// A factor of a coordinate: a number, or a node that depends on time alone.
 #[derive(Clone, Copy)]
 enum Factor {
@@ -109,6 +114,12 @@ fn kinds_fit(parameters: &[&str], values: &[(Value, Span)]) -> bool {
 
 impl<'a> Lowering<'a> {
     pub fn method(&mut self, receiver: &Expr, method: &Name, arguments: &[Argument], span: Span) -> Value {
+        if let Some(file) = self.import_of(receiver) {
+            return self.call_imported(file, method, arguments, span);
+        }
+        if self.has_failed(receiver) {
+            return Value::Failed;
+        }
         let shape = self.field(receiver);
         let known = METHODS.into_iter().find(|(name, _)| *name == method.text);
         let Some((_, transform)) = known else {
@@ -118,7 +129,7 @@ impl<'a> Lowering<'a> {
             if let Some(foreign) = self.foreign_method(receiver, method, arguments) {
                 return self.fail(foreign);
             }
-            let own = self.names.functions_of_shapes();
+            let own = self.names.functions_of_shapes(self.scope.source);
             let names: Vec<&str> =
                 METHODS.iter().map(|(name, _)| *name).chain(own.iter().map(String::as_str)).collect();
             let message = format!("shapes have no method `{}`", method.text);

@@ -131,6 +131,20 @@ impl Grid {
         Ok(grid)
     }
 
+    /// A grid for what of a solid's bounds lies in a box: around the bounds, or filling the part in the box if that
+    /// is smaller.
+    ///
+    /// # Errors
+    /// [`GridError`] if the boxes or the resolution are unusable.
+    pub fn within(bounds: &Aabb, domain: &Aabb, resolution: Resolution) -> Result<Self, GridError> {
+        let over = bounds.intersection(&domain.grown(1e-3 * domain.size().max_element()));
+        if *bounds == over || over.is_empty() {
+            Self::around(bounds, resolution)
+        } else {
+            Self::filling(&over, resolution)
+        }
+    }
+
     /// The box that the cells fill, in metres.
     pub fn bounds(&self) -> &Aabb {
         &self.bounds

@@ -99,6 +99,18 @@ impl Mesh {
     /// The largest number of vertices of a mesh. The corners of twice as many triangles then still have
     /// 32-bit numbers, and indices fit the signed 32 bits of PLY and VTP files.
     pub const MAX_VERTICES: usize = 1 << 29;
+
+    /// Meshes as one: their vertices and triangles one after the other.
+    pub fn joined(meshes: &[Self]) -> Self {
+        let mut all = Self::default();
+        for mesh in meshes {
+            let first = all.positions.len() as u32;
+            all.positions.extend(&mesh.positions);
+            all.normals.extend(&mesh.normals);
+            all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+        }
+        all
+    }
 }
 
 /// Counts of work. They are the same on any machine.

@@ -9,7 +9,7 @@ use super::{
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, set_positions},
 };
-use crate::field::Field;
+use crate::field::{Field, Points};
 
 /// The triangles of one cell of a brick.
 #[derive(Debug, Clone)]
@@ -32,8 +32,7 @@ pub(super) fn find(
     evaluations: &mut u64,
 ) -> Vec<CellPatch> {
     let mut found = Vec::new();
-    for (z, bit) in undecided(around) {
-        let cell = CellValues::new(field, lattice, cell_low(low, (z, bit)));
+    for ((z, bit), cell) in CellValues::of_brick(field, lattice, low, around) {
         *evaluations += 8;
         let CellTriangles { triangles, inner } = cell.patch();
         let inner =
@@ -44,7 +43,7 @@ pub(super) fn find(
 }
 
 /// The planes and bits of a brick's cells that signs alone do not decide, ascending.
-pub(super) fn undecided(around: &Around) -> impl Iterator<Item = (usize, usize)> {
+fn undecided(around: &Around) -> impl Iterator<Item = (usize, usize)> {
     let planes = (0..BRICK).map(|z| (z, around.corners(z)));
     let crossed = planes.filter(|(_, corners)| crossed_cells(corners) != 0);
     crossed.flat_map(|(z, corners)| set_positions(undecided_cells(&corners)).map(move |bit| (z, bit)))
@@ -80,17 +79,34 @@ pub(super) struct CellValues {
 }
 
 impl CellValues {
-    pub(super) fn new(field: &dyn Field, lattice: &Lattice, low: [usize; 3]) -> Self {
-        let ends = [low, low.map(|n| n + 1)];
-        let at = |corner: usize| [0, 1, 2].map(|axis: usize| ends[corner >> axis & 1][axis]);
-        let positions: [DVec3; 8] = std::array::from_fn(|corner| lattice.position(at(corner)));
-        let mut values = positions.map(|p| field.continuous(p));
-        for (corner, value) in values.iter_mut().enumerate() {
-            if (0..3).any(|axis| lattice.is_ring(axis, at(corner)[axis])) {
+    /// The cells of a brick that signs alone do not decide, with their planes and bits, in the order of
+    /// [`undecided`]. `low` are the extended indices of the brick's first node.
+    pub(super) fn of_brick(
+        field: &dyn Field,
+        lattice: &Lattice,
+        low: [usize; 3],
+        around: &Around,
+    ) -> Vec<((usize, usize), Self)> {
+        let cells: Vec<(usize, usize)> = undecided(around).collect();
+        let corners = |cell: (usize, usize)| {
+            let low = cell_low(low, cell);
+            (0..8).map(move |corner: usize| [0, 1, 2].map(|axis: usize| low[axis] + (corner >> axis & 1)))
+        };
+        let nodes: Vec<[usize; 3]> = cells.iter().flat_map(|&cell| corners(cell)).collect();
+        let positions: Vec<DVec3> = nodes.iter().map(|&node| lattice.position(node)).collect();
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| positions.iter().map(|p| p[axis]).collect::<Vec<f64>>());
+        let mut values = vec![0.0; nodes.len()];
+        field.continuous_many(Points { x: &x, y: &y, z: &z }, &mut values);
+        for (node, value) in nodes.iter().zip(&mut values) {
+            if (0..3).any(|axis| lattice.is_ring(axis, node[axis])) {
                 *value = f64::NEG_INFINITY;
             }
         }
-        Self { low: positions[0], high: positions[7], values }
+        let of = |(i, cell): (usize, (usize, usize))| {
+            let values = std::array::from_fn(|corner| values[8 * i + corner]);
+            (cell, Self { low: positions[8 * i], high: positions[8 * i + 7], values })
+        };
+        cells.into_iter().enumerate().map(of).collect()
     }
 
     /// The cell's loops of crossed edges, and the two of them that bound a tunnel, if any do.

@@ -37,7 +37,7 @@ impl fmt::Display for Exactness {
 /// The roots and what they use, simplified.
 pub fn simplify(graph: &Graph, roots: &[Node]) -> (Graph, Vec<Node>, Applied) {
     let used = graph.reachable(roots);
-    let mut simplifier = Simplifier::new(rules::ALL);
+    let mut simplifier = Simplifier::new(graph, rules::ALL);
     let mut image: Vec<Option<Node>> = vec![None; graph.len()];
     for (node, expr) in graph.nodes().filter(|(node, _)| used[node.index()]) {
         let mapped = expr.map(|operand| image[operand.index()].unwrap_or(operand));

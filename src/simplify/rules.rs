@@ -38,7 +38,11 @@ fn fold(s: &mut Simplifier, expr: Expr, _: Option<Span>) -> Option<Node> {
     let value = match expr {
         Expr::Unary(op, a) => op.eval(s.graph.as_constant(a)?),
         Expr::Binary(op, a, b) => op.eval(s.graph.as_constant(a)?, s.graph.as_constant(b)?),
-        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => return None,
+        Expr::Constant(_)
+        | Expr::Coordinate(_)
+        | Expr::Parameter(_)
+        | Expr::Uniform(_)
+        | Expr::Lookup(..) => return None,
     };
     (!value.is_nan()).then(|| s.graph.constant(value))
 }

@@ -48,8 +48,9 @@ pub(super) struct Simplifier {
 }
 
 impl Simplifier {
-    pub fn new(rules: &'static [Rule]) -> Self {
-        Self { graph: Graph::default(), applied: Applied::default(), rules }
+    /// For the nodes of a graph.
+    pub fn new(graph: &Graph, rules: &'static [Rule]) -> Self {
+        Self { graph: Graph::like(graph), applied: Applied::default(), rules }
     }
 
     /// The node of an expression over simplified operands, itself simplified.

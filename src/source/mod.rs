@@ -164,6 +164,8 @@ pub enum SourceError {
     NoSuchPrecision(Target, Precision),
     /// A shader has no other functions than its own.
     NoSuchMath(Target),
+    /// The solid has a part that is looked up in a table, such as a mesh from a file.
+    Table,
 }
 
 impl fmt::Display for SourceError {
@@ -190,6 +192,10 @@ impl fmt::Display for SourceError {
                 "a .{} file calls the functions of the shader language: the bits of rfm are for c, h, cu and rs",
                 target.ending()
             ),
+            Self::Table => f.write_str(
+                "the solid has a part that is no formula, such as the mesh of a file: `rfm mesh` writes its surface, and \
+                 programs can call the library",
+            ),
         }
     }
 }
@@ -200,7 +206,7 @@ impl std::error::Error for SourceError {}
 ///
 /// # Errors
 /// If the target has no such precision or functions, or cannot hold a number of the formula, or if no name may begin
-/// with the prefix.
+/// with the prefix, or if a part of the solid is no formula.
 pub fn write(solid: &Solid, target: Target, options: &Options) -> Result<Source, SourceError> {
     if target.is_shader() {
         if options.precisions.contains(&Precision::F64) {
@@ -231,6 +237,10 @@ fn in_file<R>(
     options: &Options,
     make: impl FnOnce(&File<'_>) -> R,
 ) -> Result<R, SourceError> {
+    let (graph, root) = solid.formula();
+    if graph.has_lookups(&[root]) {
+        return Err(SourceError::Table);
+    }
     let prefix = names::prefix(options.prefix.as_deref().unwrap_or(solid.name()))?;
     let wanted = |precision: &Precision| match options.precisions.is_empty() {
         true => *precision == Precision::F32 || !in_f32_alone,

@@ -22,7 +22,9 @@ pub(super) fn prefix(given: &str) -> Result<String, SourceError> {
 pub(super) fn fields(params: &[Param]) -> Vec<String> {
     let mut fields: Vec<String> = Vec::with_capacity(params.len());
     for (i, param) in params.iter().enumerate() {
-        let own = param.name.as_str();
+        // the param of an imported file has a dot in its name
+        let own = param.name.replace('.', "_");
+        let own = own.as_str();
         let name = if !is_plain(own) || own.starts_with("gl_") {
             format!("param_{i}")
         } else if TAKEN.split_whitespace().any(|word| word == own) {

@@ -97,7 +97,7 @@ pub fn object(solid: &Solid, options: &Options, triple: Option<&str>) -> Result<
 /// numbered as they stand in their structure.
 fn time_as_x(file: &File<'_>, program: &Program) -> Option<(Graph, Vec<Node>)> {
     let (graph, roots) = program.uniforms.as_ref()?;
-    let mut out = Graph::default();
+    let mut out = Graph::like(graph);
     let mut image: Vec<Node> = Vec::with_capacity(graph.len());
     for (node, expr) in graph.nodes() {
         let new = match expr {

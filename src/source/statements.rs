@@ -132,6 +132,7 @@ impl State<'_> {
                 let (u, v) = (self.texts[&u].clone(), self.texts[&v].clone());
                 self.binary(op, &u, &v)?
             }
+            Expr::Lookup(..) => return Err(SourceError::Table),
         };
         let name = self.name(node);
         self.declare(writer.language.number(writer.precision), &name, &value);

@@ -449,7 +449,7 @@ fn surface_energy(parameters: &Parameters, densities: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::geom::Aabb;
-    use crate::sph::{Dfsph, FluidBlock, Method, Simulation, Wcsph, scenes};
+    use crate::sph::{Dfsph, FluidBlock, Method, Paper, Simulation, Wcsph, scenes};
 
     const TANK: Aabb = Aabb::new(DVec3::ZERO, DVec3::new(1.2, 0.2, 1.4));
 
@@ -499,7 +499,7 @@ mod tests {
 
     #[test]
     fn a_splash_in_a_closed_tank_makes_no_energy() {
-        for method in [Method::from(Wcsph::default()), Method::default()] {
+        for method in [Method::from(Wcsph::default()), Paper::default().into()] {
             let mut simulation = column(method, 0.05);
             simulation.advance(2.0, |_| std::ops::ControlFlow::Continue(())).unwrap();
             let audit = simulation.audit();

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::error::ParameterError;
 use super::kernel::Kernels;
-use super::methods::{COURANT, Method};
+use super::methods::{COURANT, Method, Paper};
 use super::scales::{Scales, Slip};
 use crate::precision::Precision;
 use crate::quantity::Bound;
@@ -69,7 +69,7 @@ impl Default for Parameters {
             time_step: 0.002,
             adaptive: false,
             expected_speed: 7.7,
-            method: Method::default(),
+            method: Paper::default().into(),
             slip: Slip::Free,
             wall_friction: 0.0,
             fills_vessel: false,

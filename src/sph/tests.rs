@@ -367,7 +367,7 @@ fn energy_between_walls(method: Method, speed: f64, obstacles: bool) -> f64 {
 #[test]
 fn walls_give_a_particle_no_energy() {
     let weakly = Wcsph { sound_speed: Some(40.0), ..Wcsph::default() };
-    for method in [Method::from(weakly), Dfsph::default().into(), Method::default()] {
+    for method in [Method::from(weakly), Dfsph::default().into(), Paper::default().into()] {
         for speed in [1.0, 4.0, 7.0, 12.0, 40.0, 100.0] {
             for obstacles in [false, true] {
                 let excess = energy_between_walls(method, speed, obstacles);

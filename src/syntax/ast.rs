@@ -19,11 +19,22 @@ pub struct Ast {
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
+    Import(Import),
     Param(Param),
     Let(Definition),
     Function(Function),
     Solid(Definition),
     Scene(SceneItem),
+}
+
+/// `import "path" as name`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Import {
+    pub name: Name,
+    /// As it is written, without the quotes.
+    pub path: String,
+    /// The path with its quotes.
+    pub span: Span,
 }
 
 /// `param name = value in low .. high "doc"`
@@ -143,6 +154,11 @@ pub enum ExprKind {
         vector: Box<Expr>,
         axis: usize,
     },
+    /// `chess.pawn`: a name of an imported file.
+    Member {
+        of: Box<Expr>,
+        name: Name,
+    },
     Method {
         receiver: Box<Expr>,
         method: Name,
@@ -251,6 +267,7 @@ pub enum MulOp {
 impl Item {
     pub fn name(&self) -> &Name {
         match self {
+            Self::Import(import) => &import.name,
             Self::Param(param) => &param.name,
             Self::Let(definition) | Self::Solid(definition) => &definition.name,
             Self::Function(function) => &function.name,
@@ -261,6 +278,7 @@ impl Item {
     /// The first place in its expressions that is nested deeper than `levels`, or `None`.
     pub fn deeper_than(&self, levels: usize) -> Option<Span> {
         match self {
+            Self::Import(_) => None,
             Self::Param(param) => {
                 let range = param.range.iter().flat_map(|(low, high)| [low, high]);
                 deepest(range.chain([&param.value]), levels)
@@ -298,9 +316,10 @@ impl Expr {
         match &self.kind {
             ExprKind::Number(_) | ExprKind::Quantity { .. } | ExprKind::Text(_) | ExprKind::Name(_) => vec![],
             ExprKind::Vector(parts) | ExprKind::Logic { operands: parts, .. } => parts.iter().collect(),
-            ExprKind::Not(inner) | ExprKind::Negate(inner) | ExprKind::Component { vector: inner, .. } => {
-                vec![inner]
-            }
+            ExprKind::Not(inner)
+            | ExprKind::Negate(inner)
+            | ExprKind::Component { vector: inner, .. }
+            | ExprKind::Member { of: inner, .. } => vec![inner],
             ExprKind::Compare { first, rest } => {
                 std::iter::once(&**first).chain(rest.iter().map(|(_, _, e)| e)).collect()
             }

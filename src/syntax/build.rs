@@ -8,8 +8,8 @@ use pest::iterators::{Pair, Pairs};
 use std::cell::Cell;
 
 use super::ast::{
-    AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Fold, Function, Item,
-    Logic, Members, MulOp, Name, Param, Parameter, SceneItem,
+    AddOp, Argument, Ast, Attribute, Comparison, Definition, Entry, Expr, ExprKind, Fold, Function, Import,
+    Item, Logic, Members, MulOp, Name, Param, Parameter, SceneItem,
 };
 use super::grammar::{DEEPEST_TREE, EDITION, Rule};
 use crate::diagnostic::{Code, Diagnostic, Source, SourceId, Span};
@@ -29,11 +29,12 @@ pub(super) fn file(source: &Source, pairs: Pairs<'_, Rule>, diagnostics: &mut Ve
         }
     }
     match version {
-        None if source.id == SourceId::File => {
+        None if source.id != SourceId::Prelude => {
             let start = Span::new(source.id, 0, 0);
             diagnostics.push(
                 Diagnostic::warning(Code::VERSION_MISSING, start, "the first line does not say `rfm 1`")
-                    .help("write `rfm 1` as the first line"),
+                    .help("write `rfm 1` as the first line")
+                    .edit(start, "", format!("rfm {EDITION}\n"), true),
             );
         }
         Some(pair) => {
@@ -133,6 +134,13 @@ impl Builder {
             attributes.push(self.attribute(pair));
         }
         inner.next(); // the keyword
+        if rule == Rule::import_item {
+            let text = inner.next();
+            let span = text.as_ref().map_or(Span::new(self.source, 0, 0), |text| self.span(text));
+            let path = text.map_or_else(String::new, text_of);
+            let name = inner.find(|part| part.as_rule() == Rule::name);
+            return Item::Import(Import { name: self.name(name), path, span });
+        }
         let name = self.name(inner.next());
         match rule {
             Rule::param => self.param(name, inner),
@@ -375,6 +383,9 @@ impl Builder {
                     _ => 2,
                 };
                 ExprKind::Component { vector: Box::new(result), axis }
+            } else if pair.as_rule() == Rule::member {
+                let name = self.name(parts(pair).next());
+                ExprKind::Member { of: Box::new(result), name }
             } else if pair.as_rule() == Rule::index {
                 let index = Box::new(self.expr_or_zero(parts(pair).next()));
                 ExprKind::Index { list: Box::new(result), index }

@@ -1,4 +1,4 @@
-//! From text to [`Ast`].
+//! From text to [`Ast`], and to the same text in its layout.
 //!
 //! Invariant: the parser generator's types never leave this module, and it concludes nothing: it looks up no
 //! name and computes no number. Every node carries its span.
@@ -6,13 +6,17 @@
 pub mod ast;
 mod build;
 pub mod foreign;
+mod format;
 mod grammar;
 mod parse;
 mod print;
 mod slips;
+mod tokens;
 mod words;
 
 pub use ast::Ast;
+pub use format::{Spelling, format};
 pub use grammar::EDITION;
 pub use parse::parse;
 pub use print::print;
+pub use words::KEYWORDS;

@@ -36,16 +36,21 @@ pub fn parse(source: &Source) -> (Ast, Vec<Diagnostic>) {
         let diagnostic = Diagnostic::error(Code::TOO_DEEP, span, message).help("name a part with `let`");
         return (Ast::default(), vec![diagnostic]);
     }
+    on_large_stack(|| parse_here(source, &scan))
+}
+
+/// Runs what nests as deeply as a text on a thread with a stack for it.
+pub(super) fn on_large_stack<T: Send>(work: impl Fn() -> T + Send + Sync) -> T {
     std::thread::scope(|scope| {
         let spawned = std::thread::Builder::new()
             .name("rfm-parse".into())
             .stack_size(STACK_BYTES)
-            .spawn_scoped(scope, || parse_here(source, &scan));
+            .spawn_scoped(scope, &work);
         match spawned.map(std::thread::ScopedJoinHandle::join) {
-            Ok(Ok(parsed)) => parsed,
+            Ok(Ok(done)) => done,
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
             // if no thread can be started, the caller's own stack serves, and the grammar guards it
-            Err(_) => parse_here(source, &scan),
+            Err(_) => work(),
         }
     })
 }
@@ -57,7 +62,7 @@ fn parse_here(source: &Source, scan: &Scan) -> (Ast, Vec<Diagnostic>) {
         Err(_) => recover(source, scan, &mut diagnostics),
     };
     let broken = diagnostics.iter().any(|d| d.severity == Severity::Error);
-    if ast.items.is_empty() && !broken && source.id == SourceId::File {
+    if ast.items.is_empty() && !broken && source.id != SourceId::Prelude {
         let start = Span::new(source.id, 0, 0);
         let empty = Diagnostic::error(Code::EMPTY_FILE, start, "the file defines nothing")
             .help("write for example `solid ball = sphere(1)`; `rfm --help` has more");
@@ -150,10 +155,11 @@ fn expectation(rules: &[Rule]) -> String {
             Rule::open_brace => add("`{`"),
             Rule::kw_solid if rules.contains(&Rule::attribute_name) && !may_end => add("`solid`"),
             Rule::close_brace => add("`}`"),
+            Rule::kw_as => add("`as`"),
             Rule::kw_in if !may_end => add("`in`"),
             Rule::version => add("`rfm 1`"),
             Rule::edition => add("the edition of the language, as in `rfm 1`"),
-            Rule::axis => add("`x`, `y`, `z` or the name of a method"),
+            Rule::axis => add("`x`, `y`, `z`, or the name of a method or of something imported"),
             Rule::text_body => add("a text"),
             _ => {}
         }

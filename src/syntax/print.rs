@@ -34,6 +34,9 @@ impl Printer {
 
     fn item(&mut self, item: &Item) {
         match item {
+            Item::Import(import) => {
+                self.line(format_args!("import {:?} as {}", import.path, import.name.text))
+            }
             Item::Param(param) => self.nested(format_args!("param {}", param.name.text), |p| {
                 p.expr(&param.value);
                 if let Some((low, high)) = &param.range {
@@ -136,6 +139,9 @@ impl Printer {
             }
             ExprKind::Component { vector, axis } => {
                 self.nested(format_args!("component {axis}"), |p| p.expr(vector));
+            }
+            ExprKind::Member { of, name } => {
+                self.nested(format_args!("member {}", name.text), |p| p.expr(of));
             }
             ExprKind::Index { list, index } => {
                 self.nested(format_args!("index"), |p| p.exprs([&**list, &**index]));

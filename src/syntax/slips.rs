@@ -22,6 +22,9 @@ impl<'t> Slip<'t> {
         if let Some(diagnostic) = self.unit_taken_for_a_key() {
             return Some(diagnostic);
         }
+        if let Some(diagnostic) = self.import() {
+            return Some(diagnostic);
+        }
         if self.found.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_') {
             return self.word();
         }
@@ -62,9 +65,6 @@ impl<'t> Slip<'t> {
         if KEYWORDS.contains(&self.found) && called && !self.ends_an_operand() {
             return self.operator_as_a_function();
         }
-        if self.found == "import" {
-            return Some(self.import());
-        }
         if self.on_its_line().trim().is_empty() {
             return Some(self.first_word());
         }
@@ -79,6 +79,9 @@ impl<'t> Slip<'t> {
             return Some(
                 self.unexpected().at("`for` is written `any` here").help("write `any i in 0..6: …`"),
             );
+        }
+        if matches!(last_word(line), "if" | "when" | "case") {
+            return Some(self.syntax("a formula has no `if`").help(foreign::CONDITION));
         }
         if called && line.ends_with(')') {
             return self.transform_in_front();
@@ -113,16 +116,26 @@ impl<'t> Slip<'t> {
         )
     }
 
-    fn import(&self) -> Diagnostic {
-        let message = "`import` is not part of this version";
-        let mesh = [".stl", ".obj", ".ply", ".step", ".stp", ".3mf", ".glb"];
-        let line = self.after().lines().next().unwrap_or_default().to_lowercase();
-        self.syntax(message).help(if mesh.iter().any(|ending| line.contains(ending)) {
-            "a mesh cannot be read: describe the shape by standard solids and inequalities, \
-             as in `solid part = box([0, 0, 0], [1, 1, 1]) \\ cylinder(0.2, 1)`"
+    /// An `import` without a name, or without quotes.
+    fn import(&self) -> Option<Diagnostic> {
+        let line = self.text[self.start..].trim_start().strip_prefix("import")?;
+        if self.before().contains('\n') {
+            return None;
+        }
+        let line = line.lines().next().unwrap_or_default();
+        let quoted = line.split('"').nth(1).unwrap_or("chess.rfm");
+        let stem = quoted.rsplit(['/', '\\']).next().unwrap_or(quoted).split('.').next().unwrap_or(quoted);
+        let is_name = stem.starts_with(|c: char| c.is_alphabetic())
+            && stem.chars().all(|c| c.is_alphanumeric() || c == '_')
+            && !KEYWORDS.contains(&stem);
+        let name = if is_name { stem } else { "part" };
+        let mesh = [".stl", ".obj", ".ply"].iter().any(|ending| quoted.to_lowercase().ends_with(ending));
+        let message = "an import has a path in quotes and a name";
+        Some(self.syntax(message).help(if mesh {
+            format!("a mesh is a solid, as in `solid {name} = mesh(\"{quoted}\")`")
         } else {
-            "copy the definitions into this file, above the place where they are used"
-        })
+            format!("as in `import \"{quoted}\" as {name}`; its solids are then `{name}.…`")
+        }))
     }
 
     /// A word that begins a line but no item.

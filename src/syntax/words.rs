@@ -2,7 +2,8 @@
 
 pub(super) const ITEM_WORDS: [&str; 6] = ["param", "let", "fn", "solid", "scene", "import"];
 
-pub(super) const KEYWORDS: [&str; 12] =
+/// The words that cannot be names.
+pub const KEYWORDS: [&str; 12] =
     ["param", "let", "fn", "solid", "scene", "import", "and", "or", "not", "any", "all", "in"];
 
 /// The word, number or single character at a place in the text.

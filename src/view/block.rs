@@ -16,6 +16,22 @@ pub struct Frame {
     pub levels: Vec<Vec<u8>>,
 }
 
+impl Frame {
+    /// The frame of particles at these places, with numbers of one array each, and the ranges of the arrays.
+    pub fn of(
+        lattice: &Lattice,
+        places: impl Iterator<Item = DVec3>,
+        arrays: &[&[f64]],
+    ) -> (Self, Vec<Levels>) {
+        let range =
+            |values: &[f64]| Levels::of(values.iter().copied()).unwrap_or(Levels { low: 0.0, high: 0.0 });
+        let ranges: Vec<Levels> = arrays.iter().map(|values| range(values)).collect();
+        let levels = |(values, range): (&&[f64], &Levels)| values.iter().map(|v| range.level(*v)).collect();
+        let levels = arrays.iter().zip(&ranges).map(levels).collect();
+        (Self { sites: places.map(|place| lattice.site(place)).collect(), levels }, ranges)
+    }
+}
+
 /// What the head of a frame says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrameHead {

@@ -17,8 +17,8 @@ use rfm::field::{Faces, Part, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::sph::{
-    Dfsph, FluidBlock, FluidShape, Gradients, Method, Obstacle, Parameters, Particles, Precision, Simulation,
-    Wcsph, carve,
+    Dfsph, FluidBlock, FluidShape, Gradients, Method, Obstacle, Paper, Parameters, Particles, Precision,
+    Simulation, Wcsph, carve,
 };
 use rfm::{Engine, Program};
 
@@ -153,7 +153,7 @@ fn methods(sizes: &[usize]) {
             ("wcsph, differences", wcsph(Gradients::Differences)),
             ("dfsph, 0.1 %", dfsph(1e-3)),
             ("dfsph, 0.01 %", dfsph(1e-4)),
-            ("paper", Method::default()),
+            ("paper", Paper::default().into()),
         ] {
             for precision in [Precision::F32, Precision::F64] {
                 row(name, particles, method, precision);

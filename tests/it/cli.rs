@@ -13,6 +13,7 @@ scene drop {
   box { max: [1, 1, 1] }
   fluid { shape: ball([0.5, 0.5, 0.7], 0.12), fill: middle, particles: 30, mass: 0.05, support_radius: 0.1 }
   obstacle { solid: post }
+  method: paper
   run { dt: 1 ms, until: 10 ms, save_every: 5 ms }
 }
 ";

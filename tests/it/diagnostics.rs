@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::tool::{cases, rfm, root, snapshot, stem};
 
-const FOLDERS: [&str; 5] = ["parse_error", "name_error", "type_error", "range_error", "scene_error"];
+const FOLDERS: [&str; 6] =
+    ["parse_error", "name_error", "type_error", "range_error", "scene_error", "file_error"];
 
 /// Codes that no file can raise by itself: for files of more than 256 MiB, for flags of the command line, for a
 /// machine without room, and for what the audit of a run finds.

@@ -2,11 +2,12 @@
 
 use crate::tool::{rfm, rfm_reading, root};
 
-const DOCUMENTS: [&str; 11] = [
+const DOCUMENTS: [&str; 12] = [
     "README.md",
     "CHANGELOG.md",
     "grammar/README.md",
     "examples/README.md",
+    "examples/lammps/README.md",
     "examples/validation/README.md",
     "tests/bench/README.md",
     "tests/peers/README.md",
@@ -20,12 +21,47 @@ fn text(document: &str) -> String {
     std::fs::read_to_string(root().join(document)).unwrap_or_else(|e| panic!("{document}: {e}"))
 }
 
+/// The page of words.
+const WORDS: &str = "grammar/README.md";
+
+fn rfm_blocks(document: &str) -> Vec<String> {
+    let blocks = |text: String| -> Vec<String> {
+        text.split("```rfm\n").skip(1).map(|part| part.split_once("```").unwrap().0.to_string()).collect()
+    };
+    blocks(text(document))
+}
+
+/// Blends and shells take `rfm check` minutes to measure, so the solids on the page of words are compiled and looked at here:
+/// without a warning, with bounds, and with an inside.
+#[test]
+fn every_block_of_the_page_of_words_makes_solids() {
+    let blocks = rfm_blocks(WORDS);
+    assert!(blocks.len() >= 6 && !text(WORDS).contains("```text\nrfm"), "{}", blocks.len());
+    for block in blocks {
+        let path = root().join("page.rfm");
+        let source = rfm::diagnostic::Source::file(path.display().to_string(), block.as_str());
+        let files = rfm::compile::files_beside(&path, false);
+        let program = rfm::Program::check(source, rfm::lower::Options { files, ..Default::default() });
+        let program = program.unwrap_or_else(|e| panic!("{:?}", e.list));
+        assert_eq!(program.warnings().list, [], "{block}");
+        assert!(!program.module().solids.is_empty(), "{block}");
+        for named in &program.module().solids {
+            let solid = program.solid(&named.name).unwrap();
+            let bounds = solid.bounds().aabb().unwrap_or_else(|| panic!("{} has no bounds", named.name));
+            let place = |i: u32| {
+                let cell = |n: u32| (f64::from(n % 40) + 0.5) / 40.0;
+                bounds.min + bounds.size() * rfm::glam::DVec3::new(cell(i), cell(i / 40), cell(i / 1600))
+            };
+            assert!((0..64_000).any(|i| solid.omega(place(i)) > 0.0), "{} is empty", named.name);
+        }
+    }
+}
+
 #[test]
 fn every_rfm_block_checks_without_a_word() {
     let mut blocks = 0;
-    for document in DOCUMENTS {
-        for part in text(document).split("```rfm\n").skip(1) {
-            let (block, _) = part.split_once("```").unwrap();
+    for document in DOCUMENTS.into_iter().filter(|document| *document != WORDS) {
+        for block in rfm_blocks(document) {
             let outcome =
                 rfm_reading(root(), &["check", "--deny", "warnings", "-"], block.as_bytes()).expect(0);
             assert_eq!(outcome.stderr, "", "{document}: {block}");

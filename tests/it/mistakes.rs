@@ -200,7 +200,7 @@ const SCENES: &[&str] = &[
     "fluid { shape: ball([0.5, 0.5, 1], 0.2), spacing: 5 cm }",
     "fluid { shape: box([-1, 0, 0.5], [1, 1, 2]), spacing: 5 cm }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 }",
-    "fluid { shape: ball([0.5, 0.5, 0.7], 1 mm) }",
+    "fluid { shape: ball([0.5, 0.5, 0.7], 1 mm), spacing: 2 cm }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), particles: 1e9 }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), particles: 500, spacing: 5 cm }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 0.1 mm }",

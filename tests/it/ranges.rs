@@ -4,7 +4,7 @@ use rfm::codegen::Rounding;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::interval::Interval;
-use rfm::ir::{Graph, Interpreter, Node, RangeEvaluator, exact};
+use rfm::ir::{Binary, Expr, Graph, Interpreter, Node, RangeEvaluator, exact};
 use rfm::simplify::simplify;
 use rfm::solid::{CellMap, Place, RangeProgram};
 use rfm::{Engine, Field, Program, Solid};
@@ -108,7 +108,7 @@ fn odd_boxes_have_an_answer() {
 
 /// ω as written, and a range program of it for each way of rounding that this processor supports.
 fn formulas() -> Vec<(Graph, Node, RangeEvaluator, Vec<RangeProgram>)> {
-    const FORMULAS: [&str; 8] = [
+    const FORMULAS: [&str; 10] = [
         "x*(3 - x)",
         "(x - 0.1)*(x - 0.7) or (0.3 - y)*(y + 1e3)",
         "x*y*z - (x + y)*(y - z)*(2 - x) and 3*x - y/7 + z*(-0.3)",
@@ -117,6 +117,9 @@ fn formulas() -> Vec<(Graph, Node, RangeEvaluator, Vec<RangeProgram>)> {
         "(x and y) + (y or z)*(x and -z) and x",
         "min(x, y, z) + max(x*y, y*z, 0.5) or (1 - x)*(1 - x)",
         "(0.1 - z)*(0.3 - z) and (z - 5)*(-z)",
+        // where a divisor may vanish only the interpreter answers
+        "x/(y - 0.3) + (z/(2 + abs(z)) - y)/sqrt(x^2 + y^2)",
+        "(1 - x)/(x*y - 0.5)/(z^2 + 1e-3)",
     ];
     let formula = |text: &&str| {
         let program = Program::from_source("f.rfm", format!("rfm 1\nsolid s = {text}"));
@@ -143,10 +146,12 @@ fn neither_exact_values_nor_rounded_ones_leave_the_range() {
     let mut random = Random(11);
     for (graph, root, evaluator, programs) in formulas() {
         let interpreter = Interpreter::new(&graph, &[root]);
+        let mut answers = 0;
         for i in 0..boxes() {
             let over = random.aabb();
             let slow = evaluator.eval(&over);
-            let fast: Vec<Interval> = programs.iter().map(|p| p.call(&over, &[], &[]).unwrap()).collect();
+            let fast: Vec<Interval> = programs.iter().filter_map(|p| p.call(&over, &[], &[])).collect();
+            answers += fast.len();
             for _ in 0..3 {
                 let at = DVec3::new(random.unit(), random.unit(), random.unit());
                 let p = (over.min + over.size() * at).clamp(over.min, over.max);
@@ -168,6 +173,9 @@ fn neither_exact_values_nor_rounded_ones_leave_the_range() {
                 assert!(close, "{graph:?} over {over:?}: {range:?} {slow:?}");
             }
         }
+        let asked = boxes() * programs.len();
+        let divides = graph.nodes().any(|(_, expr)| matches!(expr, Expr::Binary(Binary::Div, ..)));
+        assert!(answers == asked || divides && 3 * answers > asked, "{graph:?}: {answers} of {asked}");
     }
 }
 

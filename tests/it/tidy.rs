@@ -19,15 +19,49 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("precision", &[]),
     ("quantity", &[]),
     ("lettering", &[]),
+    ("table", &["geom", "interval"]),
+    ("heights", &["geom", "interval", "table"]),
+    ("triangles", &["geom", "interval", "table"]),
     ("field", &["geom", "interval"]),
+    ("files", &["table"]),
     ("syntax", &["diagnostic"]),
-    ("ir", &["diagnostic", "geom", "interval", "precision"]),
-    ("lower", &["syntax", "ir", "diagnostic", "geom", "precision", "quantity", "sph"]),
+    ("ir", &["diagnostic", "geom", "interval", "precision", "table"]),
+    (
+        "lower",
+        &[
+            "syntax",
+            "ir",
+            "diagnostic",
+            "geom",
+            "precision",
+            "quantity",
+            "sph",
+            "files",
+            "table",
+            "triangles",
+            "heights",
+        ],
+    ),
     ("simplify", &["ir", "diagnostic"]),
-    ("codegen", &["ir", "diagnostic", "geom", "precision"]),
+    ("codegen", &["ir", "diagnostic", "geom", "precision", "table"]),
     ("solid", &["diagnostic", "ir", "simplify", "codegen", "field", "geom", "interval", "precision"]),
     ("source", &["ir", "codegen", "precision", "solid"]),
-    ("compile", &["diagnostic", "geom", "syntax", "ir", "lower", "simplify", "codegen", "solid", "sph"]),
+    (
+        "compile",
+        &[
+            "diagnostic",
+            "files",
+            "geom",
+            "syntax",
+            "ir",
+            "lower",
+            "simplify",
+            "codegen",
+            "solid",
+            "sph",
+            "triangles",
+        ],
+    ),
     ("slice", &["field", "geom", "interval", "lettering"]),
     ("mesh", &["field", "geom", "interval"]),
     ("fluid_surface", &["geom", "mesh"]),
@@ -167,7 +201,7 @@ fn unsafe_stands_where_machine_code_and_the_memory_of_others_are_used() {
     for (path, text) in sources().into_iter().filter(|(path, _)| path.starts_with("src")) {
         let allowed = path.starts_with("src/codegen")
             || path == Path::new("src/solid/programs/compiled.rs")
-            || ["memory", "evaluate", "state"]
+            || ["memory", "evaluate", "collision", "state"]
                 .iter()
                 .any(|name| path == Path::new("src/bindings/python/src").join(name).with_extension("rs"))
             || path == Path::new("src/bindings/columns/src/memory.rs")

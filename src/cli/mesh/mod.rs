@@ -260,6 +260,9 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
     let (what, at) = (if thin.is_gap { "a gap" } else { "a part" }, thin.at);
     let how = match thin.cells_needed(grid) {
         Some(needed) => format!("{what} {:.2e} thick: about {needed} cells would show it", thin.thickness),
+        None if thin.thickness.is_finite() => {
+            format!("{what} {:.0e} thick, as at a sharp edge", thin.thickness)
+        }
         None => format!("{what} of unknown thickness"),
     };
     format!(

@@ -56,6 +56,12 @@ pub(super) fn variants(program: &Program, solid: &Solid) -> Result<Vec<(&'static
     let node = program.module().solids.iter().find(|s| s.name == solid.name()).map(|s| s.node);
     let Some(node) = node else { return Err(Failure::usage("the solid has no definition of its own")) };
     let graph = &program.module().graph;
+    if graph.has_lookups(&[node]) {
+        let name = solid.name();
+        return Err(Failure::usage(format!(
+            "the errors of `{name}` cannot be measured: a part of it is no formula but a mesh or a map from a file"
+        )));
+    }
     let make =
         |engine, form| Solid::with_form(solid.name(), graph, node, engine, form).map_err(Failure::usage);
     let mut all = Vec::new();

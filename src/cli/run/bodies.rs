@@ -70,25 +70,7 @@ impl Bodies {
 
     fn grid(&self, solid: &Solid) -> Result<Grid, Failure> {
         let bounds = solid.bounds().aabb().unwrap_or(self.domain);
-        let inside = self.domain.grown(1e-3 * self.domain.size().max_element());
-        let over = bounds.intersection(&inside);
-        let grid = if bounds == over || over.is_empty() {
-            Grid::around(&bounds, Resolution::Cells(self.cells))
-        } else {
-            Grid::filling(&over, Resolution::Cells(self.cells))
-        };
+        let grid = Grid::within(&bounds, &self.domain, Resolution::Cells(self.cells));
         grid.map_err(|error| no_grid(&error, "--mesh-cells", self.cells))
     }
-}
-
-/// All meshes as one.
-pub(in crate::cli) fn joined(meshes: &[Mesh]) -> Mesh {
-    let mut all = Mesh::default();
-    for mesh in meshes {
-        let first = all.positions.len() as u32;
-        all.positions.extend(&mesh.positions);
-        all.normals.extend(&mesh.normals);
-        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
-    }
-    all
 }

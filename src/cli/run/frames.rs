@@ -8,12 +8,12 @@ use std::time::Instant;
 
 use super::super::args::Run;
 use super::super::{Failure, output};
-use super::bodies::{Bodies, joined};
+use super::bodies::Bodies;
 use super::pictures::Pictures;
 use super::{checkpoints, folder, probes};
 use crate::cli::output::Shown;
 use rfm::Experiment;
-use rfm::mesh;
+use rfm::mesh::{self, Mesh};
 use rfm::sph::{self, Checkpoint, Simulation};
 
 /// Meshes of a run are in the unit of its frames.
@@ -62,7 +62,7 @@ impl Frames {
             create(&folder.join("pictures"))?;
         }
         if write_frames && !bodies.is_empty() {
-            let obstacle = joined(&meshes);
+            let obstacle = Mesh::joined(&meshes);
             output::write(&folder.join("obstacle.stl"), |mut out| {
                 mesh::stl::write(&obstacle, METRE, &mut out)
             })?;
@@ -148,7 +148,7 @@ impl Frames {
             if self.bodies.move_about() { Some(self.bodies.meshes_at(simulation.time())?) } else { None };
         if let Some(meshes) = &moved {
             let path = self.folder.join(obstacle_name(self.count));
-            output::write(&path, |mut out| mesh::vtp::write(&joined(meshes), METRE, &mut out))?;
+            output::write(&path, |mut out| mesh::vtp::write(&Mesh::joined(meshes), METRE, &mut out))?;
         }
         self.saved.push((simulation.time(), name));
         self.write_collections()?;
@@ -212,7 +212,7 @@ impl FrameCost {
         let finer = (options.mesh_cells as f64 / bodies.cells as f64).powi(2);
         let (mut seconds, mut bytes) = (0.0, 0.0);
         if bodies.move_about() {
-            mesh::vtp::write(&joined(&meshes), METRE, &mut out)?;
+            mesh::vtp::write(&Mesh::joined(&meshes), METRE, &mut out)?;
             seconds += finer * started.elapsed().as_secs_f64();
             bytes += finer * out.len() as f64;
             out.clear();

@@ -10,12 +10,14 @@ use super::super::args::{Shared, View};
 use super::super::choose;
 use super::super::failure::Failure;
 use super::super::input;
-use super::super::run::bodies::{Bodies, joined};
+use super::super::run::bodies::Bodies;
 use crate::cli::output::Shown;
+use rfm::compile::files_beside;
 use rfm::diagnostic::{Diagnostics, Style, render};
+use rfm::files::Files;
 use rfm::geom::Aabb;
 use rfm::lower::{Gravity, Options, Scene};
-use rfm::mesh::split_creases;
+use rfm::mesh::{Mesh, split_creases};
 use rfm::quantity::Dimension;
 use rfm::sph::Simulation;
 use rfm::view::{Array, Corners, Frame, FrameHead, Lattice, Levels, Param, Setting, pack_frame, pack_mesh};
@@ -30,6 +32,8 @@ pub(super) struct Subject {
     define: BTreeMap<String, f64>,
     dimensions: BTreeMap<String, Dimension>,
     max_nodes: usize,
+    /// The files that it names.
+    files: Files,
     engine: Engine,
 }
 
@@ -62,7 +66,7 @@ pub(super) enum Detail {
 const PASSING_CELLS: usize = 40;
 
 /// What tells one state of a file from another one.
-pub(super) type Stamp = Option<(SystemTime, u64)>;
+pub(super) type Stamp = Option<Vec<Option<(SystemTime, u64)>>>;
 
 impl Subject {
     pub fn new(shared: &Shared, options: &View) -> Self {
@@ -78,14 +82,25 @@ impl Subject {
                 .filter_map(|given| Some((given.name.clone(), given.dimension?)))
                 .collect(),
             max_nodes: shared.max_nodes,
+            files: files_beside(&options.subject, shared.allow_outside),
             engine: shared.engine.into(),
         }
     }
 
-    /// When the file was written, and its length; `None` while it is not there.
+    /// When the file was written, and its length, and those of the files that it names; `None` while it is not there.
     pub fn stamp(&self) -> Stamp {
-        let file = std::fs::metadata(&self.path).ok()?;
-        Some((file.modified().ok()?, file.len()))
+        let of = |path: &Path| {
+            let file = std::fs::metadata(path).ok()?;
+            Some((file.modified().ok()?, file.len()))
+        };
+        let own = of(&self.path)?;
+        let named = self.files.asked();
+        Some(std::iter::once(Some(own)).chain(named.iter().map(|name| of(Path::new(name)))).collect())
+    }
+
+    /// Reads the files that the file names anew when it is next checked.
+    pub fn forget(&self) {
+        self.files.forget();
     }
 
     pub fn title(&self) -> String {
@@ -101,7 +116,13 @@ impl Subject {
         let mut overrides = self.define.clone();
         overrides.extend(values.iter().map(|(name, value)| (name.clone(), *value)));
         let dimensions = self.dimensions.clone();
-        let options = Options { overrides, dimensions, max_nodes: self.max_nodes, ..Options::default() };
+        let options = Options {
+            overrides,
+            dimensions,
+            max_nodes: self.max_nodes,
+            files: self.files.clone(),
+            ..Options::default()
+        };
         let program = Program::check(source, options).map_err(|diagnostics| plain(&diagnostics))?;
         let has_scene = !program.module().scenes.is_empty();
         let scene = if self.solid.is_none() && (has_scene || self.scene.is_some()) {
@@ -135,7 +156,7 @@ impl Subject {
             Detail::Lasting => self.cells,
         };
         let meshes = Bodies::of(solids, domain, cells).meshes_at(0.0).map_err(message)?;
-        Ok((pack_mesh(&split_creases(&joined(&meshes)), run), domain))
+        Ok((pack_mesh(&split_creases(&Mesh::joined(&meshes)), run), domain))
     }
 
     fn solids_of(&self, checked: &Checked, scene: &Scene) -> Result<Vec<Solid>, String> {
@@ -237,23 +258,15 @@ impl Running {
     /// The block of the obstacles' mesh as they stand now.
     pub fn mesh(&self, run: u64) -> Result<Vec<u8>, String> {
         let meshes = self.bodies.meshes_at(self.simulation.time()).map_err(message)?;
-        Ok(pack_mesh(&split_creases(&joined(&meshes)), run))
+        Ok(pack_mesh(&split_creases(&Mesh::joined(&meshes)), run))
     }
 
     /// The block of the present instant.
     pub fn frame(&self, run: u64) -> Vec<u8> {
         let particles = self.simulation.particles();
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
-        let columns = [&speeds, &particles.density, &particles.pressure];
-        let range =
-            |values: &[f64]| Levels::of(values.iter().copied()).unwrap_or(Levels { low: 0.0, high: 0.0 });
-        let ranges: Vec<Levels> = columns.iter().map(|values| range(values)).collect();
-        let levels =
-            |(values, range): (&&Vec<f64>, &Levels)| values.iter().map(|v| range.level(*v)).collect();
-        let frame = Frame {
-            sites: particles.position.iter().map(|p| self.lattice.site(p)).collect(),
-            levels: columns.iter().zip(&ranges).map(levels).collect(),
-        };
+        let arrays: [&[f64]; 3] = [&speeds, &particles.density, &particles.pressure];
+        let (frame, ranges) = Frame::of(&self.lattice, particles.position.iter(), &arrays);
         let (time, step) = (self.simulation.time(), Some(self.simulation.steps()));
         pack_frame(&FrameHead { time, step, ranges, mesh: None, run }, &frame, None)
     }

@@ -174,6 +174,7 @@ impl Session {
             return;
         }
         self.stamp = stamp;
+        self.subject.forget();
         if let Ok(plain) = self.subject.checked(&BTreeMap::new()) {
             self.values.retain(|name, _| plain.has_param(name));
         }

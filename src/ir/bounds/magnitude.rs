@@ -119,7 +119,8 @@ fn exponent(graph: &Graph, expr: Expr, range: Interval, known: &[f64]) -> f64 {
         | Expr::Constant(_)
         | Expr::Coordinate(_)
         | Expr::Parameter(_)
-        | Expr::Uniform(_) => f64::INFINITY,
+        | Expr::Uniform(_)
+        | Expr::Lookup(..) => f64::INFINITY,
     }
 }
 

@@ -16,6 +16,7 @@ use std::cell::RefCell;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::lookup::Tables;
 use crate::ir::op::{Binary, Unary};
 use crate::ir::r0;
 
@@ -98,6 +99,7 @@ impl<'a> Region<'a> {
 pub struct RangeEvaluator {
     rules: Vec<RangeRule>,
     root: Node,
+    tables: Tables,
 }
 
 thread_local! {
@@ -108,7 +110,7 @@ impl RangeEvaluator {
     /// Prepares a root of a graph.
     pub fn new(graph: &Graph, root: Node) -> Self {
         let rules = graph.nodes().map(|(_, expr)| RangeRule::of(graph, expr)).collect();
-        Self { rules, root }
+        Self { rules, root, tables: graph.tables().clone() }
     }
 
     /// The range of ω over a box at any time; bounds of the box may be infinite.
@@ -119,7 +121,7 @@ impl RangeEvaluator {
     /// The range over a region.
     pub fn eval_with(&self, region: &Region<'_>) -> Interval {
         SCRATCH.with_borrow_mut(|values| {
-            self.fill(region, values);
+            self.fill(region, values, None);
             values[self.root.index()]
         })
     }
@@ -132,11 +134,20 @@ impl RangeEvaluator {
     /// The ranges of all nodes over a region.
     pub fn all_with(&self, region: &Region<'_>) -> Vec<Interval> {
         let mut values = Vec::new();
-        self.fill(region, &mut values);
+        self.fill(region, &mut values, None);
         values
     }
 
-    fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>) {
+    /// The ranges of all nodes over the points of a region at which no node that is not a number, and divides
+    /// another, is nearer to 0 than `least_divisor`.
+    pub(crate) fn all_without_poles(&self, region: &Region<'_>, least_divisor: f64) -> Vec<Interval> {
+        let mut values = Vec::new();
+        self.fill(region, &mut values, Some(least_divisor));
+        values
+    }
+
+    fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>, least_divisor: Option<f64>) {
+        let steepest = least_divisor.map(|least| Interval::new(-1.0 / least, 1.0 / least));
         values.clear();
         for &rule in &self.rules {
             // a coordinate is always a number, even if nothing else is known of it
@@ -156,6 +167,17 @@ impl RangeEvaluator {
                 }
                 RangeRule::Plain(Expr::Unary(_, a)) if unknown(a) => Interval::ALL,
                 RangeRule::Plain(Expr::Binary(_, a, b)) if unknown(a) || unknown(b) => Interval::ALL,
+                RangeRule::Plain(Expr::Binary(Binary::Div | Binary::DivOrZero, a, b))
+                    if let Some(steepest) = steepest
+                        && values[b.index()].contains(0.0)
+                        && values[b.index()].width() > 0.0 =>
+                {
+                    values[a.index()] * steepest
+                }
+                RangeRule::Plain(Expr::Lookup(_, at)) if at.into_iter().any(unknown) => Interval::ALL,
+                RangeRule::Plain(Expr::Lookup(lookup, at)) => {
+                    lookup.range(&self.tables, at.map(|node| values[node.index()]))
+                }
                 RangeRule::Plain(expr) => plain(expr, values, region),
             };
             values.push(value);
@@ -231,6 +253,8 @@ fn plain(expr: Expr, values: &[Interval], region: &Region<'_>) -> Interval {
         Expr::Uniform(i) => region.uniforms.get(i as usize).copied().unwrap_or(Interval::ALL),
         Expr::Unary(op, a) => unary(op, values[a.index()]),
         Expr::Binary(op, a, b) => binary(op, values[a.index()], values[b.index()]),
+        // the caller has the tables
+        Expr::Lookup(..) => Interval::ALL,
     }
 }
 
@@ -270,8 +294,10 @@ pub(in crate::ir) fn binary(op: Binary, a: Interval, b: Interval) -> Interval {
         Binary::Or => -conjunction(-a, -b),
         // two infinite operands have no weights
         Binary::AndWeight | Binary::OrWeight if is_infinite(a) && is_infinite(b) => Interval::ALL,
-        Binary::MinWeight | Binary::MaxWeight => Interval { lo: 0.0, hi: 1.0 },
-        Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() },
+        Binary::MinWeight => minimum_weight(a, b),
+        Binary::MaxWeight => minimum_weight(b, a),
+        Binary::AndWeight => conjunction_weight(a, b),
+        Binary::OrWeight => conjunction_weight(-a, -b),
         Binary::Call(function) => function.range(a, b),
     }
 }
@@ -313,6 +339,37 @@ fn conjunction(a: Interval, b: Interval) -> Interval {
         (true, false) => 0.5 * x,
     };
     Interval::new(outwards(exact.lo, exact.lo < 0.0), outwards(exact.hi, exact.hi > 0.0))
+}
+
+/// The share of a in the smaller of a and b.
+fn minimum_weight(a: Interval, b: Interval) -> Interval {
+    if a.hi < b.lo {
+        Interval::point(1.0)
+    } else if b.hi < a.lo {
+        Interval::point(0.0)
+    } else {
+        Interval { lo: 0.0, hi: 1.0 }
+    }
+}
+
+/// How far the weights of R₀ may be from their exact values by rounding, in all its forms.
+const WEIGHT_ROUNDING: f64 = 1e-14;
+
+/// The range of 1 − u/√(u² + v²), the derivative of u ∧ v by u.
+pub(in crate::ir) fn conjunction_weight(u: Interval, v: Interval) -> Interval {
+    let any = Interval { lo: 0.0, hi: 2.0_f64.next_up() };
+    let v = v.abs();
+    let nearest = v.lo.max(u.lo).max(-u.hi);
+    let farthest = v.hi.max(-u.lo).max(u.hi);
+    // at the corner the weights take all values; where squares leave the range of numbers the forms differ
+    if !(nearest > SQUARES_UNDERFLOW && farthest < SQUARES_OVERFLOW) {
+        return any;
+    }
+    // it falls with u, and grows with |v| where u is positive
+    let weight = |u: f64, v: f64| 1.0 - u / (u * u + v * v).sqrt();
+    let least = weight(u.hi, if u.hi > 0.0 { v.lo } else { v.hi });
+    let most = weight(u.lo, if u.lo > 0.0 { v.hi } else { v.lo });
+    Interval { lo: (least - WEIGHT_ROUNDING).max(any.lo), hi: (most + WEIGHT_ROUNDING).min(any.hi) }
 }
 
 #[cfg(test)]
@@ -365,6 +422,36 @@ mod tests {
             let range = RangeEvaluator::new(&graph, root).eval(&Aabb::new(min, max));
             prop_assert!(range.contains(omega[0]), "{omega:?} not in {range:?}");
         }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #[test]
+        fn no_weight_is_outside_its_range(
+            lo in prop::array::uniform2(-2.0..2.0f64),
+            size in prop::array::uniform2(prop_oneof![Just(0.0), 0.0..1.0f64, 0.0..1e-9f64]),
+            at in prop::array::uniform2(0.0..=1.0f64),
+            scale in -520_i32..=500,
+        ) {
+            let scale = 2.0_f64.powi(scale);
+            let side = |i: usize| Interval::new(lo[i] * scale, (lo[i] + size[i]) * scale);
+            let (a, b) = (side(0), side(1));
+            let within = |i: usize, range: Interval| ((lo[i] + at[i] * size[i]) * scale).clamp(range.lo, range.hi);
+            let (u, v) = (within(0, a), within(1, b));
+            for op in [Binary::AndWeight, Binary::OrWeight, Binary::MinWeight, Binary::MaxWeight] {
+                let (weight, range) = (op.eval(u, v), binary(op, a, b));
+                prop_assert!(range.contains(weight), "{op:?} of {u}, {v}: {weight} not in {range:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn weights_far_from_a_corner_are_nearly_known() {
+        let (u, v) = (Interval::new(0.1, 0.11), Interval::new(0.9, 1.0));
+        // 1 − u/√(u² + v²)
+        let range = binary(Binary::AndWeight, u, v);
+        assert!(range.lo > 0.878 && range.hi < 0.901, "{range:?}");
+        assert_eq!(binary(Binary::MinWeight, u, v), Interval::point(1.0));
     }
 
     #[test]

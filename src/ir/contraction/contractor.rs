@@ -10,6 +10,7 @@ use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::bounds::range::{Affine, Region, is_zero};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::lookup::Tables;
 use crate::ir::op::Binary;
 
 /// A graph prepared for contraction.
@@ -21,10 +22,11 @@ pub struct Contractor {
     /// Whether the root is a number only if the node is.
     needed: Vec<bool>,
     /// The operands of each node that it needs.
-    needs: Vec<[bool; 2]>,
+    needs: Vec<[bool; 3]>,
     /// Linear forms that something else is computed from, or the root.
     pub(super) forms: Vec<Node>,
     coordinates: [Option<Node>; 3],
+    pub(super) tables: Tables,
 }
 
 /// What is asked of a formula.
@@ -62,13 +64,13 @@ impl Contractor {
         }
         let needs = rules.iter().map(|rule| {
             let needed: Vec<Node> = rule.needed(graph).collect();
-            let mut flags = [false; 2];
+            let mut flags = [false; 3];
             for (flag, operand) in flags.iter_mut().zip(rule.operands()) {
                 *flag = needed.contains(&operand);
             }
             flags
         });
-        let needs: Vec<[bool; 2]> = needs.collect();
+        let needs: Vec<[bool; 3]> = needs.collect();
         let mut needed = vec![false; rules.len()];
         needed[root.index()] = true;
         let mut read_by_other = vec![false; rules.len()];
@@ -87,7 +89,8 @@ impl Contractor {
         };
         let forms = graph.nodes().filter(is_form).map(|(node, _)| node).collect();
         let coordinates = Axis::SPACE.map(|axis| graph.find(Expr::Coordinate(axis)));
-        Self { rules, degrees, root, needed, needs, forms, coordinates }
+        let tables = graph.tables().clone();
+        Self { rules, degrees, root, needed, needs, forms, coordinates, tables }
     }
 
     /// How many nodes a call visits.
@@ -127,7 +130,7 @@ impl Contractor {
             // an operand that is undefined where the node is not says nothing of the node
             let unknown = |node: Node| may_fail[node.index()];
             let is_open = rule.operands().zip(self.needs[i]).any(|(node, needed)| !needed && unknown(node));
-            let found = numbers(rule, |node| values[node.index()], region);
+            let found = numbers(rule, |node| values[node.index()], region, &self.tables);
             let fails = found.may_fail || rule.operands().any(unknown);
             // a choice that is made leaves out what may be undefined
             let is_left_out = matches!(*rule, Rule::Plain(Expr::Binary(Binary::MulOrZero, _, b))
@@ -166,7 +169,7 @@ impl Contractor {
             }
             Rule::Plain(Expr::Binary(op, a, b)) => {
                 let [left, right] = backward::binary(op, value, values[a.index()], values[b.index()])?;
-                let [needs_a, needs_b] = self.needs[i];
+                let [needs_a, needs_b, _] = self.needs[i];
                 if a == b {
                     if needs_a && needs_b {
                         values[a.index()] = meet(left, right)?;
@@ -178,6 +181,13 @@ impl Contractor {
                 }
                 if needs_b {
                     values[b.index()] = right;
+                }
+            }
+            Rule::Plain(Expr::Lookup(lookup, at)) => {
+                let reach = lookup.reach(&self.tables, value.lo);
+                for (axis, node) in at.into_iter().enumerate() {
+                    let left = Interval { lo: reach.min[axis], hi: reach.max[axis] };
+                    values[node.index()] = meet(left, values[node.index()])?;
                 }
             }
             Rule::Plain(Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_)) => {}

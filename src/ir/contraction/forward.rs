@@ -6,6 +6,7 @@ use crate::interval::Interval;
 use crate::ir::bounds::range::{self, Region};
 use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::graph::{Axis, Expr};
+use crate::ir::lookup::Tables;
 use crate::ir::op::{Binary, Unary};
 
 pub const POSITIVE: Interval = Interval { lo: 0.0, hi: f64::INFINITY };
@@ -33,7 +34,12 @@ fn partial(operand: Interval, domain: Interval, f: impl Fn(Interval) -> Interval
 }
 
 /// What a node with this rule may be; `of` gives that of its operands.
-pub fn numbers(rule: &Rule, of: impl Fn(crate::ir::Node) -> Interval, region: &Region<'_>) -> Numbers {
+pub fn numbers(
+    rule: &Rule,
+    of: impl Fn(crate::ir::Node) -> Interval,
+    region: &Region<'_>,
+    tables: &Tables,
+) -> Numbers {
     match *rule {
         Rule::Power { of: base, exponent } => power(of(base), exponent).into(),
         Rule::Slab { of: e, first, second } => {
@@ -42,6 +48,7 @@ pub fn numbers(rule: &Rule, of: impl Fn(crate::ir::Node) -> Interval, region: &R
         }
         Rule::Plain(Expr::Unary(op, a)) => unary(op, of(a)),
         Rule::Plain(Expr::Binary(op, a, b)) => binary(op, of(a), of(b)),
+        Rule::Plain(Expr::Lookup(lookup, at)) => lookup.range(tables, at.map(of)).into(),
         Rule::Plain(Expr::Coordinate(axis)) => coordinate(axis, region).into(),
         Rule::Plain(Expr::Constant(bits)) => {
             let value = f64::from_bits(bits);
@@ -106,10 +113,11 @@ fn binary(op: Binary, a: Interval, b: Interval) -> Numbers {
         | Binary::PlainMin
         | Binary::PlainMax
         | Binary::MinWeight
-        | Binary::MaxWeight => range::binary(op, a, b).into(),
+        | Binary::MaxWeight
+        | Binary::AndWeight
+        | Binary::OrWeight => range::binary(op, a, b).into(),
         Binary::And => conjunction(a, b).into(),
         Binary::Or => (-conjunction(-a, -b)).into(),
-        Binary::AndWeight | Binary::OrWeight => Interval { lo: 0.0, hi: 2.0_f64.next_up() }.into(),
         Binary::Call(BinaryFunction::Pow) => general_power(a, b),
         Binary::Call(function @ BinaryFunction::Atan2) => function.range(a, b).into(),
     }

@@ -136,6 +136,35 @@ mod tests {
         }
     }
 
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        /// Whatever the operations: no gradient in a box is outside the slopes.
+        #[test]
+        fn slopes_hold_all_gradients(
+            steps in prop::collection::vec((0..200_usize, 0..4_usize, 0..9_usize, -3.0..3.0f64), 1..9),
+            lo in prop::array::uniform3(-3.0..2.0f64),
+            size in prop_oneof![prop::array::uniform3(0.0..1.0f64), prop::array::uniform3(0.0..0.01f64)],
+            at in prop::array::uniform3(0.0..=1.0f64),
+        ) {
+            let (mut graph, root) = formula(&steps);
+            let min = DVec3::from_array(lo);
+            let space = Aabb::new(min, min + DVec3::from_array(size));
+            let slopes = Contractor::new(&graph, root).slopes(&Region::of(&space));
+            let gradient = crate::ir::gradient(&mut graph, root);
+            let p = (space.min + space.size() * DVec3::from_array(at)).clamp(space.min, space.max);
+            let all: Vec<Node> = graph.nodes().map(|(node, _)| node).collect();
+            let mut values = vec![0.0; all.len()];
+            Interpreter::new(&graph, &all).eval_f64(p.to_array(), &mut values);
+            // the rounding of what is added up to a gradient
+            let slack = 1e-12 * values.iter().fold(1.0, |most: f64, value| most.max(value.abs()));
+            for (node, slope) in gradient.into_iter().zip(slopes.into_iter().flatten()) {
+                let found = values[node.index()];
+                let holds = found.is_nan() || slope.lo - slack <= found && found <= slope.hi + slack;
+                prop_assert!(holds, "{found:e} not in {slope:?}");
+            }
+        }
+    }
+
     #[track_caller]
     fn check(build: impl Fn(&mut Graph, [Node; 3]) -> Node, expected: [[f64; 2]; 3]) {
         let mut graph = Graph::default();

@@ -33,3 +33,4 @@ pub use contractor::{Contractor, Wanted};
 pub use linear::{LinearForm, contract_linear, contract_linear_around};
 pub use reach::reach;
 pub use sets::Contracted;
+pub use slopes::SURFACE_ROUNDING;

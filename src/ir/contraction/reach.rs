@@ -40,7 +40,7 @@ pub fn reach(graph: &Graph, root: Node) -> Option<Aabb> {
 
 /// The graph of a root alone, with the values of what uses no coordinate: rules look for numbers.
 fn folded(graph: &Graph, root: Node) -> (Graph, Node) {
-    let mut out = Graph::default();
+    let mut out = Graph::like(graph);
     let mut image: FxHashMap<Node, Node> = FxHashMap::default();
     for node in graph.cone(root) {
         let expr = graph.expr(node).map(|operand| image[&operand]);
@@ -48,7 +48,11 @@ fn folded(graph: &Graph, root: Node) -> (Graph, Node) {
         let value = match expr {
             Expr::Unary(op, a) => number(a).map(|a| op.eval(a)),
             Expr::Binary(op, a, b) => number(a).zip(number(b)).map(|(a, b)| op.eval(a, b)),
-            Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => None,
+            Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => None,
         };
         let new = match value {
             Some(value) => out.constant(value),

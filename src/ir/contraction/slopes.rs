@@ -14,13 +14,14 @@ use super::rule::Rule;
 use super::sets::{Contracted, meet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::bounds::range::{Region, is_zero};
+use crate::ir::bounds::range::{Region, conjunction_weight, is_zero};
 use crate::ir::function::BinaryFunction;
 use crate::ir::graph::{Axis, Expr, Node};
+use crate::ir::lookup::{Part, Tables};
 use crate::ir::op::{Binary, Unary};
 
 /// How far rounding may move a surface, relative to the coordinates of its points.
-const ROUNDING: f64 = 1e-13;
+pub const SURFACE_ROUNDING: f64 = 1e-13;
 
 const ZERO: Interval = Interval::point(0.0);
 const ONE: Interval = Interval::point(1.0);
@@ -40,6 +41,21 @@ impl Contractor {
         SCRATCH.with_borrow_mut(|scratch| {
             scratch.known.clear();
             contract(self, wanted, space, forms, scratch)
+        })
+    }
+}
+
+impl Contractor {
+    /// Enclosures of the (generalised) derivatives over a region. `None` if the formula may be undefined there.
+    pub fn slopes(&self, region: &Region<'_>) -> Option<[Interval; 3]> {
+        SCRATCH.with_borrow_mut(|scratch| {
+            scratch.known.clear();
+            self.forward(region, scratch)?;
+            if scratch.may_fail[self.root().index()] {
+                return None;
+            }
+            fill(self, scratch);
+            Some(scratch.slopes[self.root().index()])
         })
     }
 }
@@ -97,7 +113,8 @@ fn solve(most: f64, slopes: Slopes, centre: DVec3, space: &mut Aabb) -> Contract
             return Contracted::Nowhere;
         };
         // programs round a formula, and so move its surface a little
-        let slack = ROUNDING * (space.min[axis].abs().max(space.max[axis].abs()) + space.size()[axis]);
+        let slack =
+            SURFACE_ROUNDING * (space.min[axis].abs().max(space.max[axis].abs()) + space.size()[axis]);
         let kept = Interval { lo: centre[axis] + left.lo - slack, hi: centre[axis] + left.hi + slack };
         let Some(kept) = meet(Interval { lo: space.min[axis], hi: space.max[axis] }, kept) else {
             return Contracted::Nowhere;
@@ -117,7 +134,7 @@ fn fill(contractor: &Contractor, scratch: &mut Scratch) {
             Rule::Power { of: base, exponent } => {
                 let (a, da) = of(base);
                 let factor = Interval::point(f64::from(exponent)) * power(a, exponent - 1);
-                da.map(|d| factor * d)
+                scaled(factor, da)
             }
             Rule::Slab { of: e, first, second } => {
                 let (value, de) = of(e);
@@ -127,15 +144,15 @@ fn fill(contractor: &Contractor, scratch: &mut Scratch) {
                 };
                 let ((p, q), (r, s)) = (line(first), line(second));
                 let factor = TWO * p * r * value + (p * s + r * q);
-                de.map(|d| factor * d)
+                scaled(factor, de)
             }
-            Rule::Plain(expr) => plain(expr, of, values[i]),
+            Rule::Plain(expr) => plain(expr, of, values[i], &contractor.tables),
         };
         slopes.push(slope);
     }
 }
 
-fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval) -> Slopes {
+fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval, tables: &Tables) -> Slopes {
     match expr {
         Expr::Constant(_) | Expr::Parameter(_) | Expr::Uniform(_) | Expr::Coordinate(Axis::T) => [ZERO; 3],
         Expr::Coordinate(Axis::X) => [ONE, ZERO, ZERO],
@@ -164,6 +181,14 @@ fn plain(expr: Expr, of: impl Fn(Node) -> (Interval, Slopes), value: Interval) -
             scaled(factor, da)
         }
         Expr::Binary(op, a, b) => binary(op, of(a), of(b), value),
+        Expr::Lookup(lookup, at) => {
+            let slopes = match lookup.part {
+                Part::Value => lookup.slopes(tables, at.map(|node| of(node).0)),
+                Part::Slope(_) => [Interval::ALL; 3], // it jumps
+            };
+            let parts: [Slopes; 3] = std::array::from_fn(|axis| scaled(slopes[axis], of(at[axis]).1));
+            std::array::from_fn(|i| parts[0][i] + parts[1][i] + parts[2][i])
+        }
     }
 }
 
@@ -178,7 +203,11 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
         Binary::MulOrZero if is_zero(b) => [ZERO; 3],
         Binary::Mul => mixed(b, a),
         Binary::MulOrZero if !b.contains(0.0) => mixed(b, a),
-        Binary::Div if !b.contains(0.0) => mixed(ONE / b, -(value / b)),
+        Binary::Div | Binary::DivOrZero if !b.contains(0.0) => mixed(ONE / b, -(value / b)),
+        // between their jumps they are constant
+        Binary::MinWeight | Binary::MaxWeight if value.lo == value.hi => [ZERO; 3],
+        Binary::AndWeight if let Some([by_a, by_b]) = slopes_of_weight(a, b) => mixed(by_a, by_b),
+        Binary::OrWeight if let Some([by_a, by_b]) = slopes_of_weight(a, b) => mixed(-by_a, -by_b),
         Binary::Min | Binary::PlainMin if a.hi < b.lo => da,
         Binary::Min | Binary::PlainMin if b.hi < a.lo => db,
         Binary::Max | Binary::PlainMax if a.lo > b.hi => da,
@@ -186,10 +215,8 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
         Binary::Min | Binary::PlainMin | Binary::Max | Binary::PlainMax => {
             std::array::from_fn(|i| da[i].hull(db[i]))
         }
-        Binary::And | Binary::Or => {
-            let weight = Interval { lo: 0.0, hi: 2.0_f64.next_up() };
-            mixed(weight, weight)
-        }
+        Binary::And => mixed(conjunction_weight(a, b), conjunction_weight(b, a)),
+        Binary::Or => mixed(conjunction_weight(-a, -b), conjunction_weight(-b, -a)),
         Binary::Call(BinaryFunction::Pow) if b.lo == b.hi && a.lo > 0.0 => scaled(b * (value / a), da),
         // an angle jumps where it turns from π to −π
         Binary::Call(BinaryFunction::Atan2) if a.contains(0.0) && b.lo <= 0.0 => {
@@ -212,6 +239,13 @@ fn binary(op: Binary, (a, da): (Interval, Slopes), (b, db): (Interval, Slopes), 
             std::array::from_fn(|i| da[i].hull(db[i]))
         }
     }
+}
+
+/// The derivatives of 1 − u/√(u² + v²), which are −v²/(u² + v²)^(3/2) and u·v/(u² + v²)^(3/2). `None` if both may vanish.
+fn slopes_of_weight(u: Interval, v: Interval) -> Option<[Interval; 2]> {
+    let squares = u.square() + v.square();
+    let cubes = squares * squares.sqrt();
+    (cubes.lo > f64::MIN_POSITIVE).then(|| [-v.square() / cubes, u * v / cubes])
 }
 
 /// A factor times slopes. What does not vary has no slope, however steep the function of it.

@@ -9,6 +9,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ir::function_rules::{Chain, ChainOfTwo};
 use crate::ir::graph::{Expr, Graph, Node};
+use crate::ir::lookup::{Lookup, Part};
 use crate::ir::op::{Binary, Unary};
 
 /// (∂root/∂x, ∂root/∂y, ∂root/∂z). The work grows with what the root uses, not with the graph.
@@ -71,7 +72,15 @@ fn depends_on_coordinates(graph: &Graph, cone: &[Node]) -> FxHashSet<Node> {
     let mut depends = FxHashSet::default();
     for &node in cone {
         let expr = graph.expr(node);
-        let is_step = matches!(expr, Expr::Unary(op, _) if op.is_step());
+        let is_step = match expr {
+            Expr::Unary(op, _) => op.is_step(),
+            Expr::Lookup(Lookup { part, .. }, _) => part != Part::Value,
+            Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Binary(..) => false,
+        };
         let is_varied = matches!(expr, Expr::Coordinate(_)) || expr.operands().any(|o| depends.contains(&o));
         if is_varied && !is_step {
             depends.insert(node);
@@ -106,6 +115,16 @@ fn contributions(
                 && let Some(contribution) = binary(graph, op, node, [a, b], Side::Second, adjoint)
             {
                 out.push((b, contribution));
+            }
+        }
+        // steps are not among what depends on coordinates: this is the value
+        Expr::Lookup(lookup, at) => {
+            let span = graph.span(node);
+            for (axis, operand) in at.into_iter().enumerate().filter(|(_, operand)| depends.contains(operand))
+            {
+                let slope = graph.intern(Expr::Lookup(lookup.with(Part::Slope(axis as u8)), at), span);
+                let contribution = graph.binary(Binary::Mul, adjoint, slope);
+                out.push((operand, contribution));
             }
         }
     }

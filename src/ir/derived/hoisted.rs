@@ -104,7 +104,7 @@ pub fn hoisted(graph: &Graph, outputs: &[Node], outside: Outside) -> Hoisted {
             graph.expr(node).operands().for_each(|operand| needed[operand.index()] = true);
         }
     }
-    let mut rest = Graph::default();
+    let mut rest = Graph::like(graph);
     let mut image: Vec<Option<Node>> = vec![None; graph.len()];
     let mut roots = Vec::new();
     for (node, expr) in graph.nodes().filter(|(node, _)| needed[node.index()]) {

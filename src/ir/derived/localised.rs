@@ -31,7 +31,7 @@ enum Image {
 /// The root as a function of x − origin. Each constant of the new graph that was folded with the origin is
 /// off by at most 2⁻⁵⁰ of itself; no other constant is changed.
 pub fn localised(graph: &Graph, root: Node, origin: DVec3) -> (Graph, Node) {
-    let mut out = Graph::default();
+    let mut out = Graph::like(graph);
     let mut images: HashMap<Node, Image> = HashMap::new();
     for node in graph.cone(root) {
         let shifted = match graph.expr(node) {

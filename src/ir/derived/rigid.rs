@@ -40,7 +40,7 @@ impl Degree {
                 degree(a).max(degree(b))
             }
             Expr::Binary(Binary::Div, a, b) if degree(b) == Self::Constant => degree(a),
-            Expr::Unary(..) | Expr::Binary(..) => {
+            Expr::Unary(..) | Expr::Binary(..) | Expr::Lookup(..) => {
                 if expr.operands().all(|operand| degree(operand) == Self::Constant) {
                     Self::Constant
                 } else {

@@ -34,7 +34,8 @@ impl SignRule {
             | Expr::Constant(_)
             | Expr::Coordinate(_)
             | Expr::Parameter(_)
-            | Expr::Uniform(_) => Self::Leaf,
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => Self::Leaf,
         }
     }
 

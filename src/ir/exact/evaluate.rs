@@ -60,7 +60,7 @@ pub fn evaluate_at(graph: &Graph, outputs: &[Node], point: [f64; 3], time: f64) 
             Expr::Coordinate(Axis::Y) => big(point[1])?,
             Expr::Coordinate(Axis::Z) => big(point[2])?,
             Expr::Coordinate(Axis::T) => big(time)?,
-            Expr::Parameter(_) | Expr::Uniform(_) => return None,
+            Expr::Parameter(_) | Expr::Uniform(_) | Expr::Lookup(..) => return None,
             Expr::Unary(op, a) => unary(op, of(a)?)?,
             Expr::Binary(op, a, b) => binary(op, of(a)?, of(b)?)?,
         };

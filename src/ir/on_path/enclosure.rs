@@ -11,6 +11,7 @@ use std::cell::RefCell;
 use crate::interval::Interval;
 use crate::ir::bounds::range::{self, RangeRule};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
+use crate::ir::lookup::{Lookup, Part, Tables};
 use crate::ir::op::{Binary, Unary};
 
 /// What is known of a leaf along a stretch of a path.
@@ -27,6 +28,7 @@ pub struct Enclosure {
 pub struct EnclosureEvaluator {
     steps: Vec<(Expr, RangeRule)>,
     root: Node,
+    tables: Tables,
 }
 
 /// The Taylor coefficients of one node: at t₀, and over the stretch.
@@ -45,7 +47,8 @@ thread_local! {
 impl EnclosureEvaluator {
     /// Prepares a root of a graph.
     pub fn new(graph: &Graph, root: Node) -> Self {
-        Self { steps: graph.nodes().map(|(_, expr)| (expr, RangeRule::of(graph, expr))).collect(), root }
+        let steps = graph.nodes().map(|(_, expr)| (expr, RangeRule::of(graph, expr))).collect();
+        Self { steps, root, tables: graph.tables().clone() }
     }
 
     /// The enclosure over the part [t₀, t₁] of the path between two points (x, y, z and time), for a graph
@@ -67,7 +70,7 @@ impl EnclosureEvaluator {
         SCRATCH.with_borrow_mut(|jets| {
             jets.clear();
             for &(expr, step) in &self.steps {
-                let mut jet = jet(expr, jets, axes, parameters);
+                let mut jet = jet(expr, jets, axes, parameters, &self.tables);
                 if let RangeRule::Square(_) | RangeRule::Slab { .. } = step {
                     jet.over[0] = step.over(|node| jets[node.index()].over[0]).unwrap_or(jet.over[0]);
                 }
@@ -105,7 +108,7 @@ impl Jet {
     }
 }
 
-fn jet(expr: Expr, jets: &[Jet], axes: [Jet; 4], parameters: &[f64]) -> Jet {
+fn jet(expr: Expr, jets: &[Jet], axes: [Jet; 4], parameters: &[f64], tables: &Tables) -> Jet {
     match expr {
         Expr::Constant(bits) => Jet::constant(f64::from_bits(bits)),
         Expr::Coordinate(Axis::X) => axes[0],
@@ -117,6 +120,24 @@ fn jet(expr: Expr, jets: &[Jet], axes: [Jet; 4], parameters: &[f64]) -> Jet {
         Expr::Parameter(i) => Jet::constant(parameters.get(i as usize).copied().unwrap_or(f64::NAN)),
         Expr::Unary(op, a) => unary(op, jets[a.index()]),
         Expr::Binary(op, a, b) => binary(op, jets[a.index()], jets[b.index()]),
+        Expr::Lookup(at, place) => lookup(at, place.map(|node| jets[node.index()]), tables),
+    }
+}
+
+/// A table bends in ways that nobody knows: its slope is one of those that it has on the stretch.
+fn lookup(lookup: Lookup, place: [Jet; 3], tables: &Tables) -> Jet {
+    let at = lookup.range(tables, place.map(|jet| jet.at[0]));
+    let over = lookup.range(tables, place.map(|jet| jet.over[0]));
+    match lookup.part {
+        Part::Value => {
+            let slopes = lookup.slopes(tables, place.map(|jet| jet.over[0]));
+            let along = |rate: fn(&Jet) -> Interval| {
+                std::iter::zip(slopes, &place).fold(ZERO, |sum, (slope, jet)| sum + slope * rate(jet))
+            };
+            let slope = along(|jet| jet.over[1]);
+            Jet { at: [at, along(|jet| jet.at[1])], over: [over, slope, Interval::ALL] }
+        }
+        Part::Slope(_) => Jet::rough(at, over),
     }
 }
 

@@ -86,7 +86,7 @@ impl Builder<'_> {
                 _ => return None,
             },
             // no other operation keeps a polynomial one
-            Expr::Unary(..) | Expr::Binary(..) => return None,
+            Expr::Unary(..) | Expr::Binary(..) | Expr::Lookup(..) => return None,
         })
     }
 

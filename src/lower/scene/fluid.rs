@@ -11,7 +11,7 @@ use crate::sph::{Fill, KeyBlock, KeyReader, Method};
 use crate::syntax::ast::Entry;
 
 /// Keys of a fluid that every method has.
-const FLUID_KEYS: [&str; 12] = [
+pub(in crate::lower) const FLUID_KEYS: [&str; 12] = [
     "shape",
     "fill",
     "particles",
@@ -27,7 +27,7 @@ const FLUID_KEYS: [&str; 12] = [
 ];
 
 /// Keys of a solver that every method has.
-const SOLVER_KEYS: [&str; 1] = ["precision"];
+pub(in crate::lower) const SOLVER_KEYS: [&str; 1] = ["precision"];
 
 /// What a scene states about its fluid and method.
 pub(super) struct FluidAndMethod {
@@ -156,12 +156,13 @@ impl<'a> Lowering<'a> {
         let seed = self.count_key(block, "seed", 0);
         let (shape, shape_span) = shape?;
         let Resolution { density, mass, size_span, support_radius } = resolution?;
+        let particles = particles?.or(defaults.particles.filter(|_| size_span.is_none()));
         Some(Fluid {
             name: block.label.map_or_else(|| "fluid".into(), |label| label.text.clone()),
             shape,
             shape_span,
             fill: fill?,
-            particles: particles?,
+            particles,
             particles_span: block.setting("particles").map(|(_, value)| value.span),
             density,
             mass,

@@ -68,7 +68,9 @@ impl<'a> Lowering<'a> {
                     .iter()
                     .find(|(block, keys)| known.contains(block) && keys.contains(&key.text.as_str()));
                 self.report(match (elsewhere, inner) {
-                    (Some(own), _) => diagnostic.help(format!("`{}` is called `{own}` here", key.text)),
+                    (Some(own), _) => diagnostic
+                        .help(format!("`{}` is called `{own}` here", key.text))
+                        .edit(key.span, &key.text, own, false),
                     (None, Some((block, _))) => diagnostic
                         .help(format!("it is a key of `{block}`: write `{block} {{ {}: … }}`", key.text)),
                     (None, None) => diagnostic,

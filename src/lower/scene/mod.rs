@@ -5,10 +5,10 @@
 //! This file has the data, [`read`] reads the blocks of a scene, [`fluid`] its fluid and method, [`picture`] how it is
 //! drawn, and [`keys`] what a key may hold.
 
-mod fluid;
+pub(super) mod fluid;
 mod keys;
-mod picture;
-mod read;
+pub(super) mod picture;
+pub(super) mod read;
 
 use glam::DVec3;
 

@@ -8,7 +8,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::quantity::Dimension;
 use crate::syntax::ast::{Comparison, Expr, ExprKind};
 
-const PICTURE_KEYS: [&str; 3] = ["camera", "cut", "hide"];
+pub(in crate::lower) const PICTURE_KEYS: [&str; 3] = ["camera", "cut", "hide"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 const CUT_HELP: &str =
     "write `cut: y <= 0.5` for the part of the obstacles that is taken away, `cut: auto` or `cut: none`";

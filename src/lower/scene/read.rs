@@ -13,7 +13,7 @@ use crate::quantity::{Bound, Dimension};
 use crate::sph::Slip;
 use crate::syntax::ast::{self, Entry, Expr, ExprKind};
 
-const SCENE_KEYS: [&str; 14] = [
+pub(in crate::lower) const SCENE_KEYS: [&str; 14] = [
     "units",
     "box",
     "container",
@@ -29,12 +29,13 @@ const SCENE_KEYS: [&str; 14] = [
     "picture",
     "tolerance",
 ];
-const TRUTH_KEYS: [&str; 4] = ["pressure", "velocity", "front", "from"];
-const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
-const OBSTACLE_KEYS: [&str; 5] = ["solid", "restitution", "friction", "walls", "surface_velocity"];
+pub(in crate::lower) const TRUTH_KEYS: [&str; 4] = ["pressure", "velocity", "front", "from"];
+pub(in crate::lower) const BOX_KEYS: [&str; 4] = ["min", "max", "restitution", "friction"];
+pub(in crate::lower) const OBSTACLE_KEYS: [&str; 5] =
+    ["solid", "restitution", "friction", "walls", "surface_velocity"];
 const FREE_SLIP: (&str, Slip) = ("free_slip", Slip::Free);
 const NO_SLIP: (&str, Slip) = ("no_slip", Slip::No);
-const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
+pub(in crate::lower) const RUN_KEYS: [&str; 4] = ["dt", "until", "save_every", "checkpoint_every"];
 
 impl<'a> Lowering<'a> {
     /// Reads a scene; `None` if it has errors, which are reported.
@@ -279,6 +280,15 @@ impl<'a> Lowering<'a> {
             let help =
                 "a run that is interrupted saves one too; without this key there is one with every frame";
             self.report(Diagnostic::warning(Code::FRAMES, value.span, message).help(help));
+        }
+        if let (Some(dt), Some(at)) = (run.dt, run.dt_span)
+            && dt > run.until
+        {
+            let [until, step] = [run.until, dt].map(seconds_as_written);
+            let message = format!("a step of {step} is longer than the run of {until}");
+            let help = "leave `dt` out: the step is then as long as is stable";
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(help));
+            return None;
         }
         let stated =
             block.setting("save_every").or(block.setting("until")).map_or(span, |(_, value)| value.span);

@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 
 use super::super::{
     cases::{Ambiguous, FACES, loops, needs_values},
-    patches::{self, CellValues},
+    patches::CellValues,
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, inside_corners, set_positions},
 };
@@ -61,8 +61,8 @@ impl Sheets {
     /// The sheets of the brick whose first node has the extended indices `low`.
     pub fn find(field: &dyn Field, lattice: &Lattice, low: [usize; 3], around: &Around) -> Self {
         let mut sheets = Self { undecided: Vec::new(), vertices: 0, evaluations: 0 };
-        for cell in patches::undecided(around) {
-            let (polygons, tunnel) = CellValues::new(field, lattice, patches::cell_low(low, cell)).loops();
+        for (cell, values) in CellValues::of_brick(field, lattice, low, around) {
+            let (polygons, tunnel) = values.loops();
             let found = CellLoops {
                 cell,
                 loops: polygons.iter().map(|polygon| Loop::of(polygon)).collect(),

@@ -9,8 +9,8 @@ use super::super::{
 };
 use crate::field::Field;
 
-/// Bisections of a way to the surface. They leave a millionth of it.
-pub(super) const HALVED: usize = 20;
+/// Bisections of an edge. They leave a thousandth of it, over which a normal hardly turns.
+const HALVED: usize = 10;
 
 /// Nodes along a side: those of the brick's cells, and one more on both sides.
 const SIDE: usize = BRICK + 3;

@@ -5,6 +5,9 @@ use glam::DVec3;
 use super::super::Grid;
 use crate::geom::Aabb;
 
+/// Cells along a side beyond which nobody makes a grid: what needs more is an edge, a tip or a touch.
+const FINEST: f64 = 1e5;
+
 /// The cells in which a surface is hidden from the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThinCells {
@@ -26,10 +29,10 @@ impl ThinCells {
         Self { count: 0, bounds: Aabb::EMPTY, thickness: f64::INFINITY, at: DVec3::ZERO, is_gap: false };
 
     /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
-    /// `None` if nothing hides, or its thickness is not known.
+    /// `None` if nothing hides, its thickness is not known, or no grid is so fine.
     pub fn cells_needed(&self, grid: &Grid) -> Option<usize> {
         let needed = (2.0 * grid.bounds().size().max_element() / self.thickness).ceil();
-        (self.count > 0 && needed.is_finite() && needed > 0.0).then_some(needed as usize)
+        (self.count > 0 && needed > 0.0 && needed <= FINEST).then_some(needed as usize)
     }
 
     /// The cells of two parts of a grid.

@@ -6,7 +6,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::super::{normals::unit, prune::Lattice};
-use super::edges::{BrickEdges, HALVED};
+use super::edges::BrickEdges;
 use super::found::ThinCells;
 use crate::field::{Field, Sheet};
 use crate::geom::Aabb;
@@ -39,6 +39,13 @@ const BACK: f64 = 0.5;
 /// The longest way in cells over which a thickness is measured, and its steps.
 const THICKEST: f64 = 2.0;
 const STEPS_ACROSS: usize = 64;
+
+/// How far beyond the cell, in cells, a point of the surface counts as its own: what passes just between the nodes
+/// leaves next to nothing in the cell itself.
+const BESIDE_CELL: f64 = 1.0 / 16.0;
+
+/// Bisections of a step across. They leave a millionth of it.
+const HALVED: usize = 20;
 
 type Normals = SmallVec<[DVec3; 16]>;
 
@@ -237,11 +244,12 @@ impl Look<'_> {
         let reach = 0.5 * over.size();
         let within = Aabb::new(over.min - reach, over.max + reach);
         let size = self.bounds.size().min_element();
+        let own = self.bounds.grown(BESIDE_CELL * size);
         let mut seek = |at: &dyn Fn(DVec3) -> (f64, DVec3)| {
             for start in std::iter::once(over.centre()).chain(over.corners()) {
                 let Some(foot) = descend(at, start, &within, size) else { continue };
                 let is_new = |other: &Foot| other.normal.dot(foot.normal) < 0.95;
-                if self.bounds.contains(foot.at) && found.iter().all(is_new) && self.is_surface(&foot, size) {
+                if own.contains(foot.at) && found.iter().all(is_new) && self.is_surface(&foot, size) {
                     found.push(foot);
                 }
             }

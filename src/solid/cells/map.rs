@@ -389,6 +389,10 @@ impl Field for CellMap {
         self.twin.omega(p)
     }
 
+    fn continuous_many(&self, points: Points<'_>, omega: &mut [f64]) {
+        self.twin.omega_many(points, omega);
+    }
+
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
         self.evaluate(points, omega, |depth| self.cells.shortest_side(depth));
     }

@@ -10,12 +10,12 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::pruning::{Verdict, prune};
-use super::shape::{Motion, Shape};
+use super::shape::{Motion, Shape, SlopeProgram};
 use super::words::{self, Word};
 use crate::field::{Path, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{Contractor, Enclosure, Expr, Graph, Node, Region, Wanted};
+use crate::ir::{Contractor, Enclosure, Expr, Graph, Node, Region, SURFACE_ROUNDING, Wanted};
 use crate::solid::engine::Engine;
 
 struct Leaf {
@@ -99,13 +99,12 @@ impl LeafStore {
         (shape, &self.constants[first..first + shape.parameters])
     }
 
-    fn has_tame_slopes(&self, leaf: u32) -> bool {
-        let is_tame = |leaf: u32| {
-            let (shape, constants) = self.of(leaf);
-            shape.motion.is_none() && shape.slopes(self.engine).is_tame(constants)
-        };
+    /// What answers for a leaf's slopes by machine code, if it may.
+    fn slope_program(&self, leaf: u32) -> Option<&SlopeProgram> {
+        let program = |leaf: u32| self.of(leaf).0.slopes(self.engine);
+        let is_tame = |leaf: u32| program(leaf).is_some_and(|program| program.is_tame(self.of(leaf).1));
         let all = || (0..self.leaves.len() as u32).map(is_tame).collect();
-        self.tame_slopes.get_or_init(all)[leaf as usize]
+        if self.tame_slopes.get_or_init(all)[leaf as usize] { program(leaf) } else { None }
     }
 
     /// The leaves that move, with their shapes and constants.
@@ -204,26 +203,33 @@ impl Leaves {
 
     /// Enclosures of the leaf's derivatives over a box, at all times of the stretch.
     pub fn slopes(&self, leaf: u32, over: &Aabb) -> [Interval; 3] {
-        let (shape, constants, own) = self.of(leaf);
-        let evaluator = shape.slopes(self.store.engine);
-        if own.is_empty() {
-            if self.store.has_tame_slopes(leaf)
-                && let Some(slopes) = evaluator.by_code(over, constants)
-            {
-                return slopes;
-            }
-            return evaluator.over(&Region { parameters: constants, ..Region::of(over) });
+        let (shape, parameters, own) = self.of(leaf);
+        if let Some(program) = self.store.slope_program(leaf)
+            && let Some(slopes) = program.over(over, parameters)
+        {
+            return slopes;
         }
-        let first = self.store.leaves[leaf as usize].first_uniform as usize;
-        let uniforms = &self.ranges().uniforms[first..first + own.len()];
-        evaluator.over(&Region { parameters: constants, uniforms, ..Region::of(over) })
+        let mut region = Region { parameters, ..Region::of(over) };
+        if !own.is_empty() {
+            let first = self.store.leaves[leaf as usize].first_uniform as usize;
+            region.uniforms = &self.ranges().uniforms[first..first + own.len()];
+        }
+        shape.contractor().slopes(&region).unwrap_or([Interval::ALL; 3])
     }
 
     /// Visits the faces of a tree in prefix form that may be part of its surface in a box, those of leaves
     /// that `known` does not hold yet.
     pub fn sheets(&self, tree: &[u32], over: &Aabb, known: &mut Vec<u32>, visit: &mut dyn FnMut(Sheet<'_>)) {
-        let mut left = Vec::new();
-        if prune(tree, &mut |leaf| self.range(leaf, over), &mut left) != Verdict::Near {
+        let (mut near, mut left) = (Vec::new(), Vec::new());
+        let mut slopes: Vec<(u32, [Interval; 3])> = Vec::new();
+        let mut range = |leaf| {
+            let (range, slopes_of) = self.range_by_slopes(leaf, over);
+            slopes.push((leaf, slopes_of));
+            range
+        };
+        if prune(tree, &mut |leaf| self.range(leaf, over), &mut near) != Verdict::Near
+            || prune(&near, &mut range, &mut left) != Verdict::Near
+        {
             return;
         }
         for word in left {
@@ -232,13 +238,29 @@ impl Leaves {
                 continue;
             }
             known.push(word);
-            let slopes = self.slopes(leaf, over).map(|slope| if negated { -slope } else { slope });
+            let Some((_, slopes)) = slopes.iter().find(|(other, _)| *other == leaf) else { continue };
+            let slopes = slopes.map(|slope| if negated { -slope } else { slope });
             let at = |p: DVec3| {
                 let (value, gradient) = self.gradient(leaf, p);
                 if negated { (-value, -gradient) } else { (value, gradient) }
             };
             visit(Sheet { slopes, at: &at });
         }
+    }
+
+    /// The range of a leaf by the mean value theorem, and its slopes. Its error falls with the square of the
+    /// box, where that of [`range`](Self::range) falls with the box.
+    fn range_by_slopes(&self, leaf: u32, over: &Aabb) -> (Interval, [Interval; 3]) {
+        let slopes = self.slopes(leaf, over);
+        let centre = over.centre();
+        let mut range = self.range(leaf, &Aabb::new(centre, centre));
+        for (axis, slope) in slopes.into_iter().enumerate() {
+            // programs round a formula, and so move its surface a little
+            let slack = SURFACE_ROUNDING * over.min[axis].abs().max(over.max[axis].abs());
+            let half = (over.max[axis] - centre[axis]).max(centre[axis] - over.min[axis]) + slack;
+            range = range + slope * Interval::new(-half, half);
+        }
+        (range, slopes)
     }
 
     /// What makes boxes smaller around the points where a leaf is positive, or negative where it is negated, at

@@ -37,46 +37,40 @@ pub struct Shape {
     /// Coefficients along a path, if the leaf is a polynomial of degree two at most.
     polynomial: OnceLock<Option<Evaluator>>,
     enclosures: OnceLock<EnclosureEvaluator>,
-    slopes: OnceLock<SlopeEvaluator>,
+    slopes: OnceLock<Option<SlopeProgram>>,
     contractor: OnceLock<Contractor>,
 }
 
-/// Ranges of a shape's derivatives.
-pub struct SlopeEvaluator {
+/// Ranges of a shape's derivatives by machine code.
+pub struct SlopeProgram {
     graph: Graph,
     ranges: RangeEvaluator,
-    derivatives: [Node; 3],
-    /// `None` for few leaves, and where only the interpreter knows the operations.
-    code: Option<RangeProgram>,
+    code: RangeProgram,
 }
 
-impl SlopeEvaluator {
-    fn new(shape: &Shape, engine: Engine) -> Self {
+impl SlopeProgram {
+    /// `None` for few leaves, and where only the interpreter knows the operations.
+    fn new(shape: &Shape, engine: Engine) -> Option<Self> {
+        if engine == Engine::Interpreter || shape.leaves < MANY_LEAVES || shape.motion.is_some() {
+            return None;
+        }
         let mut graph = shape.graph.clone();
         let derivatives = ir::gradient(&mut graph, shape.root);
         let (graph, roots, _) = simplify(&graph, &derivatives);
-        let derivatives = [roots[0], roots[1], roots[2]];
+        let code = RangeProgram::of_all(&graph, &[roots[0], roots[1], roots[2]], shape.parameters).ok()?;
         let ranges = RangeEvaluator::new(&graph, roots[0]);
-        let pays = engine != Engine::Interpreter && shape.leaves >= MANY_LEAVES && shape.motion.is_none();
-        let code = pays.then(|| RangeProgram::of_all(&graph, &derivatives, shape.parameters).ok()).flatten();
-        Self { graph, ranges, derivatives, code }
+        Some(Self { graph, ranges, code })
     }
 
-    /// Whether machine code may answer for a leaf at rest with these numbers.
+    /// Whether it may answer for a leaf at rest with these numbers.
     pub fn is_tame(&self, parameters: &[f64]) -> bool {
         let numbers = Region { parameters, ..Region::of(&Aabb::EMPTY) };
-        self.code.is_some() && codegen::range_stays_finite(&self.graph, &self.ranges, numbers)
+        codegen::range_stays_finite(&self.graph, &self.ranges, numbers)
     }
 
     /// Enclosures of the derivatives of a tame leaf over a box; `None` if it reaches too far out.
-    pub fn by_code(&self, over: &Aabb, parameters: &[f64]) -> Option<[Interval; 3]> {
-        self.code.as_ref()?.call_all(over, parameters, &[])
-    }
-
-    /// Enclosures of the derivatives over a region.
-    pub fn over(&self, region: &Region<'_>) -> [Interval; 3] {
-        let all = self.ranges.all_with(region);
-        self.derivatives.map(|node| all[node.index()])
+    pub fn over(&self, over: &Aabb, parameters: &[f64]) -> Option<[Interval; 3]> {
+        self.code.call_all(over, parameters, &[])
     }
 }
 
@@ -199,12 +193,12 @@ impl Shape {
         })
     }
 
-    /// Ranges of the derivatives.
-    pub fn slopes(&self, engine: Engine) -> &SlopeEvaluator {
-        self.slopes.get_or_init(|| SlopeEvaluator::new(self, engine))
+    /// Ranges of the derivatives by machine code, where it pays.
+    pub fn slopes(&self, engine: Engine) -> Option<&SlopeProgram> {
+        self.slopes.get_or_init(|| SlopeProgram::new(self, engine)).as_ref()
     }
 
-    /// What makes boxes smaller around the points where a leaf is positive.
+    /// Derivatives over boxes, and what makes boxes smaller around the points where a leaf is positive.
     pub fn contractor(&self) -> &Contractor {
         self.contractor.get_or_init(|| Contractor::new(&self.graph, self.root))
     }

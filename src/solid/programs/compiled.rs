@@ -330,7 +330,8 @@ impl RangeProgram {
         Ok(Self { code: codegen::compile(request)?, rounding, parameters, uniforms })
     }
 
-    /// The range over a box, for uniforms within these bounds; `None` if the box reaches too far out.
+    /// The range over a box, for uniforms within these bounds; `None` if the box reaches too far out, or a divisor
+    /// may vanish in it.
     ///
     /// # Panics
     /// If there are not as many parameters or uniforms as the program has.
@@ -380,6 +381,10 @@ impl RangeProgram {
                 unsafe { entry(input.as_ptr(), out.as_mut_ptr(), third, fourth) };
             }
             Rounding::Upward => self.call_rounding_upwards(&input, out, [third, fourth]),
+        }
+        // a divisor may vanish
+        if ranges.as_flattened().iter().any(|bound| bound.is_nan()) {
+            return None;
         }
         Some(ranges.map(|[lo, hi]| Interval::new(lo, hi)))
     }

@@ -78,6 +78,9 @@ pub struct FluidDefaults {
     pub viscosity: f64,
     /// Surface tension, N/m.
     pub surface_tension: f64,
+    /// How many particles fill the shape if the scene says neither that nor how large they are. `None`: as many as
+    /// fill it with a mass of 0.02 kg.
+    pub particles: Option<usize>,
     /// Support radius of the kernel.
     pub support: Support,
     /// Precision of the sums over neighbours.

@@ -102,13 +102,13 @@ macro_rules! methods {
 }
 
 methods! {
-    /// The method of the paper, equations 8–14, corrected.
-    Paper,
     /// Weakly compressible: density from the equation of continuity, pressure by Tait's equation.
     Wcsph,
     /// Divergence-free (Bender & Koschier 2017): the pressure is solved for, so that the density stays
     /// constant.
     Dfsph,
+    /// The method of the paper, equations 8–14, corrected.
+    Paper,
 }
 
 impl Method {
@@ -126,7 +126,7 @@ impl Method {
 
 impl Default for Method {
     fn default() -> Self {
-        Self::Paper(Paper::default())
+        Self::Wcsph(Wcsph::default())
     }
 }
 

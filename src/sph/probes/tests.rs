@@ -136,7 +136,7 @@ fn the_height_of_a_column_is_found_in_its_middle_and_at_walls_and_spray_is_not()
 #[test]
 fn a_falling_block_carries_its_mass_through_a_plane() {
     let (from, to) = (DVec3::new(0.1, 0.1, 0.3), DVec3::new(0.4, 0.3, 0.8));
-    for method in [Method::default(), weakly()] {
+    for method in [Method::from(Paper::default()), weakly()] {
         let mut core = state(method, lattice(from, to), bowl());
         core.particles.velocity.z.fill(-2.0);
         let area = (to.x - from.x) * (to.y - from.y);
@@ -180,7 +180,7 @@ fn energies_of_a_fall() {
 
 #[test]
 fn elastic_energy_is_the_integral_of_pressure() {
-    for method in [Method::default(), weakly()] {
+    for method in [Method::from(Paper::default()), weakly()] {
         let mut core = state(method, lattice(DVec3::ZERO, DVec3::splat(SPACING)), bowl());
         let most = 1.05 * RHO;
         core.particles.density = vec![most];

@@ -1,7 +1,6 @@
 //! Questions about many points, and collisions.
 
-use library::glam::DVec3;
-use rfm_columns::{Bounce, Collision, Column, Job, Number, collide};
+use rfm_columns::{BLOCK, Bounce, Collisions, Column, Job, Number, Particles, Vectors};
 
 use crate::error::{RfmError, RfmStatus, attempt};
 use crate::solid::{RfmSolid, solid as solid_of};
@@ -313,7 +312,8 @@ pub unsafe extern "C" fn rfm_contact_many_f32(
 /// Puts particles that are inside a solid, or on its surface, back to the nearest place outside, at most `reach`
 /// metres away, and reflects their velocities relative to that of the surface: the part `restitution` of the normal
 /// speed returns, and the tangential speed loses at most `friction` times the change of the normal speed. Particles
-/// that stay outside keep their bits. `collisions` may be null.
+/// that stay outside keep their bits. `collisions` may be null. The first call for a solid of many parts takes longer,
+/// because it finds out which of them matter where; see rfm_solid_within.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_collide(
     solid: *const RfmSolid,
@@ -334,62 +334,25 @@ pub unsafe extern "C" fn rfm_collide(
                 check::<f64>(count, start.is_null(), vectors.stride, true)?;
             }
         }
-        let range = |name: &str, value: f64, fits: bool, expected: &str| match fits {
-            true => Ok(()),
-            false => Err(RfmError::bad(format!("{name} is {value}, expected {expected}"))),
-        };
-        range("restitution", restitution, (0.0..=1.0).contains(&restitution), "0 to 1")?;
-        range("friction", friction, (0.0..f64::INFINITY).contains(&friction), "0 or more")?;
-        range("reach", reach, reach > 0.0, "a length above 0")?;
-        let bounce = Bounce { restitution, friction, reach };
-        let mut found = RfmCollisions::default();
-        for i in 0..count {
-            // SAFETY: the caller promises so many particles
-            let (mut x, mut v) = unsafe { (read(&positions, i), read(&velocities, i)) };
-            match collide(&this.solid, &bounce, &mut x, &mut v) {
-                Collision::None => continue,
-                Collision::Stuck => found.stuck += 1,
-                Collision::Undefined => found.undefined += 1,
-                Collision::Hit => {
-                    found.hits += 1;
-                    // SAFETY: as above
-                    unsafe {
-                        write(&positions, i, x);
-                        write(&velocities, i, v);
-                    }
-                }
-            }
+        let bounce = Bounce::new(restitution, friction, reach).map_err(RfmError::bad)?;
+        let [positions, velocities] = [positions, velocities]
+            .map(|vectors| [vectors.x, vectors.y, vectors.z].map(|start| Column::new(start, vectors.stride)));
+        // SAFETY: the caller promises so many particles
+        let mut particles = Particles::new(unsafe { Vectors::new(count, [positions, velocities]) });
+        let mut counts = Collisions::default();
+        // a block at a time, so that little is remembered
+        for start in (0..count).step_by(BLOCK) {
+            let found = particles.look(start..(start + BLOCK).min(count), &this.obstacle, &bounce);
+            particles.put(&found);
+            counts = counts.and(found.counts);
         }
+        let Collisions { hits, stuck, undefined } = counts;
         if !collisions.is_null() {
             // SAFETY: the caller may have it written
-            unsafe { collisions.write(found) };
+            unsafe { collisions.write(RfmCollisions { hits, stuck, undefined }) };
         }
         Ok(())
     };
     // SAFETY: null, or the caller's
     unsafe { attempt(error, work) }
-}
-
-/// Vector `i`.
-///
-/// # Safety
-/// There is one.
-// SAFETY: the caller promises it
-unsafe fn read(vectors: &RfmVectors, i: usize) -> DVec3 {
-    let at = |start: *mut f64| start.wrapping_byte_offset(i as isize * vectors.stride);
-    // SAFETY: the caller promises the numbers
-    let [x, y, z] = [vectors.x, vectors.y, vectors.z].map(|start| unsafe { at(start).read_unaligned() });
-    DVec3::new(x, y, z)
-}
-
-/// Replaces vector `i`.
-///
-/// # Safety
-/// There is one.
-// SAFETY: the caller promises it
-unsafe fn write(vectors: &RfmVectors, i: usize, vector: DVec3) {
-    for (start, value) in [vectors.x, vectors.y, vectors.z].into_iter().zip(vector.to_array()) {
-        // SAFETY: the caller promises the numbers
-        unsafe { start.wrapping_byte_offset(i as isize * vectors.stride).write_unaligned(value) };
-    }
 }

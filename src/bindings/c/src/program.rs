@@ -3,6 +3,7 @@
 use std::ffi::{CString, c_char};
 use std::ptr::null;
 
+use library::compile::files_beside;
 use library::diagnostic::Source;
 use library::lower::Options;
 use library::{Error, Program};
@@ -64,7 +65,8 @@ pub unsafe extern "C" fn rfm_load_file(
         // SAFETY: the caller promises a text
         let path = unsafe { read_text(path, "path") }?;
         // SAFETY: the caller promises so many params
-        let options = unsafe { options(params, count) }?;
+        let mut options = unsafe { options(params, count) }?;
+        options.files = files_beside(path, false);
         let read = std::fs::read(path).and_then(library::compile::text_of);
         let text = read.map_err(|error| Error::File { path: path.to_string(), error })?;
         // SAFETY: the caller may have it written

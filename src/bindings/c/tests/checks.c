@@ -156,6 +156,38 @@ static void mistakes_become_error_objects(const RfmSolid *pawn) {
     rfm_error_free(NULL);
 }
 
+/* a particle in a corner leaves all three faces, and one near many parts has the answer of all */
+static void corners_and_many_parts(void) {
+    const char *text =
+        "rfm 1\nsolid posts = any i in 0..40: cylinder(0.01, 0.7).move([0.1 + 0.02*i, 0.5, -0.2])\n"
+        "solid both = posts or not box([0, 0, 0], [1, 1, 1])";
+    RfmProgram *program = NULL;
+    RfmSolid *both = NULL, *near = NULL;
+    RfmCollisions found;
+    const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
+    CHECK(rfm_load_text(text, "posts", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_solid(program, "both", &both, NULL) == RFM_OK);
+    CHECK(rfm_solid_within(both, low, high, &near, NULL) == RFM_OK);
+    CHECK(rfm_solid_within(both, high, low, &near, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_solid_within(both, NULL, high, &near, NULL) == RFM_BAD_ARGUMENT);
+    CHECK(rfm_solid_within(NULL, low, high, &near, NULL) == RFM_BAD_ARGUMENT);
+    double x[3][3] = {{-0.001, -0.002, 1.0005}, {0.5, 0.495, 0.3}, {0.5, 0.3, 0.3}};
+    double v[3][3] = {{-2, -2, 2}, {0, 3, 0}, {1, 1, 1}};
+    RfmVectors places = {&x[0][0], &x[0][1], &x[0][2], sizeof x[0]};
+    RfmVectors velocities = {&v[0][0], &v[0][1], &v[0][2], sizeof v[0]};
+    CHECK(rfm_omega(near, 0.5, 0.495, 0.3) == rfm_omega(both, 0.5, 0.495, 0.3));
+    CHECK(rfm_collide(near, 3, places, velocities, 0.5, 0.0, 0.1, &found, NULL) == RFM_OK);
+    CHECK(found.hits == 2 && found.stuck == 0 && found.undefined == 0);
+    CHECK(fabs(v[0][0] - 1) < 1e-9 && fabs(v[0][1] - 1) < 1e-9 && fabs(v[0][2] + 1) < 1e-9);
+    CHECK(fabs(x[0][0]) < 1e-9 && fabs(x[0][1]) < 1e-9 && fabs(x[0][2] - 1) < 1e-9);
+    CHECK(fabs(x[1][1] - 0.49) < 1e-6 && fabs(v[1][1] + 1.5) < 1e-6);
+    CHECK(x[2][1] == 0.3 && v[2][0] == 1);
+    for (int i = 0; i < 3; i++) CHECK(rfm_omega(both, x[i][0], x[i][1], x[i][2]) < 0.0);
+    rfm_solid_free(near);
+    rfm_solid_free(both);
+    rfm_program_free(program);
+}
+
 static void collisions_put_back_and_reflect(void) {
     RfmProgram *program = NULL;
     RfmSolid *floor = NULL, *then = NULL;
@@ -202,6 +234,7 @@ int main(int count, char **arguments) {
     columns_of_any_stride_have_the_bits_of_points(pawn);
     mistakes_become_error_objects(pawn);
     collisions_put_back_and_reflect();
+    corners_and_many_parts();
     rfm_solid_free(pawn);
     printf("%d failures\n", failures);
     return failures != 0;

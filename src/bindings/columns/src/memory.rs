@@ -41,6 +41,29 @@ impl<T> Column<T> {
         self.start.wrapping_byte_offset(i as isize * self.stride)
     }
 
+    /// Number `i`.
+    ///
+    /// # Safety
+    /// There is one, and nothing writes to it meanwhile.
+    // SAFETY: the caller promises what the read needs
+    unsafe fn read(self, i: usize) -> T
+    where
+        T: Copy,
+    {
+        // SAFETY: the caller promises the number; it need not be aligned
+        unsafe { self.at(i).read_unaligned() }
+    }
+
+    /// Replaces number `i`.
+    ///
+    /// # Safety
+    /// There is one, and nothing else uses it meanwhile.
+    // SAFETY: the caller promises what the write needs
+    unsafe fn write(self, i: usize, number: T) {
+        // SAFETY: the caller promises the number; it need not be aligned
+        unsafe { self.at(i).write_unaligned(number) };
+    }
+
     /// The addresses from the first to the last of `count` numbers.
     pub fn extent(self, count: usize) -> Range<usize> {
         if count == 0 {
@@ -48,6 +71,58 @@ impl<T> Column<T> {
         }
         let (first, last) = (self.start.addr(), self.at(count - 1).addr());
         first.min(last)..first.max(last) + size_of::<T>()
+    }
+}
+
+/// Vectors that may be changed, `N` at each index, as columns.
+pub struct Vectors<const N: usize> {
+    count: usize,
+    columns: [[Column<f64>; 3]; N],
+}
+
+// SAFETY: the pointers lead to memory that the caller of `Vectors::new` keeps
+unsafe impl<const N: usize> Send for Vectors<N> {}
+// SAFETY: what takes `&self` only reads
+unsafe impl<const N: usize> Sync for Vectors<N> {}
+
+impl<const N: usize> Vectors<N> {
+    /// Vectors by the columns of their components.
+    ///
+    /// # Safety
+    /// The columns have `count` numbers each, in memory that outlives the vectors, and nothing else uses them
+    /// meanwhile.
+    // SAFETY: the caller promises what the methods need
+    pub unsafe fn new(count: usize, columns: [[Column<f64>; 3]; N]) -> Self {
+        Self { count, columns }
+    }
+
+    /// The number of indices.
+    #[allow(clippy::len_without_is_empty)] // nobody asks
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Vector `k` at an index.
+    ///
+    /// # Panics
+    /// If there is none.
+    #[inline]
+    pub fn get(&self, k: usize, i: usize) -> [f64; 3] {
+        assert!(i < self.count, "an index of a vector");
+        // SAFETY: `new` promises that the numbers exist
+        self.columns[k].map(|column| unsafe { column.read(i) })
+    }
+
+    /// Replaces vector `k` at an index.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn set(&mut self, k: usize, i: usize, vector: [f64; 3]) {
+        assert!(i < self.count, "an index of a vector");
+        for (column, number) in self.columns[k].into_iter().zip(vector) {
+            // SAFETY: `new` promises that the number exists, and that nothing else uses it
+            unsafe { column.write(i, number) };
+        }
     }
 }
 
@@ -152,7 +227,7 @@ impl<T: Number, const N: usize> Job<T, N> {
                 };
                 for (i, value) in block.clone().zip(values) {
                     // SAFETY: `new` promises that the number exists and that nothing else uses it
-                    unsafe { column.at(i).write_unaligned(*value) };
+                    unsafe { column.write(i, *value) };
                 }
             }
         }
@@ -174,7 +249,7 @@ impl<T: Number, const N: usize> Job<T, N> {
             }
             for (i, number) in block.clone().zip(numbers) {
                 // SAFETY: `new` promises that the number exists
-                *number = unsafe { column.at(i).read_unaligned() };
+                *number = unsafe { column.read(i) };
             }
         }
     }

@@ -12,13 +12,13 @@ use crate::pool::{Threads, pool};
 use crate::results::Target;
 
 /// Points that one thread takes at a time.
-const CHUNK: usize = 8192;
+pub const CHUNK: usize = 8192;
 
 /// From so many points on, several threads are used if the caller states no number.
-const WORTH_THREADS: usize = 4 * CHUNK;
+pub const WORTH_THREADS: usize = 4 * CHUNK;
 
 /// Below this many points, Python's lock is kept: to release it takes as long as some points do.
-const WORTH_RELEASING: usize = 64;
+pub const WORTH_RELEASING: usize = 64;
 
 /// Calls `evaluate` for all points.
 fn over<T: Number + Element, const N: usize>(
@@ -56,6 +56,28 @@ pub struct Question<'a, 'py> {
     pub chosen: Option<&'a Chosen>,
     pub threads: Threads,
 }
+
+/// Asks a question about points of either precision, or returns `$one` for a single point.
+macro_rules! ask {
+    ($self:ident, $points:expr, $threads:ident, |$p:ident| $one:expr, |$question:ident, $columns:ident| $many:expr) => {{
+        let (points, y, z): (&Bound<'py, PyAny>, Option<&Bound<'py, PyAny>>, Option<&Bound<'py, PyAny>>) =
+            $points;
+        let py = points.py();
+        let $question = $crate::evaluate::Question {
+            py,
+            solid: &$self.solid,
+            chosen: $self.chosen.as_ref(),
+            threads: $threads,
+        };
+        match $crate::points::Given::read(points, y, z)? {
+            $crate::points::Given::One($p) => $one,
+            $crate::points::Given::Double($columns) => $many,
+            $crate::points::Given::Single($columns) => $many,
+        }
+    }};
+}
+
+pub(crate) use ask;
 
 /// Something of Python's.
 type Any<'py> = Bound<'py, PyAny>;

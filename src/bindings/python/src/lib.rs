@@ -4,12 +4,15 @@
 //! |---|---|
 //! | `program`, `solid`, `mesh`, `slice`, `simulation` | one class of Python each |
 //! | `points`, `results`, `evaluate`, `path` | arguments as columns, new and given arrays, questions about many points |
+//! | `collision` | particles that are put back in arrays of the caller |
 //! | `source` | solids as source text |
+//! | `show` | what notebooks show |
 //! | `memory`, `state` | the memory of arrays; the particles of a simulation as arrays |
 //! | `pool`, `error` | threads, and what happens to them in a forked process; exceptions |
 //!
 //! Invariant: no argument leads to a panic or to memory that is not the caller's. Errors are exceptions.
 
+mod collision;
 mod error;
 mod evaluate;
 mod memory;
@@ -19,6 +22,7 @@ mod points;
 mod pool;
 mod program;
 mod results;
+mod show;
 mod simulation;
 mod slice;
 mod solid;

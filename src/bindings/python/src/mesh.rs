@@ -7,9 +7,14 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use rfm::Solid;
 use rfm::field::Field;
+use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::mesh::{self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, dual_contouring, marching_cubes};
+use rfm::mesh::{
+    self, FORMATS, Grid, LengthUnit, Mesh, MeshError, Report, Resolution, dual_contouring, marching_cubes,
+};
+use rfm::solid::Bounds;
 
 use crate::error::{not_read, refused};
 
@@ -25,6 +30,24 @@ pub fn mesher(method: &str) -> PyResult<Mesher> {
     }
 }
 
+/// The volume of a solid, m³.
+///
+/// # Errors
+/// `RfmError` if no box around the solid is known, or if it cannot be meshed.
+pub fn volume(solid: &Solid, cells: usize) -> PyResult<f64> {
+    let bounds = match solid.bounds() {
+        Bounds::Within(bounds) => bounds,
+        Bounds::Empty => return Ok(0.0),
+        Bounds::Unbounded => return Err(refused(unbounded(solid))),
+    };
+    let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
+    mesh::volume(&*surface, bounds, cells).map(|found| found.volume).map_err(refused)
+}
+
+fn unbounded(solid: &Solid) -> String {
+    format!("`{}` could not be proven to end anywhere: state the box to mesh", solid.name())
+}
+
 /// A closed triangle mesh of a solid's surface. Its arrays are read-only; copy them to change them.
 #[pyclass(frozen, module = "rfm", name = "Mesh")]
 pub struct PyMesh {
@@ -36,11 +59,32 @@ pub struct PyMesh {
 }
 
 impl PyMesh {
+    /// The mesh of a solid in a box, or in its own bounds.
+    ///
+    /// # Errors
+    /// `RfmError` if no box around the solid is known, or if it cannot be meshed.
+    pub fn of(
+        solid: &Solid,
+        domain: Option<Aabb>,
+        resolution: Resolution,
+        mesher: Mesher,
+        no_slivers: bool,
+    ) -> PyResult<Self> {
+        let grid = match (domain, solid.bounds()) {
+            (Some(domain), _) => Grid::filling(&domain, resolution),
+            (None, Bounds::Within(bounds)) => Grid::around(bounds, resolution),
+            (None, Bounds::Empty) => return Ok(Self::empty()),
+            (None, Bounds::Unbounded) => return Err(refused(unbounded(solid))),
+        };
+        let grid = grid.map_err(refused)?;
+        Self::new(&*solid.surface(*grid.bounds()), &grid, mesher, no_slivers)
+    }
+
     /// The mesh of a field, checked.
     ///
     /// # Errors
     /// `RfmError` if the field cannot be meshed.
-    pub fn new(field: &dyn Field, grid: &Grid, mesher: Mesher, no_slivers: bool) -> PyResult<Self> {
+    fn new(field: &dyn Field, grid: &Grid, mesher: Mesher, no_slivers: bool) -> PyResult<Self> {
         let mut found = mesher(field, grid).map_err(refused)?;
         if no_slivers {
             mesh::remove_slivers(&mut found);
@@ -50,7 +94,7 @@ impl PyMesh {
     }
 
     /// The mesh of an empty solid.
-    pub fn empty() -> Self {
+    fn empty() -> Self {
         let nowhere = rfm::field::Closures { omega: |_| -1.0, gradient: |_| DVec3::ZERO };
         let empty = Mesh::default();
         let report = mesh::check(&empty, &nowhere);

@@ -8,12 +8,14 @@ use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyString, PyTuple, PyType};
-use rfm::compile::text_of;
+use rfm::compile::{files_beside, text_of};
 use rfm::diagnostic::{Source, SourceId};
+use rfm::files::Files;
 use rfm::lower::Options;
 use rfm::{Error, Program, Solid};
 
 use crate::error::{diagnostics, not_read, of_diagnostics, raised};
+use crate::points::aabb;
 use crate::pool::Threads;
 use crate::simulation::PySimulation;
 use crate::solid::PySolid;
@@ -88,7 +90,9 @@ pub struct PyProgram {
 
 impl PyProgram {
     fn check(py: Python<'_>, source: Source, params: Vec<(String, f64)>) -> PyResult<Self> {
-        let options = Options { overrides: params.into_iter().collect(), ..Options::default() };
+        // a text has no folder, and names no other files
+        let files = if &*source.name == TEXT { Files::default() } else { files_beside(&*source.name, false) };
+        let options = Options { overrides: params.into_iter().collect(), files, ..Options::default() };
         let program = py.detach(|| Program::check(source, options));
         program.map(Self::new).map_err(|found| of_diagnostics(py, &found))
     }
@@ -175,7 +179,7 @@ impl PyProgram {
                 return Err(crate::error::refused(message));
             }
         };
-        PySolid::new(slf, this.compiled(slf.py(), name)?, [0.0, 0.0])
+        PySolid::new(slf, this.compiled(slf.py(), name)?, [0.0, 0.0], None)
     }
 
     fn __getitem__(slf: &Bound<'_, Self>, name: &str) -> PyResult<PySolid> {
@@ -266,14 +270,15 @@ pub fn program_from_pickle(
     PyProgram::check(py, Source::file(name, text), params)
 }
 
-/// A solid of a program by its name, at a stretch of time; for pickles.
-#[pyfunction(name = "_solid")]
+/// A solid of a program by its name, at a stretch of time and for particles in a box; for pickles.
+#[pyfunction(name = "_solid", signature = (program, name, from, to, over=None))]
 pub fn solid_from_pickle(
     program: &Bound<'_, PyProgram>,
     name: &str,
     from: f64,
     to: f64,
+    over: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PySolid> {
     let solid = program.get().compiled(program.py(), name)?;
-    PySolid::new(program, solid, [from, to])
+    PySolid::new(program, solid, [from, to], over.map(aabb).transpose()?)
 }

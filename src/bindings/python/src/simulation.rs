@@ -17,6 +17,7 @@ use crate::error::{diagnostics, not_read, raised, refused};
 use crate::mesh::write_file;
 use crate::pool::{Threads, run};
 use crate::program::PyProgram;
+use crate::show;
 use crate::state::{self, Lent};
 
 /// Time between looks for Ctrl-C and reports of progress.
@@ -507,6 +508,12 @@ impl PySimulation {
         let (simulation, recorders) = resumed?;
         *state = State { simulation, recorders, failed: None, lent: Lent::default() };
         Ok(())
+    }
+
+    /// The particles and the obstacles as they are now, in the viewer's page, for notebooks.
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        let state = self.state()?;
+        show::simulation(py, &self.experiment, &state.simulation, self.threads)
     }
 
     fn __repr__(&self) -> PyResult<String> {

@@ -10,15 +10,18 @@ use rfm::glam::DVec3;
 use rfm::solid::{Bounds, Chosen};
 use rfm::source::Target;
 use rfm::{Solid, mesh};
+use rfm_columns::{Bounce, Obstacle};
 
+use crate::collision::collide;
 use crate::error::{of_diagnostics, refused};
-use crate::evaluate::Question;
+use crate::evaluate::ask;
 use crate::mesh::PyMesh;
 use crate::path::first_entry;
-use crate::points::{Given, aabb};
+use crate::points::aabb;
 use crate::pool::{Threads, run};
 use crate::program::PyProgram;
 use crate::results::{no_out, several};
+use crate::show;
 use crate::slice::PySlice;
 use crate::source::{Asked, text};
 
@@ -43,27 +46,19 @@ pub struct PySolid {
     stretch: [f64; 2],
     /// The cheaper program that keeps the tolerance of the file.
     chosen: Option<Chosen>,
-}
-
-/// Asks a question about points of either precision, or returns `$one` for a single point.
-macro_rules! ask {
-    ($self:ident, $points:expr, $threads:ident, |$p:ident| $one:expr, |$question:ident, $columns:ident| $many:expr) => {{
-        let (points, y, z): (&Bound<'py, PyAny>, Option<&Bound<'py, PyAny>>, Option<&Bound<'py, PyAny>>) =
-            $points;
-        let py = points.py();
-        let $question =
-            Question { py, solid: &$self.solid, chosen: $self.chosen.as_ref(), threads: $threads };
-        match Given::read(points, y, z)? {
-            Given::One($p) => $one,
-            Given::Double($columns) => $many,
-            Given::Single($columns) => $many,
-        }
-    }};
+    /// The solid for collisions, and the box where the particles are.
+    obstacle: Obstacle,
+    over: Option<Aabb>,
 }
 
 impl PySolid {
-    /// A solid of a program by its name, during a stretch of time.
-    pub fn new(program: &Bound<'_, PyProgram>, solid: Solid, [from, to]: [f64; 2]) -> PyResult<Self> {
+    /// A solid of a program during a stretch of time, for particles in a box.
+    pub fn new(
+        program: &Bound<'_, PyProgram>,
+        solid: Solid,
+        [from, to]: [f64; 2],
+        over: Option<Aabb>,
+    ) -> PyResult<Self> {
         let solid = solid.between(from, to);
         let file = &program.get().program;
         let chosen = match file.within_tolerance(&solid) {
@@ -75,7 +70,8 @@ impl PySolid {
                 return Err(of_diagnostics(program.py(), &found));
             }
         };
-        Ok(Self { program: program.clone().unbind(), solid, stretch: [from, to], chosen })
+        let obstacle = Obstacle::new(solid.clone(), over);
+        Ok(Self { program: program.clone().unbind(), solid, stretch: [from, to], chosen, obstacle, over })
     }
 
     fn omega_at(&self, p: DVec3) -> f64 {
@@ -345,6 +341,42 @@ impl PySolid {
         first_entry(&self.solid, start, end, threads)
     }
 
+    /// Puts particles that are inside the solid, or on its surface, back to the nearest place outside, and reflects
+    /// their velocities relative to that of the surface. Both arrays are changed in place; particles that stay
+    /// outside keep their bits.
+    ///
+    /// Parameters
+    /// ----------
+    /// positions, velocities : float64 arrays of shape (n, 3), m and m/s; or tuples of three columns
+    /// reach : float, m
+    ///     The farthest that a particle is moved.
+    /// restitution : float
+    ///     The part of the normal speed that returns, 0 to 1.
+    /// friction : float
+    ///     The tangential speed loses at most this times the change of the normal speed.
+    /// threads : int, optional
+    ///
+    /// Returns
+    /// -------
+    /// `Collisions`: ``hits`` particles have been put back; ``stuck`` are inside without a way out within reach, and
+    /// ``undefined`` are not finite, or ω has no value there: these stay as they are.
+    #[pyo3(signature = (positions, velocities, *, reach, restitution=0.0, friction=0.0, threads=Threads::Auto))]
+    #[pyo3(
+        text_signature = "($self, positions, velocities, *, reach, restitution=0.0, friction=0.0, threads=None)"
+    )]
+    fn collide<'py>(
+        &self,
+        positions: &Bound<'py, PyAny>,
+        velocities: &Bound<'py, PyAny>,
+        reach: f64,
+        restitution: f64,
+        friction: f64,
+        threads: Threads,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let bounce = Bounce::new(restitution, friction, reach).map_err(PyValueError::new_err)?;
+        collide(&self.obstacle, positions, velocities, &bounce, threads)
+    }
+
     /// The smallest known box around the solid: an array of shape (2, 3), m, its lowest and its highest corner.
     ///
     /// None if the solid is empty, and infinite if no box could be proven.
@@ -400,7 +432,18 @@ impl PySolid {
                 return Err(PyValueError::new_err(format!("the time is {time} s, expected a finite number")));
             }
         }
-        Self::new(self.program.bind(py), self.solid.clone(), [start, end])
+        Self::new(self.program.bind(py), self.solid.clone(), [start, end], self.over)
+    }
+
+    /// The solid for particles in a box: all answers stay the same, but `collide` with a solid of many parts that has
+    /// no bounds, such as a vessel with posts in it, is much faster in the box.
+    ///
+    /// Parameters
+    /// ----------
+    /// box : two corners, or six numbers, m
+    #[pyo3(signature = (r#box, /), text_signature = "($self, box, /)")]
+    fn within(&self, py: Python<'_>, r#box: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::new(self.program.bind(py), self.solid.clone(), self.stretch, Some(aabb(r#box)?))
     }
 
     /// The volume, m³, found on meshes with `cells` cells and half as many along the longest side.
@@ -412,16 +455,7 @@ impl PySolid {
     #[pyo3(signature = (cells=96, *, threads=Threads::Auto))]
     #[pyo3(text_signature = "($self, cells=96, *, threads=None)")]
     fn volume(&self, py: Python<'_>, cells: usize, threads: Threads) -> PyResult<f64> {
-        let solid = &self.solid;
-        run(py, threads, || {
-            let bounds = match solid.bounds() {
-                Bounds::Within(bounds) => bounds,
-                Bounds::Empty => return Ok(0.0),
-                Bounds::Unbounded => return Err(refused(unbounded(solid))),
-            };
-            let surface = solid.surface(bounds.grown(0.1 * bounds.size().max_element()));
-            mesh::volume(&*surface, bounds, cells).map(|found| found.volume).map_err(refused)
-        })?
+        run(py, threads, || crate::mesh::volume(&self.solid, cells))?
     }
 
     /// A closed triangle mesh of the surface.
@@ -458,18 +492,7 @@ impl PySolid {
         let resolution = cell.map_or(mesh::Resolution::Cells(cells), mesh::Resolution::Spacing);
         let domain = r#box.map(aabb).transpose()?;
         let mesher = crate::mesh::mesher(method)?;
-        let solid = &self.solid;
-        run(py, threads, || {
-            let grid = match (domain, solid.bounds()) {
-                (Some(domain), _) => mesh::Grid::filling(&domain, resolution),
-                (None, Bounds::Within(bounds)) => mesh::Grid::around(bounds, resolution),
-                (None, Bounds::Empty) => return Ok(PyMesh::empty()),
-                (None, Bounds::Unbounded) => return Err(refused(unbounded(solid))),
-            };
-            let grid = grid.map_err(refused)?;
-            let surface = solid.surface(*grid.bounds());
-            PyMesh::new(&*surface, &grid, mesher, no_slivers)
-        })?
+        run(py, threads, || PyMesh::of(&self.solid, domain, resolution, mesher, no_slivers))?
     }
 
     /// ω in a plane.
@@ -549,26 +572,13 @@ impl PySolid {
 
     /// A picture for notebooks: the slice across y through the middle of the scene's box or of the bounds.
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        let Some(domain) = self.domain() else { return Ok(None) };
-        let middle = match self.solid.bounds() {
-            Bounds::Within(bounds) => bounds.centre().y,
-            Bounds::Unbounded | Bounds::Empty => domain.centre().y,
-        };
-        let slice = self.slice(py, None, Some(middle), None, 200, None, Threads::Auto)?;
-        slice.svg().map(Some)
+        show::picture(py, (&self.solid, self.chosen.as_ref()), self.domain())
     }
 
-    /// A picture with the most important facts, for notebooks.
+    /// The solid in the viewer's page, to be turned and cut, with the most important facts, for notebooks.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
-        let picture = self._repr_svg_(py)?.unwrap_or_default();
-        let bounds = match self.solid.bounds() {
-            Bounds::Within(found) => format!("{:.4} … {:.4} m", found.min, found.max),
-            Bounds::Unbounded => "none found".into(),
-            Bounds::Empty => "the solid is empty".into(),
-        };
-        let motion = if self.solid.moves() { format!(", at t = {} s", self.time()) } else { String::new() };
-        let name = rfm::slice::escaped(self.solid.name());
-        Ok(format!("<div><p><b>solid {name}</b>{motion}; bounds {bounds}</p>{picture}</div>"))
+        let picture = self._repr_svg_(py)?;
+        show::solid(py, &self.solid, self.time(), self.domain(), picture)
     }
 
     fn __repr__(&self) -> String {
@@ -580,10 +590,7 @@ impl PySolid {
         let (py, this) = (slf.py(), slf.get());
         let rebuild = py.import("rfm._rfm")?.getattr("_solid")?;
         let [from, to] = this.stretch;
-        Ok((rebuild, (this.program.clone_ref(py), this.solid.name(), from, to).into_pyobject(py)?))
+        let over = this.over.map(|over| [over.min.to_array(), over.max.to_array()].concat());
+        Ok((rebuild, (this.program.clone_ref(py), this.solid.name(), from, to, over).into_pyobject(py)?))
     }
-}
-
-fn unbounded(solid: &Solid) -> String {
-    format!("`{}` could not be proven to end anywhere: state the box to mesh", solid.name())
 }

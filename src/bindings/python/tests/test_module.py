@@ -1,15 +1,20 @@
 """The module as a whole: programs, meshes, slices, pickles, processes and threads, stubs."""
 
+import base64
 import copy
+import html
+import json
 import multiprocessing
 import os
 import pickle
 import pydoc
+import re
 import subprocess
 import sys
 import threading
 import time
 import xml.etree.ElementTree
+import zlib
 
 import numpy as np
 import pytest
@@ -107,6 +112,33 @@ def test_slices_are_samples_and_pictures(pawn, program, tmp_path):
 def test_notebooks_see_a_picture(pawn):
     assert pawn._repr_svg_().startswith("<svg") and "<svg" in pawn._repr_html_() and "pawn" in pawn._repr_html_()
     assert pawn.slice(z=0.5)._repr_svg_().startswith("<svg")
+
+
+def pages(shown):
+    """The viewer's pages in a text for a notebook, and the heads of their blocks."""
+    found = re.findall(r'<iframe sandbox="allow-scripts allow-downloads" style="[^"]*" srcdoc="([^"]*)"></iframe>', shown)
+    pages = [html.unescape(page) for page in found]
+    blocks = [re.findall(r'<script type="application/octet-stream">([^<]*)</script>', page) for page in pages]
+    raw = [[zlib.decompress(base64.b64decode(block), -15) for block in page] for page in blocks]
+    heads = [[json.loads(b[4 : 4 + int.from_bytes(b[:4], "little")]) for b in page] for page in raw]
+    return pages, heads
+
+
+def test_notebooks_see_the_viewer(pawn):
+    [page], [[mesh]] = pages(pawn._repr_html_())
+    assert page.startswith("<!doctype html>") and page.rstrip().endswith("</html>")
+    assert mesh["kind"] == "mesh" and mesh["triangles"] > 1000
+    assert mesh["min"] == pytest.approx(pawn.bounds[0], abs=0.01) and mesh["max"] == pytest.approx(pawn.bounds[1], abs=0.01)
+    simulation = rfm.load(EXAMPLES / "pawn.rfm", particles=500).scene()
+    simulation.advance(0.02)
+    shown = simulation._repr_html_()
+    assert "scene drop · paper · 500 particles · t = 0.0200 s" in shown
+    [page], [[mesh, frame]] = pages(shown)
+    assert (mesh["kind"], frame["kind"], frame["count"], frame["mesh"]) == ("mesh", "frame", 500, 0)
+    assert frame["time"] == pytest.approx(0.02) and frame["ranges"][0]["high"] > 0.1
+    # what has no mesh is shown without one
+    nothing = rfm.load("rfm 1\nsolid none = sphere(1) and x >= 2")["none"]
+    assert pages(nothing._repr_html_()) == ([], []) and "empty" in nothing._repr_html_()
 
 
 def test_pickles_keep_source_params_and_time():

@@ -80,7 +80,7 @@ impl ErrorRules<'_> {
                 (self.constant(value), value >= 0.0)
             }
             Expr::Coordinate(_) => (self.coordinate(), false),
-            Expr::Parameter(_) | Expr::Uniform(_) => (Error::UNKNOWN, false),
+            Expr::Parameter(_) | Expr::Uniform(_) | Expr::Lookup(..) => (Error::UNKNOWN, false),
             Expr::Unary(op, a) => (self.unary(op, operand(a)), matches!(op, Unary::Abs | Unary::Sqrt)),
             Expr::Binary(op, a, b) => {
                 let (u, v) = (operand(a), operand(b));

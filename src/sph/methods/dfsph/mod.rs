@@ -58,6 +58,7 @@ impl Declaration for Dfsph {
     const FLUID: FluidDefaults = FluidDefaults {
         viscosity: 1e-3,
         surface_tension: 0.0,
+        particles: Some(10_000),
         // many neighbours make the solver slow
         support: Support::Spacings(2.2),
         precision: Precision::F32,

@@ -53,6 +53,7 @@ impl Declaration for Paper {
     const FLUID: FluidDefaults = FluidDefaults {
         viscosity: 3.5,
         surface_tension: 0.0728,
+        particles: None,
         support: Support::Metres(0.1),
         precision: Precision::F64,
         adaptive: false,

@@ -88,6 +88,7 @@ impl Declaration for Wcsph {
     const FLUID: FluidDefaults = FluidDefaults {
         viscosity: 1e-3,
         surface_tension: 0.0,
+        particles: Some(10_000),
         // many neighbours make pressures smooth
         support: Support::Spacings(2.6),
         precision: Precision::F32,

@@ -12,7 +12,7 @@ True
 
 from ._rfm import Mesh, Program, RfmError, Simulation, Slice, Solid, __version__, load
 
-_RECORDS = ("Audit", "Contact", "Diagnostic", "Entry", "Param", "Stats")
+_RECORDS = ("Audit", "Collisions", "Contact", "Diagnostic", "Entry", "Param", "Stats")
 
 __all__ = ["Mesh", "Program", "RfmError", "Simulation", "Slice", "Solid", "__version__", "load", *_RECORDS]
 

@@ -16,6 +16,7 @@ __all__ = [
     "__version__",
     "load",
     "Audit",
+    "Collisions",
     "Contact",
     "Diagnostic",
     "Entry",
@@ -57,6 +58,11 @@ class Entry(NamedTuple):
     point: _Doubles
     normal: _Doubles
     certain: Any
+
+class Collisions(NamedTuple):
+    hits: int
+    stuck: int
+    undefined: int
 
 class Audit(NamedTuple):
     energy_excess: float | None
@@ -181,9 +187,20 @@ class Solid:
         threads: int | None = None,
     ) -> Contact: ...
     def first_entry(self, start: ArrayLike, end: ArrayLike, *, threads: int | None = None) -> Entry: ...
+    def collide(
+        self,
+        positions: _Doubles | tuple[_Doubles, _Doubles, _Doubles] | list[_Doubles],
+        velocities: _Doubles | tuple[_Doubles, _Doubles, _Doubles] | list[_Doubles],
+        *,
+        reach: float,
+        restitution: float = 0.0,
+        friction: float = 0.0,
+        threads: int | None = None,
+    ) -> Collisions: ...
     def range(self, box: ArrayLike, /) -> tuple[float, float]: ...
     def at(self, time: float) -> Solid: ...
     def between(self, start: float, end: float) -> Solid: ...
+    def within(self, box: ArrayLike, /) -> Solid: ...
     def volume(self, cells: int = 96, *, threads: int | None = None) -> float: ...
     def mesh(
         self,
@@ -303,4 +320,5 @@ class Simulation:
     def advance(self, until: float, *, progress: bool = False) -> None: ...
     def save(self, folder: _Path) -> pathlib.Path: ...
     def resume(self, folder: _Path) -> None: ...
+    def _repr_html_(self) -> str: ...
     def __len__(self) -> int: ...

@@ -32,6 +32,14 @@ Entry.__doc__ = """Where paths first meet a solid.
 ``normal`` (..., 3) is the outward unit normal; ``certain`` (...) is False where a path only grazes the surface.
 """
 
+Collisions = namedtuple("Collisions", ["hits", "stuck", "undefined"])
+Collisions.__module__ = "rfm"
+Collisions.__doc__ = """What became of particles.
+
+``hits`` were inside, or on the surface, and have been put back; ``stuck`` are inside without a way out within reach;
+``undefined`` are not finite, or ω has no value there. The last two stay as they are.
+"""
+
 Audit = namedtuple(
     "Audit",
     [

@@ -1,0 +1,172 @@
+//! What may be written at the cursor, and which argument of a call it is.
+
+use lsp_types::{
+    CompletionItem, CompletionItemKind, Documentation, ParameterInformation, ParameterLabel, SignatureHelp,
+    SignatureInformation,
+};
+
+use rfm::lower::vocabulary;
+use rfm::sph::Method;
+use rfm::syntax::ast::{Entry, ExprKind, Item};
+
+use super::context::Context;
+use super::document::Document;
+use super::words::{self, Signature};
+
+const OPERATORS: [&str; 9] = ["and", "or", "not", "any", "all", "sum", "product", "min", "max"];
+
+fn item(label: impl Into<String>, kind: CompletionItemKind, about: &str) -> CompletionItem {
+    let documentation = (!about.is_empty()).then(|| Documentation::String(about.to_string()));
+    CompletionItem { label: label.into(), kind: Some(kind), documentation, ..CompletionItem::default() }
+}
+
+fn called(signature: Signature, kind: CompletionItemKind) -> CompletionItem {
+    let detail = Some(signature.label());
+    CompletionItem { detail, ..item(signature.name, kind, &signature.about) }
+}
+
+/// What may be written at a byte. The editor leaves out what does not begin with the word that is there.
+pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
+    let context = Context::at(document.text(), byte);
+    if context.is_quiet {
+        return Vec::new();
+    }
+    if context.after_dot {
+        let axes =
+            ["x", "y", "z"].map(|axis| item(axis, CompletionItemKind::FIELD, "a component of a vector"));
+        let methods = methods(document).into_iter().map(|method| called(method, CompletionItemKind::METHOD));
+        return methods.chain(axes).collect();
+    }
+    if context.wants_key()
+        && let Some(block) = context.block()
+    {
+        let method = method_around(document, byte).unwrap_or_default();
+        let keys = vocabulary::keys(block, method).into_iter();
+        return keys.map(|key| item(key, CompletionItemKind::PROPERTY, &about_key(key))).collect();
+    }
+    if let Some(key) = &context.key {
+        let words = vocabulary::words(key);
+        if !words.is_empty() {
+            return words.into_iter().map(|word| item(word, CompletionItemKind::ENUM_MEMBER, "")).collect();
+        }
+    }
+    let mut found = Vec::new();
+    if context.begins_item {
+        found.extend(words::ITEMS.map(|(word, about)| item(word, CompletionItemKind::KEYWORD, about)));
+    }
+    if let Some(open) = context.open.last().filter(|open| open.bracket == '(')
+        && let Some(signature) = signature(document, &open.word, open.is_method)
+    {
+        let names = signature.parameters.iter().filter_map(|p| p.split(" = ").next()).filter(|p| *p != "…");
+        found.extend(names.map(|name| CompletionItem {
+            insert_text: Some(format!("{name} = ")),
+            ..item(format!("{name} ="), CompletionItemKind::VARIABLE, "an argument by its name")
+        }));
+    }
+    found.extend(context.locals.iter().map(|name| item(name, CompletionItemKind::VARIABLE, "")));
+    found.extend(names(document, byte));
+    found.extend(words::functions().into_iter().map(|f| called(f, CompletionItemKind::FUNCTION)));
+    found.extend(vocabulary::reserved().iter().map(|word| item(*word, CompletionItemKind::CONSTANT, "")));
+    found.extend(OPERATORS.map(|word| item(word, CompletionItemKind::KEYWORD, "")));
+    let mut known = std::collections::HashSet::new();
+    found.retain(|item| known.insert(item.label.clone()));
+    found
+}
+
+/// What the file defines above a byte.
+fn names(document: &Document, byte: usize) -> Vec<CompletionItem> {
+    let text = document.text();
+    let above = document.ast.items.iter().filter(|item| item.name().span.range().end < byte);
+    above
+        .filter_map(|defined| {
+            let name = defined.name();
+            let about = words::comment_above(text, name.span.range().start);
+            match defined {
+                Item::Param(param) => {
+                    let about = param.doc.clone().unwrap_or(about);
+                    Some(item(&name.text, CompletionItemKind::CONSTANT, &about))
+                }
+                Item::Let(_) => Some(item(&name.text, CompletionItemKind::VARIABLE, &about)),
+                Item::Solid(_) => Some(item(&name.text, CompletionItemKind::CLASS, &about)),
+                Item::Function(function) => {
+                    Some(called(words::of(function, text), CompletionItemKind::FUNCTION))
+                }
+                Item::Import(_) => Some(item(&name.text, CompletionItemKind::MODULE, &about)),
+                Item::Scene(_) => None,
+            }
+        })
+        .collect()
+}
+
+fn methods(document: &Document) -> Vec<Signature> {
+    let own = document.ast.items.iter().filter_map(|item| match item {
+        Item::Function(function) if function.takes_a_shape() => {
+            Some(words::behind_a_shape(words::of(function, document.text())))
+        }
+        _ => None,
+    });
+    own.chain(words::methods()).collect()
+}
+
+/// What a key means, for those that methods of the solver declare.
+pub(super) fn about_key(key: &str) -> String {
+    let declared = Method::all().into_iter().flat_map(|method| method.info().keys);
+    let known = declared.into_iter().find(|own| own.name == key);
+    known.map_or_else(String::new, |own| {
+        let unit = own.unit.map_or(String::new(), |unit| format!(", in {unit}"));
+        format!("{}{unit}; accepts {}; by default {}", own.about, own.accepts, own.default)
+    })
+}
+
+/// The method of the scene around a byte, if it states one.
+fn method_around(document: &Document, byte: usize) -> Option<Method> {
+    let in_tree = document.ast.items.iter().find_map(|item| match item {
+        Item::Scene(scene) if scene.span.range().contains(&byte) => Some(scene.entries.iter()),
+        _ => None,
+    });
+    let stated = in_tree.into_iter().flatten().find_map(|entry| match entry {
+        Entry::Setting { key, value } if key.text == "method" => match &value.kind {
+            ExprKind::Name(word) => Method::named(word),
+            _ => None,
+        },
+        _ => None,
+    });
+    // a scene that is being typed is not in the tree
+    stated.or_else(|| {
+        let scene = document.text().get(..byte)?.rfind("scene ")?;
+        let (_, after) = document.text()[scene..].split_once("method:")?;
+        Method::named(after.split_whitespace().next()?.trim_end_matches([',', '}']))
+    })
+}
+
+/// The signature of a function or a method.
+pub(super) fn signature(document: &Document, name: &str, is_method: bool) -> Option<Signature> {
+    if is_method {
+        return methods(document).into_iter().find(|method| method.name == name);
+    }
+    let own = document.ast.items.iter().find_map(|item| match item {
+        Item::Function(function) if function.name.text == name => Some(words::of(function, document.text())),
+        _ => None,
+    });
+    own.or_else(|| words::functions().into_iter().find(|function| function.name == name))
+}
+
+/// The call around a byte, with the argument at which it stands.
+pub(super) fn signature_help(document: &Document, byte: usize) -> Option<SignatureHelp> {
+    let context = Context::at(document.text(), byte);
+    let open = context.open.iter().rev().find(|open| open.bracket == '(' && !open.word.is_empty())?;
+    let signature = signature(document, &open.word, open.is_method)?;
+    let last = signature.parameters.len().saturating_sub(1);
+    let active = Some(open.commas.min(last) as u32);
+    let parameters = signature.parameters.iter().map(|parameter| ParameterInformation {
+        label: ParameterLabel::Simple(parameter.clone()),
+        documentation: None,
+    });
+    let information = SignatureInformation {
+        label: signature.label(),
+        documentation: (!signature.about.is_empty()).then(|| Documentation::String(signature.about.clone())),
+        parameters: Some(parameters.collect()),
+        active_parameter: active,
+    };
+    Some(SignatureHelp { signatures: vec![information], active_signature: Some(0), active_parameter: active })
+}

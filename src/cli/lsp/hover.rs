@@ -1,0 +1,139 @@
+//! What is known of the name under the cursor.
+
+use std::ops::Range;
+
+use rfm::geom::Aabb;
+use rfm::glam::DVec3;
+use rfm::syntax::ast::{Definition, Item};
+use rfm::{Engine, Program};
+
+use super::complete::{about_key, signature};
+use super::document::Document;
+use super::names::{Meaning, Mention};
+use super::words::comment_above;
+
+/// Lines of a definition that are shown.
+const MOST_LINES: usize = 12;
+
+/// Solids of more operations have no range shown: nobody waits for a hover.
+const MOST_OPERATIONS: usize = 20_000;
+
+/// The words about the name at a byte, in Markdown, and its place.
+pub(super) fn at(document: &Document, byte: usize) -> Option<(String, Range<usize>)> {
+    let mention = document.names.at(byte)?;
+    let words = match &mention.meaning {
+        Meaning::Defined(place) => defined(document, mention, place),
+        Meaning::Standard => standard(document, mention)?,
+        Meaning::Key(_) => {
+            let about = about_key(&mention.text);
+            format!("key `{}`{}", mention.text, if about.is_empty() { about } else { format!(": {about}") })
+        }
+    };
+    Some((words, mention.place.clone()))
+}
+
+fn standard(document: &Document, mention: &Mention) -> Option<String> {
+    let before = document.text().get(..mention.place.start)?.trim_end();
+    match mention.text.as_str() {
+        "x" | "y" | "z" => return Some(format!("the coordinate {}", mention.text)),
+        "t" => return Some("the time, in seconds".to_string()),
+        "pi" => return Some("π = 3.14159…".to_string()),
+        _ => {}
+    }
+    let signature = signature(document, &mention.text, before.ends_with('.'))?;
+    Some(format!("```rfm\n{}\n```\n\n{}", signature.label(), signature.about))
+}
+
+fn defined(document: &Document, mention: &Mention, place: &Range<usize>) -> String {
+    let text = document.text();
+    let item = document.ast.items.iter().find(|item| item.name().span.range() == *place);
+    let Some(item) = item else {
+        return format!("`{}`: a parameter, the variable of a fold, or the label of a block", mention.text);
+    };
+    let (keyword, end) = match item {
+        Item::Param(param) => {
+            ("param", param.range.as_ref().map_or(param.value.span, |(_, high)| high.span).range().end)
+        }
+        Item::Let(definition) => ("let", definition.value.span.range().end),
+        Item::Solid(definition) => ("solid", definition.value.span.range().end),
+        Item::Function(function) => ("fn", function.body.span.range().end),
+        Item::Scene(scene) => ("scene", scene.name.span.range().end),
+        Item::Import(import) => return format!("the file `{}` as `{}`", import.path, import.name.text),
+    };
+    let written = text.get(place.start..end).unwrap_or("");
+    let mut shown: String = written.lines().take(MOST_LINES).collect::<Vec<_>>().join("\n");
+    if written.lines().count() > MOST_LINES {
+        shown.push_str("\n…");
+    }
+    let mut words = format!("```rfm\n{keyword} {shown}\n```");
+    let mut say = |line: &str| {
+        if !line.is_empty() {
+            words.push_str("\n\n");
+            words.push_str(line);
+        }
+    };
+    say(&comment_above(text, place.start));
+    match item {
+        Item::Param(param) => {
+            say(param.doc.as_deref().unwrap_or(""));
+            let value = document
+                .program
+                .as_ref()
+                .and_then(|program| program.module().params.iter().find(|value| value.name == mention.text));
+            if let Some(unit) =
+                value.and_then(|value| value.unit.as_ref()).and_then(|(unit, _)| unit.dimension.unit())
+            {
+                say(&format!("in {unit}"));
+            }
+        }
+        Item::Solid(definition) => say(&range_of_solid(document, definition).unwrap_or_default()),
+        Item::Let(definition) => say(&range_of_let(document, definition).unwrap_or_default()),
+        Item::Function(_) | Item::Scene(_) | Item::Import(_) => {}
+    }
+    words
+}
+
+fn range_of_solid(document: &Document, definition: &Definition) -> Option<String> {
+    range(document.program.as_ref()?, &definition.name.text)
+}
+
+/// The range of a name for a number or a field: as that of a solid at the end of the file.
+fn range_of_let(document: &Document, definition: &Definition) -> Option<String> {
+    const NAME: &str = "shown_by_the_editor";
+    document.program.as_ref()?;
+    range(&document.with(&format!("solid {NAME} = {}", definition.name.text))?, NAME)
+}
+
+/// What ω is in the box of the scene, or around the solids of the file.
+fn range(program: &Program, name: &str) -> Option<String> {
+    let node = program.module().solids.iter().find(|solid| solid.name == name)?.node;
+    let (graph, _) = program.module().graph.extract_cone(node);
+    if graph.len() > MOST_OPERATIONS {
+        return None;
+    }
+    let solid = program.solid_with(name, Engine::Interpreter).ok()?;
+    let over = match &program.module().scenes[..] {
+        [scene, ..] => scene.domain,
+        [] => program.domain(&solid).unwrap_or(Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0))),
+    };
+    let range = solid.range(&over);
+    let corner = |p: DVec3| format!("({}, {}, {})", short(p.x), short(p.y), short(p.z));
+    Some(if range.lo == range.hi {
+        format!("= {}", range.lo)
+    } else if range.lo.is_finite() || range.hi.is_finite() {
+        format!("{} … {} for {} … {}", short(range.lo), short(range.hi), corner(over.min), corner(over.max))
+    } else {
+        return None;
+    })
+}
+
+/// A number with four digits.
+fn short(number: f64) -> String {
+    if number == 0.0 || !number.is_finite() {
+        return number.to_string();
+    }
+    let digits = (3.0 - number.abs().log10().floor()).clamp(0.0, 12.0);
+    let unit = 10f64.powf(digits);
+    let rounded = (number * unit).round() / unit;
+    rounded.to_string()
+}

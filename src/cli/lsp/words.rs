@@ -1,0 +1,184 @@
+//! What the language's own words mean: signatures and one line each.
+
+use rfm::lower::vocabulary;
+use rfm::syntax::ast::{Function, Item};
+
+/// A word with its parameters.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Signature {
+    pub name: String,
+    pub parameters: Vec<String>,
+    pub about: String,
+}
+
+impl Signature {
+    /// `name(a, b = 1)`
+    pub fn label(&self) -> String {
+        format!("{}({})", self.name, self.parameters.join(", "))
+    }
+}
+
+/// What begins an item, and what it defines.
+pub(super) const ITEMS: [(&str, &str); 6] = [
+    ("import", "what another file defines: `import \"chess.rfm\" as chess`"),
+    ("param", "a number that the command line may set, within its range"),
+    ("let", "a name for an expression"),
+    ("fn", "a function"),
+    ("solid", "a solid: positive inside"),
+    ("scene", "what a simulation needs"),
+];
+
+/// Functions that are no text of the prelude: name, parameters, meaning.
+const FUNCTIONS: &[(&str, &str, &str)] = &[
+    ("sqrt", "e", "the square root"),
+    ("abs", "e", "the absolute value"),
+    ("sin", "angle", "the sine; radians unless a unit says otherwise"),
+    ("cos", "angle", "the cosine; radians unless a unit says otherwise"),
+    ("tan", "angle", "the tangent; radians unless a unit says otherwise"),
+    ("asin", "e", "the inverse of the sine, in radians"),
+    ("acos", "e", "the inverse of the cosine, in radians"),
+    ("atan", "e", "the inverse of the tangent, in radians"),
+    ("sinh", "e", "the hyperbolic sine"),
+    ("cosh", "e", "the hyperbolic cosine"),
+    ("tanh", "e", "the hyperbolic tangent"),
+    ("exp", "e", "e to the power of a number"),
+    ("ln", "e", "the natural logarithm"),
+    ("log2", "e", "the logarithm to base 2"),
+    ("log10", "e", "the logarithm to base 10"),
+    ("sign", "e", "1, 0 or −1"),
+    ("floor", "e", "the next whole number below"),
+    ("ceil", "e", "the next whole number above"),
+    ("round", "e", "the nearest whole number, the even one of two that are equally near"),
+    ("fract", "e", "e − ⌊e⌋"),
+    ("mod", "a, b", "a − b·⌊a/b⌋, which has the sign of b"),
+    ("step", "edge, e", "1 where e ≥ edge, 0 elsewhere"),
+    ("where", "condition, a, b", "a where the condition holds, b elsewhere"),
+    ("atan2", "y, x", "the angle of the point (x, y), in radians"),
+    ("pow", "a, b", "a to the power of b"),
+    ("min", "a, b, …", "the smallest"),
+    ("max", "a, b, …", "the largest"),
+    ("hypot", "a, b, c", "√(a² + b² + c²); c may be left out"),
+    ("clamp", "e, low, high", "e, but no less than low and no more than high"),
+    ("dot", "a, b", "the scalar product of two vectors"),
+    ("cross", "a, b", "the vector product"),
+    ("length", "v", "the length of a vector"),
+    ("random", "seed, i", "a number from 0 to 1 that looks like chance, the same in every run"),
+    ("count", "list", "how many members a list has"),
+    ("polygon", "corners", "the field of a simple polygon in x and y: `polygon([[0, 0], [1, 0], [0, 1]])`"),
+    (
+        "mesh",
+        "path, unit",
+        "the closed surface of an STL, OBJ or PLY file: `mesh(\"part.stl\", 1 mm)`; the unit may be left out",
+    ),
+    (
+        "height_map",
+        "path, low, high, scale",
+        "the ground below a map of heights: `height_map(\"ground.csv\", [0, 0], [4, 3])`; the scale may be left out",
+    ),
+    ("points", "path", "the rows of a file of numbers as a list of vectors: `polygon(points(\"wing.csv\"))`"),
+    ("around", "e, outer", "the smaller one of e and the field of a ball around `outer`"),
+    ("slope", "e", "the length of the gradient, |∇ω|"),
+    ("normalise", "e", "ω/√(ω² + |∇ω|²)"),
+    ("normalize", "e", "ω/√(ω² + |∇ω|²)"),
+    ("positive", "e, what", "e, or an error that names `what` if e is not above zero"),
+];
+
+/// Methods that are no text of the prelude: name, meaning.
+const METHODS: &[(&str, &str)] = &[
+    ("move", "the shape moved by a vector, which may depend on t"),
+    ("rotate_x", "the shape turned about the x axis"),
+    ("rotate_y", "the shape turned about the y axis"),
+    ("rotate_z", "the shape turned about the z axis"),
+    ("rotate", "the shape turned about an axis through the origin, or through `about`"),
+    ("scale", "the shape made larger, by one factor or by three"),
+    ("mirror", "the shape mirrored in the plane with this normal through a point"),
+    ("at", "other coordinates in place of x, y and z: `.at([x - 0.3*z, y, z])`"),
+    ("turned", "the shape turned about z by an angle that may differ from point to point"),
+    ("repeat", "copies on a lattice: `.repeat([dx, dy, dz], [nx, ny, nz])`"),
+];
+
+/// The functions of the language, standard solids among them.
+pub(super) fn functions() -> Vec<Signature> {
+    let builtin = |name: &'static str| {
+        let (parameters, about) =
+            FUNCTIONS.iter().find(|known| known.0 == name).map_or(("…", ""), |known| (known.1, known.2));
+        let parameters = parameters.split(", ").map(String::from).collect();
+        Signature { name: name.to_string(), parameters, about: about.to_string() }
+    };
+    let ast = vocabulary::prelude();
+    let standard = ast.items.iter().filter_map(|item| match item {
+        Item::Function(function) if function.name.text != "around" => Some(of(function, &ast.text)),
+        _ => None,
+    });
+    vocabulary::builtins().map(builtin).chain(standard).collect()
+}
+
+/// The methods of shapes that the language has.
+pub(super) fn methods() -> Vec<Signature> {
+    let builtin = |(name, parameters): (&'static str, &'static [&'static str])| {
+        let about = METHODS.iter().find(|known| known.0 == name).map_or("", |known| known.1);
+        let parameters = parameters.iter().map(ToString::to_string).collect();
+        Signature { name: name.to_string(), parameters, about: about.to_string() }
+    };
+    let ast = vocabulary::prelude();
+    let standard = ast.items.iter().filter_map(|item| match item {
+        Item::Function(function) if function.takes_a_shape() => Some(behind_a_shape(of(function, &ast.text))),
+        _ => None,
+    });
+    vocabulary::methods().map(builtin).chain(standard).collect()
+}
+
+/// The signature of a function of a text, with the comment above it.
+pub(super) fn of(function: &Function, text: &str) -> Signature {
+    let parameter = |p: &rfm::syntax::ast::Parameter| {
+        let default = p.default.as_ref().and_then(|value| text.get(value.span.range()));
+        default.map_or_else(|| p.name.text.clone(), |default| format!("{} = {default}", p.name.text))
+    };
+    Signature {
+        name: function.name.text.clone(),
+        parameters: function.parameters.iter().map(parameter).collect(),
+        about: comment_above(text, function.name.span.range().start),
+    }
+}
+
+/// The signature without the shape in front of the dot.
+pub(super) fn behind_a_shape(mut signature: Signature) -> Signature {
+    signature.parameters.remove(0);
+    signature
+}
+
+/// The lines of comments directly above the line of a byte, without their signs.
+pub(super) fn comment_above(text: &str, byte: usize) -> String {
+    let before = text.get(..byte).unwrap_or("");
+    let above = &before[..before.rfind('\n').map_or(0, |at| at + 1)];
+    let mut lines: Vec<&str> = Vec::new();
+    for line in above.lines().rev() {
+        let Some(comment) = line.trim().strip_prefix('#').or_else(|| line.trim().strip_prefix("//")) else {
+            break;
+        };
+        lines.push(comment.trim());
+    }
+    lines.reverse();
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_of_the_language_is_described() {
+        for signature in functions().into_iter().chain(methods()) {
+            assert!(
+                !signature.parameters.contains(&"…".to_string()) || signature.name.starts_with("m"),
+                "{signature:?}"
+            );
+            let standard = vocabulary::prelude().items.iter().any(|item| item.name().text == signature.name);
+            assert!(standard || !signature.about.is_empty(), "{} has no description", signature.name);
+        }
+        let known: Vec<&str> = vocabulary::builtins().collect();
+        for (name, ..) in FUNCTIONS {
+            assert!(known.contains(name), "{name} is no function of the language");
+        }
+    }
+}
