@@ -80,7 +80,7 @@ impl<F: Friction> Coverage<F> {
             spread: spread * Symmetric::square(face.normal),
             sweep: 0.0,
             barrier: Barrier { part: barrier, gradient: -barrier_area / h * face.normal, sweep: 0.0 },
-            friction: F::of_face(face, area / h, h),
+            friction: F::of_face(face, part, area / h, h),
         }
     }
 
@@ -119,8 +119,8 @@ impl<F: Friction> Coverage<F> {
 
     /// The coverage by what lies behind both.
     pub fn and(&self, other: &Self) -> Self {
-        let (part, da, db) = common(self.part, other.part, self.cosine(other));
-        self.joined(other, part, da, db)
+        let cosine = self.cosine(other);
+        self.joined(other, |a, b| common(a, b, cosine))
     }
 
     /// The coverage by what lies behind either: all but what lies before both.
@@ -129,8 +129,11 @@ impl<F: Friction> Coverage<F> {
             return if self.part == 0.0 { *other } else { *self };
         }
         // the faces of both complements look the other way, so the angle between them stays the same
-        let (part, da, db) = common(1.0 - self.part, 1.0 - other.part, self.cosine(other));
-        self.joined(other, 1.0 - part, da, db)
+        let cosine = self.cosine(other);
+        self.joined(other, |a, b| {
+            let (before, da, db) = common(1.0 - a, 1.0 - b, cosine);
+            (1.0 - before, da, db)
+        })
     }
 
     /// Cosine of the angle between the directions in which two walls lie.
@@ -167,7 +170,9 @@ impl<F: Friction> Coverage<F> {
         if moment.determinant() < LEAST_FREE.powi(3) { largest } else { moment.inverse() }
     }
 
-    fn joined(&self, other: &Self, part: f64, da: f64, db: f64) -> Self {
+    /// Two walls combined by a rule, which says how their λ combine, and the derivatives by both.
+    fn joined(&self, other: &Self, rule: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {
+        let (part, da, db) = rule(self.part, other.part);
         Self {
             part: part.clamp(0.0, 1.0),
             filled: (part + da * (self.filled - self.part) + db * (other.filled - other.part))
@@ -176,7 +181,7 @@ impl<F: Friction> Coverage<F> {
             spread: da * self.spread + db * other.spread,
             sweep: da * self.sweep + db * other.sweep,
             barrier: self.barrier.joined(&other.barrier, part, [da, db], [self.part, other.part]),
-            friction: self.friction.joined(&other.friction, da, db),
+            friction: self.friction.joined(&other.friction, rule),
         }
     }
 }
@@ -213,7 +218,7 @@ impl Coverage {
             friction: (),
         };
         let (da, db) = (1.0 - bodies.part, 1.0 - self.part);
-        let whole = self.joined(&bodies, self.part + db * bodies.part, da, db);
+        let whole = self.joined(&bodies, |_, _| (self.part + db * bodies.part, da, db));
         // K of bodies in the box adds to that of the box
         Self { spread: self.spread + bodies.spread, ..whole }
     }
@@ -332,8 +337,31 @@ mod tests {
             let slab = Coverage::of_faces(&wall, &Faces::from_slice(&[Part::All(2), near, far]));
             // all but the rounding of a + 1 − 1
             assert!((slab.part - alone.part).abs() < 1e-15, "{slab:?} {alone:?}");
-            let same = Coverage { part: alone.part, filled: alone.filled, barrier: alone.barrier, ..slab };
-            assert_eq!(same, alone);
+            assert_eq!(slab.friction.tensor, alone.friction.tensor);
+            let Coverage { part, filled, barrier, friction, .. } = alone;
+            assert_eq!(Coverage { part, filled, barrier, friction, ..slab }, alone);
+        }
+    }
+
+    /// A wall that lets the fluid slip stands for the same flow once more behind it. So beside such walls the friction of
+    /// another wall is what it is far from them, and that within the fluid is a sum over what they have left.
+    #[test]
+    fn slippery_walls_do_not_change_the_friction_of_others() {
+        let viscosity = 0.3;
+        let (drag, velocity) = (DVec3::new(0.4, -1.0, 2.0), DVec3::new(-0.7, 1.1, 0.2));
+        let floor = Coverage::of_faces(&WALL, &Faces::from_slice(&[face(0.2 * H, DVec3::X)]));
+        let wanted = drag + floor.friction.complete(DVec3::ZERO, velocity, viscosity);
+        for [y, z] in [[0.15, 2.0], [0.4, 0.6], [0.3, 0.1]] {
+            let sides = [face(y * H, DVec3::Y), face(z * H, DVec3::Z)].map(|side| {
+                let mut side = Coverage::of_faces(&WALL, &Faces::from_slice(&[side]));
+                side.let_slip();
+                side
+            });
+            let left = (1.0 - sides[0].part) * (1.0 - sides[1].part);
+            for whole in [floor.or(&sides[0]).or(&sides[1]), sides[1].or(&floor).or(&sides[0])] {
+                let found = whole.friction.complete(left * drag, velocity, viscosity);
+                assert!((found - wanted).length() < 1e-3, "{found} {wanted}");
+            }
         }
     }
 

@@ -32,11 +32,11 @@ pub(in crate::sph) trait Friction: Copy + Default {
     /// Whether there is none.
     const IS_NONE: bool = false;
 
-    /// The friction of one face whose ∇λ has the length `area`, 1/m, with the kernel Wendland C2.
-    fn of_face(face: &Face, area: f64, h: f64) -> Self;
+    /// The friction of one face whose λ is `part`, and whose ∇λ has the length `area`, 1/m, with the kernel Wendland C2.
+    fn of_face(face: &Face, part: f64, area: f64, h: f64) -> Self;
 
-    /// The friction of two walls combined; `da` and `db` are the derivatives of the combined λ by their λ.
-    fn joined(&self, other: &Self, da: f64, db: f64) -> Self;
+    /// The friction of two walls combined by a rule, which says how their λ combine, and the derivatives by both.
+    fn joined(&self, other: &Self, rule: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self;
 
     /// Adds a velocity, m/s, to the motion of all of these walls.
     fn take_along(&mut self, velocity: DVec3);
@@ -52,9 +52,9 @@ pub(in crate::sph) trait Friction: Copy + Default {
 impl Friction for () {
     const IS_NONE: bool = true;
 
-    fn of_face(_: &Face, _: f64, _: f64) -> Self {}
+    fn of_face(_: &Face, _: f64, _: f64, _: f64) -> Self {}
 
-    fn joined(&self, (): &Self, _: f64, _: f64) -> Self {}
+    fn joined(&self, (): &Self, _: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {}
 
     fn take_along(&mut self, _: DVec3) {}
 
@@ -65,12 +65,15 @@ impl Friction for () {
     }
 }
 
-/// The friction of a viscous fluid with walls.
+/// The friction of a viscous fluid with walls. Walls to which it sticks and walls along which it slips combine among
+/// themselves: behind the latter the whole flow goes on, friction included.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::sph) struct WallDrag {
     /// Σ (Aᵥ/h)/d·(1 − n⊗n), 1/m², over the faces to which the fluid sticks. Times −2ν and a velocity it is
     /// the drag of walls at rest.
     pub tensor: Symmetric,
+    /// λ of the faces to which the fluid sticks.
+    sticky: f64,
     /// λ of those walls along which the fluid slips.
     slippery: f64,
     /// The drag of the walls' own velocity, 1/(m·s).
@@ -78,16 +81,18 @@ pub(in crate::sph) struct WallDrag {
 }
 
 impl Friction for WallDrag {
-    fn of_face(face: &Face, area: f64, h: f64) -> Self {
+    fn of_face(face: &Face, part: f64, area: f64, h: f64) -> Self {
         let along = Symmetric::IDENTITY - Symmetric::square(face.normal);
         let area = area * along_lines(face.distance / h);
-        Self { tensor: area / face.distance.max(NEAREST * h) * along, ..Self::default() }
+        Self { tensor: area / face.distance.max(NEAREST * h) * along, sticky: part, ..Self::default() }
     }
 
-    fn joined(&self, other: &Self, da: f64, db: f64) -> Self {
+    fn joined(&self, other: &Self, rule: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {
+        let (sticky, da, db) = rule(self.sticky, other.sticky);
         Self {
             tensor: da * self.tensor + db * other.tensor,
-            slippery: da * self.slippery + db * other.slippery,
+            sticky,
+            slippery: rule(self.slippery, other.slippery).0,
             haul: da * self.haul + db * other.haul,
         }
     }
