@@ -262,3 +262,26 @@ fn videos_are_handed_to_the_program_of_the_system() {
     assert!(outcome.status.code() == Some(2) && text.contains("Unknown encoder libx264"), "{text}");
     assert_eq!(std::fs::read_to_string(here.join("a.mp4")).unwrap(), "film\n");
 }
+
+#[test]
+fn an_obstacle_that_moves_is_drawn_where_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let still = "sphere(0.15).move([0.2, 0.2, 1.2])";
+    assert!(SCENE.contains(still));
+    // it leaves the picture within the run
+    let moving = SCENE.replace(still, "sphere(0.15).move([0.2, 0.2, 1.2 + 20*t])");
+    std::fs::write(here.join("drop.rfm"), moving).unwrap();
+    rfm(here, &["run", "drop.rfm", "--no-pictures", "--mesh-cells", "24"]).expect(0);
+    let render = |target: &str, others: &[&str]| {
+        let flags = ["--size", "640x480", "--cut", "none", "--hide", "post", "--range", "50..60"];
+        rfm(here, &[&["render", "drop.out", "-o", target], &flags[..], others].concat()).expect(0);
+    };
+    render("all", &[]);
+    let stone = |k: usize| shares(&here.join(format!("all/frame_{k:06}.png")))[2];
+    assert!(stone(0) > 0.005 && stone(5) < 0.001, "{} {}", stone(0), stone(5));
+    // a frame alone is the same picture
+    render("one.png", &["--frames", "1"]);
+    let bytes = |name: &str| std::fs::read(here.join(name)).unwrap();
+    assert!(bytes("one.png") == bytes("all/frame_000001.png"));
+}
