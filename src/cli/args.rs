@@ -99,6 +99,8 @@ pub(super) enum Command {
     Run(Run),
     /// Show a scene, a solid or the frames of a run in the browser, or save a run as one page
     View(View),
+    /// Make pictures or a film of the frames of a run, or a picture of a solid
+    Render(super::render::Render),
     /// Measure speed against error: of every program of a solid and its meshes, or of a flow that is known
     Report(Report),
     /// Explain a message, or show what a stage of the compiler makes of a file

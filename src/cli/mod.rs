@@ -26,10 +26,13 @@ mod output;
 mod params;
 mod plot;
 mod progress;
+mod render;
 mod report;
 mod run;
 mod saved;
+mod scenery;
 mod section;
+mod survey;
 mod values;
 mod view;
 
@@ -89,6 +92,7 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
         args::Command::Build(options) => build::run(&shared, &options),
         args::Command::Run(options) => run::run(&shared, &options),
         args::Command::View(options) => view::run(&shared, &options),
+        args::Command::Render(options) => render::run(&shared, &options),
         args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),
         args::Command::Fmt(options) => fmt::run(&shared, &options),

@@ -50,6 +50,26 @@ pub(super) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     Ok(())
 }
 
+/// Lets another program write a file: `fill` gets the path of a temporary one, which then takes the place of the file.
+pub(super) fn through(path: &Path, fill: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
+    let failed = |error: io::Error| Failure::usage(format!("cannot write `{}`: {error}", path.shown()));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if path.is_dir() || !folder.is_dir() {
+        // says what is wrong
+        return write(path, |_| Ok(()));
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let ending = path.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+    let prefix = format!("{TEMPORARY}{name}-");
+    let temporary =
+        tempfile::Builder::new().prefix(&prefix).suffix(&ending).tempfile_in(folder).map_err(failed)?;
+    let _ = temporary.as_file().try_lock();
+    fill(temporary.path())?;
+    readable_by_others(temporary.as_file()).map_err(failed)?;
+    temporary.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}
+
 /// Puts a text in place of a file at once. A link stays a link, and who may read the file may still do so.
 pub(super) fn replace(path: &Path, text: &str) -> Result<(), Failure> {
     let failed = |e: io::Error| Failure::usage(format!("cannot write `{}`: {e}", path.shown()));

@@ -1,6 +1,6 @@
 //! What `rfm run` left in a folder: the list of its frames, and the figures of its summary.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
@@ -16,6 +16,9 @@ pub(super) struct RunFigures {
     pub rest_density: f64,
     #[serde(default)]
     pub scene: String,
+    /// The names of the obstacles, in the order of the array `body` of their mesh.
+    #[serde(default)]
+    pub obstacles: Vec<String>,
     /// The lowest and the highest corner of the scene's box, m.
     #[serde(default, rename = "box")]
     pub domain: Option<[[f64; 3]; 2]>,
@@ -48,6 +51,38 @@ pub(super) fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
         return Err(Failure::usage(format!("cannot read `{}`: it lists no frames", path.shown())));
     }
     Ok(entries)
+}
+
+/// The meshes of the obstacles, and which of them belongs to each frame.
+pub(super) type Meshes = (Vec<PathBuf>, Vec<Option<usize>>);
+
+/// The meshes of the obstacles: one, or if they move one for each frame.
+pub(super) fn obstacles(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Meshes, Failure> {
+    let moving = folder.join("obstacle.pvd");
+    if moving.is_file() {
+        let listed = listed(&moving)?;
+        let mut files = Vec::new();
+        let mesh_of = entries.iter().map(|(_, entry)| {
+            let there = listed.iter().find(|mesh| mesh.time == entry.time);
+            if let Some(mesh) = there.filter(|mesh| folder.join(&mesh.file).is_file()) {
+                files.push(folder.join(&mesh.file));
+            }
+            files.len().checked_sub(1)
+        });
+        let mesh_of = mesh_of.collect();
+        return Ok((files, mesh_of));
+    }
+    let still = folder.join("obstacle.vtp");
+    if still.is_file() {
+        return Ok((vec![still], vec![Some(0); entries.len()]));
+    }
+    Ok((Vec::new(), vec![None; entries.len()]))
+}
+
+/// The name of a run's folder.
+pub(super) fn title(folder: &Path) -> String {
+    let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
+    whole.file_name().map_or_else(|| whole.shown(), |name| Path::new(name).shown())
 }
 
 /// The entries of a collection.

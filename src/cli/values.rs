@@ -158,14 +158,49 @@ pub(super) fn point(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text).map(DVec3::from_array)
 }
 
-/// Three numbers that are not all zero.
+/// Three numbers that are not all zero; also as a scene states them: `camera: [0.5, -1, 0.4]`.
 pub(super) fn direction(text: &str) -> Result<DVec3, String> {
-    let found = point(text)?;
+    let within = text.split_once('[').and_then(|(before, rest)| Some((before, rest.split_once(']')?.0)));
+    let is_key = |before: &str| before.trim().is_empty() || before.trim().ends_with("camera:");
+    let numbers = within.filter(|(before, _)| is_key(before)).map_or(text, |(_, numbers)| numbers);
+    let found = point(numbers)?;
     if found.is_finite() && found != DVec3::ZERO {
         Ok(found)
     } else {
         Err("the direction has no length".into())
     }
+}
+
+/// Width and height in pixels: `1280x720`.
+pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.trim().parse::<u32>().ok().filter(|n| (16..=8192).contains(n));
+    let sides = text.split_once(['x', '×', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
+    sides.ok_or_else(|| {
+        format!("`{text}` is not a size; expected WIDTHxHEIGHT with 16 to 8192 pixels each way")
+    })
+}
+
+/// How many times as large: above 0.
+pub(super) fn zoom(text: &str) -> Result<f64, String> {
+    let found = text.trim().parse().ok().filter(|zoom| (0.05..=20.0).contains(zoom));
+    found.ok_or_else(|| "expected a number from 0.05 to 20".to_string())
+}
+
+/// Two numbers in SI units, the lower one first: `0..2.5`.
+pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    let ends = text.split_once("..").and_then(|(low, high)| Some((number(low)?, number(high)?)));
+    let (low, high) =
+        ends.ok_or_else(|| format!("`{text}` is not a range of numbers; expected LOW..HIGH"))?;
+    if low < high { Ok((low, high)) } else { Err("the first number must be the lower one".into()) }
+}
+
+/// `A..B`, `A..` or `..B` in seconds or with units; an end that is not stated is infinite.
+pub(super) fn times(text: &str) -> Result<(f64, f64), String> {
+    let (from, to) = text.split_once("..").ok_or("expected A..B, as in 0.5..2 or 500ms..")?;
+    let end = |text: &str, open: f64| if text.trim().is_empty() { Ok(open) } else { seconds(text) };
+    let (from, to) = (end(from, f64::NEG_INFINITY)?, end(to, f64::INFINITY)?);
+    if from <= to { Ok((from, to)) } else { Err("the first time must be the earlier one".into()) }
 }
 
 /// A plane, `auto` or `none`.
@@ -239,6 +274,29 @@ mod tests {
         for text in ["0", "-1mm", "%", "0%", "nan", "inf%", "1e400", "few"] {
             assert!(tolerance(text).is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn directions_are_read_as_the_viewer_copies_them() {
+        let expected = Ok(DVec3::new(0.42, -0.9, 0.1));
+        for text in ["0.42,-0.9,0.1", "[0.42, -0.9, 0.1]", "picture { camera: [0.42, -0.9, 0.1] }"] {
+            assert_eq!(direction(text), expected, "{text}");
+        }
+        for text in ["0,0,0", "cut: [1, 0, 0]", "camera: [1, 0]", "camera: [1, 0, 0"] {
+            assert!(direction(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn sizes_ranges_and_times() {
+        assert_eq!((size("1280x720"), size("640×480")), (Ok((1280, 720)), Ok((640, 480))));
+        assert_eq!((range("0..2.5"), range("-1e3..-5")), (Ok((0.0, 2.5)), Ok((-1000.0, -5.0))));
+        assert_eq!((times("500ms..2"), times("..1")), (Ok((0.5, 2.0)), Ok((f64::NEG_INFINITY, 1.0))));
+        for text in ["", "12", "1280", "9000x9000", "2..1", "a..b", "1..1", "nan..2"] {
+            assert!(size(text).is_err() && range(text).is_err(), "{text}");
+        }
+        assert!(times("2..1").is_err() && times("2").is_err() && times("2 kg..").is_err());
+        assert!(zoom("2").is_ok() && zoom("0").is_err() && zoom("nan").is_err());
     }
 
     #[test]

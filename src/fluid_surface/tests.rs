@@ -166,3 +166,15 @@ fn collections_are_read_in_their_order() {
     assert!(matches!(read_collection("x"), Err(CollectionError::NotACollection(_))));
     assert!(matches!(read_collection("<VTKFile/>"), Err(CollectionError::NotACollection(_))));
 }
+
+#[test]
+fn bodies_of_a_mesh_are_numbered_at_their_vertices() {
+    let triangle = Mesh::from_triangles(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]);
+    let meshes = [triangle.clone(), Mesh::default(), triangle];
+    let mut bytes = Vec::new();
+    crate::mesh::vtp::write_bodies(&meshes, crate::mesh::LengthUnit::METRE, &mut bytes).unwrap();
+    let (points, arrays) = read_arrays(&bytes).unwrap();
+    let body = arrays.iter().find(|array| array.name == "body").unwrap();
+    assert_eq!((points.len(), &body.values[..]), (6, &[0.0, 0.0, 0.0, 2.0, 2.0, 2.0][..]));
+    assert_eq!(read_mesh(&bytes).unwrap().triangles, [[0, 1, 2], [3, 4, 5]]);
+}

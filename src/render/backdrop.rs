@@ -5,7 +5,7 @@ use super::{
     camera::{Camera, SUBPIXELS, Seen},
     image::Layer,
     mesh::Facets,
-    overlay::{self, Caption, Legend},
+    overlay::{self, Caption, Legend, Scale},
     particles::{discs, draw},
     raster::{BAND_ROWS, Band, Canvas, Corner, mix},
 };
@@ -25,7 +25,7 @@ const FLOOR_BEHIND: f64 = 1.0 - 1e-4;
 #[derive(Debug)]
 pub struct Backdrop {
     camera: Camera,
-    fastest: f64,
+    scale: Scale<'static>,
     /// The floor and the mesh. The edges of the box are drawn last, over particles too, because their soft
     /// borders need the colour behind them.
     canvas: Canvas,
@@ -33,7 +33,7 @@ pub struct Backdrop {
     /// The canvas and the edges as pixels.
     still: Vec<u8>,
     title: Layer,
-    bar: Layer,
+    bar: Option<Layer>,
     /// The number of triangles of the meshes that are not drawn because a corner is not finite, lies behind the
     /// eye, or does not exist.
     pub skipped_triangles: usize,
@@ -66,12 +66,12 @@ impl Backdrop {
         let still = pixels(&mut finished);
         let scale = unit(&camera);
         Ok(Self {
-            fastest: legend.fastest,
+            scale: legend.scale.map_or(Scale::speeds(1.0), |scale| scale.unlabelled()),
             canvas,
             edges,
             still,
             title: overlay::title(legend.title, f64::from(camera.width) / scale, scale)?,
-            bar: overlay::bar(legend, scale)?,
+            bar: legend.scale.map(|values| overlay::bar(&values, scale)).transpose()?,
             skipped_triangles: facets.iter().map(|facets| facets.skipped).sum(),
             camera,
         })
@@ -80,9 +80,9 @@ impl Backdrop {
     /// The picture with particles in it, and the caption of its moment.
     ///
     /// Particles whose position is not finite or lies behind the eye are left out and counted in
-    /// [`Image::skipped`]. Those whose speed is NaN are grey.
+    /// [`Image::skipped`]. Those whose value is NaN are grey.
     pub fn frame(&self, particles: &ParticlesView<'_>, moment: &Caption) -> Image {
-        let discs = discs(particles, &self.camera, self.fastest);
+        let discs = discs(particles, &self.camera, &self.scale);
         let total = particles.positions.len();
         let mut image = Image {
             width: self.camera.width,
@@ -91,20 +91,32 @@ impl Backdrop {
             skipped: total - discs.len(),
         };
         draw(&discs, &self.canvas, |band| draw_edges(&self.edges, band), &mut image.pixels);
-        self.write_on(&mut image, moment, total);
+        self.write_on(&mut image);
+        let scale = unit(&self.camera);
+        // our own digits and letters always make a caption
+        if let Ok(caption) = overlay::caption(moment, total, scale) {
+            let top = f64::from(image.height) - overlay::CAPTION_HEIGHT * scale;
+            image.lay(&caption, 0, top.max(0.0) as usize);
+        }
         image
     }
 
-    fn write_on(&self, image: &mut Image, moment: &Caption, particles: usize) {
+    /// The picture without particles and without a caption.
+    pub fn still(&self) -> Image {
+        let (width, height) = (self.camera.width, self.camera.height);
+        let mut image = Image { width, height, pixels: self.still.clone(), skipped: 0 };
+        self.write_on(&mut image);
+        image
+    }
+
+    fn write_on(&self, image: &mut Image) {
         let scale = unit(&self.camera);
         let (width, height) = (f64::from(image.width), f64::from(image.height));
-        let place = |units: f64, from: f64| (from - units * scale).max(0.0) as usize;
         image.lay(&self.title, 0, 0);
-        let bar_top = 0.5 * height - 0.5 * overlay::BAR_HEIGHT * scale;
-        image.lay(&self.bar, place(overlay::BAR_WIDTH, width), bar_top.max(0.0) as usize);
-        // our own digits and letters always make a caption
-        if let Ok(caption) = overlay::caption(moment, particles, scale) {
-            image.lay(&caption, 0, place(overlay::CAPTION_HEIGHT, height));
+        if let Some(bar) = &self.bar {
+            let top = 0.5 * height - 0.5 * overlay::BAR_HEIGHT * scale;
+            let left = width - overlay::BAR_WIDTH * scale;
+            image.lay(bar, left.max(0.0) as usize, top.max(0.0) as usize);
         }
     }
 }
@@ -178,9 +190,13 @@ mod tests {
 
     use super::*;
     use crate::field::Points;
+    use crate::render::ColourMap;
 
-    const MOMENT: Caption = Caption { time: 0.0, step: 0 };
-    const LEGEND: Legend<'_> = Legend { title: "test", fastest: 1.0 };
+    const MOMENT: Caption = Caption { time: 0.0, step: None };
+    const LEGEND: Legend<'_> = Legend {
+        title: "test",
+        scale: Some(Scale { label: "speed, m/s", low: 0.0, high: 1.0, map: ColourMap::BlueYellowRed }),
+    };
 
     fn cube() -> Aabb {
         Aabb::new(DVec3::splat(-1.0), DVec3::ONE)
@@ -194,7 +210,10 @@ mod tests {
 
     fn frame(scene: &Backdrop, points: &[DVec3], speeds: &[f64]) -> Image {
         let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<_>>());
-        scene.frame(&ParticlesView { positions: Points::new(&x, &y, &z), speeds, radius: 0.2 }, &MOMENT)
+        scene.frame(
+            &ParticlesView { positions: Points::new(&x, &y, &z), values: speeds, radius: 0.2 },
+            &MOMENT,
+        )
     }
 
     fn centre(image: &Image, scene: &Backdrop) -> Rgb {
@@ -246,7 +265,7 @@ mod tests {
         assert_eq!(frame(&scene, &[], &[]).pixels.len(), 3 * 320 * 240);
         for radius in [f64::NAN, -1.0, 0.0, 1e300] {
             let one = [0.0];
-            let particles = ParticlesView { positions: Points::new(&one, &one, &one), speeds: &one, radius };
+            let particles = ParticlesView { positions: Points::new(&one, &one, &one), values: &one, radius };
             assert_eq!(scene.frame(&particles, &MOMENT).skipped, 0);
         }
     }

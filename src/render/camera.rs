@@ -85,12 +85,29 @@ impl Camera {
         let corners = bounds.corners().map(|corner| self.look(corner).map_or(DVec2::ZERO, |seen| seen.at));
         let (low, high) =
             corners.iter().fold((corners[0], corners[0]), |(low, high), p| (low.min(*p), high.max(*p)));
-        let sub = SUBPIXELS as f64;
-        let page = sub * DVec2::new(f64::from(self.width), f64::from(self.height));
-        let [left, top, right, bottom] = MARGINS.map(|m| m * page.y / 960.0);
-        let room = (page - DVec2::new(left + right, top + bottom)).max(0.25 * page);
+        let (corner, end) = self.room();
+        let room = end - corner;
         self.focal = (room / (high - low).max(DVec2::splat(1e-12))).min_element();
-        self.centre = DVec2::new(left, top) + 0.5 * room - 0.5 * self.focal * (low + high);
+        self.centre = corner + 0.5 * room - 0.5 * self.focal * (low + high);
+    }
+
+    /// The view with a point in the middle of what margins leave, and everything `zoom` times as large.
+    #[must_use]
+    pub fn aimed(mut self, at: DVec3, zoom: f64) -> Self {
+        self.focal *= zoom;
+        let (low, high) = self.room();
+        if let Some(seen) = self.look(at) {
+            self.centre += 0.5 * (low + high) - seen.at;
+        }
+        self
+    }
+
+    /// The corners of the part of the picture within the margins, in sub-pixels.
+    fn room(&self) -> (DVec2, DVec2) {
+        let page = SUBPIXELS as f64 * DVec2::new(f64::from(self.width), f64::from(self.height));
+        let [left, top, right, bottom] = MARGINS.map(|m| m * page.y / 960.0);
+        let low = DVec2::new(left, top);
+        (low, low + (page - DVec2::new(left + right, top + bottom)).max(0.25 * page))
     }
 
     /// A point on the screen. `None` for points that are not finite, and for those behind or very near
@@ -165,6 +182,20 @@ mod tests {
         assert!(see(0.0, 0.0, 3.0).at.y < see(0.0, 0.0, 0.0).at.y);
         assert!(see(3.0, 0.0, 0.0).at.x > see(0.0, 0.0, 0.0).at.x);
         assert!(see(0.0, 0.0, 0.0).nearness > see(0.0, 3.0, 0.0).nearness);
+    }
+
+    #[test]
+    fn an_aimed_view_has_its_point_in_the_middle_and_is_larger() {
+        let camera = Camera::three_quarter(&cube(), (1280, 720)).unwrap();
+        let point = DVec3::new(0.5, 2.0, 1.0);
+        let near = camera.clone().aimed(point, 3.0);
+        let (low, high) = near.room();
+        assert!(near.look(point).unwrap().at.distance(0.5 * (low + high)) < 1e-9);
+        let length = |camera: &Camera| {
+            let see = |p: DVec3| camera.look(p).unwrap().at;
+            see(point).distance(see(point + DVec3::Z))
+        };
+        assert!((length(&near) / length(&camera) - 3.0).abs() < 1e-9);
     }
 
     #[test]

@@ -1,7 +1,8 @@
-//! Pictures of a simulation: the box, the obstacle's mesh and the particles, coloured by their speed.
+//! Pictures of a simulation: the box, the obstacle's mesh and the particles, coloured by their speed or another value.
 //!
 //! ```text
 //! Camera, box, mesh ──Backdrop::new──▶ Backdrop ──frame(particles)──▶ Image ──write_png──▶ PNG
+//!                                                                       └──Apng, Gif──▶ a film
 //! ```
 //!
 //! Everything is drawn on the processor at twice the size and averaged down. Rows are cut into bands of fixed
@@ -16,6 +17,8 @@ mod camera;
 mod colour;
 mod cut;
 mod facet;
+mod film;
+mod gif_film;
 mod hidden;
 mod image;
 mod mesh;
@@ -31,11 +34,14 @@ use self::colour::Rgb;
 pub use self::{
     backdrop::Backdrop,
     camera::Camera,
+    colour::ColourMap,
     cut::Cut,
+    film::Apng,
+    gif_film::{Gif, Palette},
     hidden::hidden,
     image::Image,
     mesh::MeshView,
-    overlay::{Caption, Legend},
+    overlay::{Caption, Legend, Scale},
     particles::ParticlesView,
 };
 use crate::geom::Aabb;

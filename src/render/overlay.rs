@@ -5,16 +5,45 @@ use std::fmt::Write;
 
 use resvg::tiny_skia::{Pixmap, Transform};
 
-use super::{RenderError, colour::STOPS, image::Layer};
+use super::{ColourMap, RenderError, Rgb, image::Layer};
 
 /// The text beside the picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Legend<'a> {
     /// The title over the picture.
     pub title: &'a str,
-    /// The speed that is shown in red, in m/s. Frames of a run can be compared if it is the same for all
-    /// of them.
-    pub fastest: f64,
+    /// What the colour bar shows; `None` draws no bar.
+    pub scale: Option<Scale<'a>>,
+}
+
+/// What the colours of particles mean. Frames of a run can be compared if it is the same for all of them.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale<'a> {
+    /// What is shown, with its unit, over the colour bar.
+    pub label: &'a str,
+    /// The value at the low end of the map.
+    pub low: f64,
+    /// The value at the high end of the map.
+    pub high: f64,
+    /// The colours.
+    pub map: ColourMap,
+}
+
+impl<'a> Scale<'a> {
+    /// Speeds from rest to `fastest`, in m/s.
+    pub fn speeds(fastest: f64) -> Self {
+        Self { label: "speed, m/s", low: 0.0, high: fastest, map: ColourMap::default() }
+    }
+
+    /// The scale without its label, which then need not live as long as the text.
+    pub(super) fn unlabelled(&self) -> Scale<'static> {
+        Scale { label: "", low: self.low, high: self.high, map: self.map }
+    }
+
+    /// The colour of a value.
+    pub(super) fn colour(&self, value: f64) -> Rgb {
+        self.map.colour(value, (self.low, self.high))
+    }
 }
 
 /// The text under a frame.
@@ -22,8 +51,8 @@ pub struct Legend<'a> {
 pub struct Caption {
     /// Simulated time in seconds.
     pub time: f64,
-    /// The number of the step.
-    pub step: u64,
+    /// The number of the step, if it is known.
+    pub step: Option<u64>,
 }
 
 use crate::lettering;
@@ -47,6 +76,12 @@ fn draw(size: (f64, f64), scale: f64, body: &str) -> Result<Layer, RenderError> 
 
 /// The title, for the upper left corner of a page `width` units wide.
 pub fn title(text: &str, width: f64, scale: f64) -> Result<Layer, RenderError> {
+    let text = escaped(text);
+    draw((width, 48.0), scale, &format!(r#"<text x="32" y="36" font-size="22">{text}</text>"#))
+}
+
+/// A text as SVG holds it.
+fn escaped(text: &str) -> String {
     let mut escaped = String::new();
     for c in text.chars().filter(|c| !c.is_control()) {
         match c {
@@ -55,7 +90,7 @@ pub fn title(text: &str, width: f64, scale: f64) -> Result<Layer, RenderError> {
             _ => escaped.push(c),
         }
     }
-    draw((width, 48.0), scale, &format!(r#"<text x="32" y="36" font-size="22">{escaped}</text>"#))
+    escaped
 }
 
 /// The width of the colour bar's layer, in units.
@@ -63,21 +98,23 @@ pub const BAR_WIDTH: f64 = 124.0;
 /// The height of the colour bar's layer, in units.
 pub const BAR_HEIGHT: f64 = 420.0;
 
-/// The colour bar for speeds.
-pub fn bar(legend: &Legend<'_>, scale: f64) -> Result<Layer, RenderError> {
+/// The colour bar.
+pub fn bar(values: &Scale<'_>, scale: f64) -> Result<Layer, RenderError> {
     let (left, top, width, height) = (16.0, 44.0, 18.0, 360.0);
     let mut body = String::from(r#"<linearGradient id="g" x1="0" y1="1" x2="0" y2="0">"#);
-    for (k, [r, g, b]) in STOPS.iter().enumerate() {
-        let offset = k as f64 / (STOPS.len() - 1) as f64;
+    let stops = values.map.stops();
+    for (k, [r, g, b]) in stops.iter().enumerate() {
+        let offset = k as f64 / (stops.len() - 1) as f64;
         let _ = write!(body, r#"<stop offset="{offset}" stop-color="rgb({r},{g},{b})"/>"#);
     }
     let _ = write!(
         body,
-        r#"</linearGradient><rect x="{left}" y="{top}" width="{width}" height="{height}" fill="url(#g)" stroke="{INK}"/><g font-size="16"><text x="{left}" y="{}">speed, m/s</text>"#,
-        top - 18.0
+        r#"</linearGradient><rect x="{left}" y="{top}" width="{width}" height="{height}" fill="url(#g)" stroke="{INK}"/><g font-size="16"><text x="{left}" y="{}">{}</text>"#,
+        top - 18.0,
+        escaped(values.label)
     );
-    for (value, label) in round_values(legend.fastest) {
-        let y = top + height * (1.0 - value / legend.fastest);
+    for (value, label) in round_values(values.low, values.high) {
+        let y = top + height * (values.high - value) / (values.high - values.low);
         let right = left + width;
         let _ = write!(
             body,
@@ -95,12 +132,14 @@ pub const CAPTION_HEIGHT: f64 = 44.0;
 
 /// The time, the step and the number of particles, in columns that stay in place while the numbers change.
 pub fn caption(moment: &Caption, particles: usize, scale: f64) -> Result<Layer, RenderError> {
-    let body = format!(
-        r#"<g font-size="18"><text x="32" y="22">t = {:.3} s</text><text x="172" y="22">step {}</text><text x="312" y="22">N = {}</text></g>"#,
-        moment.time,
-        grouped(moment.step),
-        grouped(particles as u64)
-    );
+    let mut words = vec![format!("t = {:.3} s", moment.time)];
+    words.extend(moment.step.map(|step| format!("step {}", grouped(step))));
+    words.push(format!("N = {}", grouped(particles as u64)));
+    let mut body = String::from(r#"<g font-size="18">"#);
+    for (k, words) in words.iter().enumerate() {
+        let _ = write!(body, r#"<text x="{}" y="22">{words}</text>"#, 32 + 140 * k);
+    }
+    body.push_str("</g>");
     draw((520.0, CAPTION_HEIGHT), scale, &body)
 }
 
@@ -117,22 +156,27 @@ fn grouped(number: u64) -> String {
     out
 }
 
-/// Three to seven round values from 0 to `top` with their labels. Empty if `top` is not a positive number.
-fn round_values(top: f64) -> Vec<(f64, String)> {
-    if !(top > 0.0 && top.is_finite()) {
+/// Two to seven round values of a range with their labels. Empty if the range is empty or endless.
+fn round_values(low: f64, high: f64) -> Vec<(f64, String)> {
+    let width = high - low;
+    // between numbers that agree in all but their last digits there are no others to show
+    let noise = 1e-9 * low.abs().max(high.abs());
+    if !(width > noise && width.is_finite()) {
         return Vec::new();
     }
-    let decade = libm::log10(top).floor() as i32;
+    let decade = libm::log10(width).floor() as i32;
     let candidates = [(1, decade - 1), (2, decade - 1), (5, decade - 1), (1, decade), (2, decade)];
     for (mantissa, exponent) in candidates {
         // read back from digits, so that the value is the one of the label
         let number = |k: i64| format!("{}e{exponent}", k * mantissa).parse::<f64>().unwrap_or(f64::NAN);
-        let count = (0..20).take_while(|&k| number(k) <= top * (1.0 + 1e-9)).count() as i64;
-        if count <= 7 {
+        let step = number(1);
+        let first = ((low - 1e-9 * width) / step).ceil() as i64;
+        let last = ((high + 1e-9 * width) / step).floor() as i64;
+        if last - first < 7 {
             let places = (-exponent).max(0) as usize;
-            let plain = (-4..5).contains(&exponent);
+            let plain = (-4..5).contains(&exponent) && low.abs().max(high.abs()) < 1e7;
             let label = |v: f64| if plain { format!("{v:.places$}") } else { format!("{v:e}") };
-            return (0..count).map(|k| (number(k), label(number(k)))).collect();
+            return (first..=last).map(|k| (number(k), label(number(k)))).collect();
         }
     }
     Vec::new()
@@ -144,12 +188,18 @@ mod tests {
 
     #[test]
     fn the_bar_has_a_few_round_numbers() {
-        let labels = |top: f64| round_values(top).into_iter().map(|(_, l)| l).collect::<Vec<_>>().join(" ");
+        let range = |low: f64, high: f64| {
+            round_values(low, high).into_iter().map(|(_, l)| l).collect::<Vec<_>>().join(" ")
+        };
+        let labels = |top: f64| range(0.0, top);
         assert_eq!(labels(5.4), "0 1 2 3 4 5");
         assert_eq!(labels(1.0), "0.0 0.2 0.4 0.6 0.8 1.0");
         assert_eq!(labels(0.3), "0.00 0.05 0.10 0.15 0.20 0.25 0.30");
         assert_eq!(labels(2e-9), "0e0 5e-10 1e-9 1.5e-9 2e-9");
         assert_eq!(labels(f64::NAN) + &labels(-1.0) + &labels(f64::INFINITY), "");
+        assert_eq!(range(987.0, 1012.0), "990 995 1000 1005 1010");
+        assert_eq!(range(-0.25, 0.25), "-0.2 -0.1 0.0 0.1 0.2");
+        assert_eq!(range(1e300, 1e300) + &range(1.0, 1.0 + 1e-15), "");
     }
 
     #[test]
@@ -163,7 +213,7 @@ mod tests {
     #[test]
     fn any_title_and_moment_can_be_set() {
         assert!(title("a<b & \"c\"\u{0}", 400.0, 1.0).is_ok());
-        let layer = caption(&Caption { time: f64::NAN, step: u64::MAX }, 0, 0.1).unwrap();
+        let layer = caption(&Caption { time: f64::NAN, step: Some(u64::MAX) }, 0, 0.1).unwrap();
         assert_eq!((layer.width, layer.height), (52, 5));
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     camera::{Camera, SUBPIXELS},
-    colour::speed_colour,
+    overlay::Scale,
     raster::{BAND_ROWS, Band, Canvas},
     shade,
 };
@@ -15,9 +15,8 @@ use crate::field::Points;
 pub struct ParticlesView<'a> {
     /// The positions in metres.
     pub positions: Points<'a>,
-    /// The speeds, in the unit of [`Legend::fastest`](super::Legend::fastest). Particles without a speed
-    /// are grey.
-    pub speeds: &'a [f64],
+    /// The values that choose the colours, in the unit of the [`Scale`]. Particles without a value are grey.
+    pub values: &'a [f64],
     /// The radius of every ball in metres. Neighbours touch if it is half their spacing.
     pub radius: f64,
 }
@@ -38,11 +37,11 @@ pub struct Disc {
 const MIN_RADIUS: f32 = 0.9;
 
 /// The discs of all particles that the camera sees, in the particles' order.
-pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, fastest: f64) -> Vec<Disc> {
+pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, scale: &Scale) -> Vec<Disc> {
     let radius = if particles.radius.is_finite() { particles.radius.max(0.0) } else { 0.0 };
     let disc = |i: usize| {
         let seen = camera.look(particles.positions.get(i))?;
-        let speed = particles.speeds.get(i).copied().unwrap_or(f64::NAN);
+        let value = particles.values.get(i).copied().unwrap_or(f64::NAN);
         Some(Disc {
             x: seen.at.x as f32,
             y: seen.at.y as f32,
@@ -50,7 +49,7 @@ pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, fastest: f64) -> Ve
             nearness: seen.nearness as f32,
             // the derivative of 1/depth, because a ball is small beside its distance
             bulge: (radius * seen.nearness * seen.nearness) as f32,
-            colour: speed_colour(speed, fastest).map(f32::from),
+            colour: scale.colour(value).map(f32::from),
         })
     };
     let seen: Vec<_> = (0..particles.positions.len()).into_par_iter().map(disc).collect();
@@ -62,11 +61,10 @@ pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, fastest: f64) -> Ve
 pub fn draw(discs: &[Disc], canvas: &Canvas, finish: impl Fn(&mut Band<'_>) + Sync, pixels: &mut [u8]) {
     let stride = canvas.width / SUBPIXELS;
     let height = canvas.nearness.len() / canvas.width;
+    let by_band = by_band(discs, height.div_ceil(BAND_ROWS));
     pixels.par_chunks_mut(3 * stride * BAND_ROWS / SUBPIXELS).enumerate().for_each(|(k, out)| {
         let rows = k * BAND_ROWS..((k + 1) * BAND_ROWS).min(height);
-        let (first, end) = (rows.start as f32, rows.end as f32);
-        let mut here: Vec<_> =
-            discs.iter().filter(|d| d.y + d.reach() >= first && d.y - d.reach() <= end).collect();
+        let here = &by_band[k];
         let left = here.iter().map(|d| d.x - d.reach()).fold(f32::INFINITY, f32::min);
         let right = here.iter().map(|d| d.x + d.reach()).fold(f32::NEG_INFINITY, f32::max);
         // whole pixels; the rest of the row stays as it is
@@ -83,15 +81,33 @@ pub fn draw(discs: &[Disc], canvas: &Canvas, finish: impl Fn(&mut Band<'_>) + Sy
             nearness: &mut nearness,
             colour: &mut colour,
         };
-        // near discs first: most of the others are then hidden and need no shading; equally near ones keep
-        // their order
-        here.sort_by(|a, b| b.nearness.total_cmp(&a.nearness));
         for disc in here {
             disc.draw(&mut band);
         }
         finish(&mut band);
         band.average(out, stride);
     });
+}
+
+/// The discs that may reach each band, near ones first: most of the others are then hidden and need no shading. Equally
+/// near ones keep their order.
+fn by_band(discs: &[Disc], bands: usize) -> Vec<Vec<Disc>> {
+    // nearness is positive, so its bits have its order; the index makes every key another one
+    let key = |(i, disc): (usize, &Disc)| u64::from(!disc.nearness.to_bits()) << 32 | i as u64;
+    let mut keys: Vec<u64> = discs.par_iter().enumerate().map(key).collect();
+    keys.par_sort_unstable();
+    let mut found = vec![Vec::new(); bands];
+    for key in keys {
+        let disc = discs[(key & u64::from(u32::MAX)) as usize];
+        // `as` saturates
+        let band = |y: f32| (y / BAND_ROWS as f32).floor().max(0.0) as usize;
+        if disc.y + disc.reach() + 1.0 < 0.0 {
+            continue;
+        }
+        let (first, last) = (band(disc.y - disc.reach() - 1.0), band(disc.y + disc.reach() + 1.0));
+        found.iter_mut().take(last.saturating_add(1)).skip(first).for_each(|list| list.push(disc));
+    }
+    found
 }
 
 impl Disc {

@@ -12,7 +12,7 @@ const KEPT: usize = 64;
 
 struct Memory {
     entries: [Entry; KEPT],
-    /// The solid of the last search, and the triangle that it found.
+    /// The solid of the last search, and the place of the triangle that it found.
     last: (u64, u32),
 }
 
@@ -32,7 +32,7 @@ thread_local! {
     };
 }
 
-/// What was found at a point, or what `search` finds; it is told which triangle the last search has found.
+/// What was found at a point, or what `search` finds; it is told where the last search has found its triangle.
 pub fn remembered(solid: u64, point: DVec3, search: impl FnOnce(Option<u32>) -> (Sample, u32)) -> Sample {
     MEMORY.with_borrow_mut(|memory| {
         let entry = &mut memory.entries[place(point)];

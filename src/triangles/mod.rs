@@ -9,12 +9,14 @@
 //! |---|---|
 //! | `read` | STL, OBJ and PLY files |
 //! | `surface` | triangles that share their corners; whether they are closed |
-//! | `tree` | the boxes: which triangle is nearest, which ones a ray passes |
+//! | `tree` | which triangle is nearest, which ones a ray passes |
+//! | `boxes` | the boxes of the tree |
 //! | `nearest` | the point of one triangle that is nearest |
 //! | `memory` | what a thread has just found |
 //!
 //! Invariant: a value depends on the point alone, to the bit, and not on what was asked before.
 
+mod boxes;
 mod memory;
 mod nearest;
 mod read;
@@ -111,9 +113,8 @@ impl TriangleSolid {
     fn signed(&self, p: DVec3, triangle: u32, nearest: nearest::Nearest) -> Sample {
         let distance = nearest.square.sqrt();
         let (normal, is_clear) = self.surface.normal_at(triangle, nearest.feature);
-        if nearest.feature == Feature::Face {
+        if let Feature::Face { above, .. } = nearest.feature {
             // the plane tells more digits than the nearest point does
-            let above = normal.dot(p - self.surface.corners_of(triangle)[0]);
             return Sample { value: -above, gradient: -normal };
         }
         let offset = p - nearest.point;
@@ -145,8 +146,8 @@ impl Table for TriangleSolid {
             return Sample::NAN;
         }
         memory::remembered(self.number, p, |last| {
-            let (triangle, nearest) = self.tree.nearest(&self.surface, p, last);
-            (self.signed(p, triangle, nearest), triangle)
+            let (place, nearest) = self.tree.nearest(&self.surface, p, last);
+            (self.signed(p, self.tree.triangle(place), nearest), place)
         })
     }
 

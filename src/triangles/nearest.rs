@@ -2,16 +2,23 @@
 
 use glam::DVec3;
 
+/// A triangle whose height is smaller than this, relative to its longest edge, has no normal.
+const LEAST_HEIGHT: f64 = 1e-12;
+
 /// A part of a triangle. Edges are numbered by the corner that they start from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Feature {
-    Face,
+    /// Its plane, whose unit normal this is, and how far above it the other point is.
+    Face {
+        normal: DVec3,
+        above: f64,
+    },
     Edge(usize),
     Corner(usize),
 }
 
 /// The nearest point of a triangle.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
     pub point: DVec3,
     /// The square of the distance.
@@ -19,9 +26,33 @@ pub struct Nearest {
     pub feature: Feature,
 }
 
+/// The normal of a triangle before its length is made 1, which few of those that are looked at need.
+#[derive(Debug, Clone, Copy)]
+pub struct Plane {
+    cross: DVec3,
+    area: f64,
+}
+
+impl Plane {
+    /// `None` for triangles without an area.
+    #[inline]
+    pub fn of([a, b, c]: [DVec3; 3]) -> Option<Self> {
+        let cross = (b - a).cross(c - a);
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        let area = cross.length();
+        (area > LEAST_HEIGHT * longest).then_some(Self { cross, area })
+    }
+
+    /// Of length 1.
+    #[inline]
+    pub fn normal(self) -> DVec3 {
+        self.cross / self.area
+    }
+}
+
 /// The nearest point of a triangle: the regions of Ericson (Real-Time Collision Detection, 2005, §5.1.5).
-pub fn on_triangle(p: DVec3, [a, b, c]: [DVec3; 3], normal: Option<DVec3>) -> Nearest {
-    let Some(normal) = normal else { return on_edges(p, [a, b, c]) };
+pub fn on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> Nearest {
+    let Some(plane) = Plane::of([a, b, c]) else { return on_edges(p, [a, b, c]) };
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {
@@ -49,8 +80,9 @@ pub fn on_triangle(p: DVec3, [a, b, c]: [DVec3; 3], normal: Option<DVec3>) -> Ne
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
         return edge(p, b, c, 1);
     }
+    let normal = plane.normal();
     let above = normal.dot(ap);
-    Nearest { point: p - above * normal, square: above * above, feature: Feature::Face }
+    Nearest { point: p - above * normal, square: above * above, feature: Feature::Face { normal, above } }
 }
 
 fn corner(p: DVec3, corner: DVec3, number: usize) -> Nearest {

@@ -5,11 +5,9 @@ use std::fmt;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
-use super::nearest::Feature;
+use super::boxes::Space;
+use super::nearest::{Feature, Plane};
 use crate::geom::Aabb;
-
-/// A triangle whose height is smaller than this, relative to its longest edge, has no normal.
-const LEAST_HEIGHT: f64 = 1e-12;
 
 /// So many holes are listed.
 pub const MOST_LISTED: usize = 4;
@@ -139,6 +137,7 @@ pub struct Surface {
     corner_normals: Vec<DVec3>,
     clear_corners: Vec<bool>,
     pub bounds: Aabb,
+    space: Space,
     /// The longest side of the bounds, or the largest coordinate.
     pub size: f64,
 }
@@ -159,7 +158,7 @@ impl Surface {
         let edges = Edges::of(&triangles);
         edges.are_closed(&places, &triangles)?;
         let normals: Vec<Option<DVec3>> =
-            triangles.iter().map(|t| unit_normal(t.map(|i| places[i as usize]))).collect();
+            triangles.iter().map(|t| Plane::of(t.map(|i| places[i as usize])).map(Plane::normal)).collect();
         if normals.iter().all(Option::is_none) {
             return Err(NotClosed::Empty);
         }
@@ -179,6 +178,7 @@ impl Surface {
             triangles,
             normals,
             bounds,
+            space: Space::around(&bounds),
             size,
         };
         surface.add_normals(&edges);
@@ -223,8 +223,23 @@ impl Surface {
         self.triangles.len()
     }
 
+    /// The space of boxes around its triangles.
+    pub fn space(&self) -> &Space {
+        &self.space
+    }
+
     pub fn corners_of(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| self.places[i as usize])
+    }
+
+    /// The numbers of a triangle's corners.
+    pub fn numbers_of(&self, triangle: u32) -> [u32; 3] {
+        self.triangles[triangle as usize]
+    }
+
+    /// The corner with a number.
+    pub fn place(&self, corner: u32) -> DVec3 {
+        self.places[corner as usize]
     }
 
     pub fn normal_of(&self, triangle: u32) -> Option<DVec3> {
@@ -240,7 +255,7 @@ impl Surface {
     pub fn normal_at(&self, triangle: u32, feature: Feature) -> (DVec3, bool) {
         let t = triangle as usize;
         match feature {
-            Feature::Face => (self.face_normal(triangle), true),
+            Feature::Face { normal, .. } => (normal, true),
             Feature::Edge(k) => (self.edge_normals[t][k], self.clear_edges[t][k]),
             Feature::Corner(k) => {
                 let corner = self.triangles[t][k] as usize;
@@ -270,13 +285,6 @@ fn shared(soup: &[[DVec3; 3]]) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         }
     }
     (places, triangles)
-}
-
-fn unit_normal([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
-    let cross = (b - a).cross(c - a);
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    let area = cross.length();
-    (area > LEAST_HEIGHT * longest).then(|| cross / area)
 }
 
 /// Six times the volume, about a point of the surface.

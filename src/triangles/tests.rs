@@ -162,6 +162,48 @@ fn distances_and_signs_are_those_of_all_triangles() {
     }
 }
 
+/// The tree finds the triangle that a search through all of them finds, to the bit: for solids of any size, far from the
+/// origin, flat ones, and points near and far.
+#[test]
+fn the_tree_hides_no_triangle() {
+    let mut random = Random(21);
+    let bumpy = |u: DVec3| 0.6 + 0.15 * (7.0 * u.x).sin() * (5.0 * u.y).cos() + 0.1 * (9.0 * u.z).sin();
+    let of = |scale: DVec3, by: DVec3| {
+        ball(24, 30, bumpy).into_iter().map(|t| t.map(|p| p * scale + by)).collect::<Soup>()
+    };
+    let soups = [
+        of(DVec3::ONE, DVec3::ZERO),
+        of(DVec3::ONE, DVec3::new(1e6, -2e6, 3e5)),
+        of(DVec3::splat(1e-30), DVec3::ZERO),
+        of(DVec3::splat(1e60), DVec3::ZERO),
+        of(DVec3::new(1.0, 1e-5, 1e3), DVec3::X),
+        // every point of the middle is about as far from all triangles
+        ball(30, 40, |_| 1.0),
+        shapes().swap_remove(6).1,
+    ];
+    for (number, soup) in soups.iter().enumerate() {
+        let surface = Surface::new(soup).unwrap();
+        let tree = Tree::new(&surface);
+        let Aabb { min, max } = surface.bounds;
+        let (centre, half) = (0.5 * (min + max), 0.5 * (max - min));
+        let mut last = None;
+        for i in 0..1500 {
+            let corner = surface.corners_of((random.unit() * surface.len() as f64) as u32)[i % 3];
+            let p = match i % 5 {
+                0 => centre + 1.2 * half * random.place(),
+                1 => centre + 1e-3 * half * random.place(),
+                2 => centre + surface.size * 10f64.powi(i as i32 % 40) * random.place(),
+                _ => corner + half * random.place() * 10f64.powi(-(i as i32 % 17)),
+            };
+            let all = (0..surface.len() as u32).map(|t| (t, nearest::on_triangle(p, surface.corners_of(t))));
+            let (truth, expected) = all.reduce(|a, b| if b.1.square < a.1.square { b } else { a }).unwrap();
+            let (place, found) = tree.nearest(&surface, p, last);
+            assert_eq!((tree.triangle(place), found), (truth, expected), "solid {number} at {p}");
+            last = Some(place);
+        }
+    }
+}
+
 #[test]
 fn a_value_does_not_depend_on_what_was_asked_before() {
     let soup = shapes().swap_remove(0).1;

@@ -1,26 +1,28 @@
 //! Boxes within boxes: the triangle that is nearest to a point, and the triangles that a ray passes.
 //!
-//! Boxes are kept in single precision, rounded outwards. Halves of equally many triangles keep the tree low whatever
-//! the triangles are.
+//! Groups of equally many triangles keep the tree low whatever the triangles are. Each branch has four of them.
+
+use std::ops::Range;
 
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 
+use super::boxes::{Boxes, View, WIDTH};
 use super::nearest::{Nearest, on_triangle};
 use super::surface::Surface;
 use crate::geom::Aabb;
 
 /// The most triangles of a leaf.
-const LEAF: usize = 4;
+const LEAF: usize = 2;
 
-/// More than the levels of a tree of 2³² triangles.
-const DEEPEST: usize = 48;
-
-/// Boxes are entered if they are nearer than the best triangle times this: distances of boxes and of triangles round
-/// in their own ways, and what is found must not depend on the order of the search.
-const SLACK: f64 = 1.0 + 1e-12;
+/// More than what waits on the way down in a tree of 2²⁶ triangles: three boxes on each of its levels.
+const DEEPEST: usize = 64;
 
 /// Boxes with more triangles near them are too large for their normals to say much.
 const MOST_NORMALS: usize = 64;
+
+/// Triangles count as within a distance if they are farther by no more than this.
+const SLACK: f64 = 1.0 + 1e-12;
 
 /// Where a ray begins on a triangle, relative to the size of the surface.
 const TOUCHING: f64 = 1e-12;
@@ -36,30 +38,57 @@ const DIRECTIONS: [DVec3; 4] = [
 pub struct Tree {
     branches: Vec<Branch>,
     /// The triangles in the order of the leaves.
-    order: Vec<u32>,
+    pieces: Vec<Piece>,
+    /// Their corners, in the order in which the leaves come to them.
+    places: Vec<DVec3>,
     root: Child,
 }
 
-#[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Branch {
-    boxes: [SmallBox; 2],
-    children: [Child; 2],
+    boxes: Boxes,
+    children: [Child; WIDTH],
 }
 
-#[derive(Clone, Copy)]
-struct SmallBox {
-    min: [f32; 3],
-    max: [f32; 3],
+/// A triangle of a leaf.
+struct Piece {
+    /// Numbers of its corners in the tree.
+    corners: [u32; 3],
+    /// Its number in the surface.
+    triangle: u32,
 }
 
+/// Where a branch or a leaf is, in few bytes.
 #[derive(Clone, Copy)]
-enum Child {
-    Branch(u32),
+struct Child(u32);
+
+enum Found {
+    Branch(usize),
     /// Triangles in the tree's order.
-    Leaf {
-        first: u32,
-        count: u32,
-    },
+    Leaf(Range<usize>),
+}
+
+impl Child {
+    const NOTHING: Self = Self::leaf(0, 0);
+    /// Bits of the number of a branch or of a leaf's first triangle; those above are one more than the number of
+    /// triangles, and 0 for a branch.
+    const BITS: u32 = 28;
+
+    const fn leaf(first: usize, count: usize) -> Self {
+        Self(first as u32 | (count as u32 + 1) << Self::BITS)
+    }
+
+    const fn branch(place: usize) -> Self {
+        Self(place as u32)
+    }
+
+    fn found(self) -> Found {
+        let first = (self.0 & ((1 << Self::BITS) - 1)) as usize;
+        match self.0 >> Self::BITS {
+            0 => Found::Branch(first),
+            more => Found::Leaf(first..first + more as usize - 1),
+        }
+    }
 }
 
 /// What a ray passes.
@@ -72,90 +101,85 @@ pub struct Crossings {
     pub touches: bool,
 }
 
-impl SmallBox {
-    fn around(bounds: &Aabb) -> Self {
-        let down = |x: f64| {
-            let near = x as f32;
-            if f64::from(near) > x { near.next_down() } else { near }
-        };
-        let up = |x: f64| {
-            let near = x as f32;
-            if f64::from(near) < x { near.next_up() } else { near }
-        };
-        Self { min: bounds.min.to_array().map(down), max: bounds.max.to_array().map(up) }
-    }
-
-    /// The square of the distance of a point.
-    fn square(&self, p: DVec3) -> f64 {
-        let (min, max) = (wide(self.min), wide(self.max));
-        (min - p).max(p - max).max(DVec3::ZERO).length_squared()
-    }
-
-    /// Whether a ray may pass it.
-    fn is_met(&self, from: DVec3, inverse: DVec3, slack: f64) -> bool {
-        let (a, b) = ((wide(self.min) - from) * inverse, (wide(self.max) - from) * inverse);
-        let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
-        enter <= leave + slack && leave >= -slack
-    }
-}
-
-fn wide(v: [f32; 3]) -> DVec3 {
-    DVec3::from_array(v.map(f64::from))
-}
-
 /// A triangle while the tree is made.
+#[derive(Clone, Copy)]
 struct Member {
     triangle: u32,
-    bounds: Aabb,
     centre: DVec3,
 }
+
+/// Triangles and the place of the first of them in the tree.
+type Group<'m> = (usize, &'m mut [Member]);
 
 impl Tree {
     pub fn new(surface: &Surface) -> Self {
         let member = |triangle: u32| {
             let [a, b, c] = surface.corners_of(triangle);
-            let bounds = Aabb::new(a.min(b).min(c), a.max(b).max(c));
-            Member { triangle, bounds, centre: bounds.centre() }
+            Member { triangle, centre: 0.5 * (a.min(b).min(c) + a.max(b).max(c)) }
         };
         let mut members: Vec<Member> = (0..surface.len() as u32).map(member).collect();
         let mut tree =
-            Self { branches: Vec::new(), order: Vec::new(), root: Child::Leaf { first: 0, count: 0 } };
-        tree.root = tree.part(&mut members);
+            Self { branches: Vec::new(), pieces: Vec::new(), places: Vec::new(), root: Child::NOTHING };
+        tree.root = tree.part(surface, (0, &mut members));
+        let mut numbers = FxHashMap::default();
+        for member in members {
+            let corners = surface.numbers_of(member.triangle).map(|corner| {
+                *numbers.entry(corner).or_insert_with(|| {
+                    tree.places.push(surface.place(corner));
+                    tree.places.len() as u32 - 1
+                })
+            });
+            tree.pieces.push(Piece { corners, triangle: member.triangle });
+        }
         tree
     }
 
-    fn part(&mut self, members: &mut [Member]) -> Child {
+    /// The branch or leaf of some members, which are put in the order of the leaves; `first` is the place of the first
+    /// one.
+    fn part(&mut self, surface: &Surface, (first, members): Group<'_>) -> Child {
         if members.len() <= LEAF {
-            let first = self.order.len() as u32;
-            self.order.extend(members.iter().map(|member| member.triangle));
-            return Child::Leaf { first, count: members.len() as u32 };
+            return Child::leaf(first, members.len());
         }
-        let of = |m: &[Member]| m.iter().fold(Aabb::EMPTY, |all, m| all.including(m.centre)).size();
-        let size = of(members);
-        let axis = (0..3).fold(0, |best, axis| if size[axis] > size[best] { axis } else { best });
-        let middle = members.len() / 2;
-        members.select_nth_unstable_by(middle, |a, b| {
-            a.centre[axis].total_cmp(&b.centre[axis]).then(a.triangle.cmp(&b.triangle))
-        });
-        let (low, high) = members.split_at_mut(middle);
-        let around =
-            |m: &[Member]| SmallBox::around(&m.iter().fold(Aabb::EMPTY, |all, m| all.union(&m.bounds)));
-        let boxes = [around(low), around(high)];
+        let (low, high) = halves((first, members));
+        let mut groups = Vec::with_capacity(WIDTH);
+        for half in [low, high] {
+            if half.1.len() <= LEAF {
+                groups.push(half);
+            } else {
+                groups.extend(<[_; 2]>::from(halves(half)));
+            }
+        }
+        let mut boxes = Boxes::EMPTY;
+        for (lane, (_, group)) in groups.iter().enumerate() {
+            let corners: Vec<[DVec3; 3]> =
+                group.iter().map(|member| surface.corners_of(member.triangle)).collect();
+            boxes.set(lane, &corners, surface.space());
+        }
         let place = self.branches.len();
-        let nothing = Child::Leaf { first: 0, count: 0 };
-        self.branches.push(Branch { boxes, children: [nothing; 2] });
-        let children = [self.part(low), self.part(high)];
-        self.branches[place].children = children;
-        Child::Branch(place as u32)
+        self.branches.push(Branch { boxes, children: [Child::NOTHING; WIDTH] });
+        for (lane, group) in groups.into_iter().enumerate() {
+            self.branches[place].children[lane] = self.part(surface, group);
+        }
+        Child::branch(place)
     }
 
-    /// The triangle that is nearest to a point, the first one of several, and its nearest point. The search begins with
-    /// the triangle `last`, which decides nothing but its cost.
+    fn corners(&self, piece: &Piece) -> [DVec3; 3] {
+        piece.corners.map(|corner| self.places[corner as usize])
+    }
+
+    /// The number that the surface has for a triangle of the tree.
+    pub fn triangle(&self, place: u32) -> u32 {
+        self.pieces[place as usize].triangle
+    }
+
+    /// The place in the tree of the triangle that is nearest to a point, the first one of the surface if there are several,
+    /// and its nearest point. The search begins with the triangle at `last`, which decides nothing but its cost.
     pub fn nearest(&self, surface: &Surface, p: DVec3, last: Option<u32>) -> (u32, Nearest) {
-        let look = |t: u32| on_triangle(p, surface.corners_of(t), surface.normal_of(t));
-        let first = last.filter(|&t| (t as usize) < surface.len()).unwrap_or(self.order[0]);
-        let mut best = (first, look(first));
-        let mut limit = best.1.square * SLACK;
+        let look = |place: usize| on_triangle(p, self.corners(&self.pieces[place]));
+        let first = last.filter(|&place| (place as usize) < self.pieces.len()).unwrap_or(0);
+        let mut best = (first as usize, look(first as usize));
+        let view = View::new(p, surface.space());
+        let mut limit = view.limit(best.1.square);
         let mut stack = [(self.root, 0.0); DEEPEST];
         let mut height = 1;
         while height > 0 {
@@ -164,30 +188,39 @@ impl Tree {
             if square > limit {
                 continue;
             }
-            match child {
-                Child::Leaf { first, count } => {
-                    for &t in &self.order[first as usize..(first + count) as usize] {
-                        let found = look(t);
-                        if found.square < best.1.square || found.square == best.1.square && t < best.0 {
-                            best = (t, found);
-                            limit = found.square * SLACK;
+            match child.found() {
+                Found::Leaf(places) => {
+                    for place in places {
+                        let found = look(place);
+                        let number = |place: usize| self.pieces[place].triangle;
+                        if found.square < best.1.square
+                            || found.square == best.1.square && number(place) < number(best.0)
+                        {
+                            best = (place, found);
+                            limit = view.limit(found.square);
                         }
                     }
                 }
-                Child::Branch(i) => {
-                    let Branch { boxes, children } = &self.branches[i as usize];
-                    let [a, b] = boxes.map(|b| b.square(p));
-                    let (near, far) = if a <= b { ((0, a), (1, b)) } else { ((1, b), (0, a)) };
-                    for (which, square) in [far, near] {
-                        if square <= limit {
-                            stack[height] = (children[which], square);
-                            height += 1;
+                Found::Branch(i) => {
+                    let Branch { boxes, children } = &self.branches[i];
+                    let base = height;
+                    for (square, &child) in boxes.squares(&view).into_iter().zip(children) {
+                        if square > limit {
+                            continue;
                         }
+                        // the nearest one is on top
+                        let mut place = height;
+                        while place > base && stack[place - 1].1 < square {
+                            stack[place] = stack[place - 1];
+                            place -= 1;
+                        }
+                        stack[place] = (child, square);
+                        height += 1;
                     }
                 }
             }
         }
-        best
+        (best.0 as u32, best.1)
     }
 
     /// The least and the greatest components of the normals of all triangles within a distance of a point, and the sum of
@@ -198,20 +231,21 @@ impl Tree {
         p: DVec3,
         distance: f64,
     ) -> Option<(DVec3, DVec3, DVec3)> {
-        let limit = distance * distance * SLACK;
+        let view = View::new(p, surface.space());
+        let square = distance * distance;
+        let limit = view.limit(square);
         let (mut low, mut high, mut sum) = (DVec3::INFINITY, DVec3::NEG_INFINITY, DVec3::ZERO);
         let mut stack = [self.root; DEEPEST];
         let (mut height, mut met) = (1, 0);
         while height > 0 {
             height -= 1;
-            match stack[height] {
-                Child::Leaf { first, count } => {
-                    for &t in &self.order[first as usize..(first + count) as usize] {
-                        let normal = surface.normal_of(t);
-                        if on_triangle(p, surface.corners_of(t), normal).square > limit {
+            match stack[height].found() {
+                Found::Leaf(places) => {
+                    for piece in &self.pieces[places] {
+                        if on_triangle(p, self.corners(piece)).square > square * SLACK {
                             continue;
                         }
-                        let normal = normal?;
+                        let normal = surface.normal_of(piece.triangle)?;
                         (low, high, sum) = (low.min(normal), high.max(normal), sum + normal);
                         met += 1;
                         if met > MOST_NORMALS {
@@ -219,10 +253,10 @@ impl Tree {
                         }
                     }
                 }
-                Child::Branch(i) => {
-                    let Branch { boxes, children } = &self.branches[i as usize];
-                    for (bounds, &child) in boxes.iter().zip(children) {
-                        if bounds.square(p) <= limit {
+                Found::Branch(i) => {
+                    let Branch { boxes, children } = &self.branches[i];
+                    for (square, &child) in boxes.squares(&view).into_iter().zip(children) {
+                        if square <= limit {
                             stack[height] = child;
                             height += 1;
                         }
@@ -239,26 +273,26 @@ impl Tree {
     }
 
     fn passed(&self, surface: &Surface, ray: (DVec3, DVec3), without: Option<u32>) -> Option<Crossings> {
-        let (from, direction) = ray;
-        let (inverse, slack) = (direction.recip(), 1e-9 * surface.size);
-        let mut found = Crossings { winding: 0, direction, touches: false };
+        let mut found = Crossings { winding: 0, direction: ray.1, touches: false };
+        let space = surface.space();
+        let local = (space.local(ray.0).as_vec3().to_array(), ray.1.as_vec3().to_array());
         let mut stack = [self.root; DEEPEST];
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            match stack[height] {
-                Child::Leaf { first, count } => {
-                    let triangles = &self.order[first as usize..(first + count) as usize];
-                    for &t in triangles.iter().filter(|&&t| Some(t) != without) {
-                        let Some((side, along)) = crossing(ray, surface.corners_of(t))? else { continue };
+            match stack[height].found() {
+                Found::Leaf(places) => {
+                    let pieces = self.pieces[places].iter();
+                    for piece in pieces.filter(|piece| Some(piece.triangle) != without) {
+                        let Some((side, along)) = crossing(ray, self.corners(piece))? else { continue };
                         found.touches |= along.abs() <= TOUCHING * surface.size;
                         found.winding += if along > 0.0 { side } else { 0 };
                     }
                 }
-                Child::Branch(i) => {
-                    let Branch { boxes, children } = &self.branches[i as usize];
-                    for (bounds, &child) in boxes.iter().zip(children) {
-                        if bounds.is_met(from, inverse, slack) {
+                Found::Branch(i) => {
+                    let Branch { boxes, children } = &self.branches[i];
+                    for (is_met, &child) in boxes.are_met(local).into_iter().zip(children) {
+                        if is_met {
                             stack[height] = child;
                             height += 1;
                         }
@@ -268,6 +302,18 @@ impl Tree {
         }
         Some(found)
     }
+}
+
+/// Two groups of equally many triangles, side by side along the axis on which their centres are farthest apart.
+fn halves((first, members): Group<'_>) -> (Group<'_>, Group<'_>) {
+    let size = members.iter().fold(Aabb::EMPTY, |all, m| all.including(m.centre)).size();
+    let axis = (0..3).fold(0, |best, axis| if size[axis] > size[best] { axis } else { best });
+    let middle = members.len() / 2;
+    members.select_nth_unstable_by(middle, |a, b| {
+        a.centre[axis].total_cmp(&b.centre[axis]).then(a.triangle.cmp(&b.triangle))
+    });
+    let (low, high) = members.split_at_mut(middle);
+    ((first, low), (first + middle, high))
 }
 
 /// Where a line passes a triangle: 1 if it leaves the solid there and −1 if it enters it, and how far along. The outer

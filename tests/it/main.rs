@@ -34,6 +34,7 @@ mod pipeline;
 mod polygons;
 mod properties;
 mod ranges;
+mod render;
 mod reports;
 mod run;
 mod simplify;

@@ -275,7 +275,7 @@ fn a_pawn_with_holes_has_a_closed_mesh() {
         assert!(report.closed && report.manifold, "{report:?}");
         let off = mesh.positions.iter().filter(|&&p| solid.omega(p).abs() > 1e-7).count();
         // those that would make triangles cross stay off it
-        assert!(off * 20 < mesh.positions.len(), "{off} of {}", mesh.positions.len());
+        assert!(off * 60 < mesh.positions.len(), "{off} of {}", mesh.positions.len());
     }
 }
 

@@ -67,7 +67,7 @@ impl Frames {
                 mesh::stl::write(&obstacle, METRE, &mut out)
             })?;
             output::write(&folder.join("obstacle.vtp"), |mut out| {
-                mesh::vtp::write(&obstacle, METRE, &mut out)
+                mesh::vtp::write_bodies(&meshes, METRE, &mut out)
             })?;
         }
         let (count, last_time) = (0, 0.0);
@@ -148,7 +148,7 @@ impl Frames {
             if self.bodies.move_about() { Some(self.bodies.meshes_at(simulation.time())?) } else { None };
         if let Some(meshes) = &moved {
             let path = self.folder.join(obstacle_name(self.count));
-            output::write(&path, |mut out| mesh::vtp::write(&Mesh::joined(meshes), METRE, &mut out))?;
+            output::write(&path, |mut out| mesh::vtp::write_bodies(meshes, METRE, &mut out))?;
         }
         self.saved.push((simulation.time(), name));
         self.write_collections()?;
@@ -212,7 +212,7 @@ impl FrameCost {
         let finer = (options.mesh_cells as f64 / bodies.cells as f64).powi(2);
         let (mut seconds, mut bytes) = (0.0, 0.0);
         if bodies.move_about() {
-            mesh::vtp::write(&Mesh::joined(&meshes), METRE, &mut out)?;
+            mesh::vtp::write_bodies(&meshes, METRE, &mut out)?;
             seconds += finer * started.elapsed().as_secs_f64();
             bytes += finer * out.len() as f64;
             out.clear();

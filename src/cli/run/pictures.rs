@@ -10,18 +10,16 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::args::{CutFlag, Run};
-use super::super::{Failure, note, output};
+use super::super::{Failure, output};
 use crate::cli::output::Shown;
+use crate::cli::scenery::{self, Drawn, half, out_of_the_way};
 use rfm::field::Walls;
 use rfm::geom::Aabb;
 use rfm::lower::Opening;
-use rfm::mesh::{Mesh, split_creases};
-use rfm::render::{self, Camera, Cut, MeshView};
+use rfm::mesh::Mesh;
+use rfm::render::{self, Camera, Scale};
 use rfm::sph::Simulation;
 use rfm::{Experiment, Solid};
-
-/// An obstacle that hides more than this part of the fluid at its start is in the way.
-const MOST_HIDDEN: f64 = 0.35;
 
 /// Points along each side of the fluid's bounds that stand for the fluid.
 const SAMPLES: usize = 14;
@@ -32,9 +30,6 @@ const SMALL: (u32, u32) = (320, 240);
 /// The speed that is drawn red, as a part of the speed of a fall through the whole box: obstacles stop most particles
 /// long before.
 const FASTEST: f64 = 0.6;
-
-/// Most obstacles that a title names; of more it gives the number.
-const NAMED: usize = 3;
 
 /// What all pictures of a run share.
 pub(super) struct Pictures {
@@ -56,14 +51,6 @@ struct Body {
     drawn: Drawn,
     /// Its surface where it stands still and has so many faces that it pays to ask first whether one is near.
     near: Option<Box<dyn Walls>>,
-}
-
-/// How an obstacle is drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Drawn {
-    Whole,
-    Open(Cut),
-    Hidden,
 }
 
 impl Pictures {
@@ -116,10 +103,10 @@ impl Pictures {
         self.scene.frame(
             &render::ParticlesView {
                 positions: rfm::field::Points::new(&x, &y, &z),
-                speeds: &speeds,
+                values: &speeds,
                 radius: self.radius,
             },
-            &render::Caption { time: simulation.time(), step: simulation.steps() },
+            &render::Caption { time: simulation.time(), step: Some(simulation.steps()) },
         )
     }
 
@@ -162,19 +149,9 @@ fn backdrop(
     bodies: &[Body],
     meshes: &[Mesh],
 ) -> Result<render::Backdrop, Failure> {
-    let shown = bodies.iter().zip(meshes).filter(|(body, _)| body.drawn != Drawn::Hidden);
-    let sharp: Vec<(Drawn, Mesh)> = shown.map(|(body, mesh)| (body.drawn, split_creases(mesh))).collect();
-    let views: Vec<MeshView<'_>> = sharp.iter().map(|(drawn, mesh)| view(mesh, *drawn)).collect();
-    let legend = render::Legend { title, fastest };
-    render::Backdrop::new(camera.clone(), domain, &views, &legend).map_err(Failure::usage)
-}
-
-fn view(mesh: &Mesh, drawn: Drawn) -> MeshView<'_> {
-    let cut = match drawn {
-        Drawn::Open(cut) => Some(cut),
-        Drawn::Whole | Drawn::Hidden => None,
-    };
-    MeshView { vertices: &mesh.positions, normals: &mesh.normals, triangles: &mesh.triangles, cut }
+    let legend = render::Legend { title, scale: Some(Scale::speeds(fastest)) };
+    let drawn = bodies.iter().map(|body| body.drawn).zip(meshes);
+    scenery::backdrop(camera, domain, &legend, drawn)
 }
 
 /// The camera that the flags or the scene ask for.
@@ -201,10 +178,7 @@ fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec
     let is_hidden = |name: &str| stated.hide.iter().chain(&options.hide).any(|hidden| hidden == name);
     let small = camera(options, experiment, SMALL)?;
     let fixed = match (&options.cut, stated.cut) {
-        (Some(CutFlag::Plane(plane)), _) => {
-            let axis = DVec3::AXES[plane.axis.index()];
-            Some(Some(half(axis, plane.value, axis.dot(small.towards_eye()) < 0.0)))
-        }
+        (Some(CutFlag::Plane(plane)), _) => Some(Some(scenery::half_towards_eye(plane, &small))),
         (Some(CutFlag::None), _) | (None, Opening::None) => Some(None),
         (None, Opening::Half { axis, at, below }) => Some(Some(half(DVec3::AXES[axis], at, below))),
         (Some(CutFlag::Auto), _) | (None, Opening::Automatic) => None,
@@ -217,40 +191,6 @@ fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec
         None => out_of_the_way(&small, name, mesh, &samples),
     };
     Ok(names.iter().zip(meshes).map(drawn).collect())
-}
-
-/// The cut that takes away one side of a plane across an axis.
-fn half(axis: DVec3, at: f64, below: bool) -> Cut {
-    if below { Cut { normal: -axis, offset: -at } } else { Cut { normal: axis, offset: at } }
-}
-
-/// How a body is drawn without hiding much of the fluid, for which the samples stand: whole, without its front half, or
-/// not at all.
-fn out_of_the_way(camera: &Camera, name: &str, mesh: &Mesh, samples: &[DVec3]) -> Drawn {
-    let hides = |drawn| render::hidden(camera, &view(mesh, drawn), samples) > MOST_HIDDEN;
-    if !hides(Drawn::Whole) {
-        return Drawn::Whole;
-    }
-    let towards_eye = camera.towards_eye();
-    let axis = towards_eye.abs().max_position();
-    let bounds = samples.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
-    let at = rounded(bounds.centre()[axis], bounds.size()[axis]);
-    let open = Drawn::Open(half(DVec3::AXES[axis], at, towards_eye[axis] < 0.0));
-    if !hides(open) {
-        return open;
-    }
-    note(format!(
-        "pictures leave out the obstacle `{name}`, which hides the fluid even when it is cut in half: --cut none draws it"
-    ));
-    Drawn::Hidden
-}
-
-/// A coordinate with as many digits as tell parts of a size apart.
-fn rounded(at: f64, size: f64) -> f64 {
-    let step = 10f64.powf(size.log10().floor() - 2.0);
-    let found = (at / step).round() * step;
-    // read back from digits, so that a title shows no others
-    format!("{found:.9}").parse().ok().filter(|x: &f64| x.is_finite() && size > 0.0).unwrap_or(at)
 }
 
 /// Points of the fluid as it is at the start.
@@ -276,27 +216,7 @@ fn title(options: &Run, experiment: &Experiment, drawn: &[Drawn]) -> String {
         Some(_) | None => "standard input".into(),
     };
     let mut parts = vec![file, scene.name.clone(), scene.method.name().to_string()];
-    let names = experiment.bodies().iter().map(|body| body.solid.name());
-    let mut done: Vec<(String, Vec<&str>)> = Vec::new();
-    for (name, drawn) in names.zip(drawn) {
-        let what = match drawn {
-            Drawn::Whole => continue,
-            Drawn::Hidden => "left out".to_string(),
-            Drawn::Open(cut) => {
-                let axis = cut.normal.abs().max_position();
-                format!("cut at {} = {}", ["x", "y", "z"][axis], cut.offset * cut.normal[axis] + 0.0)
-            }
-        };
-        match done.iter_mut().find(|(known, _)| *known == what) {
-            Some((_, names)) if names.contains(&name) => {}
-            Some((_, names)) => names.push(name),
-            None => done.push((what, vec![name])),
-        }
-    }
-    for (what, names) in done {
-        let few = names.len() <= NAMED;
-        let who = if few { names.join(", ") } else { format!("{} obstacles", names.len()) };
-        parts.push(format!("{who} {what}"));
-    }
+    let names: Vec<&str> = experiment.bodies().iter().map(|body| body.solid.name()).collect();
+    parts.extend(scenery::described(&names, drawn));
     parts.join(" · ")
 }

@@ -17,6 +17,8 @@ use rfm::sph::{Pass, Simulation};
 pub(super) struct Summary {
     schema: u32,
     scene: String,
+    /// The names of the obstacles, in the order of the array `body` of their mesh.
+    obstacles: Vec<String>,
     steps: u64,
     simulated_seconds: f64,
     time_step: f64,
@@ -85,6 +87,7 @@ impl Summary {
         Self {
             schema: 1,
             scene: experiment.scene().name.clone(),
+            obstacles: experiment.bodies().iter().map(|body| body.solid.name().to_string()).collect(),
             steps,
             simulated_seconds: simulation.time(),
             time_step: simulation.time() / steps.max(1) as f64,

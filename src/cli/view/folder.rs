@@ -5,22 +5,15 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
-use rayon::prelude::*;
-
 use super::super::args::View;
 use super::super::failure::Failure;
 use super::super::saved::{self, RunFigures};
-use crate::cli::output::Shown;
-use rfm::fluid_surface::{FrameEntry, PointArray, read_arrays, read_mesh};
-use rfm::geom::Aabb;
+use super::super::survey::Survey;
+use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::mesh::split_creases;
 use rfm::view::{
     Array, Column, Corners, Frame, FrameHead, Lattice, Levels, Page, Plot, Setting, pack_frame, pack_mesh,
 };
-
-/// The part of the values of a frame at each end that may lie beyond the range of the levels.
-const STRAY: f64 = 0.001;
 
 /// Most points of a plot.
 const MOST_POINTS: usize = 1000;
@@ -37,15 +30,6 @@ pub(super) struct SavedRun {
     lattice: Lattice,
 }
 
-/// What is known of all frames together.
-struct Survey {
-    bounds: Aabb,
-    /// Name and range of each array that all frames have.
-    arrays: Vec<(String, Levels)>,
-    /// The number of particles of all frames together.
-    particles: usize,
-}
-
 impl SavedRun {
     /// Reads what the folder has, the frames included.
     pub fn open(folder: &Path, options: &View) -> Result<Self, Failure> {
@@ -54,27 +38,16 @@ impl SavedRun {
         saved::check_frames(folder, &entries)?;
         let figures = RunFigures::read(&folder.join("summary.json")).ok();
         let survey = Survey::of(folder, &entries)?;
-        let (meshes, mesh_of) = obstacles(folder, &entries)?;
-        let domain = figures
-            .as_ref()
-            .and_then(|figures| figures.domain)
-            .map(|[min, max]| Aabb::new(DVec3::from_array(min), DVec3::from_array(max)));
-        let domain =
-            domain.filter(|domain| domain.is_finite() && !domain.is_empty()).unwrap_or(survey.bounds);
+        let (meshes, mesh_of) = saved::obstacles(folder, &entries)?;
+        let domain = survey.domain(figures.as_ref());
         let lattice = Lattice::new(&domain.union(&survey.bounds));
-        let volume = figures.as_ref().map(RunFigures::particle_volume);
-        let volume = volume.filter(|volume| volume.is_finite() && *volume > 0.0).unwrap_or_else(|| {
-            // without a summary it is guessed from the box around the particles
-            let frames = entries.len().max(1);
-            survey.bounds.volume() / (survey.particles / frames).max(1) as f64 / 8.0
-        });
         let setting = Setting {
-            title: title(folder),
+            title: saved::title(folder),
             facts: facts(&entries, &survey, figures.as_ref()),
             live: false,
             domain: Corners::from(&domain),
             lattice: Some(Corners::from(lattice.bounds())),
-            radius: 0.5 * volume.cbrt(),
+            radius: survey.radius(figures.as_ref(), entries.len()),
             arrays: survey.arrays.iter().map(|(name, range)| Array::named(name, Some(*range))).collect(),
             gravity: None,
             params: Vec::new(),
@@ -131,85 +104,6 @@ impl SavedRun {
             levels: self.survey.arrays.iter().map(levels).collect::<io::Result<_>>()?,
         })
     }
-}
-
-impl Survey {
-    fn of(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Self, Failure> {
-        let surveys: Result<Vec<Self>, Failure> = entries
-            .par_iter()
-            .map(|(_, entry)| {
-                let path = folder.join(&entry.file);
-                let failed = |error: String| {
-                    Failure::usage(format!("cannot read the frame `{}`: {error}", path.shown()))
-                };
-                let file = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
-                let (points, arrays) = read_arrays(&file).map_err(|error| failed(error.to_string()))?;
-                Ok(Self::of_frame(&points, &arrays))
-            })
-            .collect();
-        let mut surveys = surveys?.into_iter();
-        let mut all =
-            surveys.next().unwrap_or(Self { bounds: Aabb::EMPTY, arrays: Vec::new(), particles: 0 });
-        for next in surveys {
-            all.bounds = all.bounds.union(&next.bounds);
-            all.particles += next.particles;
-            all.arrays.retain_mut(|(name, range)| {
-                let same = next.arrays.iter().find(|(other, _)| other == name);
-                same.inspect(|(_, other)| *range = range.with(*other)).is_some()
-            });
-        }
-        if all.bounds.is_empty() {
-            all.bounds = Aabb::new(DVec3::ZERO, DVec3::ONE);
-        }
-        // colours of speeds begin at rest
-        all.arrays.iter_mut().filter(|(name, _)| name == "speed").for_each(|(_, range)| range.low = 0.0);
-        Ok(all)
-    }
-
-    fn of_frame(points: &[DVec3], arrays: &[PointArray]) -> Self {
-        let finite = points.iter().filter(|p| p.is_finite());
-        let scalars = arrays.iter().filter(|array| array.components == 1 && array.name != "id");
-        let range = |array: &PointArray| {
-            let range = Levels::of_most(array.values.iter().copied(), STRAY);
-            (array.name.clone(), range.unwrap_or(Levels { low: 0.0, high: 0.0 }))
-        };
-        Self {
-            bounds: finite.fold(Aabb::EMPTY, |all, p| all.including(*p)),
-            arrays: scalars.map(range).collect(),
-            particles: points.len(),
-        }
-    }
-}
-
-/// The meshes of the obstacles, and which of them belongs to each frame.
-type Meshes = (Vec<PathBuf>, Vec<Option<usize>>);
-
-/// The meshes of the obstacles: one, or if they move one for each frame.
-fn obstacles(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Meshes, Failure> {
-    let moving = folder.join("obstacle.pvd");
-    if moving.is_file() {
-        let listed = saved::listed(&moving)?;
-        let mut files = Vec::new();
-        let mesh_of = entries.iter().map(|(_, entry)| {
-            let there = listed.iter().find(|mesh| mesh.time == entry.time);
-            if let Some(mesh) = there.filter(|mesh| folder.join(&mesh.file).is_file()) {
-                files.push(folder.join(&mesh.file));
-            }
-            files.len().checked_sub(1)
-        });
-        let mesh_of = mesh_of.collect();
-        return Ok((files, mesh_of));
-    }
-    let still = folder.join("obstacle.vtp");
-    if still.is_file() {
-        return Ok((vec![still], vec![Some(0); entries.len()]));
-    }
-    Ok((Vec::new(), vec![None; entries.len()]))
-}
-
-fn title(folder: &Path) -> String {
-    let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
-    whole.file_name().map_or_else(|| whole.shown(), |name| Path::new(name).shown())
 }
 
 fn facts(entries: &[(usize, FrameEntry)], survey: &Survey, figures: Option<&RunFigures>) -> String {

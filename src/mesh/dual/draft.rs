@@ -1,7 +1,11 @@
 //! The mesh between its first triangles and its end: refined, mended, merged, and given its last normals.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 use super::super::{
     Grid, Mesh, MeshError, Work,
@@ -27,6 +31,9 @@ const LEAST_MENDING: u64 = 20_000;
 
 /// Rounds of moving cuts back, at most. The last one moves all back.
 const UNDOINGS: usize = 8;
+
+/// How often some of them are tried on the surface again, at most.
+const RESTORINGS: usize = 512;
 
 /// A triangle that agrees less than this (cosine) with the surface at a corner is compared with others.
 const AGREEING: f64 = 0.3;
@@ -77,11 +84,13 @@ impl<'a> Draft<'a> {
         left
     }
 
-    /// Moves vertices that cut edges back to the middles of their edges where triangles cross. The vertices
-    /// from `first` on cut the edges with the given ends; without them nothing crosses.
+    /// Moves vertices that cut edges back to the middles of their edges where triangles cross, and then as many of
+    /// them as can be to the surface again. The vertices from `first` on cut the edges with the given ends; without
+    /// them nothing crosses.
     fn uncross(&mut self, first: usize, ends: &[[u32; 2]]) {
         let mut is_back = vec![false; ends.len()];
         let mut suspects = self.doubtful_since(first);
+        let mut cuts: BTreeMap<u32, Vertex> = BTreeMap::new();
         for round in 0..UNDOINGS {
             let pairs = crossing_pairs(&self.vertices.positions, &self.triangles, &suspects, self.size);
             let mut moves = round > 0 && !pairs.is_empty();
@@ -119,7 +128,39 @@ impl<'a> Draft<'a> {
             for (place, [a, b]) in ends.iter().enumerate().filter(|(place, _)| is_back[*place]) {
                 let [p, q] = [a, b].map(|v| self.vertices.positions[*v as usize]);
                 let vertex = Vertex { position: p.midpoint(q), normal: DVec3::ZERO, kind: VertexKind::Sharp };
-                self.vertices.set((first + place) as u32, vertex);
+                let v = (first + place) as u32;
+                cuts.entry(v).or_insert_with(|| self.vertices.get(v));
+                self.vertices.set(v, vertex);
+            }
+        }
+        self.restore(&cuts);
+    }
+
+    /// Moves vertices to where they were, as far as no triangle beside them crosses another then: all at once if that
+    /// can be, and else each half of them.
+    fn restore(&mut self, cuts: &BTreeMap<u32, Vertex>) {
+        let mut beside: FxHashMap<u32, SmallVec<[u32; 8]>> = FxHashMap::default();
+        for (t, triangle) in (0..).zip(&self.triangles) {
+            for v in triangle.iter().filter(|v| cuts.contains_key(v)) {
+                beside.entry(*v).or_default().push(t);
+            }
+        }
+        let all: Vec<u32> = cuts.keys().copied().collect();
+        let mut waiting = vec![&all[..]];
+        for _ in 0..RESTORINGS {
+            let Some(part) = waiting.pop() else { break };
+            let before: Vec<Vertex> = part.iter().map(|&v| self.vertices.get(v)).collect();
+            part.iter().for_each(|v| self.vertices.set(*v, cuts[v]));
+            let mut suspects: Vec<u32> =
+                part.iter().filter_map(|v| beside.get(v)).flatten().copied().collect();
+            suspects.sort_unstable();
+            suspects.dedup();
+            if !crossing_pairs(&self.vertices.positions, &self.triangles, &suspects, self.size).is_empty() {
+                part.iter().zip(before).for_each(|(&v, vertex)| self.vertices.set(v, vertex));
+                if part.len() > 1 {
+                    let (low, high) = part.split_at(part.len() / 2);
+                    waiting.extend([high, low]);
+                }
             }
         }
     }

@@ -44,6 +44,7 @@ use self::draft::Draft;
 use self::loops::Sheets;
 use self::place::{Placed, Placement, Slots};
 use self::quads::{Cut, Quads};
+use self::secure::Surface;
 use self::vertices::{Hits, Rings, Vertices};
 use super::{
     Grid, Mesh, MeshError, Work,
@@ -240,7 +241,10 @@ fn join(
     move_spoilt(&quads, &mut cut, vertices, fallbacks, size, &mut work.gradients);
     work.gradients += cut.gradients + placed.iter().map(|part| part.gradients).sum::<u64>();
     let tubes: Vec<[u32; 3]> = placed.iter().flat_map(|part| part.tubes.iter().copied()).collect();
-    secure::secure((quads, cut), vertices, &tubes, size, care)
+    let mut surface = Surface { field, size, gradients: 0 };
+    let triangles = secure::secure((quads, cut), vertices, &tubes, &mut surface, care);
+    work.gradients += surface.gradients;
+    triangles
 }
 
 /// How often vertices are moved back because triangles lie upside down.

@@ -10,7 +10,8 @@
 //! All other quads are compared with the triangles near them. Where some cross, the vertices of their cells
 //! retreat: into their cells first, then to the mean of their hits. Their quads become fans around the hits,
 //! and sides are bent so that they pass through the faces between cells. Each triangle then lies in one cell,
-//! and those of a cell are a cone over a closed curve on its faces.
+//! and those of a cell are a cone over a closed curve on its faces. Wherever the tip of the cone is in the cell, it does
+//! not cross itself, so that tips and bends are put on the surface; where sheets share a cell and cross, they go back.
 //!
 //! Invariant: retreats change no topology, and they spread until nothing crosses.
 
@@ -21,25 +22,31 @@ use smallvec::SmallVec;
 
 use super::super::intersections::crossing_pairs;
 use super::Care;
+use super::project;
 use super::quads::{Cut, NOTHING, Quad, Quads};
 use super::vertices::{Vertex, VertexKind, Vertices};
+use crate::field::Field;
 use crate::geom::Aabb;
 
 /// Rounds of retreats at most. From the third on they spread to the cells around.
 const ROUNDS: usize = 8;
 
+/// In so many rounds vertices in retreat, and the bends of sides, are put on the surface.
+const SETTLING: usize = 4;
+
 /// Vertices in retreat keep this distance from the faces of their cells, in cells.
 const INSET: f64 = 0.05;
 
 /// The triangles of all quads and tubes, without crossings if care is taken. Adds the middles of fans and of bent sides to the
-/// vertices. `size` is the shortest side of a cell.
+/// vertices.
 pub(super) fn secure(
     (mut quads, mut cut): (Quads<'_>, Cut),
     vertices: &mut Vertices,
     tubes: &[[u32; 3]],
-    size: f64,
+    surface: &mut Surface<'_>,
     care: Care,
 ) -> Vec<[u32; 3]> {
+    let size = surface.size;
     if care == Care::Sharp {
         return assemble(&quads, &cut, vertices, tubes, &[]).0;
     }
@@ -72,7 +79,7 @@ pub(super) fn secure(
                 quad.corners.iter().for_each(|&v| is_marked[v as usize] = true);
             }
         }
-        retreat(&mut quads, &mut cut, vertices, &is_marked, round);
+        retreat(&mut quads, &mut cut, vertices, &is_marked, (surface, round));
         lasting = vertices.len();
     }
     Vec::new()
@@ -119,6 +126,41 @@ fn assemble(
     (triangles, chosen)
 }
 
+/// The surface, for what is put on it.
+pub(super) struct Surface<'a> {
+    pub field: &'a dyn Field,
+    /// The shortest side of a cell.
+    pub size: f64,
+    /// Evaluations of the gradient.
+    pub gradients: u64,
+}
+
+impl Surface<'_> {
+    /// The surface near a point, if it is there in a box.
+    fn within(&mut self, start: DVec3, bounds: &Aabb) -> Option<DVec3> {
+        let found = project::newton(self.field, start, self.size, &mut self.gradients)?.point;
+        is_within(bounds, found).then_some(found)
+    }
+
+    /// The surface between two hits on the sides of a face between cells, on the line in the face through the middle.
+    fn in_face(&mut self, [p, q]: [DVec3; 2], face: &Aabb) -> Option<DVec3> {
+        let (middle, size) = (p.midpoint(q), face.size());
+        let across = [DVec3::X, DVec3::Y, DVec3::Z][size.min_position()];
+        let normal = across.cross(q - p).try_normalize()?;
+        self.gradients += 1;
+        let gradient = self.field.omega_grad(middle).1;
+        let outwards = if normal.dot(gradient) > 0.0 { -normal } else { normal };
+        let found =
+            project::along(self.field, middle, outwards, 0.5 * p.distance(q), &mut self.gradients)?.point;
+        let inset = INSET * size;
+        is_within(&Aabb::new(face.min + inset, face.max - inset), found).then_some(found)
+    }
+}
+
+fn is_within(bounds: &Aabb, p: DVec3) -> bool {
+    (p.cmpge(bounds.min) & p.cmple(bounds.max)).all()
+}
+
 /// What is known of a cell that retreats.
 struct Retreat {
     hits: DVec3,
@@ -127,9 +169,15 @@ struct Retreat {
 }
 
 /// Moves the marked vertices into their cells and makes fans of their quads, with bent sides.
-fn retreat(quads: &mut Quads<'_>, cut: &mut Cut, vertices: &mut Vertices, is_marked: &[bool], round: usize) {
+fn retreat(
+    quads: &mut Quads<'_>,
+    cut: &mut Cut,
+    vertices: &mut Vertices,
+    is_marked: &[bool],
+    (surface, round): (&mut Surface<'_>, usize),
+) {
     let touched = quads.with_corners(is_marked);
-    let mut sides: BTreeMap<[u32; 2], SmallVec<[u32; 4]>> = BTreeMap::new();
+    let mut sides: BTreeMap<[u32; 2], (SmallVec<[u32; 4]>, Aabb)> = BTreeMap::new();
     let mut cells: BTreeMap<u32, Retreat> = BTreeMap::new();
     for quad in &touched {
         for i in 0..4 {
@@ -141,7 +189,8 @@ fn retreat(quads: &mut Quads<'_>, cut: &mut Cut, vertices: &mut Vertices, is_mar
                 found.count += 1.0;
             }
             if is_marked[a as usize] || is_marked[b as usize] {
-                sides.entry([a.min(b), a.max(b)]).or_default().push(quad.hit);
+                let face = quads.cell(quad, i).intersection(&quads.cell(quad, (i + 1) % 4));
+                sides.entry([a.min(b), a.max(b)]).or_insert_with(|| (SmallVec::new(), face)).0.push(quad.hit);
             }
         }
     }
@@ -154,24 +203,35 @@ fn retreat(quads: &mut Quads<'_>, cut: &mut Cut, vertices: &mut Vertices, is_mar
             continue;
         }
         let inset = INSET * cell.size();
-        let position = if round == 0 && !vertices.doubtful[place] {
-            vertices.positions[place].clamp(cell.min + inset, cell.max - inset)
+        let within = Aabb::new(cell.min + inset, cell.max - inset);
+        let mut position = if round == 0 && !vertices.doubtful[place] {
+            vertices.positions[place].clamp(within.min, within.max)
         } else {
             hits / count
         };
+        if round < SETTLING {
+            position = surface.within(position, &within).unwrap_or(position);
+        }
         if position != vertices.positions[place] {
             vertices.set(v, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
         }
     }
-    for (ends, hits) in sides {
+    for (ends, (hits, face)) in sides {
         let &[first, second] = &hits[..] else { continue };
-        if quads.middles.contains_key(&(first, ends)) {
+        let [p, q] = [first, second].map(|hit| quads.hits.get(hit));
+        let halfway = p.position.midpoint(q.position);
+        if let Some(&middle) = quads.middles.get(&(first, ends)) {
+            if round >= SETTLING {
+                vertices.positions[middle as usize] = halfway;
+            }
             continue;
         }
-        let [p, q] = [first, second].map(|hit| quads.hits.get(hit));
         let kind = if p.is_cap && q.is_cap { VertexKind::Cap } else { VertexKind::Sharp };
+        let settled = (kind == VertexKind::Sharp && round < SETTLING)
+            .then(|| surface.in_face([p.position, q.position], &face))
+            .flatten();
         let middle = vertices.len() as u32;
-        vertices.push(Vertex { position: p.position.midpoint(q.position), normal: DVec3::ZERO, kind });
+        vertices.push(Vertex { position: settled.unwrap_or(halfway), normal: DVec3::ZERO, kind });
         for hit in [first, second] {
             quads.middles.insert((hit, ends), middle);
         }

@@ -22,6 +22,26 @@ pub const FORMAT: Format =
 /// # Errors
 /// Those of the stream.
 pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
+    write_with(mesh, None, unit, out)
+}
+
+/// Writes several meshes as one, as [`write`] does. Each vertex also has the number of its mesh, from 0, in the array
+/// `body`.
+///
+/// # Errors
+/// Those of the stream.
+pub fn write_bodies(meshes: &[Mesh], unit: LengthUnit, out: &mut dyn Write) -> io::Result<()> {
+    let numbered = (0..).zip(meshes);
+    let bodies = numbered.flat_map(|(number, mesh)| std::iter::repeat_n(number, mesh.positions.len()));
+    write_with(&Mesh::joined(meshes), Some(bodies.collect()), unit, out)
+}
+
+fn write_with(
+    mesh: &Mesh,
+    bodies: Option<Vec<i32>>,
+    unit: LengthUnit,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     in_metres(unit)?;
     let (points, polys) = (mesh.positions.len(), mesh.triangles.len());
     write!(
@@ -35,6 +55,9 @@ pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<(
     )?;
     let normals = mesh.normals.iter().flat_map(|n| n.to_array()).map(|x| (x as f32).to_le_bytes());
     array(out, "Float32", "normals", 3, normals)?;
+    if let Some(bodies) = bodies {
+        array(out, "Int32", "body", 1, bodies.into_iter().map(i32::to_le_bytes))?;
+    }
     writeln!(out, "</PointData>\n<Points>")?;
     let positions = mesh.positions.iter().flat_map(|p| p.to_array()).map(f64::to_le_bytes);
     array(out, "Float64", "points", 3, positions)?;

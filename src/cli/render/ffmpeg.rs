@@ -1,0 +1,122 @@
+//! Films that the program `ffmpeg` of the system encodes. It reads pictures from a pipe and writes a temporary file.
+
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::thread::JoinHandle;
+
+use crate::cli::failure::Failure;
+use crate::cli::output::Shown;
+use rfm::diagnostic::printable_line;
+use rfm::render::Image;
+
+const PROGRAM: &str = "ffmpeg";
+
+/// A film that is being encoded.
+pub(super) struct Video {
+    shown: String,
+    child: Child,
+    pixels: Option<ChildStdin>,
+    /// What the program complains of.
+    complaint: Option<JoinHandle<String>>,
+}
+
+impl Video {
+    /// Whether the program is there.
+    pub fn check(path: &Path) -> Result<(), Failure> {
+        let asked = Command::new(PROGRAM).arg("-version").stdin(Stdio::null()).output();
+        match asked {
+            Ok(answer) if answer.status.success() => Ok(()),
+            Ok(_) | Err(_) => Err(Failure::usage(format!(
+                "cannot write `{}`: .mp4 and .webm are made by the program `{PROGRAM}`, which does not start on this machine; \
+                 install it, or write .gif or .apng, which are built in",
+                path.shown()
+            ))),
+        }
+    }
+
+    /// Starts the program. `path` is the file that the user asked for, `temporary` the one that is written.
+    pub fn begin(
+        path: &Path,
+        temporary: &Path,
+        (width, height): (u32, u32),
+        rate: u32,
+    ) -> Result<Self, Failure> {
+        let is_webm = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("webm"));
+        let codec: &[&str] = if is_webm {
+            &["-c:v", "libvpx-vp9", "-crf", "30", "-b:v", "0", "-row-mt", "1", "-f", "webm"]
+        } else {
+            &["-c:v", "libx264", "-crf", "18", "-preset", "medium", "-movflags", "+faststart", "-f", "mp4"]
+        };
+        let mut command = Command::new(PROGRAM);
+        command.args([
+            "-hide_banner",
+            "-loglevel",
+            "error",
+            "-nostdin",
+            "-y",
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            "rgb24",
+        ]);
+        command
+            .arg("-s")
+            .arg(format!("{width}x{height}"))
+            .arg("-r")
+            .arg(rate.to_string())
+            .args(["-i", "pipe:0"]);
+        command.args(codec).args(["-pix_fmt", "yuv420p", "-map_metadata", "-1", "-fflags", "+bitexact"]);
+        command.arg("-flags:v").arg("+bitexact").arg(temporary);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let shown = path.shown();
+        let mut child = command.spawn().map_err(|error| {
+            Failure::usage(format!("cannot write `{shown}`: `{PROGRAM}` does not start: {error}"))
+        })?;
+        let pixels = child.stdin.take();
+        // it is read while the program works, because a full pipe would stop it
+        let complaint = child.stderr.take().map(|mut stream| {
+            std::thread::spawn(move || {
+                let mut text = Vec::new();
+                // what was read until then is all that there is to show
+                let _ = stream.read_to_end(&mut text);
+                String::from_utf8_lossy(&text).into_owned()
+            })
+        });
+        Ok(Self { shown, child, pixels, complaint })
+    }
+
+    /// Hands a picture to the program.
+    pub fn add(&mut self, image: &Image) -> io::Result<()> {
+        match &mut self.pixels {
+            Some(pixels) => pixels.write_all(&image.pixels),
+            None => Err(io::ErrorKind::BrokenPipe.into()),
+        }
+    }
+
+    /// Waits for the end of the file. `fed` tells whether all pictures could be handed over.
+    pub fn finish(mut self, fed: io::Result<()>) -> Result<(), Failure> {
+        drop(self.pixels.take());
+        let status = self.child.wait()?;
+        let complaint = self.complaint.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        if status.success() && fed.is_ok() {
+            return Ok(());
+        }
+        let last = complaint.lines().rev().find(|line| !line.trim().is_empty());
+        let reason = match (last, fed) {
+            (Some(line), _) => printable_line(line.trim()).into_owned(),
+            (None, Err(error)) => error.to_string(),
+            (None, Ok(())) => status.to_string(),
+        };
+        Err(Failure::usage(format!("cannot write `{}`: `{PROGRAM}` failed: {reason}", self.shown)))
+    }
+}
+
+impl Drop for Video {
+    fn drop(&mut self) {
+        drop(self.pixels.take());
+        // a program that has ended already needs no end
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

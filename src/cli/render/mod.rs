@@ -1,0 +1,26 @@
+//! `rfm render`: pictures and films of the frames that `rfm run` wrote, and pictures of solids.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | `options` | the flags, with the help that teaches them |
+//! | `scene` | the folder of a run → a picture of each frame |
+//! | `solid` | an obstacle file → one picture |
+//! | `film` | pictures → .png files, .gif, .apng |
+//! | `ffmpeg` | pictures → .mp4, .webm |
+//!
+//! Invariant: everything is read and checked before the first file is written, and the bytes of .png, .gif and .apng do
+//! not depend on the number of threads.
+
+mod ffmpeg;
+mod film;
+mod options;
+mod scene;
+mod solid;
+
+use super::args::Shared;
+use super::failure::Failure;
+pub(super) use options::Render;
+
+pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
+    if options.subject.is_dir() { scene::run(shared, options) } else { solid::run(shared, options) }
+}

@@ -1,0 +1,110 @@
+//! The obstacles of pictures: which of them are whole, cut open or left out, so that they do not hide the fluid.
+
+use glam::DVec3;
+
+use super::failure::{Failure, note};
+use rfm::geom::Aabb;
+use rfm::mesh::{Mesh, split_creases};
+use rfm::render::{self, Backdrop, Camera, Cut, Legend, MeshView};
+use rfm::slice::Plane;
+
+/// An obstacle that hides more than this part of the fluid at its start is in the way.
+const MOST_HIDDEN: f64 = 0.35;
+
+/// Most obstacles that a title names; of more it gives the number.
+const NAMED: usize = 3;
+
+/// How an obstacle is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Drawn {
+    Whole,
+    Open(Cut),
+    Hidden,
+}
+
+/// The scene of a picture without its particles: the box, the obstacles, the legend.
+pub(super) fn backdrop<'a>(
+    camera: &Camera,
+    domain: &Aabb,
+    legend: &Legend<'_>,
+    bodies: impl Iterator<Item = (Drawn, &'a Mesh)>,
+) -> Result<Backdrop, Failure> {
+    let shown = bodies.filter(|(drawn, _)| *drawn != Drawn::Hidden);
+    let sharp: Vec<(Drawn, Mesh)> = shown.map(|(drawn, mesh)| (drawn, split_creases(mesh))).collect();
+    let views: Vec<MeshView<'_>> = sharp.iter().map(|(drawn, mesh)| view(mesh, *drawn)).collect();
+    Backdrop::new(camera.clone(), domain, &views, legend).map_err(Failure::usage)
+}
+
+fn view(mesh: &Mesh, drawn: Drawn) -> MeshView<'_> {
+    let cut = match drawn {
+        Drawn::Open(cut) => Some(cut),
+        Drawn::Whole | Drawn::Hidden => None,
+    };
+    MeshView { vertices: &mesh.positions, normals: &mesh.normals, triangles: &mesh.triangles, cut }
+}
+
+/// The cut that takes away one side of a plane across an axis.
+pub(super) fn half(axis: DVec3, at: f64, below: bool) -> Cut {
+    if below { Cut { normal: -axis, offset: -at } } else { Cut { normal: axis, offset: at } }
+}
+
+/// The cut that takes away the side of a plane towards the eye.
+pub(super) fn half_towards_eye(plane: &Plane, camera: &Camera) -> Cut {
+    let axis = DVec3::AXES[plane.axis.index()];
+    half(axis, plane.value, axis.dot(camera.towards_eye()) < 0.0)
+}
+
+/// How a body is drawn without hiding much of the fluid, for which the samples stand: whole, without its front half, or
+/// not at all.
+pub(super) fn out_of_the_way(camera: &Camera, name: &str, mesh: &Mesh, samples: &[DVec3]) -> Drawn {
+    let hides = |drawn| render::hidden(camera, &view(mesh, drawn), samples) > MOST_HIDDEN;
+    if !hides(Drawn::Whole) {
+        return Drawn::Whole;
+    }
+    let towards_eye = camera.towards_eye();
+    let axis = towards_eye.abs().max_position();
+    let bounds = samples.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
+    let at = rounded(bounds.centre()[axis], bounds.size()[axis]);
+    let open = Drawn::Open(half(DVec3::AXES[axis], at, towards_eye[axis] < 0.0));
+    if !hides(open) {
+        return open;
+    }
+    note(format!(
+        "pictures leave out the obstacle `{name}`, which hides the fluid even when it is cut in half: --cut none draws it"
+    ));
+    Drawn::Hidden
+}
+
+/// A coordinate with as many digits as tell parts of a size apart.
+fn rounded(at: f64, size: f64) -> f64 {
+    let step = 10f64.powf(size.log10().floor() - 2.0);
+    let found = (at / step).round() * step;
+    // read back from digits, so that a title shows no others
+    format!("{found:.9}").parse().ok().filter(|x: &f64| x.is_finite() && size > 0.0).unwrap_or(at)
+}
+
+/// What was done to obstacles, in words for a title.
+pub(super) fn described(names: &[&str], drawn: &[Drawn]) -> Vec<String> {
+    let mut done: Vec<(String, Vec<&str>)> = Vec::new();
+    for (name, drawn) in names.iter().zip(drawn) {
+        let what = match drawn {
+            Drawn::Whole => continue,
+            Drawn::Hidden => "left out".to_string(),
+            Drawn::Open(cut) => {
+                let axis = cut.normal.abs().max_position();
+                format!("cut at {} = {}", ["x", "y", "z"][axis], cut.offset * cut.normal[axis] + 0.0)
+            }
+        };
+        match done.iter_mut().find(|(known, _)| *known == what) {
+            Some((_, names)) if names.contains(name) => {}
+            Some((_, names)) => names.push(name),
+            None => done.push((what, vec![name])),
+        }
+    }
+    let words = done.into_iter().map(|(what, names)| {
+        let few = names.len() <= NAMED;
+        let who = if few { names.join(", ") } else { format!("{} obstacles", names.len()) };
+        format!("{who} {what}")
+    });
+    words.collect()
+}

@@ -1,0 +1,91 @@
+//! What is known of all frames of a run together: the places of the particles and the ranges of the values at them.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::failure::Failure;
+use super::saved::RunFigures;
+use crate::cli::output::Shown;
+use rfm::fluid_surface::{FrameEntry, PointArray, read_arrays};
+use rfm::geom::Aabb;
+use rfm::view::Levels;
+
+/// The part of the values of a frame at each end that may lie beyond the range of the levels.
+const STRAY: f64 = 0.001;
+
+/// What is known of all frames together.
+pub(super) struct Survey {
+    pub bounds: Aabb,
+    /// Name and range of each array that all frames have.
+    pub arrays: Vec<(String, Levels)>,
+    /// The number of particles of all frames together.
+    pub particles: usize,
+}
+
+impl Survey {
+    pub fn of(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Self, Failure> {
+        let surveys: Result<Vec<Self>, Failure> = entries
+            .par_iter()
+            .map(|(_, entry)| {
+                let path = folder.join(&entry.file);
+                let failed = |error: String| {
+                    Failure::usage(format!("cannot read the frame `{}`: {error}", path.shown()))
+                };
+                let file = std::fs::read(&path).map_err(|error| failed(error.to_string()))?;
+                let (points, arrays) = read_arrays(&file).map_err(|error| failed(error.to_string()))?;
+                Ok(Self::of_frame(&points, &arrays))
+            })
+            .collect();
+        let mut surveys = surveys?.into_iter();
+        let mut all =
+            surveys.next().unwrap_or(Self { bounds: Aabb::EMPTY, arrays: Vec::new(), particles: 0 });
+        for next in surveys {
+            all.bounds = all.bounds.union(&next.bounds);
+            all.particles += next.particles;
+            all.arrays.retain_mut(|(name, range)| {
+                let same = next.arrays.iter().find(|(other, _)| other == name);
+                same.inspect(|(_, other)| *range = range.with(*other)).is_some()
+            });
+        }
+        if all.bounds.is_empty() {
+            all.bounds = Aabb::new(DVec3::ZERO, DVec3::ONE);
+        }
+        // colours of speeds begin at rest
+        all.arrays.iter_mut().filter(|(name, _)| name == "speed").for_each(|(_, range)| range.low = 0.0);
+        Ok(all)
+    }
+
+    fn of_frame(points: &[DVec3], arrays: &[PointArray]) -> Self {
+        let finite = points.iter().filter(|p| p.is_finite());
+        let scalars = arrays.iter().filter(|array| array.components == 1 && array.name != "id");
+        let range = |array: &PointArray| {
+            let range = Levels::of_most(array.values.iter().copied(), STRAY);
+            (array.name.clone(), range.unwrap_or(Levels { low: 0.0, high: 0.0 }))
+        };
+        Self {
+            bounds: finite.fold(Aabb::EMPTY, |all, p| all.including(*p)),
+            arrays: scalars.map(range).collect(),
+            particles: points.len(),
+        }
+    }
+
+    /// The box of the scene if a summary states it, and otherwise that around all particles.
+    pub fn domain(&self, figures: Option<&RunFigures>) -> Aabb {
+        let domain = figures
+            .and_then(|figures| figures.domain)
+            .map(|[min, max]| Aabb::new(DVec3::from_array(min), DVec3::from_array(max)));
+        domain.filter(|domain| domain.is_finite() && !domain.is_empty()).unwrap_or(self.bounds)
+    }
+
+    /// Half the spacing of the particles, m.
+    pub fn radius(&self, figures: Option<&RunFigures>, frames: usize) -> f64 {
+        let volume = figures.map(RunFigures::particle_volume);
+        let volume = volume.filter(|volume| volume.is_finite() && *volume > 0.0).unwrap_or_else(|| {
+            // without a summary it is guessed from the box around the particles
+            self.bounds.volume() / (self.particles / frames.max(1)).max(1) as f64 / 8.0
+        });
+        0.5 * volume.cbrt()
+    }
+}

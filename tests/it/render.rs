@@ -1,0 +1,287 @@
+//! `rfm render`: what its pictures show, what its films hold, and what it refuses.
+
+use std::io::Cursor;
+use std::path::Path;
+use std::process::Command;
+
+use rfm::fluid_surface::read_arrays;
+
+use crate::tool::rfm;
+
+const SCENE: &str = "rfm 1
+solid post = cylinder(0.2, 0.5).move([0.5, 0.5, 0])
+solid moon = sphere(0.15).move([0.2, 0.2, 1.2])
+scene drop {
+  box { min: [0, 0, 0], max: [1, 1, 1.5] }
+  fluid { shape: ball([0.5, 0.5, 1], 0.25), particles: 800, fill: middle }
+  obstacle { solid: post }
+  obstacle { solid: moon }
+  run { until: 0.1 s, save_every: 0.02 s }
+}
+";
+
+/// Runs the scene: six frames, 0.02 s apart, in `drop.out`.
+fn run(here: &Path) {
+    std::fs::write(here.join("drop.rfm"), SCENE).unwrap();
+    rfm(here, &["run", "drop.rfm", "--no-pictures", "--mesh-cells", "24"]).expect(0);
+}
+
+/// The pixels of a PNG.
+fn pixels(file: &[u8]) -> Vec<u8> {
+    let mut reader = png::Decoder::new(Cursor::new(file)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    pixels
+}
+
+/// The parts of a picture 640 wide, without its colour bar, that are blue, red, and of the colour of stone and of
+/// sections.
+fn shares(picture: &Path) -> [f64; 4] {
+    let pixels = pixels(&std::fs::read(picture).unwrap());
+    let count = |is: &dyn Fn(i32, i32, i32) -> bool| {
+        let rows = pixels.chunks(3 * 640).flat_map(|row| row[..3 * 540].chunks(3));
+        let found = rows.filter(|p| is(p[0].into(), p[1].into(), p[2].into())).count();
+        found as f64 / (pixels.len() / 3) as f64
+    };
+    [
+        count(&|r, _, b| b > r + 40),
+        count(&|r, g, b| r > g + 90 && r > b + 90),
+        count(&|r, _, b| (8..25).contains(&(r - b)) && r < 235),
+        count(&|r, g, b| (40..90).contains(&(r - b)) && r - g < 60),
+    ]
+}
+
+#[test]
+fn every_frame_becomes_a_picture_with_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    for target in ["frames", "drop.gif", "drop.apng"] {
+        let made = |threads: &str| {
+            let flags =
+                ["render", "drop.out", "-o", target, "--size", "320x240", "--threads", threads, "--json"];
+            let document = rfm(here, &flags).expect(0).json();
+            assert_eq!((&document["pictures"], &document["by"]), (&6.into(), &"speed".into()));
+            let file = |name: String| std::fs::read(here.join(name)).unwrap();
+            let frames: Vec<Vec<u8>> = match target {
+                "frames" => (0..6).map(|k| file(format!("frames/frame_{k:06}.png"))).collect(),
+                film => vec![file(film.into())],
+            };
+            frames
+        };
+        assert!(made("1") == made("2"), "{target}");
+    }
+    let apng = std::fs::read(here.join("drop.apng")).unwrap();
+    let still = std::fs::read(here.join("frames/frame_000000.png")).unwrap();
+    assert!(pixels(&apng) == pixels(&still), "a program without animation shows the first frame");
+    let reader = png::Decoder::new(Cursor::new(&apng)).read_info().unwrap();
+    assert_eq!(reader.info().animation_control.unwrap().num_frames, 6);
+    let gif = std::fs::read(here.join("drop.gif")).unwrap();
+    let mut decoder = gif::DecodeOptions::new().read_info(&gif[..]).unwrap();
+    assert_eq!((decoder.width(), decoder.height()), (320, 240));
+    let mut delays = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().unwrap() {
+        delays.push(frame.delay);
+    }
+    assert_eq!(delays, [4; 6]);
+}
+
+#[test]
+fn frames_are_chosen_by_number_time_and_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    let count = |flags: &[&str]| {
+        let mut arguments = vec!["render", "drop.out", "-o", "a.gif", "--size", "64x48", "--json"];
+        arguments.extend(flags);
+        rfm(here, &arguments).expect(0).json()["pictures"].as_u64().unwrap()
+    };
+    assert_eq!(count(&["--frames", "2..5"]), 3);
+    assert_eq!(count(&["--every", "4"]), 2);
+    assert_eq!(count(&["--times", "40ms..0.08"]), 3);
+    assert_eq!(count(&["--times", "..0.05", "--every", "2"]), 2);
+    // the numbers of files are those of the frames
+    rfm(here, &["render", "drop.out", "--frames", "3.."]).expect(0);
+    let first = pixels(&std::fs::read(here.join("drop.out/render/frame_000003.png")).unwrap());
+    assert_eq!(first.len(), 3 * 1280 * 720);
+    assert!(!here.join("drop.out/render/frame_000002.png").exists());
+}
+
+#[test]
+fn colours_have_the_range_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    let file = std::fs::read(here.join("drop.out/frames/particles_000005.vtp")).unwrap();
+    let (_, arrays) = read_arrays(&file).unwrap();
+    let speeds = &arrays.iter().find(|array| array.name == "speed").unwrap().values;
+    let fastest = speeds.iter().copied().fold(0.0, f64::max);
+    let slowest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
+    let picture = |flags: &[&str]| {
+        let mut arguments = vec!["render", "drop.out", "-o", "one.png", "--frames", "5", "--size", "640x480"];
+        arguments.extend(flags);
+        rfm(here, &arguments).expect(0);
+        shares(&here.join("one.png"))
+    };
+    let [blue, red, ..] = picture(&["--range", &format!("{fastest}..{}", fastest + 9.0)]);
+    assert!(blue > 0.01 && red == 0.0, "all below the range: {blue} {red}");
+    let [blue, red, ..] = picture(&["--range", &format!("{}..{slowest}", slowest - 9.0)]);
+    assert!(blue == 0.0 && red > 0.01, "all above the range: {blue} {red}");
+    let [blue, red, ..] =
+        picture(&["--range", &format!("{}..{slowest}", slowest - 9.0), "--colours", "grey"]);
+    assert!(blue == 0.0 && red == 0.0, "grey: {blue} {red}");
+    let [blue, red, ..] = picture(&["--by", "density", "--range", "5000..6000"]);
+    assert!(blue > 0.01 && red == 0.0, "densities of water are low there: {blue} {red}");
+}
+
+#[test]
+fn obstacles_are_hidden_by_name_and_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    let stone = |flags: &[&str]| {
+        let mut arguments = vec!["render", "drop.out", "-o", "one.png", "--frames", "0", "--size", "640x480"];
+        arguments.extend(flags);
+        rfm(here, &arguments).expect(0);
+        shares(&here.join("one.png"))
+    };
+    let [_, _, all, section] = stone(&["--cut", "none"]);
+    let [_, _, no_moon, _] = stone(&["--cut", "none", "--hide", "moon"]);
+    let [_, _, nothing, _] = stone(&["--cut", "none", "--hide", "moon,post"]);
+    assert!(nothing < 0.002 && no_moon > 0.01 && all > no_moon + 0.003, "{all} {no_moon} {nothing}");
+    assert!(section < 0.002);
+    let [.., opened] = stone(&["--cut", "y=0.5"]);
+    assert!(opened > 0.01, "{opened}");
+    // zoomed in on the post, it fills more of the picture
+    let [_, _, near, _] = stone(&["--cut", "none", "--look-at", "0.5,0.5,0.25", "--zoom", "2"]);
+    assert!(near > 1.8 * all, "{near} {all}");
+    // the direction as the viewer copies it
+    let of = |camera: &str| {
+        rfm(here, &["render", "drop.out", "-o", "one.png", "--frames", "0", "--camera", camera]).expect(0);
+        std::fs::read(here.join("one.png")).unwrap()
+    };
+    assert!(of("0.1,-1,0.3") == of("picture { camera: [0.1, -1, 0.3] }"));
+    assert!(of("0.1,-1,0.3") != of("1,-1,0.3"));
+}
+
+#[test]
+fn a_solid_is_one_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SCENE).unwrap();
+    let document = rfm(here, &["render", "drop.rfm", "--size", "640x480", "--json"]).expect(0).json();
+    assert_eq!(document["file"], "post.png");
+    let [_, _, stone, section] = shares(&here.join("post.png"));
+    assert!(stone > 0.1 && section < 0.002, "{stone} {section}");
+    let cut = ["render", "drop.rfm", "-s", "moon", "-o", "m.png", "--cut", "y=0.2", "--size", "640x480"];
+    rfm(here, &cut).expect(0);
+    let [.., section] = shares(&here.join("m.png"));
+    assert!(section > 0.1, "{section}");
+}
+
+#[test]
+fn refusals_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    let cases: [(&[&str], &str); 19] = [
+        (&["drop.out", "-o", "a.jpg"], ".jpg is none of .png .gif .apng .mp4 .webm"),
+        (&["drop.out", "-o", "a.png"], "`a.png` is one picture, and there are 6 frames"),
+        (&["drop.out", "-o", "a.gif", "--fps", "60"], "50 is the most"),
+        (&["drop.out", "--fps", "30"], "--fps is for films"),
+        (&["drop.out", "-o", "a.mp4", "--size", "641x480"], "both must be even"),
+        (&["drop.out", "--size", "640"], "expected WIDTHxHEIGHT"),
+        (&["drop.out", "--range", "3..1"], "the first number must be the lower one"),
+        (&["drop.out", "--times", "5..6"], "no frame lies there; they go from 0 s to 0.1"),
+        (&["drop.out", "--times", "0..1", "--frames", "0..1"], "cannot be used with"),
+        (&["drop.out", "--frames", "3..90"], "there are 6 frames"),
+        (&["drop.out", "--by", "sped"], "did you mean `speed`?"),
+        (&["drop.out", "--hide", "sun"], "there is post, moon"),
+        (&["drop.out", "--zoom", "0"], "expected a number from 0.05 to 20"),
+        (&["drop.out", "--solid", "post"], "--solid is for a solid of a file"),
+        (&["drop.rfm", "--by", "speed"], "--by is for the folder of a run"),
+        (&["drop.rfm", "-o", "a.gif"], "a solid is one picture"),
+        (&["drop.rfm", "--cut", "auto"], "choose a plane"),
+        (&["nothing.rfm"], "cannot read `nothing.rfm`"),
+        (&["drop.out", "-o", "no/such/a.gif"], "does not exist"),
+    ];
+    for (arguments, reason) in cases {
+        let outcome = rfm(here, &[&["render"], arguments].concat()).expect(2);
+        assert!(outcome.stderr.contains(reason), "{arguments:?}: {}", outcome.stderr);
+        assert!(!here.join("drop.out/render").exists(), "{arguments:?}");
+    }
+    // a run without its summary does not know the names of its obstacles, and is drawn all the same
+    std::fs::remove_file(here.join("drop.out/summary.json")).unwrap();
+    let outcome = rfm(here, &["render", "drop.out", "--hide", "post"]).expect(2);
+    assert!(outcome.stderr.contains("does not name its obstacles"), "{}", outcome.stderr);
+    rfm(here, &["render", "drop.out", "-o", "a.gif", "--size", "64x48"]).expect(0);
+    // a damaged frame is named, and nothing is left half-written
+    std::fs::write(here.join("drop.out/frames/particles_000002.vtp"), "nonsense").unwrap();
+    let outcome = rfm(here, &["render", "drop.out", "-o", "b.gif"]).expect(2);
+    assert!(outcome.stderr.contains("particles_000002.vtp"), "{}", outcome.stderr);
+    assert!(!here.join("b.gif").exists());
+    std::fs::remove_dir_all(here.join("drop.out/frames")).unwrap();
+    let outcome = rfm(here, &["render", "drop.out"]).expect(2);
+    assert!(outcome.stderr.contains("is missing"), "{}", outcome.stderr);
+}
+
+#[cfg(unix)]
+#[test]
+fn videos_are_handed_to_the_program_of_the_system() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    let tools = here.join("tools");
+    std::fs::create_dir(&tools).unwrap();
+    let render = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_rfm"));
+        command.args(["render", "drop.out", "-o", "a.mp4", "--size", "64x48", "--fps", "10"]);
+        command.current_dir(here).env("PATH", &tools).output().unwrap()
+    };
+    let outcome = render();
+    let text = String::from_utf8_lossy(&outcome.stderr).into_owned();
+    assert!(outcome.status.code() == Some(2) && text.contains("write .gif or .apng"), "{text}");
+    // a program that keeps what it is told and given
+    let script = |body: &str| {
+        let path = tools.join("ffmpeg");
+        std::fs::write(&path, format!("#!/bin/sh\n[ \"$1\" = -version ] && exit 0\n{body}\n")).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    };
+    script("echo \"$@\" > told\n/bin/cat > given\nfor last; do :; done\necho film > \"$last\"");
+    let outcome = render();
+    assert!(outcome.status.success(), "{}", String::from_utf8_lossy(&outcome.stderr));
+    assert_eq!(std::fs::metadata(here.join("given")).unwrap().len(), 6 * 3 * 64 * 48);
+    let told = std::fs::read_to_string(here.join("told")).unwrap();
+    assert!(told.contains("-s 64x48 -r 10 -i pipe:0") && told.contains("libx264"), "{told}");
+    assert_eq!(std::fs::read_to_string(here.join("a.mp4")).unwrap(), "film\n");
+    // one that fails: its last words are told, and the film that was there stays
+    script("echo 'Unknown encoder libx264' >&2\nexit 1");
+    let outcome = render();
+    let text = String::from_utf8_lossy(&outcome.stderr).into_owned();
+    assert!(outcome.status.code() == Some(2) && text.contains("Unknown encoder libx264"), "{text}");
+    assert_eq!(std::fs::read_to_string(here.join("a.mp4")).unwrap(), "film\n");
+}
+
+#[test]
+fn an_obstacle_that_moves_is_drawn_where_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let still = "sphere(0.15).move([0.2, 0.2, 1.2])";
+    assert!(SCENE.contains(still));
+    // it leaves the picture within the run
+    let moving = SCENE.replace(still, "sphere(0.15).move([0.2, 0.2, 1.2 + 20*t])");
+    std::fs::write(here.join("drop.rfm"), moving).unwrap();
+    rfm(here, &["run", "drop.rfm", "--no-pictures", "--mesh-cells", "24"]).expect(0);
+    let render = |target: &str, others: &[&str]| {
+        let flags = ["--size", "640x480", "--cut", "none", "--hide", "post", "--range", "50..60"];
+        rfm(here, &[&["render", "drop.out", "-o", target], &flags[..], others].concat()).expect(0);
+    };
+    render("all", &[]);
+    let stone = |k: usize| shares(&here.join(format!("all/frame_{k:06}.png")))[2];
+    assert!(stone(0) > 0.005 && stone(5) < 0.001, "{} {}", stone(0), stone(5));
+    // a frame alone is the same picture
+    render("one.png", &["--frames", "1"]);
+    let bytes = |name: &str| std::fs::read(here.join(name)).unwrap();
+    assert!(bytes("one.png") == bytes("all/frame_000001.png"));
+}
