@@ -38,6 +38,13 @@ const LEAST_ROOM: f64 = 1.03;
 /// Lattices that are tried for one shape, at most.
 const TRIALS: usize = 8;
 
+/// How much worse vacancies of a lattice are than cells that are longer than wide by the same part.
+const VACANCIES: f64 = 4.0;
+
+/// Part of a lattice's sites from which on the search for a better lattice goes on, where a number of particles is
+/// stated and the others stay vacant.
+const MANY_VACANCIES: f64 = 0.02;
+
 /// Change of a particle's mass or of the spacing that is not made, because it is no rounding of a lattice any more.
 const TOO_FAR: f64 = 0.1;
 
@@ -91,7 +98,7 @@ impl Experiment {
         let fills_vessel = self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume;
         let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume)?;
         if let Some(number) = fluid.particles {
-            particles.truncate(number);
+            particles = thinned(&particles, number);
             carved.kept = particles.len();
         }
         let fitted = fluid.density * volume / particles.len() as f64;
@@ -115,14 +122,33 @@ impl Experiment {
         let spacing = self.parameters.spacing();
         // a hair smaller than the box, whose faces have ω = 0
         let is_box = self.fluid.range(&within.grown(-1e-6 * within.size().min_element())).lo > 0.0;
+        let mut best: Option<(f64, (Particles, Carved, DVec3))> = None;
         if is_box {
-            let cell = fitted_to(within.size(), spacing, wanted.filter(|_| obstacles.is_empty()));
-            let (particles, carved) = self.place(obstacles, Some(cell), None)?;
-            if wanted.is_none_or(|wanted| particles.len() >= wanted) {
-                return Ok((particles, carved, cell));
+            // bodies take a part of the box, and its number of sites is that much larger
+            let share = volume / within.volume();
+            let (mut sites, spacing) = match wanted {
+                None => (None, spacing),
+                Some(wanted) => (Some(wanted as f64 / share), spacing * share.cbrt()),
+            };
+            for _ in 0..TRIALS {
+                let cell = fitted_to(within.size(), spacing, sites);
+                let (particles, carved) = self.place(obstacles, Some(cell), None)?;
+                let (Some(wanted), Some(least)) = (wanted, &mut sites) else {
+                    return Ok((particles, carved, cell));
+                };
+                let excess = (particles.len() as f64 / wanted as f64).ln();
+                if excess >= 0.0 && best.as_ref().is_none_or(|(least, _)| excess < *least) {
+                    best = Some((excess, (particles, carved, cell)));
+                }
+                if (0.0..MANY_VACANCIES).contains(&excess) {
+                    break;
+                }
+                *least *= (-excess).exp() * (1.0 + GOOD_ENOUGH);
+            }
+            if let Some((_, found)) = best.take_if(|(excess, _)| *excess < MANY_VACANCIES) {
+                return Ok(found);
             }
         }
-        let mut best: Option<(f64, (Particles, Carved, DVec3))> = None;
         let mut size = spacing;
         // along how many axes the cells may change
         let free =
@@ -276,31 +302,44 @@ impl Experiment {
     }
 }
 
-/// The size of cells with a spacing about as given that fill a box; with a number of particles, not fewer than so
-/// many.
-fn fitted_to(size: DVec3, spacing: f64, number: Option<usize>) -> DVec3 {
-    let layers = (size / spacing).to_array().map(|n| (n.floor().max(1.0), n.ceil().max(1.0)));
+/// So many of the particles, evenly chosen: the others leave vacancies that the fluid closes at once. (If a top layer were
+/// left out instead, all the rest would be compressed by what it weighs.)
+fn thinned(particles: &Particles, number: usize) -> Particles {
+    let mut kept = Particles::default();
+    let all = particles.len();
+    // in whole numbers: a site stays if a further one of the wanted particles falls to it
+    let before = |site: usize| (site as u128 * number.min(all) as u128 / all.max(1) as u128) as usize;
+    for site in (0..all).filter(|&site| before(site + 1) > before(site)) {
+        kept.push(particles.position.get(site), particles.velocity.get(site));
+    }
+    kept
+}
+
+/// The size of cells with a spacing about as given that fill a box; with a number of sites, not fewer than so many.
+fn fitted_to(size: DVec3, spacing: f64, sites: Option<f64>) -> DVec3 {
+    let layers = (size / spacing).to_array().map(f64::floor);
     let stretch = |counts: DVec3| {
         let cell = size / counts;
         cell.max_element() / cell.min_element()
     };
     let mut best: Option<(f64, DVec3)> = None;
-    for choice in 0..8 {
-        let pick = |axis: usize| if choice >> axis & 1 == 0 { layers[axis].0 } else { layers[axis].1 };
+    for choice in 0..64 {
+        // from one layer fewer to two more
+        let pick = |axis: usize| (layers[axis] + f64::from(choice >> (2 * axis) & 3) - 1.0).max(1.0);
         let counts = DVec3::new(pick(0), pick(1), pick(2));
         let cells = counts.element_product();
-        let excess = match number {
-            Some(number) if cells < number as f64 => continue,
-            Some(number) => cells / number as f64,
+        let excess = match sites {
+            Some(sites) if cells < sites * (1.0 - 1e-9) => continue,
+            Some(sites) => VACANCIES * (cells / sites).ln(),
             // as near as may be to the spacing that is asked for
-            None => (size.element_product() / cells / spacing.powi(3)).ln().abs().exp(),
+            None => (size.element_product() / cells / spacing.powi(3)).ln().abs(),
         };
-        let badness = stretch(counts).ln() + excess.ln();
+        let badness = stretch(counts).ln() + excess;
         if best.is_none_or(|(least, _)| badness < least) {
             best = Some((badness, counts));
         }
     }
-    size / best.map_or(DVec3::from_array(layers.map(|(_, most)| most)), |(_, counts)| counts)
+    size / best.map_or(DVec3::from_array(layers.map(|layers| layers + 2.0)), |(_, counts)| counts)
 }
 
 #[cfg(test)]
@@ -315,8 +354,8 @@ mod tests {
         assert_eq!(counts.round(), DVec3::new(20.0, 10.0, 5.0));
         assert!((counts - counts.round()).abs().max_element() < 1e-12);
         // enough layers for a number of particles
-        let cell = fitted_to(size, 0.05, Some(1001));
-        assert_eq!((size / cell).round(), DVec3::new(20.0, 10.0, 6.0));
+        let cell = fitted_to(size, 0.05, Some(1001.0));
+        assert_eq!((size / cell).round(), DVec3::new(21.0, 10.0, 5.0));
         // a box thinner than the spacing holds one layer
         assert_eq!(
             (DVec3::new(1.0, 1.0, 0.01) / fitted_to(DVec3::new(1.0, 1.0, 0.01), 0.1, None)).round().z,

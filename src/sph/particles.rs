@@ -119,17 +119,6 @@ impl Particles {
         self.pressure.push(0.0);
     }
 
-    /// Keeps the first `count` particles.
-    pub fn truncate(&mut self, count: usize) {
-        let Self { position, velocity, density, pressure, id } = self;
-        for column in [position, velocity].into_iter().flat_map(Vectors::components_mut) {
-            column.truncate(count);
-        }
-        density.truncate(count);
-        pressure.truncate(count);
-        id.truncate(count);
-    }
-
     /// Adds all particles of another fluid after these. Their ids continue those of this fluid.
     pub fn append(&mut self, other: &Self) {
         for i in 0..other.len() {

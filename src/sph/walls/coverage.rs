@@ -80,7 +80,7 @@ impl<F: Friction> Coverage<F> {
             spread: spread * Symmetric::square(face.normal),
             sweep: 0.0,
             barrier: Barrier { part: barrier, gradient: -barrier_area / h * face.normal, sweep: 0.0 },
-            friction: F::of_face(face, part, area / h, h),
+            friction: F::of_face(face, area / h, h),
         }
     }
 
@@ -350,7 +350,7 @@ mod tests {
         let viscosity = 0.3;
         let (drag, velocity) = (DVec3::new(0.4, -1.0, 2.0), DVec3::new(-0.7, 1.1, 0.2));
         let floor = Coverage::of_faces(&WALL, &Faces::from_slice(&[face(0.2 * H, DVec3::X)]));
-        let wanted = drag + floor.friction.complete(DVec3::ZERO, velocity, viscosity);
+        let wanted = floor.friction.complete(drag, velocity, viscosity);
         for [y, z] in [[0.15, 2.0], [0.4, 0.6], [0.3, 0.1]] {
             let sides = [face(y * H, DVec3::Y), face(z * H, DVec3::Z)].map(|side| {
                 let mut side = Coverage::of_faces(&WALL, &Faces::from_slice(&[side]));
