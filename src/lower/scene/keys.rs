@@ -22,6 +22,9 @@ const INNER: [(&str, &[&str]); 4] = [
     ("solver", &["precision"]),
 ];
 
+/// Keys of the scene that are often written in one of its blocks.
+const OUTER: [&str; 3] = ["walls", "gravity", "method"];
+
 /// The entries of a block. Unknown and repeated keys have been reported.
 pub(in crate::lower) struct Block<'a> {
     pub entries: &'a [Entry],
@@ -67,12 +70,17 @@ impl<'a> Lowering<'a> {
                 let inner = INNER
                     .iter()
                     .find(|(block, keys)| known.contains(block) && keys.contains(&key.text.as_str()));
+                let is_outer = OUTER.contains(&key.text.as_str());
                 self.report(match (elsewhere, inner) {
                     (Some(own), _) => diagnostic
                         .help(format!("`{}` is called `{own}` here", key.text))
                         .edit(key.span, &key.text, own, false),
                     (None, Some((block, _))) => diagnostic
                         .help(format!("it is a key of `{block}`: write `{block} {{ {}: … }}`", key.text)),
+                    (None, None) if is_outer => diagnostic.help(format!(
+                        "it is a key of the scene: write `{}: …` outside of this block",
+                        key.text
+                    )),
                     (None, None) => diagnostic,
                 });
             } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
