@@ -78,7 +78,7 @@ impl ColourMap {
     }
 
     /// The colour of a value on the map over the range `low` … `high`, all in the same unit. Values beyond the range have
-    /// the colours of its ends, all values that of the low end if the range is empty, and NaN is [`UNKNOWN`].
+    /// the colours of its ends, all values that of the low end if the range is empty, and NaN is a grey of its own.
     pub fn colour(self, value: f64, (low, high): (f64, f64)) -> Rgb {
         if value.is_nan() {
             return UNKNOWN;

@@ -25,7 +25,7 @@ pub fn write(mesh: &Mesh, unit: LengthUnit, out: &mut dyn Write) -> io::Result<(
     write_with(mesh, None, unit, out)
 }
 
-/// Writes several meshes as one, as [`write`] does. Each vertex also has the number of its mesh, from 0, in the array
+/// Writes several meshes as one, as [`write()`] does. Each vertex also has the number of its mesh, from 0, in the array
 /// `body`.
 ///
 /// # Errors
