@@ -142,10 +142,13 @@ fn distances(mesh: &Mesh, field: &dyn Field) -> (f64, f64) {
     let on_surface: Vec<DVec3> =
         mesh.positions.iter().zip(&is_cap).filter(|(_, cap)| !**cap).map(|(p, _)| *p).collect();
     let largest = on_surface.iter().fold(0.0, |most, p| f64::max(most, p.abs().max_element()));
+    let edges =
+        mesh.triangles.iter().map(|t| mesh.positions[t[0] as usize].distance(mesh.positions[t[1] as usize]));
+    let edge = edges.sum::<f64>() / mesh.triangles.len().max(1) as f64;
     let parts: Vec<(f64, f64)> = on_surface
         .par_chunks(BATCH)
         .map(|part| {
-            let distances = project(field, part, largest);
+            let distances = project(field, part, (largest, edge));
             distances.iter().fold((0.0, 0.0), |(max, sum), d| (f64::max(max, *d), sum + d * d))
         })
         .collect();
@@ -158,8 +161,9 @@ const NEWTON_STEPS: usize = 8;
 
 /// The distance of each point from ω = 0: the way that Newton's method along ∇ω takes to the surface. The
 /// distance within which ω changes sign is taken if it is shorter, or if Newton's method does not converge.
-/// `largest` is the largest coordinate of all points: a tip at the origin is no more exact than the rest.
-fn project(field: &dyn Field, points: &[DVec3], largest: f64) -> Vec<f64> {
+/// `largest` is the largest coordinate of all points: a tip at the origin is no more exact than the rest. `edge` is the
+/// mean length of the mesh's edges.
+fn project(field: &dyn Field, points: &[DVec3], (largest, edge): (f64, f64)) -> Vec<f64> {
     let mut at = points.to_vec();
     let mut directions = vec![DVec3::ZERO; points.len()];
     let mut gradients = GradientColumns::default();
@@ -192,27 +196,56 @@ fn project(field: &dyn Field, points: &[DVec3], largest: f64) -> Vec<f64> {
                 return way;
             }
             let newton = if converged { way } else { f64::INFINITY };
-            newton.min(sign_change_distance(field, points[i], directions[i], rounding))
+            newton.min(sign_change_distance(field, points[i], directions[i], (rounding, edge)))
         })
         .collect()
 }
 
-/// The least radius, up to a factor of two, at which ω has both signs on the axes and on the gradient's line
-/// through a point. This bound for the distance holds for flat and kinked fields too. It is infinite if there
-/// is no change of sign within the size of the coordinates, whose rounding is the least radius tried.
-fn sign_change_distance(field: &dyn Field, p: DVec3, direction: DVec3, rounding: f64) -> f64 {
-    let mut radius = rounding;
-    for _ in 0..52 {
-        let ways = [direction, DVec3::X, DVec3::Y, DVec3::Z];
-        let around = ways.into_iter().flat_map(|way| [p + radius * way, p - radius * way]);
-        let inside = around.map(|q| field.omega(q) > 0.0).filter(|inside| *inside).count();
-        let expected = 2 * ways.len();
-        if inside > 0 && inside < expected {
-            return radius;
-        }
-        radius *= 2.0;
+/// Radii are doubled so many times at once until ω changes sign, and one by one from the last at which it did not.
+const STRIDE: usize = 5;
+
+/// Doublings from the rounding of coordinates to a quarter of their size.
+const DOUBLINGS: usize = 50;
+
+/// Directions in which a surface is looked for that is said to be farther than an edge, from two edges inwards.
+const DIRECTIONS: usize = 200;
+const FINE_RADII: i32 = 8;
+
+/// A radius at which ω has both signs on the axes and on the gradient's line through a point: an upper bound for the
+/// distance, also of flat and kinked fields, and mostly the least one up to a factor of two. A vertex that would then
+/// be farther off than an edge lies near a surface that those lines miss, and many others are tried. It is infinite
+/// without a change of sign within the size of the coordinates, whose rounding is the least radius tried.
+fn sign_change_distance(field: &dyn Field, p: DVec3, direction: DVec3, (rounding, edge): (f64, f64)) -> f64 {
+    let ways = [direction, DVec3::X, DVec3::Y, DVec3::Z];
+    let changes = |doublings: usize| {
+        let radius = rounding * f64::exp2(doublings as f64);
+        let mut around = ways.into_iter().flat_map(|way| [p + radius * way, p - radius * way]);
+        let first = field.omega(p + radius * direction) > 0.0;
+        around.any(|q| (field.omega(q) > 0.0) != first).then_some(radius)
+    };
+    let coarse = (0..=DOUBLINGS).step_by(STRIDE).find_map(|count| Some((count, changes(count)?)));
+    let radius = coarse.map_or(f64::INFINITY, |(count, radius)| {
+        let finer = (count + 1).saturating_sub(STRIDE)..count;
+        finer.into_iter().find_map(changes).unwrap_or(radius)
+    });
+    if radius <= edge {
+        return radius;
     }
-    f64::INFINITY
+    let inside = field.omega(p) > 0.0;
+    let differs = |radius: f64| sphere(DIRECTIONS).any(|way| (field.omega(p + radius * way) > 0.0) != inside);
+    let finest = (0..FINE_RADII).map(|halvings| edge * f64::exp2(f64::from(1 - halvings)));
+    finest.filter(|&radius| differs(radius)).fold(radius, f64::min)
+}
+
+/// Directions spread evenly.
+fn sphere(count: usize) -> impl Iterator<Item = DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..count).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+        let (sin, cos) = (golden * i as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cos, r * sin, z)
+    })
 }
 
 #[cfg(test)]
@@ -281,7 +314,7 @@ mod tests {
                 omega: move |p: DVec3| omega(p.x - 1.0),
                 gradient: move |p: DVec3| slope(p.x - 1.0) * DVec3::X,
             };
-            project(&field, &[DVec3::new(1.001, 5.0, 7.0)], 7.0)[0]
+            project(&field, &[DVec3::new(1.001, 5.0, 7.0)], (7.0, 1.0))[0]
         };
         let plain = wall_at_one(|s| 50.0 * s, |_| 50.0);
         assert!((plain - 1e-3).abs() < 1e-12, "{plain}");
@@ -297,7 +330,16 @@ mod tests {
             omega: |p: DVec3| p.z * p.z - p.x * p.x - p.y * p.y,
             gradient: |p: DVec3| 2.0 * DVec3::new(-p.x, -p.y, p.z),
         };
-        let tip = project(&cone, &[DVec3::ZERO], 1.0)[0];
+        let tip = project(&cone, &[DVec3::ZERO], (1.0, 1.0))[0];
         assert!(tip < 1e-15, "{tip}");
+        // a ball beside the lines through the vertex, with a wall far behind it
+        let centre = DVec3::new(0.03, 0.02, 0.01);
+        let ball = Closures {
+            omega: |p: DVec3| f64::max(0.01 - p.distance(centre), p.x - 0.9),
+            gradient: |p: DVec3| if p.x < 0.5 { DVec3::Z } else { DVec3::X },
+        };
+        let beside = project(&ball, &[DVec3::ZERO], (1.0, 0.04))[0];
+        let truth = centre.length() - 0.01;
+        assert!((truth..2.0 * truth).contains(&beside), "{beside}");
     }
 }

@@ -232,6 +232,19 @@ impl Neighbours {
         }
     }
 
+    /// Whether one of some triangles, each of which was found or added where it is now, crosses any other.
+    pub fn any_crosses(&self, positions: &[DVec3], triangles: &[[u32; 3]], suspects: &[u32]) -> bool {
+        suspects.iter().any(|&s| {
+            let own = corners(positions, triangles[s as usize]);
+            let bounds = bounds_of(own);
+            bounds.is_finite()
+                && self.around(&bounds).any(|t| {
+                    let other = corners(positions, triangles[t as usize]);
+                    t != s && overlap(&bounds, &bounds_of(other)) && cross(&own, &other)
+                })
+        })
+    }
+
     /// The triangles that share a cube with a box, some of them more than once.
     pub fn around(&self, bounds: &Aabb) -> impl Iterator<Item = u32> + use<'_> {
         self.cubes.touched(bounds).flat_map(|cube| self.by_cube.get(&cube).into_iter().flatten().copied())

@@ -10,7 +10,7 @@ use smallvec::SmallVec;
 use super::super::{
     Grid, Mesh, MeshError, Work,
     collapse::{self, AtNode},
-    intersections::crossing_pairs,
+    intersections::{Cubes, Neighbours, bounds_of, corners, crossing_pairs},
     normals,
 };
 use super::Care;
@@ -33,7 +33,7 @@ const LEAST_MENDING: u64 = 20_000;
 const UNDOINGS: usize = 8;
 
 /// How often some of them are tried on the surface again, at most.
-const RESTORINGS: usize = 192;
+const RESTORINGS: usize = 10_000;
 
 /// A triangle that agrees less than this (cosine) with the surface at a corner is compared with others.
 const AGREEING: f64 = 0.3;
@@ -140,11 +140,18 @@ impl<'a> Draft<'a> {
     /// can be, and else each half of them.
     fn restore(&mut self, cuts: &BTreeMap<u32, Vertex>) {
         let mut beside: FxHashMap<u32, SmallVec<[u32; 8]>> = FxHashMap::default();
+        let mut touched = Vec::new();
         for (t, triangle) in (0..).zip(&self.triangles) {
-            for v in triangle.iter().filter(|v| cuts.contains_key(v)) {
-                beside.entry(*v).or_default().push(t);
-            }
+            let moved = triangle.iter().filter(|v| cuts.contains_key(v));
+            moved.clone().for_each(|v| beside.entry(*v).or_default().push(t));
+            touched.extend(moved.map(|_| t).next());
         }
+        let farthest = |most: f64, (&v, cut): (&u32, &Vertex)| {
+            most.max(self.vertices.positions[v as usize].distance(cut.position))
+        };
+        let margin = cuts.iter().fold(0.0, farthest);
+        let cubes = Cubes { size: self.size };
+        let mut near = Neighbours::find(&self.vertices.positions, &self.triangles, (&touched, margin), cubes);
         let all: Vec<u32> = cuts.keys().copied().collect();
         let mut waiting = vec![&all[..]];
         for _ in 0..RESTORINGS {
@@ -155,7 +162,11 @@ impl<'a> Draft<'a> {
                 part.iter().filter_map(|v| beside.get(v)).flatten().copied().collect();
             suspects.sort_unstable();
             suspects.dedup();
-            if !crossing_pairs(&self.vertices.positions, &self.triangles, &suspects, self.size).is_empty() {
+            let (positions, triangles) = (&self.vertices.positions, &self.triangles);
+            for &t in &suspects {
+                near.add(t, &bounds_of(corners(positions, triangles[t as usize])));
+            }
+            if near.any_crosses(positions, triangles, &suspects) {
                 part.iter().zip(before).for_each(|(&v, vertex)| self.vertices.set(v, vertex));
                 if part.len() > 1 {
                     let (low, high) = part.split_at(part.len() / 2);

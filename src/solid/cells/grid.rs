@@ -149,7 +149,14 @@ impl Cells {
     /// Divides a box; `margin` is positive.
     pub fn new(parts: &LeafTree, domain: Aabb, margin: f64) -> Self {
         let (mut cells, level) = Self::begin(parts, domain, margin);
-        cells.refine(level, parts, margin, |_| false);
+        cells.refine(level, parts, (margin, MAX_DEPTH), |_| false);
+        cells
+    }
+
+    /// The same box with another margin, divided no deeper than the flat grid.
+    pub fn with_margin(&self, parts: &LeafTree, margin: f64) -> Self {
+        let (mut cells, level) = Self::begin(parts, self.domain, margin);
+        cells.refine(level, parts, (margin, DEPTH), |_| false);
         cells
     }
 
@@ -157,8 +164,9 @@ impl Cells {
     /// left may change: those in which a leaf that moves matters at some time.
     pub fn lasting(parts: &LeafTree, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
         let (mut cells, level) = Self::begin(parts, domain, margin);
-        let left = cells
-            .refine(level, parts, margin, |cell| cell.depth == RESTLESS_DEPTH && cell.is_restless(parts));
+        let left = cells.refine(level, parts, (margin, MAX_DEPTH), |cell| {
+            cell.depth == RESTLESS_DEPTH && cell.is_restless(parts)
+        });
         (cells, left)
     }
 
@@ -166,7 +174,7 @@ impl Cells {
     /// time.
     pub fn completed(&self, left: &[Pending], parts: &LeafTree, margin: f64) -> Self {
         let mut cells = self.clone();
-        cells.refine(left.to_vec(), parts, margin, |_| false);
+        cells.refine(left.to_vec(), parts, (margin, MAX_DEPTH), |_| false);
         cells
     }
 
@@ -193,12 +201,13 @@ impl Cells {
         (cells, level)
     }
 
-    /// Divides cells of one level until little is left in them; gives back those that `leave` says.
+    /// Divides cells of one level until little is left in them, or the deepest level is reached; gives back those
+    /// that `leave` says.
     fn refine(
         &mut self,
         mut level: Vec<Pending>,
         parts: &LeafTree,
-        margin: f64,
+        (margin, deepest): (f64, u32),
         leave: impl Fn(&Pending) -> bool,
     ) -> Vec<Pending> {
         let domain = self.domain;
@@ -215,7 +224,7 @@ impl Cells {
             let Some(depth) = level.first().map(|cell: &Pending| cell.depth) else { return all_left };
             let leaves: Vec<usize> = level.iter().map(|cell| leaf_count(&cell.words)).collect();
             spent += 8 * leaves.iter().sum::<usize>();
-            if spent > MOST_RANGES || depth >= MAX_DEPTH {
+            if spent > MOST_RANGES || depth >= deepest {
                 level.into_iter().for_each(|cell| self.finish(cell, &mut known));
                 return all_left;
             }

@@ -8,7 +8,7 @@
 //! jumps between cells. A map with a reach also answers for distance, normal and curvature up to that
 //! distance from the surface.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
@@ -33,6 +33,10 @@ const SHORTEST_RUN: usize = 4;
 /// Cells that are looked at one by one for a range; for larger boxes the twin answers.
 const MOST_TOUCHED: usize = 4096;
 
+/// How far off the surface, in longest sides of the flat grid's cells, gradients come from the leaves nearby and not
+/// from the twin, which asks all of them. Meshes are mended by gradients within one of their own cells.
+const AROUND: f64 = 1.5;
+
 /// What a map knows of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
@@ -50,6 +54,8 @@ pub struct CellMap {
     twin: Twin,
     parts: Arc<LeafTree>,
     cells: Arc<Cells>,
+    /// The same box with what decides within [`AROUND`] of a cell, made when a gradient is asked for off the surface.
+    around: OnceLock<Cells>,
     reach: f64,
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
     /// still right.
@@ -117,7 +123,8 @@ impl CellMap {
     /// A map of cells that are right for the solid's stretch of time, and were grown by [`margin`].
     pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
         let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
-        Some(Self { solid: solid.clone(), twin: solid.twin(), parts, cells, reach, margin })
+        let (solid, twin, around) = (solid.clone(), solid.twin(), OnceLock::new());
+        Some(Self { solid, twin, parts, cells, around, reach, margin })
     }
 
     /// How the box was divided.
@@ -198,6 +205,19 @@ impl CellMap {
     #[inline]
     fn run(&self, program: u32, p: DVec3) -> (f64, (u32, bool)) {
         self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
+    }
+
+    /// What decides near a point that is in no cell of a surface; `None` far from all surfaces and outside the box.
+    fn program_around(&self, p: DVec3) -> Option<(&[u32], u32)> {
+        if self.solid.moves() {
+            return None; // a map of its own for each stretch of time does not pay
+        }
+        let reach = AROUND * self.cells.domain.size().max_element() / f64::from(SIDE);
+        let around = self.around.get_or_init(|| self.cells.with_margin(&self.parts, reach.max(self.margin)));
+        match around.find(p)?.cell {
+            Cell::Near(program) => Some((&around.programs, program)),
+            Cell::Fluid | Cell::Inside | Cell::Divided(_) => None,
+        }
     }
 
     /// The value of a program at up to [`RUN`] points.
@@ -377,10 +397,13 @@ impl Field for CellMap {
     }
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let Some(Found { cell: Cell::Near(program), .. }) = self.cells.find(p) else {
-            return self.twin.omega_grad(p);
+        let near = match self.cells.find(p).map(|found| found.cell) {
+            Some(Cell::Near(program)) => Some((&self.cells.programs[..], program)),
+            Some(_) => self.program_around(p),
+            None => None,
         };
-        let (value, (leaf, negated)) = self.run(program, p);
+        let Some((words, program)) = near else { return self.twin.omega_grad(p) };
+        let (value, (leaf, negated)) = self.parts.leaves.decide(words, &mut (program as usize), p);
         let gradient = self.parts.leaves.gradient(leaf, p).1;
         (value, if negated { -gradient } else { gradient })
     }
