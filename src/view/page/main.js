@@ -304,10 +304,12 @@ class Viewer {
       const context = canvas.getContext("2d");
       const recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: "video/webm", videoBitsPerSecond: 12e6 });
       const parts = [];
-      recorder.ondataavailable = ({ data }) => parts.push(data);
+      const film = { recorder, bytes: 0 };
+      recorder.ondataavailable = ({ data }) => { parts.push(data); film.bytes += data.size; };
       recorder.onstop = () => this.save(new Blob(parts, { type: "video/webm" }), "webm");
-      recorder.start();
-      this.film = { recorder, add: (...layers) => layers.forEach((layer) => context.drawImage(layer, 0, 0)) };
+      // in pieces, so that a slow machine has not encoded all of it at the end
+      recorder.start(250);
+      this.film = Object.assign(film, { add: (...layers) => layers.forEach((layer) => context.drawImage(layer, 0, 0)) });
       this.changed();
     }
     byId("record").setAttribute("aria-pressed", String(!!this.film));

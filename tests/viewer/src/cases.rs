@@ -179,8 +179,8 @@ fn handed_over(room: &mut Room, begin: &str, end: &str) -> (String, f64) {
     );
     room.browser.key(begin);
     if !end.is_empty() {
-        // a second of video
-        std::thread::sleep(Duration::from_secs(1));
+        // how much a second of video is depends on the machine
+        room.browser.wait_for("viewer.film.bytes > 10000");
         room.browser.key(end);
     }
     room.browser.wait_for("window.handed");
