@@ -7,10 +7,10 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
-pub(super) use super::values::CutFlag;
+pub(super) use super::values::{CameraFlag, CutFlag};
 use super::values::{
-    Definition, Deny, Frames, Tolerance, aabb, count, cut, definition, deny, direction, frames, length,
-    plane, point, seconds, threads, tolerance, window,
+    Definition, Deny, Frames, Tolerance, aabb, camera, count, cut, definition, deny, frames, length, plane,
+    point, seconds, threads, tolerance, window,
 };
 use glam::DVec3;
 use rfm::geom::Aabb;
@@ -383,9 +383,10 @@ pub(super) struct Run {
     /// Refuse scenes with more obstacles than this: many parts are better joined with `or` into one solid
     #[arg(long, value_name = "N", default_value_t = 500)]
     pub most_obstacles: usize,
-    /// Direction from the scene to the eye in pictures [default: the scene's, or 0.48,-1,0.46]
-    #[arg(long, help_heading = "Pictures", value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
-    pub camera: Option<DVec3>,
+    /// Direction from the scene to the eye in pictures; also as the viewer copies it [default: the scene's, or
+    /// 0.48,-1,0.46]
+    #[arg(long, help_heading = "Pictures", value_name = "X,Y,Z", value_parser = camera, allow_hyphen_values = true)]
+    pub camera: Option<CameraFlag>,
     /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of the
     /// fluid, `none` none [default: the scene's, or auto]
     #[arg(long, help_heading = "Pictures", value_name = "AXIS=VALUE|auto|none", value_parser = cut)]
@@ -454,7 +455,8 @@ pub(super) struct View {
 #[command(after_help = "A solid is judged by exact arithmetic:  rfm report examples/pawn.rfm -o pawn.svg\n\
                         A scene by its `truth`, at growing resolution:\n  \
                         rfm report examples/validation/free_fall.rfm:free_fall --particles 125,1000 \
-                        --methods wcsph,dfsph -o fall.svg")]
+                        --methods wcsph,dfsph -o fall.svg\n\
+                        All in a page for others:            rfm report examples/pawn.rfm --html pawn.html")]
 pub(super) struct Report {
     /// The file, with the name of a solid or a scene if it has several; `-` is standard input
     #[arg(value_name = "FILE[:NAME]")]
@@ -468,6 +470,9 @@ pub(super) struct Report {
     /// Plot the error of meshes against their cells: .svg or .png
     #[arg(long, value_name = "FILE")]
     pub mesh_plot: Option<PathBuf>,
+    /// Write all of it as one page: tables, plots, pictures, the files, the machine and the command. It needs no network
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Cells along the longest side of the finest mesh; the others have half as many each
     #[arg(long, value_name = "N", default_value_t = 128)]
     pub mesh_cells: usize,

@@ -8,6 +8,13 @@ use super::failure::Failure;
 use super::output::Shown;
 use super::values::Frames;
 use rfm::fluid_surface::{FrameEntry, read_collection};
+use rfm::sph::Probe;
+
+/// The folder, within that of a run, of the tables that every run writes.
+pub(super) const HISTORY: &str = "history";
+
+/// These tables: `energy.csv` and `audit.csv`.
+pub(super) const OWN_TABLES: [(&str, Probe); 2] = [("energy", Probe::Energy), ("audit", Probe::Audit)];
 
 /// The part of a run's `summary.json` that other commands need.
 #[derive(Debug, Clone, Deserialize)]

@@ -22,6 +22,24 @@ pub(super) enum Drawn {
     Hidden,
 }
 
+/// From where a picture of a box is seen: the whole of it from the front, right and above unless stated otherwise.
+pub(super) fn camera(
+    domain: &Aabb,
+    towards_eye: Option<DVec3>,
+    (look_at, zoom): (Option<DVec3>, Option<f64>),
+    size: (u32, u32),
+) -> Result<Camera, Failure> {
+    let camera = match towards_eye {
+        Some(towards_eye) => Camera::new(domain, towards_eye, size),
+        None => Camera::three_quarter(domain, size),
+    };
+    let camera = camera.map_err(Failure::usage)?;
+    Ok(match (look_at, zoom) {
+        (None, None) => camera,
+        (at, zoom) => camera.aimed(at.unwrap_or(domain.centre()), zoom.unwrap_or(1.0)),
+    })
+}
+
 /// The scene of a picture without its particles: the box, the obstacles, the legend.
 pub(super) fn backdrop<'a>(
     camera: &Camera,

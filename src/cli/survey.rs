@@ -20,8 +20,15 @@ pub(super) struct Survey {
     pub bounds: Aabb,
     /// Name and range of each array that all frames have.
     pub arrays: Vec<(String, Levels)>,
+    /// The range of all components of the velocity, with 0 in its middle; `None` if a frame has no velocities.
+    pub velocity: Option<Levels>,
     /// The number of particles of all frames together.
     pub particles: usize,
+}
+
+/// Whether an array is that of the velocities.
+pub(super) fn is_velocity(array: &PointArray) -> bool {
+    array.components == 3 && array.name == "velocity"
 }
 
 impl Survey {
@@ -39,11 +46,16 @@ impl Survey {
             })
             .collect();
         let mut surveys = surveys?.into_iter();
-        let mut all =
-            surveys.next().unwrap_or(Self { bounds: Aabb::EMPTY, arrays: Vec::new(), particles: 0 });
+        let mut all = surveys.next().unwrap_or(Self {
+            bounds: Aabb::EMPTY,
+            arrays: Vec::new(),
+            velocity: None,
+            particles: 0,
+        });
         for next in surveys {
             all.bounds = all.bounds.union(&next.bounds);
             all.particles += next.particles;
+            all.velocity = all.velocity.zip(next.velocity).map(|(range, other)| range.with(other));
             all.arrays.retain_mut(|(name, range)| {
                 let same = next.arrays.iter().find(|(other, _)| other == name);
                 same.inspect(|(_, other)| *range = range.with(*other)).is_some()
@@ -67,6 +79,11 @@ impl Survey {
         Self {
             bounds: finite.fold(Aabb::EMPTY, |all, p| all.including(*p)),
             arrays: scalars.map(range).collect(),
+            velocity: arrays.iter().find(|array| is_velocity(array)).map(|array| {
+                let sizes = array.values.iter().map(|component| component.abs());
+                let largest = Levels::of_most(sizes, STRAY).map_or(0.0, |range| range.high);
+                Levels { low: -largest, high: largest }
+            }),
             particles: points.len(),
         }
     }

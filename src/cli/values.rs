@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use glam::DVec3;
 use rfm::diagnostic::{Diagnostic, explain};
 use rfm::geom::Aabb;
+use rfm::lower::Picture;
 use rfm::quantity::{Dimension, parse_quantity};
 use rfm::slice::{Axis, Plane};
 
@@ -158,17 +159,59 @@ pub(super) fn point(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text).map(DVec3::from_array)
 }
 
-/// Three numbers that are not all zero; also as a scene states them: `camera: [0.5, -1, 0.4]`.
-pub(super) fn direction(text: &str) -> Result<DVec3, String> {
-    let within = text.split_once('[').and_then(|(before, rest)| Some((before, rest.split_once(']')?.0)));
-    let is_key = |before: &str| before.trim().is_empty() || before.trim().ends_with("camera:");
-    let numbers = within.filter(|(before, _)| is_key(before)).map_or(text, |(_, numbers)| numbers);
-    let found = point(numbers)?;
-    if found.is_finite() && found != DVec3::ZERO {
-        Ok(found)
+/// From where a picture is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct CameraFlag {
+    /// The direction to the eye.
+    pub towards_eye: DVec3,
+    pub look_at: Option<DVec3>,
+    pub zoom: Option<f64>,
+}
+
+/// Three numbers that are not all zero; or what a scene states and the viewer copies:
+/// `picture { camera: [0.5, -1, 0.4], look_at: [1, 1, 0.5], zoom: 2 }`.
+pub(super) fn camera(text: &str) -> Result<CameraFlag, String> {
+    let bare = |text: &str| {
+        let text = text.trim();
+        point(text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(text))
+    };
+    let (mut towards_eye, mut look_at, mut zoomed) = (None, None, None);
+    if text.contains(':') {
+        let entries = text.trim().strip_prefix("picture").map_or(text, str::trim);
+        let entries = entries.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')).unwrap_or(entries);
+        let mut rest = entries.trim();
+        while let Some((key, after)) = rest.split_once(':') {
+            let after = after.trim_start();
+            let end = match after.strip_prefix('[') {
+                Some(vector) => vector.find(']').ok_or("`[` is not closed")? + 2,
+                None => after.find(',').unwrap_or(after.len()),
+            };
+            let (value, next) = after.split_at(end);
+            match key.trim() {
+                "camera" => towards_eye = Some(bare(value)?),
+                "look_at" => look_at = Some(bare(value)?),
+                "zoom" => zoomed = Some(zoom(value)?),
+                other => {
+                    return Err(format!("`{other}` is no key of a camera; expected camera, look_at or zoom"));
+                }
+            }
+            rest = next.trim_start().strip_prefix(',').unwrap_or(next).trim_start();
+        }
+        if !rest.trim().is_empty() {
+            return Err(format!("`{}` has no key; expected camera, look_at or zoom", rest.trim()));
+        }
     } else {
-        Err("the direction has no length".into())
+        towards_eye = Some(bare(text)?);
     }
+    let towards_eye =
+        towards_eye.ok_or("the direction to the eye is missing, as in camera: [0.5, -1, 0.4]")?;
+    if !towards_eye.is_finite() || towards_eye == DVec3::ZERO {
+        return Err("the direction has no length".into());
+    }
+    if look_at.is_some_and(|at: DVec3| !at.is_finite()) {
+        return Err("`look_at` must be finite".into());
+    }
+    Ok(CameraFlag { towards_eye, look_at, zoom: zoomed })
 }
 
 /// Width and height in pixels: `1280x720`.
@@ -182,8 +225,10 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
 
 /// How many times as large: above 0.
 pub(super) fn zoom(text: &str) -> Result<f64, String> {
-    let found = text.trim().parse().ok().filter(|zoom| (0.05..=20.0).contains(zoom));
-    found.ok_or_else(|| "expected a number from 0.05 to 20".to_string())
+    let found = text.trim().parse().ok().filter(|zoom| Picture::ZOOMS.contains(zoom));
+    found.ok_or_else(|| {
+        format!("expected a number from {} to {}", Picture::ZOOMS.start(), Picture::ZOOMS.end())
+    })
 }
 
 /// Two numbers in SI units, the lower one first: `0..2.5`.
@@ -277,13 +322,27 @@ mod tests {
     }
 
     #[test]
-    fn directions_are_read_as_the_viewer_copies_them() {
-        let expected = Ok(DVec3::new(0.42, -0.9, 0.1));
+    fn cameras_are_read_as_the_viewer_copies_them() {
+        let towards_eye = DVec3::new(0.42, -0.9, 0.1);
+        let expected = Ok(CameraFlag { towards_eye, look_at: None, zoom: None });
         for text in ["0.42,-0.9,0.1", "[0.42, -0.9, 0.1]", "picture { camera: [0.42, -0.9, 0.1] }"] {
-            assert_eq!(direction(text), expected, "{text}");
+            assert_eq!(camera(text), expected, "{text}");
         }
-        for text in ["0,0,0", "cut: [1, 0, 0]", "camera: [1, 0]", "camera: [1, 0, 0"] {
-            assert!(direction(text).is_err(), "{text}");
+        let whole = "picture { camera: [0.42, -0.9, 0.1], look_at: [1, 2, -3], zoom: 2.5 }";
+        let look_at = Some(DVec3::new(1.0, 2.0, -3.0));
+        assert_eq!(camera(whole), Ok(CameraFlag { towards_eye, look_at, zoom: Some(2.5) }));
+        for text in [
+            "0,0,0",
+            "cut: [1, 0, 0]",
+            "camera: [1, 0]",
+            "camera: [1, 0, 0",
+            "look_at: [1, 0, 0]",
+            "camera: [1, 0, 0], zoom: 0",
+            "camera: [1, 0, 0], look_at: 3",
+            "camera: [1, 0, 0], look_at: [nan, 0, 0]",
+            "camera: [1, 0, 0] zoom",
+        ] {
+            assert!(camera(text).is_err(), "{text}");
         }
     }
 

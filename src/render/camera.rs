@@ -199,6 +199,16 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_is_as_high_as_the_viewer_takes_it_to_be() {
+        let camera = Camera::new(&cube(), DVec3::new(0.6, -0.64, 0.48), (1280, 720)).unwrap();
+        let (low, high) = camera.room();
+        let nearness = camera.look(DVec3::splat(1.5)).unwrap().nearness;
+        let height = (high.y - low.y) / camera.magnification(nearness);
+        // tests/viewer asks the page for the same figure
+        assert!((height - 4.692_309_429_472).abs() < 1e-6, "{height}");
+    }
+
+    #[test]
     fn odd_boxes_and_views_are_errors_or_drawn() {
         let size = Camera::SIZE;
         assert!(matches!(Camera::three_quarter(&Aabb::EMPTY, size), Err(RenderError::Bounds(_))));

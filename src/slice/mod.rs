@@ -38,6 +38,11 @@ use crate::field::Field;
 /// The number of samples along the longer side that makes a plot smooth at the printed size.
 pub const DEFAULT_SAMPLES: usize = 320;
 
+/// The levels between the bands of colours in a plot of samples, ascending; 0 is one of them.
+pub fn levels(samples: &Samples) -> Vec<f64> {
+    colour::Scale::for_samples(samples).levels().to_vec()
+}
+
 /// Writes a slice as an SVG document, with `samples` samples along the window's longer side. `name` is part
 /// of the title.
 ///

@@ -385,7 +385,10 @@ impl Audit {
             largest,
             self.max_speed,
         ];
-        numbers.into_iter().chain(told).collect()
+        let now = self.now;
+        let Compression { mean, p99, largest } = now.compression;
+        let now = [now.excess, now.volume_change, mean, p99, largest, now.speed];
+        numbers.into_iter().chain(now).chain(told).collect()
     }
 
     /// Takes up the audit of a checkpoint. A memory of another length is ignored.
@@ -406,9 +409,15 @@ impl Audit {
                 p99,
                 largest,
                 max_speed,
+                excess_now,
+                volume_now,
+                mean_now,
+                p99_now,
+                largest_now,
+                speed,
                 told @ ..,
             ],
-        ) = <[f64; 17]>::try_from(memory)
+        ) = <[f64; 23]>::try_from(memory)
         else {
             return;
         };
@@ -424,7 +433,12 @@ impl Audit {
             volume_change,
             compression: Compression { mean, p99, largest },
             max_speed,
-            now: self.now,
+            now: Instant {
+                excess: excess_now,
+                volume_change: volume_now,
+                compression: Compression { mean: mean_now, p99: p99_now, largest: largest_now },
+                speed,
+            },
             told: told.map(|told| told != 0.0),
         };
     }

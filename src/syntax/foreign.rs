@@ -209,6 +209,8 @@ pub fn key(word: &str) -> Option<&'static str> {
         "region" | "geometry" | "block" => "shape",
         "sensor" | "gauge" | "measure" => "probe",
         "eye" | "view" | "look_from" | "viewpoint" => "camera",
+        "target" | "lookat" | "focus" => "look_at",
+        "magnification" | "magnify" => "zoom",
         "section" | "clip" | "slice" | "opening" => "cut",
         "invisible" | "hidden" | "without" => "hide",
         "render" | "image" | "pictures" | "plot" => "picture",

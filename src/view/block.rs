@@ -137,6 +137,36 @@ pub fn pack_mesh(mesh: &Mesh, run: u64) -> Vec<u8> {
     out
 }
 
+/// What the head of a slice says: ω on a grid of nodes in a plane across an axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SliceHead {
+    /// The number of the axis that the plane lies across.
+    pub axis: usize,
+    /// The plane's coordinate on it, m.
+    pub at: f64,
+    /// Nodes from left to right: along y where the axis is x, along x otherwise.
+    pub columns: usize,
+    /// Nodes upwards: along y where the axis is z, along z otherwise.
+    pub rows: usize,
+    /// The lower left node in the plane, m.
+    pub min: [f64; 2],
+    /// The upper right node, m.
+    pub max: [f64; 2],
+    /// The levels of the isolines, ascending; 0 is one of them.
+    pub levels: Vec<f64>,
+    /// The number of the run that the slice belongs to.
+    pub run: u64,
+}
+
+/// The block of a slice: ω at its nodes in single precision, row by row from below.
+pub fn pack_slice(head: &SliceHead, omega: &[f64]) -> Vec<u8> {
+    let mut out = begin(&Head { kind: "slice", count: omega.len(), follows: false, rest: head });
+    for byte in 0..4 {
+        out.extend(omega.iter().map(|w| (*w as f32).to_le_bytes()[byte]));
+    }
+    out
+}
+
 fn begin(head: &impl Serialize) -> Vec<u8> {
     // numbers, names and texts: all of it has a form in JSON
     let head = serde_json::to_vec(head).unwrap_or_default();

@@ -1,8 +1,8 @@
 //! The viewer's page: a document for a browser that shows particles, obstacles and their box, and the form in which
-//! it is given frames and meshes.
+//! it is given frames, meshes and slices.
 //!
-//! [`Page`] writes one self-contained file, which needs neither a server nor a network. [`pack_frame`] and
-//! [`pack_mesh`] make the blocks that such a file holds and that a server sends. A block is the length of its head
+//! [`Page`] writes one self-contained file, which needs neither a server nor a network. [`pack_frame`],
+//! [`pack_mesh`] and [`pack_slice`] make the blocks that such a file holds and that a server sends. A block is the length of its head
 //! (32 bits, little-endian), the head (JSON), and planes of bytes.
 //!
 //! Positions have 16 bits for each coordinate in a box ([`Lattice`]), arrays 8 bits ([`Levels`]). A plane holds one
@@ -15,7 +15,7 @@ mod levels;
 mod page;
 mod setting;
 
-pub use block::{Frame, FrameHead, pack_frame, pack_mesh};
+pub use block::{Frame, FrameHead, SliceHead, pack_frame, pack_mesh, pack_slice};
 pub use levels::{Lattice, Levels, UNKNOWN_LEVEL};
 pub use page::{Page, document, solid};
-pub use setting::{Array, Column, Corners, Param, Plot, Setting};
+pub use setting::{Array, Column, Corners, Param, Plot, Setting, VELOCITY};

@@ -21,6 +21,8 @@ const PROGRAM: &[&str] = &[
     include_str!("page/colours.js"),
     include_str!("page/blocks.js"),
     include_str!("page/shaders.js"),
+    include_str!("page/slice.js"),
+    include_str!("page/motion.js"),
     include_str!("page/scene.js"),
     include_str!("page/camera.js"),
     include_str!("page/overlay.js"),
@@ -108,7 +110,7 @@ pub fn solid(title: &str, mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         arrays: Vec::new(),
         gravity: None,
         params: Vec::new(),
-        plots: Vec::new(),
+        plots: None,
     };
     let mut page = Page::begin(out, &setting)?;
     page.block(&pack_mesh(&split_creases(mesh), 0))?;

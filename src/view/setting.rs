@@ -27,8 +27,8 @@ pub struct Setting {
     pub gravity: Option<[f64; 3]>,
     /// The params that a live page may change.
     pub params: Vec<Param>,
-    /// Quantities over time.
-    pub plots: Vec<Plot>,
+    /// Quantities over time; `None` if they are told apart from the rest.
+    pub plots: Option<Vec<Plot>>,
 }
 
 /// The lowest and the highest corner of a box.
@@ -57,11 +57,15 @@ pub struct Array {
     pub range: Option<Levels>,
 }
 
+/// The names of the arrays that a page takes as the components of the velocity.
+pub const VELOCITY: [&str; 3] = ["velocity x", "velocity y", "velocity z"];
+
 impl Array {
     /// An array of a run by its name.
     pub fn named(name: &str, range: Option<Levels>) -> Self {
         let unit = match name {
             "speed" => "m/s",
+            name if VELOCITY.contains(&name) => "m/s",
             "density" => "kg/m³",
             "pressure" => "Pa",
             _ => "",
@@ -90,8 +94,10 @@ pub struct Param {
 /// Quantities over time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Plot {
-    /// What is shown, with its unit.
+    /// What is shown.
     pub name: String,
+    /// The unit of all columns.
+    pub unit: String,
     /// The instants, s.
     pub times: Vec<f64>,
     /// The quantities.

@@ -450,6 +450,7 @@ fn runs_are_the_same_for_any_number_of_threads() {
     let expected = [
         "checkpoints",
         "frames",
+        "history",
         "obstacle.stl",
         "obstacle.vtp",
         "particles.pvd",
@@ -476,7 +477,12 @@ fn run_defaults_and_flags() {
     let none = rfm(folder.path(), &["run", "drop.rfm", "--steps", "0", "--no-frames", "--json", "-o", "z"])
         .expect(0);
     assert_eq!(none.json()["steps"], 0);
-    assert_eq!(files(&folder.path().join("z")), ["summary.json"]);
+    assert_eq!(files(&folder.path().join("z")), ["history", "summary.json"]);
+    // the start alone: a header and a line for each table
+    for table in ["energy", "audit"] {
+        let text = std::fs::read_to_string(folder.path().join(format!("z/history/{table}.csv"))).unwrap();
+        assert_eq!(text.lines().count(), 2, "{table}: {text}");
+    }
 }
 
 #[test]
@@ -508,7 +514,7 @@ fn a_run_leaves_nothing_of_the_one_before() {
     assert!(refused.contains("holds a run already (scene drop, 0.010 s, 3 frames)"), "{refused}");
     assert_eq!([files(&here.join("out")), files(&here.join("out/frames"))], before);
     run(&["--force", "--no-frames", "--steps", "1"]).expect(0);
-    assert_eq!(files(&here.join("out")), ["checkpoints", "frames", "pictures", "summary.json"]);
+    assert_eq!(files(&here.join("out")), ["checkpoints", "frames", "history", "pictures", "summary.json"]);
     assert_eq!(files(&here.join("out/frames")), ["notes.txt"]);
     assert!(files(&here.join("out/pictures")).is_empty());
 }

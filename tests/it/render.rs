@@ -162,6 +162,31 @@ fn obstacles_are_hidden_by_name_and_cut() {
     };
     assert!(of("0.1,-1,0.3") == of("picture { camera: [0.1, -1, 0.3] }"));
     assert!(of("0.1,-1,0.3") != of("1,-1,0.3"));
+    // and with the place in the middle and the size; flags go before them
+    let whole = "picture { camera: [0.1, -1, 0.3], look_at: [0.5, 0.5, 0.25], zoom: 2 }";
+    let aimed = of(whole);
+    assert!(aimed != of("0.1,-1,0.3"));
+    let by = |flags: &[&str]| {
+        let first = ["render", "drop.out", "-o", "two.png", "--frames", "0"];
+        rfm(here, &[&first[..], flags].concat()).expect(0);
+        std::fs::read(here.join("two.png")).unwrap()
+    };
+    assert!(aimed == by(&["--camera", "0.1,-1,0.3", "--look-at", "0.5,0.5,0.25", "--zoom", "2"]));
+    assert!(by(&["--camera", whole, "--zoom", "1", "--look-at", "0.5,0.5,0.75"]) != aimed);
+    // a scene states the same keys for the pictures of its run
+    let file = std::fs::read_to_string(here.join("drop.rfm")).unwrap();
+    std::fs::create_dir(here.join("seen")).unwrap();
+    let stated = file.replacen("fluid", &format!("{whole}\n  fluid"), 1);
+    std::fs::write(here.join("seen/drop.rfm"), stated).unwrap();
+    let run = |file: &str, out: &str, flags: &[&str]| {
+        let first = ["run", file, "-o", out, "--steps", "1"];
+        rfm(here, &[&first[..], flags].concat()).expect(0);
+        std::fs::read(here.join(out).join("pictures/frame_000000.png")).unwrap()
+    };
+    assert!(run("seen/drop.rfm", "a", &[]) == run("drop.rfm", "b", &["--camera", whole]));
+    assert!(
+        run("seen/drop.rfm", "c", &["--camera", "0.1,-1,0.3"]) != run("drop.rfm", "d", &["--camera", whole])
+    );
 }
 
 #[test]
@@ -184,12 +209,11 @@ fn refusals_say_why() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     run(here);
-    let cases: [(&[&str], &str); 19] = [
+    let cases: [(&[&str], &str); 18] = [
         (&["drop.out", "-o", "a.jpg"], ".jpg is none of .png .gif .apng .mp4 .webm"),
         (&["drop.out", "-o", "a.png"], "`a.png` is one picture, and there are 6 frames"),
         (&["drop.out", "-o", "a.gif", "--fps", "60"], "50 is the most"),
         (&["drop.out", "--fps", "30"], "--fps is for films"),
-        (&["drop.out", "-o", "a.mp4", "--size", "641x480"], "both must be even"),
         (&["drop.out", "--size", "640"], "expected WIDTHxHEIGHT"),
         (&["drop.out", "--range", "3..1"], "the first number must be the lower one"),
         (&["drop.out", "--times", "5..6"], "no frame lies there; they go from 0 s to 0.1"),
@@ -234,11 +258,12 @@ fn videos_are_handed_to_the_program_of_the_system() {
     run(here);
     let tools = here.join("tools");
     std::fs::create_dir(&tools).unwrap();
-    let render = || {
+    let of_size = |size: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_rfm"));
-        command.args(["render", "drop.out", "-o", "a.mp4", "--size", "64x48", "--fps", "10"]);
+        command.args(["render", "drop.out", "-o", "a.mp4", "--size", size, "--fps", "10"]);
         command.current_dir(here).env("PATH", &tools).output().unwrap()
     };
+    let render = || of_size("64x48");
     let outcome = render();
     let text = String::from_utf8_lossy(&outcome.stderr).into_owned();
     assert!(outcome.status.code() == Some(2) && text.contains("write .gif or .apng"), "{text}");
@@ -255,6 +280,13 @@ fn videos_are_handed_to_the_program_of_the_system() {
     let told = std::fs::read_to_string(here.join("told")).unwrap();
     assert!(told.contains("-s 64x48 -r 10 -i pipe:0") && told.contains("libx264"), "{told}");
     assert_eq!(std::fs::read_to_string(here.join("a.mp4")).unwrap(), "film\n");
+    assert!(!told.contains("pad="), "{told}");
+    // colours are stored for squares of four pixels: an odd size gets a border
+    let outcome = of_size("65x49");
+    let note = String::from_utf8_lossy(&outcome.stderr).into_owned();
+    assert!(outcome.status.success() && note.contains("white border and has 66x50"), "{note}");
+    let told = std::fs::read_to_string(here.join("told")).unwrap();
+    assert!(told.contains("-s 65x49") && told.contains("-vf pad=66:50:0:0:white"), "{told}");
     // one that fails: its last words are told, and the film that was there stays
     script("echo 'Unknown encoder libx264' >&2\nexit 1");
     let outcome = render();

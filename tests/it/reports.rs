@@ -82,6 +82,85 @@ fn reports_measure_flows() {
     assert!(rows[0]["pressure_order"].is_null());
 }
 
+/// What a page shows of itself: its tables, each as rows of cells.
+fn tables(page: &str) -> Vec<Vec<Vec<String>>> {
+    let cells = |row: &str| -> Vec<String> {
+        let cells = row.split("<td").skip(1).map(|cell| cell.split_once('>').unwrap().1);
+        cells.map(|cell| cell.split_once("</td>").unwrap().0.to_string()).collect()
+    };
+    let rows = |table: &str| -> Vec<Vec<String>> {
+        let body = table.split_once("<tbody>").unwrap().1.split_once("</tbody>").unwrap().0;
+        body.split("<tr>").skip(1).map(cells).collect()
+    };
+    page.split("<table>").skip(1).map(rows).collect()
+}
+
+#[test]
+fn a_report_is_one_page_whatever_its_files_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let evil = "</pre><script>alert(1)</script><img src=\"https://example.org/a.png\">";
+    let import = "import \"ball.rfm\" as balls\nsolid lens = balls.ball and z <= 0.2\n";
+    std::fs::write(here.join("lens & co.rfm"), format!("rfm 1\n# {evil}\n{import}")).unwrap();
+    std::fs::write(here.join("ball.rfm"), "rfm 1\nsolid ball = sphere(0.5)\n").unwrap();
+    let arguments = ["report", "lens & co.rfm", "--mesh-cells", "24", "--html", "a.html", "--json"];
+    let told = rfm(here, &arguments).expect(0).json();
+    let page = std::fs::read_to_string(here.join("a.html")).unwrap();
+    assert!(page.starts_with("<!doctype html>") && page.trim_end().ends_with("</html>"));
+    // the files are shown, and nothing of them is part of the document
+    assert!(
+        page.contains(
+            "&lt;/pre&gt;&lt;script&gt;alert(1)&lt;/script&gt;&lt;img src=&quot;https://example.org"
+        )
+    );
+    assert!(page.contains("solid ball = sphere(0.5)"), "what it imports");
+    assert_eq!(page.matches("<h3>").count(), 2, "and no other file");
+    assert_eq!(page.matches("<script").count() + page.matches("<link rel=\"style").count(), 0);
+    assert_eq!(page.matches("http").count(), 2, "the policy and the comment of the file");
+    assert!(page.contains("default-src 'none'"));
+    assert!(page.contains("rfm report &#39;lens &amp; co.rfm&#39; --mesh-cells 24 --html a.html --json"));
+    // a picture, a slice, and a plot of the programs and one of the meshes
+    let images: Vec<&str> =
+        page.split(" src=\"data:").skip(1).map(|rest| rest.split_once(';').unwrap().0).collect();
+    assert_eq!(images, ["image/png", "image/svg+xml", "image/svg+xml", "image/svg+xml"]);
+    // the tables have what the document of the command has
+    let [programs, meshes] = &tables(&page)[..] else { panic!("two tables") };
+    let rows = |name: &str| told[name].as_array().unwrap().clone();
+    assert_eq!((programs.len(), meshes.len()), (rows("rows").len(), rows("meshes").len()));
+    for (cells, row) in programs.iter().zip(rows("rows")) {
+        assert_eq!(
+            (cells[0].as_str(), cells[3].as_str()),
+            (row["program"].as_str().unwrap(), row["form"].as_str().unwrap())
+        );
+    }
+    for (cells, row) in meshes.iter().zip(rows("meshes")) {
+        assert_eq!(cells[1], row["cells"].to_string());
+        assert_eq!(cells[2], row["triangles"].to_string());
+    }
+    let refused = rfm(here, &["report", "lens & co.rfm", "--html", "a.pdf"]).expect(2);
+    assert!(refused.stderr.contains("file .html"), "{}", refused.stderr);
+}
+
+#[test]
+fn a_report_of_a_flow_is_a_page_too() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("still.rfm"), STILL).unwrap();
+    let arguments = ["report", "still.rfm", "--particles", "64,27", "--threads", "1", "--html", "a.html"];
+    let text = rfm(folder.path(), &arguments).expect(0).stdout;
+    assert!(text.contains("page written to a.html"), "{text}");
+    let page = std::fs::read_to_string(folder.path().join("a.html")).unwrap();
+    let [runs] = &tables(&page)[..] else { panic!("one table") };
+    // the same cells as in the table on the terminal
+    let printed: Vec<Vec<&str>> = text
+        .lines()
+        .filter(|line| line.starts_with("wcsph"))
+        .map(|line| line.split_whitespace().collect())
+        .collect();
+    assert_eq!(runs.len(), 2);
+    assert_eq!(runs, &printed);
+    assert!(page.contains("truth { pressure: 9810*max(0.1 - z, 0)"));
+}
+
 #[test]
 fn a_report_says_which_run_failed() {
     // steps of a hundred times what is stable

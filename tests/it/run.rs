@@ -51,6 +51,7 @@ fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
     };
     names(&out.join("frames")).into_iter().for_each(|name| add(format!("frames/{name}")));
     PROBES.iter().for_each(|name| add(format!("probes/{name}.csv")));
+    ["energy", "audit"].iter().for_each(|name| add(format!("history/{name}.csv")));
     add("particles.pvd".into());
     found
 }

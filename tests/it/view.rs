@@ -82,7 +82,11 @@ fn a_saved_page_holds_every_position_in_few_bytes() {
     let setting: serde_json::Value = serde_json::from_str(setting).unwrap();
     assert_eq!(setting["box"]["max"], serde_json::json!([1.0, 1.0, 1.5]));
     let names: Vec<_> = setting["arrays"].as_array().unwrap().iter().map(|array| &array["name"]).collect();
-    assert_eq!(names, ["speed", "density", "pressure"]);
+    assert_eq!(names, ["speed", "density", "pressure", "velocity x", "velocity y", "velocity z"]);
+    let plots = setting["plots"].as_array().unwrap().iter();
+    let plots: Vec<_> =
+        plots.map(|plot| (plot["name"].as_str().unwrap(), plot["unit"].as_str().unwrap())).collect();
+    assert_eq!(plots, [("energy", "J"), ("audit", "%"), ("audit", "m/s")]);
 
     let blocks = blocks(&page);
     let frames = || blocks.iter().filter(|(head, _)| head["kind"] == "frame");

@@ -12,6 +12,11 @@ use rfm::render::Image;
 
 const PROGRAM: &str = "ffmpeg";
 
+/// The least even width and height that hold a size: colours are stored for squares of four pixels.
+pub(super) fn even((width, height): (u32, u32)) -> (u32, u32) {
+    (width.next_multiple_of(2), height.next_multiple_of(2))
+}
+
 /// A film that is being encoded.
 pub(super) struct Video {
     shown: String,
@@ -66,6 +71,10 @@ impl Video {
             .arg("-r")
             .arg(rate.to_string())
             .args(["-i", "pipe:0"]);
+        let padded = even((width, height));
+        if padded != (width, height) {
+            command.arg("-vf").arg(format!("pad={}:{}:0:0:white", padded.0, padded.1));
+        }
         command.args(codec).args(["-pix_fmt", "yuv420p", "-map_metadata", "-1", "-fflags", "+bitexact"]);
         command.arg("-flags:v").arg("+bitexact").arg(temporary);
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::ffmpeg::Video;
+use super::ffmpeg::{Video, even};
 use crate::cli::failure::{Failure, note};
 use crate::cli::output::{self, Shown};
 use crate::cli::progress::{self, Progress};
@@ -84,10 +84,12 @@ impl Target {
             )),
             Kind::Mp4 | Kind::Webm => {
                 let (width, height) = self.size;
-                if width % 2 + height % 2 > 0 {
-                    return refuse(format!(
-                        "--size {width}x{height}: the colours of .mp4 and .webm have half the width and height, so both must \
-                         be even"
+                let even = even(self.size);
+                if even != self.size {
+                    note(format!(
+                        "--size {width}x{height}: the colours of .mp4 and .webm have half the width and height, so `{path}` \
+                         gets a white border and has {}x{}",
+                        even.0, even.1
                     ));
                 }
                 Video::check(&self.path)

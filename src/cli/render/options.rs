@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
 
 use crate::cli::values::{
-    CutFlag, Frames, count, cut, direction, frames, point, range, seconds, size, times, zoom,
+    CameraFlag, CutFlag, Frames, camera, count, cut, frames, point, range, seconds, size, times, zoom,
 };
 use rfm::render::ColourMap;
 
@@ -33,16 +33,16 @@ pub(in crate::cli) struct Render {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub size: (u32, u32),
-    /// Direction from the scene to the eye; also as the viewer copies it: "picture { camera: [0.5, -1, 0.4] }"
-    /// [default: 0.48,-1,0.46]
-    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
-    pub camera: Option<DVec3>,
-    /// The place in the middle of the picture [default: the middle of the box]
+    /// Direction from the scene to the eye; also as the viewer copies it, with the place in the middle and the size:
+    /// "picture { camera: [0.5, -1, 0.4], look_at: [1, 1, 0.5], zoom: 2 }" [default: 0.48,-1,0.46]
+    #[arg(long, value_name = "X,Y,Z", value_parser = camera, allow_hyphen_values = true)]
+    pub camera: Option<CameraFlag>,
+    /// The place in the middle of the picture [default: that of --camera, or the middle of the box]
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub look_at: Option<DVec3>,
-    /// How many times as large as if the whole box were seen
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = zoom)]
-    pub zoom: f64,
+    /// How many times as large as if the whole box were seen [default: that of --camera, or 1]
+    #[arg(long, value_name = "FACTOR", value_parser = zoom)]
+    pub zoom: Option<f64>,
     /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of the
     /// fluid of the first frame, `none` none [default: auto; of a solid none]
     #[arg(long, value_name = "AXIS=VALUE|auto|none", value_parser = cut)]

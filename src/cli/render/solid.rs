@@ -80,13 +80,8 @@ pub(super) fn camera(options: &Render, domain: &rfm::geom::Aabb) -> Result<Camer
     if options.look_at.is_some_and(|at| !at.is_finite()) {
         return Err(Failure::usage("--look-at: expected three finite lengths"));
     }
-    let camera = match options.camera {
-        Some(towards_eye) => Camera::new(domain, towards_eye, options.size),
-        None => Camera::three_quarter(domain, options.size),
-    };
-    let camera = camera.map_err(Failure::usage)?;
-    match options.look_at {
-        None if options.zoom == 1.0 => Ok(camera),
-        at => Ok(camera.aimed(at.unwrap_or(domain.centre()), options.zoom)),
-    }
+    let flag = options.camera;
+    let look_at = options.look_at.or(flag.and_then(|flag| flag.look_at));
+    let zoom = options.zoom.or(flag.and_then(|flag| flag.zoom));
+    scenery::camera(domain, flag.map(|flag| flag.towards_eye), (look_at, zoom), options.size)
 }

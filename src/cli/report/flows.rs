@@ -10,10 +10,12 @@ use std::time::Instant;
 use anstream::println;
 use serde::Serialize;
 
-use super::super::args::{Flow, Shared};
+use super::super::args::{Report, Shared};
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
 use super::flow_run::FlowRun;
+use super::page::{Figure, Page};
+use super::table::{self, Column};
 use crate::cli::output::Shown;
 use rfm::experiment::{Deviation, Deviations};
 use rfm::lower::{Scene, Truth};
@@ -45,9 +47,9 @@ pub(super) fn run(
     shared: &Shared,
     program: &Program,
     scene: &Scene,
-    options: &Flow,
-    picture: Option<&Path>,
+    options: &Report,
 ) -> Result<(), Failure> {
+    let (picture, options, html) = (options.output.as_deref(), &options.flow, options.html.as_deref());
     let Some(truth) = scene.truth else {
         return Err(Failure::usage(format!(
             "the scene `{}` does not say what is known of its flow; write `truth {{ pressure: … }}`, with \
@@ -63,11 +65,8 @@ pub(super) fn run(
     let mut study = Study { shared, scene: &scene.name, instants: 0, bar: bar(&sizes, methods.len()) };
     let table = Table::of(&truth);
     if !shared.json {
-        println!(
-            "{}: relative deviation from what is known, over all particles and the saved instants from {} s on",
-            scene.name, truth.from
-        );
-        table.head();
+        println!("{}: {}", scene.name, about(&truth));
+        println!("{}", table::head(&table.columns()));
     }
     let rows = study.rows(program, &methods, &sizes, &table)?;
     study.bar.finish_and_clear();
@@ -76,16 +75,52 @@ pub(super) fn run(
         output::write(path, |out| out.write_all(&picture))?;
     }
     let instants = study.instants;
+    if let Some(path) = html {
+        let page = page(program, scene, &truth, &table, &rows)?;
+        output::write(path, |out| out.write_all(&page))?;
+    }
     if shared.json {
         let threads = rayon::current_num_threads();
         output::json(&Document { schema: 1, scene: &scene.name, threads, instants, rows: &rows })?;
-    } else if let Some(path) = picture {
-        println!("plot written to {}", path.shown());
+    } else {
+        if let Some(path) = picture {
+            println!("plot written to {}", path.shown());
+        }
+        if let Some(path) = html {
+            println!("page written to {}", path.shown());
+        }
     }
     match failures(&rows) {
         None => Ok(()),
         Some(failures) => Err(Failure::Numerical(failures)),
     }
+}
+
+/// What the table of a flow means.
+fn about(truth: &Truth) -> String {
+    format!(
+        "relative deviation from what is known, over all particles and the saved instants from {} s on",
+        truth.from
+    )
+}
+
+/// The report as a page.
+fn page(
+    program: &Program,
+    scene: &Scene,
+    truth: &Truth,
+    table: &Table,
+    rows: &[FlowRun],
+) -> Result<Vec<u8>, Failure> {
+    let mut page = Page::begin(&format!("{}: error against cost", scene.name), &about(truth));
+    let drawn = flow_plot::draw(&scene.name, rows, Path::new("drawing.svg"))?;
+    page.figures(&[Figure::svg(drawn, "Each mark is a run: its processor time against its deviation")]);
+    page.section("Runs", "The order is p of error ∝ spacingᵖ between a run and the coarser one before it.");
+    page.table(&table.columns(), rows.iter().map(|row| table.cells(row)));
+    if let Some(failures) = failures(rows) {
+        page.section("Runs that failed", &failures);
+    }
+    Ok(page.end(program))
 }
 
 /// The failures of runs, one in each line; `None` if there are none.
@@ -154,7 +189,7 @@ impl Study<'_> {
                     row.compare(coarser);
                 }
                 if !self.shared.json {
-                    self.bar.suspend(|| table.row(&row));
+                    self.bar.suspend(|| println!("{}", table::line(&table.columns(), &table.cells(&row))));
                 }
                 rows.push(row);
             }
@@ -251,7 +286,7 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// The table of a report, printed a row at a time.
+/// The table of a report.
 struct Table {
     /// Indices, in [`Deviation::NAMES`], of the quantities that are known.
     known: Vec<usize>,
@@ -263,36 +298,39 @@ impl Table {
         Self { known: (0..3).filter(|&k| known[k]).collect() }
     }
 
-    fn head(&self) {
-        let names = self.known.iter().map(|&k| format!(" {:>9} {:>6}", Deviation::NAMES[k], "order"));
-        println!(
-            "{:<7} {:<9} {:>9} {:>9}{} {:>8} {:>9} {:>17}",
-            "method",
-            "precision",
-            "particles",
-            "spacing",
-            names.collect::<String>(),
-            "steps",
-            "CPU s",
-            "per simulated s"
-        );
+    fn columns(&self) -> Vec<Column> {
+        let known = self.known.iter();
+        let errors =
+            known.flat_map(|&k| [Column::numbers(Deviation::NAMES[k], 9), Column::numbers("order", 6)]);
+        let first = [
+            Column::words("method", 7),
+            Column::words("precision", 9),
+            Column::numbers("particles", 9),
+            Column::numbers("spacing", 9),
+        ];
+        let last = [
+            Column::numbers("steps", 8),
+            Column::numbers("CPU s", 9),
+            Column::numbers("per simulated s", 17),
+        ];
+        first.into_iter().chain(errors).chain(last).collect()
     }
 
-    fn row(&self, row: &FlowRun) {
-        let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));
+    fn cells(&self, row: &FlowRun) -> Vec<String> {
         let error = |error: Option<f64>| error.map_or("failed".to_string(), |error| format!("{error:.2e}"));
         let (errors, orders) = (row.errors(), row.orders());
-        let cells = self.known.iter().map(|&k| format!(" {:>9} {:>6}", error(errors[k]), order(orders[k])));
-        println!(
-            "{:<7} {:<9} {:>9} {:>9.4}{} {:>8} {:>9.2} {:>17.2}",
-            row.method,
-            row.precision,
-            row.particles,
-            row.spacing,
-            cells.collect::<String>(),
-            row.steps,
-            row.cpu_seconds,
-            row.cpu_seconds_per_simulated_second,
-        );
+        let first = [
+            row.method.to_string(),
+            row.precision.to_string(),
+            row.particles.to_string(),
+            format!("{:.4}", row.spacing),
+        ];
+        let known = self.known.iter().flat_map(|&k| [error(errors[k]), table::order(orders[k])]);
+        let last = [
+            row.steps.to_string(),
+            format!("{:.2}", row.cpu_seconds),
+            format!("{:.2}", row.cpu_seconds_per_simulated_second),
+        ];
+        first.into_iter().chain(known).chain(last).collect()
     }
 }

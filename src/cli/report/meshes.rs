@@ -12,6 +12,7 @@ use super::super::failure::Failure;
 use super::super::mesh::no_grid;
 use super::super::plot::{self, Labels, Legend, LogAxis};
 use super::super::progress;
+use super::table::{self, Column};
 use rfm::Solid;
 use rfm::mesh::{self, Grid, Quality, Resolution};
 use rfm::solid::Depth;
@@ -97,46 +98,55 @@ fn row(solid: &Solid, method: MeshMethod, cells: usize, grid: &Grid) -> Result<M
     })
 }
 
+/// What the table of meshes means.
+pub(super) const ABOUT: &str =
+    "lengths in metres; the order is log2 of the error's ratio to that in half as many cells";
+
 pub(super) fn print(rows: &[MeshFigures]) {
     if rows.is_empty() {
         return println!("no meshes: the solid has no bounds");
     }
-    println!(
-        "meshes; lengths in metres; the order is log2 of the error's ratio to that in half as many cells"
-    );
-    println!(
-        "{:<7} {:>5} {:>9} {:>9} {:>10} {:>6} {:>9} {:>6} {:>9} {:>8} {:>8} {:>7}",
-        "method",
-        "cells",
-        "triangles",
-        "ms",
-        "Hausdorff",
-        "order",
-        "rms",
-        "order",
-        "volume",
-        "normals",
-        "slivers",
-        "flipped"
-    );
+    println!("meshes; {ABOUT}");
+    println!("{}", table::head(&COLUMNS));
     for row in rows {
-        let order = |order: Option<f64>| order.map_or("–".to_string(), |order| format!("{order:.2}"));
-        let quality = &row.quality;
-        println!(
-            "{:<7} {:>5} {:>9} {:>9.2} {:>10.2e} {:>6} {:>9.1e} {:>6} {:>+9.1e} {:>7.2}° {:>6.2} % {:>7}",
-            row.method,
-            row.cells,
-            row.triangles,
-            row.milliseconds,
-            quality.hausdorff(),
-            order(row.order),
-            quality.to_surface.rms,
-            order(row.order_rms),
-            quality.volume_error,
-            quality.normal_error.rms,
-            100.0 * quality.slivers,
-            quality.flipped,
-        );
+        println!("{}", table::line(&COLUMNS, &row.cells()));
+    }
+}
+
+/// What the table of meshes holds.
+pub(super) const COLUMNS: [Column; 12] = [
+    Column::words("method", 7),
+    Column::numbers("cells", 5),
+    Column::numbers("triangles", 9),
+    Column::numbers("ms", 9),
+    Column::numbers("Hausdorff", 10),
+    Column::numbers("order", 6),
+    Column::numbers("rms", 9),
+    Column::numbers("order", 6),
+    Column::numbers("volume", 9),
+    Column::numbers("normals", 8),
+    Column::numbers("slivers", 8),
+    Column::numbers("flipped", 7),
+];
+
+impl MeshFigures {
+    /// The cells of [`COLUMNS`].
+    pub fn cells(&self) -> Vec<String> {
+        let quality = &self.quality;
+        vec![
+            self.method.to_string(),
+            self.cells.to_string(),
+            self.triangles.to_string(),
+            format!("{:.2}", self.milliseconds),
+            format!("{:.2e}", quality.hausdorff()),
+            table::order(self.order),
+            format!("{:.1e}", quality.to_surface.rms),
+            table::order(self.order_rms),
+            format!("{:+.1e}", quality.volume_error),
+            format!("{:.2}°", quality.normal_error.rms),
+            format!("{:.2} %", 100.0 * quality.slivers),
+            quality.flipped.to_string(),
+        ]
     }
 }
 

@@ -3,15 +3,18 @@
 //! Errors of programs are measured against 120-digit arithmetic at random points of the box and at points on
 //! the surface. Times are medians over batches of random points on one thread. For meshes the report gives
 //! the error and the time of each method against the number of cells, and the order of convergence. A scene
-//! is run at several resolutions instead ([`flows`]).
+//! is run at several resolutions instead ([`flows`]). All of it may become one page ([`page`]).
 
 mod flow_plot;
 mod flow_run;
 mod flows;
 mod meshes;
+mod page;
 mod plot;
 mod points;
 mod programs;
+mod solid_page;
+mod table;
 
 use anstream::println;
 use serde::Serialize;
@@ -45,10 +48,13 @@ pub(super) fn run(shared: &Shared, options: &Report) -> Result<(), Failure> {
     for path in options.output.iter().chain(&options.mesh_plot) {
         output::Picture::of(path)?;
     }
+    if let Some(path) = options.html.as_ref().filter(|path| path.extension().is_none_or(|e| e != "html")) {
+        return Err(Failure::usage(format!("`{}`: the page of a report is a file .html", path.shown())));
+    }
     let (path, name) = choose::subject(&options.subject);
     let program = input::program(shared, path)?;
     if let Some(scene) = scene(&program, name, options)? {
-        return flows::run(shared, &program, scene, &options.flow, options.output.as_deref());
+        return flows::run(shared, &program, scene, options);
     }
     if let Some(name) = name.filter(|name| program.module().solids.iter().all(|s| s.name != *name)) {
         return Err(choose::no_such(path, &program, name));
@@ -72,6 +78,10 @@ fn solid(shared: &Shared, options: &Report, program: &Program, solid: &Solid) ->
         let picture = meshes::draw(solid.name(), &meshes, path)?;
         output::write(path, |out| out.write_all(&picture))?;
     }
+    if let Some(path) = &options.html {
+        let page = solid_page::made(program, solid, &about(&points, over), &rows, &meshes)?;
+        output::write(path, |out| out.write_all(&page))?;
+    }
     if shared.json {
         return output::json(&Document {
             schema: 1,
@@ -89,6 +99,9 @@ fn solid(shared: &Shared, options: &Report, program: &Program, solid: &Solid) ->
     meshes::print(&meshes);
     for path in options.output.iter().chain(&options.mesh_plot) {
         println!("plot written to {}", path.shown());
+    }
+    if let Some(path) = &options.html {
+        println!("page written to {}", path.shown());
     }
     Ok(())
 }
@@ -144,44 +157,22 @@ fn scene<'a>(
     }
 }
 
-fn print(solid: &Solid, points: &SamplePoints, over: Aabb, rows: &[ProgramFigures]) {
-    println!("solid {} on {}", solid.name(), target_description());
-    println!(
+/// What the table of programs means.
+fn about(points: &SamplePoints, over: Aabb) -> String {
+    format!(
         "{} random points of {} … {}, {} points on the surface; one thread, medians; errors against 120 digits",
         points.random.len(),
         over.min,
         over.max,
         points.surface.len()
-    );
-    println!(
-        "{:<9} {:<5} {:<7} {:<9} {:<5} {:>9} {:>10} {:>10} {:>10} {:>6} {:>11}",
-        "program",
-        "prec",
-        "engine",
-        "form",
-        "shape",
-        "ns/point",
-        "abs error",
-        "certified",
-        "rel error",
-        "signs",
-        "surface, m"
-    );
+    )
+}
+
+fn print(solid: &Solid, points: &SamplePoints, over: Aabb, rows: &[ProgramFigures]) {
+    println!("solid {} on {}", solid.name(), target_description());
+    println!("{}", about(points, over));
+    println!("{}", table::head(&programs::COLUMNS));
     for row in rows {
-        let number = |x: Option<f64>| x.map_or("–".to_string(), |x| format!("{x:.1e}"));
-        println!(
-            "{:<9} {:<5} {:<7} {:<9} {:<5} {:>9.2} {:>10} {:>10} {:>10} {:>6} {:>11}",
-            row.program,
-            row.precision,
-            row.engine,
-            row.form,
-            row.shape,
-            row.ns_per_point,
-            number(row.max_abs_error),
-            number(row.certified_error),
-            number(row.max_rel_error),
-            row.sign_mismatches.map_or("–".to_string(), |n| n.to_string()),
-            number(row.max_distance_error),
-        );
+        println!("{}", table::line(&programs::COLUMNS, &row.cells()));
     }
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::super::failure::Failure;
 use super::points::SamplePoints;
+use super::table::{Column, scientific};
 use rfm::codegen::Form;
 use rfm::geom::Aabb;
 use rfm::ir::exact::{self, Exact};
@@ -41,6 +42,40 @@ pub(super) struct ProgramFigures {
     pub sign_mismatches: Option<usize>,
     /// The largest displacement |error of ω|/|∇ω| of the surface, in metres.
     pub max_distance_error: Option<f64>,
+}
+
+/// What the table of programs holds.
+pub(super) const COLUMNS: [Column; 11] = [
+    Column::words("program", 9),
+    Column::words("prec", 5),
+    Column::words("engine", 7),
+    Column::words("form", 9),
+    Column::words("shape", 5),
+    Column::numbers("ns/point", 9),
+    Column::numbers("abs error", 10),
+    Column::numbers("certified", 10),
+    Column::numbers("rel error", 10),
+    Column::numbers("signs", 6),
+    Column::numbers("surface, m", 11),
+];
+
+impl ProgramFigures {
+    /// The cells of [`COLUMNS`].
+    pub fn cells(&self) -> Vec<String> {
+        vec![
+            self.program.to_string(),
+            self.precision.to_string(),
+            self.engine.to_string(),
+            self.form.to_string(),
+            self.shape.to_string(),
+            format!("{:.2}", self.ns_per_point),
+            scientific(self.max_abs_error),
+            scientific(self.certified_error),
+            scientific(self.max_rel_error),
+            self.sign_mismatches.map_or("–".to_string(), |n| n.to_string()),
+            scientific(self.max_distance_error),
+        ]
+    }
 }
 
 /// The forms that are compared.

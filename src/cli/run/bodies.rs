@@ -27,6 +27,10 @@ impl Bodies {
         Self { solids, domain, cells }
     }
 
+    pub fn solids(&self) -> &[Solid] {
+        &self.solids
+    }
+
     pub fn is_empty(&self) -> bool {
         self.solids.is_empty()
     }

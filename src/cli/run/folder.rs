@@ -9,12 +9,13 @@ use super::super::args::Run;
 use super::super::output::{Shown, TEMPORARY};
 use super::super::{Failure, note};
 use super::checkpoints;
+use crate::cli::saved::HISTORY;
 
 /// Name of the file that a run locks in its folder. The system unlocks it when the process ends, however it ends.
 const LOCK: &str = ".rfm.lock";
 
 /// Folders within that of a run.
-const PARTS: [&str; 4] = ["frames", "pictures", "checkpoints", "probes"];
+const PARTS: [&str; 5] = ["frames", "pictures", "checkpoints", "probes", HISTORY];
 
 /// Beginnings of the names of files that a run writes beside these folders.
 const FILES: [&str; 3] = ["summary", "particles", "obstacle"];

@@ -156,12 +156,12 @@ fn backdrop(
 
 /// The camera that the flags or the scene ask for.
 fn camera(options: &Run, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
-    let domain = experiment.domain();
-    let camera = match options.camera.or(experiment.scene().picture.camera) {
-        Some(towards_eye) => Camera::new(&domain, towards_eye, size),
-        None => Camera::three_quarter(&domain, size),
+    let stated = &experiment.scene().picture;
+    let (towards_eye, aim) = match options.camera {
+        Some(flag) => (Some(flag.towards_eye), (flag.look_at, flag.zoom)),
+        None => (stated.camera, (stated.look_at, stated.zoom)),
     };
-    camera.map_err(Failure::usage)
+    scenery::camera(&experiment.domain(), towards_eye, aim, size)
 }
 
 /// How each body is drawn.

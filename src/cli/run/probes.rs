@@ -1,4 +1,5 @@
-//! The samples of probes, as CSV that grows by one line at a time, and as a plot at the end.
+//! The samples of probes, as CSV that grows by one line at a time, and as a plot at the end. Every run also has tables of
+//! its energy and its audit.
 //!
 //! Invariant: however a run ends, a file holds its header and the lines of all samples before that. At most
 //! one line is cut off, which `--resume` removes.
@@ -12,6 +13,7 @@ use super::super::plot;
 use super::super::{Failure, output};
 use super::probe_plot::drawn;
 use crate::cli::output::Shown;
+use crate::cli::saved::{HISTORY, OWN_TABLES};
 use rfm::experiment::{Every, probe_column, probe_of};
 use rfm::lower::Scene;
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
@@ -22,8 +24,16 @@ const FOLDER: &str = "probes";
 /// written with twelve digits, so these are the samples before the checkpoint.
 const ROUNDING: f64 = 1e-10;
 
+/// Samples of a run's own tables from one frame to the next.
+const SAMPLES_PER_FRAME: f64 = 10.0;
+
 /// The probes of a run.
-pub(super) struct Probes(Vec<Recorder>);
+pub(super) struct Probes {
+    /// Those that the scene states.
+    stated: Vec<Recorder>,
+    /// Those of the energy and the audit.
+    own: Vec<Recorder>,
+}
 
 /// One probe with its file.
 struct Recorder {
@@ -44,37 +54,33 @@ impl Probes {
     ) -> Result<Self, Failure> {
         let folder = run_folder.join(FOLDER);
         if !scene.probes.is_empty() {
-            std::fs::create_dir_all(&folder)
-                .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.shown())))?;
+            create(&folder)?;
         }
-        let mut recorders = Vec::new();
-        for stated in &scene.probes {
-            let probe = probe_of(&stated.measured);
-            let memory = resumed.and_then(|checkpoint| checkpoint.get(&probe_column(&stated.name)).ok());
+        let mut stated = Vec::new();
+        for probe in &scene.probes {
+            let measured = probe_of(&probe.measured);
+            let memory = resumed.and_then(|checkpoint| checkpoint.get(&probe_column(&probe.name)).ok());
             let gauge = match resumed {
-                Some(checkpoint) => simulation.gauge_at(probe, checkpoint, memory.unwrap_or_default()),
-                None => simulation.gauge(probe),
+                Some(checkpoint) => simulation.gauge_at(measured, checkpoint, memory.unwrap_or_default()),
+                None => simulation.gauge(measured),
             };
-            let gauge = gauge.map_err(|e| Failure::usage(format!("probe `{}`: {e}", stated.name)))?;
-            let path = folder.join(format!("{}.csv", stated.name));
-            let header = header(&probe);
-            let kept = match resumed {
-                Some(checkpoint) => lines_until(&path, &header, checkpoint.time * (1.0 + ROUNDING)),
-                None => String::new(),
-            };
-            output::write(&path, |out| write!(out, "{header}\n{kept}"))?;
-            let file = OpenOptions::new().append(true).open(&path).map_err(|e| not_written(&path, &e))?;
-            let every = stated.every.unwrap_or(scene.run.save_every);
-            // a new probe begins with the present instant
-            let clock = Every::after(every, if kept.is_empty() { -every } else { simulation.time() });
-            recorders.push(Recorder { name: stated.name.clone(), gauge, clock, path, file });
+            let gauge = gauge.map_err(|e| Failure::usage(format!("probe `{}`: {e}", probe.name)))?;
+            let every = probe.every.unwrap_or(scene.run.save_every);
+            stated.push(Recorder::start(&folder, &probe.name, gauge, every, simulation, resumed)?);
         }
-        Ok(Self(recorders))
+        let every = scene.run.save_every / SAMPLES_PER_FRAME;
+        let folder = run_folder.join(HISTORY);
+        create(&folder)?;
+        let own = OWN_TABLES.into_iter().map(|(name, probe)| {
+            Recorder::start(&folder, name, Gauge::new(probe), every, simulation, resumed)
+        });
+        let own = own.collect::<Result<_, _>>()?;
+        Ok(Self { stated, own })
     }
 
     /// Samples the probes that are due.
     pub fn sample(&mut self, simulation: &Simulation) -> Result<(), Failure> {
-        for recorder in &mut self.0 {
+        for recorder in self.stated.iter_mut().chain(&mut self.own) {
             if !recorder.clock.is_due(simulation.time()) {
                 continue;
             }
@@ -92,14 +98,14 @@ impl Probes {
 
     /// Puts into a checkpoint what a probe needs to go on.
     pub fn save(&self, checkpoint: &mut Checkpoint) {
-        for recorder in &self.0 {
+        for recorder in &self.stated {
             checkpoint.set(&probe_column(&recorder.name), recorder.gauge.memory().to_vec());
         }
     }
 
     /// Draws the samples as SVG and PNG beside each file.
     pub fn plot(&self) -> Result<(), Failure> {
-        for recorder in &self.0 {
+        for recorder in &self.stated {
             let text = std::fs::read_to_string(&recorder.path)
                 .map_err(|e| Failure::usage(format!("cannot read `{}`: {e}", recorder.path.shown())))?;
             for ending in ["svg", "png"] {
@@ -112,25 +118,50 @@ impl Probes {
     }
 
     pub fn count(&self) -> usize {
-        self.0.len()
+        self.stated.len()
     }
 }
 
-/// Removes the tables and plots that the probes of an earlier run have left, and nothing else.
-pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
-    let folder = run_folder.join(FOLDER);
-    if !folder.is_dir() {
-        return Ok(());
+impl Recorder {
+    /// Begins the file of a probe in a folder, or continues that of a resumed run.
+    fn start(
+        folder: &Path,
+        name: &str,
+        gauge: Gauge,
+        every: f64,
+        simulation: &Simulation,
+        resumed: Option<&Checkpoint>,
+    ) -> Result<Self, Failure> {
+        let path = folder.join(format!("{name}.csv"));
+        let header = header(&gauge.probe);
+        let kept = match resumed {
+            Some(checkpoint) => lines_until(&path, &header, checkpoint.time * (1.0 + ROUNDING)),
+            None => String::new(),
+        };
+        output::write(&path, |out| write!(out, "{header}\n{kept}"))?;
+        let file = OpenOptions::new().append(true).open(&path).map_err(|e| not_written(&path, &e))?;
+        // a new probe begins with the present instant
+        let clock = Every::after(every, if kept.is_empty() { -every } else { simulation.time() });
+        Ok(Self { name: name.to_string(), gauge, clock, path, file })
     }
-    for entry in std::fs::read_dir(&folder)? {
-        let path = entry?.path();
-        let is_table = path.extension().is_some_and(|ending| ending == "csv")
-            && std::fs::read(&path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()));
-        if is_table {
-            for ending in ["svg", "png", "csv"] {
-                let path = path.with_extension(ending);
-                if path.is_file() {
-                    std::fs::remove_file(path)?;
+}
+
+/// Removes the tables and plots that an earlier run has left, and nothing else.
+pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
+    for folder in [FOLDER, HISTORY].map(|folder| run_folder.join(folder)) {
+        if !folder.is_dir() {
+            continue;
+        }
+        for entry in std::fs::read_dir(&folder)? {
+            let path = entry?.path();
+            let is_table = path.extension().is_some_and(|ending| ending == "csv")
+                && std::fs::read(&path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()));
+            if is_table {
+                for ending in ["svg", "png", "csv"] {
+                    let path = path.with_extension(ending);
+                    if path.is_file() {
+                        std::fs::remove_file(path)?;
+                    }
                 }
             }
         }
@@ -155,6 +186,11 @@ fn lines_until(path: &Path, header: &str, end: f64) -> String {
     let before =
         |line: &&str| line.split(',').next().and_then(|t| t.parse().ok()).is_some_and(|t: f64| t <= end);
     lines.take_while(before).collect()
+}
+
+fn create(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::usage(format!("cannot make the folder `{}`: {e}", folder.shown())))
 }
 
 fn not_written(path: &Path, error: &std::io::Error) -> Failure {

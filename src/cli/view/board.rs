@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 use tungstenite::{Bytes, Message};
 
-use rfm::view::Setting;
+use rfm::view::{Plot, Setting};
 
 /// The longest time after which a page that waits looks whether it is still wanted.
 const LOOK: Duration = Duration::from_millis(500);
@@ -16,16 +16,18 @@ const LOOK: Duration = Duration::from_millis(500);
 pub(super) enum Topic {
     Setting,
     Mesh,
+    Slice,
     Frame,
+    Plots,
     Status,
 }
 
 impl Topic {
-    const ALL: [Self; 4] = [Self::Setting, Self::Mesh, Self::Frame, Self::Status];
+    const ALL: [Self; 6] = [Self::Setting, Self::Mesh, Self::Slice, Self::Frame, Self::Plots, Self::Status];
 
     /// Whether the page says when it has taken such a message.
     pub fn is_answered(self) -> bool {
-        matches!(self, Self::Mesh | Self::Frame)
+        matches!(self, Self::Mesh | Self::Slice | Self::Frame)
     }
 }
 
@@ -46,7 +48,7 @@ pub(super) struct Status {
 struct News {
     setting: Option<Setting>,
     /// For each topic the newest message, with the number of messages of the topic so far.
-    newest: [(u64, Option<Message>); 4],
+    newest: [(u64, Option<Message>); 6],
 }
 
 /// The newest of everything that pages are told.
@@ -57,7 +59,7 @@ pub(super) struct Board {
 }
 
 /// What a page has been sent: for each topic the number of its newest message.
-pub(super) type Sent = [u64; 4];
+pub(super) type Sent = [u64; 6];
 
 impl Board {
     /// What the page shows besides frames; `None` until the file has been read for the first time.
@@ -75,7 +77,15 @@ impl Board {
         self.put(Topic::Status, told("status", status));
     }
 
-    /// Sets a mesh or a frame.
+    pub fn set_plots(&self, plots: Vec<Plot>) {
+        #[derive(Serialize)]
+        struct Plots {
+            plots: Vec<Plot>,
+        }
+        self.put(Topic::Plots, told("plots", &Plots { plots }));
+    }
+
+    /// Sets a mesh, a slice or a frame.
     pub fn set_block(&self, topic: Topic, block: Vec<u8>) {
         self.put(topic, Message::Binary(Bytes::from(block)));
     }

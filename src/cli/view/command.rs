@@ -1,5 +1,6 @@
 //! What a page may ask of the simulation.
 
+use rfm::slice::Axis;
 use serde::Deserialize;
 
 /// A command of a page, as JSON: `{"do": "set", "name": "cx", "value": 1.2}`.
@@ -22,10 +23,31 @@ pub(super) enum Command {
     Set { name: String, value: f64 },
     /// Let gravity act in this direction from now on, m/s².
     Gravity { vector: [f64; 3] },
+    /// Show ω in the plane across an axis at a coordinate, m; in none without an axis.
+    Slice { axis: Option<SliceAxis>, at: f64 },
     /// Show so many simulated seconds in a second, if the machine is fast enough.
     Speed { value: f64 },
     /// The page has taken a message and is ready for another one.
     Seen,
+}
+
+/// The axis that a slice lies across.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum SliceAxis {
+    X,
+    Y,
+    Z,
+}
+
+impl From<SliceAxis> for Axis {
+    fn from(axis: SliceAxis) -> Self {
+        match axis {
+            SliceAxis::X => Self::X,
+            SliceAxis::Y => Self::Y,
+            SliceAxis::Z => Self::Z,
+        }
+    }
 }
 
 /// Leaves out commands that later ones undo: a slider sends many values, and only the last one counts.
@@ -38,6 +60,7 @@ pub(super) fn settled(commands: Vec<Command>) -> Vec<Command> {
             )
             | (Command::Set { name, .. }, Command::Set { name: again, .. }) => name == again,
             (Command::Gravity { .. }, Command::Gravity { .. })
+            | (Command::Slice { .. }, Command::Slice { .. })
             | (Command::Speed { .. }, Command::Speed { .. }) => true,
             _ => false,
         })
@@ -56,8 +79,11 @@ mod tests {
         assert_eq!(read(r#"{"do":"play"}"#), Some(Command::Play));
         let set = Command::Set { name: "cx".into(), value: 1.5 };
         assert_eq!(read(r#"{"do":"set","name":"cx","value":1.5}"#), Some(set));
+        let slice = Command::Slice { axis: Some(SliceAxis::Z), at: 0.25 };
+        assert_eq!(read(r#"{"do":"slice","axis":"z","at":0.25}"#), Some(slice));
         for text in [
             "",
+            r#"{"do":"slice","axis":"w","at":1}"#,
             "{}",
             r#"{"do":"erase"}"#,
             r#"{"do":"set","name":"cx"}"#,

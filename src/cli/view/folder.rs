@@ -8,15 +8,13 @@ use std::path::{Path, PathBuf};
 use super::super::args::View;
 use super::super::failure::Failure;
 use super::super::saved::{self, RunFigures};
-use super::super::survey::Survey;
+use super::super::survey::{Survey, is_velocity};
+use super::plots;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::mesh::split_creases;
 use rfm::view::{
-    Array, Column, Corners, Frame, FrameHead, Lattice, Levels, Page, Plot, Setting, pack_frame, pack_mesh,
+    Array, Corners, Frame, FrameHead, Lattice, Levels, Page, Setting, VELOCITY, pack_frame, pack_mesh,
 };
-
-/// Most points of a plot.
-const MOST_POINTS: usize = 1000;
 
 /// A run in its folder.
 pub(super) struct SavedRun {
@@ -25,7 +23,10 @@ pub(super) struct SavedRun {
     /// Files of the obstacles' meshes, and for each frame the number of its mesh.
     meshes: Vec<PathBuf>,
     mesh_of: Vec<Option<usize>>,
-    survey: Survey,
+    /// Name and range of each array of a page: the numbers at particles, then the components of the velocity.
+    arrays: Vec<(String, Levels)>,
+    /// The number of particles of all frames together.
+    particles: usize,
     setting: Setting,
     lattice: Lattice,
 }
@@ -40,6 +41,9 @@ impl SavedRun {
         let survey = Survey::of(folder, &entries)?;
         let (meshes, mesh_of) = saved::obstacles(folder, &entries)?;
         let domain = survey.domain(figures.as_ref());
+        let mut arrays = survey.arrays.clone();
+        let velocity = survey.velocity.into_iter();
+        arrays.extend(velocity.flat_map(|range| VELOCITY.map(|name| (name.to_string(), range))));
         let lattice = Lattice::new(&domain.union(&survey.bounds));
         let setting = Setting {
             title: saved::title(folder),
@@ -48,12 +52,13 @@ impl SavedRun {
             domain: Corners::from(&domain),
             lattice: Some(Corners::from(lattice.bounds())),
             radius: survey.radius(figures.as_ref(), entries.len()),
-            arrays: survey.arrays.iter().map(|(name, range)| Array::named(name, Some(*range))).collect(),
+            arrays: arrays.iter().map(|(name, range)| Array::named(name, Some(*range))).collect(),
             gravity: None,
             params: Vec::new(),
-            plots: plots(&folder.join("probes")),
+            plots: Some(plots::saved(folder)),
         };
-        Ok(Self { folder: folder.to_path_buf(), entries, meshes, mesh_of, survey, setting, lattice })
+        let (folder, particles) = (folder.to_path_buf(), survey.particles);
+        Ok(Self { folder, entries, meshes, mesh_of, arrays, particles, setting, lattice })
     }
 
     pub fn frames(&self) -> usize {
@@ -62,7 +67,7 @@ impl SavedRun {
 
     /// The number of particles of all frames together.
     pub fn particles(&self) -> usize {
-        self.survey.particles
+        self.particles
     }
 
     /// Writes the page.
@@ -81,7 +86,7 @@ impl SavedRun {
             let head = FrameHead {
                 time: entry.time,
                 step: None,
-                ranges: self.survey.arrays.iter().map(|(_, range)| *range).collect(),
+                ranges: self.arrays.iter().map(|(_, range)| *range).collect(),
                 mesh: *mesh,
                 run: 0,
             };
@@ -95,13 +100,17 @@ impl SavedRun {
         let file = std::fs::read(self.folder.join(&entry.file))?;
         let (points, arrays) = read_arrays(&file).map_err(io::Error::other)?;
         let levels = |(name, range): &(String, Levels)| {
-            let array = arrays.iter().find(|array| array.name == *name && array.components == 1);
+            let (array, first) = match VELOCITY.iter().position(|component| component == name) {
+                Some(component) => (arrays.iter().find(|array| is_velocity(array)), component),
+                None => (arrays.iter().find(|array| array.name == *name && array.components == 1), 0),
+            };
             let array = array.ok_or_else(|| io::Error::other(format!("the array `{name}` is missing")))?;
-            Ok(array.values.iter().map(|value| range.level(*value)).collect())
+            let values = array.values.iter().skip(first).step_by(array.components);
+            Ok(values.map(|value| range.level(*value)).collect())
         };
         Ok(Frame {
             sites: points.iter().map(|p| self.lattice.site(*p)).collect(),
-            levels: self.survey.arrays.iter().map(levels).collect::<io::Result<_>>()?,
+            levels: self.arrays.iter().map(levels).collect::<io::Result<_>>()?,
         })
     }
 }
@@ -114,43 +123,4 @@ fn facts(entries: &[(usize, FrameEntry)], survey: &Survey, figures: Option<&RunF
         parts.push(format!("{} frames, {} to {} s", entries.len(), first.time, last.time));
     }
     parts.join(" · ")
-}
-
-/// The tables of probes, a plot for each unit. A table that cannot be read is left out: it may be a file of the user's.
-fn plots(folder: &Path) -> Vec<Plot> {
-    let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut tables: Vec<PathBuf> =
-        files.filter(|path| path.extension().is_some_and(|e| e == "csv")).collect();
-    tables.sort();
-    tables.iter().flat_map(|path| plots_of(path).unwrap_or_default()).collect()
-}
-
-fn plots_of(path: &Path) -> Option<Vec<Plot>> {
-    let text = std::fs::read_to_string(path).ok()?;
-    let (header, lines) = text.split_once('\n')?;
-    let mut names = header.split(',').map(|name| name.trim().trim_end_matches(']').split_once(" ["));
-    names.next().flatten().filter(|(name, unit)| (*name, *unit) == ("time", "s"))?;
-    let columns: Vec<(&str, &str)> = names.collect::<Option<_>>()?;
-    let numbers =
-        |line: &str| line.split(',').map(|word| word.trim().parse().ok()).collect::<Option<Vec<f64>>>();
-    let rows: Vec<Vec<f64>> =
-        lines.lines().filter_map(numbers).filter(|row| row.len() == columns.len() + 1).collect();
-    let every = rows.len().div_ceil(MOST_POINTS).max(1);
-    let column = |k: usize| rows.iter().step_by(every).map(|row| row[k]).collect::<Vec<f64>>();
-    let mut units: Vec<&str> = Vec::new();
-    for (_, unit) in &columns {
-        if !units.contains(unit) {
-            units.push(unit);
-        }
-    }
-    let name = path.file_stem()?.to_string_lossy();
-    let plot = |unit: &str| {
-        let same = columns.iter().enumerate().filter(|(_, (_, other))| *other == unit);
-        let columns: Vec<Column> =
-            same.map(|(k, (name, _))| Column { name: name.to_string(), values: column(k + 1) }).collect();
-        let what =
-            if let [only] = &columns[..] { format!("{name}: {}", only.name) } else { name.to_string() };
-        Plot { name: format!("{what}, {unit}"), times: column(0), columns }
-    };
-    Some(units.into_iter().filter(|_| !rows.is_empty()).map(plot).collect())
 }

@@ -4,6 +4,8 @@
 //! | file | what it does |
 //! |---|---|
 //! | `folder` | the folder of a run → a page with its frames |
+//! | `plots` | energy, audit and probes over time, of a folder or of a simulation that goes on |
+//! | `section` | ω in a plane |
 //! | `server`, `request`, `stream` | the page and its stream at an address with a token |
 //! | `board` | the newest of everything that pages are told |
 //! | `session`, `model`, `command` | the simulation on its own thread, and what pages ask of it |
@@ -13,7 +15,9 @@ mod browser;
 mod command;
 mod folder;
 mod model;
+mod plots;
 mod request;
+mod section;
 mod server;
 mod session;
 mod stream;

@@ -11,6 +11,7 @@ use super::super::choose;
 use super::super::failure::Failure;
 use super::super::input;
 use super::super::run::bodies::Bodies;
+use super::plots::History;
 use crate::cli::output::Shown;
 use rfm::compile::files_beside;
 use rfm::diagnostic::{Diagnostics, Style, render};
@@ -20,7 +21,9 @@ use rfm::lower::{Gravity, Options, Scene};
 use rfm::mesh::{Mesh, split_creases};
 use rfm::quantity::Dimension;
 use rfm::sph::Simulation;
-use rfm::view::{Array, Corners, Frame, FrameHead, Lattice, Levels, Param, Setting, pack_frame, pack_mesh};
+use rfm::view::{
+    Array, Corners, Frame, FrameHead, Lattice, Levels, Param, Setting, VELOCITY, pack_frame, pack_mesh,
+};
 use rfm::{Engine, Error, Experiment, Program, Solid};
 
 /// What is viewed, as the command line states it.
@@ -45,10 +48,18 @@ pub(super) struct Checked {
     solid: Option<String>,
 }
 
+/// Solids with the block of their mesh and the box in which they are shown.
+pub(super) struct Standing {
+    pub mesh: Vec<u8>,
+    pub solids: Vec<Solid>,
+    pub domain: Aabb,
+}
+
 /// A simulation with what is drawn of its scene.
 pub(super) struct Running {
     pub simulation: Simulation,
     pub experiment: Experiment,
+    pub history: History,
     bodies: Bodies,
     lattice: Lattice,
 }
@@ -133,11 +144,11 @@ impl Subject {
         Ok(Checked { program, scene, solid: self.solid.clone() })
     }
 
-    /// The block of the mesh of all that stands in the fluid's way at the start, or of the solid. And its box.
+    /// All that stands in the fluid's way at the start, or the solid.
     ///
     /// # Errors
     /// Why there is no mesh.
-    pub fn mesh(&self, checked: &Checked, detail: Detail, run: u64) -> Result<(Vec<u8>, Aabb), String> {
+    pub fn standing(&self, checked: &Checked, detail: Detail, run: u64) -> Result<Standing, String> {
         let (solids, domain) = match &checked.scene {
             Some(scene) => (self.solids_of(checked, scene)?, scene.domain),
             None => {
@@ -155,8 +166,10 @@ impl Subject {
             Detail::Passing => self.cells.min(PASSING_CELLS),
             Detail::Lasting => self.cells,
         };
-        let meshes = Bodies::of(solids, domain, cells).meshes_at(0.0).map_err(message)?;
-        Ok((pack_mesh(&split_creases(&Mesh::joined(&meshes)), run), domain))
+        let bodies = Bodies::of(solids, domain, cells);
+        let meshes = bodies.meshes_at(0.0).map_err(message)?;
+        let mesh = pack_mesh(&split_creases(&Mesh::joined(&meshes)), run);
+        Ok(Standing { mesh, solids: bodies.solids().to_vec(), domain })
     }
 
     fn solids_of(&self, checked: &Checked, scene: &Scene) -> Result<Vec<Solid>, String> {
@@ -182,11 +195,12 @@ impl Subject {
     /// The messages, as the command line shows them.
     pub fn start(&self, checked: &Checked, scene: &Scene) -> Result<Running, String> {
         let experiment = Experiment::new(&checked.program, &scene.name, self.engine).map_err(refused)?;
-        let simulation = experiment.start().map_err(refused)?.simulation;
+        let mut simulation = experiment.start().map_err(refused)?.simulation;
+        let history = History::start(&mut simulation, scene);
         let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
         let domain = experiment.domain();
         let bodies = Bodies::of(solids, domain, self.cells);
-        Ok(Running { simulation, bodies, lattice: Lattice::new(&domain), experiment })
+        Ok(Running { simulation, history, bodies, lattice: Lattice::new(&domain), experiment })
     }
 
     /// What a page shows besides frames and meshes.
@@ -205,7 +219,8 @@ impl Subject {
             (None, None, _) => String::new(),
         };
         let fastest = running.map(|running| Levels { low: 0.0, high: running.experiment.speed_scale() });
-        let arrays = ["speed", "density", "pressure"].map(|name| {
+        let [x, y, z] = VELOCITY;
+        let arrays = ["speed", "density", "pressure", x, y, z].map(|name| {
             Array::named(name, fastest.filter(|range| name == "speed" && range.high.is_finite()))
         });
         Setting {
@@ -221,7 +236,7 @@ impl Subject {
                 Gravity::Turning(_) | Gravity::Field(_) => None,
             }),
             params: checked.map_or_else(Vec::new, params),
-            plots: Vec::new(),
+            plots: running.is_none().then(Vec::new),
         }
     }
 }
@@ -250,6 +265,16 @@ fn params(checked: &Checked) -> Vec<Param> {
 }
 
 impl Running {
+    /// Begins again.
+    ///
+    /// # Errors
+    /// Why that is not possible; the run is as it was then.
+    pub fn restart(&mut self) -> Result<(), String> {
+        self.simulation = self.experiment.start().map_err(refused)?.simulation;
+        self.history = History::start(&mut self.simulation, self.experiment.scene());
+        Ok(())
+    }
+
     /// Whether any obstacle moves by itself.
     pub fn moves(&self) -> bool {
         self.bodies.move_about()
@@ -264,9 +289,20 @@ impl Running {
     /// The block of the present instant.
     pub fn frame(&self, run: u64) -> Vec<u8> {
         let particles = self.simulation.particles();
-        let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
-        let arrays: [&[f64]; 3] = [&speeds, &particles.density, &particles.pressure];
-        let (frame, ranges) = Frame::of(&self.lattice, particles.position.iter(), &arrays);
+        // by their ids, so that the page can follow each of them
+        let order = particles.order_by_id();
+        let column = |of: &dyn Fn(usize) -> f64| order.iter().map(|&i| of(i)).collect::<Vec<f64>>();
+        let velocity = &particles.velocity;
+        let arrays = [
+            column(&|i| velocity.get(i).length()),
+            column(&|i| particles.density[i]),
+            column(&|i| particles.pressure[i]),
+            column(&|i| velocity.x[i]),
+            column(&|i| velocity.y[i]),
+            column(&|i| velocity.z[i]),
+        ];
+        let places = order.iter().map(|&i| particles.position.get(i));
+        let (frame, ranges) = Frame::of(&self.lattice, places, &arrays.each_ref().map(Vec::as_slice));
         let (time, step) = (self.simulation.time(), Some(self.simulation.steps()));
         pack_frame(&FrameHead { time, step, ranges, mesh: None, run }, &frame, None)
     }

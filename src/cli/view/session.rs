@@ -14,14 +14,20 @@ use super::super::args::{Shared, View};
 use super::super::failure::Failure;
 use super::board::{Board, Status, Topic};
 use super::command::{Command, settled};
-use super::model::{Checked, Detail, Running, Stamp, Subject};
+use super::model::{Checked, Detail, Running, Stamp, Standing, Subject};
+use super::section;
+use rfm::Solid;
 use rfm::geom::Aabb;
+use rfm::slice::Plane;
 
 /// Time between looks at the file, and the longest time for which a command waits while nothing runs.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Time of the clock between frames.
 const FRAME: Duration = Duration::from_millis(33);
+
+/// Time of the clock between plots.
+const PLOTS: Duration = Duration::from_millis(250);
 
 /// Pause of a simulation that is ahead of the clock.
 const BREATH: Duration = Duration::from_millis(4);
@@ -39,6 +45,10 @@ pub(super) struct Session {
     checked: Option<Checked>,
     running: Option<Running>,
     status: Status,
+    /// What stands in the scene as it is shown, and the box around it.
+    standing: Option<(Vec<Solid>, Aabb)>,
+    /// The plane in which a page looks at ω.
+    plane: Option<Plane>,
     /// Gravity in the box, m/s², if a page has turned it.
     gravity: Option<DVec3>,
     pace: Pace,
@@ -53,6 +63,8 @@ struct Pace {
     seconds_per_step: f64,
     /// When the last mesh of a moving obstacle was made, and how long that took.
     mesh: (Instant, Duration),
+    /// When the plots were told.
+    plots: Instant,
 }
 
 impl Session {
@@ -67,8 +79,10 @@ impl Session {
             checked: None,
             running: None,
             status: Status { speed: 1.0, ..Status::default() },
+            standing: None,
+            plane: None,
             gravity: None,
-            pace: Pace { from: (now, 0.0), seconds_per_step: 0.0, mesh: (now, Duration::ZERO) },
+            pace: Pace { from: (now, 0.0), seconds_per_step: 0.0, mesh: (now, Duration::ZERO), plots: now },
             run: 0,
         };
         // a page that is asked for before the first run needs something to show
@@ -124,7 +138,10 @@ impl Session {
                 self.status.playing = self.running.is_some();
                 self.follow_clock();
             }
-            Command::Pause => self.status.playing = false,
+            Command::Pause => {
+                self.status.playing = false;
+                self.show_plots();
+            }
             Command::Step => {
                 self.status.playing = false;
                 self.steps(|_| true);
@@ -151,6 +168,11 @@ impl Session {
                     self.gravity = Some(gravity);
                     self.running.iter_mut().for_each(|running| running.set_gravity(gravity));
                 }
+            }
+            Command::Slice { axis, at } => {
+                let plane = axis.map(|axis| Plane::new(axis.into(), at));
+                self.plane = plane.filter(|plane| plane.value.is_finite());
+                self.show_slice(self.time());
             }
             Command::Speed { value } => {
                 if value.is_finite() && value > 0.0 {
@@ -187,16 +209,18 @@ impl Session {
     fn show_mesh(&mut self, values: &BTreeMap<String, f64>, detail: Detail) -> Option<(Checked, Aabb)> {
         let began = Instant::now();
         let made = self.subject.checked(values).and_then(|checked| {
-            let made = self.subject.mesh(&checked, detail, self.run)?;
+            let made = self.subject.standing(&checked, detail, self.run)?;
             Ok((checked, made))
         });
         match made {
-            Ok((checked, (mesh, bounds))) => {
+            Ok((checked, Standing { mesh, solids, domain })) => {
                 self.board.set_block(Topic::Mesh, mesh);
                 self.status.error = None;
+                self.standing = Some((solids, domain));
+                self.show_slice(0.0);
                 self.status.latency =
                     Some(format!("the obstacle followed in {:.0} ms", began.elapsed().as_secs_f64() * 1e3));
-                Some((checked, bounds))
+                Some((checked, domain))
             }
             Err(error) => {
                 self.status.error = Some(error);
@@ -236,14 +260,13 @@ impl Session {
     /// Begins the present experiment again.
     fn restart(&mut self) {
         let Some(running) = &mut self.running else { return };
-        match running.experiment.start() {
-            Ok(start) => {
-                running.simulation = start.simulation;
+        match running.restart() {
+            Ok(()) => {
                 self.status.error = None;
                 let bounds = running.experiment.domain();
                 self.begin(&bounds);
             }
-            Err(error) => self.status.error = Some(error.to_string()),
+            Err(error) => self.status.error = Some(error),
         }
     }
 
@@ -257,11 +280,28 @@ impl Session {
         self.pace.seconds_per_step = 0.0;
         self.follow_clock();
         self.show_frame();
+        self.show_plots();
     }
 
     fn follow_clock(&mut self) {
-        let time = self.running.as_ref().map_or(0.0, |running| running.simulation.time());
-        self.pace.from = (Instant::now(), time);
+        self.pace.from = (Instant::now(), self.time());
+    }
+
+    /// The simulated time, s.
+    fn time(&self) -> f64 {
+        self.running.as_ref().map_or(0.0, |running| running.simulation.time())
+    }
+
+    /// Shows ω at a time, s, in the plane that is asked for.
+    fn show_slice(&mut self, time: f64) {
+        let (Some(plane), Some((solids, domain))) = (self.plane, &self.standing) else { return };
+        let solids: Vec<Solid> = solids.iter().map(|solid| solid.at(time)).collect();
+        match section::block(&solids, domain, plane, self.run) {
+            Ok(Some(block)) => self.board.set_block(Topic::Slice, block),
+            // a scene without obstacles has no ω
+            Ok(None) => {}
+            Err(error) => self.status.error = Some(error),
+        }
     }
 
     /// The simulated time that belongs to the present instant of the clock, s.
@@ -279,8 +319,7 @@ impl Session {
         let began = Instant::now();
         let due = self.due();
         self.steps(|time| began.elapsed() >= FRAME || time >= due);
-        let time = self.running.as_ref().map_or(0.0, |running| running.simulation.time());
-        if time < due {
+        if self.time() < due {
             // what could not be computed in time is not made up for later
             self.follow_clock();
         }
@@ -305,7 +344,19 @@ impl Session {
                 break;
             }
         }
+        running.history.sample(&running.simulation);
         self.show_frame();
+        if !self.status.playing || self.pace.plots.elapsed() >= PLOTS {
+            self.show_plots();
+        }
+    }
+
+    /// Shows what is known of the quantities over time.
+    fn show_plots(&mut self) {
+        if let Some(running) = &self.running {
+            self.board.set_plots(running.history.plots());
+            self.pace.plots = Instant::now();
+        }
     }
 
     fn show_frame(&mut self) {
@@ -318,8 +369,11 @@ impl Session {
                 Ok(mesh) => self.board.set_block(Topic::Mesh, mesh),
                 Err(error) => self.status.error = Some(error),
             }
+            let time = running.simulation.time();
+            self.show_slice(time);
             self.pace.mesh = (Instant::now(), began.elapsed());
         }
+        let Some(running) = &self.running else { return };
         self.board.set_block(Topic::Frame, running.frame(self.run));
     }
 

@@ -251,10 +251,19 @@ pub enum Measured {
 pub struct Picture {
     /// The direction from the scene to the eye, of any length above 0; `None`: from the front, right and above.
     pub camera: Option<DVec3>,
+    /// The place in the middle of a picture, m; `None`: that of the box.
+    pub look_at: Option<DVec3>,
+    /// How many times as large as if the whole box were seen; `None`: 1.
+    pub zoom: Option<f64>,
     /// What is taken away of obstacles.
     pub cut: Opening,
     /// The names of obstacles that are not drawn.
     pub hide: Vec<String>,
+}
+
+impl Picture {
+    /// The values that [`Picture::zoom`] may have.
+    pub const ZOOMS: std::ops::RangeInclusive<f64> = 0.05..=20.0;
 }
 
 /// What is taken away of obstacles in pictures, so that they do not hide the fluid.

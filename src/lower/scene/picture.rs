@@ -8,7 +8,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::quantity::Dimension;
 use crate::syntax::ast::{Comparison, Expr, ExprKind};
 
-pub(in crate::lower) const PICTURE_KEYS: [&str; 3] = ["camera", "cut", "hide"];
+pub(in crate::lower) const PICTURE_KEYS: [&str; 5] = ["camera", "look_at", "zoom", "cut", "hide"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 const CUT_HELP: &str =
     "write `cut: y <= 0.5` for the part of the obstacles that is taken away, `cut: auto` or `cut: none`";
@@ -21,6 +21,11 @@ impl<'a> Lowering<'a> {
         };
         let block = self.block(entries, "a picture", span, &PICTURE_KEYS, &[]);
         let camera = self.camera(&block)?;
+        let look_at = match block.setting("look_at") {
+            Some(_) => Some(self.vector_key(&block, "look_at", Dimension::LENGTH, DVec3::ZERO)?),
+            None => None,
+        };
+        let zoom = self.zoom(&block)?;
         let cut = match block.setting("cut") {
             Some((_, value)) => self.opening(value)?,
             None => Opening::default(),
@@ -36,7 +41,7 @@ impl<'a> Lowering<'a> {
                 hide.push(bodies[found].to_string());
             }
         }
-        Some(Picture { camera, cut, hide })
+        Some(Picture { camera, look_at, zoom, cut, hide })
     }
 
     /// Reads the direction to the eye. The outer option is `None` if it is wrong, which is reported; the inner one if it is
@@ -56,6 +61,21 @@ impl<'a> Lowering<'a> {
             return None;
         }
         Some(Some(camera))
+    }
+
+    /// Reads how large the picture is. The outer option is `None` if it is wrong, which is reported; the inner one if it is
+    /// not stated.
+    fn zoom(&mut self, block: &Block<'_>) -> Option<Option<f64>> {
+        let Some((_, value)) = block.setting("zoom") else { return Some(None) };
+        let zoom = self.quantity_expr(value, Dimension::NONE, "zoom")?;
+        if Picture::ZOOMS.contains(&zoom) {
+            return Some(Some(zoom));
+        }
+        let (least, most) = (Picture::ZOOMS.start(), Picture::ZOOMS.end());
+        let message = format!("`zoom` must be from {least} to {most}, found {zoom}");
+        let help = "it is how many times as large as if the whole box were seen: write `zoom: 2`";
+        self.report(Diagnostic::error(Code::OUT_OF_RANGE, value.span, message).help(help));
+        None
     }
 
     /// Reads what is taken away of obstacles: a word, or a comparison of one coordinate with a number.

@@ -68,6 +68,12 @@ function shown(x, digits = 3) {
   return String(Number(x.toPrecision(Math.max(digits, Math.ceil(Math.log10(size)))))).replace("-", "−");
 }
 
+/** The nearest of 1, 2, 5, 10, … at or below a number above 0. */
+function rounded(x) {
+  const power = 10 ** Math.floor(Math.log10(x));
+  return Number(([5, 2, 1].find((k) => k * power <= x * (1 + 1e-9)) * power).toPrecision(6));
+}
+
 /** Round numbers between two values, about so many. */
 function ticks(low, high, about = 5) {
   const width = high - low;

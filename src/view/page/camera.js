@@ -53,6 +53,33 @@ class Camera {
     return times(look, turnMatrix(this.turn, this.centre));
   }
 
+  /** The camera as a scene states it: the direction to the eye, the place in the middle, how large the picture is. */
+  key(box, [width, height], free) {
+    const towards = turned(back(this.turn), this.axes().towards);
+    const at = add(this.centre, turned(back(this.turn), sub(this.target, this.centre)));
+    const aspect = Math.max(width - free.left - free.right, 60) / Math.max(height - free.top - free.bottom, 60);
+    const seen = (2 * Math.tan(HALF_ANGLE) * this.distance) / Math.min(aspect, 1);
+    const zoom = clamp(this.renderedHeight(box, towards, at) / seen, 0.05, 20);
+    const numbers = (v) => `[${v.map((x) => Number(x.toFixed(4)) + 0).join(", ")}]`;
+    return `picture { camera: ${numbers(towards)}, look_at: ${numbers(at)}, zoom: ${Number(zoom.toPrecision(4))} }`;
+  }
+
+  /** How large `rfm render` draws a box seen from a direction, in a picture of its usual size: the height in metres, about a
+   *  point, of what it leaves to the scene. It follows src/render/camera.rs. */
+  renderedHeight({ min, max }, towards, point) {
+    const [page, margins] = [[1280, 720], [48, 56, 150, 72].map((margin) => (margin * 720) / 960)];
+    const room = [page[0] - margins[0] - margins[2], page[1] - margins[1] - margins[3]];
+    const right = norm(cross([0, 0, 1], towards)) > 1e-12 ? unit(cross([0, 0, 1], towards)) : [1, 0, 0];
+    const up = cross(towards, right);
+    const eye = add(scale(add(min, max), 0.5), scale(towards, 3 * norm(sub(max, min))));
+    const depth = (p) => dot(sub(eye, p), towards);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? max : min)[axis]));
+    const seen = corners.map((p) => [right, up].map((axis) => dot(sub(p, eye), axis) / depth(p)));
+    const extent = [0, 1].map((k) => Math.max(...seen.map((at) => at[k])) - Math.min(...seen.map((at) => at[k])));
+    const focal = Math.min(room[0] / Math.max(extent[0], 1e-12), room[1] / Math.max(extent[1], 1e-12));
+    return (room[1] * depth(point)) / focal;
+  }
+
   /** The matrix from the eye to a page of so many pixels, whose middle is that of what the controls leave free. */
   projection([width, height], free) {
     const [w, h] = [Math.max(width - free.left - free.right, 60), Math.max(height - free.top - free.bottom, 60)];

@@ -9,7 +9,7 @@ class Viewer {
     this.scene = new Scene(this.canvas);
     this.camera = new Camera();
     this.timeline = new Timeline();
-    this.plots = new Plots(byId("plots"));
+    this.plots = new Plots(byId("plots"), (time) => this.seek(time));
     this.meshes = [];
     this.errors = [];
     this.run = { number: 0, playing: false, speed: 1 };
@@ -17,6 +17,7 @@ class Viewer {
     this.look = {
       colours: sceneColours(), obstacle: "opaque", particles: true, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
       cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
+      slicing: { axis: "none", part: 0.5 }, arrows: false, arrowLength: 1, trails: false, trailFrames: 12,
     };
     this.take(setting);
     this.camera.frame(this.look.boxBounds);
@@ -24,6 +25,7 @@ class Viewer {
     this.scene.restored = () => { this.scene.setMap(this.look.map); this.scene.setBox(this.look.boxBounds); this.changed(); };
     this.listen();
     this.showPanel(innerWidth > 720);
+    this.showPlots(innerWidth >= 1000);
     byId("transport").hidden = setting.arrays.length === 0;
     byId("record").hidden = !window.MediaRecorder || setting.arrays.length === 0;
     if (setting.live) this.live = new Live((kind, content) => this.told(kind, content));
@@ -40,7 +42,7 @@ class Viewer {
     byId("title").textContent = document.title = setting.title;
     byId("facts").textContent = setting.facts;
     this.scene.setBox(setting.box);
-    this.plots.set(setting.plots ?? []);
+    if (setting.plots) this.tellPlots(setting.plots);
     // controls in use stay as they are: only another set of them is built anew
     const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name)]);
     if (kind !== this.kind) buildPanel(byId("panel"), this);
@@ -93,6 +95,12 @@ class Viewer {
       case "mesh":
         this.meshes = [content];
         break;
+      case "slice":
+        this.slice = content;
+        break;
+      case "plots":
+        this.tellPlots(content.plots);
+        break;
       case "status":
         Object.assign(this.run, { playing: content.playing, speed: content.speed });
         this.notice(content.error);
@@ -143,6 +151,14 @@ class Viewer {
     this.play(false);
     if (this.live && by > 0 && timeline.place >= timeline.last) this.send({ do: "step" });
     else timeline.step(by);
+    this.timelineChanged();
+    this.changed();
+  }
+
+  seek(time) {
+    this.play(false);
+    this.timeline.seek(time);
+    if (this.live || !this.look.blend) this.timeline.place = Math.round(this.timeline.place);
     this.timelineChanged();
     this.changed();
   }
@@ -201,17 +217,17 @@ class Viewer {
         const range = { low: Math.min(...ranges.map((r) => r.low)), high: Math.max(...ranges.map((r) => r.high)) };
         look.range = look.fixed ?? (ranges.length ? range : { low: 0, high: 1 });
       }
-      look.legend = look.particles && timeline.frames.length ? array : null;
+      look.legend = (look.particles || look.arrows || look.trails) && timeline.frames.length ? array : null;
       this.showRange();
     }
     const { axis, part, flipped } = look.cutting;
     const k = "xyz".indexOf(axis);
-    const { min, max } = look.boxBounds;
-    const at = k < 0 ? 0 : min[k] + part * (max[k] - min[k]);
+    const at = this.placeOf(look.cutting);
     const sign = flipped ? -1 : 1;
     look.cut = k < 0 ? NO_CUT : [0, 1, 2].map((i) => (i === k ? sign : 0)).concat(sign * at);
     [look.cutSolid, look.cutFluid] = [look.cutting.solid, look.cutting.fluid];
     look.free = this.free();
+    this.settleMotion();
     if (byId("cut-value")) byId("cut-value").textContent = k < 0 ? "" : `${shown(at)} m`;
     look.parallel = camera.parallel;
     look.gravity = setting.gravity;
@@ -223,11 +239,53 @@ class Viewer {
     }
   }
 
+  /** The coordinate of a plane across an axis; 0 if there is none. */
+  placeOf({ axis, part }) {
+    const k = "xyz".indexOf(axis);
+    const { min, max } = this.look.boxBounds;
+    return k < 0 ? 0 : min[k] + part * (max[k] - min[k]);
+  }
+
+  /** Settles the slice that is shown, and what arrows and trails need. */
+  settleMotion() {
+    const { look, setting, timeline } = this;
+    const k = "xyz".indexOf(look.slicing.axis);
+    look.slice = k >= 0 && this.slice?.axis === k ? this.slice : null;
+    if (byId("slice-value")) byId("slice-value").textContent = k < 0 ? "" : `${shown(this.placeOf(look.slicing))} m`;
+    const components = ["velocity x", "velocity y", "velocity z"].map((name) => setting.arrays.findIndex((array) => array.name === name));
+    look.velocity = components.includes(-1) ? null : components;
+    look.blended = look.blend && !this.live;
+    // the fastest particle of the scale goes an eighth of the box's diagonal, in a round time
+    const speed = setting.arrays.find((array) => array.name === "speed")?.range?.high;
+    const last = timeline.frames[timeline.last];
+    const fastest = speed || (last && look.velocity ? Math.max(...look.velocity.map((array) => Math.max(last.ranges[array].high, -last.ranges[array].low))) : 0);
+    look.arrowSeconds = rounded(((this.camera.reach * 0.25) / (fastest || 1)) * look.arrowLength);
+    if (byId("arrow-value")) byId("arrow-value").textContent = `way in ${shown(look.arrowSeconds)} s`;
+    if (byId("trail-value")) {
+      const end = clamp(Math.floor(timeline.place + 1e-9), 0, timeline.last);
+      const start = timeline.frames[Math.max(end - look.trailFrames, 0)];
+      byId("trail-value").textContent = start ? `${shown(timeline.frames[end].time - start.time)} s` : "";
+    }
+  }
+
+  /** Asks for ω in the plane that is chosen. */
+  askSlice() {
+    const { slicing } = this.look;
+    this.send({ do: "slice", axis: slicing.axis === "none" ? null : slicing.axis, at: this.placeOf(slicing) });
+    this.changed();
+  }
+
   /** What the controls leave free of the page, as distances from its edges. */
   free() {
-    const [panel, transport] = [byId("panel"), byId("transport")];
+    const [panel, transport, { look }] = [byId("panel"), byId("transport"), this];
     const bottom = transport.hidden ? 10 : innerHeight - transport.getBoundingClientRect().top;
-    const free = { left: 0, right: 0, top: 30, bottom };
+    const free = { left: 0, right: 0, top: 30, bottom, legend: 0 };
+    const plots = byId("plots");
+    if (!plots.hidden && plots.children.length > 0 && innerWidth > 720) {
+      free.legend = plots.getBoundingClientRect().right;
+      free.left = free.legend + 60;
+    }
+    if (look.slicing.axis !== "none" && innerWidth > 720) free.left += 30;
     if (panel.hidden) return free;
     if (innerWidth > 720) free.right = innerWidth - panel.getBoundingClientRect().left;
     else free.bottom = innerHeight - panel.getBoundingClientRect().top;
@@ -255,7 +313,8 @@ class Viewer {
     const view = camera.view();
     const page = size.map((x) => x / ratio);
     const projection = camera.projection(page, look.free);
-    scene.draw(look, view, projection, frames);
+    look.ratio = ratio;
+    scene.draw(look, view, projection, frames, timeline);
     const seen = { view, all: times(projection, view) };
     drawOverlay(overlay.getContext("2d"), size, ratio, look, camera, seen, null);
     this.plots.draw(timeline.time, look.colours, ratio);
@@ -266,7 +325,7 @@ class Viewer {
 
   /** The picture with its legend and title on a canvas of its own. */
   composed() {
-    const whole = { left: 0, right: 0, top: 20, bottom: 10 };
+    const whole = { left: 0, right: 0, top: 20, bottom: 10, legend: 0 };
     this.draw(whole);
     const { canvas, look, camera, timeline } = this;
     const picture = element("canvas", { width: canvas.width, height: canvas.height });
@@ -304,18 +363,20 @@ class Viewer {
       const context = canvas.getContext("2d");
       const recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: "video/webm", videoBitsPerSecond: 12e6 });
       const parts = [];
-      recorder.ondataavailable = ({ data }) => parts.push(data);
+      const film = { recorder, bytes: 0 };
+      recorder.ondataavailable = ({ data }) => { parts.push(data); film.bytes += data.size; };
       recorder.onstop = () => this.save(new Blob(parts, { type: "video/webm" }), "webm");
-      recorder.start();
-      this.film = { recorder, add: (...layers) => layers.forEach((layer) => context.drawImage(layer, 0, 0)) };
+      // in pieces, so that a slow machine has not encoded all of it at the end
+      recorder.start(250);
+      this.film = Object.assign(film, { add: (...layers) => layers.forEach((layer) => context.drawImage(layer, 0, 0)) });
       this.changed();
     }
     byId("record").setAttribute("aria-pressed", String(!!this.film));
   }
 
   copyCamera() {
-    const towards = turned(back(this.camera.turn), this.camera.axes().towards);
-    const text = `picture { camera: [${towards.map((x) => Number(x.toFixed(3))).join(", ")}] }`;
+    const { canvas, look } = this;
+    const text = this.camera.key(look.boxBounds, [canvas.clientWidth, canvas.clientHeight], this.free());
     const copied = navigator.clipboard?.writeText(text) ?? Promise.reject();
     copied.then(() => this.state(`copied: ${text}`), () => this.state(text));
   }
@@ -327,7 +388,20 @@ class Viewer {
 
   showPanel(on) {
     byId("panel").hidden = !on;
+    if (on && isNarrow()) this.showPlots(false);
     byId("show-panel").setAttribute("aria-expanded", String(on));
+    this.changed();
+  }
+
+  tellPlots(plots) {
+    this.plots.set(plots);
+    byId("show-plots").hidden = plots.length === 0;
+  }
+
+  showPlots(on) {
+    byId("plots").hidden = !on;
+    if (on && isNarrow()) this.showPanel(false);
+    byId("show-plots").setAttribute("aria-expanded", String(on));
     this.changed();
   }
 
@@ -341,11 +415,14 @@ class Viewer {
       ended: () => { this.dragging = false; this.changed(); },
       turns: () => look.turns,
     });
-    addEventListener("resize", () => this.changed());
+    addEventListener("resize", () => {
+      if (!byId("panel").hidden) this.showPanel(true);
+      this.changed();
+    });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { look.colours = sceneColours(); this.changed(); });
     const clicks = { play: () => this.play(!this.playing), back: () => this.step(-1), forward: () => this.step(1), restart: () => this.restart(),
       home: () => this.home(), screenshot: () => this.screenshot(), record: () => this.record(), "show-help": () => byId("help").showModal(),
-      "show-panel": () => this.showPanel(byId("panel").hidden) };
+      "show-panel": () => this.showPanel(byId("panel").hidden), "show-plots": () => this.showPlots(byId("plots").hidden) };
     for (const [id, act] of Object.entries(clicks)) byId(id).addEventListener("click", act);
     byId("scrub").addEventListener("input", (event) => {
       if (!this.live) this.play(false);
@@ -377,9 +454,12 @@ class Viewer {
       [["p"], "p", "parallel projection", clicked("parallel")],
       [["o"], "o", "obstacle: opaque, transparent, hidden", () => { nextOf("obstacle"); }],
       [["c"], "c", "cut across x, y, z, or not", () => { nextOf("cut-axis"); }],
+      [["a"], "a", "arrows of the velocity", clicked("arrows-shown")],
+      [["t"], "t", "trails of the particles", clicked("trails-shown")],
       [["s"], "s", "save the picture", clicked("screenshot")],
       [["v"], "v", "begin or end a video", clicked("record")],
       [["m"], "m", "show or hide the controls", clicked("show-panel")],
+      [["d"], "d", "show or hide the plots over time", clicked("show-plots")],
       [["?"], "?", "this list", clicked("show-help")],
     ];
     const mouse = [["drag", "turn the view, or the box"], ["right drag, shift", "move the view"], ["wheel, pinch", "nearer or farther"]];
@@ -397,6 +477,9 @@ class Viewer {
     });
   }
 }
+
+/** Whether the window has room for either the controls or the plots. */
+const isNarrow = () => innerWidth <= 720;
 
 const clicked = (id) => () => byId(id)?.click();
 

@@ -11,6 +11,17 @@ function drawOverlay(context, size, ratio, look, camera, seen, caption) {
   if (look.box) drawLengths(context, page, look, seen);
   drawAxes(context, page, look, camera, seen);
   if (look.legend) drawLegend(context, page, look);
+  // above the legend of the colours stands what else there is to say
+  const height = legendHeight(page);
+  const left = look.free.legend + 18;
+  let bottom = page[1] - look.free.bottom - 12 - (look.legend ? height + 32 : 0);
+  if (look.arrows && look.velocity && look.legend) {
+    context.fillStyle = look.colours.soft;
+    context.textAlign = "left";
+    context.fillText(`arrows: way in ${shown(look.arrowSeconds)} s`, left, bottom);
+    bottom -= 18;
+  }
+  if (look.slice) drawSliceLegend(context, look, look.slice, [left, bottom], height);
   if (caption) {
     context.fillStyle = look.colours.text;
     context.textAlign = "left";
@@ -18,9 +29,11 @@ function drawOverlay(context, size, ratio, look, camera, seen, caption) {
   }
 }
 
+const legendHeight = (page) => Math.min(190, page[1] * 0.34);
+
 function drawLegend(context, page, look) {
-  const [width, height] = [14, Math.min(190, page[1] * 0.34)];
-  const [left, top] = [18, page[1] - look.free.bottom - height - 12];
+  const [width, height] = [14, legendHeight(page)];
+  const [left, top] = [18 + look.free.legend, page[1] - look.free.bottom - height - 12];
   const { low, high } = look.range;
   for (let y = 0; y < height; y++) {
     const [r, g, b] = colourAt(look.map, 1 - (y + 0.5) / height);

@@ -36,6 +36,8 @@ function buildPanel(place, viewer) {
   if (setting.arrays.length) groups.push(colourGroup(viewer));
   groups.push(group(setting.arrays.length ? "Obstacle" : "Solid", true, choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); })));
   groups.push(cutGroup(viewer));
+  if (setting.live) groups.push(sliceGroup(viewer));
+  if (setting.arrays.length) groups.push(motionGroup(viewer));
   const direction = (name, d) => element("button", { title: `look along ${name[1]}`, onclick: () => { camera.look(d); again(); } }, name);
   groups.push(group("View", true,
     element("div", { className: "buttons" },
@@ -51,6 +53,43 @@ function buildPanel(place, viewer) {
   const open = new Map([...place.querySelectorAll("details")].map((old) => [old.firstChild.textContent, old.open]));
   for (const made of groups) made.open = open.get(made.firstChild.textContent) ?? made.open;
   place.replaceChildren(...groups);
+}
+
+/** ω in a plane; on request the scene is cut open there. */
+function sliceGroup(viewer) {
+  const { look } = viewer;
+  const { slicing, cutting } = look;
+  const opens = check("slice-cuts", "cut open there", true, () => changed());
+  const changed = () => {
+    place.disabled = slicing.axis === "none";
+    const axis = byId("cut-axis");
+    if (opens.firstChild.checked && axis) {
+      // the side towards the eye is taken away
+      if (axis.value !== slicing.axis) {
+        axis.value = slicing.axis;
+        axis.dispatchEvent(new Event("change"));
+      }
+      cutting.part = slicing.part;
+      byId("cut-at").value = slicing.part;
+    }
+    viewer.askSlice();
+  };
+  const place = slider("slice-at", [0, 1, slicing.part], (part) => { slicing.part = part; changed(); });
+  place.disabled = slicing.axis === "none";
+  const axis = choice("slice-axis", ["none", "x", "y", "z"], slicing.axis, (value) => { slicing.axis = value; changed(); });
+  return group("Slice of ω", slicing.axis !== "none", row("across", axis), row("at", place, element("output", { id: "slice-value" })), row("", opens));
+}
+
+/** Arrows and trails. */
+function motionGroup(viewer) {
+  const { look, setting } = viewer;
+  const again = () => viewer.changed();
+  const has = setting.arrays.some((array) => array.name === "velocity x");
+  return group("Motion", false,
+    has ? row("", check("arrows-shown", "arrows of velocity", look.arrows, (value) => { look.arrows = value; again(); })) : null,
+    has ? row("length", slider("arrow-length", [-2, 2, Math.log2(look.arrowLength)], (value) => { look.arrowLength = 2 ** value; again(); }), element("output", { id: "arrow-value" })) : null,
+    row("", check("trails-shown", "trails", look.trails, (value) => { look.trails = value; again(); })),
+    row("of", slider("trail-frames", [1, 60, look.trailFrames], (value) => { look.trailFrames = Math.round(value); again(); }), element("output", { id: "trail-value" })));
 }
 
 function colourGroup(viewer) {

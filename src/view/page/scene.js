@@ -21,12 +21,14 @@ class Scene {
     this.mesh = this.program(MESH_VERTEX, MESH_FRAGMENT);
     this.lines = this.program(LINES_VERTEX, LINES_FRAGMENT);
     this.map = gl.createTexture();
-    this.buffers = { from: gl.createBuffer(), to: gl.createBuffer(), level: gl.createBuffer(), edges: gl.createBuffer() };
+    this.buffers = Object.fromEntries(["from", "to", "level", "edges", "velocity0", "velocity1", "velocity2"].map((name) => [name, gl.createBuffer()]));
     this.pointsArray = gl.createVertexArray();
     this.edgesArray = gl.createVertexArray();
     this.solid = null;
     this.shown = {};
     this.edges = 0;
+    this.slice = new SliceView(this);
+    this.motion = new MotionView(this);
   }
 
   program(vertex, fragment) {
@@ -110,8 +112,8 @@ class Scene {
     this.gl.bufferData(this.gl.ARRAY_BUFFER, data, this.gl.DYNAMIC_DRAW);
   }
 
-  /** Draws everything. `look` says how; `frames` are the two between which the time lies. */
-  draw(look, view, projection, frames) {
+  /** Draws everything. `look` says how; `frames` are the two between which the time lies, of the frames of `timeline`. */
+  draw(look, view, projection, frames, timeline) {
     const gl = this.gl;
     const [width, height] = [this.canvas.width, this.canvas.height];
     gl.viewport(0, 0, width, height);
@@ -122,7 +124,10 @@ class Scene {
     gl.disable(gl.BLEND);
     if (this.solid && look.obstacle === "opaque") this.drawMesh(look, view, projection, 1);
     if (frames && look.particles) this.drawPoints(look, view, projection, frames);
+    if (frames && look.arrows && look.velocity) this.motion.drawArrows(look, view, projection, frames);
     this.drawLines(look, view, projection);
+    if (frames && look.trails) this.motion.drawTrails(look, view, projection, timeline.frames, look.blended ? timeline.place : Math.floor(timeline.place + 1e-9));
+    if (look.slice) this.slice.draw(look.slice, view, projection);
     if (this.solid && look.obstacle === "transparent") this.drawMesh(look, view, projection, 0.3);
   }
 
@@ -190,10 +195,10 @@ class Scene {
     points.set("1f", "part", next === from ? 0 : part);
     points.set("1f", "radius", look.radius);
     points.set("1f", "height", this.canvas.height);
-    points.set("4f", "cut", ...(look.cutFluid ? look.cut : NO_CUT));
-    const range = from.ranges[look.array];
-    const width = look.range.high - look.range.low || 1;
-    points.set("2f", "tone", (range.high - range.low) / width, (range.low - look.range.low) / width);
+    // balls that stand out of a plane would hide what is drawn in it
+    const [nx, ny, nz, offset] = look.cutFluid ? look.cut : NO_CUT;
+    points.set("4f", "cut", nx, ny, nz, look.slice ? offset - 1.1 * look.radius : offset);
+    points.set("2f", "tone", ...toneOf(from.ranges[look.array], look.range));
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.map);
     points.set("1i", "map", 0);

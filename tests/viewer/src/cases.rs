@@ -12,6 +12,9 @@ use crate::program::{Viewer, rfm};
 
 const SIZE: (u32, u32) = (1100, 700);
 
+/// The height in metres of what `rfm render` leaves to the scene, for a cube of 3 m from the direction (0.6, −0.64, 0.48).
+const RENDERED_HEIGHT: f64 = 4.692_309_429_472;
+
 /// What the cases share.
 pub struct Room {
     pub browser: Browser,
@@ -27,6 +30,11 @@ pub const ALL: &[(&str, Case)] = &[
     ("pictures and videos are saved", files),
     ("a page of a mesh", mesh),
     ("a page of moving obstacles and probes", moving),
+    ("plots of energy, audit and probes follow a run and stand in its page", plots),
+    ("a slice of ω, cut open there, follows its slider and the obstacle", slice),
+    ("arrows and trails show where the fluid goes", motion),
+    ("the camera is copied as `rfm render` and a scene read it", camera),
+    ("the page of a report opens from a file", report),
     ("small windows and both themes", windows),
     ("a hundred thousand particles", many),
     ("a run is followed, stopped, stepped and begun again", live),
@@ -179,8 +187,8 @@ fn handed_over(room: &mut Room, begin: &str, end: &str) -> (String, f64) {
     );
     room.browser.key(begin);
     if !end.is_empty() {
-        // a second of video
-        std::thread::sleep(Duration::from_secs(1));
+        // how much a second of video is depends on the machine
+        room.browser.wait_for("viewer.film.bytes > 10000");
         room.browser.key(end);
     }
     room.browser.wait_for("window.handed");
@@ -215,7 +223,233 @@ fn moving(room: &mut Room) {
     room.place(6.0);
     room.shot("moving");
     assert!(Picture::of(&room.scene()).difference(&first) > 0.2);
-    assert_eq!(room.browser.number("document.querySelectorAll('#plots canvas').length"), 1.0);
+    // the energy, the audit in per cent and its speed, and the height of the scene's probe
+    assert_eq!(room.browser.number("document.querySelectorAll('#plots canvas').length"), 4.0);
+}
+
+/// What stands in plots is within them, and they are within the window.
+fn assert_plots_fit(room: &mut Room) {
+    let outside = room.browser.number(
+        "viewer.plots.plots.filter(({ canvas, legend, x, last }) => { const box = canvas.getBoundingClientRect(); \
+         const list = document.getElementById('plots'); \
+         return box.left < 0 || box.width < 268 || list.scrollWidth > list.clientWidth || x(last) > 268 || \
+         legend.places.some(([left]) => left + legend.width > 264); }).length",
+    );
+    assert_eq!(outside, 0.0);
+}
+
+fn plots(room: &mut Room) {
+    room.open_saved("pawn");
+    room.place(9.0);
+    room.shot("plots");
+    let names =
+        room.browser.eval("viewer.plots.plots.map(({ name, unit }) => `${name}, ${unit}`).join('; ')");
+    assert_eq!(names.as_str().unwrap(), "energy, J; audit, %; audit, m/s");
+    assert_plots_fit(room);
+    // ten samples from frame to frame, and the sum of the energies is their total
+    assert!(room.browser.number("viewer.plots.plots[0].times.length") > 150.0);
+    let off = room.browser.number(
+        "Math.max(...viewer.plots.plots[0].columns[3].values.map((total, k) => \
+         Math.abs(total - [0, 1, 2].reduce((sum, c) => sum + viewer.plots.plots[0].columns[c].values[k], 0)) / total))",
+    );
+    assert!(off < 1e-4, "{off}");
+    // the fluid falls from rest
+    assert_eq!(room.browser.number("viewer.plots.plots[0].columns[0].values[0]"), 0.0);
+    // a click goes to its time
+    let (x, y) = room.browser.middle("#plots canvas");
+    room.browser.drag((x, y), (x, y));
+    let (time, clicked) =
+        (room.browser.number("viewer.timeline.time"), room.browser.number("viewer.plots.plots[0].at(134)"));
+    assert!((time - clicked).abs() < 0.02, "{time} {clicked}");
+    room.browser.key("d");
+    assert_eq!(room.browser.number("document.querySelector('#plots').getBoundingClientRect().height"), 0.0);
+    room.browser.key("d");
+
+    let viewer = Viewer::start(&room.folder, &["paddle.rfm", "-D", "particles=1500"]);
+    room.browser.open(&viewer.address);
+    room.browser.wait_for(
+        "window.viewer && viewer.plots.plots.length === 4 && viewer.plots.plots[0].times.length > 8",
+    );
+    let last = room.browser.number("viewer.plots.plots[0].times.at(-1)");
+    room.browser.wait_for(&format!("viewer.plots.plots[0].times.at(-1) > {last} + 0.02"));
+    room.browser.click("#play");
+    // the last sample is told when the run pauses
+    room.browser.wait_for("!viewer.run.playing && viewer.plots.plots[0].times.at(-1) === Number(viewer.timeline.frames.at(-1).time.toPrecision(6))");
+    room.shot("plots-live");
+    assert_plots_fit(room);
+    let hidden = room.browser.number(
+        "document.getElementById('plots').scrollHeight - document.getElementById('plots').clientHeight",
+    );
+    assert!(hidden <= 0.0, "four plots of usual size are seen whole, and {hidden} pixels are not");
+    room.browser.click("#restart");
+    room.browser.wait_for("viewer.plots.plots[0].times.length === 1");
+    room.browser.theme("dark");
+    room.browser.click("#play");
+    room.browser.wait_for("viewer.plots.plots[0].times.length > 20");
+    room.shot("plots-dark");
+    room.browser.theme("light");
+}
+
+fn slice(room: &mut Room) {
+    let viewer = Viewer::start(&room.folder, &["pawn.rfm", "-D", "particles=2000"]);
+    room.browser.open(&viewer.address);
+    room.browser.wait_for("window.viewer && viewer.meshes.length === 1 && viewer.timeline.frames.length > 8");
+    room.browser.eval("viewer.play(false)");
+    room.browser.wait_for("!viewer.run.playing");
+    let before = Picture::of(&room.scene());
+    room.browser.choose("#slice-axis", "y");
+    room.browser.wait_for("viewer.look.slice?.axis === 1");
+    assert_eq!(room.browser.eval("viewer.look.cutting.axis"), "y");
+    assert!((room.browser.number("viewer.look.slice.at") - 1.5).abs() < 1e-9);
+    room.shot("slice");
+    let cut = Picture::of(&room.scene());
+    assert!(cut.difference(&before) > 2.0);
+    // orange inside, blue outside
+    assert!(cut.part(|[r, _, b]| r > b.saturating_add(60)) > 0.003);
+    assert!(cut.part(|[r, _, b]| b > r.saturating_add(25)) > 0.03);
+    // the values are those of `rfm eval` in the same plane
+    for line in ["0.1,1.5,0.3", "1.5,1.5,0.5", "2,1.5,2.9", "1.3,1.5,1.2"] {
+        let at: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
+        let told = rfm(&room.folder, &["eval", "pawn.rfm", "--at", line, "--json"]);
+        let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+        let exact = told["points"][0]["omega"].as_f64().unwrap_or_else(|| panic!("{told}"));
+        // bilinear between four nodes, a hundredth apart
+        let found = room.browser.number(&format!(
+            "(() => {{ const s = viewer.look.slice, u = ({} - s.min[0]) / (s.max[0] - s.min[0]) * (s.columns - 1), \
+             v = ({} - s.min[1]) / (s.max[1] - s.min[1]) * (s.rows - 1), i = Math.min(Math.floor(u), s.columns - 2), \
+             j = Math.min(Math.floor(v), s.rows - 2), w = (a, b) => s.values[(j + b) * s.columns + i + a], f = u - i, g = v - j; \
+             return (w(0, 0) * (1 - f) + w(1, 0) * f) * (1 - g) + (w(0, 1) * (1 - f) + w(1, 1) * f) * g; }})()",
+            at[0], at[2]
+        ));
+        assert!((found - exact).abs() < 2e-3 * exact.abs().max(1.0), "{line}: {found} {exact}");
+    }
+    // a param that moves the pawn moves its section
+    room.browser.eval("viewer.oldSlice = viewer.look.slice");
+    room.browser.eval("(() => { const track = document.getElementById('param-cx'); track.value = 2; track.dispatchEvent(new Event('input')); })()");
+    room.browser.wait_for("viewer.look.slice !== viewer.oldSlice");
+    let began = Instant::now();
+    room.browser.eval("(() => { viewer.oldSlice = viewer.look.slice; const track = document.getElementById('slice-at'); track.value = 0.4; track.dispatchEvent(new Event('input')); })()");
+    room.browser
+        .wait_for("viewer.look.slice !== viewer.oldSlice && Math.abs(viewer.look.slice.at - 1.2) < 1e-9");
+    println!("  from the slider of a slice to the picture: {:.0} ms", began.elapsed().as_secs_f64() * 1e3);
+    room.shot("slice-moved");
+    for axis in ["x", "z"] {
+        room.browser.choose("#slice-axis", axis);
+        room.browser.wait_for(&format!("viewer.look.slice?.axis === 'xyz'.indexOf('{axis}')"));
+        room.shot(&format!("slice-{axis}"));
+    }
+    room.browser.choose("#slice-axis", "none");
+    room.browser.wait_for("!viewer.look.slice && viewer.look.cutting.axis === 'none'");
+}
+
+fn motion(room: &mut Room) {
+    room.open_saved("pawn");
+    room.place(9.0);
+    let before = Picture::of(&room.scene());
+    room.browser.key("a");
+    room.shot("arrows");
+    let arrows = Picture::of(&room.scene());
+    assert!(arrows.difference(&before) > 0.2, "{}", arrows.difference(&before));
+    assert!(room.browser.number("viewer.scene.motion.drawn") >= 2000.0);
+    // velocities are those of the frames: their length is the speed
+    let off = room.browser.number(
+        "(() => { const f = viewer.timeline.frames[9], value = (k, i) => f.ranges[k].low + f.levels[k][i] / 254 * (f.ranges[k].high - f.ranges[k].low); \
+         let most = 0; for (let i = 0; i < f.count; i++) { const v = viewer.look.velocity.map((k) => value(k, i)); \
+         most = Math.max(most, Math.abs(Math.hypot(...v) - value(0, i))); } return most / f.ranges[0].high; })()",
+    );
+    assert!(off < 0.02, "{off}");
+    room.browser.key("a");
+    room.browser.key("t");
+    room.shot("trails");
+    let trails = Picture::of(&room.scene());
+    assert!(trails.difference(&before) > 0.2, "{}", trails.difference(&before));
+    // a thousand particles and more, each with a piece from frame to frame
+    assert!(room.browser.number("viewer.scene.motion.ways.count") >= 900.0 * 9.0 * 2.0);
+    room.browser
+        .eval("(() => { viewer.look.particles = false; viewer.look.arrows = true; viewer.changed(); })()");
+    room.shot("arrows-trails");
+    // in the run that is computed, too
+    let viewer = Viewer::start(&room.folder, &["pawn.rfm", "-D", "particles=2000"]);
+    room.browser.open(&viewer.address);
+    room.browser.wait_for("window.viewer && viewer.timeline.frames.length > 12");
+    room.browser.key("a");
+    room.browser.key("t");
+    room.browser.wait_for("viewer.scene.motion.drawn > 900 && viewer.scene.motion.ways.count > 10000");
+    room.shot("motion-live");
+}
+
+fn camera(room: &mut Room) {
+    room.open_saved("pawn");
+    room.place(9.0);
+    room.browser.drag((560.0, 300.0), (640.0, 260.0));
+    room.browser
+        .eval("(() => { viewer.camera.pan(-60, 40, 700); viewer.camera.zoom(0.5); viewer.copyCamera(); })()");
+    let key = "viewer.camera.key(viewer.look.boxBounds, [viewer.canvas.clientWidth, viewer.canvas.clientHeight], viewer.free())";
+    let key = room.browser.eval(key).as_str().unwrap().to_string();
+    println!("  {key}");
+    room.shot("camera");
+    rfm(
+        &room.folder,
+        &[
+            "render",
+            "pawn.out",
+            "-o",
+            "camera-render.png",
+            "--frames",
+            "9",
+            "--camera",
+            &key,
+            "--cut",
+            "none",
+        ],
+    );
+    std::fs::copy(room.folder.join("camera-render.png"), room.shots.join("camera-render.png")).unwrap();
+    // what is in the middle of the one is in the middle of the other, as large
+    let file = std::fs::read_to_string(room.folder.join("pawn.rfm")).unwrap();
+    let scene = file.replacen("fluid ", &format!("{key}\n  fluid "), 1);
+    assert_ne!(file, scene);
+    std::fs::write(room.folder.join("seen.rfm"), scene).unwrap();
+    rfm(&room.folder, &["check", "seen.rfm"]);
+    let room_height = room.browser.number(
+        "(() => { const free = viewer.free(), size = [viewer.canvas.clientWidth, viewer.canvas.clientHeight]; \
+         const lens = viewer.camera.projection(size, free)[5]; \
+         return (size[1] - free.top - free.bottom) * viewer.camera.distance / (0.5 * size[1] * lens); })()",
+    );
+    let zoom: f64 = key.rsplit_once("zoom: ").unwrap().1.trim_end_matches(" }").parse().unwrap();
+    let rendered = room.browser.number(
+        "viewer.camera.renderedHeight(viewer.look.boxBounds, viewer.camera.axes().towards, viewer.camera.target)",
+    );
+    // the same figure stands in a test of src/render/camera.rs
+    let whole = room.browser.number(
+        "viewer.camera.renderedHeight({ min: [0, 0, 0], max: [3, 3, 3] }, [0.6, -0.64, 0.48], [1.5, 1.5, 1.5])",
+    );
+    assert!((whole - RENDERED_HEIGHT).abs() < 1e-6, "{whole}");
+    assert!((rendered / zoom / room_height - 1.0).abs() < 1e-3, "{rendered} {zoom} {room_height}");
+}
+
+fn report(room: &mut Room) {
+    rfm(&room.folder, &["report", "pawn.rfm", "--mesh-cells", "32", "--html", "report.html"]);
+    let page = room.folder.join("report.html");
+    room.browser.open(&format!("file://{}", page.display()));
+    room.browser.wait_for("document.images.length === 4 && [...document.images].every((i) => i.complete)");
+    // every drawing is one, nothing but the file was asked for, and nothing is wider than the window
+    assert_eq!(room.browser.number("[...document.images].filter((i) => i.naturalWidth < 300).length"), 0.0);
+    let asked = "performance.getEntriesByType('resource').filter((r) => !r.name.startsWith('data:')).length";
+    assert_eq!(room.browser.number(asked), 0.0);
+    for (name, size) in [("report", SIZE), ("report-phone", (390, 760))] {
+        room.browser.resize(size);
+        assert!(room.browser.number("document.documentElement.scrollWidth - innerWidth") <= 0.0, "{name}");
+        room.shot(name);
+        room.browser.eval("scrollTo(0, 700)");
+        room.shot(&format!("{name}-below"));
+        room.browser.eval("scrollTo(0, document.body.scrollHeight)");
+        room.shot(&format!("{name}-end"));
+        room.browser.eval("scrollTo(0, 0)");
+    }
+    room.browser.resize(SIZE);
+    room.browser.theme("dark");
+    room.shot("report-dark");
+    room.browser.theme("light");
 }
 
 fn windows(room: &mut Room) {

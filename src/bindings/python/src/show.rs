@@ -6,7 +6,9 @@ use rfm::glam::DVec3;
 use rfm::mesh::{Grid, Mesh, MeshError, Resolution, dual_contouring, split_creases};
 use rfm::solid::{Bounds, Chosen};
 use rfm::sph::Simulation;
-use rfm::view::{Array, Corners, Frame, FrameHead, Lattice, Levels, Page, Setting, pack_frame, pack_mesh};
+use rfm::view::{
+    Array, Corners, Frame, FrameHead, Lattice, Levels, Page, Setting, VELOCITY, pack_frame, pack_mesh,
+};
 use rfm::{Experiment, Solid, slice};
 
 use crate::pool::{Threads, run};
@@ -104,7 +106,9 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
     let particles = simulation.particles();
     let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
     let lattice = Lattice::new(&domain);
-    let arrays: [&[f64]; 3] = [&speeds, &particles.density, &particles.pressure];
+    let velocity = &particles.velocity;
+    let arrays: [&[f64]; 6] =
+        [&speeds, &particles.density, &particles.pressure, &velocity.x, &velocity.y, &velocity.z];
     let (frame, ranges) = Frame::of(&lattice, particles.position.iter(), &arrays);
     let fastest = Levels { low: 0.0, high: ranges[0].high };
     let array = |name| Array::named(name, (name == "speed").then_some(fastest));
@@ -115,10 +119,10 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
         domain: Corners::from(&domain),
         lattice: Some(Corners::from(lattice.bounds())),
         radius: 0.5 * experiment.parameters().spacing(),
-        arrays: ["speed", "density", "pressure"].map(array).to_vec(),
+        arrays: ["speed", "density", "pressure"].into_iter().chain(VELOCITY).map(array).collect(),
         gravity: None,
         params: Vec::new(),
-        plots: Vec::new(),
+        plots: None,
     };
     let mut out = Vec::new();
     let mut page = Page::begin(&mut out, &setting).ok()?;
