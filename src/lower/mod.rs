@@ -27,6 +27,7 @@ mod scene;
 mod slips;
 mod transforms;
 mod tubes;
+mod unused;
 mod value;
 pub mod vocabulary;
 
@@ -155,6 +156,7 @@ fn lower_here(
     }
     if !lowering.diagnostics.iter().any(|d| d.severity == Severity::Error) {
         lowering.unused(); // an item that failed may contain the use
+        ast.items.iter().for_each(|item| lowering.unused_locals(item));
     }
     lowering.unknown_overrides((ast, imported), options);
     (lowering.module, lowering.diagnostics)

@@ -59,11 +59,11 @@ fn follows(definition: &str, truth: impl Fn(DVec2) -> f64, tolerance: f64) {
     let mut random = Random(5);
     let over = Aabb::new(DVec3::new(-4.0, -4.0, 0.0), DVec3::new(4.0, 4.0, 1.0));
     let mut near = 0;
-    for i in 0..60_000 {
+    for i in 0..20_000 {
         let mut p = random.within(&over);
         if i % 2 == 0 {
             // towards the outline
-            for _ in 0..30 {
+            for _ in 0..8 {
                 let slope = |axis: DVec3| {
                     (truth((p + 1e-6 * axis).truncate()) - truth((p - 1e-6 * axis).truncate())) / 2e-6
                 };
