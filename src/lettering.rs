@@ -81,6 +81,32 @@ fn paths(svg: &str, text: Node<'_, '_>) -> String {
     parts.iter().zip(starts).map(path).collect()
 }
 
+/// A closed outline of Bézier curves of third order, each of which begins where the one before ends. Straight pieces are
+/// such curves too.
+pub(crate) type Contour = Vec<[[f64; 2]; 4]>;
+
+/// The outlines of each glyph of a line of text that begins at the origin, in heights of a capital letter; y points up.
+///
+/// # Errors
+/// Returns the first character that the font does not have.
+pub(crate) fn contours(words: &str) -> Result<Vec<Vec<Contour>>, char> {
+    if let Some(unknown) = words.chars().find(|c| c.is_control() || FONT.face.glyph_index(*c).is_none()) {
+        return Err(unknown);
+    }
+    let glyphs = FONT.glyphs(words);
+    let capital = FONT.face.capital_height().unwrap_or_else(|| FONT.face.ascender());
+    let scale = 1.0 / f64::from(capital);
+    let mut x = 0.0;
+    let mut all = Vec::with_capacity(glyphs.len());
+    for (i, &glyph) in glyphs.iter().enumerate() {
+        let mut tracer = Tracer { contours: Vec::new(), begin: [0.0; 2], at: [0.0; 2], x, scale };
+        FONT.face.outline_glyph(glyph, &mut tracer);
+        x += scale * FONT.advance(glyph, glyphs.get(i + 1));
+        all.push(tracer.contours);
+    }
+    Ok(all)
+}
+
 /// Built-in font with its rules for adjacent glyphs.
 struct Font {
     face: Face<'static>,
@@ -219,6 +245,65 @@ impl OutlineBuilder for Pen {
 
     fn close(&mut self) {
         self.path.push('z');
+    }
+}
+
+/// Collects the outlines of a glyph.
+struct Tracer {
+    contours: Vec<Contour>,
+    begin: [f64; 2],
+    at: [f64; 2],
+    /// Position where the glyph begins.
+    x: f64,
+    scale: f64,
+}
+
+impl Tracer {
+    fn place(&self, x: f32, y: f32) -> [f64; 2] {
+        [self.x + self.scale * f64::from(x), self.scale * f64::from(y)]
+    }
+
+    fn curve(&mut self, a: [f64; 2], b: [f64; 2], end: [f64; 2]) {
+        if let Some(contour) = self.contours.last_mut() {
+            contour.push([self.at, a, b, end]);
+        }
+        self.at = end;
+    }
+
+    fn line(&mut self, end: [f64; 2]) {
+        let part = |t: f64| between(self.at, end, t);
+        self.curve(part(1.0 / 3.0), part(2.0 / 3.0), end);
+    }
+}
+
+fn between(a: [f64; 2], b: [f64; 2], t: f64) -> [f64; 2] {
+    [0, 1].map(|i| a[i] + t * (b[i] - a[i]))
+}
+
+impl OutlineBuilder for Tracer {
+    fn move_to(&mut self, x: f32, y: f32) {
+        self.begin = self.place(x, y);
+        self.at = self.begin;
+        self.contours.push(Vec::new());
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        self.line(self.place(x, y));
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let (middle, end) = (self.place(x1, y1), self.place(x, y));
+        self.curve(between(self.at, middle, 2.0 / 3.0), between(end, middle, 2.0 / 3.0), end);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        self.curve(self.place(x1, y1), self.place(x2, y2), self.place(x, y));
+    }
+
+    fn close(&mut self) {
+        if self.at != self.begin {
+            self.line(self.begin);
+        }
     }
 }
 

@@ -159,7 +159,8 @@ SCENE_NO_ROOM = "E0304":
 "The fluid cannot be put where the scene says: its shape has too little room for the particles that are asked for, is
 empty or far too large, or its formula has no value somewhere. The message says which.";
 UNUSED = "W0401":
-"The item is never used. Remove it, or start its name with `_` to keep it silently.";
+"The item, the parameter of a function or the variable of a fold is never used. Remove it, or start its name with `_` to keep
+it silently. A fold whose variable is not used has many equal members.";
 EMPTY_SOLID = "W0402":
 "Interval arithmetic proves that ω is nowhere positive: the solid is empty, its mesh has no triangles and nothing
 ever collides with it.";

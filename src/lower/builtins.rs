@@ -27,13 +27,13 @@ enum Meaning {
     /// Vectors become a vector.
     Vector(fn(&mut Lowering<'_>, &[[Node; 3]], Span) -> [Node; 3]),
     /// Values of any kind become a value.
-    Value(fn(&mut Lowering<'_>, &[Value], &[Argument]) -> Value),
+    Value(fn(&mut Lowering<'_>, &[Value], &[Argument], Span) -> Value),
     /// The arguments are looked at before they are evaluated.
     Unevaluated(fn(&mut Lowering<'_>, &[Argument], Span) -> Value),
 }
 
 /// The builtins that are more than one operation on one number.
-const COMPOSED: [Builtin; 24] = {
+const COMPOSED: [Builtin; 30] = {
     use Meaning::{Number, NumberOfVectors, Unevaluated, Value, Vector};
     const MANY: usize = usize::MAX;
     const fn builtin(name: &'static str, arity: (usize, usize), meaning: Meaning) -> Builtin {
@@ -69,12 +69,22 @@ const COMPOSED: [Builtin; 24] = {
             (3, 3),
             Unevaluated(|l, a, span| l.choose(&a[0].value, [&a[1].value, &a[2].value], span)),
         ),
-        builtin("random", (2, 2), Value(|l, values, arguments| l.random(values, arguments))),
-        builtin("count", (1, 1), Value(|l, values, arguments| l.count(&values[0], &arguments[0].value))),
-        builtin("polygon", (1, 1), Value(|l, values, arguments| l.polygon(&values[0], &arguments[0].value))),
-        builtin("mesh", (1, 2), Value(|l, values, arguments| l.mesh(values, arguments))),
-        builtin("height_map", (3, 4), Value(|l, values, arguments| l.height_map(values, arguments))),
-        builtin("points", (1, 1), Value(|l, values, arguments| l.points(values, arguments))),
+        builtin("random", (2, 2), Value(|l, values, arguments, _| l.random(values, arguments))),
+        builtin("count", (1, 1), Value(|l, values, arguments, _| l.count(&values[0], &arguments[0].value))),
+        builtin(
+            "polygon",
+            (1, 1),
+            Value(|l, values, arguments, _| l.polygon(&values[0], &arguments[0].value)),
+        ),
+        builtin("mesh", (1, 2), Value(|l, values, arguments, _| l.mesh(values, arguments))),
+        builtin("height_map", (3, 4), Value(|l, values, arguments, _| l.height_map(values, arguments))),
+        builtin("points", (1, 1), Value(|l, values, arguments, _| l.points(values, arguments))),
+        builtin("arc", (3, 5), Value(|l, values, arguments, span| l.arc(values, arguments, span))),
+        builtin("spline", (1, 2), Value(|l, values, arguments, span| l.spline(values, arguments, span))),
+        builtin("helix", (3, 4), Value(|l, values, arguments, span| l.helix(values, arguments, span))),
+        builtin("rounded", (2, 3), Value(|l, values, arguments, span| l.rounded(values, arguments, span))),
+        builtin("sweep", (2, 2), Value(|l, values, arguments, span| l.sweep(values, arguments, span))),
+        builtin("text", (2, 2), Value(|l, values, arguments, span| l.text(values, arguments, span))),
         builtin("around", (2, 2), Number(|l, a, span| l.around(a[0], a[1], span))),
         builtin("slope", (1, 1), Number(|l, a, span| l.slope(a[0], span))),
         builtin("normalise", (1, 1), Number(|l, a, span| l.normalise(a[0], span))),
@@ -121,7 +131,7 @@ impl Lowering<'_> {
         match builtin.meaning {
             Meaning::Unevaluated(build) => build(self, arguments, span),
             Meaning::Value(build) => {
-                self.values(arguments).map_or(Value::Failed, |values| build(self, &values, arguments))
+                self.values(arguments).map_or(Value::Failed, |values| build(self, &values, arguments, span))
             }
             Meaning::Unary(op) => number(self.numbers(arguments).map(|a| self.unary(op, a[0], span))),
             Meaning::Number(build) => number(self.numbers(arguments).map(|a| build(self, &a, span))),

@@ -200,10 +200,6 @@ fn solid(name: &str, a: &[&str]) -> Option<Words> {
         "surface" | "heightfield" | "height_field" | "heightmap" => {
             written("`height_map(…)` here", "height_map(\"terrain.csv\", [0, 0], [100, 80])")
         }
-        "text" => words(
-            "there are no letters",
-            "write a letter as a polygon, or read a mesh of it by `mesh(\"letter.stl\")`",
-        ),
         _ => None,
     }
 }

@@ -10,19 +10,24 @@ mod arguments;
 mod builtins;
 mod choice;
 mod columns;
+mod curves;
 mod eval;
 mod foreign;
 mod imports;
+mod letters;
 mod lists;
 mod lowering;
 mod maps;
 mod module;
 mod names;
 mod outline;
+mod paths;
 mod probes;
 mod scene;
 mod slips;
 mod transforms;
+mod tubes;
+mod unused;
 mod value;
 pub mod vocabulary;
 
@@ -151,6 +156,7 @@ fn lower_here(
     }
     if !lowering.diagnostics.iter().any(|d| d.severity == Severity::Error) {
         lowering.unused(); // an item that failed may contain the use
+        ast.items.iter().for_each(|item| lowering.unused_locals(item));
     }
     lowering.unknown_overrides((ast, imported), options);
     (lowering.module, lowering.diagnostics)

@@ -7,18 +7,30 @@
 use std::cmp::Ordering;
 
 use super::lowering::Lowering;
+use super::paths::{self, Dimensions, PathKind, Spot};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
-use crate::ir::{Axis, Binary, Node, Unary};
-use crate::syntax::ast::{Expr, ExprKind, Logic};
+use crate::ir::{Axis, Binary, Node};
+use crate::syntax::ast::{Expr, Logic};
 
 /// The most corners of a polygon: all pairs of edges are looked at.
 const MOST_CORNERS: usize = 10_000;
 
+/// Cosine of the turn at corners that are those of chords of a curve: 15°.
+const SMOOTH: f64 = 0.965_925_826_289_068_3;
+
 /// Sines below this are those of rounded angles.
 const STRAIGHT: f64 = 1e-14;
 
-type Point = [f64; 2];
+pub(super) type Point = [f64; 2];
+
+const CORNERS: PathKind = PathKind {
+    list: "a polygon takes a list of corners",
+    point: "a corner has two coordinates",
+    what: "a corner of a polygon",
+    example: "polygon([[0, 0], [2, 0], [1, 1]])",
+    dimensions: Dimensions::Plane,
+};
 
 /// The polygon as a formula.
 #[derive(Debug, PartialEq)]
@@ -30,7 +42,7 @@ enum Chain {
 
 /// What is wrong with an outline.
 #[derive(Debug, PartialEq)]
-enum Flaw {
+pub(super) enum Flaw {
     Repeated(usize),
     TurnsBack(usize),
     /// The edges that begin at two corners touch.
@@ -41,11 +53,12 @@ enum Flaw {
 impl Lowering<'_> {
     /// The field of the polygon with these corners; it does not depend on z.
     pub fn polygon(&mut self, corners: &Value, written: &Expr) -> Value {
-        let Some(mut points) = self.corners(corners, written) else { return Value::Failed };
+        let Some((mut spots, _)) = self.spots(corners, written, &CORNERS) else { return Value::Failed };
         // data often ends where it began
-        if points.len() > 3 && points.first() == points.last() {
-            points.pop();
+        if spots.len() > 3 && paths::is_closed(&spots) {
+            spots.pop();
         }
+        let points: Vec<Point> = spots.iter().map(|spot| [spot.at.x, spot.at.y]).collect();
         let count = points.len();
         if !(3..=MOST_CORNERS).contains(&count) {
             let span = self.user_span(written.span);
@@ -53,67 +66,34 @@ impl Lowering<'_> {
             return self.fail(Diagnostic::error(Code::OUT_OF_RANGE, span, message));
         }
         if let Some(flaw) = flaw(&points) {
-            let diagnostic = self.explained(&flaw, written);
+            let diagnostic = self.explained(&flaw, &spots, written);
             return self.fail(diagnostic);
         }
-        let outline = outline(points);
-        let last = outline.len();
-        let corner = |i: usize| outline[i % last];
+        Value::Number(self.enclosed(outline(points), written.span))
+    }
+
+    /// The field of an outline without flaws, counter-clockwise.
+    pub fn enclosed(&mut self, outline: Vec<Point>, span: Span) -> Node {
+        let count = outline.len();
         let order = |a: &usize, b: &usize| outline[*a].partial_cmp(&outline[*b]).unwrap_or(Ordering::Equal);
         // the leftmost corner and the rightmost one: edges from there go on to the left and to the right
-        let (Some(first), Some(second)) = ((0..last).min_by(order), (0..last).max_by(order)) else {
-            return Value::Failed;
-        };
-        let formula = whole(&|i| corner(first + i), (second + last - first) % last, last);
-        let span = written.span;
-        Value::Number(self.outlined(&formula, &|i| [corner(first + i), corner(first + i + 1)], span))
+        let first = (0..count).min_by(order).unwrap_or(0);
+        let second = (0..count).max_by(order).unwrap_or(0);
+        let corners: Vec<Point> = (0..=count).map(|i| outline[(first + i) % count]).collect();
+        let corner = |i: usize| corners[i % count];
+        let formula = whole(&corner, (second + count - first) % count, count);
+        let (node, _) = self.outlined((&formula, true), &corners, span);
+        node
     }
 
-    /// The corners as numbers; what is none is reported at its place.
-    fn corners(&mut self, corners: &Value, written: &Expr) -> Option<Vec<Point>> {
-        let Some(members) = corners.members() else {
-            let span = self.user_span(written.span);
-            let message = format!("a polygon takes a list of corners, found {}", corners.describe());
-            let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
-            self.report(diagnostic.help("write for example `polygon([[0, 0], [2, 0], [1, 1]])`"));
-            return None;
-        };
-        let mut points = Vec::with_capacity(members.len());
-        for (i, member) in members.iter().enumerate() {
-            let at = place_of(written, i);
-            let pair = member.members();
-            let Some([Value::Number(x), Value::Number(y)]) = pair.as_deref() else {
-                let span = self.user_span(at);
-                let message = format!("a corner has two coordinates, found {}", described(member));
-                let diagnostic = Diagnostic::error(Code::WRONG_TYPE, span, message);
-                self.report(diagnostic.help("write for example `polygon([[0, 0], [2, 0], [1, 1]])`"));
-                return None;
-            };
-            let (x, y) = (
-                self.as_constant(*x, at, "a corner of a polygon"),
-                self.as_constant(*y, at, "a corner of a polygon"),
-            );
-            let point = [x?, y?];
-            if !point.iter().all(|c| c.is_finite()) {
-                let message = format!("corner {i} of the polygon is at [{}, {}]", point[0], point[1]);
-                self.report(Diagnostic::error(Code::OUT_OF_RANGE, self.user_span(at), message));
-                return None;
-            }
-            points.push(point);
-        }
-        Some(points)
-    }
-
-    fn explained(&self, flaw: &Flaw, written: &Expr) -> Diagnostic {
+    fn explained(&self, flaw: &Flaw, spots: &[Spot], written: &Expr) -> Diagnostic {
         let (at, message) = match *flaw {
             Flaw::Repeated(i) => {
-                (place_of(written, i), format!("corners {} and {i} of the polygon are the same", i - 1))
+                (spots[i].place, format!("corners {} and {i} of the polygon are the same", i - 1))
             }
-            Flaw::TurnsBack(i) => {
-                (place_of(written, i), format!("the outline turns back on itself at corner {i}"))
-            }
+            Flaw::TurnsBack(i) => (spots[i].place, format!("the outline turns back on itself at corner {i}")),
             Flaw::Touch(i, j) => (
-                place_of(written, j),
+                spots[j].place,
                 format!("the outline touches itself: the edges behind corners {i} and {j} meet"),
             ),
             Flaw::NoArea => (written.span, "the polygon has no area".to_string()),
@@ -124,59 +104,50 @@ impl Lowering<'_> {
         )
     }
 
-    fn outlined(&mut self, formula: &Chain, edge: &impl Fn(usize) -> [Point; 2], span: Span) -> Node {
-        match formula {
-            Chain::Edge(i) => self.beside(edge(*i), span),
-            Chain::Joined(op, parts) => {
-                let nodes: Vec<Node> = parts.iter().map(|part| self.outlined(part, edge, span)).collect();
-                self.balanced(*op, &nodes, span)
-            }
+    /// The field of a part of the formula, and its first edge; the whole formula goes round. Parts that meet at a corner of
+    /// less than [`SMOOTH`] are joined by the least or the greatest of both: along the chords of a curve, R₀ of many fields
+    /// that are nearly equal would be far from the distance.
+    fn outlined(
+        &mut self,
+        (formula, is_whole): (&Chain, bool),
+        corners: &[Point],
+        span: Span,
+    ) -> (Node, usize) {
+        let (op, parts) = match formula {
+            Chain::Edge(i) => return (self.beside([corners[*i], corners[i + 1]], span), *i),
+            Chain::Joined(op, parts) => (*op, parts),
+        };
+        let parts: Vec<_> = parts.iter().map(|part| self.outlined((part, false), corners, span)).collect();
+        let mut runs: Vec<Vec<Node>> = parts
+            .chunk_by(|_, (_, edge)| is_smooth(corners, *edge))
+            .map(|run| run.iter().map(|(node, _)| *node).collect())
+            .collect();
+        if is_whole && runs.len() > 1 && is_smooth(corners, 0) {
+            let last = runs.pop().unwrap_or_default();
+            runs[0].extend(last);
         }
+        let choice = if op == Logic::And { Binary::Min } else { Binary::Max };
+        let nodes: Vec<Node> = runs.iter().map(|run| self.extreme(choice, run, span)).collect();
+        (self.balanced(op, &nodes, span), parts[0].1)
     }
 
     /// The distance from the line through two points, positive to the left.
     fn beside(&mut self, [a, b]: [Point; 2], span: Span) -> Node {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = libm::hypot(dx, dy);
-        let mut sum = None;
-        for (axis, slope, from) in [(Axis::Y, dx / length, a[1]), (Axis::X, -dy / length, a[0])] {
-            if slope == 0.0 {
-                continue;
-            }
-            let coordinate = self.module.graph.coordinate(axis);
-            let from = self.constant(from);
-            let ahead = self.binary(Binary::Sub, coordinate, from, span);
-            let term = if slope.abs() == 1.0 {
-                ahead
-            } else {
-                let size = self.constant(slope.abs());
-                self.binary(Binary::Mul, size, ahead, span)
-            };
-            sum = Some(match sum {
-                None if slope < 0.0 => self.unary(Unary::Neg, term, span),
-                None => term,
-                Some(sum) => {
-                    self.binary(if slope < 0.0 { Binary::Sub } else { Binary::Add }, sum, term, span)
-                }
-            });
-        }
-        sum.unwrap_or_else(|| self.constant(0.0))
+        let terms = [(Axis::Y, dx / length, a[1]), (Axis::X, -dy / length, a[0])];
+        self.linear(terms.into_iter(), span)
     }
 }
 
-/// The place of a corner, if the list was written out, or of the list.
-fn place_of(written: &Expr, corner: usize) -> Span {
-    match &written.kind {
-        ExprKind::Vector(parts) => parts.get(corner).map_or(written.span, |part| part.span),
-        _ => written.span,
-    }
-}
-
-fn described(value: &Value) -> String {
-    match value.members() {
-        Some(members) => format!("{} with {} members", value.describe(), members.len()),
-        None => value.describe().to_string(),
-    }
+/// Whether the outline hardly turns where an edge begins. The first corner is also the last one.
+fn is_smooth(corners: &[Point], edge: usize) -> bool {
+    let before = if edge > 0 { edge - 1 } else { corners.len() - 2 };
+    let [u, v] = [before, edge].map(|i| {
+        let (a, b) = (corners[i], corners[i + 1]);
+        [b[0] - a[0], b[1] - a[1]]
+    });
+    u[0] * v[0] + u[1] * v[1] > SMOOTH * libm::hypot(u[0], u[1]) * libm::hypot(v[0], v[1])
 }
 
 /// Twice the area of the triangle a b c, positive if it runs counter-clockwise; 0 if its corners lie on a line but for
@@ -189,7 +160,7 @@ fn side(a: Point, b: Point, c: Point) -> f64 {
 }
 
 /// The first flaw of an outline.
-fn flaw(points: &[Point]) -> Option<Flaw> {
+pub(super) fn flaw(points: &[Point]) -> Option<Flaw> {
     let n = points.len();
     if let Some(i) = (1..n).find(|&i| points[i] == points[i - 1]) {
         return Some(Flaw::Repeated(i));
@@ -233,7 +204,7 @@ fn area(points: &[Point]) -> f64 {
 }
 
 /// The corners counter-clockwise, without those in the middle of a straight line.
-fn outline(mut points: Vec<Point>) -> Vec<Point> {
+pub(super) fn outline(mut points: Vec<Point>) -> Vec<Point> {
     if area(&points) < 0.0 {
         points.reverse();
     }

@@ -248,6 +248,9 @@ fn machine_code_is_the_interpreter_in_every_program() {
         "tanh(x) + sinh(y)*cosh(z) - log2(1.5 + z^2) + log10(2 + y^2) and round(3*x) <= 2 or fract(y) >= 0.3",
         "blend(box(), sphere(0.7), 0.2) and mod(x, 0.4) <= 0.3",
         "polygon([[0, 0], [2, 0], [2, 2], [1, 1], [0, 2]]).extrude(0, 1).shell(0.1)",
+        "polygon([[0, 0], arc([1, 0], 1, -90°, 90°), spline([[1, 1], [0.4, 0.5], [0, 1]])]).revolve()",
+        "polygon([[-1, -1], [1, -1], [0, 1]]).loft(polygon(arc([0, 0], 0.7, 0°, 360°, 0.02)), -1, 1)",
+        "sweep([[0, 0, 0], [1, 0, 0], arc([1, 0, 0], [1.5, 0.2, 0.3], [1, 1, 0])], 0.2) \\ sphere(0.3)",
     ] {
         let text = format!("solid s = {definition}");
         let (jit, interpreter) = (compiled(&text, Engine::Jit), compiled(&text, Engine::Interpreter));

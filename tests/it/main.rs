@@ -32,6 +32,7 @@ mod params;
 mod pictures;
 mod pipeline;
 mod polygons;
+mod profiles;
 mod properties;
 mod ranges;
 mod render;

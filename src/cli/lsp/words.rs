@@ -76,6 +76,32 @@ const FUNCTIONS: &[(&str, &str, &str)] = &[
         "the ground below a map of heights: `height_map(\"ground.csv\", [0, 0], [4, 3])`; the scale may be left out",
     ),
     ("points", "path", "the rows of a file of numbers as a list of vectors: `polygon(points(\"wing.csv\"))`"),
+    (
+        "arc",
+        "a, b, c",
+        "an arc as a list of points: from a through b to c, or around a centre `arc([0, 0], 1, 0°, 90°)`",
+    ),
+    (
+        "spline",
+        "points, tolerance",
+        "a smooth curve through points as a list of points, closed if the last is the first; the tolerance may be left out",
+    ),
+    ("helix", "radius, pitch, turns", "a helix around z, from [radius, 0, 0] upwards, as a list of points"),
+    (
+        "rounded",
+        "points, radius",
+        "straight pieces with an arc at each corner as a list of points, closed if the last point is the first",
+    ),
+    (
+        "sweep",
+        "path, radius",
+        "all points within a radius of a path: `sweep([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.1)`",
+    ),
+    (
+        "text",
+        "words, height",
+        "a line of letters that begins at the origin, as a profile: `text(\"R\", 1).extrude(0, 0.2)`",
+    ),
     ("around", "e, outer", "the smaller one of e and the field of a ball around `outer`"),
     ("slope", "e", "the length of the gradient, |∇ω|"),
     ("normalise", "e", "ω/√(ω² + |∇ω|²)"),
