@@ -470,7 +470,8 @@ pub(super) struct Report {
     /// Plot the error of meshes against their cells: .svg or .png
     #[arg(long, value_name = "FILE")]
     pub mesh_plot: Option<PathBuf>,
-    /// Write all of it as one page: tables, plots, pictures, the files, the machine and the command. It needs no network
+    /// Write all of it as one page: tables, plots, pictures, the .rfm files, the machine and the command. It needs no
+    /// network
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
     /// Cells along the longest side of the finest mesh; the others have half as many each

@@ -187,6 +187,15 @@ pub(super) fn camera(text: &str) -> Result<CameraFlag, String> {
                 None => after.find(',').unwrap_or(after.len()),
             };
             let (value, next) = after.split_at(end);
+            let is_repeated = match key.trim() {
+                "camera" => towards_eye.is_some(),
+                "look_at" => look_at.is_some(),
+                "zoom" => zoomed.is_some(),
+                _ => false,
+            };
+            if is_repeated {
+                return Err(format!("`{}` is stated twice", key.trim()));
+            }
             match key.trim() {
                 "camera" => towards_eye = Some(bare(value)?),
                 "look_at" => look_at = Some(bare(value)?),
@@ -341,6 +350,7 @@ mod tests {
             "camera: [1, 0, 0], look_at: 3",
             "camera: [1, 0, 0], look_at: [nan, 0, 0]",
             "camera: [1, 0, 0] zoom",
+            "camera: [1, 0, 0], camera: [0, 1, 0]",
         ] {
             assert!(camera(text).is_err(), "{text}");
         }

@@ -30,7 +30,7 @@ impl Lowering<'_> {
         let Some(height) = self.above_zero(&values[1], &arguments[1], "the height of letters") else {
             return Value::Failed;
         };
-        if words.trim().is_empty() || words.len() > LONGEST {
+        if words.trim().is_empty() || words.chars().count() > LONGEST {
             let message = format!("a text has 1 to {LONGEST} letters");
             return self.fail(Diagnostic::error(Code::OUT_OF_RANGE, at, message));
         }

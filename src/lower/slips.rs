@@ -173,11 +173,7 @@ impl Lowering<'_> {
 
     /// Reports an angle where lengths are asked for, as in `ball([1 deg, 0, 0], 1)`.
     pub fn no_angle(&mut self, expr: &Expr) -> bool {
-        let inner = match &expr.kind {
-            ExprKind::Negate(inner) => inner,
-            _ => expr,
-        };
-        let ExprKind::Quantity { unit, .. } = &inner.kind else { return true };
+        let ExprKind::Quantity { unit, .. } = &without_sign(expr).kind else { return true };
         let is_angle = parse_unit(&unit.text).is_some_and(|unit| unit.dimension == Dimension::ANGLE);
         if is_angle && expr.span.source == SourceId::File {
             self.report(
@@ -191,7 +187,7 @@ impl Lowering<'_> {
 
     /// Reports a length where an angle is asked for, as in `.rotate_z(5 mm)`.
     pub fn no_length(&mut self, expr: &Expr) -> bool {
-        let ExprKind::Quantity { unit, .. } = &expr.kind else { return true };
+        let ExprKind::Quantity { unit, .. } = &without_sign(expr).kind else { return true };
         let is_length = parse_unit(&unit.text).is_some_and(|unit| unit.dimension == Dimension::LENGTH);
         if is_length {
             self.report(
@@ -230,6 +226,10 @@ impl Lowering<'_> {
 }
 
 /// The first number above a whole turn in an expression, and its place. Whole and half multiples of π stand for turns.
+fn without_sign(expr: &Expr) -> &Expr {
+    if let ExprKind::Negate(inner) = &expr.kind { inner } else { expr }
+}
+
 fn large_number(expr: &Expr) -> Option<(f64, &Expr)> {
     let ExprKind::Number(number) = expr.kind else {
         return expr.children().into_iter().find_map(large_number);

@@ -24,6 +24,11 @@ impl Lowering<'_> {
         let path = self.spots(&values[0], &arguments[0].value, &PATH);
         let radius = self.above_zero(&values[1], &arguments[1], "the radius of a tube");
         let (Some((spots, _)), Some(radius)) = (path, radius) else { return Value::Failed };
+        if !(radius * radius).is_normal() {
+            let at = self.user_span(arguments[1].value.span);
+            let message = format!("the square of the radius {radius} is no number that can be computed with");
+            return self.fail(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help("scale the numbers"));
+        }
         let mut points: Vec<DVec3> = spots.iter().map(|spot| spot.at).collect();
         points.dedup();
         if points.len() < 2 {

@@ -178,7 +178,7 @@ fn examples_do_not_cross_themselves() {
             if solid.bounds().aabb().is_none() {
                 continue;
             }
-            for cells in [16, 40, 64] {
+            for cells in [16, 40] {
                 check(&format!("{} of {}", named.name, path.display()), &solid, cells);
                 meshed += 1;
             }
@@ -192,7 +192,7 @@ fn coarse_products_shells_and_gears_do_not_cross_themselves() {
     for (name, text, list) in [
         ("product", PRODUCT, &[16, 31, 64][..]),
         ("shell", "solid s = sphere(1) \\ sphere(0.985)", &[16, 32, 48]),
-        ("gear", GEAR, &[16, 32, 48, 64, 96, 128]),
+        ("gear", GEAR, &[16, 32, 64, 128]),
         (
             "nut",
             "solid s = (all i in 0..6: half_space([1, 0, 0], [1, 0, 0]).rotate_z(i*60 deg)) and 0 <= z <= 0.5 \\ cylinder(0.5, 0.5)",

@@ -417,7 +417,7 @@ fn a_moving_map_finds_the_entries_of_the_solid() {
     let map = MovingMap::new(&solid, unit_box(), 0.0, (0.0, 3.0), 0.2).unwrap();
     let mut random = Random(31);
     let mut hits = 0;
-    for _ in 0..1_500 {
+    for _ in 0..600 {
         let from = random.within(0.0, 2.9);
         let to = from + random.within(0.0, 0.1);
         let path = Path::new(random.point(1.4), random.point(1.4), f64::INFINITY);
@@ -431,7 +431,7 @@ fn a_moving_map_finds_the_entries_of_the_solid() {
             (slow, fast) => assert!(slow.is_none() && fast.is_none(), "{slow:?} {fast:?}"),
         }
     }
-    assert!(hits > 400, "{hits}");
+    assert!(hits > 150, "{hits}");
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn follows(definition: &str, truth: impl Fn(DVec2) -> f64, tolerance: f64) {
     let found = solid(definition);
     let mut random = Random(5);
     let over = Aabb::new(DVec3::new(-4.0, -4.0, 0.0), DVec3::new(4.0, 4.0, 1.0));
-    let mut near = 0;
+    let (mut near, mut farthest) = (0, 0.0);
     for i in 0..20_000 {
         let mut p = random.within(&over);
         if i % 2 == 0 {
@@ -74,6 +74,9 @@ fn follows(definition: &str, truth: impl Fn(DVec2) -> f64, tolerance: f64) {
         }
         let (omega, distance) = (found.omega(p), truth(p.truncate()));
         near += usize::from(distance.abs() < 3.0 * tolerance);
+        if (omega > 0.0) != (distance > 0.0) {
+            farthest = f64::max(farthest, distance.abs());
+        }
         if distance.abs() > tolerance {
             assert!(
                 omega != 0.0 && (omega > 0.0) == (distance > 0.0),
@@ -82,6 +85,7 @@ fn follows(definition: &str, truth: impl Fn(DVec2) -> f64, tolerance: f64) {
         }
     }
     assert!(near > 1000, "{definition}: {near} points near the outline");
+    assert!(farthest > 0.1 * tolerance, "{definition}: the chords are {farthest} away");
 }
 
 #[test]
@@ -441,6 +445,8 @@ fn letters_have_the_outlines_of_the_font() {
 
 #[test]
 fn curves_with_mistakes_are_explained() {
+    // letters are counted and not their bytes
+    solid(&format!("text(\"{}\", 1)", "Ж".repeat(600)));
     for (definition, words) in [
         ("polygon(arc([0, 0], [1, 1], [2, 2]))", "lie on a line"),
         ("polygon(arc([0, 0], 1, 0°, 0°))", "an angle up to 360°"),
@@ -448,6 +454,7 @@ fn curves_with_mistakes_are_explained() {
         ("polygon(arc([0, 0], -1, 0°, 90°))", "must be positive"),
         ("polygon(arc([0, 0], 1, 0°))", "a radius and two angles"),
         ("polygon(arc([0, 0], 1, 0 m, 90°))", "a length is not an angle"),
+        ("polygon(arc([0, 0], 1, -5 mm, 90°))", "a length is not an angle"),
         ("polygon(arc([0, 0], 1, 0°, 90°, 1e-15))", "more than 10000 points"),
         ("polygon(arc([0, 0], [1, 1], [2, 0], 0.1, 0.1))", "three points and a tolerance"),
         ("polygon(arc([0, 0], [1, 1, 1], [2, 0]))", "as many as the other points"),
@@ -468,6 +475,8 @@ fn curves_with_mistakes_are_explained() {
         ("sweep([[0, 0, 0]], 0.1)", "two points or more"),
         ("sweep([[0, 0, 0], [1, 0, 0]], 0)", "must be positive"),
         ("sweep([[0, 0, 0], [1, 0, 0]], x)", "must be a constant"),
+        ("sweep([[0, 0, 0], [1, 0, 0]], 1e-162)", "scale the numbers"),
+        ("sweep([[0, 0, 0], [1, 0, 0]], 1e200)", "scale the numbers"),
         ("sweep(helix(1, 1, 0), 0.1)", "cannot be 0"),
         ("sweep(helix(1, 1, 1e9), 0.1)", "more than 10000 points"),
         ("sweep([[0, 0, 0], [1e300, 0, 0]], 0.1)", "apart"),

@@ -120,7 +120,7 @@ impl Page {
         }
         self.section(
             "How to make it again",
-            "With the files above, in the folder in which this command was given:",
+            "With the files above and the data that they read, in the folder in which this command was given:",
         );
         self.add(format_args!("<pre>{}</pre>\n<dl>\n", escaped(&command(std::env::args_os()))));
         let facts = [

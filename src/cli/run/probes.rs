@@ -148,22 +148,23 @@ impl Recorder {
 
 /// Removes the tables and plots that an earlier run has left, and nothing else.
 pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
-    for folder in [FOLDER, HISTORY].map(|folder| run_folder.join(folder)) {
-        if !folder.is_dir() {
-            continue;
+    let is_table = |path: &Path| std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()));
+    let remove = |path: &Path| if path.is_file() { std::fs::remove_file(path) } else { Ok(()) };
+    // tables of their own names, without drawings
+    for (name, _) in OWN_TABLES {
+        let path = run_folder.join(HISTORY).join(format!("{name}.csv"));
+        if is_table(&path) {
+            remove(&path)?;
         }
-        for entry in std::fs::read_dir(&folder)? {
-            let path = entry?.path();
-            let is_table = path.extension().is_some_and(|ending| ending == "csv")
-                && std::fs::read(&path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()));
-            if is_table {
-                for ending in ["svg", "png", "csv"] {
-                    let path = path.with_extension(ending);
-                    if path.is_file() {
-                        std::fs::remove_file(path)?;
-                    }
-                }
-            }
+    }
+    let probes = run_folder.join(FOLDER);
+    if !probes.is_dir() {
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(&probes)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|ending| ending == "csv") && is_table(&path) {
+            ["svg", "png", "csv"].into_iter().try_for_each(|ending| remove(&path.with_extension(ending)))?;
         }
     }
     Ok(())

@@ -90,6 +90,11 @@ impl Board {
         self.put(topic, Message::Binary(Bytes::from(block)));
     }
 
+    /// Forgets what a page that comes later need not see.
+    pub fn clear(&self, topic: Topic) {
+        self.lock().newest[topic as usize].1 = None;
+    }
+
     fn put(&self, topic: Topic, message: Message) {
         let mut news = self.lock();
         let place = &mut news.newest[topic as usize];

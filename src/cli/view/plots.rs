@@ -143,6 +143,10 @@ impl History {
 
     /// Takes a sample, at most one at each instant.
     pub fn sample(&mut self, simulation: &Simulation) {
+        let last = self.probes.first().and_then(|(_, table)| table.times.last());
+        if last == Some(&simulation.time()) {
+            return;
+        }
         let is_kept = self.passed.is_multiple_of(self.every);
         self.passed += 1;
         if !is_kept {

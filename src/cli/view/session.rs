@@ -172,6 +172,9 @@ impl Session {
             Command::Slice { axis, at } => {
                 let plane = axis.map(|axis| Plane::new(axis.into(), at));
                 self.plane = plane.filter(|plane| plane.value.is_finite());
+                if self.plane.is_none() {
+                    self.board.clear(Topic::Slice);
+                }
                 self.show_slice(self.time());
             }
             Command::Speed { value } => {

@@ -122,6 +122,20 @@ impl Cell {
     }
 }
 
+/// How a box is divided.
+struct Division {
+    margin: f64,
+    deepest: u32,
+    /// Whether all threads take part.
+    parallel: bool,
+}
+
+impl Division {
+    fn deep(margin: f64) -> Self {
+        Self { margin, deepest: MAX_DEPTH, parallel: true }
+    }
+}
+
 /// What is known of a box, and what is left of the solid in it.
 fn judged(parts: &LeafTree, over: &Aabb, words: &[u32]) -> (Verdict, Vec<u32>) {
     let mut left = Vec::new();
@@ -149,14 +163,15 @@ impl Cells {
     /// Divides a box; `margin` is positive.
     pub fn new(parts: &LeafTree, domain: Aabb, margin: f64) -> Self {
         let (mut cells, level) = Self::begin(parts, domain, margin);
-        cells.refine(level, parts, (margin, MAX_DEPTH), |_| false);
+        cells.refine(level, parts, Division::deep(margin), |_| false);
         cells
     }
 
-    /// The same box with another margin, divided no deeper than the flat grid.
+    /// The same box with another margin, divided no deeper than the flat grid, on the calling thread alone: others may
+    /// wait for it while they hold what this thread would be given to do.
     pub fn with_margin(&self, parts: &LeafTree, margin: f64) -> Self {
         let (mut cells, level) = Self::begin(parts, self.domain, margin);
-        cells.refine(level, parts, (margin, DEPTH), |_| false);
+        cells.refine(level, parts, Division { margin, deepest: DEPTH, parallel: false }, |_| false);
         cells
     }
 
@@ -164,7 +179,7 @@ impl Cells {
     /// left may change: those in which a leaf that moves matters at some time.
     pub fn lasting(parts: &LeafTree, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
         let (mut cells, level) = Self::begin(parts, domain, margin);
-        let left = cells.refine(level, parts, (margin, MAX_DEPTH), |cell| {
+        let left = cells.refine(level, parts, Division::deep(margin), |cell| {
             cell.depth == RESTLESS_DEPTH && cell.is_restless(parts)
         });
         (cells, left)
@@ -174,7 +189,7 @@ impl Cells {
     /// time.
     pub fn completed(&self, left: &[Pending], parts: &LeafTree, margin: f64) -> Self {
         let mut cells = self.clone();
-        cells.refine(left.to_vec(), parts, (margin, MAX_DEPTH), |_| false);
+        cells.refine(left.to_vec(), parts, Division::deep(margin), |_| false);
         cells
     }
 
@@ -207,7 +222,7 @@ impl Cells {
         &mut self,
         mut level: Vec<Pending>,
         parts: &LeafTree,
-        (margin, deepest): (f64, u32),
+        Division { margin, deepest, parallel }: Division,
         leave: impl Fn(&Pending) -> bool,
     ) -> Vec<Pending> {
         let domain = self.domain;
@@ -234,11 +249,15 @@ impl Cells {
                 if depth >= DEPTH && enough { done.push(cell) } else { divided.push((cell, count)) }
             }
             done.into_iter().for_each(|cell| self.finish(cell, &mut known));
-            // in parallel, but collected in order: the map is the same for any number of threads
-            let octants: Vec<[(Verdict, Vec<u32>); 8]> = divided
-                .par_iter()
-                .map(|(cell, _)| std::array::from_fn(|k| judge(depth + 1, octant(cell.at, k), &cell.words)))
-                .collect();
+            let octants = |(cell, _): &(Pending, usize)| -> [(Verdict, Vec<u32>); 8] {
+                std::array::from_fn(|k| judge(depth + 1, octant(cell.at, k), &cell.words))
+            };
+            // collected in order: the map is the same for any number of threads
+            let octants: Vec<_> = if parallel {
+                divided.par_iter().map(octants).collect()
+            } else {
+                divided.iter().map(octants).collect()
+            };
             level = Vec::new();
             for ((cell, count), octants) in divided.into_iter().zip(octants) {
                 let first = self.divide(&cell);

@@ -60,8 +60,10 @@ class Camera {
     const aspect = Math.max(width - free.left - free.right, 60) / Math.max(height - free.top - free.bottom, 60);
     const seen = (2 * Math.tan(HALF_ANGLE) * this.distance) / Math.min(aspect, 1);
     const zoom = clamp(this.renderedHeight(box, towards, at) / seen, 0.05, 20);
-    const numbers = (v) => `[${v.map((x) => Number(x.toFixed(4)) + 0).join(", ")}]`;
-    return `picture { camera: ${numbers(towards)}, look_at: ${numbers(at)}, zoom: ${Number(zoom.toPrecision(4))} }`;
+    // places are rounded to a part of the box, which may be millimetres wide
+    const digits = clamp(5 - Math.floor(Math.log10(Math.max(...sub(box.max, box.min)))), 0, 20);
+    const numbers = (v, places) => `[${v.map((x) => Number(x.toFixed(places)) + 0).join(", ")}]`;
+    return `picture { camera: ${numbers(towards, 4)}, look_at: ${numbers(at, digits)}, zoom: ${Number(zoom.toPrecision(4))} }`;
   }
 
   /** How large `rfm render` draws a box seen from a direction, in a picture of its usual size: the height in metres, about a

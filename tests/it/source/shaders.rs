@@ -125,7 +125,7 @@ fn glsl_computes_omega_to_the_digits_of_f32() {
 
 /// Values in `f32` against those of the machine code in `f32`: functions of the system differ in their last bits.
 fn check(solid: &Solid, places: &[[f32; 3]], numbers: &[f32]) {
-    let mut largest = 0f32;
+    let (mut largest, mut creased) = (0f32, 0);
     for p in places.iter().filter(|p| p.iter().all(|c| c.abs() <= 3.0)) {
         let omega = solid.omega_f32((*p).into());
         if omega.is_finite() {
@@ -143,7 +143,7 @@ fn check(solid: &Solid, places: &[[f32; 3]], numbers: &[f32]) {
             assert!(found[0].signum() == omega.signum(), "{solid:?} at {p:?}: {} and {omega}", found[0]);
         }
         if gradient.is_finite() && solid.name() != "everything" {
-            // at a crease any of the gradients beside it will do
+            // at a crease any of the gradients beside it will do, and sums of them, where operands have it together
             let beside = (0..6).map(|i| {
                 let mut q = *p;
                 q[i % 3] += if i < 3 { 1e-5 } else { -1e-5 };
@@ -152,13 +152,16 @@ fn check(solid: &Solid, places: &[[f32; 3]], numbers: &[f32]) {
             let all = beside.filter(|g| g.is_finite());
             let (least, most) =
                 all.fold((gradient, gradient), |(least, most), g| (least.min(g), most.max(g)));
+            let allowed = 1e-3 * (1.0 + gradient.length());
+            if (most - least).length() > allowed {
+                creased += 1;
+                continue;
+            }
             let error = (glam(found) - glam(found).clamp(least, most)).length();
-            assert!(
-                error <= 1e-3 * (1.0 + gradient.length()),
-                "{solid:?} at {p:?}: {found:?} and {gradient}"
-            );
+            assert!(error <= allowed, "{solid:?} at {p:?}: {found:?} and {gradient}");
         }
     }
+    assert!(creased * 10 <= places.len(), "{solid:?}: {creased} gradients at creases");
 }
 
 fn glam(found: &[f32]) -> rfm::glam::Vec3 {
