@@ -33,7 +33,7 @@ const LEAST_MENDING: u64 = 20_000;
 const UNDOINGS: usize = 8;
 
 /// How often some of them are tried on the surface again, at most.
-const RESTORINGS: usize = 2_000;
+const RESTORINGS: usize = 10_000;
 
 /// A triangle that agrees less than this (cosine) with the surface at a corner is compared with others.
 const AGREEING: f64 = 0.3;
