@@ -180,7 +180,15 @@ def test_an_end_by_numbers_is_an_error_and_final():
     assert str(ended.value) and not os.path.exists("nowhere")
 
 
-def test_ctrl_c_ends_between_two_steps(drop):
+@pytest.fixture
+def interrupts():
+    """Python's own answer to Ctrl-C: a process that was started in the background would ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_ends_between_two_steps(drop, interrupts):
     threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     started = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
