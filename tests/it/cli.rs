@@ -6,7 +6,7 @@ use crate::tool::{rfm, rfm_reading, root, snapshot};
 
 const PAWN: &str = "examples/pawn.rfm";
 
-const SMALL: &str = "rfm 1
+pub const SMALL: &str = "rfm 1
 param r = 0.1 in 0.05 .. 0.2 \"radius of the post\"
 solid post = cylinder(r, 0.3).move([0.5, 0.5, 0])
 scene drop {
@@ -32,7 +32,8 @@ pub fn contract(text: &str, value: &serde_json::Value, expected: &[&str]) {
     }
 }
 
-fn files(folder: &Path) -> Vec<String> {
+/// The names in a folder, sorted.
+pub fn files(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
@@ -497,70 +498,6 @@ fn one_document_or_none() {
     let thin = b"rfm 1\nsolid s = sphere(1) and -1e-4 <= x + y + 0.7*z - 0.0123 <= 1e-4";
     let thin = rfm_reading(root(), &["check", "-", "--json"], thin).expect(0).json();
     assert_eq!((&thin["solids"][0]["empty"], &thin["solids"][0]["volume"]), (&false.into(), &().into()));
-}
-
-#[test]
-fn a_run_leaves_nothing_of_the_one_before() {
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
-    let run = |flags: &[&str]| rfm(here, &[&["run", "drop.rfm", "-o", "out"], flags].concat());
-    run(&[]).expect(0);
-    std::fs::write(here.join("out/frames/notes.txt"), "kept").unwrap();
-    // what is refused changes nothing
-    let before = [files(&here.join("out")), files(&here.join("out/frames"))];
-    run(&["--force", "--mesh-cells", "0"]).expect(2);
-    let refused = run(&["--steps", "1"]).expect(2).stderr;
-    assert!(refused.contains("holds a run already (scene drop, 0.010 s, 3 frames)"), "{refused}");
-    assert_eq!([files(&here.join("out")), files(&here.join("out/frames"))], before);
-    run(&["--force", "--no-frames", "--steps", "1"]).expect(0);
-    assert_eq!(files(&here.join("out")), ["checkpoints", "frames", "history", "pictures", "summary.json"]);
-    assert_eq!(files(&here.join("out/frames")), ["notes.txt"]);
-    assert!(files(&here.join("out/pictures")).is_empty());
-}
-
-#[test]
-fn unwritable_places_are_refused_and_nothing_is_left() {
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
-    std::fs::write(here.join("file"), "kept").unwrap();
-    std::fs::create_dir(here.join("folder.stl")).unwrap();
-    std::fs::create_dir(here.join("folder.svg")).unwrap();
-    let before = files(here);
-    for (name, arguments) in [
-        ("mesh into a missing folder", &["mesh", "drop.rfm", "--cells", "16", "-o", "none/post.stl"][..]),
-        ("mesh onto a folder", &["mesh", "drop.rfm", "--cells", "16", "-o", "folder.stl"]),
-        ("mesh below a file", &["mesh", "drop.rfm", "--cells", "16", "-o", "file/post.stl"]),
-        ("slice into a missing folder", &["check", "drop.rfm", "--slice", "z=0.1", "-o", "none/post.svg"]),
-        ("slice onto a folder", &["check", "drop.rfm", "--slice", "z=0.1", "-o", "folder.svg"]),
-        ("run into a file", &["run", "drop.rfm", "-o", "file"]),
-        ("run below a file", &["run", "drop.rfm", "-o", "file/out"]),
-    ] {
-        let outcome = rfm(here, arguments).expect(2);
-        snapshot("cli", name, &format!("rfm {}\n{}exit 2\n", arguments.join(" "), outcome.stderr));
-        assert_eq!(files(here), before, "{name}");
-    }
-    assert_eq!(std::fs::read_to_string(here.join("file")).unwrap(), "kept");
-    assert!(files(&here.join("folder.stl")).is_empty());
-}
-
-#[test]
-fn what_killed_commands_leave_is_removed_and_what_others_write_is_not() {
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    std::fs::write(here.join("post.rfm"), SMALL).unwrap();
-    for name in [".rfm-p.stl-a1b2c3", ".rfm-other.svg-d4e5f6", ".rfm-busy.stl-g7h8i9"] {
-        std::fs::write(here.join(name), "half a file").unwrap();
-    }
-    // a command that still runs holds a lock on what it writes
-    let busy = std::fs::File::open(here.join(".rfm-busy.stl-g7h8i9")).unwrap();
-    busy.lock().unwrap();
-    rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
-    assert_eq!(files(here), [".rfm-busy.stl-g7h8i9", "p.stl", "post.rfm"]);
-    drop(busy);
-    rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
-    assert_eq!(files(here), ["p.stl", "post.rfm"]);
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod fluid_surface;
 mod hard_cases;
 mod language;
 mod layout;
+mod leftovers;
 mod lsp;
 mod mesh_properties;
 mod meshes;

@@ -1,12 +1,13 @@
 //! What is tried.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
 use crate::browser::Browser;
+use crate::live;
 use crate::pictures::{Picture, compare};
 use crate::program::{Viewer, rfm};
 
@@ -18,7 +19,7 @@ const RENDERED_HEIGHT: f64 = 4.692_309_429_472;
 /// What the cases share.
 pub struct Room {
     pub browser: Browser,
-    folder: PathBuf,
+    pub folder: PathBuf,
     shots: PathBuf,
 }
 
@@ -37,11 +38,11 @@ pub const ALL: &[(&str, Case)] = &[
     ("the page of a report opens from a file", report),
     ("small windows and both themes", windows),
     ("a hundred thousand particles", many),
-    ("a run is followed, stopped, stepped and begun again", live),
-    ("the obstacle follows a slider", slider),
-    ("the box turns and gravity stays", turned),
-    ("a mistake in the file is shown and mended", mended),
-    ("a solid without a scene", solid),
+    ("a run is followed, stopped, stepped and begun again", live::live),
+    ("the obstacle follows a slider", live::slider),
+    ("the box turns and gravity stays", live::turned),
+    ("a mistake in the file is shown and mended", live::mended),
+    ("a solid without a scene", live::solid),
 ];
 
 impl Room {
@@ -58,7 +59,7 @@ impl Room {
         Self { browser: Browser::start(program, SIZE), folder: folder.into(), shots: shots.into() }
     }
 
-    fn shot(&mut self, name: &str) -> Picture {
+    pub fn shot(&mut self, name: &str) -> Picture {
         let png = self.browser.screenshot();
         std::fs::write(self.shots.join(format!("{name}.png")), &png).unwrap();
         Picture::of(&png)
@@ -493,110 +494,4 @@ fn many(room: &mut Room) {
         SIZE.0, SIZE.1
     );
     assert_eq!(room.browser.number("viewer.scene.drawn"), 100_000.0);
-}
-
-fn live(room: &mut Room) {
-    let viewer = Viewer::start(&room.folder, &["pawn.rfm", "-D", "particles=4000"]);
-    room.browser.open(&viewer.address);
-    room.browser.wait_for("window.viewer && viewer.timeline.frames.length > 5");
-    room.browser.wait_for("viewer.meshes.length === 1 && viewer.scene.drawn > 3900");
-    room.shot("live");
-    room.browser.click("#play");
-    room.browser.wait_for("!viewer.run.playing");
-    std::thread::sleep(Duration::from_millis(300));
-    let count = room.browser.number("viewer.timeline.frames.length");
-    let step = room.browser.number("viewer.timeline.frames.at(-1).step");
-    room.browser.click("#forward");
-    room.browser.wait_for(&format!("viewer.timeline.frames.length > {count}"));
-    assert_eq!(room.browser.number("viewer.timeline.frames.at(-1).step"), step + 1.0);
-    room.browser.click("#restart");
-    room.browser.wait_for("viewer.timeline.frames.length === 1 && viewer.timeline.frames[0].step === 0");
-    room.browser.click("#play");
-    room.browser.wait_for("viewer.timeline.frames.length > 3");
-    // a second page sees the same run, and one that goes away disturbs nobody
-    room.browser.open("about:blank");
-    room.browser.open(&viewer.address);
-    room.browser.wait_for("window.viewer && viewer.timeline.frames.length > 3");
-}
-
-fn slider(room: &mut Room) {
-    let viewer = Viewer::start(&room.folder, &["pawn.rfm", "-D", "particles=2000"]);
-    room.browser.open(&viewer.address);
-    room.browser.wait_for("window.viewer && viewer.meshes.length === 1 && viewer.timeline.frames.length > 1");
-    room.browser.eval("viewer.play(false)");
-    room.browser.wait_for("!viewer.run.playing");
-    let mut times = Vec::new();
-    for k in 0..9 {
-        let began = Instant::now();
-        room.browser.eval(&format!(
-            "(() => {{ viewer.old = viewer.scene.shown.mesh; const track = document.getElementById('param-cx'); track.value = {}; \
-             track.dispatchEvent(new Event('input')); }})()",
-            1.0 + 0.1 * f64::from(k)
-        ));
-        room.browser.wait_for("viewer.scene.shown.mesh !== viewer.old");
-        times.push(began.elapsed().as_secs_f64() * 1e3);
-    }
-    times.sort_by(f64::total_cmp);
-    println!("  from a slider to the picture: {:.0} ms, at most {:.0} ms", times[4], times[8]);
-    let run = room.browser.number("viewer.run.number");
-    let (x, y) = room.browser.middle("#param-cx");
-    room.browser.drag((x, y), (x + 40.0, y));
-    room.browser.wait_for(&format!("viewer.run.number > {run} && viewer.timeline.frames.length >= 1"));
-    room.shot("slider");
-    let value = room.browser.number("viewer.setting.params.find((p) => p.name === 'cx').value");
-    assert!(value > 1.5, "{value}");
-    room.browser.click("#params-reset");
-    room.browser.wait_for("viewer.setting.params.find((p) => p.name === 'cx').value === 1.5");
-}
-
-fn turned(room: &mut Room) {
-    let viewer = Viewer::start(&room.folder, &["pawn.rfm", "-D", "particles=1000"]);
-    room.browser.open(&viewer.address);
-    room.browser.wait_for("window.viewer && viewer.timeline.frames.length > 1");
-    room.browser.choose("#drag", "turns the box");
-    room.browser.drag((400.0, 300.0), (400.0, 90.0));
-    let gravity =
-        |room: &mut Room| ["0", "1", "2"].map(|k| room.browser.number(&format!("viewer.look.gravity[{k}]")));
-    let [x, y, z] = gravity(room);
-    let length = (x * x + y * y + z * z).sqrt();
-    assert!((length - 9.81).abs() < 1e-3 && z > -9.0, "{x} {y} {z}");
-    // the fluid goes where gravity points in the box
-    room.browser.wait_for("viewer.timeline.frames.at(-1).time > 0.3");
-    room.shot("turned");
-    room.browser.choose("#gravity", "turns with the box");
-    room.browser.wait_for("Math.abs(viewer.look.gravity[2] + 9.81) < 1e-6");
-    room.browser.click("#upright");
-    room.browser.wait_for("viewer.camera.turn[3] === 1");
-}
-
-fn mended(room: &mut Room) {
-    let file = room.folder.join("edited.rfm");
-    let good =
-        std::fs::read_to_string(room.folder.join("pawn.rfm")).unwrap().replace("= 10000 in", "= 1000 in");
-    std::fs::write(&file, &good).unwrap();
-    let viewer = Viewer::start(&room.folder, &["edited.rfm"]);
-    room.browser.open(&viewer.address);
-    room.browser.wait_for("window.viewer && viewer.meshes.length === 1 && viewer.timeline.frames.length > 2");
-    std::fs::write(&file, good.replace("waist(0.75)", "<b>waits</b>(0.75)")).unwrap();
-    room.browser.wait_for("!document.getElementById('notice').hidden");
-    room.shot("mistake");
-    let notice = room.browser.eval("document.getElementById('notice').textContent");
-    let notice = notice.as_str().unwrap();
-    assert!(notice.contains("edited.rfm:") && notice.contains('^') && notice.contains("<b>"), "{notice}");
-    assert_eq!(room.browser.number("document.querySelectorAll('#notice *').length"), 0.0);
-    assert!(room.browser.number("viewer.scene.drawn") > 900.0, "the last good picture remains");
-    std::fs::write(&file, good.replace("0.05)\n", "0.08)\n")).unwrap();
-    let waited = room.browser.wait_for("document.getElementById('notice').hidden");
-    println!("  mended after {:.0} ms", waited.as_secs_f64() * 1e3);
-}
-
-fn solid(room: &mut Room) {
-    let viewer = Viewer::start(&room.folder, &["solid.rfm"]);
-    room.browser.open(&viewer.address);
-    room.browser.wait_for("window.viewer && viewer.meshes.length === 1");
-    room.shot("solid");
-    assert_eq!(room.browser.eval("document.querySelector('#value-r').value"), "5");
-    room.browser.eval("viewer.old = viewer.scene.shown.mesh");
-    room.browser.eval("(() => { const track = document.getElementById('param-r'); track.value = 0.1; track.dispatchEvent(new Event('input')); })()");
-    room.browser.wait_for("viewer.scene.shown.mesh !== viewer.old");
 }

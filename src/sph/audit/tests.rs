@@ -1,0 +1,144 @@
+//! The audit against runs whose energy, volume and speeds are known.
+
+use super::*;
+use crate::geom::Aabb;
+use crate::sph::{Dfsph, FluidBlock, Method, Paper, Simulation, Wcsph, scenes};
+
+const TANK: Aabb = Aabb::new(DVec3::ZERO, DVec3::new(1.2, 0.2, 1.4));
+
+fn parameters(method: Method, spacing: f64) -> Parameters {
+    Parameters {
+        rest_density: 1000.0,
+        particle_mass: 1000.0 * spacing.powi(3),
+        support_radius: if matches!(method, Method::Dfsph(_)) { 2.2 } else { 2.6 } * spacing,
+        viscosity: 1e-3,
+        surface_tension: 0.0,
+        wall_restitution: 0.0,
+        adaptive: true,
+        time_step: 0.1,
+        expected_speed: 4.0,
+        method,
+        ..Parameters::default()
+    }
+}
+
+/// A column of water in a closed tank, that falls over.
+fn column(method: Method, spacing: f64) -> Simulation {
+    let parameters = parameters(method, spacing);
+    let mut fluid = crate::sph::Particles::default();
+    let count = |length: f64| (length / spacing).round() as usize;
+    for (i, j, k) in (0..count(0.4))
+        .flat_map(|i| (0..count(0.2)).flat_map(move |j| (0..count(0.8)).map(move |k| (i, j, k))))
+    {
+        fluid.push(spacing * (DVec3::new(i as f64, j as f64, k as f64) + 0.5), DVec3::ZERO);
+    }
+    Simulation::new(parameters, fluid, TANK, Vec::new()).unwrap()
+}
+
+#[test]
+fn classes_give_mean_and_percentile() {
+    // a hundred and one densities from 0 to 10 % above rest, and as many below it
+    let densities: Vec<f64> =
+        (0..=100).map(|k| 1000.0 + f64::from(k)).chain((0..101).map(|_| 700.0)).collect();
+    let (Compression { mean, p99, largest }, volume) = Compression::of(&densities, 1000.0);
+    assert!((mean - 0.025).abs() < 1e-12, "{mean}");
+    assert!((largest - 0.1).abs() < 1e-12);
+    // 202 particles, so two lie above it: 0.099 and 0.1
+    // the upper end of its class
+    assert!((p99 - 0.098).abs() < 1.01 * CLASS, "{p99}");
+    let exact: f64 = densities.iter().map(|rho| 1000.0 / rho.max(1000.0)).sum::<f64>() / 202.0;
+    assert!((volume - exact).abs() < 1e-12);
+}
+
+#[test]
+fn a_splash_in_a_closed_tank_makes_no_energy() {
+    for method in [Method::from(Wcsph::default()), Paper::default().into()] {
+        let mut simulation = column(method, 0.05);
+        simulation.advance(2.0, |_| std::ops::ControlFlow::Continue(())).unwrap();
+        let audit = simulation.audit();
+        let excess = audit.energy_excess().unwrap();
+        assert!(excess < 1e-4, "{}: {excess}", method.name());
+        // Torricelli's speed of the whole height, twice over
+        assert!(audit.max_speed() < 2.0 * (2.0 * 9.81 * 0.8f64).sqrt(), "{}", audit.max_speed());
+    }
+}
+
+#[test]
+fn water_in_the_tank_keeps_its_volume() {
+    let mut simulation = column(Wcsph::default().into(), 0.05);
+    simulation.advance(2.0, |_| std::ops::ControlFlow::Continue(())).unwrap();
+    let change = simulation.audit().volume_change();
+    assert!(change.abs() < 0.01, "{change}");
+    assert_eq!(simulation.findings(), []);
+}
+
+#[test]
+fn energy_from_nowhere_is_found_and_stops_a_run() {
+    let mut simulation = column(Wcsph::default().into(), 0.1);
+    simulation.step().unwrap();
+    assert!(simulation.news().is_empty());
+    let faster = |simulation: &mut Simulation, speed: f64| {
+        let mut checkpoint = simulation.checkpoint();
+        let mut column = checkpoint.get("velocity y").unwrap().to_vec();
+        column.iter_mut().for_each(|v| *v += speed);
+        checkpoint.set("velocity y", column);
+        *simulation =
+            Simulation::resume(simulation.parameters().clone(), &checkpoint, TANK, Vec::new()).unwrap();
+    };
+    faster(&mut simulation, 0.5);
+    simulation.step().unwrap();
+    let excess = simulation.audit().energy_excess().unwrap();
+    // ½v² over the potential energy of the column, g·0.4 m, less a little for the pressure
+    assert!((excess - 0.125 / (9.81 * 0.4)).abs() < 5e-3, "{excess}");
+    let told = simulation.news();
+    assert!(matches!(told[..], [(Finding::Energy, _)]), "{told:?}");
+    assert!(simulation.news().is_empty(), "told once");
+    faster(&mut simulation, 4.0);
+    assert!(matches!(simulation.step(), Err(StepError::EnergyDoubled { .. })));
+}
+
+#[test]
+fn crowded_places_are_found_whatever_density_is_carried() {
+    // particles that nothing pushes apart
+    let dust = crate::sph::Paper { stiffness: 0.0, ..crate::sph::Paper::default() };
+    let mut simulation = column(dust.into(), 0.1);
+    let mut checkpoint = simulation.checkpoint();
+    for name in ["position x", "position y", "position z"] {
+        let column = checkpoint.get(name).unwrap().iter().map(|x| 0.9 * x).collect();
+        checkpoint.set(name, column);
+    }
+    simulation = Simulation::resume(simulation.parameters().clone(), &checkpoint, TANK, Vec::new()).unwrap();
+    while simulation.steps() < LOOK {
+        simulation.step().unwrap();
+    }
+    assert!(simulation.audit().volume_change() < -0.05, "{}", simulation.audit().volume_change());
+    assert!(simulation.audit().compression().p99 > 0.1);
+}
+
+#[test]
+fn the_energy_of_a_surface_is_its_tension_times_its_area() {
+    let parameters = Parameters {
+        surface_tension: 1.0,
+        gravity: DVec3::ZERO,
+        ..parameters(Dfsph::default().into(), 0.05)
+    };
+    let count = 4000;
+    let space = Aabb::new(DVec3::splat(-9.0), DVec3::splat(9.0));
+    let drop = FluidBlock::drop(DVec3::ZERO, count).seed(&parameters, space).unwrap();
+    let radius = (count as f64 * 0.05f64.powi(3) * 0.75 / std::f64::consts::PI).cbrt();
+    let simulation = Simulation::new(parameters.clone(), drop, space, Vec::new()).unwrap();
+    let found = surface_energy(&parameters, &simulation.particles().density);
+    let exact = 4.0 * std::f64::consts::PI * radius * radius;
+    // a lattice's ball has steps
+    assert!((found / exact - 1.0).abs() < 0.15, "{found} {exact}");
+}
+
+#[test]
+fn a_fluid_without_energy_is_not_judged() {
+    let simulation = scenes::free(
+        Parameters { gravity: DVec3::ZERO, ..parameters(Wcsph::default().into(), 0.1) },
+        &[(DVec3::ZERO, DVec3::ZERO)],
+    );
+    assert_eq!(simulation.audit().unjudged(), Some(NO_ENERGY));
+    assert_eq!(simulation.audit().energy_excess(), None);
+}

@@ -1,0 +1,72 @@
+//! What commands leave in folders: nothing half written, nothing of an earlier run, and all that others keep there.
+
+use crate::cli::{SMALL, files};
+use crate::tool::{rfm, snapshot};
+
+#[test]
+fn a_run_leaves_nothing_of_the_one_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
+    let run = |flags: &[&str]| rfm(here, &[&["run", "drop.rfm", "-o", "out"], flags].concat());
+    run(&[]).expect(0);
+    std::fs::write(here.join("out/frames/notes.txt"), "kept").unwrap();
+    // what is refused changes nothing
+    let before = [files(&here.join("out")), files(&here.join("out/frames"))];
+    run(&["--force", "--mesh-cells", "0"]).expect(2);
+    let refused = run(&["--steps", "1"]).expect(2).stderr;
+    assert!(refused.contains("holds a run already (scene drop, 0.010 s, 3 frames)"), "{refused}");
+    assert_eq!([files(&here.join("out")), files(&here.join("out/frames"))], before);
+    // nor is what others keep beside the run's own tables
+    let kept = ["compare.csv", "energy.png"].map(|name| here.join("out/history").join(name));
+    kept.iter().for_each(|path| std::fs::write(path, "time [s],mine\n").unwrap());
+    run(&["--force", "--no-frames", "--steps", "1"]).expect(0);
+    assert_eq!(files(&here.join("out/history")), ["audit.csv", "compare.csv", "energy.csv", "energy.png"]);
+    assert_eq!(files(&here.join("out")), ["checkpoints", "frames", "history", "pictures", "summary.json"]);
+    assert_eq!(files(&here.join("out/frames")), ["notes.txt"]);
+    assert!(files(&here.join("out/pictures")).is_empty());
+}
+
+#[test]
+fn unwritable_places_are_refused_and_nothing_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), SMALL).unwrap();
+    std::fs::write(here.join("file"), "kept").unwrap();
+    std::fs::create_dir(here.join("folder.stl")).unwrap();
+    std::fs::create_dir(here.join("folder.svg")).unwrap();
+    let before = files(here);
+    for (name, arguments) in [
+        ("mesh into a missing folder", &["mesh", "drop.rfm", "--cells", "16", "-o", "none/post.stl"][..]),
+        ("mesh onto a folder", &["mesh", "drop.rfm", "--cells", "16", "-o", "folder.stl"]),
+        ("mesh below a file", &["mesh", "drop.rfm", "--cells", "16", "-o", "file/post.stl"]),
+        ("slice into a missing folder", &["check", "drop.rfm", "--slice", "z=0.1", "-o", "none/post.svg"]),
+        ("slice onto a folder", &["check", "drop.rfm", "--slice", "z=0.1", "-o", "folder.svg"]),
+        ("run into a file", &["run", "drop.rfm", "-o", "file"]),
+        ("run below a file", &["run", "drop.rfm", "-o", "file/out"]),
+    ] {
+        let outcome = rfm(here, arguments).expect(2);
+        snapshot("cli", name, &format!("rfm {}\n{}exit 2\n", arguments.join(" "), outcome.stderr));
+        assert_eq!(files(here), before, "{name}");
+    }
+    assert_eq!(std::fs::read_to_string(here.join("file")).unwrap(), "kept");
+    assert!(files(&here.join("folder.stl")).is_empty());
+}
+
+#[test]
+fn what_killed_commands_leave_is_removed_and_what_others_write_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("post.rfm"), SMALL).unwrap();
+    for name in [".rfm-p.stl-a1b2c3", ".rfm-other.svg-d4e5f6", ".rfm-busy.stl-g7h8i9"] {
+        std::fs::write(here.join(name), "half a file").unwrap();
+    }
+    // a command that still runs holds a lock on what it writes
+    let busy = std::fs::File::open(here.join(".rfm-busy.stl-g7h8i9")).unwrap();
+    busy.lock().unwrap();
+    rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
+    assert_eq!(files(here), [".rfm-busy.stl-g7h8i9", "p.stl", "post.rfm"]);
+    drop(busy);
+    rfm(here, &["mesh", "post.rfm", "-o", "p.stl", "--cells", "16"]).expect(0);
+    assert_eq!(files(here), ["p.stl", "post.rfm"]);
+}
