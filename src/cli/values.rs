@@ -187,22 +187,17 @@ pub(super) fn camera(text: &str) -> Result<CameraFlag, String> {
                 None => after.find(',').unwrap_or(after.len()),
             };
             let (value, next) = after.split_at(end);
-            let is_repeated = match key.trim() {
-                "camera" => towards_eye.is_some(),
-                "look_at" => look_at.is_some(),
-                "zoom" => zoomed.is_some(),
-                _ => false,
-            };
-            if is_repeated {
-                return Err(format!("`{}` is stated twice", key.trim()));
-            }
-            match key.trim() {
-                "camera" => towards_eye = Some(bare(value)?),
-                "look_at" => look_at = Some(bare(value)?),
-                "zoom" => zoomed = Some(zoom(value)?),
+            let key = key.trim();
+            let is_repeated = match key {
+                "camera" => towards_eye.replace(bare(value)?).is_some(),
+                "look_at" => look_at.replace(bare(value)?).is_some(),
+                "zoom" => zoomed.replace(zoom(value)?).is_some(),
                 other => {
                     return Err(format!("`{other}` is no key of a camera; expected camera, look_at or zoom"));
                 }
+            };
+            if is_repeated {
+                return Err(format!("`{key}` is stated twice"));
             }
             rest = next.trim_start().strip_prefix(',').unwrap_or(next).trim_start();
         }

@@ -109,25 +109,42 @@ pub(super) fn helix(radius: f64, pitch: f64, turns: f64, tolerance: f64) -> Resu
     finite((0..=count).map(at).collect())
 }
 
+/// The straight ways between points that a curve goes through.
+struct Legs {
+    /// Whether the last point is the first.
+    closed: bool,
+    lengths: Vec<f64>,
+    /// The directions of the ways, of length 1.
+    ahead: Vec<DVec3>,
+}
+
+impl Legs {
+    fn between(points: &[DVec3]) -> Result<Self, Flaw> {
+        let pieces = points.len().saturating_sub(1);
+        let closed = points.first() == points.last();
+        if pieces < if closed { 3 } else { 1 } {
+            return Err(Flaw::TooFew);
+        }
+        if let Some(i) = (1..=pieces).find(|&i| points[i] == points[i - 1]) {
+            return Err(Flaw::Repeated(i));
+        }
+        let lengths: Vec<f64> = points.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
+        if !lengths.iter().all(|length| length.is_normal()) {
+            return Err(Flaw::TooLarge);
+        }
+        let ahead = points.windows(2).zip(&lengths).map(|(pair, length)| (pair[1] - pair[0]) / *length);
+        let ahead = ahead.collect();
+        Ok(Self { closed, lengths, ahead })
+    }
+}
+
 /// The cubic spline through points, over the length of the chords between them: its direction and its curvature have no
 /// jumps. Its ends are straight; if the last point is the first one, it is closed and as smooth there as elsewhere.
 pub(super) fn spline(points: &[DVec3], tolerance: f64) -> Result<Vec<DVec3>, Flaw> {
-    let pieces = points.len().saturating_sub(1);
-    let closed = points.first() == points.last();
-    if pieces < if closed { 3 } else { 1 } {
-        return Err(Flaw::TooFew);
-    }
-    if let Some(i) = (1..=pieces).find(|&i| points[i] == points[i - 1]) {
-        return Err(Flaw::Repeated(i));
-    }
-    let lengths: Vec<f64> = points.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-    if !lengths.iter().all(|length| length.is_normal()) {
-        return Err(Flaw::TooLarge);
-    }
-    let slopes: Vec<DVec3> = points.windows(2).zip(&lengths).map(|(p, l)| (p[1] - p[0]) / *l).collect();
-    let bends = if closed { closed_bends(&lengths, &slopes) } else { open_bends(&lengths, &slopes) };
+    let Legs { closed, lengths, ahead } = Legs::between(points)?;
+    let bends = if closed { closed_bends(&lengths, &ahead) } else { open_bends(&lengths, &ahead) };
     let mut chain = vec![points[0]];
-    for i in 0..pieces {
+    for i in 0..lengths.len() {
         let (length, from, to) = (lengths[i], bends[i], bends[i + 1]);
         // a chord over a step h of the parameter is no farther from the curve than h²/8 times its largest bend
         let bend = from.length().max(to.length());
@@ -169,19 +186,8 @@ pub(super) fn beziers(curves: &[[DVec3; 4]], tolerance: f64) -> Result<Vec<DVec3
 
 /// A chain of straight pieces with an arc in place of each corner, closed if the last point is the first.
 pub(super) fn rounded(points: &[DVec3], radius: f64, tolerance: f64) -> Result<Vec<DVec3>, Flaw> {
-    let pieces = points.len().saturating_sub(1);
-    let closed = points.first() == points.last();
-    if pieces < if closed { 3 } else { 1 } {
-        return Err(Flaw::TooFew);
-    }
-    if let Some(i) = (1..=pieces).find(|&i| points[i] == points[i - 1]) {
-        return Err(Flaw::Repeated(i));
-    }
-    let lengths: Vec<f64> = points.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
-    if !lengths.iter().all(|length| length.is_normal()) {
-        return Err(Flaw::TooLarge);
-    }
-    let ahead: Vec<DVec3> = points.windows(2).zip(&lengths).map(|(p, l)| (p[1] - p[0]) / *l).collect();
+    let Legs { closed, lengths, ahead } = Legs::between(points)?;
+    let pieces = lengths.len();
     // the piece in front of a corner; none in front of the first point of an open chain
     let before = |i: usize| if i > 0 { i - 1 } else { pieces - 1 };
     let turn = |i: usize| match i {
@@ -232,10 +238,10 @@ pub(super) fn rounded(points: &[DVec3], radius: f64, tolerance: f64) -> Result<V
 }
 
 /// The second derivatives at the points of an open spline: none at its ends.
-fn open_bends(lengths: &[f64], slopes: &[DVec3]) -> Vec<DVec3> {
+fn open_bends(lengths: &[f64], ahead: &[DVec3]) -> Vec<DVec3> {
     let inner = lengths.len() - 1;
     let middle: Vec<f64> = (0..inner).map(|i| 2.0 * (lengths[i] + lengths[i + 1])).collect();
-    let right: Vec<DVec3> = (0..inner).map(|i| 6.0 * (slopes[i + 1] - slopes[i])).collect();
+    let right: Vec<DVec3> = (0..inner).map(|i| 6.0 * (ahead[i + 1] - ahead[i])).collect();
     let off: Vec<f64> = lengths[1..lengths.len()].to_vec();
     let mut bends = vec![DVec3::ZERO];
     bends.extend(solved(&middle, &off, right));
@@ -245,11 +251,11 @@ fn open_bends(lengths: &[f64], slopes: &[DVec3]) -> Vec<DVec3> {
 
 /// The second derivatives at the points of a closed spline, the first of them again at its end. The system has two
 /// corners beside its three diagonals, which are a correction of rank one (Sherman and Morrison).
-fn closed_bends(lengths: &[f64], slopes: &[DVec3]) -> Vec<DVec3> {
+fn closed_bends(lengths: &[f64], ahead: &[DVec3]) -> Vec<DVec3> {
     let n = lengths.len();
     let before = |i: usize| (i + n - 1) % n;
     let mut middle: Vec<f64> = (0..n).map(|i| 2.0 * (lengths[before(i)] + lengths[i])).collect();
-    let right: Vec<DVec3> = (0..n).map(|i| 6.0 * (slopes[i] - slopes[before(i)])).collect();
+    let right: Vec<DVec3> = (0..n).map(|i| 6.0 * (ahead[i] - ahead[before(i)])).collect();
     let corner = lengths[n - 1];
     let first = -middle[0];
     middle[0] -= first;

@@ -361,14 +361,16 @@ impl Lowering<'_> {
 
     /// An n-ary operation as a balanced tree, the left half the larger one: a fold would let ω grow as 2ⁿ.
     pub fn balanced(&mut self, op: Logic, nodes: &[Node], span: Span) -> Node {
-        match nodes {
-            [only] => *only,
-            _ => {
-                let (left, right) = nodes.split_at(nodes.len().div_ceil(2));
-                let (a, b) = (self.balanced(op, left, span), self.balanced(op, right, span));
-                let op = if op == Logic::Or { Binary::Or } else { Binary::And };
-                self.binary(op, a, b, span)
-            }
+        self.tree(if op == Logic::Or { Binary::Or } else { Binary::And }, nodes, span)
+    }
+
+    /// One operation over some nodes as a balanced tree.
+    pub fn tree(&mut self, op: Binary, nodes: &[Node], span: Span) -> Node {
+        if let [only] = nodes {
+            return *only;
         }
+        let (left, right) = nodes.split_at(nodes.len().div_ceil(2));
+        let (a, b) = (self.tree(op, left, span), self.tree(op, right, span));
+        self.binary(op, a, b, span)
     }
 }

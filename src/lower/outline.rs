@@ -127,7 +127,7 @@ impl Lowering<'_> {
             runs[0].extend(last);
         }
         let choice = if op == Logic::And { Binary::Min } else { Binary::Max };
-        let nodes: Vec<Node> = runs.iter().map(|run| self.extreme(choice, run, span)).collect();
+        let nodes: Vec<Node> = runs.iter().map(|run| self.tree(choice, run, span)).collect();
         (self.balanced(op, &nodes, span), parts[0].1)
     }
 

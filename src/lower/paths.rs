@@ -301,10 +301,8 @@ impl Lowering<'_> {
                 let mut members = Vec::with_capacity(points.len());
                 for p in points {
                     let [x, y, z] = p.to_array().map(|c| self.constant(c));
-                    members.push(match dimensions {
-                        3 => Value::Vector([x, y, z]),
-                        _ => Value::List([x, y].map(Value::Number).into()),
-                    });
+                    let flat = || Value::List([x, y].map(Value::Number).into());
+                    members.push(if dimensions == 3 { Value::Vector([x, y, z]) } else { flat() });
                 }
                 return self.list(members, span);
             }

@@ -51,7 +51,7 @@ impl Lowering<'_> {
                 return Value::Failed;
             }
         }
-        Value::Number(self.extreme(Binary::Max, &capsules, span))
+        Value::Number(self.tree(Binary::Max, &capsules, span))
     }
 
     /// (r² − d²)/2r, with d the distance from a segment. Along and across the segment its parts are lengths of their own,
@@ -110,20 +110,5 @@ impl Lowering<'_> {
             });
         }
         sum.unwrap_or_else(|| self.constant(0.0))
-    }
-
-    /// The least or the greatest of some fields, as a balanced tree.
-    pub fn extreme(&mut self, op: Binary, fields: &[Node], span: Span) -> Node {
-        let mut level = fields.to_vec();
-        while level.len() > 1 {
-            level = level
-                .chunks(2)
-                .map(|pair| match *pair {
-                    [a, b] => self.binary(op, a, b, span),
-                    _ => pair[0],
-                })
-                .collect();
-        }
-        level[0]
     }
 }

@@ -121,8 +121,9 @@ pub(super) fn saved(folder: &Path) -> Vec<Plot> {
 /// The quantities of a run that goes on.
 pub(super) struct History {
     probes: Vec<(Gauge, Table)>,
-    /// Of so many samples one is kept, and so many came since.
+    /// One sample of so many is kept.
     every: usize,
+    /// The samples so far, kept or not.
     passed: usize,
 }
 

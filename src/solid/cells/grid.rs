@@ -167,8 +167,8 @@ impl Cells {
         cells
     }
 
-    /// The same box with another margin, divided no deeper than the flat grid, on the calling thread alone: others may
-    /// wait for it while they hold what this thread would be given to do.
+    /// Divides the same box with another margin, no deeper than the flat grid. The calling thread does it alone, because
+    /// others may wait for the result, and it must not take over work that waits, too.
     pub fn with_margin(&self, parts: &LeafTree, margin: f64) -> Self {
         let (mut cells, level) = Self::begin(parts, self.domain, margin);
         cells.refine(level, parts, Division { margin, deepest: DEPTH, parallel: false }, |_| false);

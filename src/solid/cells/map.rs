@@ -54,7 +54,8 @@ pub struct CellMap {
     twin: Twin,
     parts: Arc<LeafTree>,
     cells: Arc<Cells>,
-    /// The same box with what decides within [`AROUND`] of a cell, made when a gradient is asked for off the surface.
+    /// Cells of the same box that keep what decides within [`AROUND`] of them. They are made when a gradient is first
+    /// asked for off the surface.
     around: OnceLock<Cells>,
     reach: f64,
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are

@@ -156,42 +156,29 @@ fn beyond_lines(delta: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// ∫ over the part of the support behind a plane, by rings.
-    fn by_quadrature(d: f64) -> f64 {
-        let (n, c) = (4000, 210.0 / std::f64::consts::PI);
+    /// ∫ |W'|/r³·f(r, cos) dV over the part of the support behind a plane at the distance d, by shells and, within them,
+    /// rings; cos is that of the angle to the normal.
+    fn behind_a_plane(d: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let (n, rings) = (4000, 200);
         let step = (1.0 - d) / f64::from(n);
         let shells = (0..n).map(|k| d + (f64::from(k) + 0.5) * step).map(|r| {
-            let rings = 200;
             let width = (1.0 - d / r) / f64::from(rings);
-            let ring = |k: i32| {
-                let cosine = d / r + (f64::from(k) + 0.5) * width;
-                r * cosine * (1.0 - cosine * cosine)
-            };
-            let over_rings: f64 = (0..rings).map(|k| ring(k) * width).sum();
-            2.0 * std::f64::consts::PI * r * r * c * (1.0 - r).powi(3) * over_rings
+            let over_rings: f64 =
+                (0..rings).map(|k| f(r, d / r + (f64::from(k) + 0.5) * width) * width).sum();
+            // |W'|/r³·r² = 210/π·(1 − r)³/r² · r², and 2π around the normal
+            420.0 * (1.0 - r).powi(3) * over_rings
         });
-        2.5 * step * shells.sum::<f64>()
+        step * shells.sum::<f64>()
     }
 
     #[test]
     fn bends_go_on_behind_a_wall_as_the_integral_does() {
-        // by shells and, within them, rings: y² is half the square of their radius in the mean
+        // y² is half the square of the rings' radius in the mean
         let by_quadrature = |d: f64| {
-            let n = 4000;
-            let step = (1.0 - d) / f64::from(n);
-            let shells = (0..n).map(|k| d + (f64::from(k) + 0.5) * step).map(|r| {
-                let rings = 200;
-                let width = (1.0 - d / r) / f64::from(rings);
-                let ring = |k: i32| {
-                    let cosine = d / r + (f64::from(k) + 0.5) * width;
-                    let s = r * cosine;
-                    0.5 * r * r * (1.0 - cosine * cosine) * s * (s - d)
-                };
-                // |W'|/r³·r² = 210/π·(1 − r)³/r² · r²
-                let over_rings: f64 = (0..rings).map(|k| ring(k) * width).sum();
-                2.0 * std::f64::consts::PI * 210.0 / std::f64::consts::PI * (1.0 - r).powi(3) * over_rings
-            });
-            5.0 * step * shells.sum::<f64>()
+            5.0 * behind_a_plane(d, |r, cosine| {
+                let s = r * cosine;
+                0.5 * r * r * (1.0 - cosine * cosine) * s * (s - d)
+            })
         };
         for d in [0.0, 0.05, 0.2, 0.5, 0.8] {
             let (found, wanted) = (beyond_lines(d), by_quadrature(d));
@@ -204,6 +191,8 @@ mod tests {
 
     #[test]
     fn walls_rub_along_lines_as_the_integral_does() {
+        let by_quadrature =
+            |d: f64| 2.5 * behind_a_plane(d, |r, cosine| r.powi(3) * cosine * (1.0 - cosine * cosine));
         for d in [0.0, 0.05, 0.3, 0.6, 0.9] {
             let found = along_lines(d) * WallKernel::WendlandC2.slope(d);
             assert!((found / by_quadrature(d) - 1.0).abs() < 1e-4, "{d}: {found} {}", by_quadrature(d));
