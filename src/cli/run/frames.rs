@@ -154,7 +154,7 @@ impl Frames {
         self.write_collections()?;
         if let Some(pictures) = &mut self.pictures {
             if let Some(meshes) = &moved {
-                pictures.show(meshes)?;
+                pictures.show(meshes);
             }
             pictures.save(&self.folder.join(format!("pictures/frame_{:06}.png", self.count)), simulation)?;
         }
@@ -221,7 +221,7 @@ impl FrameCost {
             let mut pictures = Pictures::new(options, experiment, &meshes)?;
             let started = Instant::now();
             if bodies.move_about() {
-                pictures.show(&meshes)?;
+                pictures.show(&meshes);
             }
             pictures.image(simulation).write_png(&mut out)?;
             seconds += started.elapsed().as_secs_f64();

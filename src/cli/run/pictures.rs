@@ -33,13 +33,11 @@ const FASTEST: f64 = 0.6;
 
 /// What all pictures of a run share.
 pub(super) struct Pictures {
-    /// The scene that is drawn, with the box, the obstacles and the legend.
+    /// The scene that is drawn, with the box, the obstacles that stand still and the legend.
     scene: render::Backdrop,
-    camera: Camera,
-    title: String,
+    /// The other obstacles, where they are now.
+    moving: Vec<(Drawn, Mesh)>,
     domain: Aabb,
-    /// The speed that is drawn red, m/s.
-    fastest: f64,
     radius: f64,
     bodies: Vec<Body>,
     pub(super) count: usize,
@@ -69,12 +67,14 @@ impl Pictures {
         };
         let solids = experiment.bodies().iter().map(|body| &body.solid);
         let bodies: Vec<Body> = solids.zip(opened).map(body).collect();
+        let legend = render::Legend { title: &title, scale: Some(Scale::speeds(fastest)) };
+        let still = bodies.iter().zip(meshes).filter(|(body, _)| !body.solid.moves());
+        let scene =
+            scenery::backdrop(&camera, &domain, &legend, still.map(|(body, mesh)| (body.drawn, mesh)))?;
         Ok(Self {
-            scene: backdrop(&camera, &domain, (&title, fastest), &bodies, meshes)?,
-            camera,
-            title,
+            scene,
+            moving: moving(&bodies, meshes),
             domain,
-            fastest,
             radius: 0.5 * experiment.parameters().spacing(),
             bodies,
             count: 0,
@@ -82,10 +82,8 @@ impl Pictures {
     }
 
     /// Puts the obstacles where they are now.
-    pub fn show(&mut self, meshes: &[Mesh]) -> Result<(), Failure> {
-        let legend = (self.title.as_str(), self.fastest);
-        self.scene = backdrop(&self.camera, &self.domain, legend, &self.bodies, meshes)?;
-        Ok(())
+    pub fn show(&mut self, meshes: &[Mesh]) {
+        self.moving = moving(&self.bodies, meshes);
     }
 
     pub fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
@@ -100,14 +98,14 @@ impl Pictures {
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
         let places: Vec<DVec3> = particles.position.iter().collect();
         let [x, y, z] = columns(&self.lifted(places, simulation.time()));
-        self.scene.frame(
-            &render::ParticlesView {
-                positions: rfm::field::Points::new(&x, &y, &z),
-                values: &speeds,
-                radius: self.radius,
-            },
-            &render::Caption { time: simulation.time(), step: Some(simulation.steps()) },
-        )
+        let particles = render::ParticlesView {
+            positions: rfm::field::Points::new(&x, &y, &z),
+            values: &speeds,
+            radius: self.radius,
+        };
+        let moving = render::Moving { meshes: &scenery::views(&self.moving), particles, balls: true };
+        let moment = render::Caption { time: simulation.time(), step: Some(simulation.steps()) };
+        self.scene.frame_with(&moving, &moment)
     }
 
     /// The places with every ball in front of the walls: a particle is a point and may touch them, and half of its ball
@@ -141,17 +139,10 @@ fn columns(places: &[DVec3]) -> [Vec<f64>; 3] {
     [0, 1, 2].map(|axis| places.iter().map(|p| p[axis]).collect())
 }
 
-/// The scene of a picture without its particles: the box, the obstacles, the legend.
-fn backdrop(
-    camera: &Camera,
-    domain: &Aabb,
-    (title, fastest): (&str, f64),
-    bodies: &[Body],
-    meshes: &[Mesh],
-) -> Result<render::Backdrop, Failure> {
-    let legend = render::Legend { title, scale: Some(Scale::speeds(fastest)) };
-    let drawn = bodies.iter().map(|body| body.drawn).zip(meshes);
-    scenery::backdrop(camera, domain, &legend, drawn)
+/// The obstacles that move, where their meshes are.
+fn moving(bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)> {
+    let moving = bodies.iter().zip(meshes).filter(|(body, _)| body.solid.moves());
+    scenery::sharp(moving.map(|(body, mesh)| (body.drawn, mesh)))
 }
 
 /// The camera that the flags or the scene ask for.
@@ -168,14 +159,17 @@ fn camera(options: &Run, experiment: &Experiment, size: (u32, u32)) -> Result<Ca
 fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec<Drawn>, Failure> {
     let names: Vec<&str> = experiment.bodies().iter().map(|body| body.solid.name()).collect();
     let stated = &experiment.scene().picture;
-    if let Some(unknown) = options.hide.iter().find(|name| !names.contains(&name.as_str())) {
-        let there = if names.is_empty() { "none".into() } else { names.join(", ") };
-        return Err(Failure::usage(format!(
-            "--hide {unknown}: the scene `{}` has no such obstacle; there is {there}",
-            experiment.scene().name
-        )));
+    for (flag, given) in [("--hide", &options.hide), ("--glass", &options.glass)] {
+        if let Some(unknown) = given.iter().find(|name| !names.contains(&name.as_str())) {
+            let there = if names.is_empty() { "none".into() } else { names.join(", ") };
+            return Err(Failure::usage(format!(
+                "{flag} {unknown}: the scene `{}` has no such obstacle; there is {there}",
+                experiment.scene().name
+            )));
+        }
     }
     let is_hidden = |name: &str| stated.hide.iter().chain(&options.hide).any(|hidden| hidden == name);
+    let is_glass = |name: &str| stated.glass.iter().chain(&options.glass).any(|glass| glass == name);
     let small = camera(options, experiment, SMALL)?;
     let fixed = match (&options.cut, stated.cut) {
         (Some(CutFlag::Plane(plane)), _) => Some(Some(scenery::half_towards_eye(plane, &small))),
@@ -186,6 +180,7 @@ fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec
     let samples = if fixed.is_none() { fluid_samples(experiment) } else { Vec::new() };
     let drawn = |(name, mesh): (&&str, &Mesh)| match fixed {
         _ if is_hidden(name) => Drawn::Hidden,
+        _ if is_glass(name) => Drawn::Glass,
         Some(None) => Drawn::Whole,
         Some(Some(cut)) => Drawn::Open(cut),
         None => out_of_the_way(&small, name, mesh, &samples),
