@@ -10,6 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::args::{CutFlag, Run};
+use super::super::values::CameraFlag;
 use super::super::{Failure, output};
 use crate::cli::output::Shown;
 use crate::cli::scenery::{self, Drawn, half, out_of_the_way};
@@ -31,8 +32,27 @@ const SMALL: (u32, u32) = (320, 240);
 /// long before.
 const FASTEST: f64 = 0.6;
 
+/// What is asked of pictures, besides what the scene states.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::cli) struct Look<'a> {
+    /// The file of the scene, for the title.
+    pub file: &'a Path,
+    pub camera: Option<CameraFlag>,
+    pub cut: Option<&'a CutFlag>,
+    pub hide: &'a [String],
+    pub glass: &'a [String],
+}
+
+impl<'a> Look<'a> {
+    /// What the flags of a run ask for.
+    pub fn of(options: &'a Run) -> Self {
+        let Run { file, camera, cut, hide, glass, .. } = options;
+        Self { file, camera: *camera, cut: cut.as_ref(), hide, glass }
+    }
+}
+
 /// What all pictures of a run share.
-pub(super) struct Pictures {
+pub(in crate::cli) struct Pictures {
     /// The scene that is drawn, with the box, the obstacles that stand still and the legend.
     scene: render::Backdrop,
     /// The other obstacles, where they are now.
@@ -40,7 +60,7 @@ pub(super) struct Pictures {
     domain: Aabb,
     radius: f64,
     bodies: Vec<Body>,
-    pub(super) count: usize,
+    pub(in crate::cli) count: usize,
 }
 
 /// An obstacle in pictures.
@@ -53,11 +73,11 @@ struct Body {
 
 impl Pictures {
     /// Prepares the pictures. `meshes` are those of the bodies at the start.
-    pub fn new(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Self, Failure> {
+    pub fn new(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Self, Failure> {
         let domain = experiment.domain();
-        let camera = camera(options, experiment, Camera::SIZE)?;
-        let opened = opened(options, experiment, meshes)?;
-        let title = title(options, experiment, &opened);
+        let camera = camera(look, experiment, Camera::SIZE)?;
+        let opened = opened(look, experiment, meshes)?;
+        let title = title(look, experiment, &opened);
         // a fall is stopped on its way, what drives a fluid otherwise is not
         let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
         let fastest = share * experiment.speed_scale();
@@ -146,9 +166,9 @@ fn moving(bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)> {
 }
 
 /// The camera that the flags or the scene ask for.
-fn camera(options: &Run, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
+fn camera(look: Look<'_>, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
     let stated = &experiment.scene().picture;
-    let (towards_eye, aim) = match options.camera {
+    let (towards_eye, aim) = match look.camera {
         Some(flag) => (Some(flag.towards_eye), (flag.look_at, flag.zoom)),
         None => (stated.camera, (stated.look_at, stated.zoom)),
     };
@@ -156,10 +176,10 @@ fn camera(options: &Run, experiment: &Experiment, size: (u32, u32)) -> Result<Ca
 }
 
 /// How each body is drawn.
-fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec<Drawn>, Failure> {
+fn opened(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec<Drawn>, Failure> {
     let names: Vec<&str> = experiment.bodies().iter().map(|body| body.solid.name()).collect();
     let stated = &experiment.scene().picture;
-    for (flag, given) in [("--hide", &options.hide), ("--glass", &options.glass)] {
+    for (flag, given) in [("--hide", look.hide), ("--glass", look.glass)] {
         if let Some(unknown) = given.iter().find(|name| !names.contains(&name.as_str())) {
             let there = if names.is_empty() { "none".into() } else { names.join(", ") };
             return Err(Failure::usage(format!(
@@ -168,10 +188,10 @@ fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec
             )));
         }
     }
-    let is_hidden = |name: &str| stated.hide.iter().chain(&options.hide).any(|hidden| hidden == name);
-    let is_glass = |name: &str| stated.glass.iter().chain(&options.glass).any(|glass| glass == name);
-    let small = camera(options, experiment, SMALL)?;
-    let fixed = match (&options.cut, stated.cut) {
+    let is_hidden = |name: &str| stated.hide.iter().chain(look.hide).any(|hidden| hidden == name);
+    let is_glass = |name: &str| stated.glass.iter().chain(look.glass).any(|glass| glass == name);
+    let small = camera(look, experiment, SMALL)?;
+    let fixed = match (look.cut, stated.cut) {
         (Some(CutFlag::Plane(plane)), _) => Some(Some(scenery::half_towards_eye(plane, &small))),
         (Some(CutFlag::None), _) | (None, Opening::None) => Some(None),
         (None, Opening::Half { axis, at, below }) => Some(Some(half(DVec3::AXES[axis], at, below))),
@@ -204,10 +224,10 @@ fn fluid_samples(experiment: &Experiment) -> Vec<DVec3> {
 }
 
 /// What is seen: the file, the scene, the method, and what was done to the obstacles.
-fn title(options: &Run, experiment: &Experiment, drawn: &[Drawn]) -> String {
+fn title(look: Look<'_>, experiment: &Experiment, drawn: &[Drawn]) -> String {
     let scene = experiment.scene();
-    let file = match options.file.file_name() {
-        Some(name) if options.file.as_os_str() != "-" => Path::new(name).shown(),
+    let file = match look.file.file_name() {
+        Some(name) if look.file.as_os_str() != "-" => Path::new(name).shown(),
         Some(_) | None => "standard input".into(),
     };
     let mut parts = vec![file, scene.name.clone(), scene.method.name().to_string()];
