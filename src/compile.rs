@@ -338,6 +338,11 @@ impl Program {
         &self.sources
     }
 
+    /// The other files that the file names, and those that they name.
+    pub fn files(&self) -> &crate::files::Files {
+        &self.options.files
+    }
+
     /// Messages that do not prevent the use of the file.
     pub fn warnings(&self) -> Diagnostics {
         Diagnostics { list: self.warnings.clone(), sources: self.sources.clone() }

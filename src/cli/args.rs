@@ -394,6 +394,9 @@ pub(super) struct Run {
     /// Do not draw an obstacle; may be repeated
     #[arg(long, help_heading = "Pictures", value_name = "NAME", value_delimiter = ',')]
     pub hide: Vec<String>,
+    /// Draw an obstacle as clear glass, so that the fluid behind it is seen; may be repeated
+    #[arg(long, help_heading = "Pictures", value_name = "NAME", value_delimiter = ',')]
+    pub glass: Vec<String>,
     /// Write no pictures
     #[arg(long)]
     pub no_pictures: bool,

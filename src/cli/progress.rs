@@ -45,8 +45,10 @@ fn progress(length: u64, what: &'static str, bar: Option<ProgressBar>) -> Progre
 }
 
 impl Progress {
+    /// Several threads may call this at once.
     pub fn inc(&self, steps: u64) {
-        self.set_position(self.position() + steps);
+        let position = self.position.fetch_add(steps, Ordering::Relaxed) + steps;
+        self.show(position);
     }
 
     pub fn position(&self) -> u64 {
@@ -55,6 +57,10 @@ impl Progress {
 
     pub fn set_position(&self, position: u64) {
         self.position.store(position, Ordering::Relaxed);
+        self.show(position);
+    }
+
+    fn show(&self, position: u64) {
         match &self.bar {
             Some(bar) => bar.set_position(position),
             None => self.tell(position),

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::failure::{Failure, note};
 use rfm::geom::Aabb;
 use rfm::mesh::{Mesh, split_creases};
-use rfm::render::{self, Backdrop, Camera, Cut, Legend, MeshView};
+use rfm::render::{self, Backdrop, Camera, Cut, Legend, Material, MeshView};
 use rfm::slice::Plane;
 
 /// An obstacle that hides more than this part of the fluid at its start is in the way.
@@ -19,6 +19,8 @@ const NAMED: usize = 3;
 pub(super) enum Drawn {
     Whole,
     Open(Cut),
+    /// Clear, so that the fluid is seen through it.
+    Glass,
     Hidden,
 }
 
@@ -47,18 +49,34 @@ pub(super) fn backdrop<'a>(
     legend: &Legend<'_>,
     bodies: impl Iterator<Item = (Drawn, &'a Mesh)>,
 ) -> Result<Backdrop, Failure> {
+    let sharp = sharp(bodies);
+    Backdrop::new(camera.clone(), domain, &views(&sharp), legend).map_err(Failure::usage)
+}
+
+/// The meshes of the bodies that are drawn, with sharp edges.
+pub(super) fn sharp<'a>(bodies: impl Iterator<Item = (Drawn, &'a Mesh)>) -> Vec<(Drawn, Mesh)> {
     let shown = bodies.filter(|(drawn, _)| *drawn != Drawn::Hidden);
-    let sharp: Vec<(Drawn, Mesh)> = shown.map(|(drawn, mesh)| (drawn, split_creases(mesh))).collect();
-    let views: Vec<MeshView<'_>> = sharp.iter().map(|(drawn, mesh)| view(mesh, *drawn)).collect();
-    Backdrop::new(camera.clone(), domain, &views, legend).map_err(Failure::usage)
+    shown.map(|(drawn, mesh)| (drawn, split_creases(mesh))).collect()
+}
+
+/// What of these meshes is seen.
+pub(super) fn views(bodies: &[(Drawn, Mesh)]) -> Vec<MeshView<'_>> {
+    bodies.iter().map(|(drawn, mesh)| view(mesh, *drawn)).collect()
 }
 
 fn view(mesh: &Mesh, drawn: Drawn) -> MeshView<'_> {
-    let cut = match drawn {
-        Drawn::Open(cut) => Some(cut),
-        Drawn::Whole | Drawn::Hidden => None,
+    let (cut, material) = match drawn {
+        Drawn::Open(cut) => (Some(cut), Material::Stone),
+        Drawn::Glass => (None, Material::Glass),
+        Drawn::Whole | Drawn::Hidden => (None, Material::Stone),
     };
-    MeshView { vertices: &mesh.positions, normals: &mesh.normals, triangles: &mesh.triangles, cut }
+    MeshView { cut, material, ..surface(mesh, Material::Stone) }
+}
+
+/// A whole mesh of a material.
+pub(super) fn surface(mesh: &Mesh, material: Material) -> MeshView<'_> {
+    let (vertices, normals) = (&mesh.positions, &mesh.normals);
+    MeshView { vertices, normals, triangles: &mesh.triangles, cut: None, material }
 }
 
 /// The cut that takes away one side of a plane across an axis.
@@ -106,7 +124,8 @@ pub(super) fn described(names: &[&str], drawn: &[Drawn]) -> Vec<String> {
     let mut done: Vec<(String, Vec<&str>)> = Vec::new();
     for (name, drawn) in names.iter().zip(drawn) {
         let what = match drawn {
-            Drawn::Whole => continue,
+            // clear obstacles are seen to be clear
+            Drawn::Whole | Drawn::Glass => continue,
             Drawn::Hidden => "left out".to_string(),
             Drawn::Open(cut) => {
                 let axis = cut.normal.abs().max_position();

@@ -1,13 +1,21 @@
 //! The fixed parts of a picture, which are drawn once, and the frames with particles in front of them.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use super::{
     Image, MeshView, ParticlesView, RenderError, Rgb,
     camera::{Camera, SUBPIXELS, Seen},
+    floor::Floor,
+    glass::{self, Sheet},
     image::Layer,
     mesh::Facets,
+    occlusion::Balls,
     overlay::{self, Caption, Legend, Scale},
-    particles::{discs, draw},
-    raster::{BAND_ROWS, Band, Canvas, Corner, mix},
+    particles::{self, Disc, by_band, columns, discs},
+    raster::{BAND_ROWS, Band, Canvas, Corner, Frame, Scratch, mix},
+    shade::Material,
 };
 use crate::geom::Aabb;
 
@@ -20,23 +28,54 @@ const EDGE_FAR: Rgb = [186, 186, 186];
 const EDGE_THICKNESS: f64 = 2.8;
 /// The floor's nearness is reduced by this factor, so that it gives way to anything that lies on it.
 const FLOOR_BEHIND: f64 = 1.0 - 1e-4;
+/// The materials of which a sheet is made, each of its own.
+const CLEAR: [Material; 2] = [Material::Glass, Material::ClearWater];
 
-/// The camera, the box, the obstacle and the legend, ready for frames.
+/// The camera, the box, the obstacles that stand still and the legend, ready for frames.
 #[derive(Debug)]
 pub struct Backdrop {
     camera: Camera,
     scale: Scale<'static>,
-    /// The floor and the mesh. The edges of the box are drawn last, over particles too, because their soft
+    /// The floor and the opaque meshes. The edges of the box are drawn last, over particles too, because their soft
     /// borders need the colour behind them.
     canvas: Canvas,
+    /// The clear meshes in each band, by their material.
+    glass: Vec<[Option<Sheet>; 2]>,
     edges: Vec<Edge>,
-    /// The canvas and the edges as pixels.
-    still: Vec<u8>,
+    /// All of it as pixels, without light and shadow.
+    still: Plain,
+    floor: Option<Floor>,
+    balls: Balls,
     title: Layer,
     bar: Option<Layer>,
     /// The number of triangles of the meshes that are not drawn because a corner is not finite, lies behind the
     /// eye, or does not exist.
     pub skipped_triangles: usize,
+}
+
+/// What changes from frame to frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Moving<'a> {
+    /// Obstacles that move, and the surface of the fluid.
+    pub meshes: &'a [MeshView<'a>],
+    /// The particles.
+    pub particles: ParticlesView<'a>,
+    /// Whether particles are drawn. If not, they are only counted.
+    pub balls: bool,
+}
+
+/// A picture without light and shadow: its pixels, and the nearness of the foremost sub-pixel of each.
+#[derive(Debug, Clone, Default)]
+struct Plain {
+    pixels: Vec<u8>,
+    nearness: Vec<f32>,
+}
+
+/// What is drawn over a canvas.
+#[derive(Default)]
+struct Actors {
+    meshes: Vec<Facets>,
+    discs: Vec<Vec<Disc>>,
 }
 
 impl Backdrop {
@@ -52,29 +91,50 @@ impl Backdrop {
     ) -> Result<Self, RenderError> {
         let (width, height) = camera.subpixels();
         let facets: Vec<Facets> = meshes.iter().map(|mesh| Facets::new(mesh, &camera)).collect();
-        let edges = edges(bounds, &camera);
-        let floor = floor(bounds, &camera);
+        let floor_corners = floor_corners(bounds, &camera);
         let mut canvas = Canvas::new(width, height, PAPER);
         canvas.draw(|band| {
-            for corners in &floor {
+            for corners in &floor_corners {
                 band.triangle(corners, |_| FLOOR);
             }
-            facets.iter().for_each(|facets| facets.draw(band));
+            facets.iter().filter(|facets| !facets.material.is_clear()).for_each(|facets| facets.draw(band));
         });
-        let mut finished = canvas.clone();
-        finished.draw(|band| draw_edges(&edges, band));
-        let still = pixels(&mut finished);
+        let mut floor = Floor::new(bounds, &camera);
+        if let Some(floor) = &mut floor {
+            meshes.iter().for_each(|mesh| floor.add_mesh(mesh));
+        }
+        let bands = 0..height.div_ceil(BAND_ROWS);
+        let glass = bands
+            .into_par_iter()
+            .map(|k| CLEAR.map(|material| sheet(&facets, material, &canvas, k)))
+            .collect();
         let scale = unit(&camera);
-        Ok(Self {
+        let middle = camera.look(bounds.centre()).map_or(0.0, |seen| seen.nearness);
+        let pixels = camera.magnification(middle) / SUBPIXELS as f64;
+        let mut backdrop = Self {
             scale: legend.scale.map_or(Scale::speeds(1.0), |scale| scale.unlabelled()),
-            canvas,
-            edges,
-            still,
+            glass,
+            edges: edges(bounds, &camera),
+            still: Plain { pixels: vec![0; 3 * width * height / 4], nearness: vec![0.0; width * height / 4] },
+            floor,
+            balls: Balls::new(bounds.size().length(), pixels),
             title: overlay::title(legend.title, f64::from(camera.width) / scale, scale)?,
             bar: legend.scale.map(|values| overlay::bar(&values, scale)).transpose()?,
             skipped_triangles: facets.iter().map(|facets| facets.skipped).sum(),
             camera,
-        })
+            canvas,
+        };
+        let mut still = std::mem::take(&mut backdrop.still);
+        backdrop.draw(&Actors::default(), true, &mut still);
+        backdrop.still = still;
+        Ok(backdrop)
+    }
+
+    /// The backdrop with colours of particles that its legend need not show.
+    #[must_use]
+    pub fn coloured(mut self, scale: &Scale<'_>) -> Self {
+        self.scale = scale.unlabelled();
+        self
     }
 
     /// The picture with particles in it, and the caption of its moment.
@@ -82,18 +142,33 @@ impl Backdrop {
     /// Particles whose position is not finite or lies behind the eye are left out and counted in
     /// [`Image::skipped`]. Those whose value is NaN are grey.
     pub fn frame(&self, particles: &ParticlesView<'_>, moment: &Caption) -> Image {
-        let discs = discs(particles, &self.camera, &self.scale);
-        let total = particles.positions.len();
-        let mut image = Image {
-            width: self.camera.width,
-            height: self.camera.height,
-            pixels: self.still.clone(),
-            skipped: total - discs.len(),
+        self.frame_with(&Moving { meshes: &[], particles: *particles, balls: true }, moment)
+    }
+
+    /// The picture with all that moves in it, and the caption of its moment. Particles are treated as by
+    /// [`Backdrop::frame`]; triangles that cannot be drawn are left out.
+    pub fn frame_with(&self, moving: &Moving<'_>, moment: &Caption) -> Image {
+        let total = moving.particles.positions.len();
+        let discs =
+            if moving.balls { discs(&moving.particles, &self.camera, &self.scale) } else { Vec::new() };
+        let skipped = if moving.balls { total - discs.len() } else { 0 };
+        let actors = Actors {
+            meshes: moving.meshes.iter().map(|mesh| Facets::new(mesh, &self.camera)).collect(),
+            discs: by_band(&discs, self.glass.len()),
         };
-        draw(&discs, &self.canvas, |band| draw_edges(&self.edges, band), &mut image.pixels);
-        self.write_on(&mut image);
-        let scale = unit(&self.camera);
+        let mut plain = self.still.clone();
+        self.draw(&actors, false, &mut plain);
+        let mut floor = self.floor.clone();
+        if let Some(floor) = &mut floor {
+            moving.meshes.iter().for_each(|mesh| floor.add_mesh(mesh));
+            if moving.balls {
+                floor.add_balls(&moving.particles);
+            }
+        }
+        let mut image = self.lit(plain, floor.as_ref());
+        image.skipped = skipped;
         // our own digits and letters always make a caption
+        let scale = unit(&self.camera);
         if let Ok(caption) = overlay::caption(moment, total, scale) {
             let top = f64::from(image.height) - overlay::CAPTION_HEIGHT * scale;
             image.lay(&caption, 0, top.max(0.0) as usize);
@@ -103,8 +178,57 @@ impl Backdrop {
 
     /// The picture without particles and without a caption.
     pub fn still(&self) -> Image {
-        let (width, height) = (self.camera.width, self.camera.height);
-        let mut image = Image { width, height, pixels: self.still.clone(), skipped: 0 };
+        self.lit(self.still.clone(), self.floor.as_ref())
+    }
+
+    /// Draws over the canvas, and writes the pixels that may change by it, or all.
+    fn draw(&self, actors: &Actors, all: bool, plain: &mut Plain) {
+        let width = self.canvas.width;
+        let (stride, height) = (width / SUBPIXELS, self.canvas.nearness.len() / width);
+        let size = stride * BAND_ROWS / SUBPIXELS;
+        let pieces = plain.pixels.par_chunks_mut(3 * size).zip(plain.nearness.par_chunks_mut(size));
+        pieces.enumerate().for_each_init(Scratch::default, |scratch, (k, (pixels, nearness))| {
+            let rows = k * BAND_ROWS..((k + 1) * BAND_ROWS).min(height);
+            let columns = if all { 0..width } else { actors.columns(k, width) };
+            if columns.is_empty() {
+                return;
+            }
+            self.canvas.copy(rows.clone(), columns.clone(), scratch);
+            let mut band = Band {
+                left: columns.start,
+                top: rows.start,
+                width: columns.len(),
+                nearness: &mut scratch.nearness,
+                colour: &mut scratch.colour,
+            };
+            let opaque = actors.meshes.iter().filter(|facets| !facets.material.is_clear());
+            opaque.for_each(|facets| facets.draw(&mut band));
+            if let Some(discs) = actors.discs.get(k) {
+                particles::draw(discs, &mut band);
+            }
+            band.nearest(nearness, stride);
+            let own = CLEAR.map(|material| sheet(&actors.meshes, material, &self.canvas, k));
+            let sheets: Vec<&Sheet> = self.glass[k].iter().chain(&own).flatten().collect();
+            glass::blend(&sheets, &mut band);
+            self.edges.iter().for_each(|edge| band.line(edge.ends, edge.colours, edge.thickness));
+            band.average(pixels, stride);
+        });
+    }
+
+    /// The picture with light and shadow, the title and the legend.
+    fn lit(&self, mut plain: Plain, floor: Option<&Floor>) -> Image {
+        let width = self.camera.width as usize;
+        let mut light = self.balls.light(&plain.nearness, width);
+        if let Some(floor) = floor {
+            floor.shade(&self.camera, &plain.nearness, &mut light, width);
+        }
+        plain.pixels.par_chunks_mut(3 * width).zip(light.par_chunks(width)).for_each(|(row, light)| {
+            for (pixel, light) in row.chunks_exact_mut(3).zip(light).filter(|(_, light)| **light < 1.0) {
+                pixel.iter_mut().for_each(|channel| *channel = (f32::from(*channel) * light + 0.5) as u8);
+            }
+        });
+        let mut image =
+            Image { width: self.camera.width, height: self.camera.height, pixels: plain.pixels, skipped: 0 };
         self.write_on(&mut image);
         image
     }
@@ -126,18 +250,32 @@ fn unit(camera: &Camera) -> f64 {
     f64::from(camera.height) / 960.0
 }
 
-fn pixels(canvas: &mut Canvas) -> Vec<u8> {
-    let stride = canvas.width / SUBPIXELS;
-    let mut out = vec![0; 3 * canvas.nearness.len() / (SUBPIXELS * SUBPIXELS)];
-    let size = BAND_ROWS * canvas.width;
-    let bands = canvas.nearness.chunks_mut(size).zip(canvas.colour.chunks_mut(size));
-    for (k, (out, (nearness, colour))) in
-        out.chunks_mut(3 * stride * BAND_ROWS / SUBPIXELS).zip(bands).enumerate()
-    {
-        let band = Band { left: 0, top: k * BAND_ROWS, width: canvas.width, nearness, colour };
-        band.average(out, stride);
+impl Actors {
+    /// The columns of sub-pixels of a band that may change, as whole pixels.
+    fn columns(&self, k: usize, width: usize) -> Range<usize> {
+        let parts = self.meshes.iter().map(|facets| facets.columns(k * BAND_ROWS));
+        let discs = self.discs.get(k).map(|discs| columns(discs));
+        let (left, right) =
+            parts.chain(discs).fold((i64::MAX, i64::MIN), |all, part| (all.0.min(part.0), all.1.max(part.1)));
+        let even = |x: i64| (x.max(0) as usize).min(width) / SUBPIXELS * SUBPIXELS;
+        even(left)..(even(right.saturating_add(1)) + SUBPIXELS).min(width)
     }
-    out
+}
+
+/// The meshes of a clear material in a band of a canvas, if there are any.
+fn sheet(facets: &[Facets], material: Material, canvas: &Canvas, k: usize) -> Option<Sheet> {
+    let (top, height) = (k * BAND_ROWS, canvas.nearness.len() / canvas.width);
+    let clear = || facets.iter().filter(|facets| facets.material == material);
+    let (left, right) = clear()
+        .map(|facets| facets.columns(top))
+        .fold((i64::MAX, i64::MIN), |all, part| (all.0.min(part.0), all.1.max(part.1)));
+    let columns = (left.max(0) as usize).min(canvas.width)..((right.max(-1) + 1) as usize).min(canvas.width);
+    if columns.is_empty() {
+        return None;
+    }
+    let mut sheet = Sheet::new(Frame::new(&(top..(top + BAND_ROWS).min(height)), &columns));
+    clear().for_each(|facets| facets.hang(&mut sheet));
+    Some(sheet)
 }
 
 /// An edge of the box on the screen.
@@ -165,14 +303,8 @@ fn edges(bounds: &Aabb, camera: &Camera) -> Vec<Edge> {
         .collect()
 }
 
-fn draw_edges(edges: &[Edge], band: &mut Band<'_>) {
-    for edge in edges {
-        band.line(edge.ends, edge.colours, edge.thickness);
-    }
-}
-
 /// The bottom of the box as two triangles. It is drawn only if it is seen from above.
-fn floor(bounds: &Aabb, camera: &Camera) -> Vec<[Corner; 3]> {
+fn floor_corners(bounds: &Aabb, camera: &Camera) -> Vec<[Corner; 3]> {
     let above = camera.to_eye(bounds.min).z > 0.0;
     let Some(corners) = see(bounds, camera).filter(|_| above) else { return Vec::new() };
     let corner = |i: usize| Corner::new(Seen { nearness: FLOOR_BEHIND * corners[i].nearness, ..corners[i] });
@@ -244,6 +376,60 @@ mod tests {
             let [r, g, b] = centre(&frame(&scene, &[DVec3::X * -0.5], &[1.0]), &scene);
             assert!(r.abs_diff(b) < 40 && (100..230).contains(&g), "the mesh is grey: {r} {g} {b}");
         }
+    }
+
+    /// A square across the view.
+    fn sheet_at(x: f64) -> Vec<DVec3> {
+        [(-0.8, -0.8), (0.8, -0.8), (0.8, 0.8), (-0.8, 0.8)].map(|(y, z)| DVec3::new(x, y, z)).to_vec()
+    }
+
+    fn of(vertices: &[DVec3], material: Material) -> MeshView<'_> {
+        MeshView { vertices, triangles: &[[0, 1, 2], [0, 2, 3]], material, ..MeshView::default() }
+    }
+
+    #[test]
+    fn what_is_behind_glass_is_seen_through_it() {
+        let plate = sheet_at(0.0);
+        let through = |material, x: f64| {
+            let scene = scene(of(&plate, material));
+            let [r, _, b] = centre(&frame(&scene, &[DVec3::X * x], &[1.0]), &scene);
+            i32::from(r) - i32::from(b)
+        };
+        // how red a ball is: before a plate as without one, behind glass less, behind water still less, behind stone not
+        let bare = centre(
+            &frame(&scene(MeshView::default()), &[DVec3::X * 0.5], &[1.0]),
+            &scene(MeshView::default()),
+        );
+        for material in [Material::Stone, Material::Glass, Material::Water, Material::ClearWater] {
+            assert_eq!(through(material, 0.5), i32::from(bare[0]) - i32::from(bare[2]), "{material:?}");
+        }
+        let [glass, clear] = [Material::Glass, Material::ClearWater].map(|material| through(material, -0.5));
+        assert!(glass > 90 && clear > 5 && glass > clear + 30, "{glass} {clear}");
+        assert!(through(Material::Stone, -0.5) < 40 && through(Material::Water, -0.5) < 0);
+    }
+
+    #[test]
+    fn what_moves_is_drawn_like_what_stands_still_in_any_order() {
+        let (near, far, none) = (sheet_at(0.4), sheet_at(-0.4), [0.0; 0]);
+        let moment = |meshes: &[MeshView<'_>], still: &[MeshView<'_>]| {
+            let camera = Camera::new(&cube(), DVec3::new(1.0, 0.3, 0.4), (320, 240)).unwrap();
+            let scene = Backdrop::new(camera, &cube(), still, &LEGEND).unwrap();
+            let particles =
+                ParticlesView { positions: Points::new(&none, &none, &none), values: &[], radius: 0.1 };
+            scene.frame_with(&Moving { meshes, particles, balls: true }, &MOMENT).pixels
+        };
+        let nothing = moment(&[], &[]);
+        for material in [Material::Stone, Material::Glass] {
+            let (near, far) = (of(&near, material), of(&far, material));
+            let still = moment(&[], &[near, far]);
+            assert!(still != nothing);
+            assert!(still == moment(&[near, far], &[]) && still == moment(&[], &[far, near]), "{material:?}");
+            assert!(still == moment(&[far, near], &[]), "{material:?}");
+        }
+        // one still and one moving: fluid in a vessel
+        let (glass, water) = (of(&near, Material::Glass), of(&far, Material::ClearWater));
+        assert!(moment(&[water], &[glass]) == moment(&[water, glass], &[]));
+        assert!(moment(&[water], &[glass]) != moment(&[of(&far, Material::Water)], &[glass]));
     }
 
     #[test]

@@ -119,6 +119,13 @@ impl Camera {
         (nearness > 0.0 && at.abs().max_element() < 1e6).then_some(Seen { at, nearness })
     }
 
+    /// The point that is seen at a place on the screen with a nearness.
+    pub(super) fn place(&self, at: DVec2, nearness: f64) -> DVec3 {
+        let depth = 1.0 / nearness;
+        let across = (at - self.centre) * (depth / self.focal);
+        self.eye + across.x * self.right - across.y * self.up - depth * self.back
+    }
+
     /// The nearness of a plane as a function of the place on the screen: n = a + b·x + c·y. `None` if the eye lies in the
     /// plane.
     pub(super) fn nearness_of(&self, plane: &Cut) -> Option<[f64; 3]> {

@@ -1,6 +1,10 @@
 //! A triangle as it lies on the screen.
 
-use super::{Rgb, raster::Corner, shade};
+use super::{
+    Rgb,
+    raster::Corner,
+    shade::{self, Material, Veil},
+};
 
 /// A triangle on the screen.
 #[derive(Debug)]
@@ -15,11 +19,20 @@ pub(super) struct Facet {
 
 impl Facet {
     /// The colour at the place that has these weights of the corners.
-    pub fn colour(&self, [u, v, w]: [f32; 3]) -> Rgb {
+    pub fn colour(&self, weights: [f32; 3], material: Material) -> Rgb {
+        shade::solid(material, self.normal(weights))
+    }
+
+    /// The colour and the opacity at the place that has these weights of the corners.
+    pub fn veil(&self, weights: [f32; 3], material: Material) -> Veil {
+        shade::veil(material, self.normal(weights))
+    }
+
+    fn normal(&self, [u, v, w]: [f32; 3]) -> [f32; 3] {
         let [a, b, c] = self.normals;
         let n: [f32; 3] = std::array::from_fn(|i| u * a[i] + v * b[i] + w * c[i]);
         let length = shade::dot(n, n).sqrt();
-        shade::stone(n.map(|x| x / length))
+        n.map(|x| x / length)
     }
 
     /// Whether the place that has these weights of the corners is cut away.

@@ -40,7 +40,7 @@ mod tests {
         let bounds = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
         let camera = Camera::new(&bounds, DVec3::X, (320, 240)).unwrap();
         let (vertices, triangles) = block(DVec3::splat(-0.5), DVec3::splat(0.5));
-        let mesh = MeshView { vertices: &vertices, normals: &[], triangles: &triangles, cut };
+        let mesh = MeshView { vertices: &vertices, triangles: &triangles, cut, ..MeshView::default() };
         let facets = Facets::new(&mesh, &camera);
         let (width, height) = camera.subpixels();
         let mut canvas = Canvas::new(width, height, [255; 3]);
@@ -77,7 +77,7 @@ mod tests {
         let share = |cut| {
             hidden(
                 &camera,
-                &MeshView { vertices: &vertices, normals: &[], triangles: &triangles, cut },
+                &MeshView { vertices: &vertices, triangles: &triangles, cut, ..MeshView::default() },
                 &points,
             )
         };

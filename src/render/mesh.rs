@@ -6,8 +6,10 @@ use super::{
     Cut,
     camera::{Camera, Seen},
     facet::Facet,
-    raster::{Band, Corner},
+    glass::Sheet,
+    raster::{BAND_ROWS, Band, Corner},
     section::SeenCut,
+    shade::Material,
 };
 
 /// A triangle mesh by reference.
@@ -19,14 +21,19 @@ pub struct MeshView<'a> {
     pub normals: &'a [DVec3],
     /// Three indices of vertices for each triangle. Both sides are drawn.
     pub triangles: &'a [[u32; 3]],
-    /// The plane that cuts the mesh open, which must then be closed.
+    /// The plane that cuts the mesh open, which must then be closed. Clear meshes are not cut.
     pub cut: Option<Cut>,
+    /// What the mesh is made of.
+    pub material: Material,
 }
 
 /// Triangles on the screen.
 #[derive(Debug)]
 pub struct Facets {
     facets: Vec<Facet>,
+    /// The numbers of the facets that may reach each band.
+    by_band: Vec<Vec<u32>>,
+    pub material: Material,
     cut: Option<SeenCut>,
     /// The number of triangles with a bad index or a corner that the camera cannot see.
     pub skipped: usize,
@@ -58,15 +65,52 @@ impl Facets {
         let facets: Vec<_> = mesh.triangles.iter().filter_map(facet).collect();
         let skipped = mesh.triangles.len() - facets.len();
         let cut = mesh.cut.and_then(|cut| SeenCut::new(&cut, camera));
-        Self { facets, cut, skipped }
+        let bands = camera.subpixels().1.div_ceil(BAND_ROWS);
+        Self { by_band: by_band(&facets, bands), facets, material: mesh.material, cut, skipped }
     }
 
+    /// The facets that may reach the band that begins at a row, in their order.
+    fn in_band(&self, top: usize) -> impl Iterator<Item = &Facet> + Clone {
+        let here = self.by_band.get(top / BAND_ROWS).map_or(&[][..], Vec::as_slice);
+        here.iter().map(|&k| &self.facets[k as usize])
+    }
+
+    /// The columns of sub-pixels between which the facets in the band that begins at a row lie; empty without any.
+    pub fn columns(&self, top: usize) -> (i64, i64) {
+        let none = (i64::MAX, i64::MIN);
+        self.in_band(top)
+            .map(|facet| Corner::columns(&facet.corners))
+            .fold(none, |all, (left, right)| (all.0.min(left), all.1.max(right)))
+    }
+
+    /// Draws an opaque mesh.
     pub fn draw(&self, band: &mut Band<'_>) {
-        let (top, bottom) = (band.top as i64, band.bottom() as i64);
-        let here = self.facets.iter().filter(|facet| facet.rows.0 < bottom && facet.rows.1 >= top);
+        let here = self.in_band(band.top);
         match &self.cut {
-            Some(cut) => cut.draw(&here.collect::<Vec<_>>(), band),
-            None => here.for_each(|facet| band.triangle(&facet.corners, |weights| facet.colour(weights))),
+            Some(cut) => cut.draw(&here.collect::<Vec<_>>(), self.material, band),
+            None => here.for_each(|facet| {
+                band.triangle(&facet.corners, |weights| facet.colour(weights, self.material));
+            }),
         }
     }
+
+    /// Adds a clear mesh to sheets.
+    pub fn hang(&self, sheet: &mut Sheet) {
+        for facet in self.in_band(sheet.frame.top()) {
+            sheet.hang(&facet.corners, |weights| facet.veil(weights, self.material));
+        }
+    }
+}
+
+/// The facets that may reach each band.
+fn by_band(facets: &[Facet], bands: usize) -> Vec<Vec<u32>> {
+    let mut found = vec![Vec::new(); bands];
+    for (k, facet) in (0..).zip(facets) {
+        let band = |row: i64| (row.max(0) as usize) / BAND_ROWS;
+        if facet.rows.1 >= 0 {
+            let here = found.iter_mut().take(band(facet.rows.1) + 1).skip(band(facet.rows.0));
+            here.for_each(|list| list.push(k));
+        }
+    }
+    found
 }

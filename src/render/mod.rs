@@ -5,6 +5,9 @@
 //!                                                                       └──Apng, Gif──▶ a film
 //! ```
 //!
+//! What is clear is blended over what is opaque (`glass`); then folds are darkened by the depth of the picture (`occlusion`),
+//! and the floor by what is over it (`floor`).
+//!
 //! Everything is drawn on the processor at twice the size and averaged down. Rows are cut into bands of fixed
 //! height, which are drawn in parallel. Within a band the order is fixed, so ties in depth are settled alike
 //! every time.
@@ -18,10 +21,13 @@ mod colour;
 mod cut;
 mod facet;
 mod film;
+mod floor;
 mod gif_film;
+mod glass;
 mod hidden;
 mod image;
 mod mesh;
+mod occlusion;
 mod overlay;
 mod particles;
 mod raster;
@@ -32,7 +38,7 @@ use std::{fmt, io};
 
 use self::colour::Rgb;
 pub use self::{
-    backdrop::Backdrop,
+    backdrop::{Backdrop, Moving},
     camera::Camera,
     colour::ColourMap,
     cut::Cut,
@@ -43,6 +49,7 @@ pub use self::{
     mesh::MeshView,
     overlay::{Caption, Legend, Scale},
     particles::ParticlesView,
+    shade::Material,
 };
 use crate::geom::Aabb;
 

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::{
-    camera::{Camera, SUBPIXELS},
+    camera::Camera,
     overlay::Scale,
-    raster::{BAND_ROWS, Band, Canvas},
+    raster::{BAND_ROWS, Band},
     shade,
 };
 use crate::field::Points;
@@ -56,42 +56,67 @@ pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, scale: &Scale) -> V
     seen.into_iter().flatten().collect()
 }
 
-/// Draws discs over the canvas, and then what `finish` adds. Only the `pixels` near discs change, so they
-/// must already hold the finished picture of the canvas.
-pub fn draw(discs: &[Disc], canvas: &Canvas, finish: impl Fn(&mut Band<'_>) + Sync, pixels: &mut [u8]) {
-    let stride = canvas.width / SUBPIXELS;
-    let height = canvas.nearness.len() / canvas.width;
-    let by_band = by_band(discs, height.div_ceil(BAND_ROWS));
-    pixels.par_chunks_mut(3 * stride * BAND_ROWS / SUBPIXELS).enumerate().for_each(|(k, out)| {
-        let rows = k * BAND_ROWS..((k + 1) * BAND_ROWS).min(height);
-        let here = &by_band[k];
-        let left = here.iter().map(|d| d.x - d.reach()).fold(f32::INFINITY, f32::min);
-        let right = here.iter().map(|d| d.x + d.reach()).fold(f32::NEG_INFINITY, f32::max);
-        // whole pixels; the rest of the row stays as it is
-        let even = |x: f32| (x.max(0.0) as usize).min(canvas.width) / SUBPIXELS * SUBPIXELS;
-        let columns = even(left)..(even(right + 1.0) + SUBPIXELS).min(canvas.width);
-        if here.is_empty() || columns.is_empty() {
-            return;
+/// The columns of a band's sub-pixels that discs may reach; empty without discs.
+pub(super) fn columns(discs: &[Disc]) -> (i64, i64) {
+    let none = (i64::MAX, i64::MIN);
+    discs.iter().fold(none, |all, disc| {
+        // `as` saturates
+        let (left, right) = (disc.x - disc.reach() - 1.0, disc.x + disc.reach() + 1.0);
+        (all.0.min(left as i64), all.1.max(right as i64))
+    })
+}
+
+/// Draws discs, near ones first. Most of a crowd is hidden by the ones in front, and is passed over.
+pub(super) fn draw(discs: &[Disc], band: &mut Band<'_>) {
+    let mut hidden = Hidden { left: band.left, farthest: vec![0.0; band.width.div_ceil(TILE)] };
+    let mut next = FIRST_LOOK;
+    for (k, disc) in discs.iter().enumerate() {
+        if k == next {
+            hidden.look(band);
+            next *= 2;
         }
-        let (mut nearness, mut colour) = canvas.copy(rows.clone(), columns.clone());
-        let mut band = Band {
-            left: columns.start,
-            top: rows.start,
-            width: columns.len(),
-            nearness: &mut nearness,
-            colour: &mut colour,
-        };
-        for disc in here {
-            disc.draw(&mut band);
+        if !hidden.hides(disc) {
+            disc.draw(band);
         }
-        finish(&mut band);
-        band.average(out, stride);
-    });
+    }
+}
+
+/// Columns of a band that are looked at together.
+const TILE: usize = 16;
+/// Discs that are drawn before the first look at what hides others.
+const FIRST_LOOK: usize = 128;
+
+/// What hides discs in a band: the least nearness in each of its tiles when they were last looked at. Nearness only grows.
+struct Hidden {
+    left: usize,
+    farthest: Vec<f32>,
+}
+
+impl Hidden {
+    fn look(&mut self, band: &Band<'_>) {
+        self.farthest.fill(f32::INFINITY);
+        for line in band.nearness.chunks_exact(band.width) {
+            for (farthest, part) in self.farthest.iter_mut().zip(line.chunks(TILE)) {
+                *farthest =
+                    part.iter().fold(*farthest, |least, near| if *near < least { *near } else { least });
+            }
+        }
+    }
+
+    /// Whether no part of a disc is in front of what was seen. Discs beside the band are drawn nowhere.
+    fn hides(&self, disc: &Disc) -> bool {
+        let reach = disc.reach() + 1.0;
+        // `as` rounds down and saturates
+        let tile = |x: f32| (x as usize).saturating_sub(self.left) / TILE;
+        let (first, last) = (tile(disc.x - reach), tile(disc.x + reach));
+        let foremost = disc.nearness + disc.bulge;
+        self.farthest.iter().take(last.saturating_add(1)).skip(first).all(|farthest| foremost <= *farthest)
+    }
 }
 
 /// The discs that may reach each band, near ones first: most of the others are then hidden and need no shading. Equally
 /// near ones keep their order.
-fn by_band(discs: &[Disc], bands: usize) -> Vec<Vec<Disc>> {
+pub(super) fn by_band(discs: &[Disc], bands: usize) -> Vec<Vec<Disc>> {
     // nearness is positive, so its bits have its order; the index makes every key another one
     let key = |(i, disc): (usize, &Disc)| u64::from(!disc.nearness.to_bits()) << 32 | i as u64;
     let mut keys: Vec<u64> = discs.par_iter().enumerate().map(key).collect();
@@ -99,8 +124,8 @@ fn by_band(discs: &[Disc], bands: usize) -> Vec<Vec<Disc>> {
     let mut found = vec![Vec::new(); bands];
     for key in keys {
         let disc = discs[(key & u64::from(u32::MAX)) as usize];
-        // `as` saturates
-        let band = |y: f32| (y / BAND_ROWS as f32).floor().max(0.0) as usize;
+        // `as` rounds down and saturates
+        let band = |y: f32| (y / BAND_ROWS as f32) as usize;
         if disc.y + disc.reach() + 1.0 < 0.0 {
             continue;
         }
@@ -115,7 +140,7 @@ impl Disc {
         self.radius.max(MIN_RADIUS)
     }
 
-    fn draw(&self, band: &mut Band<'_>) {
+    pub fn draw(&self, band: &mut Band<'_>) {
         let reach = self.reach();
         let scale = 1.0 / reach;
         let foremost = self.nearness + self.bulge;

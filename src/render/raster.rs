@@ -39,17 +39,23 @@ impl Canvas {
         });
     }
 
-    /// The columns of some of a band's rows, copied.
-    pub fn copy(&self, rows: Range<usize>, columns: Range<usize>) -> (Vec<f32>, Vec<Rgb>) {
-        let area = rows.len() * columns.len();
-        let (mut nearness, mut colour) = (Vec::with_capacity(area), Vec::with_capacity(area));
+    /// Copies the columns of some of a band's rows.
+    pub fn copy(&self, rows: Range<usize>, columns: Range<usize>, scratch: &mut Scratch) {
+        scratch.nearness.clear();
+        scratch.colour.clear();
         for row in rows {
             let line = row * self.width + columns.start..row * self.width + columns.end;
-            nearness.extend_from_slice(&self.nearness[line.clone()]);
-            colour.extend_from_slice(&self.colour[line]);
+            scratch.nearness.extend_from_slice(&self.nearness[line.clone()]);
+            scratch.colour.extend_from_slice(&self.colour[line]);
         }
-        (nearness, colour)
     }
+}
+
+/// A part of a canvas. It is used again, because the system clears new memory page by page.
+#[derive(Default)]
+pub struct Scratch {
+    pub nearness: Vec<f32>,
+    pub colour: Vec<Rgb>,
 }
 
 /// A rectangle of sub-pixels, which are addressed by their place in the whole picture.
@@ -95,6 +101,18 @@ impl Band<'_> {
                         u16::from(a[0][i]) + u16::from(a[1][i]) + u16::from(b[0][i]) + u16::from(b[1][i]);
                     *channel = ((sum + 2) / 4) as u8;
                 }
+            }
+        }
+    }
+
+    /// Writes the greatest nearness of each pixel's sub-pixels, in the same way.
+    pub fn nearest(&self, out: &mut [f32], stride: usize) {
+        let first = self.left / SUBPIXELS;
+        for (row, lines) in self.nearness.chunks_exact(SUBPIXELS * self.width).enumerate() {
+            let (upper, lower) = lines.split_at(self.width);
+            let squares = upper.chunks_exact(2).zip(lower.chunks_exact(2));
+            for (pixel, (a, b)) in out[row * stride + first..].iter_mut().zip(squares) {
+                *pixel = a[0].max(a[1]).max(b[0].max(b[1]));
             }
         }
     }
@@ -146,7 +164,7 @@ impl Band<'_> {
 }
 
 /// The place of a band in the picture.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
     left: usize,
     top: usize,
@@ -155,6 +173,26 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// The frame of some columns of a band's rows.
+    pub fn new(rows: &Range<usize>, columns: &Range<usize>) -> Self {
+        Self { left: columns.start, top: rows.start, width: columns.len(), bottom: rows.end }
+    }
+
+    /// The first row.
+    pub fn top(self) -> usize {
+        self.top
+    }
+
+    /// The columns.
+    pub fn columns(self) -> Range<usize> {
+        self.left..self.left + self.width
+    }
+
+    /// The rows.
+    pub fn rows(self) -> Range<usize> {
+        self.top..self.bottom
+    }
+
     /// Gives every sub-pixel of a triangle to `fragment`: the index at which the band stores it, its nearness, and the
     /// weights of the corners, whose sum is one.
     pub fn fragments(self, corners: &[Corner; 3], mut fragment: impl FnMut(usize, f32, [f32; 3])) {
@@ -171,13 +209,8 @@ impl Frame {
         }
         let bias = [(b, c), (c, a), (a, b)].map(|(p, q)| i64::from(!is_top_or_left(p, q)));
         let scale = 1.0 / area.abs() as f32;
-        let span = |v: [i64; 3]| {
-            let ends = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
-            (ends.0 as f64 / STEPS as f64 - 0.5, ends.1 as f64 / STEPS as f64 - 0.5)
-        };
-        let ((left, right), (top, bottom)) = (span([a.x, b.x, c.x]), span([a.y, b.y, c.y]));
-        let columns = clip(left.ceil(), right.floor(), self.left, self.left + self.width);
-        for y in clip(top.ceil(), bottom.floor(), self.top, self.bottom) {
+        let columns = covered([a.x, b.x, c.x], self.left, self.left + self.width);
+        for y in covered([a.y, b.y, c.y], self.top, self.bottom) {
             let start = (centre(columns.start), centre(y));
             let mut w = [edge(b, c, start), edge(c, a, start), edge(a, b, start)];
             let step = [(b, c), (c, a), (a, b)].map(|(p, q)| -STEPS * (q.y - p.y));
@@ -197,8 +230,9 @@ impl Frame {
     }
 }
 
-/// Steps of the integer grid in a sub-pixel.
-const STEPS: i64 = 256;
+/// Steps of the integer grid in a sub-pixel, and the number of their bits.
+const STEPS: i64 = 1 << STEP_BITS;
+const STEP_BITS: u32 = 8;
 
 /// A corner of a triangle on the integer grid.
 #[derive(Debug, Clone, Copy)]
@@ -223,9 +257,19 @@ impl Corner {
 
     /// The first and last row of sub-pixels that a triangle can touch.
     pub fn rows(corners: &[Self; 3]) -> (i64, i64) {
-        let y = corners.map(|corner| corner.y.div_euclid(STEPS));
-        (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]))
+        ends(corners.map(|corner| corner.y))
     }
+
+    /// The first and last column of sub-pixels that a triangle can touch.
+    pub fn columns(corners: &[Self; 3]) -> (i64, i64) {
+        ends(corners.map(|corner| corner.x))
+    }
+}
+
+/// The sub-pixels that the least and the greatest of three coordinates lie in.
+fn ends(v: [i64; 3]) -> (i64, i64) {
+    let v = v.map(|v| v >> STEP_BITS);
+    (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]))
 }
 
 fn centre(pixel: usize) -> i64 {
@@ -242,12 +286,22 @@ fn is_top_or_left(a: Corner, b: Corner) -> bool {
     b.y < a.y || (b.y == a.y && b.x > a.x)
 }
 
-/// The whole numbers of lo..=hi within first..end. The result is always a range inside that, and may
-/// be empty.
+/// The sub-pixels of first..end whose middles lie between the least and the greatest of three coordinates.
+fn covered(v: [i64; 3], first: usize, end: usize) -> Range<usize> {
+    let (low, high) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+    // shifts divide and round down, and floats are rounded by a function call on old processors
+    let to = ((high - STEPS / 2) >> STEP_BITS) + 1;
+    let from = (low + STEPS / 2 - 1) >> STEP_BITS;
+    let to = (to.max(0) as usize).clamp(first, end);
+    (from.max(0) as usize).clamp(first, to)..to
+}
+
+/// The whole numbers of lo..=hi within first..end, and sometimes the one beyond hi. The result is always a range inside
+/// that, and may be empty.
 fn clip(lo: f64, hi: f64, first: usize, end: usize) -> Range<usize> {
-    // `as` saturates, and turns NaN into 0
-    let end = ((hi.ceil() + 1.0).max(0.0) as usize).clamp(first, end);
-    (lo.floor().max(0.0) as usize).clamp(first, end)..end
+    // `as` rounds down, saturates, and turns NaN into 0
+    let end = if hi >= 0.0 { (hi as usize).saturating_add(2).clamp(first, end) } else { first };
+    (lo as usize).clamp(first, end)..end
 }
 
 /// The colour between `a` (t = 0) and `b` (t = 1).

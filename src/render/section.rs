@@ -11,7 +11,7 @@ use super::{
     camera::Camera,
     facet::Facet,
     raster::{Band, Corner},
-    shade,
+    shade::{self, Material},
 };
 
 /// A cut as the camera sees it.
@@ -30,7 +30,7 @@ impl SeenCut {
     }
 
     /// Draws what the cut leaves of a mesh, and the face that it opens.
-    pub fn draw(&self, facets: &[&Facet], band: &mut Band<'_>) {
+    pub fn draw(&self, facets: &[&Facet], material: Material, band: &mut Band<'_>) {
         let mut left = vec![0.0_f32; band.nearness.len()];
         let mut colour = vec![[0; 3]; band.nearness.len()];
         // how often the ray has entered the part that is cut away, less how often it has left it
@@ -43,7 +43,7 @@ impl SeenCut {
                     inside[at] += entry;
                 } else if near > left[at] {
                     left[at] = near;
-                    colour[at] = facet.colour(weights);
+                    colour[at] = facet.colour(weights, material);
                 }
             });
         }

@@ -4,6 +4,33 @@
 
 use super::Rgb;
 
+/// What a mesh is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Material {
+    /// A warm grey that hides what is behind it: obstacles.
+    #[default]
+    Stone,
+    /// An obstacle through which the fluid is seen.
+    Glass,
+    /// The surface of a fluid that hides what is in it.
+    Water,
+    /// The surface of a fluid through which obstacles and particles are seen.
+    ClearWater,
+}
+
+impl Material {
+    /// Whether what is behind is seen.
+    pub(super) fn is_clear(self) -> bool {
+        match self {
+            Self::Stone | Self::Water => false,
+            Self::Glass | Self::ClearWater => true,
+        }
+    }
+}
+
+/// A colour and its opacity, 255 of which hides all.
+pub type Veil = [u8; 4];
+
 /// The unit vector towards the lamp.
 const LAMP: [f32; 3] = [-0.452_29, 0.678_434, 0.578_931];
 /// The unit vector half-way between the lamp and the eye. Spheres gleam where their normal is this.
@@ -17,8 +44,41 @@ const STONE: [f32; 3] = [203.0, 195.0, 184.0];
 /// The colour of faces that a cut has opened: that of brick.
 const SECTION: [f32; 3] = [214.0, 170.0, 146.0];
 
+/// The colour of water.
+const WATER: [f32; 3] = [72.0, 138.0, 196.0];
+
+/// The colour of a point of a surface that hides what is behind it.
+pub fn solid(material: Material, normal: [f32; 3]) -> Rgb {
+    match material {
+        Material::Stone | Material::Glass => stone(normal),
+        Material::Water | Material::ClearWater => water(normal),
+    }
+}
+
+/// The colour and the opacity of a point of a clear surface. Clear things hide more of what is behind them where they are
+/// seen at a flat angle: their outline shows, and their middle does not.
+pub fn veil(material: Material, normal: [f32; 3]) -> Veil {
+    let flat = 1.0 - normal[2].clamp(0.0, 1.0);
+    let (least, rim) = match material {
+        Material::Stone | Material::Water => (1.0, 0.0),
+        Material::Glass => (0.13, 0.62 * flat * flat * flat),
+        Material::ClearWater => (0.42, 0.46 * flat * flat),
+    };
+    let gleam = power_16(dot(normal, GLEAM));
+    let opacity = (least + rim + 0.35 * gleam).min(1.0);
+    let [r, g, b] = solid(material, normal);
+    [r, g, b, byte(255.0 * opacity)]
+}
+
+/// The colour of a point of the fluid's surface.
+fn water(normal: [f32; 3]) -> Rgb {
+    let light = 0.56 + 0.08 * normal[1] + 0.5 * dot(normal, LAMP).max(0.0);
+    let gleam = 70.0 * power_16(power_2(dot(normal, GLEAM)));
+    WATER.map(|channel| byte(channel * light + gleam))
+}
+
 /// The colour of a point of the obstacle's surface.
-pub fn stone(normal: [f32; 3]) -> Rgb {
+fn stone(normal: [f32; 3]) -> Rgb {
     // some light depends on the height of the normal, so that undersides keep their shape
     let light = AMBIENT + 0.06 * normal[1] + DIFFUSE * dot(normal, LAMP).max(0.0);
     let gleam = 14.0 * power_16(dot(normal, GLEAM));
@@ -43,8 +103,12 @@ pub fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+fn power_2(x: f32) -> f32 {
+    x.max(0.0) * x
+}
+
 fn power_16(x: f32) -> f32 {
-    let x2 = x.max(0.0) * x;
+    let x2 = power_2(x);
     let x4 = x2 * x2;
     let x8 = x4 * x4;
     x8 * x8

@@ -316,7 +316,7 @@ impl CFile<'_> {
             uniform,
             gathered: None,
             values: "v",
-            own_power: false,
+            own_functions: false,
         }
     }
 

@@ -276,12 +276,14 @@ fn rust_name(function: Function) -> &'static str {
     }
 }
 
-/// Shaders have all functions under the names of C, but a power of negative numbers is undefined: a function of the
-/// file itself stands for it, see `operations`.
+/// Shaders have all functions under the names of C. A power of negative numbers is undefined, and sin, cos and tan are of
+/// any accuracy: functions of the file itself stand for these, see `operations`.
 fn shader_call(function: Function, atan2: &str, operands: &[&str]) -> String {
     let operands = operands.join(", ");
     let name = match function {
         Function::Binary(BinaryFunction::Atan2) => atan2,
+        // π/2, because the arc cosine of some shaders is ten times worse than their arc sine
+        Function::Unary(UnaryFunction::Acos) => return format!("(1.5707964 - asin({operands}))"),
         // log10 e, to the digits of an f32
         Function::Unary(UnaryFunction::Log10) => return format!("(log({operands}) * 0.43429448)"),
         other => c_name(other, Precision::F64),

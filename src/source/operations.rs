@@ -17,6 +17,12 @@ pub(super) enum Operation {
     Weighted(Junction, Style),
     /// aᵇ also for negative a, for languages whose own power has positive bases only.
     Power,
+    /// sin u, for shaders, whose own may be off by 2e-4.
+    Sin,
+    /// cos u, likewise.
+    Cos,
+    /// tan u, likewise.
+    Tan,
 }
 
 /// ∧ or ∨
@@ -119,6 +125,29 @@ power = pow(abs(u), v)
 value = pick(u < {0}, pick(whole, pick(odd, -power, power), sqrt(u)), power)
 ";
 
+/// Sine and cosine of what is left of u without its quarter turns, whose number is k, in single precision: Cody and Waite's
+/// reduction in three parts, exact for |u| below 10⁴, and the polynomials of Moshier's Cephes library.
+const QUARTER: &str = "k = floor(u * {0.6366197723675814} + {0.5})
+r = ((u - k * {1.5703125}) - k * {0.0004837512969970703125}) - k * {7.54978995489188216e-8}
+square = r * r
+sine = r + r * square * ({-0.16666654611} + square * ({0.0083321608736} - square * {0.00019515295891}))
+tail = {0.04166664568298827} + square * ({-0.001388731625493765} + square * {0.00002443315711809948})
+cosine = {1} - {0.5} * square + square * square * tail
+is_odd? = k - {2} * floor(k / {2}) == {1}
+quarter = k - {4} * floor(k / {4})
+";
+
+const SIN: &str = "size = pick(is_odd, cosine, sine)
+value = pick(quarter > {1.5}, -size, size)
+";
+
+const COS: &str = "size = pick(is_odd, sine, cosine)
+value = pick(abs(quarter - {1.5}) < {1}, -size, size)
+";
+
+const TAN: &str = "value = pick(is_odd, -cosine, sine) / pick(is_odd, sine, cosine)
+";
+
 impl Operation {
     /// Its name in a file, behind the prefix.
     pub fn name(self) -> String {
@@ -135,6 +164,9 @@ impl Operation {
             Self::Join(junction, form) => format!("op_{}{}", name(junction), style(form)),
             Self::Weighted(junction, form) => format!("op_{}_weighted{}", name(junction), style(form)),
             Self::Power => "op_pow".into(),
+            Self::Sin => "op_sin".into(),
+            Self::Cos => "op_cos".into(),
+            Self::Tan => "op_tan".into(),
         }
     }
 
@@ -163,6 +195,9 @@ impl Operation {
             }
             Self::Weighted(j, Style::Textbook) => (j, vec![TEXTBOOK, TEXTBOOK_WEIGHTS]),
             Self::Power => (Junction::And, vec![POWER]),
+            Self::Sin => (Junction::And, vec![QUARTER, SIN]),
+            Self::Cos => (Junction::And, vec![QUARTER, COS]),
+            Self::Tan => (Junction::And, vec![QUARTER, TAN]),
         };
         signed(&parts, junction)
     }
@@ -174,12 +209,14 @@ impl Operation {
         let joint = names.joint(language, precision);
         let result = if weighted { joint.as_str() } else { number };
         let name = names.operation(self, language, precision);
-        let operands = ["u", "v"];
-        let mut lines: Vec<String> =
-            (language.head)(Head { result, name: &name, operand: number, operands: &operands })
-                .lines()
-                .map(String::from)
-                .collect();
+        let operands: &[&str] = match self {
+            Self::Join(..) | Self::Weighted(..) | Self::Power => &["u", "v"],
+            Self::Sin | Self::Cos | Self::Tan => &["u"],
+        };
+        let mut lines: Vec<String> = (language.head)(Head { result, name: &name, operand: number, operands })
+            .lines()
+            .map(String::from)
+            .collect();
         let write = |text: &str| translated(text, language, precision, names);
         let formula = self.formula();
         for (name, value) in used_lines(&formula, weighted) {
@@ -248,11 +285,12 @@ fn signed(parts: &[&str], junction: Junction) -> String {
 /// An expression of a formula in a language.
 fn translated(text: &str, language: &Language, precision: Precision, names: &Names<'_>) -> String {
     let constant = |value: f64| language.constant(value, precision).unwrap_or_default();
+    let numbers = text.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(number, _)| number));
+    let numbers = numbers.filter_map(|number| Some((format!("{{{number}}}"), number.parse().ok()?)));
+    let text =
+        numbers.fold(text.to_string(), |text, (written, value)| text.replace(&written, &constant(value)));
     let function = |both: [&'static str; 2]| super::language::pair(both, precision).to_string() + "(";
-    text.replace("{0}", &constant(0.0))
-        .replace("{1}", &constant(1.0))
-        .replace("{2}", &constant(2.0))
-        .replace("{corner}", &constant(r0::SINGULAR_TAU))
+    text.replace("{corner}", &constant(r0::SINGULAR_TAU))
         .replace("{-corner}", &constant(-r0::SINGULAR_TAU))
         .replace("pick(", &format!("{}(", names.pick(language, precision)))
         .replace("sqrt(", &function(language.root))

@@ -138,7 +138,7 @@ impl RustFile<'_> {
             uniform: &|i| format!("u[{i}]"),
             gathered: None,
             values: "v",
-            own_power: false,
+            own_functions: false,
         }
     }
 

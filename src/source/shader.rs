@@ -121,7 +121,7 @@ fn function(
         uniform: &uniform_names,
         gathered: None,
         values: "v",
-        own_power: true,
+        own_functions: true,
     };
     let Program { graph, outputs, question, .. } = program;
     let part = Part { graph, inputs: &[], outputs, forms: program.forms(PRECISION) };

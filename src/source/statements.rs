@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use super::language::{Function, Language};
 use super::operations::{Junction, Names, Operation};
 use super::{Math, SourceError};
-use crate::ir::{Axis, Binary, BinaryFunction, Expr, Forms, Graph, Node, R0, Unary};
+use crate::ir::{Axis, Binary, BinaryFunction, Expr, Forms, Graph, Node, R0, Unary, UnaryFunction};
 use crate::precision::Precision;
 
 /// How a graph is written.
@@ -27,8 +27,8 @@ pub(super) struct Writer<'a> {
     pub gathered: Option<&'a RefCell<Vec<f64>>>,
     /// What the names of values begin with, so that two graphs may stand in one function.
     pub values: &'a str,
-    /// Whether powers of negative numbers need a function of the file's own.
-    pub own_power: bool,
+    /// Whether sin, cos and tan and powers of negative numbers need functions of the file's own.
+    pub own_functions: bool,
 }
 
 /// A graph as statements.
@@ -202,7 +202,7 @@ impl State<'_> {
     }
 
     fn unary(&mut self, op: Unary, a: &str) -> Result<String, SourceError> {
-        let Writer { language, precision, math, .. } = *self.writer;
+        let Writer { language, precision, math, own_functions, .. } = *self.writer;
         let of = |both| format!("{}({a})", super::language::pair(both, precision));
         Ok(match op {
             Unary::Neg => format!("-{a}"),
@@ -215,6 +215,9 @@ impl State<'_> {
             }
             Unary::Floor => of(language.floor),
             Unary::Round => of(language.round),
+            Unary::Call(UnaryFunction::Sin) if own_functions => self.operation(Operation::Sin, a),
+            Unary::Call(UnaryFunction::Cos) if own_functions => self.operation(Operation::Cos, a),
+            Unary::Call(UnaryFunction::Tan) if own_functions => self.operation(Operation::Tan, a),
             Unary::Call(function) => {
                 self.made.functions.insert(Function::Unary(function));
                 (language.function)(Function::Unary(function), precision, math, &[a])
@@ -223,7 +226,7 @@ impl State<'_> {
     }
 
     fn binary(&mut self, op: Binary, a: &str, b: &str) -> Result<String, SourceError> {
-        let Writer { language, precision, math, own_power, .. } = *self.writer;
+        let Writer { language, precision, math, own_functions, .. } = *self.writer;
         Ok(match op {
             Binary::Add => format!("{a} + {b}"),
             Binary::Sub => format!("{a} - {b}"),
@@ -250,7 +253,7 @@ impl State<'_> {
                 let other = self.pick(&format!("{a} == {b}"), &half, &zero);
                 self.pick(&format!("{a} {sign} {b}"), &one, &other)
             }
-            Binary::Call(BinaryFunction::Pow) if own_power => {
+            Binary::Call(BinaryFunction::Pow) if own_functions => {
                 self.operation(Operation::Power, &format!("{a}, {b}"))
             }
             Binary::Call(function) => {

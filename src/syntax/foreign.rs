@@ -213,6 +213,7 @@ pub fn key(word: &str) -> Option<&'static str> {
         "magnification" | "magnify" => "zoom",
         "section" | "clip" | "slice" | "opening" => "cut",
         "invisible" | "hidden" | "without" => "hide",
+        "transparent" | "translucent" | "transparency" => "glass",
         "render" | "image" | "pictures" | "plot" => "picture",
         _ => return None,
     })

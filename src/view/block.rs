@@ -45,6 +45,60 @@ pub struct FrameHead {
     pub mesh: Option<usize>,
     /// The number of the run that the frame belongs to; a page that is told of a new run forgets frames of older ones.
     pub run: u64,
+    /// How numbers follow from velocities; `None` if they are stated without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
+}
+
+/// How the numbers of a frame follow from velocities, so that only what is left of them must be stated.
+///
+/// A particle is expected where the mean of its velocities, in the frame before and in this one, takes it. Its speed is
+/// expected to be the length of its velocity. Both are found from levels alone, by operations that every browser rounds
+/// alike.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Motion {
+    /// The numbers of the arrays of velocities.
+    pub velocity: [usize; 3],
+    /// The number of the array of speeds.
+    pub speed: Option<usize>,
+    /// Steps of the lattice along each axis for 1 m/s in each of both frames.
+    pub steps: [f64; 3],
+}
+
+impl Motion {
+    /// The velocities of a frame along an axis, m/s.
+    fn velocities<'a>(
+        &self,
+        axis: usize,
+        ranges: &'a [Levels],
+        frame: &'a Frame,
+    ) -> impl Iterator<Item = f64> + 'a {
+        let k = self.velocity[axis];
+        frame.levels[k].iter().map(move |level| ranges[k].value(*level))
+    }
+
+    /// By how many steps particles are expected to have moved along an axis.
+    fn shifts<'a>(
+        &'a self,
+        axis: usize,
+        ranges: &'a [Levels],
+        [before, now]: [&'a Frame; 2],
+    ) -> impl Iterator<Item = u16> + 'a {
+        let both = self.velocities(axis, ranges, before).zip(self.velocities(axis, ranges, now));
+        // whole numbers of steps around the lattice do not count
+        both.map(move |(then, now)| (self.steps[axis] * (then + now) + 0.5).floor() as i64 as u16)
+    }
+
+    /// The levels of the speeds that are expected, with the range of their array.
+    fn speeds<'a>(
+        &'a self,
+        range: Levels,
+        ranges: &'a [Levels],
+        frame: &'a Frame,
+    ) -> impl Iterator<Item = u8> + 'a {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.velocities(axis, ranges, frame));
+        x.zip(y).zip(z).map(move |((x, y), z)| range.level_below((x * x + y * y + z * z).sqrt()))
+    }
 }
 
 #[derive(Serialize)]
@@ -58,13 +112,14 @@ struct Head<'a, T> {
 }
 
 /// The block of a frame. If `before` has as many particles, numbers are differences from it: whoever reads the
-/// block must have it.
+/// block must have it. Its ranges must be those of the head if the head has a [`Motion`].
 pub fn pack_frame(head: &FrameHead, frame: &Frame, before: Option<&Frame>) -> Vec<u8> {
     let fits = |before: &&Frame| {
         before.sites.len() == frame.sites.len() && before.levels.len() == frame.levels.len()
     };
     let before = before.filter(fits);
     let count = frame.sites.len();
+    let FrameHead { motion, ranges, .. } = head;
     let head = Head { kind: "frame", count, follows: before.is_some(), rest: head };
     let mut out = begin(&head);
     out.reserve(count * (6 + frame.levels.len()));
@@ -72,13 +127,25 @@ pub fn pack_frame(head: &FrameHead, frame: &Frame, before: Option<&Frame>) -> Ve
         let differences: Vec<u16> = match before {
             Some(before) => {
                 let pairs = frame.sites.iter().zip(&before.sites);
-                pairs.map(|(now, then)| folded(now[axis].wrapping_sub(then[axis]))).collect()
+                let moved = pairs.map(|(now, then)| now[axis].wrapping_sub(then[axis]));
+                match &motion {
+                    Some(motion) => {
+                        let shifts = motion.shifts(axis, ranges, [before, frame]);
+                        moved.zip(shifts).map(|(moved, shift)| folded(moved.wrapping_sub(shift))).collect()
+                    }
+                    None => moved.map(folded).collect(),
+                }
             }
             None => frame.sites.iter().map(|site| site[axis]).collect(),
         };
         planes(&mut out, &differences);
     }
     for (k, levels) in frame.levels.iter().enumerate() {
+        if let Some(motion) = motion.as_ref().filter(|motion| motion.speed == Some(k)) {
+            let expected = motion.speeds(ranges[k], ranges, frame);
+            out.extend(levels.iter().zip(expected).map(|(level, expected)| level.wrapping_sub(expected)));
+            continue;
+        }
         match before {
             Some(before) => {
                 out.extend(levels.iter().zip(&before.levels[k]).map(|(now, then)| now.wrapping_sub(*then)));

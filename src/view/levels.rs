@@ -35,6 +35,11 @@ impl Lattice {
         &self.bounds
     }
 
+    /// The steps for a metre along each axis.
+    pub fn steps(&self) -> DVec3 {
+        STEPS / self.bounds.size()
+    }
+
     /// The largest distance along each axis between a position in the box and its site, m.
     pub fn rounding(&self) -> DVec3 {
         0.5 * self.bounds.size() / STEPS
@@ -97,6 +102,16 @@ impl Levels {
         }
         let width = self.high - self.low;
         if width > 0.0 { ((value - self.low) / width * LEVELS).clamp(0.0, LEVELS).round() as u8 } else { 0 }
+    }
+
+    /// The level of a value, by operations that are the same in every browser.
+    pub(super) fn level_below(&self, value: f64) -> u8 {
+        let width = self.high - self.low;
+        if width > 0.0 {
+            (((value - self.low) / width * LEVELS).clamp(0.0, LEVELS) + 0.5).floor() as u8
+        } else {
+            0
+        }
     }
 
     /// The value of a level.

@@ -6,7 +6,8 @@
 //! (32 bits, little-endian), the head (JSON), and planes of bytes.
 //!
 //! Positions have 16 bits for each coordinate in a box ([`Lattice`]), arrays 8 bits ([`Levels`]). A plane holds one
-//! byte of a number for all particles, and numbers are differences from the frame before, so that planes deflate well.
+//! byte of a number for all particles, and numbers are differences from the frame before, or from where velocities lead
+//! ([`Motion`]), so that planes deflate well.
 //!
 //! Invariant: text of the user reaches the page as JSON and is shown as text, never as part of the document.
 
@@ -15,7 +16,7 @@ mod levels;
 mod page;
 mod setting;
 
-pub use block::{Frame, FrameHead, SliceHead, pack_frame, pack_mesh, pack_slice};
+pub use block::{Frame, FrameHead, Motion, SliceHead, pack_frame, pack_mesh, pack_slice};
 pub use levels::{Lattice, Levels, UNKNOWN_LEVEL};
 pub use page::{Page, document, solid};
 pub use setting::{Array, Column, Corners, Param, Plot, Setting, VELOCITY};

@@ -306,7 +306,7 @@ fn is_accepted(code: &str) -> bool {
                 text.replace("  fluid", &format!("  probe p {{ {entries} }}\n  fluid"))
             }
             "picture" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
-            "camera" | "look_at" | "zoom" | "cut" | "hide" => {
+            "camera" | "look_at" | "zoom" | "cut" | "hide" | "glass" => {
                 text.replace("  fluid", &format!("  picture {{ {entries} }}\n  fluid"))
             }
             _ => text.replace("0.2) }", &format!("0.2), {entries} }}")),

@@ -1,5 +1,8 @@
 //! What `rfm report` measures: meshes, and flows whose outcome is known.
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+
 use crate::cli::contract;
 use crate::tool::{rfm, rfm_reading, root, snapshot};
 
@@ -141,6 +144,50 @@ fn a_report_is_one_page_whatever_its_files_hold() {
     assert!(refused.stderr.contains("file .html"), "{}", refused.stderr);
 }
 
+/// The file that a link of a page saves.
+fn linked(page: &str, name: &str) -> Vec<u8> {
+    let start = format!("<a download=\"{name}\" href=\"data:application/octet-stream;base64,");
+    let rest = page.split_once(&start).unwrap_or_else(|| panic!("no link to {name}")).1;
+    BASE64_STANDARD.decode(rest.split_once('"').unwrap().0).unwrap()
+}
+
+#[test]
+fn a_page_holds_what_its_report_needs_to_be_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let outline = "x,y\r\n0,0\r\n1,0\r\n0.5,1\r\n";
+    std::fs::create_dir(here.join("parts")).unwrap();
+    std::fs::write(here.join("parts/outline.csv"), outline).unwrap();
+    // more than a page holds
+    let many: String =
+        (0..32_000_i64).map(|i| format!("0.{:015},0.{:015}\n", i * 7919, i * 104_729)).collect();
+    std::fs::write(here.join("many.csv"), format!("x,y\n{many}")).unwrap();
+    let text = "rfm 1\r\nlet many = points(\"many.csv\")\r\nsolid tri = polygon(points(\"parts/outline.csv\")).extrude(0, 0.2) and x <= 1 + 0*count(many)\r\n";
+    std::fs::write(here.join("tri.rfm"), text).unwrap();
+    rfm(here, &["report", "tri.rfm", "--mesh-cells", "24", "--html", "a.html"]).expect(0);
+    let page = std::fs::read_to_string(here.join("a.html")).unwrap();
+    // the bytes themselves, line ends and all
+    assert_eq!(linked(&page, "tri.rfm"), text.as_bytes());
+    assert_eq!(linked(&page, "outline.csv"), outline.as_bytes());
+    assert!(page.contains(&format!(">parts/outline.csv</a>, {} bytes", outline.len())));
+    assert!(page.contains("<li>many.csv, 1.2 MB: too large") && !page.contains("download=\"many.csv\""));
+    assert!(page.contains("and 1 that this page does not hold"));
+    // made again from them, the page has the same files
+    let again = tempfile::tempdir().unwrap();
+    std::fs::create_dir(again.path().join("parts")).unwrap();
+    for (name, path) in [("tri.rfm", "tri.rfm"), ("outline.csv", "parts/outline.csv")] {
+        std::fs::write(again.path().join(path), linked(&page, name)).unwrap();
+    }
+    std::fs::copy(here.join("many.csv"), again.path().join("many.csv")).unwrap();
+    rfm(again.path(), &["report", "tri.rfm", "--mesh-cells", "24", "--html", "a.html"]).expect(0);
+    let second = std::fs::read_to_string(again.path().join("a.html")).unwrap();
+    assert_eq!(linked(&second, "outline.csv"), outline.as_bytes());
+    let errors = |page: &str| {
+        tables(page)[1].iter().map(|row| [row[1].clone(), row[2].clone(), row[4].clone()]).collect::<Vec<_>>()
+    };
+    assert_eq!(errors(&page), errors(&second), "meshes and their errors");
+}
+
 #[test]
 fn a_report_of_a_flow_is_a_page_too() {
     let folder = tempfile::tempdir().unwrap();
@@ -150,6 +197,19 @@ fn a_report_of_a_flow_is_a_page_too() {
     assert!(text.contains("page written to a.html"), "{text}");
     let page = std::fs::read_to_string(folder.path().join("a.html")).unwrap();
     let [runs] = &tables(&page)[..] else { panic!("one table") };
+    // the plot, and a picture of the fluid in the finer run
+    let images: Vec<&str> =
+        page.split(" src=\"data:").skip(1).map(|rest| rest.split_once(';').unwrap().0).collect();
+    assert_eq!(images, ["image/svg+xml", "image/png"]);
+    let particles = page.split_once("The fluid at ").unwrap().1.split_once(" particles").unwrap().0;
+    assert!(particles.ends_with(&format!("wcsph, {}", runs[1][2])), "{particles}");
+    let png = page.split_once("data:image/png;base64,").unwrap().1.split_once('"').unwrap().0;
+    let file = std::io::Cursor::new(BASE64_STANDARD.decode(png).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    let blue = pixels.chunks(3).filter(|pixel| pixel[2] > pixel[0].saturating_add(40)).count();
+    assert!(blue > 2000, "{blue} pixels of water");
     // the same cells as in the table on the terminal
     let printed: Vec<Vec<&str>> = text
         .lines()

@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use rfm::fluid_surface::read_points;
+use rfm::fluid_surface::read_arrays;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::view::Lattice;
+use rfm::view::{Lattice, Levels};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
@@ -54,20 +54,49 @@ fn blocks(page: &str) -> Vec<(serde_json::Value, Vec<u8>)> {
         .collect()
 }
 
-/// The sites of a frame, which may be stated by differences from the frame before.
-fn sites(head: &serde_json::Value, planes: &[u8], before: &[[u16; 3]]) -> Vec<[u16; 3]> {
+/// A frame of a page: the sites of the particles, and for each array their levels.
+type Decoded = (Vec<[u16; 3]>, Vec<Vec<u8>>);
+
+/// What a block says of a frame, by differences from the frame before and from where velocities lead.
+fn decoded(head: &serde_json::Value, planes: &[u8], before: &Decoded) -> Decoded {
     let n = head["count"].as_u64().unwrap() as usize;
-    let number = |axis: usize, i: usize| {
-        u16::from_le_bytes([planes[2 * axis * n + i], planes[(2 * axis + 1) * n + i]])
+    let follows = head["follows"].as_bool().unwrap();
+    let (ranges, motion) = (head["ranges"].as_array().unwrap(), &head["motion"]);
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let value = |k: usize, level: u8| {
+        let (low, high) = (number(&ranges[k]["low"]), number(&ranges[k]["high"]));
+        low + f64::from(level) / 254.0 * (high - low)
     };
+    let velocity = |axis: usize| motion["velocity"][axis].as_u64().unwrap() as usize;
+    let mut levels: Vec<Vec<u8>> = Vec::new();
+    for k in 0..ranges.len() {
+        let plane = &planes[(6 + k) * n..(7 + k) * n];
+        let is_speed = motion["speed"].as_u64() == Some(k as u64);
+        let then = |i: usize| if follows && !is_speed { before.1[k][i] } else { 0 };
+        levels.push(plane.iter().enumerate().map(|(i, level)| level.wrapping_add(then(i))).collect());
+    }
+    let speed = motion["speed"].as_u64().unwrap() as usize;
+    let (low, high) = (number(&ranges[speed]["low"]), number(&ranges[speed]["high"]));
+    let components = [0, 1, 2].map(|axis| (velocity(axis), levels[velocity(axis)].clone()));
+    for (i, level) in levels[speed].iter_mut().enumerate() {
+        let [x, y, z] = components.each_ref().map(|(k, levels)| value(*k, levels[i]));
+        let part = (((x * x + y * y + z * z).sqrt() - low) / (high - low)).clamp(0.0, 1.0);
+        *level = level.wrapping_add((part * 254.0 + 0.5).floor() as u8);
+    }
     let unfolded = |x: u16| (x >> 1) ^ 0u16.wrapping_sub(x & 1);
     let site = |i: usize| {
-        std::array::from_fn(|axis| match head["follows"].as_bool().unwrap() {
-            true => before[i][axis].wrapping_add(unfolded(number(axis, i))),
-            false => number(axis, i),
+        std::array::from_fn(|axis| {
+            let stated = u16::from_le_bytes([planes[2 * axis * n + i], planes[(2 * axis + 1) * n + i]]);
+            if !follows {
+                return stated;
+            }
+            let k = velocity(axis);
+            let moved = number(&motion["steps"][axis]) * (value(k, before.1[k][i]) + value(k, levels[k][i]));
+            let expected = i64::from(before.0[i][axis]) + (moved + 0.5).floor() as i64;
+            (expected as u16).wrapping_add(unfolded(stated))
         })
     };
-    (0..n).map(site).collect()
+    ((0..n).map(site).collect(), levels)
 }
 
 #[test]
@@ -93,22 +122,29 @@ fn a_saved_page_holds_every_position_in_few_bytes() {
     assert_eq!((frames().count(), blocks.len()), (11, 12));
     let lattice = Lattice::new(&Aabb::new(DVec3::ZERO, DVec3::new(1.0, 1.0, 1.5)));
     let rounding = lattice.rounding() + DVec3::splat(1e-7);
-    let (mut before, mut particles) = (Vec::new(), 0);
+    let (mut before, mut particles) = (Decoded::default(), 0);
     for (k, (head, planes)) in frames().enumerate() {
         let file = std::fs::read(here.join(format!("drop.out/frames/particles_{k:06}.vtp"))).unwrap();
-        let points = read_points(&file).unwrap();
-        before = sites(head, planes, &before);
-        assert_eq!(before.len(), points.len());
-        for (site, point) in before.iter().zip(&points) {
+        let (points, arrays) = read_arrays(&file).unwrap();
+        before = decoded(head, planes, &before);
+        assert_eq!(before.0.len(), points.len());
+        for (site, point) in before.0.iter().zip(&points) {
             let off = (lattice.position(*site) - *point).abs();
             assert!(off.cmple(rounding).all(), "frame {k}: {point} is {off} away");
+        }
+        for (name, j) in [("speed", 0), ("density", 1), ("pressure", 2)] {
+            let values = &arrays.iter().find(|array| array.name == name).unwrap().values;
+            let of = |end: &str| head["ranges"][j][end].as_f64().unwrap();
+            let levels = Levels { low: of("low"), high: of("high") };
+            let mut pairs = before.1[j].iter().zip(values);
+            assert!(pairs.all(|(level, value)| *level == levels.level(*value)), "frame {k}: {name}");
         }
         assert!((head["time"].as_f64().unwrap() - 0.02 * k as f64).abs() < 1e-9);
         particles += points.len();
     }
     let data = page.split("application/octet-stream\">").skip(2).map(|part| part.find("</script>").unwrap());
     let bytes = data.sum::<usize>() as f64 / particles as f64;
-    assert!(bytes <= 10.0, "{bytes} bytes per particle and frame");
+    assert!(bytes <= 8.0, "{bytes} bytes per particle and frame");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `options` | the flags, with the help that teaches them |
 //! | `scene` | the folder of a run → a picture of each frame |
+//! | `bodies` | its obstacles, and how each of them is drawn |
 //! | `solid` | an obstacle file → one picture |
 //! | `film` | pictures → .png files, .gif, .apng |
 //! | `ffmpeg` | pictures → .mp4, .webm |
@@ -11,6 +12,7 @@
 //! Invariant: everything is read and checked before the first file is written, and the bytes of .png, .gif and .apng do
 //! not depend on the number of threads.
 
+mod bodies;
 mod ffmpeg;
 mod film;
 mod options;

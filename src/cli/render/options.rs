@@ -2,14 +2,33 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 use glam::DVec3;
 
 use crate::cli::values::{
     CameraFlag, CutFlag, Frames, camera, count, cut, frames, point, range, seconds, size, times, zoom,
 };
-use rfm::render::ColourMap;
+use rfm::render::{ColourMap, Material};
+
+/// How the surface of the fluid looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum Surface {
+    /// What is in the fluid is seen
+    Clear,
+    /// What is in the fluid is hidden
+    Opaque,
+}
+
+impl Surface {
+    /// What its mesh is made of.
+    pub fn material(self) -> Material {
+        match self {
+            Self::Clear => Material::ClearWater,
+            Self::Opaque => Material::Water,
+        }
+    }
+}
 
 #[derive(Debug, Args)]
 #[command(after_help = "A run as a film:             rfm render out -o pawn.gif\n\
@@ -17,6 +36,8 @@ use rfm::render::ColourMap;
                         One frame for a paper:       rfm render out -o pawn.png --frames 40 --size 2400x1600 --colours viridis\n\
                         Closer, from the left:       rfm render out -o near.mp4 --camera=-1,-0.3,0.2 --look-at 1.5,1.5,0.5 --zoom 3\n\
                         By pressure, fixed range:    rfm render out -o p.gif --by pressure --range 0..5000\n\
+                        The surface of the water:    rfm mesh out --fluid, then rfm render out -o water.gif --surface=opaque\n\
+                        Through a clear vessel:      rfm render out -o bowl.png --frames 40 --glass bowl\n\
                         A solid:                     rfm render examples/pawn.rfm -o pawn.png\n\n\
                         The folder is that of `rfm run`, finished or not: its frames, obstacle.vtp and summary.json are read, so \
                         nothing is computed again. All pictures of a command have one camera, one range of colours and the same \
@@ -53,6 +74,16 @@ pub(in crate::cli) struct Render {
     /// Do not draw an obstacle; may be repeated
     #[arg(long, help_heading = "Runs", value_name = "NAME", value_delimiter = ',')]
     pub hide: Vec<String>,
+    /// Draw an obstacle as clear glass, so that the fluid behind it is seen; may be repeated
+    #[arg(long, help_heading = "Runs", value_name = "NAME", value_delimiter = ',')]
+    pub glass: Vec<String>,
+    /// Draw the surface of the fluid, which `rfm mesh DIR --fluid` makes, in place of the particles: `clear` shows what is in
+    /// the fluid, `opaque` does not [default without a word: clear]
+    #[arg(long, help_heading = "Runs", value_name = "LOOK", num_args = 0..=1, require_equals = true, default_missing_value = "clear", value_enum)]
+    pub surface: Option<Surface>,
+    /// Draw the particles, too, within the surface
+    #[arg(long, help_heading = "Runs", requires = "surface")]
+    pub particles: bool,
     /// Colour particles by this array of the frames [default: speed]
     #[arg(long, help_heading = "Runs", value_name = "ARRAY")]
     pub by: Option<String>,
@@ -91,6 +122,8 @@ impl Render {
     pub fn flag_of_runs(&self) -> Option<&'static str> {
         let given = [
             ("--hide", !self.hide.is_empty()),
+            ("--glass", !self.glass.is_empty()),
+            ("--surface", self.surface.is_some()),
             ("--by", self.by.is_some()),
             ("--range", self.range.is_some()),
             ("--colours", self.colours.is_some()),

@@ -6,29 +6,26 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::bodies::{Bodies, bodies_of};
 use super::film::{Kind, Target};
-use super::options::Render;
+use super::options::{Render, Surface};
 use super::solid::camera;
 use crate::cli::args::Shared;
 use crate::cli::failure::{Failure, note};
 use crate::cli::output::{self, Shown};
 use crate::cli::saved::{self, RunFigures};
-use crate::cli::scenery::{self, Drawn, half_towards_eye, out_of_the_way};
+use crate::cli::scenery::{self, Drawn};
 use crate::cli::survey::Survey;
-use crate::cli::values::CutFlag;
 use rfm::diagnostic::nearest;
 use rfm::field::Points;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::geom::Aabb;
 use rfm::mesh::Mesh;
-use rfm::render::{Backdrop, Camera, Caption, Image, Legend, ParticlesView, Scale};
+use rfm::render::{Backdrop, Caption, Image, Legend, Moving, ParticlesView, Scale};
 use rfm::view::{Array, Levels};
 
 /// Pictures in a second of a film.
 const RATE: u32 = 25;
-
-/// Most particles of the first frame that stand for the fluid when it is asked what hides it.
-const MOST_SAMPLES: usize = 3000;
 
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     let folder = options.subject.as_path();
@@ -66,14 +63,15 @@ struct RunScene {
     drawn: Vec<Drawn>,
     domain: Aabb,
     radius: f64,
-    camera: Camera,
-    title: String,
     /// The array that is shown, with its unit and its range.
     shown: Array,
     range: Levels,
-    map: rfm::render::ColourMap,
-    /// The scene without particles, where obstacles stand still.
-    still: Option<Backdrop>,
+    /// The file of the fluid's surface in each frame, and how it is drawn; none where it is not.
+    surfaces: Vec<PathBuf>,
+    surface: Option<Surface>,
+    balls: bool,
+    /// The scene without particles, and without obstacles that move.
+    still: Backdrop,
     /// What was spent on drawing, µs; the pictures that were drawn; the particles that could not be.
     spent: AtomicU64,
     pictures: AtomicUsize,
@@ -105,61 +103,64 @@ impl RunScene {
             let words = std::iter::once(saved::title(folder)).chain(scene);
             words.chain(scenery::described(&names, &drawn)).collect::<Vec<_>>().join(" · ")
         });
+        let surfaces = match options.surface {
+            Some(_) => surfaces(folder, &entries)?,
+            None => Vec::new(),
+        };
+        let balls = options.surface.is_none() || options.particles;
+        let stands = meshes.len() <= 1 && mesh_of.iter().all(|mesh| *mesh == mesh_of[0]);
+        let bodies = match meshes.first() {
+            Some(file) if stands => bodies_of(file, drawn.len())?,
+            Some(_) | None => Vec::new(),
+        };
+        let unit = &shown.unit;
+        let label = if unit.is_empty() { shown.name.clone() } else { format!("{}, {unit}", shown.name) };
         let map = options.colours.unwrap_or_default();
-        let mut scene = Self {
+        let scale = Scale { label: &label, low: range.low, high: range.high, map };
+        let legend = Legend { title: &title, scale: balls.then_some(scale) };
+        let still = scenery::backdrop(&camera, &domain, &legend, drawn.iter().copied().zip(&bodies))?;
+        Ok(Self {
             folder: folder.to_path_buf(),
             entries,
-            meshes,
+            meshes: if stands { Vec::new() } else { meshes },
             mesh_of,
             drawn,
             domain,
             radius,
-            camera,
-            title,
             shown,
             range,
-            map,
-            still: None,
+            surfaces,
+            surface: options.surface,
+            balls,
+            still: still.coloured(&scale),
             spent: AtomicU64::new(0),
             pictures: AtomicUsize::new(0),
             left_out: AtomicUsize::new(0),
-        };
-        if scene.meshes.len() <= 1 && scene.mesh_of.iter().all(|mesh| *mesh == scene.mesh_of[0]) {
-            scene.still = Some(scene.backdrop(scene.mesh_of[0])?);
-        }
-        Ok(scene)
-    }
-
-    /// The scene without its particles, with a mesh of the obstacles.
-    fn backdrop(&self, mesh: Option<usize>) -> Result<Backdrop, Failure> {
-        let bodies = match mesh {
-            Some(mesh) => bodies_of(&self.meshes[mesh], self.drawn.len())?,
-            None => Vec::new(),
-        };
-        let unit = &self.shown.unit;
-        let label =
-            if unit.is_empty() { self.shown.name.clone() } else { format!("{}, {unit}", self.shown.name) };
-        let scale = Scale { label: &label, low: self.range.low, high: self.range.high, map: self.map };
-        let legend = Legend { title: &self.title, scale: Some(scale) };
-        scenery::backdrop(&self.camera, &self.domain, &legend, self.drawn.iter().copied().zip(&bodies))
+        })
     }
 
     /// The picture of a chosen frame.
     fn picture(&self, k: usize) -> Result<Image, Failure> {
         let (_, entry) = &self.entries[k];
         let (points, values) = self.particles(entry)?;
-        let own;
-        let scene = match &self.still {
-            Some(still) => still,
-            None => {
-                own = self.backdrop(self.mesh_of[k])?;
-                &own
-            }
+        let bodies = match self.mesh_of[k].and_then(|mesh| self.meshes.get(mesh)) {
+            Some(file) => bodies_of(file, self.drawn.len())?,
+            None => Vec::new(),
         };
+        let water = self.surfaces.get(k).map(|file| surface_of(file)).transpose()?;
         let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<f64>>());
-        let view = ParticlesView { positions: Points::new(&x, &y, &z), values: &values, radius: self.radius };
+        let particles =
+            ParticlesView { positions: Points::new(&x, &y, &z), values: &values, radius: self.radius };
         let started = Instant::now();
-        let image = scene.frame(&view, &Caption { time: entry.time, step: None });
+        let bodies = scenery::sharp(self.drawn.iter().copied().zip(&bodies));
+        let mut meshes = scenery::views(&bodies);
+        meshes.extend(
+            self.surface
+                .zip(water.as_ref())
+                .map(|(surface, mesh)| scenery::surface(mesh, surface.material())),
+        );
+        let moving = Moving { meshes: &meshes, particles, balls: self.balls };
+        let image = self.still.frame_with(&moving, &Caption { time: entry.time, step: None });
         self.spent.fetch_add(started.elapsed().as_micros() as u64, Ordering::Relaxed);
         self.pictures.fetch_add(1, Ordering::Relaxed);
         self.left_out.fetch_max(image.skipped, Ordering::Relaxed);
@@ -208,6 +209,40 @@ impl RunScene {
     }
 }
 
+/// The surfaces of the fluid that `rfm mesh DIR --fluid` made of these frames.
+fn surfaces(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Vec<PathBuf>, Failure> {
+    let list = folder.join("surface").join("surface.pvd");
+    let shown = folder.shown();
+    let made_by = format!("`rfm mesh {shown} --fluid` makes them");
+    if !list.is_file() {
+        return Err(Failure::usage(format!(
+            "--surface: there are no surfaces of the fluid in `{}`: {made_by}",
+            folder.join("surface").shown()
+        )));
+    }
+    let known = saved::listed(&list)?;
+    let of_frame = |(number, entry): &(usize, FrameEntry)| {
+        let found = known.iter().find(|surface| surface.time == entry.time);
+        let file =
+            found.map(|surface| folder.join("surface").join(&surface.file)).filter(|file| file.is_file());
+        file.ok_or_else(|| {
+            Failure::usage(format!(
+                "--surface: frame {number}, at {} s, has no surface in `{}`: {made_by}, and --frames chooses others",
+                entry.time,
+                list.shown()
+            ))
+        })
+    };
+    entries.iter().map(of_frame).collect()
+}
+
+/// The mesh of a surface of the fluid.
+fn surface_of(path: &Path) -> Result<Mesh, Failure> {
+    let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
+    let file = std::fs::read(path).map_err(|error| failed(error.to_string()))?;
+    read_mesh(&file).map_err(|error| failed(error.to_string()))
+}
+
 /// The frames within a range of times, s.
 fn at_times(
     entries: Vec<(usize, FrameEntry)>,
@@ -240,95 +275,4 @@ fn shown(options: &Render, survey: &Survey) -> Result<(Array, Levels), Failure> 
     };
     let range = options.range.map_or(*found, |(low, high)| Levels { low, high });
     Ok((Array::named(name, None), range))
-}
-
-/// The obstacles at the start of a run.
-struct Bodies {
-    /// Their names; one for all if the folder does not tell them apart.
-    names: Vec<String>,
-    are_named: bool,
-    meshes: Vec<Mesh>,
-    /// Particles of the first frame.
-    samples: Vec<DVec3>,
-}
-
-impl Bodies {
-    fn at_start(
-        folder: &Path,
-        first: &FrameEntry,
-        others: &[PathBuf],
-        figures: Option<&RunFigures>,
-    ) -> Result<Self, Failure> {
-        let named = figures.map(|figures| figures.obstacles.clone()).unwrap_or_default();
-        let (files, _) = saved::obstacles(folder, &[(0, first.clone())])?;
-        let are_named = !named.is_empty();
-        let names = if are_named { named } else { vec!["the obstacles".to_string()] };
-        let meshes = match files.first().or(others.first()) {
-            Some(file) => bodies_of(file, names.len())?,
-            None => Vec::new(),
-        };
-        // a first frame that is gone or damaged only means that nothing is cut by itself
-        let points = std::fs::read(folder.join(&first.file)).ok().and_then(|file| read_arrays(&file).ok());
-        let points: Vec<DVec3> = points.map(|(points, _)| points).unwrap_or_default();
-        let finite: Vec<DVec3> = points.into_iter().filter(|p| p.is_finite()).collect();
-        let every = finite.len().div_ceil(MOST_SAMPLES).max(1);
-        Ok(Self { names, are_named, meshes, samples: finite.into_iter().step_by(every).collect() })
-    }
-
-    /// How each of them is drawn.
-    fn drawn(&self, options: &Render, camera: &Camera) -> Result<Vec<Drawn>, Failure> {
-        if let Some(unknown) = options.hide.iter().find(|name| !self.are_named || !self.names.contains(name))
-        {
-            let reason = match (self.are_named, self.meshes.is_empty()) {
-                (_, true) => "the run has no obstacles".to_string(),
-                (true, false) => format!("the run has no such obstacle; there is {}", self.names.join(", ")),
-                (false, false) => {
-                    "the folder does not name its obstacles: its summary.json is missing, or the run was made by an earlier \
-                     version; `rfm run` makes it again"
-                        .to_string()
-                }
-            };
-            return Err(Failure::usage(format!("--hide {unknown}: {reason}")));
-        }
-        let is_hidden = |name: &String| self.are_named && options.hide.contains(name);
-        let drawn = |(name, mesh): (&String, &Mesh)| match &options.cut {
-            _ if is_hidden(name) => Drawn::Hidden,
-            Some(CutFlag::None) => Drawn::Whole,
-            Some(CutFlag::Plane(plane)) => Drawn::Open(half_towards_eye(plane, camera)),
-            Some(CutFlag::Auto) | None => out_of_the_way(camera, name, mesh, &self.samples),
-        };
-        Ok(self.names.iter().zip(&self.meshes).map(drawn).collect())
-    }
-}
-
-/// The bodies of a file, told apart by its array `body` if there are several.
-fn bodies_of(path: &Path, count: usize) -> Result<Vec<Mesh>, Failure> {
-    let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
-    let file = std::fs::read(path).map_err(|error| failed(error.to_string()))?;
-    let whole = read_mesh(&file).map_err(|error| failed(error.to_string()))?;
-    if count <= 1 {
-        return Ok(vec![whole]);
-    }
-    let (_, arrays) = read_arrays(&file).map_err(|error| failed(error.to_string()))?;
-    let Some(array) = arrays.iter().find(|array| array.name == "body" && array.components == 1) else {
-        return Err(failed(
-            "it has no array `body`, which tells the obstacles apart; `rfm run` writes it".into(),
-        ));
-    };
-    let mut bodies = vec![Mesh::default(); count];
-    // the number of each vertex within its body
-    let mut numbers = Vec::with_capacity(whole.positions.len());
-    for (k, &body) in array.values.iter().enumerate() {
-        let Some(own) = bodies.get_mut(body as usize).filter(|_| body >= 0.0) else {
-            return Err(failed(format!("its array `body` names the obstacle {body}, and there are {count}")));
-        };
-        numbers.push(own.positions.len() as u32);
-        own.positions.push(whole.positions[k]);
-        own.normals.push(whole.normals[k]);
-    }
-    for triangle in &whole.triangles {
-        let body = array.values[triangle[0] as usize] as usize;
-        bodies[body].triangles.push(triangle.map(|vertex| numbers[vertex as usize]));
-    }
-    Ok(bodies)
 }

@@ -11,6 +11,8 @@ use anstream::println;
 use serde::Serialize;
 
 use super::super::args::{Report, Shared};
+use super::super::run::bodies::Bodies;
+use super::super::run::pictures::{Look, Pictures};
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
 use super::flow_run::FlowRun;
@@ -28,6 +30,9 @@ const SIZE: &str = "particles";
 /// Sizes without `--particles`, as parts of what the file states. In space two spacings then differ by 4^⅓ =
 /// 1.6, in a layer of a fixed number of spacings by 2.
 const PARTS: [f64; 3] = [1.0 / 16.0, 1.0 / 4.0, 1.0];
+
+/// Cells of the obstacles' meshes in a picture, along the longest side of each.
+const CELLS: usize = 64;
 
 /// A run stands still if this number of steps covers less than this part of its time: at that pace a hundred
 /// million steps lie before it.
@@ -49,6 +54,7 @@ pub(super) fn run(
     scene: &Scene,
     options: &Report,
 ) -> Result<(), Failure> {
+    let (file, _) = choose::subject(&options.subject);
     let (picture, options, html) = (options.output.as_deref(), &options.flow, options.html.as_deref());
     let Some(truth) = scene.truth else {
         return Err(Failure::usage(format!(
@@ -62,7 +68,14 @@ pub(super) fn run(
         [] => vec![None],
         several => several.iter().copied().map(Some).collect(),
     };
-    let mut study = Study { shared, scene: &scene.name, instants: 0, bar: bar(&sizes, methods.len()) };
+    let mut study = Study {
+        shared,
+        scene: &scene.name,
+        seen: html.map(|_| file),
+        picture: None,
+        instants: 0,
+        bar: bar(&sizes, methods.len()),
+    };
     let table = Table::of(&truth);
     if !shared.json {
         println!("{}: {}", scene.name, about(&truth));
@@ -76,7 +89,7 @@ pub(super) fn run(
     }
     let instants = study.instants;
     if let Some(path) = html {
-        let page = page(program, scene, &truth, &table, &rows)?;
+        let page = page(program, scene, &truth, &table, (&rows, study.picture))?;
         output::write(path, |out| out.write_all(&page))?;
     }
     if shared.json {
@@ -110,11 +123,12 @@ fn page(
     scene: &Scene,
     truth: &Truth,
     table: &Table,
-    rows: &[FlowRun],
+    (rows, picture): (&[FlowRun], Option<Figure>),
 ) -> Result<Vec<u8>, Failure> {
     let mut page = Page::begin(&format!("{}: error against cost", scene.name), &about(truth));
     let drawn = flow_plot::draw(&scene.name, rows, Path::new("drawing.svg"))?;
-    page.figures(&[Figure::svg(drawn, "Each mark is a run: its processor time against its deviation")]);
+    let drawn = Figure::svg(drawn, "Each mark is a run: its processor time against its deviation");
+    page.figures(&[Some(drawn), picture].into_iter().flatten().collect::<Vec<_>>());
     page.section("Runs", "The order is p of error ∝ spacingᵖ between a run and the coarser one before it.");
     page.table(&table.columns(), rows.iter().map(|row| table.cells(row)));
     if let Some(failures) = failures(rows) {
@@ -159,6 +173,10 @@ fn sizes(program: &Program, asked: &[usize]) -> Result<Vec<Option<usize>>, Failu
 struct Study<'a> {
     shared: &'a Shared,
     scene: &'a str,
+    /// The file of the scene, if a picture of the fluid is wanted.
+    seen: Option<&'a Path>,
+    /// The fluid at the end of the finest run that did not fail.
+    picture: Option<Figure>,
     instants: usize,
     bar: progress::Progress,
 }
@@ -245,9 +263,31 @@ impl Study<'_> {
         }
         self.bar.set_position(before + work(size) as u64);
         self.instants = self.instants.max(deviations.instants());
+        if failure.is_none()
+            && let Some(file) = self.seen
+        {
+            self.picture = Some(seen(file, &experiment, &simulation)?);
+        }
         let deviation = if failure.is_none() { deviations.total() } else { Deviation::default() };
         Ok(FlowRun::of(&simulation, deviation, [cpu_seconds, seconds], failure))
     }
+}
+
+/// The fluid of a run, where it is now.
+fn seen(file: &Path, experiment: &Experiment, simulation: &Simulation) -> Result<Figure, Failure> {
+    let look = Look { file, camera: None, cut: None, hide: &[], glass: &[] };
+    let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
+    let bodies = Bodies::of(solids, experiment.domain(), CELLS);
+    let mut pictures = Pictures::new(look, experiment, &bodies.meshes_at(0.0)?)?;
+    pictures.show(&bodies.meshes_at(simulation.time())?);
+    let mut png = Vec::new();
+    pictures.image(simulation).write_png(&mut png)?;
+    let (method, particles) = (experiment.parameters().method.name(), simulation.particles().len());
+    let time = simulation.time();
+    Ok(Figure::png(
+        png,
+        format!("The fluid at {time:.3} s: {method}, {particles} particles, coloured by their speed"),
+    ))
 }
 
 /// Relative duration of a run: N particles, in steps whose length is proportional to the spacing.

@@ -2,13 +2,13 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anstream::println;
 use serde::Serialize;
 
 use super::super::args::MeshMethod;
-use super::super::failure::Failure;
+use super::super::failure::{Failure, note};
 use super::super::mesh::no_grid;
 use super::super::plot::{self, Labels, Legend, LogAxis};
 use super::super::progress;
@@ -19,6 +19,13 @@ use rfm::solid::Depth;
 
 /// Resolutions for each method. Each is twice as fine as the one before.
 const RESOLUTIONS: u32 = 4;
+
+/// How many times as long a mesh of twice as many cells may take: it has four times as many triangles, and where contacts
+/// must be searched for, each of them takes longer.
+const FINER: u32 = 8;
+
+/// No mesh is begun that is likely to take longer than this, measured with its error.
+const LONG: Duration = Duration::from_secs(40);
 
 /// Timed repetitions, of which the fastest counts.
 const REPETITIONS: usize = 3;
@@ -54,6 +61,8 @@ pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, 
             let cells = (finest >> halvings).max(Grid::MIN_CELLS);
             let grid = Grid::around(&bounds, Resolution::Cells(cells))
                 .map_err(|error| no_grid(&error, "--mesh-cells", finest))?;
+            let started = Instant::now();
+            bar.set_message(format!("{}, {cells} cells", method.name()));
             let mut row = row(solid, method, cells, &grid)?;
             if let Some(coarser) = rows.last().filter(|r| r.method == row.method && 2 * r.cells == cells) {
                 row.order = order(coarser.quality.hausdorff(), row.quality.hausdorff());
@@ -61,6 +70,16 @@ pub(super) fn measure(solid: &Solid, finest: usize) -> Result<Vec<MeshFigures>, 
             }
             rows.push(row);
             bar.inc(1);
+            if halvings > 0 && started.elapsed() > LONG / FINER {
+                note(format!(
+                    "meshes of {} cells and more by {} are left out: {cells} cells took {:.0} s to mesh and measure",
+                    2 * cells,
+                    method.name(),
+                    started.elapsed().as_secs_f64()
+                ));
+                bar.inc(u64::from(halvings));
+                break;
+            }
         }
     }
     bar.finish_and_clear();

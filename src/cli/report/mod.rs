@@ -29,7 +29,10 @@ use programs::{ExactValues, ProgramFigures};
 use rfm::codegen::target_description;
 use rfm::geom::Aabb;
 use rfm::lower::Scene;
-use rfm::{Program, Solid};
+use rfm::{Precision, Program, Solid};
+
+/// What the programs of one form and precision count in the progress, where an exact value counts one.
+const PART: u64 = 200;
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -112,16 +115,21 @@ fn all_programs(
     solid: &Solid,
     points: &SamplePoints,
 ) -> Result<Vec<ProgramFigures>, Failure> {
-    let bar = progress::bar(4, "measuring");
-    let truth = ExactValues::at(solid, points);
-    bar.inc(1);
+    let variants = programs::variants(program, solid)?;
+    let judged = points.judged(Precision::F64).count() as u64;
+    let bar = progress::bar(2 * judged + PART * (2 * variants.len() as u64 + 1), "measuring");
+    bar.set_message("exact values".into());
+    let truth = ExactValues::at(solid, points, &|| bar.inc(1));
     let mut rows = Vec::new();
-    for (name, variant) in &programs::variants(program, solid)? {
+    for (name, variant) in &variants {
+        bar.set_message(format!("programs, {name}"));
         rows.extend(programs::measure::<f64>(variant, name, points, &truth.double));
-        bar.inc(1);
+        bar.inc(PART);
         rows.extend(programs::measure::<f32>(variant, name, points, &truth.single));
+        bar.inc(PART);
     }
     rows.push(programs::range_row(solid, points));
+    bar.inc(PART);
     bar.finish_and_clear();
     rows.sort_by_key(|row| (row.program, row.shape));
     Ok(rows)

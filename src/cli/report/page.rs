@@ -12,7 +12,8 @@ use base64::prelude::BASE64_STANDARD;
 use super::table::Column;
 use rfm::Program;
 use rfm::codegen::target_description;
-use rfm::diagnostic::{SourceId, printable};
+use rfm::diagnostic::{Source, SourceId, printable};
+use rfm::files::Files;
 
 /// The beginning of the document, up to the title.
 const HEAD: &str = r#"<!doctype html>
@@ -52,8 +53,13 @@ pre { margin: 6px 0 14px; padding: 12px 14px; overflow-x: auto; background: var(
 dl { display: grid; grid-template-columns: auto 1fr; gap: 4px 18px; margin: 8px 0; }
 dt { color: var(--soft); }
 dd { margin: 0; overflow-wrap: anywhere; }
+a { color: inherit; text-underline-offset: 3px; }
 @media print { body { max-width: none; } pre, .wide { overflow: visible; white-space: pre-wrap; } }
 ";
+
+/// The largest file of data that a page holds, and the most of all of them, in bytes.
+const LARGEST_FILE: usize = 1_000_000;
+const MOST_DATA: usize = 4_000_000;
 
 /// A page that is being written.
 pub(super) struct Page {
@@ -114,14 +120,23 @@ impl Page {
         let own = program.sources().iter().filter(|source| source.id != SourceId::Prelude);
         let sources: Vec<_> = own.collect();
         self.section("Source", if sources.len() > 1 { "The file, and those that it imports." } else { "" });
-        for source in sources {
-            let (name, text) = (escaped(&source.name), escaped(&source.text.replace("\r\n", "\n")));
-            self.add(format_args!("<h3>{name}</h3>\n<pre>{text}</pre>\n"));
+        for source in &sources {
+            let text = escaped(&source.text.replace("\r\n", "\n"));
+            let link = link(&source.name, source.text.as_bytes());
+            self.add(format_args!("<h3>{link}</h3>\n<pre>{text}</pre>\n"));
         }
-        self.section(
-            "How to make it again",
-            "With the files above and the data that they read, in the folder in which this command was given:",
-        );
+        let missing = self.data(program, &sources);
+        let files = match missing {
+            0 => {
+                "With the files above, whose names save them, in the folder in which this command was given:"
+                    .to_string()
+            }
+            n => format!(
+                "With the files above, whose names save them, and {n} that this page does not hold, in the folder in which \
+                 this command was given:"
+            ),
+        };
+        self.section("How to make it again", &files);
         self.add(format_args!("<pre>{}</pre>\n<dl>\n", escaped(&command(std::env::args_os()))));
         let facts = [
             ("program", format!("rfm {}", env!("CARGO_PKG_VERSION"))),
@@ -136,6 +151,36 @@ impl Page {
         }
         self.add(format_args!("</dl>\n</body>\n</html>\n"));
         self.out.into_bytes()
+    }
+
+    /// Adds the data that the files read, and returns how many of them are too large for a page.
+    fn data(&mut self, program: &Program, sources: &[&Source]) -> usize {
+        let is_source =
+            |name: &String| sources.iter().any(|source| Files::plain(&source.name).ends_with(name.as_str()));
+        let files = program.files();
+        let named = files.asked().into_iter().filter(|name| !is_source(name));
+        let data: Vec<_> = named.filter_map(|name| Some((files.read(&name).ok()?, name))).collect();
+        if data.is_empty() {
+            return 0;
+        }
+        self.section("Data", "What the files read. Their paths go from the folder of the file.");
+        self.add(format_args!("<ul>\n"));
+        let (mut room, mut missing) = (MOST_DATA, 0);
+        for (bytes, name) in data {
+            let size = size(bytes.len());
+            if bytes.len() <= LARGEST_FILE.min(room) {
+                room -= bytes.len();
+                self.add(format_args!("<li>{}, {size}</li>\n", link(&name, &bytes)));
+            } else {
+                missing += 1;
+                self.add(format_args!(
+                    "<li>{}, {size}: too large to be held by this page</li>\n",
+                    escaped(&name)
+                ));
+            }
+        }
+        self.add(format_args!("</ul>\n"));
+        missing
     }
 
     fn add(&mut self, text: std::fmt::Arguments<'_>) {
@@ -158,6 +203,22 @@ impl Figure {
 
     pub fn png(bytes: Vec<u8>, about: impl Into<String>) -> Self {
         Self { kind: "image/png", bytes, about: about.into() }
+    }
+}
+
+/// A link that saves a file under its name.
+fn link(name: &str, bytes: &[u8]) -> String {
+    let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    let (name, last, data) = (escaped(name), escaped(last), BASE64_STANDARD.encode(bytes));
+    format!("<a download=\"{last}\" href=\"data:application/octet-stream;base64,{data}\">{name}</a>")
+}
+
+/// A number of bytes as a person reads it.
+fn size(bytes: usize) -> String {
+    match bytes {
+        0..1000 => format!("{bytes} bytes"),
+        1000..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
     }
 }
 

@@ -1,9 +1,10 @@
 //! Every program of a solid: the time per point, and the distance of the results from the truth.
 
 use std::hint::black_box;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::super::failure::Failure;
@@ -21,6 +22,12 @@ const ROUNDING: f64 = 8.0;
 
 /// Timed repetitions, of which the median counts.
 const REPETITIONS: usize = 25;
+
+/// After this time a program is not timed again.
+const LONG: Duration = Duration::from_secs(1);
+
+/// The points of the first try, which tells whether a program is slow.
+const FEW: usize = 16;
 
 /// The speed and the errors of one program, a row of the report.
 #[derive(Debug, Clone, Serialize)]
@@ -114,7 +121,8 @@ pub(super) struct ExactValues {
 }
 
 impl ExactValues {
-    pub fn at(solid: &Solid, points: &SamplePoints) -> Self {
+    /// `done` is told of every point.
+    pub fn at(solid: &Solid, points: &SamplePoints, done: &(dyn Fn() + Sync)) -> Self {
         let (graph, outputs) = if solid.moves() {
             // only the formula depends on the time, programs do not
             let (formula, root) = solid.formula();
@@ -126,7 +134,13 @@ impl ExactValues {
             (graph.clone(), outputs.to_vec())
         };
         let all = |precision: Precision| {
-            points.judged(precision).map(|p| truth(&graph, &outputs, p, solid.time())).collect()
+            let points: Vec<DVec3> = points.judged(precision).collect();
+            let exact = |p: DVec3| {
+                let found = truth(&graph, &outputs, p, solid.time());
+                done();
+                found
+            };
+            points.into_par_iter().map(exact).collect()
         };
         Self { double: all(Precision::F64), single: all(Precision::F32) }
     }
@@ -198,21 +212,22 @@ impl Variant<'_> {
         let columns = PointColumns::<T>::of(points.random.iter().copied());
         let n = points.random.len();
         let mut out: [Vec<T>; 5] = std::array::from_fn(|_| vec![T::default(); n]);
-        let ns = |f: &mut dyn FnMut()| median_ns(n, f);
-        let value = ns(&mut || solid.omega_many(columns.get(), black_box(&mut out[0])));
-        let gradient = ns(&mut || {
-            let [omega, x, y, z, _] = out.each_mut().map(|c| &mut c[..]);
-            solid.omega_grad_many(columns.get(), black_box([omega, x, y, z]));
+        let ns = |f: &mut dyn FnMut(usize)| median_ns(n, f);
+        let value = ns(&mut |n| solid.omega_many(columns.first(n), black_box(&mut out[0][..n])));
+        let gradient = ns(&mut |n| {
+            let [omega, x, y, z, _] = out.each_mut().map(|c| &mut c[..n]);
+            solid.omega_grad_many(columns.first(n), black_box([omega, x, y, z]));
         });
         let mut rows = vec![
             self.figures("value", "many", value, errors.value),
             self.figures("gradient", "many", gradient, errors.gradient),
         ];
         if self.form == "stable" {
-            let sign = ns(&mut || solid.twin_many(columns.get(), black_box(&mut out[0])));
+            let sign = ns(&mut |n| solid.twin_many(columns.first(n), black_box(&mut out[0][..n])));
             rows.push(self.figures("sign", "many", sign, errors.sign));
-            let contact =
-                ns(&mut || solid.contact_many(columns.get(), black_box(out.each_mut().map(|c| &mut c[..]))));
+            let contact = ns(&mut |n| {
+                solid.contact_many(columns.first(n), black_box(out.each_mut().map(|c| &mut c[..n])));
+            });
             rows.push(self.figures("contact", "many", contact, Errors::default()));
         }
         rows
@@ -221,13 +236,13 @@ impl Variant<'_> {
     /// Programs that take one point at a time, which exist in `f64`.
     fn one(&self, points: &SamplePoints, errors: &ErrorsOfAll) -> [ProgramFigures; 2] {
         let n = points.random.len();
-        let value = median_ns(n, &mut || {
-            for &p in &points.random {
+        let value = median_ns(n, &mut |n| {
+            for &p in &points.random[..n] {
                 black_box(self.solid.omega(black_box(p)));
             }
         });
-        let gradient = median_ns(n, &mut || {
-            for &p in &points.random {
+        let gradient = median_ns(n, &mut |n| {
+            for &p in &points.random[..n] {
                 black_box(self.solid.omega_grad(black_box(p)));
             }
         });
@@ -269,8 +284,8 @@ fn certified<T: Lane>(solid: &Solid, over: Aabb) -> Option<f64> {
 pub(super) fn range_row(solid: &Solid, points: &SamplePoints) -> ProgramFigures {
     let half = 0.02 * points.over.size();
     let boxes: Vec<Aabb> = points.random.iter().map(|&p| Aabb::new(p - half, p + half)).collect();
-    let ns = median_ns(boxes.len(), &mut || {
-        for over in &boxes {
+    let ns = median_ns(boxes.len(), &mut |n| {
+        for over in &boxes[..n] {
             black_box(solid.range(black_box(over)));
         }
     });
@@ -307,7 +322,12 @@ impl<T: Lane> PointColumns<T> {
     }
 
     fn get(&self) -> [&[T]; 3] {
-        self.0.each_ref().map(|c| &c[..])
+        self.first(self.0[0].len())
+    }
+
+    /// So many of the points.
+    fn first(&self, count: usize) -> [&[T]; 3] {
+        self.0.each_ref().map(|c| &c[..count])
     }
 }
 
@@ -382,16 +402,44 @@ fn sign_mismatches<T: Lane>(found: &[T], truth: &[Option<[Exact; 4]>], at: &[DVe
     (0..found.len()).filter(wrong).count()
 }
 
-/// The median time in nanoseconds per point over many repetitions, after one that does not count.
-fn median_ns(points: usize, work: &mut dyn FnMut()) -> f64 {
-    work();
-    let mut times: Vec<f64> = (0..REPETITIONS)
-        .map(|_| {
-            let started = Instant::now();
-            work();
-            started.elapsed().as_secs_f64()
-        })
-        .collect();
+/// The median time in nanoseconds per point over many repetitions, after one that does not count. `work` takes the number
+/// of points. A slow program is timed on fewer points and less often, so that no time costs much more than a second.
+fn median_ns(points: usize, work: &mut dyn FnMut(usize)) -> f64 {
+    let started = Instant::now();
+    let mut count = FEW.min(points);
+    loop {
+        work(count);
+        if count == points || started.elapsed() > LONG / 8 {
+            break;
+        }
+        count = (4 * count).min(points);
+    }
+    let mut times: Vec<f64> = Vec::new();
+    while times.len() < REPETITIONS && (times.is_empty() || started.elapsed() < LONG) {
+        let before = Instant::now();
+        work(count);
+        times.push(before.elapsed().as_secs_f64());
+    }
     times.sort_by(f64::total_cmp);
-    times[REPETITIONS / 2] * 1e9 / points as f64
+    times[times.len() / 2] * 1e9 / count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_program_is_timed_on_few_points() {
+        let started = Instant::now();
+        let mut most = 0;
+        let ns = median_ns(4096, &mut |n| {
+            most = most.max(n);
+            std::thread::sleep(Duration::from_millis(4) * n as u32);
+        });
+        assert!(started.elapsed() < Duration::from_secs(4), "{:?}", started.elapsed());
+        assert!(most < 200 && (4e6..8e6).contains(&ns), "{most} {ns}");
+        let mut all = 0;
+        median_ns(4096, &mut |n| all = n);
+        assert_eq!(all, 4096);
+    }
 }

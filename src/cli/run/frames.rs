@@ -9,7 +9,7 @@ use std::time::Instant;
 use super::super::args::Run;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
-use super::pictures::Pictures;
+use super::pictures::{Look, Pictures};
 use super::{checkpoints, folder, probes};
 use crate::cli::output::Shown;
 use rfm::Experiment;
@@ -47,7 +47,7 @@ impl Frames {
         let bodies = Bodies::new(options, experiment);
         let meshes = if write_frames { bodies.meshes_at_start()? } else { Vec::new() };
         let pictures = if write_frames && !options.no_pictures {
-            Some(Pictures::new(options, experiment, &meshes)?)
+            Some(Pictures::new(Look::of(options), experiment, &meshes)?)
         } else {
             None
         };
@@ -154,7 +154,7 @@ impl Frames {
         self.write_collections()?;
         if let Some(pictures) = &mut self.pictures {
             if let Some(meshes) = &moved {
-                pictures.show(meshes)?;
+                pictures.show(meshes);
             }
             pictures.save(&self.folder.join(format!("pictures/frame_{:06}.png", self.count)), simulation)?;
         }
@@ -218,10 +218,10 @@ impl FrameCost {
             out.clear();
         }
         if !options.no_pictures {
-            let mut pictures = Pictures::new(options, experiment, &meshes)?;
+            let mut pictures = Pictures::new(Look::of(options), experiment, &meshes)?;
             let started = Instant::now();
             if bodies.move_about() {
-                pictures.show(&meshes)?;
+                pictures.show(&meshes);
             }
             pictures.image(simulation).write_png(&mut out)?;
             seconds += started.elapsed().as_secs_f64();

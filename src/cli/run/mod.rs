@@ -10,7 +10,7 @@ mod folder;
 mod forecast;
 mod frames;
 mod goal;
-mod pictures;
+pub(super) mod pictures;
 mod probe_plot;
 mod probes;
 mod stop;

@@ -10,6 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::super::args::{CutFlag, Run};
+use super::super::values::CameraFlag;
 use super::super::{Failure, output};
 use crate::cli::output::Shown;
 use crate::cli::scenery::{self, Drawn, half, out_of_the_way};
@@ -31,18 +32,35 @@ const SMALL: (u32, u32) = (320, 240);
 /// long before.
 const FASTEST: f64 = 0.6;
 
+/// What is asked of pictures, besides what the scene states.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::cli) struct Look<'a> {
+    /// The file of the scene, for the title.
+    pub file: &'a Path,
+    pub camera: Option<CameraFlag>,
+    pub cut: Option<&'a CutFlag>,
+    pub hide: &'a [String],
+    pub glass: &'a [String],
+}
+
+impl<'a> Look<'a> {
+    /// What the flags of a run ask for.
+    pub fn of(options: &'a Run) -> Self {
+        let Run { file, camera, cut, hide, glass, .. } = options;
+        Self { file, camera: *camera, cut: cut.as_ref(), hide, glass }
+    }
+}
+
 /// What all pictures of a run share.
-pub(super) struct Pictures {
-    /// The scene that is drawn, with the box, the obstacles and the legend.
+pub(in crate::cli) struct Pictures {
+    /// The scene that is drawn, with the box, the obstacles that stand still and the legend.
     scene: render::Backdrop,
-    camera: Camera,
-    title: String,
+    /// The other obstacles, where they are now.
+    moving: Vec<(Drawn, Mesh)>,
     domain: Aabb,
-    /// The speed that is drawn red, m/s.
-    fastest: f64,
     radius: f64,
     bodies: Vec<Body>,
-    pub(super) count: usize,
+    pub(in crate::cli) count: usize,
 }
 
 /// An obstacle in pictures.
@@ -55,11 +73,11 @@ struct Body {
 
 impl Pictures {
     /// Prepares the pictures. `meshes` are those of the bodies at the start.
-    pub fn new(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Self, Failure> {
+    pub fn new(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Self, Failure> {
         let domain = experiment.domain();
-        let camera = camera(options, experiment, Camera::SIZE)?;
-        let opened = opened(options, experiment, meshes)?;
-        let title = title(options, experiment, &opened);
+        let camera = camera(look, experiment, Camera::SIZE)?;
+        let opened = opened(look, experiment, meshes)?;
+        let title = title(look, experiment, &opened);
         // a fall is stopped on its way, what drives a fluid otherwise is not
         let share = if experiment.typical_speed() > 0.0 { FASTEST } else { 1.0 };
         let fastest = share * experiment.speed_scale();
@@ -69,12 +87,14 @@ impl Pictures {
         };
         let solids = experiment.bodies().iter().map(|body| &body.solid);
         let bodies: Vec<Body> = solids.zip(opened).map(body).collect();
+        let legend = render::Legend { title: &title, scale: Some(Scale::speeds(fastest)) };
+        let still = bodies.iter().zip(meshes).filter(|(body, _)| !body.solid.moves());
+        let scene =
+            scenery::backdrop(&camera, &domain, &legend, still.map(|(body, mesh)| (body.drawn, mesh)))?;
         Ok(Self {
-            scene: backdrop(&camera, &domain, (&title, fastest), &bodies, meshes)?,
-            camera,
-            title,
+            scene,
+            moving: moving(&bodies, meshes),
             domain,
-            fastest,
             radius: 0.5 * experiment.parameters().spacing(),
             bodies,
             count: 0,
@@ -82,10 +102,8 @@ impl Pictures {
     }
 
     /// Puts the obstacles where they are now.
-    pub fn show(&mut self, meshes: &[Mesh]) -> Result<(), Failure> {
-        let legend = (self.title.as_str(), self.fastest);
-        self.scene = backdrop(&self.camera, &self.domain, legend, &self.bodies, meshes)?;
-        Ok(())
+    pub fn show(&mut self, meshes: &[Mesh]) {
+        self.moving = moving(&self.bodies, meshes);
     }
 
     pub fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
@@ -100,14 +118,14 @@ impl Pictures {
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
         let places: Vec<DVec3> = particles.position.iter().collect();
         let [x, y, z] = columns(&self.lifted(places, simulation.time()));
-        self.scene.frame(
-            &render::ParticlesView {
-                positions: rfm::field::Points::new(&x, &y, &z),
-                values: &speeds,
-                radius: self.radius,
-            },
-            &render::Caption { time: simulation.time(), step: Some(simulation.steps()) },
-        )
+        let particles = render::ParticlesView {
+            positions: rfm::field::Points::new(&x, &y, &z),
+            values: &speeds,
+            radius: self.radius,
+        };
+        let moving = render::Moving { meshes: &scenery::views(&self.moving), particles, balls: true };
+        let moment = render::Caption { time: simulation.time(), step: Some(simulation.steps()) };
+        self.scene.frame_with(&moving, &moment)
     }
 
     /// The places with every ball in front of the walls: a particle is a point and may touch them, and half of its ball
@@ -141,23 +159,16 @@ fn columns(places: &[DVec3]) -> [Vec<f64>; 3] {
     [0, 1, 2].map(|axis| places.iter().map(|p| p[axis]).collect())
 }
 
-/// The scene of a picture without its particles: the box, the obstacles, the legend.
-fn backdrop(
-    camera: &Camera,
-    domain: &Aabb,
-    (title, fastest): (&str, f64),
-    bodies: &[Body],
-    meshes: &[Mesh],
-) -> Result<render::Backdrop, Failure> {
-    let legend = render::Legend { title, scale: Some(Scale::speeds(fastest)) };
-    let drawn = bodies.iter().map(|body| body.drawn).zip(meshes);
-    scenery::backdrop(camera, domain, &legend, drawn)
+/// The obstacles that move, where their meshes are.
+fn moving(bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)> {
+    let moving = bodies.iter().zip(meshes).filter(|(body, _)| body.solid.moves());
+    scenery::sharp(moving.map(|(body, mesh)| (body.drawn, mesh)))
 }
 
 /// The camera that the flags or the scene ask for.
-fn camera(options: &Run, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
+fn camera(look: Look<'_>, experiment: &Experiment, size: (u32, u32)) -> Result<Camera, Failure> {
     let stated = &experiment.scene().picture;
-    let (towards_eye, aim) = match options.camera {
+    let (towards_eye, aim) = match look.camera {
         Some(flag) => (Some(flag.towards_eye), (flag.look_at, flag.zoom)),
         None => (stated.camera, (stated.look_at, stated.zoom)),
     };
@@ -165,19 +176,22 @@ fn camera(options: &Run, experiment: &Experiment, size: (u32, u32)) -> Result<Ca
 }
 
 /// How each body is drawn.
-fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec<Drawn>, Failure> {
+fn opened(look: Look<'_>, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec<Drawn>, Failure> {
     let names: Vec<&str> = experiment.bodies().iter().map(|body| body.solid.name()).collect();
     let stated = &experiment.scene().picture;
-    if let Some(unknown) = options.hide.iter().find(|name| !names.contains(&name.as_str())) {
-        let there = if names.is_empty() { "none".into() } else { names.join(", ") };
-        return Err(Failure::usage(format!(
-            "--hide {unknown}: the scene `{}` has no such obstacle; there is {there}",
-            experiment.scene().name
-        )));
+    for (flag, given) in [("--hide", look.hide), ("--glass", look.glass)] {
+        if let Some(unknown) = given.iter().find(|name| !names.contains(&name.as_str())) {
+            let there = if names.is_empty() { "none".into() } else { names.join(", ") };
+            return Err(Failure::usage(format!(
+                "{flag} {unknown}: the scene `{}` has no such obstacle; there is {there}",
+                experiment.scene().name
+            )));
+        }
     }
-    let is_hidden = |name: &str| stated.hide.iter().chain(&options.hide).any(|hidden| hidden == name);
-    let small = camera(options, experiment, SMALL)?;
-    let fixed = match (&options.cut, stated.cut) {
+    let is_hidden = |name: &str| stated.hide.iter().chain(look.hide).any(|hidden| hidden == name);
+    let is_glass = |name: &str| stated.glass.iter().chain(look.glass).any(|glass| glass == name);
+    let small = camera(look, experiment, SMALL)?;
+    let fixed = match (look.cut, stated.cut) {
         (Some(CutFlag::Plane(plane)), _) => Some(Some(scenery::half_towards_eye(plane, &small))),
         (Some(CutFlag::None), _) | (None, Opening::None) => Some(None),
         (None, Opening::Half { axis, at, below }) => Some(Some(half(DVec3::AXES[axis], at, below))),
@@ -186,6 +200,7 @@ fn opened(options: &Run, experiment: &Experiment, meshes: &[Mesh]) -> Result<Vec
     let samples = if fixed.is_none() { fluid_samples(experiment) } else { Vec::new() };
     let drawn = |(name, mesh): (&&str, &Mesh)| match fixed {
         _ if is_hidden(name) => Drawn::Hidden,
+        _ if is_glass(name) => Drawn::Glass,
         Some(None) => Drawn::Whole,
         Some(Some(cut)) => Drawn::Open(cut),
         None => out_of_the_way(&small, name, mesh, &samples),
@@ -209,10 +224,10 @@ fn fluid_samples(experiment: &Experiment) -> Vec<DVec3> {
 }
 
 /// What is seen: the file, the scene, the method, and what was done to the obstacles.
-fn title(options: &Run, experiment: &Experiment, drawn: &[Drawn]) -> String {
+fn title(look: Look<'_>, experiment: &Experiment, drawn: &[Drawn]) -> String {
     let scene = experiment.scene();
-    let file = match options.file.file_name() {
-        Some(name) if options.file.as_os_str() != "-" => Path::new(name).shown(),
+    let file = match look.file.file_name() {
+        Some(name) if look.file.as_os_str() != "-" => Path::new(name).shown(),
         Some(_) | None => "standard input".into(),
     };
     let mut parts = vec![file, scene.name.clone(), scene.method.name().to_string()];

@@ -13,7 +13,7 @@ use super::plots;
 use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
 use rfm::mesh::split_creases;
 use rfm::view::{
-    Array, Corners, Frame, FrameHead, Lattice, Levels, Page, Setting, VELOCITY, pack_frame, pack_mesh,
+    Array, Corners, Frame, FrameHead, Lattice, Levels, Motion, Page, Setting, VELOCITY, pack_frame, pack_mesh,
 };
 
 /// A run in its folder.
@@ -74,7 +74,7 @@ impl SavedRun {
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let mut page = Page::begin(out, &self.setting)?;
         let mut written = 0;
-        let mut before: Option<Frame> = None;
+        let (mut before, mut time) = (None::<Frame>, 0.0);
         for ((_, entry), mesh) in self.entries.iter().zip(&self.mesh_of) {
             while mesh.is_some_and(|mesh| written <= mesh) {
                 let file = std::fs::read(&self.meshes[written])?;
@@ -89,11 +89,23 @@ impl SavedRun {
                 ranges: self.arrays.iter().map(|(_, range)| *range).collect(),
                 mesh: *mesh,
                 run: 0,
+                motion: self.motion(entry.time - time),
             };
             page.block(&pack_frame(&head, &frame, before.as_ref()))?;
-            before = Some(frame);
+            (before, time) = (Some(frame), entry.time);
         }
         page.end()
+    }
+
+    /// How numbers follow from velocities, if the frames have them, so long after the frame before, s.
+    fn motion(&self, after: f64) -> Option<Motion> {
+        let place = |wanted: &str| self.arrays.iter().position(|(name, _)| name == wanted);
+        let [Some(x), Some(y), Some(z)] = VELOCITY.map(place) else { return None };
+        let steps = (0.5 * after * self.lattice.steps()).to_array();
+        // a browser counts exactly up to 2⁵³
+        let fastest = [x, y, z].map(|k| self.arrays[k].1.low.abs().max(self.arrays[k].1.high.abs()));
+        let is_exact = steps.iter().zip(fastest).all(|(steps, fastest)| (steps * fastest).abs() < 1e12);
+        is_exact.then_some(Motion { velocity: [x, y, z], speed: place("speed"), steps })
     }
 
     fn frame(&self, entry: &FrameEntry) -> io::Result<Frame> {

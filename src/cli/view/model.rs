@@ -304,7 +304,7 @@ impl Running {
         let places = order.iter().map(|&i| particles.position.get(i));
         let (frame, ranges) = Frame::of(&self.lattice, places, &arrays.each_ref().map(Vec::as_slice));
         let (time, step) = (self.simulation.time(), Some(self.simulation.steps()));
-        pack_frame(&FrameHead { time, step, ranges, mesh: None, run }, &frame, None)
+        pack_frame(&FrameHead { time, step, ranges, mesh: None, run, motion: None }, &frame, None)
     }
 
     /// Lets gravity act in this direction from now on, m/s².

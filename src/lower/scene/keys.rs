@@ -16,7 +16,7 @@ const BLOCKS: [&str; 10] =
 
 /// Keys that are often looked for one block too far out.
 const INNER: [(&str, &[&str]); 4] = [
-    ("picture", &["camera", "look_at", "zoom", "cut", "hide"]),
+    ("picture", &["camera", "look_at", "zoom", "cut", "hide", "glass"]),
     ("run", &["until", "save_every", "checkpoint_every", "dt"]),
     ("fluid", &["density", "viscosity", "spacing", "particles", "shape", "surface_tension"]),
     ("solver", &["precision"]),

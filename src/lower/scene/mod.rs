@@ -259,6 +259,8 @@ pub struct Picture {
     pub cut: Opening,
     /// The names of obstacles that are not drawn.
     pub hide: Vec<String>,
+    /// The names of obstacles that are drawn clear.
+    pub glass: Vec<String>,
 }
 
 impl Picture {

@@ -8,7 +8,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::quantity::Dimension;
 use crate::syntax::ast::{Comparison, Expr, ExprKind};
 
-pub(in crate::lower) const PICTURE_KEYS: [&str; 5] = ["camera", "look_at", "zoom", "cut", "hide"];
+pub(in crate::lower) const PICTURE_KEYS: [&str; 6] = ["camera", "look_at", "zoom", "cut", "hide", "glass"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 const CUT_HELP: &str =
     "write `cut: y <= 0.5` for the part of the obstacles that is taken away, `cut: auto` or `cut: none`";
@@ -30,18 +30,23 @@ impl<'a> Lowering<'a> {
             Some((_, value)) => self.opening(value)?,
             None => Opening::default(),
         };
-        let mut hide = Vec::new();
-        if let Some((_, value)) = block.setting("hide") {
-            let names = match &value.kind {
-                ExprKind::Vector(names) => names.as_slice(),
-                _ => std::slice::from_ref(value),
-            };
-            for name in names {
-                let found = self.one_of(name, "hide", bodies, "obstacle of this scene")?;
-                hide.push(bodies[found].to_string());
-            }
-        }
-        Some(Picture { camera, look_at, zoom, cut, hide })
+        let hide = self.obstacles(&block, "hide", bodies)?;
+        let glass = self.obstacles(&block, "glass", bodies)?;
+        Some(Picture { camera, look_at, zoom, cut, hide, glass })
+    }
+
+    /// Reads the names of obstacles: one, or a list of them.
+    fn obstacles(&mut self, block: &Block<'_>, key: &str, bodies: &[&str]) -> Option<Vec<String>> {
+        let Some((_, value)) = block.setting(key) else { return Some(Vec::new()) };
+        let names = match &value.kind {
+            ExprKind::Vector(names) => names.as_slice(),
+            _ => std::slice::from_ref(value),
+        };
+        let name = |name: &Expr| {
+            let found = self.one_of(name, key, bodies, "obstacle of this scene")?;
+            Some(bodies[found].to_string())
+        };
+        names.iter().map(name).collect()
     }
 
     /// Reads the direction to the eye. The outer option is `None` if it is wrong, which is reported; the inner one if it is

@@ -21,25 +21,42 @@ function opened(bytes) {
   return [head, new Planes(bytes.subarray(4 + length))];
 }
 
+/** The value of every level of a range. */
+const valuesOf = ({ low, high }) => Float64Array.from({ length: 256 }, (_, level) => low + (level / 254) * (high - low));
+
+/** Adds the speeds that velocities let expect to what is left of them. */
+function addSpeeds(levels, { velocity, speed }, values, { low, high }) {
+  const [x, y, z] = velocity.map((k, axis) => Float64Array.from(levels[k], (level) => values[axis][level] * values[axis][level]));
+  const left = levels[speed];
+  const width = high - low;
+  if (!(width > 0)) return;
+  for (let i = 0; i < left.length; i++)
+    left[i] += Math.floor(Math.min(Math.max(((Math.sqrt(x[i] + y[i] + z[i]) - low) / width) * 254, 0), 254) + 0.5);
+}
+
 /** A frame; one that follows holds differences from the frame before. */
 function frameOf(head, planes, before) {
   const n = head.count;
   const sites = new Uint16Array(3 * n);
   if (head.follows && before?.count !== n) throw new Error("a frame is missing");
-  for (let axis = 0; axis < 3; axis++) {
-    const [low, high] = [planes.take(n), planes.take(n)];
-    if (head.follows) {
-      const then = before.sites;
-      for (let i = 0, j = axis; i < n; i++, j += 3) sites[j] = then[j] + unfold(low[i] | (high[i] << 8));
-    } else {
-      for (let i = 0, j = axis; i < n; i++, j += 3) sites[j] = low[i] | (high[i] << 8);
-    }
-  }
+  const axes = [0, 1, 2].map(() => [planes.take(n), planes.take(n)]);
+  const { motion } = head;
   const levels = head.ranges.map((_, k) => {
     const plane = planes.take(n);
-    if (!head.follows) return plane.slice();
+    if (!head.follows || k === motion?.speed) return plane.slice();
     const then = before.levels[k];
     return plane.map((x, i) => x + then[i]);
+  });
+  const velocities = motion?.velocity.map((k) => valuesOf(head.ranges[k]));
+  if (motion && motion.speed !== null) addSpeeds(levels, motion, velocities, head.ranges[motion.speed]);
+  axes.forEach(([low, high], axis) => {
+    const then = head.follows ? before.sites : new Uint16Array(3 * n);
+    const from = head.follows ? unfold : (x) => x;
+    for (let i = 0, j = axis; i < n; i++, j += 3) sites[j] = then[j] + from(low[i] | (high[i] << 8));
+    if (!motion || !head.follows) return;
+    const [values, k] = [velocities[axis], motion.velocity[axis]];
+    const [early, late] = [before.levels[k], levels[k]];
+    for (let i = 0, j = axis; i < n; i++, j += 3) sites[j] += Math.floor(motion.steps[axis] * (values[early[i]] + values[late[i]]) + 0.5);
   });
   return { ...head, sites, levels };
 }

@@ -10,6 +10,7 @@ use crate::browser::Browser;
 use crate::live;
 use crate::pictures::{Picture, compare};
 use crate::program::{Viewer, rfm};
+use crate::shaders;
 
 const SIZE: (u32, u32) = (1100, 700);
 
@@ -38,6 +39,7 @@ pub const ALL: &[(&str, Case)] = &[
     ("the page of a report opens from a file", report),
     ("small windows and both themes", windows),
     ("a hundred thousand particles", many),
+    ("solids as GLSL have the numbers of `rfm eval`", shaders::shaders),
     ("a run is followed, stopped, stepped and begun again", live::live),
     ("the obstacle follows a slider", live::slider),
     ("the box turns and gravity stays", live::turned),

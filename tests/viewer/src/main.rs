@@ -8,6 +8,7 @@ mod cases;
 mod live;
 mod pictures;
 mod program;
+mod shaders;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

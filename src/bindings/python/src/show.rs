@@ -131,7 +131,7 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
         page.block(&pack_mesh(&split_creases(&obstacles), 0)).ok()?;
     }
     let (time, step) = (simulation.time(), Some(simulation.steps()));
-    let head = FrameHead { time, step, ranges, mesh: has_mesh.then_some(0), run: 0 };
+    let head = FrameHead { time, step, ranges, mesh: has_mesh.then_some(0), run: 0, motion: None };
     page.block(&pack_frame(&head, &frame, None)).ok()?;
     page.end().ok()?;
     String::from_utf8(out).ok()

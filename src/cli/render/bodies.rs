@@ -1,0 +1,114 @@
+//! The obstacles of a saved run: their meshes, told apart, and how each of them is drawn.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::options::Render;
+use crate::cli::failure::Failure;
+use crate::cli::output::Shown;
+use crate::cli::saved::{self, RunFigures};
+use crate::cli::scenery::{Drawn, half_towards_eye, out_of_the_way};
+use crate::cli::values::CutFlag;
+use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
+use rfm::mesh::Mesh;
+use rfm::render::Camera;
+
+/// Most particles of the first frame that stand for the fluid when it is asked what hides it.
+const MOST_SAMPLES: usize = 3000;
+
+/// The obstacles at the start of a run.
+pub(super) struct Bodies {
+    /// Their names; one for all if the folder does not tell them apart.
+    pub names: Vec<String>,
+    are_named: bool,
+    meshes: Vec<Mesh>,
+    /// Particles of the first frame.
+    samples: Vec<DVec3>,
+}
+
+impl Bodies {
+    pub fn at_start(
+        folder: &Path,
+        first: &FrameEntry,
+        others: &[PathBuf],
+        figures: Option<&RunFigures>,
+    ) -> Result<Self, Failure> {
+        let named = figures.map(|figures| figures.obstacles.clone()).unwrap_or_default();
+        let (files, _) = saved::obstacles(folder, &[(0, first.clone())])?;
+        let are_named = !named.is_empty();
+        let names = if are_named { named } else { vec!["the obstacles".to_string()] };
+        let meshes = match files.first().or(others.first()) {
+            Some(file) => bodies_of(file, names.len())?,
+            None => Vec::new(),
+        };
+        // a first frame that is gone or damaged only means that nothing is cut by itself
+        let points = std::fs::read(folder.join(&first.file)).ok().and_then(|file| read_arrays(&file).ok());
+        let points: Vec<DVec3> = points.map(|(points, _)| points).unwrap_or_default();
+        let finite: Vec<DVec3> = points.into_iter().filter(|p| p.is_finite()).collect();
+        let every = finite.len().div_ceil(MOST_SAMPLES).max(1);
+        Ok(Self { names, are_named, meshes, samples: finite.into_iter().step_by(every).collect() })
+    }
+
+    /// How each of them is drawn.
+    pub fn drawn(&self, options: &Render, camera: &Camera) -> Result<Vec<Drawn>, Failure> {
+        let is_unknown = |name: &&String| !self.are_named || !self.names.contains(*name);
+        let unknown = |flag, given: &[String]| given.iter().find(is_unknown).map(|name| (flag, name.clone()));
+        if let Some((flag, unknown)) =
+            unknown("--hide", &options.hide).or_else(|| unknown("--glass", &options.glass))
+        {
+            let reason = match (self.are_named, self.meshes.is_empty()) {
+                (_, true) => "the run has no obstacles".to_string(),
+                (true, false) => format!("the run has no such obstacle; there is {}", self.names.join(", ")),
+                (false, false) => {
+                    "the folder does not name its obstacles: its summary.json is missing, or the run was made by an earlier \
+                     version; `rfm run` makes it again"
+                        .to_string()
+                }
+            };
+            return Err(Failure::usage(format!("{flag} {unknown}: {reason}")));
+        }
+        let is_hidden = |name: &String| self.are_named && options.hide.contains(name);
+        let is_glass = |name: &String| self.are_named && options.glass.contains(name);
+        let drawn = |(name, mesh): (&String, &Mesh)| match &options.cut {
+            _ if is_hidden(name) => Drawn::Hidden,
+            _ if is_glass(name) => Drawn::Glass,
+            Some(CutFlag::None) => Drawn::Whole,
+            Some(CutFlag::Plane(plane)) => Drawn::Open(half_towards_eye(plane, camera)),
+            Some(CutFlag::Auto) | None => out_of_the_way(camera, name, mesh, &self.samples),
+        };
+        Ok(self.names.iter().zip(&self.meshes).map(drawn).collect())
+    }
+}
+
+/// The bodies of a file, told apart by its array `body` if there are several.
+pub(super) fn bodies_of(path: &Path, count: usize) -> Result<Vec<Mesh>, Failure> {
+    let failed = |error: String| Failure::usage(format!("cannot read `{}`: {error}", path.shown()));
+    let file = std::fs::read(path).map_err(|error| failed(error.to_string()))?;
+    let whole = read_mesh(&file).map_err(|error| failed(error.to_string()))?;
+    if count <= 1 {
+        return Ok(vec![whole]);
+    }
+    let (_, arrays) = read_arrays(&file).map_err(|error| failed(error.to_string()))?;
+    let Some(array) = arrays.iter().find(|array| array.name == "body" && array.components == 1) else {
+        return Err(failed(
+            "it has no array `body`, which tells the obstacles apart; `rfm run` writes it".into(),
+        ));
+    };
+    let mut bodies = vec![Mesh::default(); count];
+    // the number of each vertex within its body
+    let mut numbers = Vec::with_capacity(whole.positions.len());
+    for (k, &body) in array.values.iter().enumerate() {
+        let Some(own) = bodies.get_mut(body as usize).filter(|_| body >= 0.0) else {
+            return Err(failed(format!("its array `body` names the obstacle {body}, and there are {count}")));
+        };
+        numbers.push(own.positions.len() as u32);
+        own.positions.push(whole.positions[k]);
+        own.normals.push(whole.normals[k]);
+    }
+    for triangle in &whole.triangles {
+        let body = array.values[triangle[0] as usize] as usize;
+        bodies[body].triangles.push(triangle.map(|vertex| numbers[vertex as usize]));
+    }
+    Ok(bodies)
+}

@@ -1,0 +1,206 @@
+//! Soft darkness in folds, corners and under things, found from the depth of the picture alone.
+//!
+//! A ball around each point of the picture is filled in part by what lies in front of that point. Loos and Sloan
+//! ("Volumetric Obscurance", 2010) measure that part along some lines through the ball, in the direction of the view, and
+//! take the lines in pairs on opposite sides of the point. Nearness is linear over the picture on every plane, so both
+//! lines of a pair together are half full on a plane, however it is turned: planes stay as bright as they are.
+//!
+//! Invariant: the same lines are taken at every pixel and nothing is random, so pictures have the same bits every time.
+
+use rayon::prelude::*;
+
+/// The radius of the balls over the diagonal of the box.
+const RADIUS: f64 = 0.035;
+/// How much darker a point is of whose ball a quarter is filled, which is one at the bottom of a right angle.
+const DARKEST: f32 = 0.45;
+/// The pairs of lines through a ball.
+const LINES: u8 = 10;
+/// The part of a turn between a pair and the next, so that directions are spread evenly for any number of pairs.
+const GOLDEN: f64 = 0.618_033_988_75;
+/// Pixels that are looked at together.
+const RUN: usize = 64;
+
+/// The balls as the picture shows them.
+#[derive(Debug, Clone)]
+pub(super) struct Balls {
+    lines: Vec<Line>,
+    /// The farthest line from its point, in pixels.
+    reach: usize,
+}
+
+/// A pair of lines.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    /// The place of one of them in the picture, from the point.
+    columns: isize,
+    rows: isize,
+    /// Half the length of a line within the ball, times two, over the square of nearness: a difference of nearness over this
+    /// and over the square of nearness is the part of the line by which it changes.
+    length: f32,
+    weight: f32,
+}
+
+impl Balls {
+    /// `diagonal` is that of the box in metres, and `pixels` are those for a metre in the middle of the box.
+    pub fn new(diagonal: f64, pixels: f64) -> Self {
+        let radius = RADIUS * diagonal;
+        let line = |k: u8| {
+            // every line stands for an equal part of the disc, and each has its own distance, so that no rings show
+            let part = ((f64::from(k) + 0.5) / f64::from(LINES)).sqrt();
+            let (sin, cos) = libm::sincos(std::f64::consts::PI * (GOLDEN * f64::from(k)).fract());
+            let at = |x: f64| (part * radius * pixels * x).round() as isize;
+            let half = (1.0 - part * part).sqrt();
+            Line { columns: at(cos), rows: at(sin), length: (radius * half) as f32, weight: half as f32 }
+        };
+        // in small pictures lines may fall on the point itself, and tell nothing there
+        let lines: Vec<Line> =
+            (0..LINES).map(line).filter(|line| (line.columns, line.rows) != (0, 0)).collect();
+        let reach = lines.iter().map(|line| line.columns.unsigned_abs().max(line.rows.unsigned_abs()));
+        Self { reach: reach.max().unwrap_or(0), lines }
+    }
+
+    /// How bright the pixels of a picture are, 0 … 1. Nearness 0 is the paper, which stays bright.
+    pub fn light(&self, nearness: &[f32], width: usize) -> Vec<f32> {
+        let mut light = vec![1.0; nearness.len()];
+        let all: f32 = self.lines.iter().map(|line| line.weight).sum();
+        if all == 0.0 || width == 0 {
+            return light;
+        }
+        let padded = Padded::new(nearness, width, self.reach);
+        light.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            for (k, part) in row.chunks_mut(RUN).enumerate() {
+                let points = padded.run(k * RUN, y, 0, 0);
+                if points[..part.len()].iter().fold(0.0_f32, |most, near| most.max(*near)) > 0.0 {
+                    let filled = self.filled(&padded, (k * RUN, y));
+                    for ((light, near), filled) in part.iter_mut().zip(points).zip(filled) {
+                        let dark = if *near > 0.0 { DARKEST * (2.0 * filled / all).min(1.0) } else { 0.0 };
+                        *light = 1.0 - dark;
+                    }
+                }
+            }
+        });
+        light
+    }
+
+    /// How full the balls of a run of pixels are beyond one half, times two, summed over the lines with their weights.
+    fn filled(&self, padded: &Padded, (x, y): (usize, usize)) -> [f32; RUN] {
+        let points = padded.run(x, y, 0, 0);
+        // paper has no depth, and is left out afterwards
+        let scale: [f32; RUN] = std::array::from_fn(|i| 1.0 / (points[i] * points[i]).max(f32::MIN_POSITIVE));
+        let mut filled = [0.0; RUN];
+        for line in &self.lines {
+            let one = padded.run(x, y, line.columns, line.rows);
+            let other = padded.run(x, y, -line.columns, -line.rows);
+            let inverse = 1.0 / line.length;
+            for i in 0..RUN {
+                let a = (one[i] - points[i]) * (scale[i] * inverse);
+                let b = (other[i] - points[i]) * (scale[i] * inverse);
+                // what is far in front of the ball is not in it, and tells nothing of what is behind
+                let far = a.max(b);
+                let within = (2.0 - 0.5 * far).clamp(0.0, 1.0);
+                let both = 0.5 * (a.clamp(-1.0, 1.0) + b.clamp(-1.0, 1.0));
+                filled[i] += line.weight * within * both.max(0.0);
+            }
+        }
+        filled
+    }
+}
+
+/// The nearness of a picture with paper around it.
+struct Padded {
+    nearness: Vec<f32>,
+    width: usize,
+    border: usize,
+}
+
+impl Padded {
+    fn new(nearness: &[f32], width: usize, border: usize) -> Self {
+        let wide = width + RUN + 2 * border;
+        let rows = nearness.len() / width;
+        let mut padded = vec![0.0; wide * (rows + 2 * border)];
+        let inner = padded.chunks_exact_mut(wide).skip(border);
+        for (to, from) in inner.zip(nearness.chunks_exact(width)) {
+            to[border..border + width].copy_from_slice(from);
+        }
+        Self { nearness: padded, width: wide, border }
+    }
+
+    /// The pixels of a row from x on, moved by so many columns and rows, which are at most the border.
+    fn run(&self, x: usize, y: usize, columns: isize, rows: isize) -> &[f32; RUN] {
+        let row = (y + self.border).wrapping_add_signed(rows);
+        let start = row * self.width + (x + self.border).wrapping_add_signed(columns);
+        self.nearness[start..].first_chunk().expect("a run ends within the border")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: usize = 120;
+    /// Pixels for a metre, and the distance of what is looked at, in metres.
+    const PIXELS: f64 = 400.0;
+    const FAR: f64 = 50.0;
+
+    /// The light in a picture of a surface that stands out by so many metres at (x, y), both in metres.
+    fn light(height: impl Fn(f64, f64) -> Option<f64>) -> Vec<f32> {
+        let near = |i: usize| {
+            let at = |k: usize| (k as f64 + 0.5 - 0.5 * WIDTH as f64) / PIXELS;
+            height(at(i % WIDTH), at(i / WIDTH)).map_or(0.0, |z| (1.0 / (FAR - z)) as f32)
+        };
+        let nearness: Vec<f32> = (0..WIDTH * WIDTH).map(near).collect();
+        Balls::new(2.0, PIXELS).light(&nearness, WIDTH)
+    }
+
+    /// How much darker a picture is at (x, y), both in metres.
+    fn dark(light: &[f32], x: f64, y: f64) -> f64 {
+        let at = |v: f64| (v * PIXELS + 0.5 * WIDTH as f64) as usize;
+        1.0 - f64::from(light[at(y) * WIDTH + at(x)])
+    }
+
+    #[test]
+    fn planes_stay_bright_however_they_are_turned() {
+        for (a, b) in [(0.0, 0.0), (0.4, -0.2), (2.0, 1.0), (-30.0, 7.0)] {
+            let light = light(|x, y| Some(a * x + b * y));
+            for (x, y) in [(0.0, 0.0), (0.03, -0.05), (-0.06, 0.04)] {
+                assert!(dark(&light, x, y).abs() < 0.01, "{a} {b}: {}", dark(&light, x, y));
+            }
+        }
+        assert!(light(|_, _| None).iter().all(|light| *light == 1.0), "paper");
+    }
+
+    #[test]
+    fn a_fold_is_as_dark_as_the_part_of_the_ball_that_it_fills() {
+        // two planes that meet at x = 0 and rise at 45° on both sides
+        let light = light(|x, _| Some(x.abs()));
+        let radius = RADIUS * 2.0;
+        for away in [0.0, 0.3, 0.6, 0.9, 1.3] {
+            // the part of a ball around (away, 0, away) that lies behind the planes, counted on a fine grid
+            let n = 80;
+            let cell = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
+            let (mut inside, mut behind) = (0, 0);
+            for (i, k) in (-n..n).flat_map(|i| (-n..n).map(move |k| (i, k))) {
+                let (x, z) = (cell(i), cell(k));
+                let rows = (1.0 - x * x - z * z).max(0.0).sqrt();
+                let weight = (rows * 1e6) as i64;
+                inside += weight;
+                behind += if z + away < (x + away).abs() { weight } else { 0 };
+            }
+            let beyond_half = (2.0 * (behind as f64 / inside as f64 - 0.5)).max(0.0);
+            let expected = f64::from(DARKEST) * (2.0 * beyond_half).min(1.0);
+            let found = dark(&light, away * radius, 0.0);
+            assert!((found - expected).abs() < 0.03, "{away}: {found} {expected}");
+        }
+    }
+
+    #[test]
+    fn what_is_far_in_front_casts_no_darkness() {
+        let radius = RADIUS * 2.0;
+        let over = |gap: f64| light(move |x, _| Some(if x > 0.0 { gap * radius } else { 0.0 }));
+        // beside a step there is darkness, beside something a metre in front of it none
+        assert!(dark(&over(0.7), -0.006, 0.0) > 0.1);
+        assert!(dark(&over(15.0), -0.006, 0.0) < 0.01);
+        // and the near side has none at all
+        assert!(dark(&over(0.7), 0.006, 0.0) < 0.01);
+    }
+}
