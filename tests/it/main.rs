@@ -22,6 +22,7 @@ mod hard_cases;
 mod language;
 mod layout;
 mod leftovers;
+mod lints;
 mod lsp;
 mod mesh_properties;
 mod meshes;
