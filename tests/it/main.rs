@@ -30,6 +30,7 @@ mod mistakes;
 mod moving;
 mod mutations;
 mod numbers;
+mod param_sweeps;
 mod params;
 mod pictures;
 mod pipeline;
