@@ -52,3 +52,4 @@ mod triangle_solids;
 mod validation;
 mod view;
 mod walls;
+mod watching;
