@@ -102,6 +102,35 @@ fn a_value_that_fails_is_told_and_the_others_go_on() {
 }
 
 #[test]
+fn warnings_are_shown_and_may_be_denied() {
+    let folder = in_folder("rfm 1\nparam r = 1\nsolid s = sphere(1) or sphere(r)\n");
+    let arguments = ["check", "a.rfm", "--sweep", "r=0.5..1.5:2", "--deny", "W0415"];
+    // of two balls about one point the smaller one has no effect, for either value
+    let outcome = rfm(folder.path(), &arguments).expect(1);
+    assert_eq!(outcome.stderr.matches("W0415: solid `s` is the same").count(), 2, "{}", outcome.stderr);
+    let found = index(&folder.path().join("a.sweep"));
+    assert!(rows(&found)[1]["failure"].as_str().unwrap().contains("without one of its operands"), "{found}");
+    assert!(figure(&rows(&found)[1], "volume") > 14.0);
+    rfm(folder.path(), &[&arguments[..4], &["--force"]].concat()).expect(0);
+}
+
+#[test]
+fn a_table_that_the_file_names_belongs_to_it() {
+    let folder = in_folder("rfm 1\nparam h = 1\nsolid s = polygon(points(\"c.csv\")).extrude(0, h)\n");
+    let corners =
+        |x: f64| std::fs::write(folder.path().join("c.csv"), format!("x,y\n0,0\n{x},0\n{x},1\n0,1\n"));
+    corners(1.0).unwrap();
+    let arguments = ["check", "a.rfm", "--sweep", "h=1..2:2"];
+    rfm(folder.path(), &arguments).expect(0);
+    corners(3.0).unwrap();
+    let refused = rfm(folder.path(), &[&arguments[..], &["--resume"]].concat()).expect(2);
+    assert!(refused.stderr.contains("of an older state of it"), "{}", refused.stderr);
+    rfm(folder.path(), &[&arguments[..], &["--force"]].concat()).expect(0);
+    let found = index(&folder.path().join("a.sweep"));
+    assert!((figure(&rows(&found)[1], "volume") / 6.0 - 1.0).abs() < 1e-2, "{found}");
+}
+
+#[test]
 fn what_cannot_be_swept_is_refused_before_anything_is_done() {
     let folder = in_folder("rfm 1\nparam radius = 1 in 0.1 .. 3\nsolid s = sphere(radius)\n");
     let check = |sweeps: &[&str], reason: &str| {

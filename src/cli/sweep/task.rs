@@ -11,6 +11,8 @@ use super::figures::Command;
 use super::index::{Axis, INDEX, Index, Row};
 use super::plot;
 use super::values::{Sweep, folder, grid};
+use serde_json::Value;
+
 use rfm::Program;
 use rfm::diagnostic::nearest;
 use rfm::slice;
@@ -132,6 +134,10 @@ impl Task<'_> {
             shared.define.push(sweep.definition(*value).map_err(Failure::Usage)?);
         }
         let (result, documents) = output::captured(|| each(&shared, &folder));
+        // of `check` messages are in its document, other commands have shown them
+        for message in messages(&documents).filter(|message| message["severity"] == "warning") {
+            note(format!("{}: {}", text_of(message, "code"), text_of(message, "message")));
+        }
         let figures = documents.iter().flat_map(|document| self.command.figures(document, &folder)).collect();
         let (exit, failure) = match &result {
             Ok(()) => (0, None),
@@ -164,14 +170,21 @@ impl Task<'_> {
         }
         let source = input::read(self.file)?;
         let files = input::files(self.shared, &source);
-        let program = input::check(self.shared, source, files).map_err(|messages| {
+        let program = input::check(self.shared, source, files.clone()).map_err(|messages| {
             input::show(&messages);
             input::failure(&messages)
         })?;
         self.sweeps.iter().try_for_each(|sweep| fits(&program, sweep))?;
-        let texts: Vec<&str> = program.sources().iter().map(|source| &*source.text).collect();
-        let text = format!("{}\n{:?}\n{texts:?}", self.options, self.shared.define);
-        Ok(blake3::hash(text.as_bytes()).to_hex()[..32].to_string())
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(format!("{}\n{:?}\n", self.options, self.shared.define).as_bytes());
+        for source in program.sources().iter() {
+            hasher.update(source.text.as_bytes());
+        }
+        // tables, meshes and maps of heights that it names; one that is gone was an error above
+        for path in files.asked() {
+            hasher.update(path.as_bytes()).update(&std::fs::read(&path).unwrap_or_default());
+        }
+        Ok(hasher.finalize().to_hex()[..32].to_string())
     }
 
     /// The index to begin with: that of the folder if the sweep is resumed.
@@ -255,10 +268,18 @@ fn fits(program: &Program, sweep: &Sweep) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The first error among the messages of a document.
-fn first_error(documents: &[serde_json::Value]) -> String {
-    let messages = documents.iter().filter_map(|document| document["diagnostics"].as_array()).flatten();
-    let mut errors = messages.filter(|message| message["severity"] == "error");
-    let first = errors.next().and_then(|message| message["message"].as_str());
+/// The messages in documents.
+fn messages(documents: &[Value]) -> impl Iterator<Item = &Value> {
+    documents.iter().filter_map(|document| document["diagnostics"].as_array()).flatten()
+}
+
+fn text_of<'a>(message: &'a Value, key: &str) -> &'a str {
+    message[key].as_str().unwrap_or_default()
+}
+
+/// The first error among the messages of a document, or the first warning where these are denied.
+fn first_error(documents: &[Value]) -> String {
+    let error = messages(documents).find(|message| message["severity"] == "error");
+    let first = error.or_else(|| messages(documents).next()).map(|message| text_of(message, "message"));
     first.unwrap_or("the file has findings").to_string()
 }
