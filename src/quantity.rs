@@ -142,6 +142,17 @@ pub fn in_unit(value: f64, unit: Unit, text: &str) -> String {
 /// # Errors
 /// What is wrong with the text, in words.
 pub fn parse_quantity(text: &str) -> Result<(f64, Option<Dimension>), String> {
+    let (number, unit) = number_and_unit(text);
+    let number: f64 = number.parse().map_err(|_| format!("`{}` is not a number", text.trim()))?;
+    if unit.is_empty() {
+        return Ok((number, None));
+    }
+    let unit = parse_unit(unit).ok_or_else(|| format!("`{unit}` is not a unit"))?;
+    Ok((number * unit.factor, Some(unit.dimension)))
+}
+
+/// A text as a number and the unit behind it, without blanks around them; the unit is empty if there is none.
+pub fn number_and_unit(text: &str) -> (&str, &str) {
     let text = text.trim();
     let is_exponent = |at: usize, c: char| {
         matches!(c, 'e' | 'E')
@@ -154,13 +165,7 @@ pub fn parse_quantity(text: &str) -> Result<(f64, Option<Dimension>), String> {
         .skip_while(|(at, _)| *at < digits)
         .find(begins_unit)
         .map_or(text.len(), |(at, _)| at);
-    let (number, unit) = (text[..split].trim(), &text[split..]);
-    let number: f64 = number.parse().map_err(|_| format!("`{text}` is not a number"))?;
-    if unit.is_empty() {
-        return Ok((number, None));
-    }
-    let unit = parse_unit(unit).ok_or_else(|| format!("`{unit}` is not a unit"))?;
-    Ok((number * unit.factor, Some(unit.dimension)))
+    (text[..split].trim(), text[split..].trim())
 }
 
 /// Reads a unit in the notation of the grammar: `kg/m^3`, `Pa·s`, `deg/s`. A `/` divides by the next unit

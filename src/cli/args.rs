@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
+use super::sweep::options::{Again, SweepOptions};
 pub(super) use super::values::{CameraFlag, CutFlag};
 use super::values::{
     Definition, Deny, Frames, Tolerance, aabb, camera, count, cut, definition, deny, frames, length, plane,
@@ -40,7 +41,7 @@ pub(super) struct Arguments {
     pub command: Command,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct Shared {
     /// Set a param of the file, with a unit or in SI units (-D d=8mm, -D alpha="10 deg"); may be repeated
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = definition, global = true)]
@@ -117,7 +118,7 @@ pub(super) enum Command {
     Man(super::manual::Man),
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct Check {
     /// Files to check; `-` is standard input
     #[arg(required = true, value_name = "FILE")]
@@ -155,6 +156,10 @@ pub(super) struct Check {
     /// Apply the fixes that do not change what a file means, then check it: `<` becomes `<=`, a missing `rfm 1` is added
     #[arg(long)]
     pub fix: bool,
+    #[command(flatten)]
+    pub sweep: SweepOptions,
+    #[command(flatten)]
+    pub again: Again,
 }
 
 /// How messages are written.
@@ -213,7 +218,7 @@ pub(super) enum What {
     Normal,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct Mesh {
     /// The file; `-` is standard input. With --fluid the folder of a run
     pub file: PathBuf,
@@ -259,7 +264,7 @@ pub(super) struct Mesh {
     #[arg(
         long,
         help_heading = "Fluid",
-        conflicts_with_all = ["solid", "cells", "domain", "method", "no_slivers", "simplify", "quality"]
+        conflicts_with_all = ["solid", "cells", "domain", "method", "no_slivers", "simplify", "quality", "sweep"]
     )]
     pub fluid: bool,
     /// Half the spacing of the particles [default: from the run's summary.json]
@@ -278,6 +283,10 @@ pub(super) struct Mesh {
     /// The format of the files [default: vtp, with a collection for ParaView]
     #[arg(long, help_heading = "Fluid", value_parser = format_name(), requires = "fluid")]
     pub format: Option<Format>,
+    #[command(flatten)]
+    pub sweep: SweepOptions,
+    #[command(flatten)]
+    pub again: Again,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -355,7 +364,7 @@ impl From<BuildMath> for rfm::source::Math {
     }
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(super) struct Run {
     /// The file; `-` is standard input
     pub file: PathBuf,
@@ -406,6 +415,8 @@ pub(super) struct Run {
     /// Cells of the obstacle's mesh along its longest side
     #[arg(long, value_name = "N", default_value_t = 96)]
     pub mesh_cells: usize,
+    #[command(flatten)]
+    pub sweep: SweepOptions,
 }
 
 #[derive(Debug, Args)]
@@ -454,7 +465,7 @@ pub(super) struct View {
     pub no_open: bool,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(after_help = "A solid is judged by exact arithmetic:  rfm report examples/pawn.rfm -o pawn.svg\n\
                         A scene by its `truth`, at growing resolution:\n  \
                         rfm report examples/validation/free_fall.rfm:free_fall --particles 125,1000 \
@@ -482,10 +493,14 @@ pub(super) struct Report {
     pub mesh_cells: usize,
     #[command(flatten)]
     pub flow: Flow,
+    #[command(flatten)]
+    pub sweep: SweepOptions,
+    #[command(flatten)]
+    pub again: Again,
 }
 
 /// How a flow is measured.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Flows")]
 pub(super) struct Flow {
     /// Run the scene with so many particles, by its `param particles` [default: 1/16, 1/4 and all of what the

@@ -10,7 +10,7 @@ use super::args::{Check, MessageFormat, Shared};
 use super::failure::{Failure, complain, note, warn};
 use super::findings::{self, Message, message};
 use super::mesh::hidden;
-use super::{choose, input, output, section};
+use super::{choose, input, lints, output, section};
 use crate::cli::output::Shown;
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
 use rfm::geom::Aabb;
@@ -271,8 +271,10 @@ fn solids(
             None => {}
         }
         diagnostics.list.extend(remarks(named, &solid, &thin));
+        diagnostics.list.extend(lints::of_solid(program, named, &solid));
         facts.push(found);
     }
+    diagnostics.list.extend(lints::of_scenes(shared, program).map_err(choose::usage)?);
     Ok(facts)
 }
 

@@ -19,6 +19,7 @@ mod findings;
 mod fmt;
 mod init;
 mod input;
+mod lints;
 mod lsp;
 mod manual;
 mod mesh;
@@ -33,6 +34,7 @@ mod saved;
 mod scenery;
 mod section;
 mod survey;
+mod sweep;
 mod values;
 mod view;
 
@@ -86,13 +88,25 @@ fn command(arguments: args::Arguments) -> Result<(), Failure> {
     define.append(&mut shared.define);
     shared.define = define;
     match arguments.command {
+        args::Command::Check(options) if !options.sweep.sweep.is_empty() => {
+            sweep::commands::check(&shared, &options)
+        }
         args::Command::Check(options) => check::run(&shared, &options),
         args::Command::Eval(options) => eval::run(&shared, &options),
+        args::Command::Mesh(options) if !options.sweep.sweep.is_empty() => {
+            sweep::commands::mesh(&shared, &options)
+        }
         args::Command::Mesh(options) => mesh::run(&shared, &options),
         args::Command::Build(options) => build::run(&shared, &options),
+        args::Command::Run(options) if !options.sweep.sweep.is_empty() => {
+            sweep::commands::run(&shared, &options)
+        }
         args::Command::Run(options) => run::run(&shared, &options),
         args::Command::View(options) => view::run(&shared, &options),
         args::Command::Render(options) => render::run(&shared, &options),
+        args::Command::Report(options) if !options.sweep.sweep.is_empty() => {
+            sweep::commands::report(&shared, &options)
+        }
         args::Command::Report(options) => report::run(&shared, &options),
         args::Command::Explain(options) => explain::run(&shared, &options),
         args::Command::Fmt(options) => fmt::run(&shared, &options),

@@ -2,6 +2,7 @@
 //! its target and then renamed, so it is whole or not there.
 
 use std::borrow::Cow;
+use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -158,8 +159,27 @@ pub(super) fn line(words: std::fmt::Arguments<'_>) {
     }
 }
 
+thread_local! {
+    /// The documents that [`captured`] keeps from standard output; `None` where it is not at work.
+    static KEPT: RefCell<Option<Vec<serde_json::Value>>> = const { RefCell::new(None) };
+}
+
+/// What a command does, and the documents that it would print with `--json`. They are not printed.
+pub(super) fn captured<T>(command: impl FnOnce() -> T) -> (T, Vec<serde_json::Value>) {
+    KEPT.set(Some(Vec::new()));
+    let result = command();
+    (result, KEPT.take().unwrap_or_default())
+}
+
 /// Prints one JSON document on standard output.
 pub(super) fn json(document: &impl Serialize) -> Result<(), Failure> {
+    let is_kept = KEPT.with_borrow_mut(|kept| match kept {
+        Some(kept) => serde_json::to_value(document).map(|document| kept.push(document)).map(|()| true),
+        None => Ok(false),
+    });
+    if is_kept.map_err(io::Error::from)? {
+        return Ok(());
+    }
     let text = serde_json::to_string_pretty(document).map_err(io::Error::from)?;
     writeln!(io::stdout().lock(), "{}", escaped(&text))?;
     Ok(())

@@ -204,6 +204,33 @@ The message says between which coordinates the solid lies.";
 SECTION_IN_FACE = "W0414":
 "The plane of a slice lies within a face of the solid, where ω is zero all over and rounding would decide what is inside. The
 picture shows the section just outside of that face; a plane a little further in shows the other side.";
+IDLE_OPERAND = "W0415":
+"It is proven that the solid has the same points without this operand of `and` or `or`: it lies within another member of the
+union, or around all that it is to cut. That is often a slip in a size or a place. Only the shape counts here: the values of ω
+do change. The proof holds for the present values of the params.
+
+    rfm 1
+    solid ball = sphere(1) or sphere(0.5)            # the second one lies within the first";
+UNEVEN_OPERANDS = "W0416":
+"The gradients of two operands that are joined differ by a factor of 1000 or more at the surface. The shape is right, but near
+the edge where they meet ω follows the flat one alone: its value says little of the distance, f32 and certified programs
+lose digits, and interpolation between the nodes of a grid is poor. `normalise(e)` divides a formula by the size of its
+gradient, and lengths in place of their powers have gradients near 1: `r - sqrt(x² + y²)` instead of `r² - x² - y²`.
+
+    rfm 1
+    solid peg = normalise(1e4*(0.01 - x² - y²)) and 0 <= z <= 1";
+JUMP = "W0417":
+"At the surface ω jumps from one sign to the other instead of passing through zero: the border of a `where`, a step of
+`floor`, `mod` or `round`, or a pole of a divisor lies there. No distance, normal or smooth mesh follows from such a surface,
+and particles may pass it. Let both values agree where they meet, move the border away from the surface, or cut the shape by
+`and` at the border.
+
+    rfm 1
+    solid step = box([-1, -1, 0], [1, 1, 2]) and where(x <= 0, 1 - z, 0.5 - z)";
+SINGULAR = "W0418":
+"Outside of the solid, in the scene that has it as an obstacle or close to it, ω has no value: a divisor is zero there, or a root or a logarithm is taken of a
+negative number. What comes near is neither inside nor outside, and a run stops there. Keep the formula away from that
+place by `max`, or choose another one by `where`: `where(x > 0, ln(max(x, 1e-9)), -20)`.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";
@@ -214,6 +241,11 @@ FLUID_LIGHTER = "W0507":
 "A fluid that fills its vessel has no surface to which it could give way. Methods that keep it from being compressed (dfsph)
 pack its particles at the start, and make them lighter as far as those at curved walls would be too dense otherwise. Forces
 and momentum are smaller by as much. More particles leave smaller gaps; `method: wcsph` keeps all of the mass.";
+THIN_FOR_PARTICLES = "W0508":
+"A gap of an obstacle is thinner than the spacing of the particles, or a wall thinner than half of it. No particle finds room in
+such a gap. Through such a wall the fluid on one side feels that on the other more than its own second neighbours. The message
+says how thin it is, where, and what spacing shows it. Parts that extend over less than two spacings, and the tips of wedges, do
+not count.";
 FRAMES = "W0505":
 "Frames are saved so rarely that none lies between the start and the end of the run, or so often that they fill a disk.
 `save_every` is the simulated time between two of them, `until` that of the whole run.";

@@ -14,7 +14,6 @@
 use glam::DVec3;
 
 use super::{Experiment, refuse};
-use crate::Solid;
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::field::{Field, Region};
@@ -22,6 +21,7 @@ use crate::geom::Aabb;
 use crate::lower::Scene;
 use crate::solid::Bounds;
 use crate::sph::{Carved, FluidBlock, FluidShape, Obstacle, Particles, carve, make_room};
+use crate::{Engine, Program, Solid};
 
 /// Least distance of particles from obstacles at the start, over the spacing.
 const CLEARANCE: f64 = 0.5;
@@ -59,6 +59,16 @@ pub(super) struct Filling {
     pub volume: Option<f64>,
     /// Whether that is all the room that there is, for a fluid that must not be compressed.
     pub fills_vessel: bool,
+}
+
+/// The spacing of the particles of a scene at rest, m: the cube root of a particle's volume.
+///
+/// # Errors
+/// [`Error::Codegen`] if the engine is not available.
+pub fn spacing(program: &Program, scene: &Scene, engine: Engine) -> Result<f64, Error> {
+    let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
+    let mass = mass_by_number(scene, &fluid).unwrap_or(scene.fluid.mass);
+    Ok((mass / scene.fluid.density).cbrt())
 }
 
 /// The mass of a particle, kg, for a scene that states a number of them and not how large they are; `None` for

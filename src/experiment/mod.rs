@@ -36,6 +36,7 @@ use crate::{Engine, Program, Solid};
 pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
 pub use every::Every;
+pub use filling::spacing;
 pub use parameters::TimeStep;
 pub use probes::{probe_column, probe_of};
 

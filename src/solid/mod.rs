@@ -11,6 +11,7 @@
 //! | `leaves` | a solid taken apart into leaves, and what is left of it in a box |
 //! | `path` | where a straight path meets a solid |
 //! | `cells` | boxes divided into cells, for solids at rest and for solids that move |
+//! | `lints` | what in a solid is most likely not meant |
 //! | `bounds`, `tolerance`, `inspection` | its extent, its certified errors, its leaves for people |
 //!
 //! Invariant: a [`Solid`] answers for every point, every engine gives the same bits, and a program is
@@ -24,6 +25,7 @@ mod engine;
 mod evaluation;
 mod inspection;
 mod leaves;
+mod lints;
 mod moment;
 mod nearest;
 mod path;
@@ -42,6 +44,7 @@ pub use depth::Depth;
 pub use engine::{Engine, ProgramKind};
 pub use evaluation::Contact;
 pub use inspection::{LeafInfo, Remainder};
+pub use lints::{Break, Breakage, ThinPart, Uneven};
 pub use nearest::{Distance, Distances};
 pub(crate) use programs::block_plan::{BlockPlan, BlockStep, Operation as JoiningOperation, Piece};
 pub(crate) use programs::columns::ColumnPlace;

@@ -407,3 +407,43 @@ fn a_keystroke_in_500_lines() {
     );
     editor.end();
 }
+
+#[test]
+fn behind_an_import_stands_what_it_defines() {
+    let folder = tempfile::tempdir().unwrap();
+    let pieces = "rfm 1\nimport \"base.rfm\" as base\nparam high = 2   \"height of a piece\"\n\
+                  # a piece without a head\nsolid pawn = sphere(1)\nfn rook(width, walls = 4) = sphere(width)\n\
+                  scene s { box { max: [1, 1, 1] } }\n";
+    std::fs::write(folder.path().join("chess.rfm"), pieces).unwrap();
+    let uri = format!("file://{}/game.rfm", folder.path().display());
+    let mut editor = Editor::new(&[]);
+    let mut labels = |text: &str| -> Vec<(String, String)> {
+        let file = json!({ "uri": uri, "languageId": "rfm", "version": 1, "text": text });
+        editor.tell("textDocument/didOpen", json!({ "textDocument": file }));
+        let position = json!({ "line": 2, "character": text.lines().nth(2).unwrap().len() });
+        let found = editor
+            .ask("textDocument/completion", json!({ "textDocument": { "uri": uri }, "position": position }));
+        let part = |item: &Value, key: &str| item[key].as_str().unwrap_or_default().to_string();
+        found
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|item| (part(item, "label"), part(item, "documentation")))
+            .collect()
+    };
+    let head = "rfm 1\nimport \"chess.rfm\" as chess\n";
+    let wanted = [("high", "height of a piece"), ("pawn", "a piece without a head"), ("rook", "")];
+    let wanted: Vec<_> = wanted.iter().map(|(name, about)| (name.to_string(), about.to_string())).collect();
+    assert_eq!(labels(&format!("{head}solid s = chess.")), wanted);
+    assert_eq!(labels(&format!("{head}solid s = sphere(1) or chess.pa")), wanted);
+    // behind a shape, and behind the name of something else, methods stand
+    for text in ["solid s = chess.pawn.", "solid s = sphere(1).", "let a = chess "] {
+        let found = labels(&format!("{head}{text}"));
+        assert!(found.iter().any(|(name, _)| name == "move" || name == "sphere"), "{text}: {found:?}");
+        assert!(!found.iter().any(|(name, _)| name == "pawn"), "{text}");
+    }
+    // a file that cannot be read has no names
+    let found = labels("rfm 1\nimport \"none.rfm\" as chess\nsolid s = chess.");
+    assert!(found.iter().any(|(name, _)| name == "move"), "{found:?}");
+    editor.end();
+}

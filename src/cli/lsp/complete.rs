@@ -7,7 +7,10 @@ use lsp_types::{
 
 use rfm::lower::vocabulary;
 use rfm::sph::Method;
-use rfm::syntax::ast::{Entry, ExprKind, Item};
+use rfm::syntax::{
+    self,
+    ast::{Entry, ExprKind, Item},
+};
 
 use super::context::Context;
 use super::document::Document;
@@ -30,6 +33,9 @@ pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
     let context = Context::at(document.text(), byte);
     if context.is_quiet {
         return Vec::new();
+    }
+    if let Some(members) = members(document, &context) {
+        return members;
     }
     if context.after_dot {
         let axes =
@@ -75,27 +81,39 @@ pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
 
 /// What the file defines above a byte.
 fn names(document: &Document, byte: usize) -> Vec<CompletionItem> {
-    let text = document.text();
     let above = document.ast.items.iter().filter(|item| item.name().span.range().end < byte);
-    above
-        .filter_map(|defined| {
-            let name = defined.name();
-            let about = words::comment_above(text, name.span.range().start);
-            match defined {
-                Item::Param(param) => {
-                    let about = param.doc.clone().unwrap_or(about);
-                    Some(item(&name.text, CompletionItemKind::CONSTANT, &about))
-                }
-                Item::Let(_) => Some(item(&name.text, CompletionItemKind::VARIABLE, &about)),
-                Item::Solid(_) => Some(item(&name.text, CompletionItemKind::CLASS, &about)),
-                Item::Function(function) => {
-                    Some(called(words::of(function, text), CompletionItemKind::FUNCTION))
-                }
-                Item::Import(_) => Some(item(&name.text, CompletionItemKind::MODULE, &about)),
-                Item::Scene(_) => None,
-            }
-        })
-        .collect()
+    above.filter_map(|item| defined(item, document.text())).collect()
+}
+
+/// What an import defines, if its name stands alone in front of the dot at the cursor. An import of its own is not among
+/// that: it has no meaning outside.
+fn members(document: &Document, context: &Context) -> Option<Vec<CompletionItem>> {
+    let owner = context.owner.as_ref().filter(|owner| !context.locals.contains(owner))?;
+    let import = document.ast.items.iter().find_map(|item| match item {
+        Item::Import(import) if import.name.text == *owner => Some(import),
+        _ => None,
+    })?;
+    let source = document.imported(&import.path)?;
+    let (ast, _) = syntax::parse(&source);
+    let items = ast.items.iter().filter(|item| !matches!(item, Item::Import(_)));
+    Some(items.filter_map(|item| defined(item, &source.text)).collect())
+}
+
+/// An item of a text as what may be written; `None` for a scene, whose name is written nowhere.
+fn defined(defined: &Item, text: &str) -> Option<CompletionItem> {
+    let name = defined.name();
+    let about = words::comment_above(text, name.span.range().start);
+    match defined {
+        Item::Param(param) => {
+            let about = param.doc.clone().unwrap_or(about);
+            Some(item(&name.text, CompletionItemKind::CONSTANT, &about))
+        }
+        Item::Let(_) => Some(item(&name.text, CompletionItemKind::VARIABLE, &about)),
+        Item::Solid(_) => Some(item(&name.text, CompletionItemKind::CLASS, &about)),
+        Item::Function(function) => Some(called(words::of(function, text), CompletionItemKind::FUNCTION)),
+        Item::Import(_) => Some(item(&name.text, CompletionItemKind::MODULE, &about)),
+        Item::Scene(_) => None,
+    }
 }
 
 fn methods(document: &Document) -> Vec<Signature> {

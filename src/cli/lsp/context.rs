@@ -25,6 +25,8 @@ pub(super) struct Context {
     pub prefix: String,
     /// Whether a dot stands in front of that word: a method is wanted.
     pub after_dot: bool,
+    /// The name in front of that dot, if it is all that stands there: perhaps that of an import.
+    pub owner: Option<String>,
     /// The key whose value is written, in a scene.
     pub key: Option<String>,
     /// Whether an item may begin here.
@@ -190,6 +192,12 @@ impl Reader {
         };
         let two_dots = self.tokens.ends_with(&[Token::Mark('.'), Token::Mark('.')]);
         self.context.after_dot = self.tokens.last() == Some(&Token::Mark('.')) && !two_dots;
+        if self.context.after_dot
+            && let [before @ .., Token::Word(owner), Token::Mark('.')] = &self.tokens[..]
+            && before.last() != Some(&Token::Mark('.'))
+        {
+            self.context.owner = Some(owner.clone());
+        }
         self.context.begins_item = self.context.open.is_empty() && on_new_line && ends_value;
         // a value is at its end where a new line begins behind an operand
         if on_new_line && ends_value && self.context.open.last().is_some_and(|open| open.bracket == '{') {
@@ -217,6 +225,15 @@ mod tests {
         let open = context.open.last().unwrap();
         assert_eq!((open.word.as_str(), open.is_method, open.commas), ("move", true, 1));
         assert!(!at("let a = any i in 0..").after_dot);
+    }
+
+    #[test]
+    fn a_name_alone_in_front_of_a_dot_is_known() {
+        assert_eq!(at("solid s = chess.pa").owner.as_deref(), Some("chess"));
+        assert_eq!(at("solid s = sphere(1) or chess.").owner.as_deref(), Some("chess"));
+        for text in ["solid s = sphere(1).mo", "let a = chess.pawn.mo", "let a = 0..", "let a = chess"] {
+            assert_eq!(at(text).owner, None, "{text}");
+        }
     }
 
     #[test]

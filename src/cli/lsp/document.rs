@@ -5,8 +5,9 @@ use std::sync::Arc;
 use lsp_types::{Position, PositionEncodingKind, Range, Uri};
 
 use rfm::Program;
-use rfm::compile::files_beside;
+use rfm::compile::{files_beside, text_of};
 use rfm::diagnostic::{Diagnostics, Source, Span};
+use rfm::files::Files;
 use rfm::lower::Options;
 use rfm::syntax::{self, Ast};
 
@@ -116,6 +117,13 @@ impl Document {
 
     pub fn whole(&self) -> Range {
         self.range(0..self.text().len())
+    }
+
+    /// A file that this one imports, by the path that is written; `None` if it cannot be read.
+    pub fn imported(&self, path: &str) -> Option<Source> {
+        let name = Files::name(path, &self.source.name);
+        let bytes = options(&self.source).files.read(&name).ok()?;
+        Some(Source::file(name, text_of(bytes.to_vec()).ok()?))
     }
 
     /// The file with more text at its end, if that compiles.

@@ -18,8 +18,8 @@ mod summary;
 mod watch;
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use super::args::{Run, Shared};
@@ -270,9 +270,19 @@ impl Recording<'_> {
     }
 }
 
+/// Whether a folder has a run that `--resume` can go on with.
+pub(super) fn has_checkpoint(folder: &Path) -> bool {
+    checkpoints::exist(folder)
+}
+
 /// A flag that Ctrl-C sets. The run ends after the present step.
 fn interruption() -> Result<Arc<AtomicBool>, Failure> {
-    let flag = Arc::new(AtomicBool::new(false));
+    // there may be several runs in a process, and one handler
+    static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+    if let Some(flag) = FLAG.get() {
+        return Ok(Arc::clone(flag));
+    }
+    let flag = Arc::clone(FLAG.get_or_init(Arc::default));
     let set = Arc::clone(&flag);
     let handler = move || {
         if set.swap(true, Ordering::Relaxed) {

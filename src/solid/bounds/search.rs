@@ -194,7 +194,7 @@ impl<S: Shrink> Faces<'_, S> {
 
 /// The two halves of a cell. Huge ones are cut by magnitude, so that the scale of a solid is found in a few
 /// steps.
-fn halves(space: &Aabb) -> [Aabb; 2] {
+pub fn halves(space: &Aabb) -> [Aabb; 2] {
     const HUGE: f64 = 1e6;
     if space.size().max_element() < HUGE {
         return space.halves();

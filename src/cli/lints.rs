@@ -1,0 +1,176 @@
+//! Warnings about solids and scenes that are valid and most likely not meant: only `rfm check` looks for them.
+
+use super::args::Shared;
+use rfm::diagnostic::{Code, Diagnostic, Span};
+use rfm::glam::DVec3;
+use rfm::lower::{NamedSolid, Obstacle, Scene};
+use rfm::solid::{Break, Breakage, ThinPart, Uneven};
+use rfm::syntax::ast::Item;
+use rfm::{Error, Program, Solid, experiment};
+
+/// Warnings about the formula of a solid.
+pub(super) fn of_solid(program: &Program, named: &NamedSolid, solid: &Solid) -> Vec<Diagnostic> {
+    let subject = Subject { named, text: definition(program, named) };
+    let around = solid.bounds().aabb().map(|bounds| bounds.grown(0.05 * bounds.size().max_element()));
+    let uses = |scene: &&Scene| scene.obstacles.iter().any(|obstacle| obstacle.name == named.name);
+    let of_scene = program.module().scenes.iter().find(uses).map(|scene| scene.domain);
+    let jumps = around.or(of_scene).map_or_else(Vec::new, |over| solid.jumps(&over));
+    let mut singular = of_scene.or(around).map_or_else(Vec::new, |over| solid.singularities(&over));
+    singular.retain(|place| jumps.iter().all(|jump| jump.span != place.span));
+    let mut found: Vec<Diagnostic> =
+        solid.idle_operands(named.span.source).into_iter().map(|span| subject.idle(span)).collect();
+    found.extend(jumps.iter().map(|jump| subject.jump(jump)));
+    found.extend(singular.iter().map(|place| subject.singular(place)));
+    // where a formula jumps, differences say nothing of its gradient
+    if jumps.is_empty() {
+        found.extend(solid.uneven_operands().first().map(|uneven| subject.uneven(uneven)));
+    }
+    found
+}
+
+/// The text of a solid's formula in the file.
+fn definition(program: &Program, named: &NamedSolid) -> Option<Span> {
+    program.ast().items.iter().find_map(|item| match item {
+        Item::Solid(solid) if solid.name.span == named.span => Some(solid.value.span),
+        Item::Solid(_)
+        | Item::Import(_)
+        | Item::Param(_)
+        | Item::Let(_)
+        | Item::Function(_)
+        | Item::Scene(_) => None,
+    })
+}
+
+/// A solid that warnings are about.
+struct Subject<'a> {
+    named: &'a NamedSolid,
+    text: Option<Span>,
+}
+
+impl Subject<'_> {
+    /// A warning at a part of the formula. What is written elsewhere, in a `let` or another solid that shares it, stands
+    /// beside the name of the solid.
+    fn warning(&self, code: Code, span: Option<Span>, message: String, what: String) -> Diagnostic {
+        let own = span.filter(|span| {
+            self.text.is_some_and(|text| {
+                span.source == text.source && text.start <= span.start && span.end <= text.end
+            })
+        });
+        match (own, span) {
+            (Some(own), _) => Diagnostic::warning(code, own, message).at(what),
+            (None, Some(span)) if span.source == self.named.span.source => {
+                let at = format!("{what}; it is first written here");
+                Diagnostic::warning(code, self.named.span, message).label(span, at)
+            }
+            (None, _) => Diagnostic::warning(code, self.named.span, message).at(what),
+        }
+    }
+
+    fn idle(&self, span: Span) -> Diagnostic {
+        let message = format!("solid `{}` is the same without one of its operands", self.named.name);
+        let what = "it changes no point of the shape".into();
+        self.warning(Code::IDLE_OPERAND, Some(span), message, what)
+            .help("remove it, or look for a slip in its size or place")
+    }
+
+    fn uneven(&self, uneven: &Uneven) -> Diagnostic {
+        let [steep, flat] = uneven.gradients;
+        let message = format!(
+            "operands of solid `{}` have gradients of very different size at the surface: {steep:.1e} and {flat:.1e}",
+            self.named.name
+        );
+        let what = format!("|∇ω| is {steep:.1e} or more here");
+        let warning = self
+            .warning(Code::UNEVEN_OPERANDS, uneven.steep, message, what)
+            .help("write `normalise(…)` around the steeper one, or lengths in place of their powers");
+        match uneven.flat.filter(|flat| flat.source == self.named.span.source && uneven.steep != Some(*flat))
+        {
+            Some(other) => warning.label(other, format!("and {flat:.1e} or less here")),
+            None => warning,
+        }
+    }
+
+    fn jump(&self, jump: &Break) -> Diagnostic {
+        let (how, help) = match jump.what {
+            Breakage::Jump => {
+                ("jumps", "let both sides agree where they meet, or cut the shape there by `and`")
+            }
+            Breakage::Pole | Breakage::NoValue => {
+                ("passes through infinity", "keep the divisor from zero, for example by `max(…, 1e-9)`")
+            }
+        };
+        let name = &self.named.name;
+        let message = format!("ω of solid `{name}` {how} from one sign to the other at {}", point(jump.at));
+        let what = format!("{} of this does", jump.operation);
+        self.warning(Code::JUMP, jump.span, message, what).help(help)
+    }
+
+    fn singular(&self, found: &Break) -> Diagnostic {
+        let what = match found.what {
+            Breakage::NoValue | Breakage::Jump => "no value",
+            Breakage::Pole => "no bound",
+        };
+        let name = &self.named.name;
+        let message = format!("ω of solid `{name}` has {what} outside of it, at {}", point(found.at));
+        let at = format!("{} of this has none there", found.operation);
+        self.warning(Code::SINGULAR, found.span, message, at)
+            .help("choose another formula there by `where`, or keep its operand away by `max`")
+    }
+}
+
+/// Warnings about obstacles that the particles of their scenes are too large for.
+pub(super) fn of_scenes(shared: &Shared, program: &Program) -> Result<Vec<Diagnostic>, Error> {
+    let mut found = Vec::new();
+    for scene in &program.module().scenes {
+        if scene.obstacles.len() > MOST_OBSTACLES {
+            continue;
+        }
+        let spacing = experiment::spacing(program, scene, shared.engine.into())?;
+        for obstacle in &scene.obstacles {
+            let solid = program.compile(&obstacle.name, obstacle.shape, shared.engine.into())?;
+            let [wall, gap] = solid.at(0.0).thinner_than(THIN_WALL * spacing, spacing);
+            let both = [(wall, "wall", THIN_WALL), (gap, "gap", 1.0)];
+            let parts =
+                both.into_iter().filter_map(|(part, what, of_spacing)| Some((part?, what, of_spacing)));
+            found.extend(
+                parts.map(|(part, what, of_spacing)| {
+                    thin((scene, spacing), obstacle, &part, (what, of_spacing))
+                }),
+            );
+        }
+    }
+    Ok(found)
+}
+
+/// Walls that are thinner than this part of the spacing are told of. A particle stays half a spacing away from each face:
+/// through such a wall it is nearer to those on the other side than to its own second neighbours.
+const THIN_WALL: f64 = 0.5;
+
+/// Scenes with more obstacles are not looked at.
+const MOST_OBSTACLES: usize = 50;
+
+fn thin(
+    (scene, spacing): (&Scene, f64),
+    obstacle: &Obstacle,
+    part: &ThinPart,
+    (what, of_spacing): (&str, f64),
+) -> Diagnostic {
+    let less = if of_spacing < 1.0 { "less than half of" } else { "less than" };
+    let message = format!(
+        "a {what} of obstacle `{}` is {:.2e} m wide at {}: {less} the {spacing:.2e} m between particles",
+        obstacle.name,
+        part.thickness,
+        point(part.at)
+    );
+    // so that it is shown
+    let needed = part.thickness / of_spacing;
+    let number = scene.fluid.particles.map_or_else(String::new, |n| {
+        format!(", that of {:.1e} particles,", n as f64 * (spacing / needed).powi(3))
+    });
+    let help = format!("a spacing of {needed:.1e} m{number} shows it; or make the {what} wider");
+    Diagnostic::warning(Code::THIN_FOR_PARTICLES, obstacle.span, message).help(help)
+}
+
+fn point(p: DVec3) -> String {
+    format!("[{:.3}, {:.3}, {:.3}]", p.x + 0.0, p.y + 0.0, p.z + 0.0)
+}

@@ -1,0 +1,136 @@
+//! The plot of a sweep: one panel for each figure that changes, over the first param, with a line for each combination of
+//! the others.
+
+use std::fmt::Write;
+
+use super::super::plot::{self, EvenAxis, Legend};
+use super::index::{Index, Row};
+use rfm::slice;
+
+/// Panels at most: the first figures are the main ones.
+const MOST_PANELS: usize = 12;
+
+/// More panels than this stand in two columns.
+const FEW_PANELS: usize = 3;
+
+/// Lines of a panel that have an entry in the legend.
+const MOST_ENTRIES: usize = 16;
+
+const COLOURS: [&str; 8] =
+    ["#1b6ca8", "#c05621", "#2f855a", "#6b46c1", "#b83280", "#4a5568", "#975a16", "#2c7a7b"];
+
+/// A line of a panel: the combination that it belongs to, and its points with their errors.
+struct Line {
+    name: String,
+    points: Vec<[f64; 3]>,
+}
+
+/// Draws all panels, as SVG.
+pub(super) fn draw(index: &Index) -> String {
+    let changes = |name: &&str| {
+        let mut values = index.figures(name).map(|figure| figure.value);
+        let first = values.next();
+        values.any(|value| Some(value) != first)
+    };
+    let mut names: Vec<&str> = index.names().into_iter().filter(changes).collect();
+    names.truncate(MOST_PANELS);
+    let panels: Vec<String> = match names.is_empty() {
+        true => vec![empty(index)],
+        false => names.iter().map(|name| panel(index, name)).collect(),
+    };
+    let columns = if panels.len() > FEW_PANELS { 2 } else { 1 };
+    let width = plot::WIDTH * columns as f64;
+    let height = plot::HEIGHT * panels.len().div_ceil(columns) as f64;
+    let mut out = format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}">"##
+    );
+    for (i, panel) in panels.iter().enumerate() {
+        let (x, y) = (plot::WIDTH * (i % columns) as f64, plot::HEIGHT * (i / columns) as f64);
+        out.push_str(&panel.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1));
+        out.push_str("</svg>\n");
+    }
+    out.push_str("</svg>\n");
+    out
+}
+
+fn empty(index: &Index) -> String {
+    let mut out = plot::begin(&index.file);
+    plot::sentence(&mut out, "no figure changes with what is swept");
+    out
+}
+
+fn panel(index: &Index, name: &str) -> String {
+    let lines = lines(index, name);
+    let right = plot::WIDTH - plot::RIGHT;
+    let points = || lines.iter().flat_map(|line| &line.points);
+    let x = EvenAxis::over(points().map(|point| point[0]), plot::LEFT, right);
+    let ends = points().flat_map(|[_, value, error]| [value - error, value + error]);
+    let y = EvenAxis::over(ends, plot::HEIGHT - plot::BOTTOM, plot::TOP);
+    let mut out = plot::begin(name);
+    let along = index.sweeps.first().map_or_else(String::new, |axis| slice::escaped(&axis.column()));
+    // the title names what goes up
+    plot::even_grid(&mut out, &x, &y, [&along, ""], right);
+    let mut legend = Legend::new();
+    for (i, (line, colour)) in lines.iter().zip(COLOURS.into_iter().cycle()).enumerate() {
+        let path: Vec<String> = line
+            .points
+            .iter()
+            .map(|[at, value, _]| format!("{:.1},{:.1}", x.at(*at), y.at(*value)))
+            .collect();
+        // writing to a String cannot fail
+        let _ = write!(
+            out,
+            r##"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="2"/>"##,
+            path.join(" ")
+        );
+        for [at, value, error] in &line.points {
+            if *error > 0.0 {
+                let _ = write!(
+                    out,
+                    r##"<line x1="{0:.1}" y1="{1:.1}" x2="{0:.1}" y2="{2:.1}" stroke="{colour}"/>"##,
+                    x.at(*at),
+                    y.at(value - error),
+                    y.at(value + error)
+                );
+            }
+            plot::dot(&mut out, x.at(*at), y.at(*value), colour);
+        }
+        if !line.name.is_empty() && i < MOST_ENTRIES {
+            legend.entry(&mut out, &line.name, |out, x, y| {
+                plot::line_sample(out, (x, y), colour, "none", true)
+            });
+        }
+    }
+    if points().any(|[.., error]| *error > 0.0) {
+        legend.gap();
+        legend.remark(&mut out, "bars: standard error");
+    }
+    out
+}
+
+/// The points of a figure, by the values of all params but the first.
+fn lines(index: &Index, name: &str) -> Vec<Line> {
+    let mut lines: Vec<Line> = Vec::new();
+    for row in &index.rows {
+        let (Some(at), Some(figure)) =
+            (row.values.first(), row.figures.iter().find(|figure| figure.name == name))
+        else {
+            continue;
+        };
+        let point = [*at, figure.value, figure.error.unwrap_or(0.0)];
+        let others = others(index, row);
+        match lines.iter_mut().find(|line| line.name == others) {
+            Some(line) => line.points.push(point),
+            None => lines.push(Line { name: others, points: vec![point] }),
+        }
+    }
+    lines
+}
+
+fn others(index: &Index, row: &Row) -> String {
+    let shown = |(axis, value): (&super::index::Axis, &f64)| match axis.unit.as_str() {
+        "" => format!("{} = {value}", axis.name),
+        unit => format!("{} = {value} {unit}", axis.name),
+    };
+    index.sweeps.iter().zip(&row.values).skip(1).map(shown).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,160 @@
+//! `--sweep NAME=A..B:N`: the values that a param goes through.
+
+use super::super::values::{Definition, definition};
+use rfm::quantity::{number_and_unit, parse_quantity, parse_unit};
+
+/// A param with the values that it goes through.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::cli) struct Sweep {
+    pub name: String,
+    /// The unit of the values, as it was written; empty without one.
+    pub unit: String,
+    /// The values in that unit, in ascending order, evenly spaced.
+    pub values: Vec<f64>,
+}
+
+/// Most values of a sweep. A larger number is a typing error.
+const MOST_VALUES: usize = 10_000;
+
+/// Digits of values: what is lost to rounding does not show.
+const DIGITS: usize = 12;
+
+/// Reads `NAME=A..B:N`, with a unit behind B or behind both.
+pub(in crate::cli) fn sweep(text: &str) -> Result<Sweep, String> {
+    let form = "expected NAME=A..B:N, as in side=1..2:5 or alpha=\"0..30 deg:4\"";
+    let (name, range) = text.split_once('=').ok_or(form)?;
+    let (ends, count) =
+        range.rsplit_once(':').ok_or_else(|| format!("the number of values is missing; {form}"))?;
+    let (low, high) = ends.split_once("..").ok_or(form)?;
+    let count = count.trim();
+    let number: usize = count.parse().map_err(|_| format!("`{count}` is no number of values; {form}"))?;
+    if number > MOST_VALUES {
+        return Err(format!("{number} values: at most {MOST_VALUES} are possible"));
+    }
+    let (_, unit) = number_and_unit(high.trim());
+    let (low, high) = (end_in(low, unit)?, end_in(high, unit)?);
+    match number {
+        0 => Err("0 values are none: write 2 or more".into()),
+        1 => Err("1 value has no two ends: write 2 or more, or set the param by -D".into()),
+        _ if low == high => Err(format!("both ends are {low}: set the param by -D")),
+        _ if low > high => {
+            Err(format!("the ends are out of order: write {}={high}..{low}{unit}:{number}", name.trim()))
+        }
+        _ => {
+            let value = |i: usize| rounded(low + (high - low) * i as f64 / (number - 1) as f64);
+            let values = (0..number).map(value).collect();
+            Ok(Sweep { name: name.trim().to_string(), unit: unit.to_string(), values })
+        }
+    }
+}
+
+/// An end of the range, in the unit of its upper one.
+fn end_in(text: &str, unit: &str) -> Result<f64, String> {
+    let (value, dimension) = parse_quantity(text)?;
+    if !value.is_finite() {
+        return Err(format!("`{}` is not finite", text.trim()));
+    }
+    let (number, own) = number_and_unit(text.trim());
+    if own == unit || own.is_empty() {
+        return number.trim().parse().map_err(|_| format!("`{number}` is not a number"));
+    }
+    let Some(wanted) = parse_unit(unit) else {
+        return Err(format!(
+            "`{}` has a unit, and the other end has none: write it behind the upper end",
+            text.trim()
+        ));
+    };
+    if dimension != Some(wanted.dimension) {
+        return Err(format!("`{own}` and `{unit}` do not measure the same"));
+    }
+    Ok(rounded(value / wanted.factor))
+}
+
+fn rounded(value: f64) -> f64 {
+    format!("{value:.DIGITS$e}").parse().unwrap_or(value)
+}
+
+impl Sweep {
+    /// A value as a person writes it.
+    pub fn shown(&self, value: f64) -> String {
+        match self.unit.as_str() {
+            "" => value.to_string(),
+            unit => format!("{value} {unit}"),
+        }
+    }
+
+    /// What sets the param to a value.
+    pub fn definition(&self, value: f64) -> Result<Definition, String> {
+        definition(&format!("{}={}", self.name, self.shown(value)))
+    }
+}
+
+/// All combinations of the values of several sweeps: the last one goes through its values first.
+pub(super) fn grid(sweeps: &[Sweep]) -> Vec<Vec<f64>> {
+    sweeps.iter().fold(vec![Vec::new()], |points, sweep| {
+        let extended = |point: &Vec<f64>| -> Vec<Vec<f64>> {
+            sweep.values.iter().map(|value| [&point[..], &[*value]].concat()).collect()
+        };
+        points.iter().flat_map(extended).collect()
+    })
+}
+
+/// The name of the folder for a combination of values.
+pub(super) fn folder(sweeps: &[Sweep], point: &[f64]) -> String {
+    let part = |(sweep, value): (&Sweep, &f64)| format!("{}={value}{}", sweep.name, sweep.unit);
+    let name: Vec<String> = sweeps.iter().zip(point).map(part).collect();
+    let allowed = |c: char| if c.is_alphanumeric() || "=,.-+_".contains(c) { c } else { '_' };
+    name.join(",").chars().map(allowed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_evenly_spaced_in_the_unit_that_is_written() {
+        let check = |text: &str, unit: &str, values: &[f64]| {
+            let found = sweep(text).unwrap();
+            assert_eq!((found.unit.as_str(), &found.values[..]), (unit, values), "{text}");
+        };
+        check("a=0..30 deg:4", "deg", &[0.0, 10.0, 20.0, 30.0]);
+        check("a=1..2:3", "", &[1.0, 1.5, 2.0]);
+        check("a=-1..1:2", "", &[-1.0, 1.0]);
+        check("a=0..0.3:4", "", &[0.0, 0.1, 0.2, 0.3]);
+        check("a=5mm..2cm:4", "cm", &[0.5, 1.0, 1.5, 2.0]);
+        check("a = 1e-3 .. 3e-3 m/s : 3", "m/s", &[1e-3, 2e-3, 3e-3]);
+        let degrees = sweep("a=0..30 deg:4").unwrap().definition(30.0).unwrap();
+        assert_eq!((degrees.name.as_str(), degrees.value), ("a", 30.0 * (std::f64::consts::PI / 180.0)));
+    }
+
+    #[test]
+    fn what_is_no_range_is_refused_in_words() {
+        for (text, reason) in [
+            ("a", "expected NAME=A..B:N"),
+            ("a=1..2", "the number of values is missing"),
+            ("a=1:2", "expected NAME=A..B:N"),
+            ("a=1..2:0", "0 values are none"),
+            ("a=1..2:1", "1 value has no two ends"),
+            ("a=1..2:x", "`x` is no number of values"),
+            ("a=1..2:20000", "at most 10000"),
+            ("a=2..1:3", "write a=1..2:3"),
+            ("a=1..1:3", "both ends are 1"),
+            ("a=1..inf:3", "not finite"),
+            ("a=1mm..2:3", "write it behind the upper end"),
+            ("a=1s..2mm:3", "do not measure the same"),
+            ("a=1..2 furlong:3", "is not a unit"),
+        ] {
+            let error = sweep(text).unwrap_err();
+            assert!(error.contains(reason), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_grid_has_all_combinations_and_each_its_folder() {
+        let sweeps = [sweep("a=1..2:2").unwrap(), sweep("v=0..1 m/s:3").unwrap()];
+        let points = grid(&sweeps);
+        assert_eq!(points.len(), 6);
+        assert_eq!((&points[0][..], &points[1][..]), (&[1.0, 0.0][..], &[1.0, 0.5][..]));
+        assert_eq!(folder(&sweeps, &points[1]), "a=1,v=0.5m_s");
+    }
+}

@@ -1,0 +1,146 @@
+//! Operands of `and` and `or` whose removal changes nothing.
+//!
+//! Points of a lattice show of most operands that they matter. For each that is left, all of space is divided into
+//! boxes, in which ranges of the leaves must prove that it does not.
+
+use glam::DVec3;
+
+use super::operands::{Operands, Sign};
+use crate::diagnostic::{SourceId, Span};
+use crate::geom::Aabb;
+use crate::interval::Interval;
+use crate::solid::bounds::search::{SEARCH_RADIUS, halves};
+use crate::solid::construction::Solid;
+use crate::solid::leaves::leaf_set::Leaves;
+
+/// Points along each side of the lattice.
+const POINTS: usize = 17;
+
+/// The lattice covers the bounds and so much around them, as a part of their longest side: what cuts something off is seen
+/// there.
+const MARGIN: f64 = 0.3;
+
+/// Ranges of leaves that may be found for one operand, and for all of them: less than a second.
+const RANGES_OF_ONE: usize = 1_000_000;
+const RANGES: usize = 6_000_000;
+
+/// Boxes that are smaller than this part of the solid decide nothing: the surfaces touch.
+const SMALLEST: f64 = 1e-4;
+
+impl Solid {
+    /// The places in a text of operands that could be left out: the solid has the same points without each of them, and
+    /// without all of them together. Of a solid that moves or has no bounds nothing is known.
+    pub fn idle_operands(&self, source: SourceId) -> Vec<Span> {
+        let (graph, root) = self.formula();
+        let (Some(bounds), false) = (self.bounds().aabb(), self.moves()) else { return Vec::new() };
+        let (Some(operands), Some(parts)) = (Operands::of(graph, root), self.parts()) else {
+            return Vec::new();
+        };
+        let search = Search { operands: &operands, leaves: &parts.leaves, bounds };
+        let mut left = search.seen_nowhere(&operands.candidates(source));
+        let mut removed = vec![false; operands.all.len()];
+        let (mut found, mut budget) = (Vec::new(), RANGES);
+        left.retain(|&operand| {
+            let is_part_of_removed =
+                removed.iter().enumerate().any(|(i, &gone)| gone && operands.is_within(operand, i));
+            if is_part_of_removed || !search.is_idle(operand, &removed, &mut budget) {
+                return false;
+            }
+            removed[operand] = true;
+            true
+        });
+        found.extend(left.into_iter().filter_map(|operand| operands.all[operand].span));
+        found
+    }
+}
+
+impl Operands {
+    /// Operands that a person has written as such, and could remove: each at a place of its own in the text. The members
+    /// of a fold and the parts of a standard solid share theirs.
+    fn candidates(&self, source: SourceId) -> Vec<usize> {
+        let place = |i: usize| self.all[i].span.filter(|span| span.source == source);
+        let is_outermost = |i: &usize| match self.all[*i].joined {
+            Some((parent, other)) => place(*i) != place(parent) && place(*i) != place(other),
+            None => false,
+        };
+        let outermost: Vec<usize> =
+            (0..self.all.len()).filter(|&i| place(i).is_some()).filter(is_outermost).collect();
+        let times = |i: usize| {
+            let written = |&other: &usize| place(other) == place(i) && other != i;
+            outermost.iter().filter(|other| written(other)).count()
+        };
+        outermost.iter().copied().filter(|&i| times(i) == 0).collect()
+    }
+}
+
+struct Search<'a> {
+    operands: &'a Operands,
+    leaves: &'a Leaves,
+    bounds: Aabb,
+}
+
+impl Search<'_> {
+    /// Those of some operands that matter at no point of a lattice.
+    fn seen_nowhere(&self, candidates: &[usize]) -> Vec<usize> {
+        let space = self.bounds.grown(MARGIN * self.bounds.size().max_element());
+        let step = space.size() / (POINTS - 1) as f64;
+        let none = vec![false; self.operands.all.len()];
+        let mut left = candidates.to_vec();
+        for plane in 0..POINTS {
+            if left.is_empty() {
+                break;
+            }
+            let points: Vec<DVec3> = (0..POINTS * POINTS)
+                .map(|i| {
+                    space.min + step * DVec3::new((i % POINTS) as f64, (i / POINTS) as f64, plane as f64)
+                })
+                .collect();
+            let columns: [Vec<f64>; 3] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect());
+            let values: Vec<Vec<f64>> = (0..self.operands.leaves as u32)
+                .map(|leaf| {
+                    let mut out = vec![0.0; points.len()];
+                    self.leaves.values(leaf, columns.each_ref().map(|c| &c[..]), &mut out);
+                    out
+                })
+                .collect();
+            for i in 0..points.len() {
+                let signs: Vec<Sign> = values.iter().map(|of_leaf| sign_of(of_leaf[i])).collect();
+                let idle = self.operands.without_effect(&signs, &none);
+                left.retain(|&operand| idle[operand]);
+            }
+        }
+        left
+    }
+
+    /// Whether all of space is proven to have the same points without an operand.
+    fn is_idle(&self, operand: usize, removed: &[bool], budget: &mut usize) -> bool {
+        let smallest = SMALLEST * self.bounds.size().max_element();
+        let mut open = vec![Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS))];
+        let mut ranges = RANGES_OF_ONE.min(*budget);
+        while let Some(space) = open.pop() {
+            let Some(rest) = ranges.checked_sub(self.operands.leaves) else { return false };
+            (ranges, *budget) = (rest, *budget - self.operands.leaves);
+            let known = |leaf: u32| Sign::of(self.leaves.range(leaf, &space));
+            let signs: Vec<Sign> = (0..self.operands.leaves as u32).map(known).collect();
+            if self.operands.without_effect(&signs, removed)[operand] {
+                continue;
+            }
+            if space.size().max_element() < smallest || self.matters_at(space.centre(), operand, removed) {
+                return false;
+            }
+            open.extend(halves(&space));
+        }
+        true
+    }
+
+    fn matters_at(&self, p: DVec3, operand: usize, removed: &[bool]) -> bool {
+        let sign = |leaf| sign_of(self.leaves.value(leaf, p));
+        let signs: Vec<Sign> = (0..self.operands.leaves as u32).map(sign).collect();
+        !self.operands.without_effect(&signs, removed)[operand]
+    }
+}
+
+/// The sign at a point. A surface through it leaves it open.
+fn sign_of(value: f64) -> Sign {
+    if value.is_nan() { Sign::Unknown } else { Sign::of(Interval::point(value)) }
+}
