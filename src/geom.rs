@@ -114,6 +114,22 @@ impl Placement {
     }
 }
 
+/// How a body moves at an instant: v(p) = v₀ + ω × p.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Twist {
+    /// The velocity at the origin, v₀, m/s.
+    pub velocity: DVec3,
+    /// The angular velocity ω, rad/s.
+    pub angular: DVec3,
+}
+
+impl Twist {
+    /// The velocity of a point that the body carries along, m/s.
+    pub fn at(&self, p: DVec3) -> DVec3 {
+        self.velocity + self.angular.cross(p)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

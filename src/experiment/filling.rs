@@ -20,7 +20,7 @@ use crate::field::{Field, Region};
 use crate::geom::Aabb;
 use crate::lower::Scene;
 use crate::solid::Bounds;
-use crate::sph::{Carved, FluidBlock, FluidShape, Obstacle, Particles, carve, make_room};
+use crate::sph::{Carved, FluidBlock, FluidShape, Obstacle, Particles, carve, carve_cells, make_room};
 use crate::{Engine, Program, Solid};
 
 /// Least distance of particles from obstacles at the start, over the spacing.
@@ -91,7 +91,7 @@ impl Experiment {
         let mass = self.parameters.particle_mass;
         let within = self.reach()?.intersection(&self.scene.domain);
         let as_stated = || {
-            let (particles, carved) = self.place(obstacles, None, fluid.particles)?;
+            let (particles, carved) = self.place(obstacles, None, fluid.particles, None)?;
             Ok(Filling { particles, carved, mass, volume: None, fills_vessel: false })
         };
         if fluid.particles.is_some() && fluid.size_span.is_some() {
@@ -106,7 +106,9 @@ impl Experiment {
         }
         // other methods do not ask, and many bodies take time
         let fills_vessel = self.parameters.keeps_density() && self.free_volume(0.0) < LEAST_ROOM * volume;
-        let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume)?;
+        let alone = Region { shape: &self.fluid, bodies: Vec::new(), within }.volume();
+        let taken = (alone - volume).max(0.0);
+        let (mut particles, mut carved, cell) = self.fit(obstacles, within, volume, taken)?;
         if let Some(number) = fluid.particles {
             particles = thinned(&particles, number);
             carved.kept = particles.len();
@@ -120,13 +122,15 @@ impl Experiment {
         Ok(Filling { particles, carved, mass, volume: Some(volume), fills_vessel })
     }
 
-    /// Places particles on the lattice that fits the shape best. Returns them, what was carved, and the size of the
+    /// Places particles on the lattice that fits the fluid's volume best, m³, in a shape of which bodies take another
+    /// volume. Returns them, what was carved, and the size of the
     /// lattice's cells.
     fn fit(
         &self,
         obstacles: &[Obstacle],
         within: Aabb,
         volume: f64,
+        taken: f64,
     ) -> Result<(Particles, Carved, DVec3), Error> {
         let wanted = self.scene.fluid.particles;
         let spacing = self.parameters.spacing();
@@ -142,7 +146,7 @@ impl Experiment {
             };
             for _ in 0..TRIALS {
                 let cell = fitted_to(within.size(), spacing, sites);
-                let (particles, carved) = self.place(obstacles, Some(cell), None)?;
+                let (particles, carved) = self.place(obstacles, Some(cell), None, Some(taken))?;
                 let (Some(wanted), Some(least)) = (wanted, &mut sites) else {
                     return Ok((particles, carved, cell));
                 };
@@ -165,7 +169,7 @@ impl Experiment {
             (self.cell(within, 2.0 * spacing) / self.cell(within, spacing)).map(f64::log2).element_sum();
         for _ in 0..TRIALS {
             let cell = self.cell(within, size);
-            let (particles, carved) = self.place(obstacles, Some(cell), None)?;
+            let (particles, carved) = self.place(obstacles, Some(cell), None, Some(taken))?;
             let number = particles.len() as f64;
             let enough = wanted.is_none_or(|wanted| particles.len() >= wanted);
             let off = (number * cell.element_product() / volume).ln();
@@ -235,12 +239,13 @@ impl Experiment {
     }
 
     /// Places particles at rest on a lattice with these cells, or with the spacing, and removes those that obstacles
-    /// leave no room for.
+    /// leave no room for: as many as the volume, m³, has cells that they take of the shape, if it is known.
     fn place(
         &self,
         obstacles: &[Obstacle],
         cell: Option<DVec3>,
         count: Option<usize>,
+        taken: Option<f64>,
     ) -> Result<(Particles, Carved), Error> {
         let (fluid, domain) = (&self.scene.fluid, &self.scene.domain);
         let reach = self.reach()?;
@@ -258,12 +263,21 @@ impl Experiment {
         let mut particles = block.seed(&self.parameters, *domain).map_err(|e| self.no_fluid(&e))?;
         let spacing = cell.map_or(self.parameters.spacing(), |cell| cell.element_product().cbrt());
         let mut clearance = CLEARANCE * spacing;
-        if self.parameters.makes_room_at_start() {
-            // particles that are too near may move; only those that find no place are removed
-            make_room(&mut particles, domain, obstacles, clearance);
-            clearance *= 0.5;
-        }
-        let carved = carve(&mut particles, domain, obstacles, clearance).map_err(|e| self.no_fluid(&e))?;
+        let cells = taken.zip(cell).map(|(taken, cell)| (taken / cell.element_product()).round() as usize);
+        let carved = match (self.parameters.makes_room_at_start(), cells) {
+            (true, Some(cells)) => {
+                carve_cells(&mut particles, domain, obstacles, (spacing, clearance), cells)
+            }
+            (makes_room, _) => {
+                if makes_room {
+                    // particles that are too near may move; only those that find no place are removed
+                    make_room(&mut particles, domain, obstacles, clearance);
+                    clearance *= 0.5;
+                }
+                carve(&mut particles, domain, obstacles, clearance)
+            }
+        };
+        let carved = carved.map_err(|e| self.no_fluid(&e))?;
         Ok((particles, carved))
     }
 
@@ -287,7 +301,11 @@ impl Experiment {
         Filling { carved, mass, volume, particles, fills_vessel: _ }: &Filling,
     ) -> Option<Diagnostic> {
         let lost = carved.inside + carved.too_close + carved.outside_box;
-        if lost == 0 {
+        let off =
+            volume.map(|volume| mass * particles.len() as f64 / (self.scene.fluid.density * volume) - 1.0);
+        let is_whole = off.is_some_and(|off| off.abs() < GOOD_ENOUGH);
+        if lost == 0 || is_whole && lost == carved.too_close {
+            // a lattice that is fitted to the room beside a wall takes nothing from the fluid
             return None;
         }
         let mut message = format!(
@@ -295,10 +313,8 @@ impl Experiment {
              outside the box; {} are left",
             carved.inside, carved.too_close, carved.outside_box, carved.kept
         );
-        if let Some(volume) = volume {
-            let (has, asked) = (mass * particles.len() as f64, self.scene.fluid.density * volume);
-            let off = has / asked - 1.0;
-            message += &if off.abs() < GOOD_ENOUGH {
+        if let Some(off) = off {
+            message += &if is_whole {
                 ", as heavy as the free part of the shape".to_string()
             } else {
                 format!(

@@ -81,7 +81,17 @@ impl Experiment {
         parameters.time_step = time_step.seconds;
         parameters.validate().map_err(|error| {
             let message = format!("the fluid's figures do not fit together: {error}");
-            refuse(&program, Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message))
+            let refusal = Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message);
+            refuse(
+                &program,
+                if error.name == "sound_speed" && typical_speed == 0.0 {
+                    refusal.help(
+                        "no fluid falls or moves at the start: state `sound_speed`, ten times the greatest speed to come",
+                    )
+                } else {
+                    refusal
+                },
+            )
         })?;
         let bodies = bodies::compile(&program, &scene, &parameters, engine)?;
         let warnings = too_long.into_iter().collect();

@@ -53,12 +53,11 @@ pub trait Walls: Field {
         self.omega(path.at(t))
     }
 
-    /// The velocity of the surface near a point along the surface's normal, in the scene's units of length
-    /// and time.
+    /// The velocity of the wall near a point of its surface, in the scene's units of length and time.
     ///
-    /// On the surface ω(x(t), t) = 0, so it moves along n = −∇ω/|∇ω| with the speed ω_t/|∇ω|. At an edge this
-    /// is the velocity of one of the faces, or their mean. ω does not contain a motion within the surface
-    /// itself, such as that of a turning cylinder.
+    /// If the field knows that the wall moves without deformation, this is v₀ + ω × p. Otherwise it is the velocity
+    /// along the normal: on the surface ω(x(t), t) = 0, so it moves along n = −∇ω/|∇ω| with the speed ω_t/|∇ω|. At an
+    /// edge this is the velocity of one of the faces, or their mean.
     fn wall_velocity(&self, _p: DVec3) -> DVec3 {
         DVec3::ZERO
     }

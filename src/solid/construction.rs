@@ -11,7 +11,7 @@ use super::programs::number::UniformValues;
 use super::programs::on_demand::{Guard, Lane, Programs};
 use super::programs::ranges::Ranges;
 use crate::codegen::{CodegenError, Form, Forms};
-use crate::geom::{Aabb, Placement};
+use crate::geom::{Aabb, Placement, Twist};
 use crate::interval::Interval;
 use crate::ir::{self, Graph, Node, RigidMotion, Uniforms};
 use crate::precision::Precision;
@@ -152,9 +152,17 @@ impl Solid {
     /// Where the solid is at a time, s, seen from where it is at the time 0, if it moves without deformation; `None` if
     /// that is not to be seen in its formula.
     pub fn placement(&self, time: f64) -> Option<Placement> {
+        self.rigid_motion()?.placement(time)
+    }
+
+    /// How the solid moves now, if it moves without deformation and its formula shows how.
+    pub(super) fn twist(&self) -> Option<Twist> {
+        self.moment.twist(|now| self.rigid_motion()?.twist(now))
+    }
+
+    fn rigid_motion(&self) -> Option<&RigidMotion> {
         let omega = &self.inner.omega;
-        let motion = self.inner.motion.get_or_init(|| RigidMotion::of(&omega.graph, omega.root));
-        motion.as_ref()?.placement(time)
+        self.inner.motion.get_or_init(|| RigidMotion::of(&omega.graph, omega.root)).as_ref()
     }
 
     /// How many numbers of a program depend on time alone: they are found once for each time, the rest at

@@ -109,13 +109,20 @@ impl Solid {
         Contact { distance, normal: DVec3::new(nx, ny, nz), mean_curvature }
     }
 
-    /// The velocity of the surface near a point, along its normal, in lengths per second: that of the face
-    /// which [`Solid::contact`] finds. Zero for a solid at rest. A motion within the surface itself, as of a
-    /// turning cylinder, is not in ω.
+    /// The velocity of the solid near a point of its surface, in lengths per second. Zero for a solid at rest.
+    ///
+    /// A solid that is moved and turned without deformation has the velocity v₀ + ω × p, also where its surface
+    /// moves within itself, as that of a turning cylinder does. Of other solids only the velocity along the normal of
+    /// the face which [`Solid::contact`] finds is in ω; solids of parts that move differently are among them.
     pub fn wall_velocity(&self, p: DVec3) -> DVec3 {
         if !self.moves() {
             return DVec3::ZERO;
         }
+        self.twist().map_or_else(|| self.face_velocity(p), |twist| twist.at(p))
+    }
+
+    /// The velocity along its normal of the face nearest to a point.
+    fn face_velocity(&self, p: DVec3) -> DVec3 {
         let mut out = [0.0; 3];
         self.evaluate(ProgramKind::Velocity, p.to_array(), &mut out);
         DVec3::from_array(out)

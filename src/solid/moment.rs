@@ -7,6 +7,7 @@ use super::engine::ProgramKind;
 use super::leaves::leaf_set::LeafTree;
 use super::programs::number::UniformValues;
 use super::programs::ranges::UniformRanges;
+use crate::geom::Twist;
 use crate::interval::Interval;
 
 /// A stretch of time. Values are those at its end, ranges hold for all of it; a solid at rest has one for
@@ -19,6 +20,7 @@ pub(super) struct Moment {
     twin_ranges: OnceLock<UniformRanges>,
     parts: OnceLock<Option<Arc<LeafTree>>>,
     bounds: OnceLock<FoundBounds>,
+    twist: OnceLock<Option<Twist>>,
 }
 
 impl Moment {
@@ -31,6 +33,7 @@ impl Moment {
             twin_ranges: OnceLock::new(),
             parts: OnceLock::new(),
             bounds: OnceLock::new(),
+            twist: OnceLock::new(),
         })
     }
 
@@ -58,5 +61,10 @@ impl Moment {
 
     pub fn bounds(&self, find: impl FnOnce() -> FoundBounds) -> &FoundBounds {
         self.bounds.get_or_init(find)
+    }
+
+    /// How the solid moves at the end of the stretch, as `find` says.
+    pub fn twist(&self, find: impl FnOnce(f64) -> Option<Twist>) -> Option<Twist> {
+        *self.twist.get_or_init(|| find(self.to))
     }
 }

@@ -13,6 +13,7 @@ mod crossings;
 mod diagnostics;
 mod distance;
 mod documents;
+mod driven;
 mod editors;
 mod examples;
 mod files;

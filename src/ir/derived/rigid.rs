@@ -3,11 +3,13 @@
 //! A solid that is moved and turned has x, y and z in its formula only through linear functions of them, whose
 //! coefficients depend on time: x cos 2πt + y sin 2πt. Each is the distance from a plane, times a factor. If one rotation
 //! and one translation bring all of these planes from where they are at the time 0 to where they are now, they bring the
-//! solid there.
+//! solid there. With the velocity v(p) = v₀ + ω × p a plane n·p + o that the solid carries along has n' = ω × n and
+//! o' = −n·v₀. This is known of a turning cylinder, too, although its surface stays where it is.
 
 use glam::{DMat3, DQuat, DVec3};
 
-use crate::geom::Placement;
+use crate::geom::{Placement, Twist};
+use crate::ir::derived::gradient::gradient_and_rate;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::interpreter::{Given, Interpreter};
 use crate::ir::op::{Binary, Unary};
@@ -62,6 +64,8 @@ struct Plane {
 #[derive(Debug)]
 pub struct RigidMotion {
     interpreter: Interpreter,
+    /// Their derivatives by time.
+    rates: Interpreter,
     count: usize,
     /// The planes at the time 0.
     at_start: Vec<Plane>,
@@ -84,9 +88,11 @@ impl RigidMotion {
             }
         }
         let interpreter = Interpreter::new(graph, &planes);
-        let mut motion = Self { interpreter, count: planes.len(), at_start: Vec::new() };
-        motion.at_start = motion.planes(0.0)?;
-        Some(motion)
+        let count = planes.len();
+        let at_start = planes_at(&interpreter, count, 0.0)?;
+        let mut graph = graph.clone();
+        let rates: Vec<Node> = planes.iter().map(|&plane| gradient_and_rate(&mut graph, plane)[3]).collect();
+        Some(Self { interpreter, rates: Interpreter::new(&graph, &rates), count, at_start })
     }
 
     /// Where the solid is at a time, s, seen from where it is at the time 0; `None` if it has another shape.
@@ -108,20 +114,70 @@ impl RigidMotion {
         (is_turn && self.at_start.iter().zip(&now).all(is_one)).then_some(placement)
     }
 
-    fn planes(&self, time: f64) -> Option<Vec<Plane>> {
-        let mut at = |point: DVec3| {
-            let mut values = vec![0.0; self.count];
-            self.interpreter.eval_given(Given { time, ..Given::point(point.to_array()) }, &mut values);
-            values
+    /// How the solid moves at a time, s; `None` if it is deformed, or if its planes do not tell how it moves along its
+    /// surface: those of a half-space, or of a prism without ends that tilts.
+    pub fn twist(&self, time: f64) -> Option<Twist> {
+        let now = self.planes(time)?;
+        let rates = planes_at(&self.rates, self.count, time)?;
+        let frame = Frame::of(&now);
+        let angular = angular_velocity(&now, &rates)?;
+        let is_known = match frame.axes[..] {
+            [a, b] => angular.dot(a).abs().max(angular.dot(b).abs()) <= SAME * angular.length(),
+            [_, _, _] => true,
+            _ => false,
         };
-        let [origin, x, y, z] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(&mut at);
-        let plane = |k: usize| {
-            let offset = origin[k];
-            Plane { normal: DVec3::new(x[k], y[k], z[k]) - offset, offset }
+        let mut velocity = DVec3::ZERO;
+        for (&(k, length), &axis) in frame.chosen.iter().zip(&frame.axes) {
+            let (wanted, normal) = (-rates[k].offset / length, now[k].normal / length);
+            velocity += (wanted - normal.dot(velocity)) / normal.dot(axis) * axis;
+        }
+        let twist = Twist { velocity, angular };
+        let (slow, fast) = (SAME * velocity.length(), SAME * angular.length());
+        let is_carried = |(plane, rate): (&Plane, &Plane)| {
+            let length = plane.normal.length();
+            (angular.cross(plane.normal) - rate.normal).length() <= length * fast
+                && (rate.offset + plane.normal.dot(velocity)).abs()
+                    <= length * slow + plane.offset.abs() * fast + SAME * rate.offset.abs()
         };
-        let planes: Vec<_> = (0..self.count).map(plane).collect();
-        planes.iter().all(|plane| plane.normal.is_finite() && plane.offset.is_finite()).then_some(planes)
+        (is_known && now.iter().zip(&rates).all(is_carried)).then_some(twist)
     }
+
+    fn planes(&self, time: f64) -> Option<Vec<Plane>> {
+        planes_at(&self.interpreter, self.count, time)
+    }
+}
+
+/// The linear functions of the place that formulas are at a time, s; `None` where they have no value.
+fn planes_at(formulas: &Interpreter, count: usize, time: f64) -> Option<Vec<Plane>> {
+    let at = |point: DVec3| {
+        let mut values = vec![0.0; count];
+        formulas.eval_given(Given { time, ..Given::point(point.to_array()) }, &mut values);
+        values
+    };
+    let [origin, x, y, z] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(at);
+    let plane = |k: usize| {
+        let offset = origin[k];
+        Plane { normal: DVec3::new(x[k], y[k], z[k]) - offset, offset }
+    };
+    let planes: Vec<_> = (0..count).map(plane).collect();
+    planes.iter().all(|plane| plane.normal.is_finite() && plane.offset.is_finite()).then_some(planes)
+}
+
+/// ω with n' = ω × n for all planes, by least squares, 1/s; `None` if they are all parallel.
+fn angular_velocity(now: &[Plane], rates: &[Plane]) -> Option<DVec3> {
+    let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
+    for (plane, rate) in now.iter().zip(rates) {
+        let length = plane.normal.length();
+        if length > 0.0 {
+            let normal = plane.normal / length;
+            let square = DMat3::from_cols(normal.x * normal, normal.y * normal, normal.z * normal);
+            matrix += DMat3::IDENTITY - square;
+            right += normal.cross(rate.normal / length);
+        }
+    }
+    let size = matrix.col(0).x + matrix.col(1).y + matrix.col(2).z;
+    let is_singular = matrix.determinant() <= (INDEPENDENT * size).powi(2) * size;
+    (!is_singular).then(|| matrix.inverse() * right)
 }
 
 /// Up to three independent planes, made orthonormal one after the other.
@@ -208,6 +264,37 @@ mod tests {
                     assert!((now - then).abs() < 1e-9 * (1.0 + now.abs()), "{text} at {time}: {now} {then}");
                 }
             }
+        }
+    }
+
+    /// A point that is carried along has the velocity that the twist says, by central differences.
+    #[test]
+    fn their_velocity_is_that_of_points_carried_along() {
+        for text in [
+            "cylinder(0.2, 2).rotate_z(5*t)",
+            "sphere(1).rotate([1, 2, -1], 3*t).move([t^2, 0, sin(t)])",
+            "box([-1,-2,-3],[1,2,3]).move([0.5, 0, 0]).rotate_y(t^2)",
+            "(x^2 + y^2 <= 1).rotate_z(t)",
+        ] {
+            let solid = solid(text);
+            let motion = motion(&solid);
+            for time in [0.0, 0.4, 2.3] {
+                let twist = motion.twist(time).unwrap_or_else(|| panic!("{text} at {time}"));
+                let step = 1e-5;
+                let now = motion.placement(time).unwrap();
+                let [before, after] = [-step, step].map(|dt| motion.placement(time + dt).unwrap());
+                for p in [DVec3::new(0.3, -0.2, 0.5), DVec3::new(-1.0, 2.0, 0.1)] {
+                    let start = now.back(p);
+                    let there = |place: &Placement| place.rotation * start + place.translation;
+                    let expected = (there(&after) - there(&before)) / (2.0 * step);
+                    let found = twist.at(p);
+                    assert!(found.distance(expected) < 1e-7, "{text} at {time}: {found} {expected}");
+                }
+            }
+        }
+        // how these move along their surfaces, nobody knows
+        for text in ["x <= t", "(x^2 + y^2 <= 1).rotate_x(t)", "sphere(1 + t)", "sphere(1) and x <= t"] {
+            assert!(motion(&solid(text)).twist(0.5).is_none(), "{text}");
         }
     }
 

@@ -475,6 +475,9 @@ impl Walls for CellMap {
         if !self.solid.moves() {
             return DVec3::ZERO;
         }
+        if let Some(twist) = self.solid.twist() {
+            return twist.at(p);
+        }
         match self.cells.find(p).map(|found| found.cell) {
             Some(Cell::Near(program)) => {
                 self.nearest(&mut (program as usize), p).velocity(&self.parts.leaves, p)

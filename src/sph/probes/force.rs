@@ -178,7 +178,7 @@ impl Wetting<'_> {
             found.pressure +=
                 weight * if is_known { pressure + density * by_pressure.dot(away) } else { 0.0 };
             if sticks {
-                let wall = self.core.boundary.velocity(self.obstacle, x);
+                let wall = self.core.boundary.velocity_along(self.obstacle, x);
                 let velocity = particles.velocity.get(i) - wall;
                 let along = velocity - velocity.dot(normal) * normal;
                 found.shear += weight / distance.max(NEAREST * h) * along;

@@ -73,9 +73,9 @@ pub struct Obstacle {
     pub resolution: f64,
     /// How the body acts on a fluid that moves along it.
     pub slip: Slip,
-    /// Motion of the surface within itself, m/s, as that of a belt or of a turning cylinder. It takes along a
-    /// fluid that sticks. It is evaluated at the places of particles near the surface, so that the field of a body
-    /// that turns does not rub on a fluid that turns with it.
+    /// Motion of the surface within itself, m/s, as that of a belt. It takes along a fluid that sticks, in place of
+    /// what is known of the body's motion along its surface. It is evaluated at the places of particles near the
+    /// surface, so that the field of a body that turns does not rub on a fluid that turns with it.
     pub surface_velocity: Option<Arc<VectorField>>,
 }
 
@@ -143,11 +143,15 @@ impl Boundary {
         REACH * self.clearance
     }
 
-    /// The velocity of an obstacle's surface near a point, m/s: that of its motion and that within itself.
-    pub fn velocity(&self, k: usize, p: DVec3) -> DVec3 {
+    /// The velocity along an obstacle's surface near a point, m/s, of which only the part in the surface has a meaning: what
+    /// the scene states, or that of the body's motion.
+    pub fn velocity_along(&self, k: usize, p: DVec3) -> DVec3 {
         let obstacle = &self.obstacles[k];
-        let moving = if obstacle.moving.is_some() { self.field(k).wall_velocity(p) } else { DVec3::ZERO };
-        moving + obstacle.surface_velocity.as_ref().map_or(DVec3::ZERO, |velocity| velocity(p, self.time))
+        match &obstacle.surface_velocity {
+            Some(velocity) => velocity(p, self.time),
+            None if obstacle.moving.is_some() => self.field(k).wall_velocity(p),
+            None => DVec3::ZERO,
+        }
     }
 
     /// The fields of all obstacles during the present step.
@@ -300,9 +304,7 @@ impl Boundary {
         if obstacle.moving.is_some() {
             coverage.set_in_motion(field.wall_velocity(p));
         }
-        if let Some(velocity) = &obstacle.surface_velocity {
-            coverage.friction.take_along(velocity(p, self.time));
-        }
+        coverage.friction.take_along(self.velocity_along(k, p));
         whole.or(&coverage)
     }
 

@@ -84,11 +84,10 @@ impl<F: Friction> Coverage<F> {
         }
     }
 
-    /// Lets all of these walls move with one velocity, m/s.
+    /// Lets all of these walls move with one velocity, m/s. Friction is told apart.
     pub fn set_in_motion(&mut self, velocity: DVec3) {
         self.sweep = self.gradient.dot(velocity);
         self.barrier.sweep = self.barrier.gradient.dot(velocity);
-        self.friction.take_along(velocity);
     }
 
     /// Lets the fluid slip along all of these walls.

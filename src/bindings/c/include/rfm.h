@@ -476,7 +476,8 @@ double rfm_sign(const struct RfmSolid *solid,
 // The surface as seen from a point; all numbers are NaN for null.
 struct RfmContact rfm_contact(const struct RfmSolid *solid, double x, double y, double z);
 
-// The velocity of the surface near a point along its normal, m/s: three numbers, zero for a solid at rest.
+// The velocity of the surface near a point, m/s: three numbers, zero for a solid at rest. Of a solid that moves and turns
+// without changing its shape it is the whole velocity, of others the part along the normal.
 void rfm_wall_velocity(const struct RfmSolid *solid, double x, double y, double z, double *velocity);
 
 // Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
@@ -594,7 +595,8 @@ double rfm_sign(const struct RfmSolid *solid,
 // The surface as seen from a point; all numbers are NaN for null.
 struct RfmContact rfm_contact(const struct RfmSolid *solid, double x, double y, double z);
 
-// The velocity of the surface near a point along its normal, m/s: three numbers, zero for a solid at rest.
+// The velocity of the surface near a point, m/s: three numbers, zero for a solid at rest. Of a solid that moves and turns
+// without changing its shape it is the whole velocity, of others the part along the normal.
 void rfm_wall_velocity(const struct RfmSolid *solid, double x, double y, double z, double *velocity);
 
 // Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it

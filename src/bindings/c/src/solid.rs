@@ -313,7 +313,8 @@ pub unsafe extern "C" fn rfm_contact(solid: *const RfmSolid, x: f64, y: f64, z: 
     })
 }
 
-/// The velocity of the surface near a point along its normal, m/s: three numbers, zero for a solid at rest.
+/// The velocity of the surface near a point, m/s: three numbers, zero for a solid at rest. Of a solid that moves and turns
+/// without changing its shape it is the whole velocity, of others the part along the normal.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_wall_velocity(
     solid: *const RfmSolid,
