@@ -2,7 +2,9 @@
 
 use super::args::Shared;
 use rfm::diagnostic::{Code, Diagnostic, Span};
+use rfm::geom::Aabb;
 use rfm::glam::DVec3;
+use rfm::ir::Node;
 use rfm::lower::{NamedSolid, Obstacle, Scene};
 use rfm::solid::{Break, Breakage, ThinPart, Uneven};
 use rfm::syntax::ast::Item;
@@ -118,17 +120,32 @@ impl Subject<'_> {
     }
 }
 
+/// A shape, the spacing of particles, m, and the box of their scene.
+type Search = (Node, f64, Aabb);
+
 /// Warnings about obstacles that the particles of their scenes are too large for.
 pub(super) fn of_scenes(shared: &Shared, program: &Program) -> Result<Vec<Diagnostic>, Error> {
     let mut found = Vec::new();
+    // scenes that compare something share their obstacles
+    let mut known: Vec<(Search, [Option<ThinPart>; 2])> = Vec::new();
+    let mut budget = THIN_OPERATIONS;
     for scene in &program.module().scenes {
-        if scene.obstacles.len() > MOST_OBSTACLES {
+        if scene.obstacles.is_empty() || scene.obstacles.len() > MOST_OBSTACLES {
             continue;
         }
         let spacing = experiment::spacing(program, scene, shared.engine.into())?;
         for obstacle in &scene.obstacles {
-            let solid = program.compile(&obstacle.name, obstacle.shape, shared.engine.into())?;
-            let [wall, gap] = solid.at(0.0).thinner_than(THIN_WALL * spacing, spacing);
+            let search = (obstacle.shape, spacing, scene.domain);
+            let [wall, gap] = match known.iter().find(|(other, _)| *other == search) {
+                Some((_, parts)) => *parts,
+                None => {
+                    let solid = program.compile(&obstacle.name, obstacle.shape, shared.engine.into())?;
+                    let parts =
+                        solid.at(0.0).thin_parts([THIN_WALL * spacing, spacing], &scene.domain, &mut budget);
+                    known.push((search, parts));
+                    parts
+                }
+            };
             let both = [(wall, "wall", THIN_WALL), (gap, "gap", 1.0)];
             let parts =
                 both.into_iter().filter_map(|(part, what, of_spacing)| Some((part?, what, of_spacing)));
@@ -145,6 +162,9 @@ pub(super) fn of_scenes(shared: &Shared, program: &Program) -> Result<Vec<Diagno
 /// Walls that are thinner than this part of the spacing are told of. A particle stays half a spacing away from each face:
 /// through such a wall it is nearer to those on the other side than to its own second neighbours.
 const THIN_WALL: f64 = 0.5;
+
+/// Operations that are spent on the walls and gaps of all scenes together, at most: some seconds.
+const THIN_OPERATIONS: usize = 2_500_000_000;
 
 /// Scenes with more obstacles are not looked at.
 const MOST_OBSTACLES: usize = 50;

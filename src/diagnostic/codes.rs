@@ -228,9 +228,9 @@ and particles may pass it. Let both values agree where they meet, move the borde
     rfm 1
     solid step = box([-1, -1, 0], [1, 1, 2]) and where(x <= 0, 1 - z, 0.5 - z)";
 SINGULAR = "W0418":
-"Outside of the solid, in the scene that has it as an obstacle or close to it, ω has no value: a divisor is zero there, or a root or a logarithm is taken of a
-negative number. What comes near is neither inside nor outside, and a run stops there. Keep the formula away from that
-place by `max`, or choose another one by `where`: `where(x > 0, ln(max(x, 1e-9)), -20)`.";
+"Outside of the solid, in the scene that has it as an obstacle or close to it, ω has no value: a divisor is zero there, or a
+root or a logarithm is taken of a negative number. What comes near is neither inside nor outside, and a run stops there. Keep
+the formula away from that place by `max`, or choose another one by `where`: `where(x > 0, ln(max(x, 1e-9)), -20)`.";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";

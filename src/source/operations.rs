@@ -137,11 +137,16 @@ is_odd? = k - {2} * floor(k / {2}) == {1}
 quarter = k - {4} * floor(k / {4})
 ";
 
-const SIN: &str = "size = pick(is_odd, cosine, sine)
+/// Where u is so large that nothing of its quarter turn is known, the result still lies in −1 … 1.
+const SIN: &str = "raw = pick(is_odd, cosine, sine)
+capped = pick(raw > {1}, {1}, raw)
+size = pick(capped < -{1}, -{1}, capped)
 value = pick(quarter > {1.5}, -size, size)
 ";
 
-const COS: &str = "size = pick(is_odd, sine, cosine)
+const COS: &str = "raw = pick(is_odd, sine, cosine)
+capped = pick(raw > {1}, {1}, raw)
+size = pick(capped < -{1}, -{1}, capped)
 value = pick(abs(quarter - {1.5}) < {1}, -size, size)
 ";
 

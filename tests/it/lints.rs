@@ -1,7 +1,8 @@
 //! What `rfm check` calls odd is odd by geometry, and what is not is left alone.
 
+use rfm::geom::Aabb;
 use rfm::glam::DVec3;
-use rfm::solid::Breakage;
+use rfm::solid::{Breakage, ThinPart};
 use rfm::{Engine, Program, Solid};
 
 use crate::tool::{rfm, root};
@@ -133,13 +134,14 @@ fn jumps_are_found_where_they_are() {
     }
 }
 
+fn singular(text: &str) -> Vec<(Breakage, DVec3)> {
+    let solid = solid(text);
+    let over = solid.bounds().aabb().expect(text).grown(1.0);
+    solid.singularities(&over).iter().map(|found| (found.what, found.at)).collect()
+}
+
 #[test]
 fn what_has_no_value_outside_is_found() {
-    let singular = |text: &str| -> Vec<(Breakage, DVec3)> {
-        let solid = solid(text);
-        let over = solid.bounds().aabb().expect(text).grown(1.0);
-        solid.singularities(&over).iter().map(|found| (found.what, found.at)).collect()
-    };
     let found = singular("sphere(1) and ln(x + 1.2) <= 0.5");
     assert!(matches!(found[..], [(Breakage::NoValue, at)] if at.x <= -1.2), "{found:?}");
     let found = singular("sphere(1) and sqrt(1.5 - y) >= 0.2");
@@ -149,6 +151,93 @@ fn what_has_no_value_outside_is_found() {
     let found = singular("sphere(1) and 0.1/(z - 1.7) <= 0.5");
     assert!(matches!(found[..], [(Breakage::Pole, at)] if (at.z - 1.7).abs() < 1e-9), "{found:?}");
     assert_eq!(singular("sphere(1) and sqrt(x*x + y*y) >= 0.2"), []);
+}
+
+/// sin(x)/x has the limit 1, 1/x has none.
+#[test]
+fn a_divisor_that_is_zero_where_omega_has_a_limit_is_no_pole() {
+    for (text, has_limit) in [
+        ("sphere(1) and sin(x)/x >= 0.5", true),
+        ("sphere(1) and (x*x - 0.25)/(x - 0.5) >= 0.2", true),
+        ("sphere(1) and 1/x >= 0.5", false),
+        ("sphere(1) and -1/x >= 0.5", false),
+        ("sphere(1) and (sin(x) + 0.1)/x >= 0.5", false),
+    ] {
+        // the middle is no node, and is met by halving
+        let found = singular(text);
+        assert_eq!(found.is_empty(), has_limit, "{text}: {found:?}");
+        assert!(found.iter().all(|(what, at)| *what == Breakage::Pole && at.x.abs() < 1e-9), "{found:?}");
+    }
+}
+
+/// Among 200 divisors that are zero without harm, because a constant takes the place of their quotients there, one harms.
+#[test]
+fn a_pole_is_found_among_many_quotients() {
+    let guarded = |i: usize| {
+        let a = i as f64 * 0.009 - 0.9;
+        format!("where(abs(x - {a}) > 0.001, 1e-6/(x - {a}), 0)")
+    };
+    let harmless: Vec<String> = (0..200).map(guarded).collect();
+    let text = format!("sphere(1) and {} <= 0.5", harmless.join(" + "));
+    assert_eq!(singular(&text), []);
+    let found = singular(&text.replacen(&harmless[100], "1e-6/(x - 0.1003)", 1));
+    assert!(matches!(found[..], [(Breakage::Pole, at)] if (at.x - 0.1003).abs() < 1e-9), "{found:?}");
+}
+
+/// What a choice leaves out is not blamed: the texts of the operations that are.
+#[test]
+fn operations_that_a_choice_leaves_out_are_not_blamed() {
+    for (of, blamed) in [
+        ("where(x > 0, ln(x), -20) + sqrt(y) - 1", vec!["sqrt(y)"]),
+        ("sqrt(y) + where(x > 0, ln(x), -20) - 1", vec!["sqrt(y)"]),
+        ("where(x > 0, ln(x), -20)", vec![]),
+        ("where(x > -0.2, ln(x), -20)", vec!["ln(x)"]),
+        ("where(abs(x) > 0.1, 0.1/x, 0) + 0.1/y - 1", vec!["0.1/y"]),
+    ] {
+        let text = format!("rfm 1\nsolid s = sphere(1) and {of} >= 0");
+        let program = Program::from_source("t.rfm", text.clone()).unwrap_or_else(|e| panic!("{text}: {e}"));
+        let found =
+            program.solid("s").unwrap().singularities(&Aabb::new(DVec3::splat(-1.5), DVec3::splat(1.4)));
+        let words: Vec<&str> = found.iter().map(|found| &text[found.span.unwrap().range()]).collect();
+        assert_eq!(words, blamed, "{text}");
+    }
+}
+
+fn thinner_than(solid: &Solid, wall: f64, gap: f64) -> [Option<ThinPart>; 2] {
+    let within = Aabb::new(DVec3::splat(-100.0), DVec3::splat(100.0));
+    solid.thin_parts([wall, gap], &within, &mut { usize::MAX })
+}
+
+/// No fluid is below a plate on the floor of its box, or behind one at its wall.
+#[test]
+fn walls_without_fluid_on_both_sides_and_gaps_outside_do_not_count() {
+    let within = Aabb::new(DVec3::ZERO, DVec3::splat(2.0));
+    let parts = |text: &str| {
+        solid(text).thin_parts([0.02, 0.04], &within, &mut { usize::MAX }).map(|part| part.is_some())
+    };
+    for (text, wanted) in [
+        ("box([0, 0, 0], [2, 2, 0.01])", [false, false]),
+        ("box([0.5, 0.5, 0], [1.5, 1.5, 0.01])", [false, false]),
+        ("box([0.5, 0.5, -0.005], [1.5, 1.5, 0.01])", [false, false]),
+        // no particle finds room below
+        ("box([0.5, 0.5, 0.02], [1.5, 1.5, 0.03])", [false, false]),
+        ("box([0.5, 0.5, 0.05], [1.5, 1.5, 0.06])", [true, false]),
+        // it stands on the floor
+        ("box([1, 0.5, 0], [1.01, 1.5, 1])", [true, false]),
+        ("box([1.99, 0.5, 0], [2, 1.5, 1])", [false, false]),
+        // a slot inside, one below the floor, and one outside
+        ("box([0.5, 0.5, 0.5], [1.5, 1.5, 0.7]) or box([0.5, 0.5, 0.73], [1.5, 1.5, 1])", [false, true]),
+        ("box([0, 0, -1], [2, 2, -0.53]) or box([0, 0, -0.5], [2, 2, 0.3])", [false, false]),
+        ("box([2.5, 0, 0], [2.51, 1, 1]) or box([1, 1, 1], [1.5, 1.5, 1.5])", [false, false]),
+    ] {
+        assert_eq!(parts(text), wanted, "{text}");
+    }
+    // beyond its budget the search says nothing
+    let plate = solid("box([0.5, 0.5, 0.5], [1.5, 1.5, 0.51])");
+    let mut budget = 1_000_000_000;
+    assert!(plate.thin_parts([0.02, 0.04], &within, &mut budget)[0].is_some());
+    assert!(budget < 1_000_000_000);
+    assert_eq!(plate.thin_parts([0.02, 0.04], &within, &mut 1000), [None; 2]);
 }
 
 /// Plates and slots of known thickness, in any direction.
@@ -164,12 +253,12 @@ fn thin_walls_and_gaps_have_their_thickness() {
             random.within(0.0, 3.0)
         );
         let plate = solid(&format!("box([-1, -1, 0], [1, 1, {t}]).{turn}"));
-        let [wall, gap] = plate.thinner_than(1.05 * t, 1.05 * t);
+        let [wall, gap] = thinner_than(&plate, 1.05 * t, 1.05 * t);
         let wall = wall.expect("a plate");
         assert!((wall.thickness / t - 1.0).abs() < 1e-6, "{} {t}", wall.thickness);
         assert!((wall.area / 4.0 - 1.0).abs() < 0.15, "{}", wall.area);
         assert_eq!(gap, None);
-        assert_eq!(plate.thinner_than(0.95 * t, 0.95 * t), [None; 2]);
+        assert_eq!(thinner_than(&plate, 0.95 * t, 0.95 * t), [None; 2]);
         let slot = solid(&format!(
             "(box([-1, -1, {}], [1, 1, {}]) or box([-1, -1, {}], [1, 1, {}])).{turn}",
             t,
@@ -177,7 +266,7 @@ fn thin_walls_and_gaps_have_their_thickness() {
             -0.7,
             0.0
         ));
-        let [wall, gap] = slot.thinner_than(0.5, 1.05 * t);
+        let [wall, gap] = thinner_than(&slot, 0.5, 1.05 * t);
         assert_eq!(wall, None);
         assert!((gap.expect("a slot").thickness / t - 1.0).abs() < 1e-6, "{gap:?} {t}");
     }
@@ -191,7 +280,7 @@ fn tips_and_edges_are_not_walls() {
         "box([0, 0, 0], [1, 1, 1])",
         "0 <= z and z <= 0.5*x and x <= 1 and 0 <= y and y <= 1",
     ] {
-        assert_eq!(solid(text).thinner_than(0.15, 0.15), [None; 2], "{text}");
+        assert_eq!(thinner_than(&solid(text), 0.15, 0.15), [None; 2], "{text}");
     }
 }
 

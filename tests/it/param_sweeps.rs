@@ -227,30 +227,58 @@ fn runs_have_their_audit_and_the_means_of_probes() {
         "{}",
         outcome.stdout
     );
-    // a run of a sweep that has not ended is continued from its checkpoint
+    // a sweep that is complete has nothing to go on with, and is not replaced unasked
     rfm(folder.path(), &[&arguments[..], &["--resume"]].concat()).expect(0);
     rfm(folder.path(), &arguments).expect(2);
 }
 
 #[test]
 fn a_report_has_the_errors_of_a_flow() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = root().join("examples/validation/free_fall.rfm");
-    let subject = format!("{}:free_fall", file.display());
-    let into = folder.path().join("out");
-    let arguments = [
-        "report",
-        &subject,
-        "--particles",
-        "125",
-        "--sweep",
-        "particles=125..216:2",
-        "--into",
-        into.to_str().unwrap(),
-    ];
-    rfm(root(), &arguments).expect(0);
-    for row in rows(&index(&into)) {
-        let error = figure(row, "velocity_error");
-        assert!((0.0..0.05).contains(&error), "{row}");
+    let text = std::fs::read_to_string(root().join("examples/validation/free_fall.rfm")).unwrap();
+    // what is said to be known is right for k = 1 only
+    let text = text.replace("-9.81*t]", "-9.81*k*t]").replacen("rfm 1\n", "rfm 1\nparam k = 1\n", 1);
+    let folder = in_folder(&text);
+    let report = |sweep: &str| {
+        let arguments =
+            ["report", "a.rfm:free_fall", "--particles", "125", "--sweep", sweep, "--into", "out"];
+        rfm(folder.path(), &arguments)
+    };
+    let refused = report("particles=125..216:2").expect(2);
+    assert!(refused.stderr.contains("sweep another param"), "{}", refused.stderr);
+    report("k=1..2:2").expect(0);
+    let found = index(&folder.path().join("out"));
+    let errors: Vec<f64> = rows(&found).iter().map(|row| figure(row, "velocity_error")).collect();
+    assert!(errors[0] < 0.05 && errors[1] > 0.3, "{errors:?}");
+}
+
+#[test]
+fn files_of_others_are_not_replaced() {
+    let folder = in_folder(BALL);
+    let own = folder.path().join("table.csv");
+    std::fs::write(&own, "mine\n").unwrap();
+    for more in [&[][..], &["--force"]] {
+        let arguments = ["check", "a.rfm", "--sweep", "r=1..2:2", "--into", "."];
+        let refused = rfm(folder.path(), &[&arguments[..], more].concat()).expect(2);
+        assert!(refused.stderr.contains("table.csv"), "{}", refused.stderr);
+        assert_eq!(std::fs::read_to_string(&own).unwrap(), "mine\n");
     }
+    let other = folder.path().join("other");
+    std::fs::create_dir(&other).unwrap();
+    std::fs::write(other.join("index.json"), "{}").unwrap();
+    rfm(folder.path(), &["check", "a.rfm", "--sweep", "r=1..2:2", "--into", "other", "--force"]).expect(2);
+    assert_eq!(std::fs::read_to_string(other.join("index.json")).unwrap(), "{}");
+}
+
+#[test]
+fn a_run_and_a_sweep_have_folders_of_their_own() {
+    let folder = in_folder(FALL);
+    let run = ["run", "a.rfm", "--no-pictures", "-o"];
+    let sweep = ["--sweep", "v=-1..0 m/s:2"];
+    rfm(folder.path(), &[&run[..], &["single"]].concat()).expect(0);
+    let refused = rfm(folder.path(), &[&run[..], &["single"], &sweep].concat()).expect(2);
+    assert!(refused.stderr.contains("holds a run"), "{}", refused.stderr);
+    rfm(folder.path(), &[&run[..], &["several"], &sweep].concat()).expect(0);
+    let refused = rfm(folder.path(), &[&run[..], &["several"]].concat()).expect(2);
+    assert!(refused.stderr.contains("holds a sweep"), "{}", refused.stderr);
+    assert!(!folder.path().join("several/frames").exists());
 }

@@ -90,8 +90,8 @@ fn names(document: &Document, byte: usize) -> Vec<CompletionItem> {
 fn members(document: &Document, context: &Context) -> Option<Vec<CompletionItem>> {
     let owner = context.owner.as_ref().filter(|owner| !context.locals.contains(owner))?;
     let import = document.ast.items.iter().find_map(|item| match item {
-        Item::Import(import) if import.name.text == *owner => Some(import),
-        _ => None,
+        Item::Import(import) => (import.name.text == *owner).then_some(import),
+        Item::Param(_) | Item::Let(_) | Item::Function(_) | Item::Solid(_) | Item::Scene(_) => None,
     })?;
     let source = document.imported(&import.path)?;
     let (ast, _) = syntax::parse(&source);
@@ -118,10 +118,10 @@ fn defined(defined: &Item, text: &str) -> Option<CompletionItem> {
 
 fn methods(document: &Document) -> Vec<Signature> {
     let own = document.ast.items.iter().filter_map(|item| match item {
-        Item::Function(function) if function.takes_a_shape() => {
-            Some(words::behind_a_shape(words::of(function, document.text())))
+        Item::Function(function) => {
+            function.takes_a_shape().then(|| words::behind_a_shape(words::of(function, document.text())))
         }
-        _ => None,
+        Item::Import(_) | Item::Param(_) | Item::Let(_) | Item::Solid(_) | Item::Scene(_) => None,
     });
     own.chain(words::methods()).collect()
 }
@@ -139,15 +139,20 @@ pub(super) fn about_key(key: &str) -> String {
 /// The method of the scene around a byte, if it states one.
 fn method_around(document: &Document, byte: usize) -> Option<Method> {
     let in_tree = document.ast.items.iter().find_map(|item| match item {
-        Item::Scene(scene) if scene.span.range().contains(&byte) => Some(scene.entries.iter()),
-        _ => None,
+        Item::Scene(scene) => scene.span.range().contains(&byte).then(|| scene.entries.iter()),
+        Item::Import(_) | Item::Param(_) | Item::Let(_) | Item::Function(_) | Item::Solid(_) => None,
     });
     let stated = in_tree.into_iter().flatten().find_map(|entry| match entry {
-        Entry::Setting { key, value } if key.text == "method" => match &value.kind {
-            ExprKind::Name(word) => Method::named(word),
-            _ => None,
-        },
-        _ => None,
+        Entry::Setting { key, value } => {
+            if let ExprKind::Name(word) = &value.kind
+                && key.text == "method"
+            {
+                Method::named(word)
+            } else {
+                None
+            }
+        }
+        Entry::Block { .. } => None,
     });
     // a scene that is being typed is not in the tree
     stated.or_else(|| {
@@ -163,8 +168,10 @@ pub(super) fn signature(document: &Document, name: &str, is_method: bool) -> Opt
         return methods(document).into_iter().find(|method| method.name == name);
     }
     let own = document.ast.items.iter().find_map(|item| match item {
-        Item::Function(function) if function.name.text == name => Some(words::of(function, document.text())),
-        _ => None,
+        Item::Function(function) => {
+            (function.name.text == name).then(|| words::of(function, document.text()))
+        }
+        Item::Import(_) | Item::Param(_) | Item::Let(_) | Item::Solid(_) | Item::Scene(_) => None,
     });
     own.or_else(|| words::functions().into_iter().find(|function| function.name == name))
 }

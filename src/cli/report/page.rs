@@ -153,20 +153,24 @@ impl Page {
         self.out.into_bytes()
     }
 
-    /// Adds the data that the files read, and returns how many of them are too large for a page.
+    /// Adds the data that the files read, and returns how many of them the page does not hold: they are too large, or cannot be read.
     fn data(&mut self, program: &Program, sources: &[&Source]) -> usize {
-        let is_source =
-            |name: &String| sources.iter().any(|source| Files::plain(&source.name).ends_with(name.as_str()));
+        let is_source = |name: &String| sources.iter().any(|source| Files::plain(&source.name) == *name);
         let files = program.files();
         let named = files.asked().into_iter().filter(|name| !is_source(name));
-        let data: Vec<_> = named.filter_map(|name| Some((files.read(&name).ok()?, name))).collect();
+        let data: Vec<_> = named.map(|name| (files.read(&name), name)).collect();
         if data.is_empty() {
             return 0;
         }
         self.section("Data", "What the files read. Their paths go from the folder of the file.");
         self.add(format_args!("<ul>\n"));
         let (mut room, mut missing) = (MOST_DATA, 0);
-        for (bytes, name) in data {
+        for (read, name) in data {
+            let Ok(bytes) = read else {
+                missing += 1;
+                self.add(format_args!("<li>{}: cannot be read</li>\n", escaped(&name)));
+                continue;
+            };
             let size = size(bytes.len());
             if bytes.len() <= LARGEST_FILE.min(room) {
                 room -= bytes.len();

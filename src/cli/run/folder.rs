@@ -36,8 +36,14 @@ pub(super) fn of(options: &Run) -> PathBuf {
     }
 }
 
-/// Refuses a folder that holds a run which is neither to be replaced nor to be continued.
+/// Refuses a folder that holds a sweep, or a run which is neither to be replaced nor to be continued.
 pub(super) fn may_be_written(folder: &Path, options: &Run) -> Result<(), Failure> {
+    if holds_a_sweep(folder) {
+        return Err(Failure::usage(format!(
+            "`{}` holds a sweep: write the run elsewhere with -o DIR",
+            folder.shown()
+        )));
+    }
     if options.resume || options.force {
         return Ok(());
     }
@@ -49,8 +55,15 @@ pub(super) fn may_be_written(folder: &Path, options: &Run) -> Result<(), Failure
     )))
 }
 
+/// Whether a folder has the index of a sweep.
+fn holds_a_sweep(folder: &Path) -> bool {
+    let text = std::fs::read_to_string(folder.join("index.json")).unwrap_or_default();
+    let index: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    ["fingerprint", "sweeps", "rows"].iter().all(|key| index.get(key).is_some())
+}
+
 /// What a folder has of a run, in words; `None` if there is nothing that a new run would remove.
-fn run_in(folder: &Path) -> Option<String> {
+pub(super) fn run_in(folder: &Path) -> Option<String> {
     let frames = std::fs::read_dir(folder.join("frames")).map_or(0, |entries| {
         entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with("particles_")).count()
     });

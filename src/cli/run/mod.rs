@@ -270,6 +270,11 @@ impl Recording<'_> {
     }
 }
 
+/// What a folder has of a run, in words; `None` if there is nothing that a new run would remove.
+pub(super) fn run_in(folder: &Path) -> Option<String> {
+    folder::run_in(folder)
+}
+
 /// Whether a folder has a run that `--resume` can go on with.
 pub(super) fn has_checkpoint(folder: &Path) -> bool {
     checkpoints::exist(folder)

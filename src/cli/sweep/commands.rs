@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Check, Mesh, MessageFormat, Report, Run, Shared};
-use super::super::{Failure, check as checks, choose, mesh as meshes, report as reports, run as runs};
+use super::super::{Failure, check as checks, choose, input, mesh as meshes, report as reports, run as runs};
 use super::figures::Command;
 use super::options::SweepOptions;
 use super::task::Task;
@@ -54,6 +54,7 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
 
 /// `rfm mesh --sweep`.
 pub(in crate::cli) fn mesh(shared: &Shared, options: &Mesh) -> Result<(), Failure> {
+    refuse(&[("-o -", options.output.as_deref() == Some(Path::new("-")))])?;
     let single = Mesh { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
     let task = Task {
         shared,
@@ -99,7 +100,13 @@ pub(in crate::cli) fn run(shared: &Shared, options: &Run) -> Result<(), Failure>
 
 /// `rfm report --sweep`.
 pub(in crate::cli) fn report(shared: &Shared, options: &Report) -> Result<(), Failure> {
-    let (file, _) = choose::subject(&options.subject);
+    let (file, name) = choose::subject(&options.subject);
+    let is_size = options.sweep.sweep.iter().any(|sweep| sweep.name == "particles");
+    if is_size && file != Path::new("-") && is_of_a_flow(shared, options, file, name)? {
+        return Err(Failure::usage(
+            "the report of a flow chooses `particles` itself: give the sizes by --particles, and sweep another param",
+        ));
+    }
     let single = Report { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
     let task = Task {
         shared,
@@ -115,5 +122,16 @@ pub(in crate::cli) fn report(shared: &Shared, options: &Report) -> Result<(), Fa
         let [output, mesh_plot, html] =
             [&options.output, &options.mesh_plot, &options.html].map(|path| within(folder, path.as_ref()));
         reports::run(shared, &Report { output, mesh_plot, html, ..single.clone() })
+    })
+}
+
+/// Whether a report is about a scene.
+fn is_of_a_flow(shared: &Shared, options: &Report, file: &Path, name: Option<&str>) -> Result<bool, Failure> {
+    let program = input::program(shared, file)?;
+    let module = program.module();
+    let asked = !options.flow.particles.is_empty() || !options.flow.methods.is_empty();
+    Ok(match name {
+        Some(name) => module.scenes.iter().any(|scene| scene.name == name),
+        None => asked || module.solids.is_empty(),
     })
 }

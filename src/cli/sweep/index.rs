@@ -67,9 +67,18 @@ impl Index {
     /// The index of a folder; `None` if there is none.
     pub fn read(folder: &Path) -> Option<Result<Self, Failure>> {
         let path = folder.join(INDEX);
-        let text = std::fs::read_to_string(&path).ok()?;
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
+            Err(error) => {
+                return Some(Err(Failure::usage(format!("cannot read `{}`: {error}", path.shown()))));
+            }
+        };
         Some(serde_json::from_str(&text).map_err(|error| {
-            Failure::usage(format!("`{}` is not the index of a sweep: {error}", path.shown()))
+            Failure::usage(format!(
+                "`{}` is not the index of a sweep, write elsewhere with --into DIR: {error}",
+                path.shown()
+            ))
         }))
     }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::super::args::Shared;
 use super::super::failure::{complain, note};
 use super::super::output::{self, Shown};
-use super::super::{Failure, input};
+use super::super::{Failure, input, run as runs};
 use super::figures::Command;
 use super::index::{Axis, INDEX, Index, Row};
 use super::plot;
@@ -22,6 +22,9 @@ const MOST_COMBINATIONS: usize = 10_000;
 
 /// Time between two writes of the index: what a process that is killed in between has done is done again.
 const BETWEEN_WRITES: Duration = Duration::from_secs(1);
+
+/// Files that a sweep writes beside its index.
+const FILES: [&str; 3] = ["table.csv", "plot.svg", "plot.png"];
 
 /// A command that is to be swept.
 pub(super) struct Task<'a> {
@@ -51,14 +54,24 @@ impl Task<'_> {
             if index.rows.iter().any(|row| row.folder == name && row.exit == 0) {
                 continue;
             }
-            if self.check()? != fingerprint {
-                self.conclude(&index)?;
-                return Err(Failure::usage(
-                    "the file has changed: what is in the folder belongs to the old one",
-                ));
-            }
-            note(format!("{} of {}: {}", i + 1, points.len(), self.shown(point)));
-            let (row, interrupted) = self.row(name, point, &each)?;
+            let unchanged = self.check().and_then(|now| match now == fingerprint {
+                true => Ok(()),
+                false => {
+                    Err(Failure::usage("the file has changed: what is in the folder belongs to the old one"))
+                }
+            });
+            let outcome = unchanged.and_then(|()| {
+                note(format!("{} of {}: {}", i + 1, points.len(), self.shown(point)));
+                self.row(name, point, &each)
+            });
+            // what was computed before is kept
+            let (row, interrupted) = match outcome {
+                Ok(outcome) => outcome,
+                Err(failure) => {
+                    self.conclude(&index)?;
+                    return Err(failure);
+                }
+            };
             index.insert(row);
             if interrupted {
                 self.conclude(&index)?;
@@ -205,14 +218,15 @@ impl Task<'_> {
         };
         let shown = self.folder.shown();
         let Some(known) = known else {
+            self.refuse_files_of_others()?;
             std::fs::create_dir_all(&self.folder)
                 .map_err(|e| Failure::usage(format!("cannot make the folder `{shown}`: {e}")))?;
             return Ok(new);
         };
+        let known = known?;
         if self.force {
             return Ok(new);
         }
-        let known = known?;
         if !self.resume {
             return Err(Failure::usage(format!(
                 "`{shown}` holds a sweep already ({} of `{}`, {} combinations): go on with it by --resume, replace it with \
@@ -238,6 +252,22 @@ impl Task<'_> {
         }
         // rows of other values stay in the table
         Ok(Index { rows: known.rows, ..new })
+    }
+
+    /// Refuses a folder without the index of a sweep that holds a run, or a file with a name that a sweep writes.
+    fn refuse_files_of_others(&self) -> Result<(), Failure> {
+        let shown = self.folder.shown();
+        if let Some(content) = runs::run_in(&self.folder) {
+            return Err(Failure::usage(format!(
+                "`{shown}` holds a run ({content}): write the sweep elsewhere with --into DIR"
+            )));
+        }
+        match FILES.into_iter().find(|name| self.folder.join(name).exists()) {
+            Some(name) => Err(Failure::usage(format!(
+                "`{shown}` holds a file `{name}` that is not of a sweep: write elsewhere with --into DIR"
+            ))),
+            None => Ok(()),
+        }
     }
 }
 

@@ -40,9 +40,13 @@ pub(in crate::cli) fn sweep(text: &str) -> Result<Sweep, String> {
         _ if low > high => {
             Err(format!("the ends are out of order: write {}={high}..{low}{unit}:{number}", name.trim()))
         }
+        _ if !(high - low).is_finite() => Err(format!("from {low:e} to {high:e} is too far")),
         _ => {
             let value = |i: usize| rounded(low + (high - low) * i as f64 / (number - 1) as f64);
-            let values = (0..number).map(value).collect();
+            let values: Vec<f64> = (0..number).map(value).collect();
+            if values.windows(2).any(|pair| pair[0] >= pair[1]) {
+                return Err(format!("{number} values so close together do not differ in {DIGITS} digits"));
+            }
             Ok(Sweep { name: name.trim().to_string(), unit: unit.to_string(), values })
         }
     }
@@ -74,12 +78,20 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.DIGITS$e}").parse().unwrap_or(value)
 }
 
+/// A value with all digits, and with an exponent where there would be many zeros.
+fn written(value: f64) -> String {
+    match value.abs() {
+        size if size == 0.0 || (1e-9..1e9).contains(&size) => value.to_string(),
+        _ => format!("{value:e}"),
+    }
+}
+
 impl Sweep {
     /// A value as a person writes it.
     pub fn shown(&self, value: f64) -> String {
         match self.unit.as_str() {
-            "" => value.to_string(),
-            unit => format!("{value} {unit}"),
+            "" => written(value),
+            unit => format!("{} {unit}", written(value)),
         }
     }
 
@@ -101,7 +113,7 @@ pub(super) fn grid(sweeps: &[Sweep]) -> Vec<Vec<f64>> {
 
 /// The name of the folder for a combination of values.
 pub(super) fn folder(sweeps: &[Sweep], point: &[f64]) -> String {
-    let part = |(sweep, value): (&Sweep, &f64)| format!("{}={value}{}", sweep.name, sweep.unit);
+    let part = |(sweep, value): (&Sweep, &f64)| format!("{}={}{}", sweep.name, written(*value), sweep.unit);
     let name: Vec<String> = sweeps.iter().zip(point).map(part).collect();
     let allowed = |c: char| if c.is_alphanumeric() || "=,.-+_".contains(c) { c } else { '_' };
     name.join(",").chars().map(allowed).collect()
@@ -140,6 +152,8 @@ mod tests {
             ("a=2..1:3", "write a=1..2:3"),
             ("a=1..1:3", "both ends are 1"),
             ("a=1..inf:3", "not finite"),
+            ("a=-1e308..1e308:3", "is too far"),
+            ("a=1..1.0000000000001:4", "do not differ in 12 digits"),
             ("a=1mm..2:3", "write it behind the upper end"),
             ("a=1s..2mm:3", "do not measure the same"),
             ("a=1..2 furlong:3", "is not a unit"),
@@ -156,5 +170,7 @@ mod tests {
         assert_eq!(points.len(), 6);
         assert_eq!((&points[0][..], &points[1][..]), (&[1.0, 0.0][..], &[1.0, 0.5][..]));
         assert_eq!(folder(&sweeps, &points[1]), "a=1,v=0.5m_s");
+        let tiny = [sweep("a=1e-300..2e-300:2").unwrap()];
+        assert_eq!(folder(&tiny, &[1e-300]), "a=1e-300");
     }
 }

@@ -2,14 +2,16 @@
 //!
 //! A surface is found between two neighbouring numbers. If ω still differs there by as much as between the nodes of a
 //! lattice, it does not pass through zero: it jumps. The operation that jumps is the first one whose value differs
-//! although its operands do not.
+//! although its operands do not. Operations that a choice leaves out at that place are not looked at.
+
+use std::collections::HashMap;
 
 use glam::DVec3;
 
 use super::crossings::{ALL_HALVINGS, Crossing, FEW_NODES, Lattice, MOST_POINTS, evenly, halved};
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
-use crate::ir::{Binary, Expr, Given, Interpreter, Node, Unary};
+use crate::ir::{Binary, Expr, Given, Graph, Interpreter, Node, Unary};
 use crate::solid::construction::Solid;
 
 /// What happens to ω.
@@ -49,6 +51,12 @@ const MOST_OPERATIONS: usize = 4000;
 /// Places at which an operation is looked at more closely, at most: most tell the same.
 const MOST_LOOKS: usize = 100;
 
+/// Operations that are carried out in search of zeros of all divisors together, at most: less than half a second.
+const POLE_OPERATIONS: usize = 100_000_000;
+
+/// Evaluations of the whole formula at one such zero, at most.
+const EVALUATIONS_OF_LOOK: usize = 10;
+
 /// An operation jumps if its value changes by so many times as much as its operands, between neighbouring numbers.
 const SUDDEN: f64 = 1e6;
 
@@ -85,35 +93,78 @@ impl Solid {
                 formula.add(&mut found, Breakage::NoValue, p, node);
             }
         }
-        let divisors = formula.divisors();
-        let values = formula.values_of(&divisors, &lattice.points);
-        for (&divisor, values) in divisors.iter().zip(&values) {
-            self.poles(&formula, &lattice, (divisor, values), &mut found);
-        }
+        self.poles(&formula, &lattice, &mut found);
         found
     }
 
-    /// Looks for a zero of a divisor between nodes of which one at least is outside.
-    fn poles(
-        &self,
-        formula: &Formula<'_>,
-        lattice: &Lattice,
-        ([node, divisor], values): ([Node; 2], &[f64]),
-        found: &mut Vec<Break>,
-    ) {
-        let is_crossed = |[a, b]: &[usize; 2]| {
-            values[*a] * values[*b] < 0.0 && (lattice.signs[*a] < 0.0 || lattice.signs[*b] < 0.0)
-        };
-        let crossed: Vec<[usize; 2]> = lattice.edges().filter(is_crossed).collect();
-        for edge in evenly(&crossed, MOST_LOOKS) {
-            let scale = edge.map(|i| self.omega(lattice.points[i]).abs()).into_iter().fold(0.0, f64::max);
-            let ends =
-                halved(edge.map(|i| lattice.points[i]), ALL_HALVINGS, |p| formula.value(divisor, p) > 0.0);
-            let sizes = ends.map(|p| self.omega(p).abs());
-            if sizes.iter().any(|size| size.is_nan() || *size > GROWTH * scale) {
-                return formula.add(found, Breakage::Pole, ends[0], node);
+    /// Looks for zeros of divisors between nodes of which one at least is outside. All divisors share a budget.
+    fn poles(&self, formula: &Formula<'_>, lattice: &Lattice, found: &mut Vec<Break>) {
+        let divisors = formula.divisors();
+        let all_signs = formula.signs_of(&divisors, &lattice.points);
+        let mut budget = POLE_OPERATIONS;
+        for (i, (divisor, signs)) in divisors.iter().zip(&all_signs).enumerate() {
+            let is_crossed = |[a, b]: &[usize; 2]| {
+                signs[*a] * signs[*b] < 0 && (lattice.signs[*a] < 0.0 || lattice.signs[*b] < 0.0)
+            };
+            let crossed: Vec<[usize; 2]> = lattice.edges().filter(is_crossed).collect();
+            let cone = formula.cone(&[divisor.node]);
+            let cost = ALL_HALVINGS * cone.operations + EVALUATIONS_OF_LOOK * formula.nodes.len();
+            let looks = MOST_LOOKS.min(budget / (divisors.len() - i) / cost);
+            if looks == 0 {
+                continue;
+            }
+            for edge in evenly(&crossed, looks) {
+                budget -= cost;
+                let edge = edge.map(|i| lattice.points[i]);
+                let ends = halved(edge, ALL_HALVINGS, |p| cone.values(p)[0] > 0.0);
+                if self.has_pole(edge, ends) {
+                    for division in formula.that_grow(&divisor.divisions, edge, ends) {
+                        formula.add(found, Breakage::Pole, ends[0], division);
+                    }
+                    break;
+                }
             }
         }
+    }
+
+    /// Whether ω has no bound between two neighbouring points on an edge, at which a divisor differs in sign.
+    fn has_pole(&self, edge: [DVec3; 2], ends: [DVec3; 2]) -> bool {
+        let scale = edge.map(|p| self.omega(p).abs()).into_iter().fold(0.0, f64::max);
+        // where the divisor is exactly zero ω may be no number although it has a limit, such as sin(x)/x, or finite although
+        // it has none: the points beyond count as well
+        let [a, b] = ends;
+        let sizes = [a, b, a + (a - b), b + (b - a)].map(|p| self.omega(p).abs());
+        // ω is no number at all of them if it is made of infinite quotients
+        sizes.iter().any(|size| *size > GROWTH * scale) || sizes.iter().all(|size| size.is_nan())
+    }
+}
+
+/// A divisor that is no constant, and all divisions by it.
+struct Divisor {
+    node: Node,
+    divisions: Vec<Node>,
+}
+
+/// Some operations of a formula, with all that they need.
+struct Cone {
+    program: Interpreter,
+    outputs: usize,
+    operations: usize,
+    time: f64,
+}
+
+impl Cone {
+    fn of(graph: &Graph, outputs: &[Node], time: f64) -> Self {
+        let (graph, outputs) = graph.extract(outputs);
+        let program = Interpreter::new(&graph, &outputs);
+        Self { program, outputs: outputs.len(), operations: graph.len(), time }
+    }
+
+    /// The values of those operations at a point.
+    fn values(&self, p: DVec3) -> Vec<f64> {
+        let mut out = vec![0.0; self.outputs];
+        self.program.eval_given(Given { time: self.time, ..Given::point(p.to_array()) }, &mut out);
+        out
     }
 }
 
@@ -150,27 +201,50 @@ impl<'a> Formula<'a> {
         out
     }
 
-    fn value(&self, node: Node, p: DVec3) -> f64 {
-        self.values(p)[node.index()]
+    fn cone(&self, outputs: &[Node]) -> Cone {
+        Cone::of(self.solid.formula().0, outputs, self.solid.time())
     }
 
-    /// Values of the second node of each pair at many points.
-    fn values_of(&self, pairs: &[[Node; 2]], points: &[DVec3]) -> Vec<Vec<f64>> {
-        let mut columns = vec![Vec::with_capacity(points.len()); pairs.len()];
-        if !pairs.is_empty() {
-            for &p in points {
-                let values = self.values(p);
-                for (column, [_, node]) in columns.iter_mut().zip(pairs) {
-                    column.push(values[node.index()]);
-                }
+    /// The signs of each divisor at many points, 0 where it is no number.
+    fn signs_of(&self, divisors: &[Divisor], points: &[DVec3]) -> Vec<Vec<i8>> {
+        let mut columns = vec![Vec::with_capacity(points.len()); divisors.len()];
+        if divisors.is_empty() {
+            return columns;
+        }
+        let nodes: Vec<Node> = divisors.iter().map(|divisor| divisor.node).collect();
+        let cone = self.cone(&nodes);
+        for &p in points {
+            for (column, value) in columns.iter_mut().zip(cone.values(p)) {
+                column.push(i8::from(value > 0.0) - i8::from(value < 0.0));
             }
         }
         columns
     }
 
+    /// Whether each operation takes part in ω at one of some points at least, given the values of all there. What is chosen
+    /// away by `where` is multiplied by zero.
+    fn taking_part(&self, at: &[Vec<f64>]) -> Vec<bool> {
+        let (_, root) = self.solid.formula();
+        let mut takes_part = vec![false; self.nodes.len()];
+        takes_part[root.index()] = true;
+        // operands come before their uses
+        for (node, expr) in self.nodes.iter().rev().filter(|(node, _)| node.index() <= root.index()) {
+            let is_zero = |factor: Node| at.iter().all(|values| values[factor.index()] == 0.0);
+            let drops_first = matches!(expr, Expr::Binary(Binary::MulOrZero, _, factor) if is_zero(*factor));
+            if takes_part[node.index()] {
+                for operand in expr.operands().skip(usize::from(drops_first)) {
+                    takes_part[operand.index()] = true;
+                }
+            }
+        }
+        takes_part
+    }
+
     /// The first operation whose values at two neighbouring points differ although those of its operands hardly do.
     fn that_jumps(&self, ends: [DVec3; 2]) -> Option<Node> {
-        let [a, b] = ends.map(|p| self.values(p));
+        let values = ends.map(|p| self.values(p));
+        let takes_part = self.taking_part(&values);
+        let [a, b] = values;
         let change = |node: Node| (a[node.index()] - b[node.index()]).abs();
         let is_sudden = |(node, expr): &&(Node, Expr)| {
             let of_operands = expr.operands().map(change).fold(0.0, f64::max);
@@ -178,31 +252,59 @@ impl<'a> Formula<'a> {
             let is_sudden = change(*node) > (SUDDEN * of_operands).max(JUMP * size);
             // 1/0 is infinite, and differs from what is beside it by ∞ or NaN
             let is_infinite = !size.is_finite() && of_operands.is_finite();
-            expr.operands().next().is_some() && (is_sudden || is_infinite)
+            takes_part[node.index()] && expr.operands().next().is_some() && (is_sudden || is_infinite)
         };
         self.nodes.iter().find(is_sudden).map(|(node, _)| *node)
     }
 
-    /// The first operation that has no value at a point, although its operands have.
+    /// The operation by which ω has no value at a point: found from the root downwards, because what has no value and is not
+    /// chosen harms nothing.
     fn without_value(&self, p: DVec3) -> Option<Node> {
+        let (graph, mut node) = self.solid.formula();
         let values = self.values(p);
-        let is_first = |(node, expr): &&(Node, Expr)| {
-            !values[node.index()].is_finite()
-                && expr.operands().all(|operand| values[operand.index()].is_finite())
-        };
-        self.nodes.iter().find(is_first).map(|(node, _)| *node)
+        let value = |node: Node| values[node.index()];
+        if value(node).is_finite() {
+            return None;
+        }
+        loop {
+            let operands = || graph.expr(node).operands().filter(|operand| !value(*operand).is_finite());
+            // of NaN and ∞ the one explains the other only if there is nothing else
+            let alike = operands().find(|operand| value(*operand).is_nan() == value(node).is_nan());
+            match alike.or_else(|| operands().next()) {
+                Some(operand) => node = operand,
+                None => return Some(node),
+            }
+        }
     }
 
-    /// The divisions by what is no constant, each with its divisor.
-    fn divisors(&self) -> Vec<[Node; 2]> {
+    /// The divisors that are no constants.
+    fn divisors(&self) -> Vec<Divisor> {
         let (graph, _) = self.solid.formula();
-        let divisor = |(node, expr): &(Node, Expr)| match expr {
-            Expr::Binary(Binary::Div, _, divisor) if graph.as_constant(*divisor).is_none() => {
-                Some([*node, *divisor])
+        let mut found: Vec<Divisor> = Vec::new();
+        let mut known: HashMap<Node, usize> = HashMap::new();
+        for &(node, expr) in &self.nodes {
+            if let Expr::Binary(Binary::Div, _, divisor) = expr
+                && graph.as_constant(divisor).is_none()
+            {
+                let number = *known.entry(divisor).or_insert_with(|| {
+                    found.push(Divisor { node: divisor, divisions: Vec::new() });
+                    found.len() - 1
+                });
+                found[number].divisions.push(node);
             }
-            _ => None,
+        }
+        found
+    }
+
+    /// Those of some divisions that take part in ω and have no bound between two neighbouring points on an edge.
+    fn that_grow(&self, divisions: &[Node], edge: [DVec3; 2], ends: [DVec3; 2]) -> Vec<Node> {
+        let (far, near) = (edge.map(|p| self.values(p)), ends.map(|p| self.values(p)));
+        let takes_part = self.taking_part(&near);
+        let size = |at: &[Vec<f64>; 2], node: Node| {
+            at.iter().map(|values| values[node.index()].abs()).fold(0.0, f64::max)
         };
-        self.nodes.iter().filter_map(divisor).collect()
+        let grows = |&node: &Node| takes_part[node.index()] && size(&near, node) > GROWTH * size(&far, node);
+        divisions.iter().copied().filter(grows).collect()
     }
 
     /// Adds a break, unless its operation is known already.

@@ -205,7 +205,14 @@ impl Reader<'_> {
                 self.graph.as_constant(if u == operand { v } else { u }).unwrap_or(1.0)
             }
             Expr::Binary(Binary::Div, _, v) => 1.0 / self.graph.as_constant(v).unwrap_or(1.0),
-            _ => 1.0,
+            // no other operation has the sign of one of its operands
+            Expr::Binary(..)
+            | Expr::Unary(..)
+            | Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => 1.0,
         }
     }
 }

@@ -7,7 +7,28 @@
 use glam::DVec3;
 
 use super::crossings::{ALL_HALVINGS, Lattice, MOST_POINTS, halved};
+use crate::geom::Aabb;
 use crate::solid::construction::Solid;
+
+/// What walls and gaps are looked for.
+struct Search {
+    /// Walls that are thinner than this length, m.
+    wall: f64,
+    /// Gaps that are thinner than this length, m: a fluid needs so much room.
+    gap: f64,
+    /// Where a fluid may be.
+    within: Aabb,
+}
+
+impl Search {
+    /// Whether a fluid may be in a gap, or on both sides of a wall, between two faces. The direction is that from the first
+    /// to the second one; the sign is 1 for a wall.
+    fn is_in_fluid(&self, [first, second]: [DVec3; 2], (direction, sign): (DVec3, f64)) -> bool {
+        let within = self.within.grown(-BORDER * self.within.size().max_element());
+        let beyond = if sign > 0.0 { self.gap * direction } else { DVec3::ZERO };
+        within.contains(first - beyond) && within.contains(second + beyond)
+    }
+}
 
 /// A wall, or a gap between walls.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +47,13 @@ const NODES: usize = 49;
 /// Solids with more operations are not looked at: the sign of each is needed some hundred thousand times.
 const MOST_OPERATIONS: usize = 5000;
 
+/// Signs that are needed of a solid, at most: at the nodes, and for each point of the surface on its edge and on two lines,
+/// of which halving needs some 50 each.
+const SIGNS: usize = NODES.pow(3) + MOST_POINTS * (50 + 2 * (STEPS + 50));
+
+/// What lies so near to the border of where a fluid may be, as a part of its longest side, lies on it.
+const BORDER: f64 = 1e-6;
+
 /// Steps along a line, and its beginning, off the surface, as a part of it.
 const STEPS: usize = 32;
 const START: f64 = 1e-6;
@@ -40,10 +68,28 @@ const LEAST_EXTENT: f64 = 2.0;
 impl Solid {
     /// The thinnest wall and the thinnest gap of the solid that are thinner than a length each, and extend over twice this
     /// length at least; `None` where there is none. Solids without bounds, and very large ones, are not looked at.
-    pub fn thinner_than(&self, wall: f64, gap: f64) -> [Option<ThinPart>; 2] {
-        let (Some(bounds), ..=MOST_OPERATIONS) = (self.bounds().aabb(), self.formula().0.len()) else {
+    ///
+    /// A fluid may be in a finite box. Both faces of a gap must lie in it, and beyond both faces of a wall there must be as
+    /// much room in it as a gap needs. The search takes its operations from a budget; if they are not left there it finds
+    /// nothing.
+    pub fn thin_parts(
+        &self,
+        [wall, gap]: [f64; 2],
+        within: &Aabb,
+        budget: &mut usize,
+    ) -> [Option<ThinPart>; 2] {
+        let search = Search { wall, gap, within: *within };
+        let operations = self.formula().0.len();
+        let (..=MOST_OPERATIONS, Some(left)) = (operations, budget.checked_sub(SIGNS * operations)) else {
             return [None; 2];
         };
+        let Some(bounds) = self.bounds().aabb().map(|bounds| bounds.intersection(&search.within)) else {
+            return [None; 2];
+        };
+        if bounds.is_empty() {
+            return [None; 2];
+        }
+        *budget = left;
         // nodes do not lie in faces
         let lattice = Lattice::of(self, &bounds.grown(0.0173 * bounds.size().max_element()), NODES);
         let (crossings, every) = lattice.crossings(self, MOST_POINTS, ALL_HALVINGS);
@@ -59,10 +105,14 @@ impl Solid {
             let axis = (0..3).find(|&axis| p[axis] != other[axis]).unwrap_or(0);
             let face = cell[(axis + 1) % 3] * cell[(axis + 2) % 3];
             let area = every as f64 * face * normal[axis].abs();
-            for (part, (direction, within, length)) in
-                found.iter_mut().zip([(-normal, 1.0, wall), (normal, -1.0, gap)])
+            for (part, (direction, sign, length)) in
+                found.iter_mut().zip([(-normal, 1.0, search.wall), (normal, -1.0, search.gap)])
             {
-                let Some(thickness) = self.thickness(p, (direction, within), length) else { continue };
+                let Some(far) = self.other_face(p, (direction, sign), length) else { continue };
+                if !search.is_in_fluid([p, far], (direction, sign)) {
+                    continue;
+                }
+                let thickness = p.distance(far);
                 let so_far = part.get_or_insert(ThinPart { at: p, thickness, area: 0.0 });
                 so_far.area += area;
                 if thickness < so_far.thickness {
@@ -70,7 +120,7 @@ impl Solid {
                 }
             }
         }
-        let mut lengths = [wall, gap].into_iter();
+        let mut lengths = [search.wall, search.gap].into_iter();
         found.map(|part| {
             let least = (LEAST_EXTENT * lengths.next()?).powi(2);
             // both sides were counted
@@ -79,17 +129,17 @@ impl Solid {
         })
     }
 
-    /// How far the next face is along a line from a point of the surface, if it is nearer than a length and looks the
-    /// other way. Along the line up to there the solid has the sign `within`.
-    fn thickness(&self, p: DVec3, (direction, within): (DVec3, f64), length: f64) -> Option<f64> {
+    /// The next face along a line from a point of the surface, if it is nearer than a length and looks the other way. Along
+    /// the line up to there the solid has one sign.
+    fn other_face(&self, p: DVec3, (direction, sign): (DVec3, f64), length: f64) -> Option<DVec3> {
         let place = |part: f64| p + direction * (length * part);
         let places = |step: usize| place((step as f64 / STEPS as f64).max(START));
-        if self.sign(places(0)) != within {
+        if self.sign(places(0)) != sign {
             return None;
         }
-        let end = (1..=STEPS).find(|&step| self.sign(places(step)) == -within)?;
-        let [far, _] = halved([places(end - 1), places(end)], ALL_HALVINGS, |q| self.sign(q) == within);
+        let end = (1..=STEPS).find(|&step| self.sign(places(step)) == -sign)?;
+        let [far, _] = halved([places(end - 1), places(end)], ALL_HALVINGS, |q| self.sign(q) == sign);
         let opposite = self.contact(p).normal.dot(self.contact(far).normal) <= OPPOSITE;
-        opposite.then(|| p.distance(far))
+        opposite.then_some(far)
     }
 }
