@@ -478,7 +478,11 @@ struct RfmContact rfm_contact(const struct RfmSolid *solid, double x, double y, 
 
 // The velocity of the surface near a point, m/s: three numbers, zero for a solid at rest. Of a solid that moves and turns
 // without changing its shape it is the whole velocity, of others the part along the normal.
-void rfm_wall_velocity(const struct RfmSolid *solid, double x, double y, double z, double *velocity);
+void rfm_wall_velocity(const struct RfmSolid *solid,
+                       double x,
+                       double y,
+                       double z,
+                       double *velocity);
 
 // Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
 // is proven that nothing of the path is in the solid, however thin the solid and long the path. `entry` may be null.
@@ -597,7 +601,11 @@ struct RfmContact rfm_contact(const struct RfmSolid *solid, double x, double y, 
 
 // The velocity of the surface near a point, m/s: three numbers, zero for a solid at rest. Of a solid that moves and turns
 // without changing its shape it is the whole velocity, of others the part along the normal.
-void rfm_wall_velocity(const struct RfmSolid *solid, double x, double y, double z, double *velocity);
+void rfm_wall_velocity(const struct RfmSolid *solid,
+                       double x,
+                       double y,
+                       double z,
+                       double *velocity);
 
 // Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
 // is proven that nothing of the path is in the solid, however thin the solid and long the path. `entry` may be null.
