@@ -1,7 +1,7 @@
 //! Clear things: obstacles of glass and the surface of the fluid, blended over what is seen through them.
 //!
-//! Of all clear triangles that a ray from the eye meets, the nearest and the farthest are kept: the front and the back of
-//! a thing. What lies between them, such as the inner sides of a thick wall, would darken the picture and show nothing.
+//! A pixel keeps the nearest and the farthest of the clear triangles that its ray meets: the front and the back of a
+//! thing. What lies between them, such as the inner sides of a thick wall, would darken the picture and show nothing.
 //!
 //! Invariant: sheets are blended from far to near, and equal ones in their order, so the order of triangles does not matter.
 

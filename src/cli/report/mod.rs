@@ -137,7 +137,7 @@ fn all_programs(
 
 /// The scene to report on, if one is meant: by its name, by options that only a flow has, or because the file
 /// has no solid.
-fn scene<'a>(
+pub(super) fn scene<'a>(
     program: &'a Program,
     name: Option<&str>,
     options: &Report,

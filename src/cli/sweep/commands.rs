@@ -8,9 +8,18 @@ use super::figures::Command;
 use super::options::SweepOptions;
 use super::task::Task;
 
-/// The folder of a sweep, as it is asked for or beside the file.
-fn folder(options: &SweepOptions, file: &Path) -> PathBuf {
-    options.into.clone().unwrap_or_else(|| file.with_extension("sweep"))
+/// What a command shall do again and again, in the folder that is asked for or one beside the file: whether it resumes and
+/// replaces, and all its other options as a text.
+fn task<'a>(
+    shared: &'a Shared,
+    command: Command,
+    file: &'a Path,
+    sweep: &'a SweepOptions,
+    [resume, force]: [bool; 2],
+    options: String,
+) -> Task<'a> {
+    let folder = sweep.into.clone().unwrap_or_else(|| file.with_extension("sweep"));
+    Task { shared, command, file, sweeps: &sweep.sweep, folder, options, resume, force }
 }
 
 /// A path within a folder that has the name of one that was asked for.
@@ -34,17 +43,8 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
         return Err(Failure::usage("--sweep goes through the values of one file at a time"));
     };
     let single = Check { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
-    let task = Task {
-        shared,
-        command: Command::Check,
-        file,
-        sweeps: &options.sweep.sweep,
-        folder: folder(&options.sweep, file),
-        options: format!("{single:?}"),
-        resume: options.again.resume,
-        force: options.again.force,
-    };
-    task.go(|shared, folder| {
+    let again = [options.again.resume, options.again.force];
+    task(shared, Command::Check, file, &options.sweep, again, format!("{single:?}")).go(|shared, folder| {
         let slice = PathBuf::from("slice.svg");
         let output =
             options.slice.and_then(|_| within(folder, Some(options.output.as_ref().unwrap_or(&slice))));
@@ -56,20 +56,13 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
 pub(in crate::cli) fn mesh(shared: &Shared, options: &Mesh) -> Result<(), Failure> {
     refuse(&[("-o -", options.output.as_deref() == Some(Path::new("-")))])?;
     let single = Mesh { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
-    let task = Task {
-        shared,
-        command: Command::Mesh,
-        file: &options.file,
-        sweeps: &options.sweep.sweep,
-        folder: folder(&options.sweep, &options.file),
-        options: format!("{single:?}"),
-        resume: options.again.resume,
-        force: options.again.force,
-    };
-    task.go(|shared, folder| {
-        let output = within(folder, options.output.as_ref());
-        meshes::run(shared, &Mesh { output, ..single.clone() })
-    })
+    let again = [options.again.resume, options.again.force];
+    task(shared, Command::Mesh, &options.file, &options.sweep, again, format!("{single:?}")).go(
+        |shared, folder| {
+            let output = within(folder, options.output.as_ref());
+            meshes::run(shared, &Mesh { output, ..single.clone() })
+        },
+    )
 }
 
 /// `rfm run --sweep`.
@@ -80,17 +73,12 @@ pub(in crate::cli) fn run(shared: &Shared, options: &Run) -> Result<(), Failure>
     }
     let single =
         Run { sweep: SweepOptions::default(), resume: false, force: false, output: None, ..options.clone() };
-    let task = Task {
-        shared,
-        command: Command::Run,
-        file: &options.file,
-        sweeps: &options.sweep.sweep,
-        folder: options.output.clone().unwrap_or_else(|| folder(&options.sweep, &options.file)),
-        options: format!("{single:?}"),
-        resume: options.resume,
-        force: options.force,
+    let sweep = SweepOptions {
+        into: options.sweep.into.clone().or_else(|| options.output.clone()),
+        ..options.sweep.clone()
     };
-    task.go(|shared, folder| {
+    let again = [options.resume, options.force];
+    task(shared, Command::Run, &options.file, &sweep, again, format!("{single:?}")).go(|shared, folder| {
         // a run of the sweep that was interrupted goes on; what else is in its folder belongs to the sweep
         let resume = options.resume && runs::has_checkpoint(folder);
         let force = !resume && (options.resume || options.force);
@@ -102,36 +90,18 @@ pub(in crate::cli) fn run(shared: &Shared, options: &Run) -> Result<(), Failure>
 pub(in crate::cli) fn report(shared: &Shared, options: &Report) -> Result<(), Failure> {
     let (file, name) = choose::subject(&options.subject);
     let is_size = options.sweep.sweep.iter().any(|sweep| sweep.name == "particles");
-    if is_size && file != Path::new("-") && is_of_a_flow(shared, options, file, name)? {
+    // standard input is read once, and no sweep reads it
+    let is_read = is_size && file != Path::new("-");
+    if is_read && reports::scene(&input::program(shared, file)?, name, options)?.is_some() {
         return Err(Failure::usage(
             "the report of a flow chooses `particles` itself: give the sizes by --particles, and sweep another param",
         ));
     }
     let single = Report { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
-    let task = Task {
-        shared,
-        command: Command::Report,
-        file,
-        sweeps: &options.sweep.sweep,
-        folder: folder(&options.sweep, file),
-        options: format!("{single:?}"),
-        resume: options.again.resume,
-        force: options.again.force,
-    };
-    task.go(|shared, folder| {
+    let again = [options.again.resume, options.again.force];
+    task(shared, Command::Report, file, &options.sweep, again, format!("{single:?}")).go(|shared, folder| {
         let [output, mesh_plot, html] =
             [&options.output, &options.mesh_plot, &options.html].map(|path| within(folder, path.as_ref()));
         reports::run(shared, &Report { output, mesh_plot, html, ..single.clone() })
-    })
-}
-
-/// Whether a report is about a scene.
-fn is_of_a_flow(shared: &Shared, options: &Report, file: &Path, name: Option<&str>) -> Result<bool, Failure> {
-    let program = input::program(shared, file)?;
-    let module = program.module();
-    let asked = !options.flow.particles.is_empty() || !options.flow.methods.is_empty();
-    Ok(match name {
-        Some(name) => module.scenes.iter().any(|scene| scene.name == name),
-        None => asked || module.solids.is_empty(),
     })
 }

@@ -88,8 +88,8 @@ fn of_solids(document: &Value) -> Vec<Figure> {
     solids.iter().flat_map(figures).collect()
 }
 
-/// Of a solid: the fastest program of ω over many points in f64, and the finest mesh. Of a flow: the errors and the time of
-/// each run.
+/// The figures of a report: for a solid the fastest program of ω over many points in f64, and the finest mesh; for a flow
+/// the errors and the time of each run.
 fn of_report(document: &Value) -> Vec<Figure> {
     let rows = document["rows"].as_array().map_or(&[][..], |list| list);
     if document["scene"].is_string() {

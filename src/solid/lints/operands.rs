@@ -59,11 +59,14 @@ pub enum Sign {
 
 impl Sign {
     pub fn of(range: Interval) -> Self {
-        match range {
-            Interval::ALL => Self::Unknown,
-            range if range.lo > 0.0 => Self::Inside,
-            range if range.hi < 0.0 => Self::Outside,
-            _ => Self::Mixed,
+        if range == Interval::ALL {
+            Self::Unknown
+        } else if range.lo > 0.0 {
+            Self::Inside
+        } else if range.hi < 0.0 {
+            Self::Outside
+        } else {
+            Self::Mixed
         }
     }
 

@@ -301,10 +301,14 @@ impl Boundary {
         if obstacle.slip == Slip::Free {
             coverage.let_slip();
         }
-        if obstacle.moving.is_some() {
-            coverage.set_in_motion(field.wall_velocity(p));
+        let motion = obstacle.moving.as_ref().map(|_| field.wall_velocity(p));
+        if let Some(velocity) = motion {
+            coverage.set_in_motion(velocity);
         }
-        coverage.friction.take_along(self.velocity_along(k, p));
+        let stated = obstacle.surface_velocity.as_ref().map(|velocity| velocity(p, self.time));
+        if let Some(velocity) = stated.or(motion) {
+            coverage.friction.take_along(velocity);
+        }
         whole.or(&coverage)
     }
 
