@@ -112,6 +112,11 @@ impl Placement {
     pub fn back(&self, p: DVec3) -> DVec3 {
         self.rotation.transpose() * (p - self.translation)
     }
+
+    /// Where a point of the body at the start is now.
+    pub fn apply(&self, p: DVec3) -> DVec3 {
+        self.rotation * p + self.translation
+    }
 }
 
 /// How a body moves at an instant: v(p) = v₀ + ω × p.

@@ -17,7 +17,7 @@ use super::{
     pairs::{Cloud, Columns, Near, PairPass, Real},
     params::Parameters,
     particles::{Particles, Vectors},
-    walls::{Boundary, Coverage, Fault, Friction, MARKED, Trouble, UNKNOWN, Undefined, Wall},
+    walls::{Boundary, Coverage, Fault, Friction, MARKED, StepLimits, Trouble, UNKNOWN, Undefined, Wall},
 };
 
 /// Number of particles that one task of a parallel loop handles.
@@ -26,6 +26,9 @@ pub(super) const CHUNK: usize = 2048;
 /// A step shorter than this part of the longest so far leads nowhere: speeds have grown by a factor of 10⁶,
 /// or forces by 10¹².
 const SHORTEST: f64 = 1e-6;
+
+/// Part of the spacing that a body beside the fluid may move in one step, as far as a particle may.
+const BODY_TRAVEL: f64 = 0.4;
 
 /// Name of the greatest speed of sound in a checkpoint.
 const SOUND: &str = "speed of sound";
@@ -296,8 +299,20 @@ impl Core {
         if dt < SHORTEST * self.longest_dt {
             return Err(self.stalled(dt));
         }
+        let dt = self.dt_beside_bodies(dt.min(most));
         // take equal steps to the instant, rather than full ones and a small rest
         Ok(if most.is_finite() { most / (most / dt - 1e-9).ceil().max(1.0) } else { dt })
+    }
+
+    /// The longest step, s, at most `dt`, in which no body passes the fluid by.
+    fn dt_beside_bodies(&self, dt: f64) -> f64 {
+        let parameters = &self.parameters;
+        let limits = StepLimits {
+            travel: BODY_TRAVEL * parameters.spacing(),
+            reach: parameters.support_radius,
+            for_acceleration: |a| parameters.force_dt(a),
+        };
+        self.boundary.step_beside_bodies(&self.particles.position, &limits, self.time, dt)
     }
 
     /// The part of a checkpoint that all methods share.

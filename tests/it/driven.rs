@@ -54,6 +54,51 @@ fn run(text: &str) -> Result<rfm::sph::Simulation, rfm::sph::StepError> {
     Ok(simulation)
 }
 
+/// The times, s, between which the steps of a run lie, until `until`.
+fn times(text: &str, until: f64) -> Vec<f64> {
+    let program = Program::from_source("moving.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, "flow", Engine::Auto).unwrap();
+    let mut simulation = experiment.start().unwrap().simulation;
+    let mut times = vec![0.0];
+    while simulation.time() < until {
+        simulation.step().unwrap();
+        times.push(simulation.time());
+    }
+    times
+}
+
+/// Nothing falls and the fluid is at rest, so that nothing but the ball limits the steps.
+#[test]
+fn steps_follow_a_body_in_a_fluid_at_rest() {
+    let flow = |motion: &str| {
+        format!(
+            "rfm 1\n\
+             solid ball = sphere(0.1).move([0.3 + {motion}, 0.25, 0.25])\n\
+             scene flow {{\n\
+             box {{ max: [1, 0.5, 0.5] }}\n\
+             obstacle {{ solid: ball }}\n\
+             fluid water {{ shape: box([0, 0, 0], [0.6, 0.5, 0.5]), density: 1000, spacing: 0.05 }}\n\
+             gravity: [0, 0, 0]\n\
+             method: dfsph\n\
+             run {{ until: 1 s }}\n\
+             }}\n"
+        )
+    };
+    // it swings by a fifth of a spacing: no step is too long for its way, but it must be seen to swing
+    let period = std::f64::consts::TAU / 20.0;
+    let swings = times(&flow("0.01*sin(20*t)"), period).len() - 1;
+    assert!((14..80).contains(&swings), "{swings} steps in a period");
+    // in a step a fast one moves by 0.4 spacings
+    let speed = 5.0;
+    let steps = times(&flow("5*t"), 0.02);
+    let longest = steps.windows(2).map(|t| speed * (t[1] - t[0])).fold(0.0, f64::max);
+    assert!(longest <= 0.4 * 0.05 * (1.0 + 1e-9), "{longest} m in a step");
+    // steps are long again where the ball has not yet set out
+    let waits = times(&flow("5*max(t - 0.3, 0)"), 0.32);
+    let before = waits.iter().filter(|t| **t <= 0.29).count();
+    assert!(before < 10 && waits.len() > before + 4, "{before} of {} steps", waits.len());
+}
+
 /// A piston comes along x, at 0.5 m/s, and a ball is in its way to the right wall, which it touches.
 fn piston(method: &str, until: f64) -> String {
     format!(

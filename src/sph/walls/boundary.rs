@@ -220,8 +220,7 @@ impl Boundary {
         is_near.resize(position.len().div_ceil(MARKED), true);
         let [x, y, z] = position.components().map(|c| c.par_chunks(MARKED));
         x.zip(y).zip(z).zip(is_near).with_min_len(64).for_each(|(((x, y), z), is_near)| {
-            let [x, y, z] = [x, y, z].map(bounds);
-            let block = Aabb::new(DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
+            let block = box_around([x, y, z]);
             let in_box = self.domain.union(&block.grown(h)) == self.domain;
             *is_near = !(in_box && self.fields().all(|field| field.is_far(&block, h)));
         });
@@ -429,6 +428,12 @@ impl Boundary {
         }
         Ok(nearest)
     }
+}
+
+/// The smallest box that holds some points, given by columns.
+pub(super) fn box_around(points: [&[f64]; 3]) -> Aabb {
+    let [x, y, z] = points.map(bounds);
+    Aabb::new(DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1))
 }
 
 /// The smallest and the largest of some numbers.

@@ -3,6 +3,7 @@
 //! ```text
 //! Field::omega ─▶ Maps: λ, ∇λ, K of obstacles by their volume ─▶ Coverage ─▶ density, pressure
 //! Field::faces ─▶ Coverage: λ, ∇λ, K of faces in closed form ─▶ viscosity, and obstacles that change their shape
+//! Moving::placement ─▶ StepLimits: how long a step may be
 //! Field::first_entry ─▶ Contact ─▶ Boundary::collide: position and velocity
 //! ```
 
@@ -11,6 +12,7 @@ mod contact;
 mod coverage;
 mod friction;
 mod kernel;
+mod motion;
 mod symmetric;
 mod volume;
 mod way_out;
@@ -23,4 +25,5 @@ pub(super) use coverage::Coverage;
 pub(super) use friction::{Friction, WallDrag};
 pub(super) use kernel::Wall;
 pub use kernel::WallKernel;
+pub(super) use motion::StepLimits;
 pub(super) use volume::Maps;
