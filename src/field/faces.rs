@@ -27,3 +27,26 @@ pub enum Part {
 
 /// A tree of faces in prefix order: each node is followed by its parts. It is empty if no surface is near.
 pub type Faces = SmallVec<[Part; 16]>;
+
+/// The face that is the obstacle's surface nearest to the point; `None` for a tree without faces. Of an intersection it
+/// is the farthest face, of a union the nearest.
+pub fn nearest(faces: &[Part]) -> Option<Face> {
+    fn of_tree(faces: &[Part], at: &mut usize) -> Option<Face> {
+        let part = *faces.get(*at)?;
+        *at += 1;
+        let (parts, all) = match part {
+            Part::Face(face) => return Some(face),
+            Part::All(parts) => (parts, true),
+            Part::Any(parts) => (parts, false),
+        };
+        let mut chosen = of_tree(faces, at)?;
+        for _ in 1..parts {
+            let next = of_tree(faces, at)?;
+            if (next.distance > chosen.distance) == all {
+                chosen = next;
+            }
+        }
+        Some(chosen)
+    }
+    of_tree(faces, &mut 0)
+}

@@ -12,7 +12,10 @@ use rand_pcg::{
     rand_core::{Rng, SeedableRng},
 };
 
-use crate::{field::Field, geom::Aabb};
+use crate::{
+    field::{Face, Faces, Field, nearest},
+    geom::Aabb,
+};
 
 use super::{params::Parameters, particles::Particles, walls::Obstacle};
 
@@ -272,7 +275,7 @@ pub struct Carved {
 }
 
 /// Removes particles that lie outside the box, in an obstacle, or nearer to one than `clearance`, m. The
-/// distance is estimated by −ω/|∇ω|, unless a ball of that radius is proven to be free. The remaining
+/// distance is that of the nearest face, unless a ball of that radius is proven to be free. The remaining
 /// particles get new ids from 0 on.
 ///
 /// # Errors
@@ -301,14 +304,9 @@ pub fn carve(
                 carved.inside += 1;
                 continue 'particles;
             }
-            if clearance > 0.0 && obstacle.field.clearance(p, clearance) < clearance {
-                // take value and gradient together: away from surfaces a map of cells has a value of its own,
-                // without a gradient to it
-                let (w, gradient) = obstacle.field.omega_grad(p);
-                if -w < clearance * gradient.length() {
-                    carved.too_close += 1;
-                    continue 'particles;
-                }
+            if surface(obstacle, p, clearance)?.is_some_and(|face| face.distance < clearance) {
+                carved.too_close += 1;
+                continue 'particles;
             }
         }
         kept.push(p, particles.velocity.get(i));
@@ -382,22 +380,39 @@ pub fn carve_cells(
     Ok(carved)
 }
 
-/// The distance, m, of a point from the nearest obstacle, estimated by −ω/|∇ω|; negative inside, infinite if it is
-/// proven to be more than `most`.
+/// The distance, m, of a point from the nearest obstacle; negative inside, infinite if it is proven to be more than
+/// `most`.
 fn distance(obstacles: &[Obstacle], p: DVec3, most: f64) -> Result<f64, SeedError> {
     let mut least = f64::INFINITY;
     for obstacle in obstacles {
-        if obstacle.field.clearance(p, most) < most {
-            let (w, gradient) = obstacle.field.omega_grad(p);
-            if w.is_nan() {
-                return Err(SeedError::Undefined { at: p });
-            }
-            let slope = gradient.length();
-            let distance = if slope > 0.0 { -w / slope } else { -w * f64::INFINITY };
-            least = least.min(if distance.is_nan() { 0.0 } else { distance });
-        }
+        least = surface(obstacle, p, most)?.map_or(least, |face| least.min(face.distance));
     }
     Ok(least)
+}
+
+/// An obstacle's face near a point, inside or outside; `None` if it is proven to be farther away than `reach`, m. A point
+/// so deep inside that no face is known is infinitely deep.
+fn surface(obstacle: &Obstacle, p: DVec3, reach: f64) -> Result<Option<Face>, SeedError> {
+    if obstacle.field.clearance(p, reach) >= reach {
+        return Ok(None);
+    }
+    let w = obstacle.field.omega(p);
+    if w.is_nan() {
+        return Err(SeedError::Undefined { at: p });
+    }
+    let mut faces = Faces::new();
+    obstacle.field.faces(p, reach, &mut faces);
+    // ω knows the side for sure, a face far from its edges the distance
+    let on_its_side = |face: Face| Face {
+        distance: if w < 0.0 { face.distance.max(0.0) } else { face.distance.min(0.0) },
+        ..face
+    };
+    let is_known = |face: &Face| face.distance.is_finite() && face.normal.is_finite();
+    if let Some(face) = nearest(&faces).filter(is_known) {
+        return Ok(Some(on_its_side(face)));
+    }
+    let deep = Face { distance: f64::NEG_INFINITY, normal: DVec3::ZERO, mean_curvature: 0.0 };
+    Ok((w >= 0.0).then_some(deep))
 }
 
 /// Moves particles that are nearer to an obstacle than `clearance`, m, to that distance. A lattice that a
@@ -412,17 +427,12 @@ fn move_out(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], cl
     for i in 0..particles.len() {
         let mut p = particles.position.get(i);
         for obstacle in obstacles {
-            if obstacle.field.clearance(p, clearance) >= clearance {
-                continue;
-            }
-            let (w, gradient) = obstacle.field.omega_grad(p);
-            let slope = gradient.length();
+            // a place without a value is told of when particles are carved
+            let Ok(Some(face)) = surface(obstacle, p, clearance.max(depth)) else { continue };
             // from inside a particle comes to half of the clearance, because another is farther out
-            let wanted = if w < 0.0 { clearance } else { 0.5 * clearance };
-            let lacking = wanted + w / slope;
-            let may_move = w < 0.0 || w < depth * slope;
-            if may_move && slope > 0.0 && lacking > 0.0 {
-                p -= lacking / slope * gradient;
+            let wanted = if face.distance > 0.0 { clearance } else { 0.5 * clearance };
+            if face.distance < wanted && face.distance >= -depth {
+                p += (wanted - face.distance) * face.normal;
             }
         }
         if domain.contains(p) {
