@@ -173,9 +173,10 @@ impl Experiment {
             let number = particles.len() as f64;
             let enough = wanted.is_none_or(|wanted| particles.len() >= wanted);
             let off = (number * cell.element_product() / volume).ln();
-            // a number of particles is reached from above: the last of them are left out
+            // a number of particles is reached from above: some of them are left out. Cells that leave a part of the
+            // fluid without sites, as where the last layer does not fit, crowd the others
             let error = match wanted {
-                Some(wanted) if enough => (number / wanted as f64).ln(),
+                Some(wanted) if enough => (number / wanted as f64).ln() + off.abs(),
                 Some(_) => f64::INFINITY,
                 None => off.abs(),
             };
