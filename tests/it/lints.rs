@@ -311,9 +311,9 @@ fn a_search_that_is_cut_says_so() {
     assert!(!all.is_cut && all.spans.len() >= 2, "{all:?}");
     let whole = usize::MAX - left;
     for budget in [0, 1000, whole / 2, whole - 1] {
-        let found = solid.idle_operands(source, &mut budget.clone());
+        let found = solid.idle_operands(source, &mut { budget });
         assert!(found.is_cut && (budget > 1000 || found.spans.is_empty()), "{budget} of {whole}: {found:?}");
         assert!(found.spans.iter().all(|span| all.spans.contains(span)));
     }
-    assert_eq!(solid.idle_operands(source, &mut whole.clone()), all);
+    assert_eq!(solid.idle_operands(source, &mut { whole }), all);
 }
