@@ -237,7 +237,7 @@ fn solids(
     diagnostics: &mut Diagnostics,
 ) -> Result<Vec<Facts>, Failure> {
     let (time, budget) = (options.time, options.budget);
-    let mut facts = Vec::new();
+    let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
     let (start, named_solids) = (Instant::now(), &program.module().solids);
     for named in named_solids {
         if !facts.is_empty() && start.elapsed().as_secs_f64() > budget {
@@ -271,9 +271,10 @@ fn solids(
             None => {}
         }
         diagnostics.list.extend(remarks(named, &solid, &thin));
-        diagnostics.list.extend(lints::of_solid(program, named, &solid));
+        diagnostics.list.extend(lints::of_solid(program, named, &solid, &mut searches));
         facts.push(found);
     }
+    searches.tell();
     diagnostics.list.extend(lints::of_scenes(shared, program).map_err(choose::usage)?);
     Ok(facts)
 }

@@ -1,6 +1,8 @@
-//! Warnings about solids and scenes that are valid and most likely not meant: only `rfm check` looks for them.
+//! Warnings about solids and scenes that are valid and most likely not meant: `rfm check` looks for all of them, and editors
+//! are told of those about solids once a text rests.
 
 use super::args::Shared;
+use super::failure::note;
 use rfm::diagnostic::{Code, Diagnostic, Span};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
@@ -10,8 +12,48 @@ use rfm::solid::{Break, Breakage, ThinPart, Uneven};
 use rfm::syntax::ast::Item;
 use rfm::{Error, Program, Solid, experiment};
 
+/// What all solids of a file share.
+pub(super) struct Searches {
+    /// Operations that are left for operands without effect.
+    budget: usize,
+    /// The names of solids of which some operands were not looked at to the end.
+    cut: Vec<String>,
+}
+
+/// Operations that are spent on operands without effect in all solids of a file together, at most: about a second.
+const IDLE_OPERATIONS: usize = 30_000_000;
+
+impl Searches {
+    pub fn new() -> Self {
+        Self { budget: IDLE_OPERATIONS, cut: Vec::new() }
+    }
+
+    /// Searches that end sooner, for texts that are being written.
+    pub fn short() -> Self {
+        Self { budget: IDLE_OPERATIONS / 10, ..Self::new() }
+    }
+
+    /// Says which searches came to no end.
+    pub fn tell(&self) {
+        let Some(first) = self.cut.first() else { return };
+        let others = match self.cut.len() - 1 {
+            0 => String::new(),
+            1 => " and another solid".into(),
+            n => format!(" and {n} other solids"),
+        };
+        note(format!(
+            "operands without effect (W0415) were looked for in `{first}`{others} only in part: that takes too long"
+        ));
+    }
+}
+
 /// Warnings about the formula of a solid.
-pub(super) fn of_solid(program: &Program, named: &NamedSolid, solid: &Solid) -> Vec<Diagnostic> {
+pub(super) fn of_solid(
+    program: &Program,
+    named: &NamedSolid,
+    solid: &Solid,
+    searches: &mut Searches,
+) -> Vec<Diagnostic> {
     let subject = Subject { named, text: definition(program, named) };
     let around = solid.bounds().aabb().map(|bounds| bounds.grown(0.05 * bounds.size().max_element()));
     let uses = |scene: &&Scene| scene.obstacles.iter().any(|obstacle| obstacle.name == named.name);
@@ -19,8 +61,11 @@ pub(super) fn of_solid(program: &Program, named: &NamedSolid, solid: &Solid) -> 
     let jumps = around.or(of_scene).map_or_else(Vec::new, |over| solid.jumps(&over));
     let mut singular = of_scene.or(around).map_or_else(Vec::new, |over| solid.singularities(&over));
     singular.retain(|place| jumps.iter().all(|jump| jump.span != place.span));
-    let mut found: Vec<Diagnostic> =
-        solid.idle_operands(named.span.source).into_iter().map(|span| subject.idle(span)).collect();
+    let idle = solid.idle_operands(named.span.source, &mut searches.budget);
+    if idle.is_cut {
+        searches.cut.push(named.name.clone());
+    }
+    let mut found: Vec<Diagnostic> = idle.spans.into_iter().map(|span| subject.idle(span)).collect();
     found.extend(jumps.iter().map(|jump| subject.jump(jump)));
     found.extend(singular.iter().map(|place| subject.singular(place)));
     // where a formula jumps, differences say nothing of its gradient

@@ -397,15 +397,24 @@ fn proven_bricks_save_samples_and_change_no_bit() {
 
 /// ω interpolated between given values at the nodes of a grid in [0, n]³, trilinear in each cell.
 pub(super) fn trilinear(values: Vec<f64>, n: usize) -> impl Fn(DVec3) -> f64 {
-    move |p| {
-        let cell = p.floor().clamp(DVec3::ZERO, DVec3::splat((n - 1) as f64));
-        let t = p - cell;
-        let [i, j, k] = cell.to_array().map(|c| c as usize);
-        let at = |c: usize| values[((k + (c >> 2)) * (n + 1) + j + (c >> 1 & 1)) * (n + 1) + i + (c & 1)];
-        let mix = |a: f64, b: f64, t: f64| (1.0 - t) * a + t * b;
-        let along_x = |c| mix(at(c), at(c + 1), t.x);
-        mix(mix(along_x(0), along_x(2), t.y), mix(along_x(4), along_x(6), t.y), t.z)
+    move |p| between_nodes(&values, n + 1, p)
+}
+
+/// The value at a point between `n`³ nodes. Meshes of random grids ask for it millions of times, so it is written for
+/// a compiler that optimises little.
+pub(super) fn between_nodes(values: &[f64], n: usize, p: DVec3) -> f64 {
+    let (i, j, k) = ((p.x as usize).min(n - 2), (p.y as usize).min(n - 2), (p.z as usize).min(n - 2));
+    let (u, v, w) = (p.x - i as f64, p.y - j as f64, p.z - k as f64);
+    let first = (k * n + j) * n + i;
+    let mut on_planes = [0.0; 2];
+    for (plane, value) in on_planes.iter_mut().enumerate() {
+        let low = first + plane * n * n;
+        let high = low + n;
+        let a = (1.0 - u) * values[low] + u * values[low + 1];
+        let b = (1.0 - u) * values[high] + u * values[high + 1];
+        *value = (1.0 - v) * a + v * b;
     }
+    (1.0 - w) * on_planes[0] + w * on_planes[1]
 }
 
 proptest! {

@@ -44,7 +44,7 @@ pub use depth::Depth;
 pub use engine::{Engine, ProgramKind};
 pub use evaluation::Contact;
 pub use inspection::{LeafInfo, Remainder};
-pub use lints::{Break, Breakage, ThinPart, Uneven};
+pub use lints::{Break, Breakage, Idle, ThinPart, Uneven};
 pub use nearest::{Distance, Distances};
 pub(crate) use programs::block_plan::{BlockPlan, BlockStep, Operation as JoiningOperation, Piece};
 pub(crate) use programs::columns::ColumnPlace;

@@ -18,7 +18,9 @@ fn idle(text: &str) -> Vec<String> {
     let program = Program::from_source("t.rfm", text.clone()).unwrap_or_else(|e| panic!("{text}: {e}"));
     let source = program.module().solids[0].span.source;
     let solid = program.solid("s").unwrap();
-    solid.idle_operands(source).iter().map(|span| text[span.range()].to_string()).collect()
+    let found = solid.idle_operands(source, &mut { usize::MAX });
+    assert!(!found.is_cut, "{text}");
+    found.spans.iter().map(|span| text[span.range()].to_string()).collect()
 }
 
 /// A small generator (Knuth's linear congruence).
@@ -294,4 +296,24 @@ fn flows_that_are_validated_check_without_a_word() {
             assert_eq!(outcome.stderr, "", "{}", path.display());
         }
     }
+}
+
+/// The budget counts the work: what is found before it ends is right, and that it has ended is said.
+#[test]
+fn a_search_that_is_cut_says_so() {
+    let shape = "all i in 0..100: x + 0.01*sin(i)*y*z*x^2 + 0.01*cos(i)*z^2*y <= 5 + i";
+    let text = format!("rfm 1\nsolid s = ({shape}) and box([-1, -1, -1], [1, 1, 1]) and x <= 30 and y >= -5");
+    let program = Program::from_source("t.rfm", text).unwrap();
+    let source = program.module().solids[0].span.source;
+    let solid = program.solid("s").unwrap();
+    let mut left = usize::MAX;
+    let all = solid.idle_operands(source, &mut left);
+    assert!(!all.is_cut && all.spans.len() >= 2, "{all:?}");
+    let whole = usize::MAX - left;
+    for budget in [0, 1000, whole / 2, whole - 1] {
+        let found = solid.idle_operands(source, &mut { budget });
+        assert!(found.is_cut && (budget > 1000 || found.spans.is_empty()), "{budget} of {whole}: {found:?}");
+        assert!(found.spans.iter().all(|span| all.spans.contains(span)));
+    }
+    assert_eq!(solid.idle_operands(source, &mut { whole }), all);
 }

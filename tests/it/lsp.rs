@@ -445,5 +445,56 @@ fn behind_an_import_stands_what_it_defines() {
     // a file that cannot be read has no names
     let found = labels("rfm 1\nimport \"none.rfm\" as chess\nsolid s = chess.");
     assert!(found.iter().any(|(name, _)| name == "move"), "{found:?}");
+    // a function of the import has its own parameters, and only behind its name
+    let mut help = |line: &str| {
+        let file = json!({ "uri": uri, "languageId": "rfm", "version": 1, "text": format!("{head}{line}") });
+        editor.tell("textDocument/didOpen", json!({ "textDocument": file }));
+        let position = json!({ "line": 2, "character": line.len() });
+        let at = json!({ "textDocument": { "uri": uri }, "position": position });
+        let help = editor.ask("textDocument/signatureHelp", at);
+        (help["signatures"][0]["label"].clone(), help["activeParameter"].clone())
+    };
+    assert_eq!(help("solid s = chess.rook(2, "), (json!("rook(width, walls = 4)"), json!(1)));
+    assert_eq!(help("solid s = chess.rook("), (json!("rook(width, walls = 4)"), json!(0)));
+    for line in ["solid s = rook(", "solid s = chess.box(", "solid s = chess.pawn.rook("] {
+        assert_eq!(help(line).0, Value::Null, "{line}");
+    }
+    editor.end();
+}
+
+/// Warnings that take longer come once a text rests, and never about an older one.
+#[test]
+fn what_takes_longer_is_told_when_the_text_rests() {
+    let idle = "rfm 1\nsolid s = sphere(1) or sphere(0.5)\n";
+    let mut editor = Editor::with(idle);
+    assert!(editor.messages.is_empty(), "{:?}", editor.messages);
+    let code =
+        |messages: &[Value]| messages.iter().map(|message| message["code"].clone()).collect::<Vec<_>>();
+    assert_eq!(code(editor.await_messages()), ["W0415"]);
+    let (start, end) = (&editor.messages[0]["range"]["start"], &editor.messages[0]["range"]["end"]);
+    assert_eq!(
+        (start, end),
+        (&json!({ "line": 1, "character": 23 }), &json!({ "line": 1, "character": 34 }))
+    );
+    // changed before it rests: what is found late is about the last text, and nothing about an older one follows
+    for (version, text) in
+        ["sphere(1) or sphere(0.7)", "sphere(1) or sphere(2", "\n  sphere(1) or sphere(0.6)"]
+            .into_iter()
+            .enumerate()
+    {
+        let file = json!({ "uri": URI, "version": version });
+        let change = json!({ "text": format!("rfm 1\nsolid s = {text}\n") });
+        let params = json!({ "textDocument": file, "contentChanges": [change] });
+        editor.tell("textDocument/didChange", params);
+    }
+    let mut versions = Vec::new();
+    while versions.last() != Some(&2) || editor.messages.is_empty() {
+        let message = editor.read();
+        versions.push(message["params"]["version"].as_i64().unwrap());
+        editor.messages = message["params"]["diagnostics"].as_array().unwrap().clone();
+    }
+    assert!(versions.is_sorted() && versions.ends_with(&[2, 2]), "{versions:?}");
+    assert_eq!(code(&editor.messages), ["W0415"]);
+    assert_eq!(editor.messages[0]["range"]["start"]["line"], 2);
     editor.end();
 }

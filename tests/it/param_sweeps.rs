@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -147,9 +149,16 @@ fn what_cannot_be_swept_is_refused_before_anything_is_done() {
     check(&["--sweep", "radius=1..2:2", "--sweep", "radius=1..2:3"], "swept twice");
     check(&["--sweep", "radius=1..2:200", "--sweep", "other=1..2:200"], "40000 combinations");
     check(&["--sweep", "radius=1..2:2", "--watch"], "--watch and --sweep exclude each other");
+    check(&["--sweep", "radius=1..2:2", "--slice", "z=0", "-o", "-"], "-o - and --sweep exclude each other");
     check(&["--into", "out"], "--sweep");
     check(&["--resume"], "--sweep");
     rfm(folder.path(), &["check", "-", "--sweep", "radius=1..2:2"]).expect(2);
+    for option in ["-o", "--html", "--mesh-plot"] {
+        let arguments = ["report", "a.rfm", "--sweep", "radius=1..2:2", option, "-"];
+        let refused = rfm(folder.path(), &arguments).expect(2);
+        let reason = format!("{option} - and --sweep exclude each other");
+        assert!(refused.stderr.contains(&reason), "{}", refused.stderr);
+    }
 }
 
 #[test]
@@ -187,8 +196,17 @@ fn a_sweep_is_continued_replaced_or_left_alone() {
     assert!(other.stderr.contains("other options"), "{}", other.stderr);
     std::fs::write(folder.path().join("a.rfm"), BALL.replace("sphere(r)", "sphere(r/2)")).unwrap();
     mesh("r=1..2:3", &["--resume"]).expect(2);
+    // folders of values that are gone are removed, and nothing that is not of the sweep
+    let sweep = folder.path().join("a.sweep");
+    std::fs::create_dir(sweep.join("r=mine")).unwrap();
+    std::fs::create_dir(folder.path().join("own=1")).unwrap();
+    let text = std::fs::read_to_string(sweep.join("index.json")).unwrap();
+    std::fs::write(sweep.join("index.json"), text.replace("\"r=0.5\"", "\"../own=1\"")).unwrap();
     mesh("r=1..2:2", &["--force"]).expect(0);
-    let found = index(&folder.path().join("a.sweep"));
+    let is_there = |name: &str| sweep.join(name).is_dir();
+    assert!(is_there("r=1") && is_there("r=2") && !is_there("r=1.25") && !is_there("r=1.5"));
+    assert!(is_there("r=mine") && is_there("r=0.5") && is_there("../own=1"));
+    let found = index(&sweep);
     assert_eq!(rows(&found).len(), 2);
     assert!((figure(&rows(&found)[0], "volume") / (PI / 6.0) - 1.0).abs() < 0.05);
 }
@@ -281,4 +299,49 @@ fn a_run_and_a_sweep_have_folders_of_their_own() {
     let refused = rfm(folder.path(), &[&run[..], &["several"]].concat()).expect(2);
     assert!(refused.stderr.contains("holds a sweep"), "{}", refused.stderr);
     assert!(!folder.path().join("several/frames").exists());
+}
+
+/// The row that was interrupted goes on from its own checkpoint, and ends as one that was not.
+#[test]
+fn an_interrupted_sweep_goes_on_within_its_row() {
+    let folder = in_folder(&FALL.replace("save_every: 0.05 s", "save_every: 4 ms"));
+    let arguments =
+        |out| ["run", "a.rfm", "--sweep", "v=-1..0 m/s:2", "--no-pictures", "--threads", "1", "-o", out];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_rfm"))
+        .args(arguments("broken"))
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let frames = folder.path().join("broken/v=-1m_s/frames");
+    let started = Instant::now();
+    while !frames.join("particles_000002.vtp").is_file() {
+        assert!(
+            started.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none(),
+            "no frame"
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    assert!(message.contains("--resume goes on with `broken`"), "{message}");
+    let found = index(&folder.path().join("broken"));
+    assert_eq!((rows(&found).len(), &rows(&found)[0]["exit"]), (1, &130.into()));
+    // a run that began again would write its first frame again
+    let first = frames.join("particles_000001.vtp");
+    let written = || std::fs::metadata(&first).unwrap().modified().unwrap();
+    let before = written();
+    rfm(folder.path(), &[&arguments("broken")[..], &["--resume"]].concat()).expect(0);
+    assert_eq!(written(), before);
+    rfm(folder.path(), &arguments("straight")).expect(0);
+    let [broken, straight] = ["broken", "straight"].map(|name| folder.path().join(name));
+    let codes: Vec<Value> = rows(&index(&broken)).iter().map(|row| row["exit"].clone()).collect();
+    assert_eq!(codes, [0, 0]);
+    for file in ["probes/top.csv", "history/energy.csv", "frames/particles_000050.vtp"] {
+        let content = |out: &Path| std::fs::read(out.join("v=-1m_s").join(file)).unwrap();
+        assert!(content(&broken) == content(&straight), "{file} differs");
+    }
 }

@@ -5,14 +5,15 @@ use lsp_types::{
     SignatureInformation,
 };
 
+use rfm::diagnostic::Source;
 use rfm::lower::vocabulary;
 use rfm::sph::Method;
 use rfm::syntax::{
     self,
-    ast::{Entry, ExprKind, Item},
+    ast::{Ast, Entry, ExprKind, Item},
 };
 
-use super::context::Context;
+use super::context::{Context, Open};
 use super::document::Document;
 use super::words::{self, Signature};
 
@@ -61,7 +62,7 @@ pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
         found.extend(words::ITEMS.map(|(word, about)| item(word, CompletionItemKind::KEYWORD, about)));
     }
     if let Some(open) = context.open.last().filter(|open| open.bracket == '(')
-        && let Some(signature) = signature(document, &open.word, open.is_method)
+        && let Some(signature) = of_call(document, &context, open)
     {
         let names = signature.parameters.iter().filter_map(|p| p.split(" = ").next()).filter(|p| *p != "…");
         found.extend(names.map(|name| CompletionItem {
@@ -88,15 +89,20 @@ fn names(document: &Document, byte: usize) -> Vec<CompletionItem> {
 /// What an import defines, if its name stands alone in front of the dot at the cursor. An import of its own is not among
 /// that: it has no meaning outside.
 fn members(document: &Document, context: &Context) -> Option<Vec<CompletionItem>> {
-    let owner = context.owner.as_ref().filter(|owner| !context.locals.contains(owner))?;
+    let source = imported(document, context, context.owner.as_deref())?;
+    let (ast, _) = syntax::parse(&source);
+    let items = ast.items.iter().filter(|item| !matches!(item, Item::Import(_)));
+    Some(items.filter_map(|item| defined(item, &source.text)).collect())
+}
+
+/// The text of an import, from the name that stands alone in front of a dot; `None` if that names something else.
+fn imported(document: &Document, context: &Context, owner: Option<&str>) -> Option<Source> {
+    let owner = owner.filter(|owner| !context.locals.iter().any(|local| local == owner))?;
     let import = document.ast.items.iter().find_map(|item| match item {
         Item::Import(import) => (import.name.text == *owner).then_some(import),
         Item::Param(_) | Item::Let(_) | Item::Function(_) | Item::Solid(_) | Item::Scene(_) => None,
     })?;
-    let source = document.imported(&import.path)?;
-    let (ast, _) = syntax::parse(&source);
-    let items = ast.items.iter().filter(|item| !matches!(item, Item::Import(_)));
-    Some(items.filter_map(|item| defined(item, &source.text)).collect())
+    document.imported(&import.path)
 }
 
 /// An item of a text as what may be written; `None` for a scene, whose name is written nowhere.
@@ -167,20 +173,31 @@ pub(super) fn signature(document: &Document, name: &str, is_method: bool) -> Opt
     if is_method {
         return methods(document).into_iter().find(|method| method.name == name);
     }
-    let own = document.ast.items.iter().find_map(|item| match item {
-        Item::Function(function) => {
-            (function.name.text == name).then(|| words::of(function, document.text()))
-        }
-        Item::Import(_) | Item::Param(_) | Item::Let(_) | Item::Solid(_) | Item::Scene(_) => None,
-    });
+    let own = function(&document.ast, document.text(), name);
     own.or_else(|| words::functions().into_iter().find(|function| function.name == name))
+}
+
+/// The signature of a function that a text defines.
+fn function(ast: &Ast, text: &str, name: &str) -> Option<Signature> {
+    ast.items.iter().find_map(|item| match item {
+        Item::Function(function) => (function.name.text == name).then(|| words::of(function, text)),
+        Item::Import(_) | Item::Param(_) | Item::Let(_) | Item::Solid(_) | Item::Scene(_) => None,
+    })
+}
+
+/// The signature of what a bracket calls: behind the name of an import, a function of its file.
+fn of_call(document: &Document, context: &Context, open: &Open) -> Option<Signature> {
+    match imported(document, context, open.owner.as_deref()) {
+        Some(source) => function(&syntax::parse(&source).0, &source.text, &open.word),
+        None => signature(document, &open.word, open.is_method),
+    }
 }
 
 /// The call around a byte, with the argument at which it stands.
 pub(super) fn signature_help(document: &Document, byte: usize) -> Option<SignatureHelp> {
     let context = Context::at(document.text(), byte);
     let open = context.open.iter().rev().find(|open| open.bracket == '(' && !open.word.is_empty())?;
-    let signature = signature(document, &open.word, open.is_method)?;
+    let signature = of_call(document, &context, open)?;
     let last = signature.parameters.len().saturating_sub(1);
     let active = Some(open.commas.min(last) as u32);
     let parameters = signature.parameters.iter().map(|parameter| ParameterInformation {

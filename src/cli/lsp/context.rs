@@ -12,6 +12,8 @@ pub(super) struct Open {
     pub word: String,
     /// Whether a dot stands in front of the word.
     pub is_method: bool,
+    /// The name in front of that dot, if it is all that stands there: perhaps that of an import.
+    pub owner: Option<String>,
     /// Commas so far between this bracket and the cursor, outside of others.
     pub commas: usize,
 }
@@ -150,7 +152,9 @@ impl Reader {
                     _ => String::new(),
                 };
                 let is_method = self.tokens.iter().rev().nth(1) == Some(&Token::Mark('.'));
-                self.context.open.push(Open { bracket: c, word, is_method, commas: 0 });
+                let before = self.tokens.len().saturating_sub(1);
+                let owner = is_method.then(|| lone_name(&self.tokens[..before])).flatten();
+                self.context.open.push(Open { bracket: c, word, is_method, owner, commas: 0 });
                 if c == '{' {
                     self.context.key = None;
                 }
@@ -192,11 +196,8 @@ impl Reader {
         };
         let two_dots = self.tokens.ends_with(&[Token::Mark('.'), Token::Mark('.')]);
         self.context.after_dot = self.tokens.last() == Some(&Token::Mark('.')) && !two_dots;
-        if self.context.after_dot
-            && let [before @ .., Token::Word(owner), Token::Mark('.')] = &self.tokens[..]
-            && before.last() != Some(&Token::Mark('.'))
-        {
-            self.context.owner = Some(owner.clone());
+        if self.context.after_dot {
+            self.context.owner = lone_name(&self.tokens);
         }
         self.context.begins_item = self.context.open.is_empty() && on_new_line && ends_value;
         // a value is at its end where a new line begins behind an operand
@@ -204,6 +205,15 @@ impl Reader {
             self.context.key = None;
         }
         self.context
+    }
+}
+
+/// The name in front of a dot that is last, if no other dot stands before it.
+fn lone_name(tokens: &[Token]) -> Option<String> {
+    match tokens {
+        [.., Token::Mark('.'), Token::Word(_), Token::Mark('.')] => None,
+        [.., Token::Word(name), Token::Mark('.')] => Some(name.clone()),
+        _ => None,
     }
 }
 
@@ -233,6 +243,11 @@ mod tests {
         assert_eq!(at("solid s = sphere(1) or chess.").owner.as_deref(), Some("chess"));
         for text in ["solid s = sphere(1).mo", "let a = chess.pawn.mo", "let a = 0..", "let a = chess"] {
             assert_eq!(at(text).owner, None, "{text}");
+        }
+        let owner_of_call = |text| at(text).open.last().unwrap().owner.clone();
+        assert_eq!(owner_of_call("solid s = chess.rook(1, ").as_deref(), Some("chess"));
+        for text in ["solid s = sphere(1).move(", "let a = chess.pawn.move(", "let a = rook("] {
+            assert_eq!(owner_of_call(text), None, "{text}");
         }
     }
 

@@ -1,8 +1,9 @@
 //! `rfm lsp`: what editors ask about files, over the Language Server Protocol on standard input and output.
 //!
 //! One thread answers one request after the other: a file is compiled again in milliseconds when it changes, so nothing is
-//! kept from one version of a text to the next.
+//! kept from one version of a text to the next. Another thread looks for warnings that take longer.
 
+mod background;
 mod complete;
 mod context;
 mod document;
@@ -37,6 +38,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::failure::Failure;
+use background::Background;
 use document::{Document, Encoding};
 use names::Meaning;
 
@@ -75,7 +77,10 @@ fn serve(connection: &Connection) -> Result<(), Failure> {
         "serverInfo": { "name": "rfm", "version": env!("CARGO_PKG_VERSION") },
     });
     connection.initialize_finish(id, answer).map_err(Failure::usage)?;
-    let mut server = Server { connection, encoding, documents: HashMap::new() };
+    let sender = connection.sender.clone();
+    // an editor that is gone is noticed by the other thread
+    let background = Background::start(encoding, move |messages| _ = sender.send(publication(messages)));
+    let mut server = Server { connection, encoding, documents: HashMap::new(), background };
     for message in &connection.receiver {
         match message {
             Message::Request(request) => {
@@ -141,6 +146,7 @@ struct Server<'c> {
     connection: &'c Connection,
     encoding: Encoding,
     documents: HashMap<String, Document>,
+    background: Background,
 }
 
 impl Server<'_> {
@@ -300,6 +306,7 @@ impl Server<'_> {
                 let Ok(closed) = serde_json::from_value::<Closed>(parameters) else { return Ok(()) };
                 let uri = closed.text_document.uri;
                 self.documents.remove(uri.as_str());
+                self.background.forget(&uri);
                 let nothing =
                     lsp_types::PublishDiagnosticsParams { uri, diagnostics: Vec::new(), version: None };
                 self.publish(nothing)
@@ -311,20 +318,27 @@ impl Server<'_> {
     /// Compiles a new version of a text and sends its messages.
     fn read(&mut self, uri: &Uri, text: String, version: Option<i32>) -> Result<(), Failure> {
         let encoding = self.encoding;
+        self.background.forget(uri);
         // a text on which the compiler fails is answered as a file that is not open
         let Ok(document) = catch_unwind(AssertUnwindSafe(|| Document::new(uri, text, encoding))) else {
             self.documents.remove(uri.as_str());
             return Ok(());
         };
         let messages = messages::published(uri, &document, version);
+        let text = document.text().to_string();
         self.documents.insert(uri.as_str().to_string(), document);
-        self.publish(messages)
+        self.publish(messages)?;
+        self.background.give(uri, text, version);
+        Ok(())
     }
 
     fn publish(&self, messages: lsp_types::PublishDiagnosticsParams) -> Result<(), Failure> {
-        let notification = Notification::new(PublishDiagnostics::METHOD.to_string(), messages);
-        self.send(Message::Notification(notification))
+        self.send(publication(messages))
     }
+}
+
+fn publication(messages: lsp_types::PublishDiagnosticsParams) -> Message {
+    Message::Notification(Notification::new(PublishDiagnostics::METHOD.to_string(), messages))
 }
 
 fn read<T: DeserializeOwned>(parameters: Value) -> Result<T, Refusal> {

@@ -27,6 +27,11 @@ fn within(folder: &Path, asked: Option<&PathBuf>) -> Option<PathBuf> {
     asked.map(|path| folder.join(path.file_name().unwrap_or_default()))
 }
 
+/// Whether a path stands for standard output, on which a sweep prints its table.
+fn is_stdout(path: Option<&Path>) -> bool {
+    path == Some(Path::new("-"))
+}
+
 /// Refuses options that have no meaning in a sweep.
 fn refuse(options: &[(&str, bool)]) -> Result<(), Failure> {
     match options.iter().find(|(_, given)| *given) {
@@ -38,7 +43,13 @@ fn refuse(options: &[(&str, bool)]) -> Result<(), Failure> {
 /// `rfm check --sweep`.
 pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Failure> {
     let form = options.message_format != MessageFormat::Human;
-    refuse(&[("--watch", options.watch), ("--fix", options.fix), ("--message-format", form)])?;
+    let to_stdout = is_stdout(options.output.as_deref());
+    refuse(&[
+        ("--watch", options.watch),
+        ("--fix", options.fix),
+        ("--message-format", form),
+        ("-o -", to_stdout),
+    ])?;
     let [file] = &options.files[..] else {
         return Err(Failure::usage("--sweep goes through the values of one file at a time"));
     };
@@ -54,7 +65,7 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
 
 /// `rfm mesh --sweep`.
 pub(in crate::cli) fn mesh(shared: &Shared, options: &Mesh) -> Result<(), Failure> {
-    refuse(&[("-o -", options.output.as_deref() == Some(Path::new("-")))])?;
+    refuse(&[("-o -", is_stdout(options.output.as_deref()))])?;
     let single = Mesh { sweep: SweepOptions::default(), again: Default::default(), ..options.clone() };
     let again = [options.again.resume, options.again.force];
     task(shared, Command::Mesh, &options.file, &options.sweep, again, format!("{single:?}")).go(
@@ -88,6 +99,9 @@ pub(in crate::cli) fn run(shared: &Shared, options: &Run) -> Result<(), Failure>
 
 /// `rfm report --sweep`.
 pub(in crate::cli) fn report(shared: &Shared, options: &Report) -> Result<(), Failure> {
+    let [output, mesh_plot, html] =
+        [&options.output, &options.mesh_plot, &options.html].map(|path| is_stdout(path.as_deref()));
+    refuse(&[("-o -", output), ("--mesh-plot -", mesh_plot), ("--html -", html)])?;
     let (file, name) = choose::subject(&options.subject);
     let is_size = options.sweep.sweep.iter().any(|sweep| sweep.name == "particles");
     // standard input is read once, and no sweep reads it

@@ -10,7 +10,7 @@ use super::super::{Failure, input, run as runs};
 use super::figures::Command;
 use super::index::{Axis, INDEX, Index, Row};
 use super::plot;
-use super::values::{Sweep, folder, grid};
+use super::values::{Sweep, folder, grid, is_folder};
 use serde_json::Value;
 
 use rfm::Program;
@@ -225,6 +225,7 @@ impl Task<'_> {
         };
         let known = known?;
         if self.force {
+            self.remove_values_that_are_gone(&known)?;
             return Ok(new);
         }
         if !self.resume {
@@ -252,6 +253,21 @@ impl Task<'_> {
         }
         // rows of other values stay in the table
         Ok(Index { rows: known.rows, ..new })
+    }
+
+    /// Removes the folders of a sweep that is replaced, but for those that are written again. Others stay.
+    fn remove_values_that_are_gone(&self, known: &Index) -> Result<(), Failure> {
+        let again: Vec<String> = grid(self.sweeps).iter().map(|point| folder(self.sweeps, point)).collect();
+        let gone = known.rows.iter().map(|row| &row.folder).filter(|name| !again.contains(name));
+        for name in gone.filter(|name| is_folder(name)) {
+            let path = self.folder.join(name);
+            // a link is not ours
+            if std::fs::symlink_metadata(&path).is_ok_and(|found| found.is_dir()) {
+                std::fs::remove_dir_all(&path)
+                    .map_err(|e| Failure::usage(format!("cannot remove `{}`: {e}", path.shown())))?;
+            }
+        }
+        Ok(())
     }
 
     /// Refuses a folder without the index of a sweep that holds a run, or a file with a name that a sweep writes.

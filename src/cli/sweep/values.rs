@@ -115,8 +115,16 @@ pub(super) fn grid(sweeps: &[Sweep]) -> Vec<Vec<f64>> {
 pub(super) fn folder(sweeps: &[Sweep], point: &[f64]) -> String {
     let part = |(sweep, value): (&Sweep, &f64)| format!("{}={}{}", sweep.name, written(*value), sweep.unit);
     let name: Vec<String> = sweeps.iter().zip(point).map(part).collect();
-    let allowed = |c: char| if c.is_alphanumeric() || "=,.-+_".contains(c) { c } else { '_' };
-    name.join(",").chars().map(allowed).collect()
+    name.join(",").chars().map(|c| if is_allowed(c) { c } else { '_' }).collect()
+}
+
+fn is_allowed(c: char) -> bool {
+    c.is_alphanumeric() || "=,.-+_".contains(c)
+}
+
+/// Whether a folder may have been named by a sweep, and thus lies within that of the sweep.
+pub(super) fn is_folder(name: &str) -> bool {
+    name.contains('=') && name.chars().all(is_allowed)
 }
 
 #[cfg(test)]

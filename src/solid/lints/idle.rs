@@ -20,36 +20,72 @@ const POINTS: usize = 17;
 /// there.
 const MARGIN: f64 = 0.3;
 
-/// Ranges of leaves that may be found for one operand, and for all of them: less than a second.
-const RANGES_OF_ONE: usize = 1_000_000;
-const RANGES: usize = 6_000_000;
+/// Operations that are spent on one operand at most: some tenths of a second.
+const OPERATIONS_OF_ONE: usize = 8_000_000;
+
+/// What a leaf costs beside its operations, for its range and the signs of its operands, in operations.
+const OPERATIONS_BESIDE: usize = 4;
+
+/// What a value costs less than a range.
+const VALUES_PER_RANGE: usize = 4;
 
 /// Boxes that are smaller than this part of the solid decide nothing: the surfaces touch.
 const SMALLEST: f64 = 1e-4;
 
+/// Operands that could be left out.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Idle {
+    /// Where they are written.
+    pub spans: Vec<Span>,
+    /// Whether the budget ended before all operands were looked at.
+    pub is_cut: bool,
+}
+
+/// What came of the search for one operand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Proof {
+    /// The solid is the same without it.
+    Idle,
+    /// It matters at a point, or where boxes are too small to tell.
+    Open,
+    /// The budget ended.
+    Cut,
+}
+
 impl Solid {
     /// The places in a text of operands that could be left out: the solid has the same points without each of them, and
-    /// without all of them together. Of a solid that moves or has no bounds nothing is known.
-    pub fn idle_operands(&self, source: SourceId) -> Vec<Span> {
+    /// without all of them together. Of a solid that moves or has no bounds nothing is known. `budget` counts operations,
+    /// and may be shared by many solids.
+    pub fn idle_operands(&self, source: SourceId, budget: &mut usize) -> Idle {
+        let mut found = Idle::default();
         let (graph, root) = self.formula();
-        let (Some(bounds), false) = (self.bounds().aabb(), self.moves()) else { return Vec::new() };
-        let (Some(operands), Some(parts)) = (Operands::of(graph, root), self.parts()) else {
-            return Vec::new();
+        let (Some(bounds), false) = (self.bounds().aabb(), self.moves()) else { return found };
+        let Some(operands) = Operands::of(graph, root) else { return found };
+        let candidates = operands.candidates(source);
+        if candidates.is_empty() {
+            return found;
+        }
+        let Some(parts) = self.parts() else { return found };
+        let search = Search::new(&operands, &parts.leaves, bounds);
+        let Some(left) = search.seen_nowhere(&candidates, budget) else {
+            return Idle { is_cut: true, ..found };
         };
-        let search = Search { operands: &operands, leaves: &parts.leaves, bounds };
-        let mut left = search.seen_nowhere(&operands.candidates(source));
         let mut removed = vec![false; operands.all.len()];
-        let (mut found, mut budget) = (Vec::new(), RANGES);
-        left.retain(|&operand| {
+        for operand in left {
             let is_part_of_removed =
                 removed.iter().enumerate().any(|(i, &gone)| gone && operands.is_within(operand, i));
-            if is_part_of_removed || !search.is_idle(operand, &removed, &mut budget) {
-                return false;
+            if is_part_of_removed {
+                continue;
             }
-            removed[operand] = true;
-            true
-        });
-        found.extend(left.into_iter().filter_map(|operand| operands.all[operand].span));
+            match search.prove(operand, &removed, budget) {
+                Proof::Idle => {
+                    removed[operand] = true;
+                    found.spans.extend(operands.all[operand].span);
+                }
+                Proof::Open => {}
+                Proof::Cut => found.is_cut = true,
+            }
+        }
         found
     }
 }
@@ -77,11 +113,19 @@ struct Search<'a> {
     operands: &'a Operands,
     leaves: &'a Leaves,
     bounds: Aabb,
+    /// What the signs of all operands in a box cost, in operations.
+    cost: usize,
 }
 
-impl Search<'_> {
-    /// Those of some operands that matter at no point of a lattice.
-    fn seen_nowhere(&self, candidates: &[usize]) -> Vec<usize> {
+impl<'a> Search<'a> {
+    fn new(operands: &'a Operands, leaves: &'a Leaves, bounds: Aabb) -> Self {
+        let of_leaf = |leaf: u32| leaves.operations(leaf) + OPERATIONS_BESIDE;
+        let cost = (0..operands.leaves as u32).map(of_leaf).sum();
+        Self { operands, leaves, bounds, cost }
+    }
+
+    /// Those of some operands that matter at no point of a lattice; `None` if the budget ends before.
+    fn seen_nowhere(&self, candidates: &[usize], budget: &mut usize) -> Option<Vec<usize>> {
         let space = self.bounds.grown(MARGIN * self.bounds.size().max_element());
         let step = space.size() / (POINTS - 1) as f64;
         let none = vec![false; self.operands.all.len()];
@@ -90,6 +134,7 @@ impl Search<'_> {
             if left.is_empty() {
                 break;
             }
+            *budget = budget.checked_sub(POINTS * POINTS * self.cost / VALUES_PER_RANGE)?;
             let points: Vec<DVec3> = (0..POINTS * POINTS)
                 .map(|i| {
                     space.min + step * DVec3::new((i % POINTS) as f64, (i / POINTS) as f64, plane as f64)
@@ -109,28 +154,28 @@ impl Search<'_> {
                 left.retain(|&operand| idle[operand]);
             }
         }
-        left
+        Some(left)
     }
 
     /// Whether all of space is proven to have the same points without an operand.
-    fn is_idle(&self, operand: usize, removed: &[bool], budget: &mut usize) -> bool {
+    fn prove(&self, operand: usize, removed: &[bool], budget: &mut usize) -> Proof {
         let smallest = SMALLEST * self.bounds.size().max_element();
         let mut open = vec![Aabb::new(DVec3::splat(-SEARCH_RADIUS), DVec3::splat(SEARCH_RADIUS))];
-        let mut ranges = RANGES_OF_ONE.min(*budget);
+        let mut own = OPERATIONS_OF_ONE.min(*budget);
         while let Some(space) = open.pop() {
-            let Some(rest) = ranges.checked_sub(self.operands.leaves) else { return false };
-            (ranges, *budget) = (rest, *budget - self.operands.leaves);
+            let Some(rest) = own.checked_sub(self.cost) else { return Proof::Cut };
+            (own, *budget) = (rest, *budget - self.cost);
             let known = |leaf: u32| Sign::of(self.leaves.range(leaf, &space));
             let signs: Vec<Sign> = (0..self.operands.leaves as u32).map(known).collect();
             if self.operands.without_effect(&signs, removed)[operand] {
                 continue;
             }
             if space.size().max_element() < smallest || self.matters_at(space.centre(), operand, removed) {
-                return false;
+                return Proof::Open;
             }
             open.extend(halves(&space));
         }
-        true
+        Proof::Idle
     }
 
     fn matters_at(&self, p: DVec3, operand: usize, removed: &[bool]) -> bool {

@@ -10,7 +10,7 @@
 //! | `thin` | walls and gaps that are thinner than a length |
 //! | `crossings` | points of the surface, between the nodes of a coarse lattice |
 //!
-//! Invariant: nothing is reported that was only guessed. A search that reaches its budget finds nothing.
+//! Invariant: nothing is reported that was only guessed. A search that reaches its budget finds nothing more.
 
 mod breaks;
 mod crossings;
@@ -20,5 +20,6 @@ mod thin;
 mod uneven;
 
 pub use breaks::{Break, Breakage};
+pub use idle::Idle;
 pub use thin::ThinPart;
 pub use uneven::Uneven;
