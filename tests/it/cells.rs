@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use rayon::prelude::*;
-use rfm::field::{Points, Walls};
+use rfm::field::{GradientsMut, Points, Walls};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{Grid, Resolution, check, marching_cubes};
@@ -77,6 +77,7 @@ fn signs_and_surface_gradients_are_those_of_the_twin() {
                 assert_eq!((sign(a), a.is_nan()), (sign(b), b.is_nan()), "{name} at {p}: {a} and {b}");
                 assert_eq!(together[i].to_bits(), a.to_bits(), "{name} at {p}");
             }
+            gradients_together_are_those_of_each(&map, &points, name);
             // at points of the surface the gradient is that of the leaf there
             let mut found = 0;
             for pair in points.windows(2) {
@@ -96,6 +97,21 @@ fn signs_and_surface_gradients_are_those_of_the_twin() {
             }
             assert!(found > 4, "{name}: {found} points on the surface");
         }
+    }
+}
+
+fn gradients_together_are_those_of_each(map: &CellMap, points: &[DVec3], name: &str) {
+    let column = |axis: usize| points.iter().map(|p| p[axis]).collect::<Vec<f64>>();
+    let (px, py, pz) = (column(0), column(1), column(2));
+    let [mut omega, mut x, mut y, mut z] = [(); 4].map(|()| vec![0.0; points.len()]);
+    let out = GradientsMut { omega: &mut omega, x: &mut x, y: &mut y, z: &mut z };
+    map.omega_grad_many(Points::new(&px, &py, &pz), out);
+    // all that is not a number is alike
+    let bits = |v: f64| if v.is_nan() { f64::NAN.to_bits() } else { v.to_bits() };
+    for (i, &p) in points.iter().enumerate() {
+        let (value, gradient) = map.omega_grad(p);
+        let alone = [value, gradient.x, gradient.y, gradient.z].map(bits);
+        assert_eq!([omega[i], x[i], y[i], z[i]].map(bits), alone, "{name} at {p}");
     }
 }
 

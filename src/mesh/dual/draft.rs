@@ -30,7 +30,7 @@ const MENDING: f64 = 0.25;
 const LEAST_MENDING: u64 = 20_000;
 
 /// Rounds of moving cuts back, at most. The last one moves all back.
-const UNDOINGS: usize = 8;
+const UNDOINGS: usize = 16;
 
 /// How often some of them are tried on the surface again, at most.
 const RESTORINGS: usize = 10_000;
@@ -63,17 +63,25 @@ impl<'a> Draft<'a> {
     pub fn new(
         field: &'a dyn Field,
         grid: &'a Grid,
-        vertices: Vertices,
-        triangles: Vec<[u32; 3]>,
+        (vertices, triangles): (Vertices, Vec<[u32; 3]>),
         (work, care): (Work, Care),
     ) -> Self {
         let (bounds, size) = (grid.bounds(), grid.spacing().min_element());
         Self { field, bounds, size, vertices, triangles, work, care }
     }
 
+    /// Cuts edges, merges vertices and mends what is still not right.
+    ///
+    /// # Errors
+    /// [`MeshError::TooManyVertices`] if that made too many.
+    pub fn refine_and_mend(&mut self) -> Result<(), MeshError> {
+        let left = self.refine();
+        self.mend(left)
+    }
+
     /// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be
     /// cut, ascending.
-    pub fn refine(&mut self) -> Vec<[u32; 2]> {
+    fn refine(&mut self) -> Vec<[u32; 2]> {
         let first = self.vertices.len();
         let Refined { left, ends, evaluations } =
             refine::refine(self.field, &mut self.vertices, &mut self.triangles, self.size);
@@ -89,49 +97,49 @@ impl<'a> Draft<'a> {
     /// them nothing crosses.
     fn uncross(&mut self, first: usize, ends: &[[u32; 2]]) {
         let mut is_back = vec![false; ends.len()];
-        let mut suspects = self.doubtful_since(first);
+        let mut suspects = self.doubtful();
         let mut cuts: BTreeMap<u32, Vertex> = BTreeMap::new();
-        for round in 0..UNDOINGS {
+        let place_of = |v: u32| (v as usize).checked_sub(first);
+        for round in 1..=UNDOINGS {
             let pairs = crossing_pairs(&self.vertices.positions, &self.triangles, &suspects, self.size);
-            let mut moves = round > 0 && !pairs.is_empty();
-            let last = round + 1 == UNDOINGS;
-            for v in pairs.iter().flatten().flat_map(|&t| self.triangles[t as usize]) {
-                if let Some(place) = (v as usize).checked_sub(first) {
-                    moves |= !is_back[place];
-                    is_back[place] = true;
+            // a vertex in the middle of its edge lies in the plane of the first triangles only if its ends do
+            let mut retreating: Vec<usize> = pairs
+                .iter()
+                .flatten()
+                .flat_map(|&t| self.triangles[t as usize])
+                .filter_map(place_of)
+                .collect();
+            let mut moves = false;
+            while let Some(place) = retreating.pop() {
+                if !std::mem::replace(&mut is_back[place], true) {
+                    moves = true;
+                    retreating.extend(ends[place].into_iter().filter_map(place_of));
                 }
             }
-            if pairs.is_empty() || !moves {
-                break;
+            if !moves {
+                break; // nothing crosses, or only what crossed before
             }
-            // what lies beside a vertex that moves may cross now
-            let beside = |t: &[u32; 3]| {
-                t.iter().any(|&v| (v as usize).checked_sub(first).is_some_and(|place| is_back[place]))
-            };
-            let touched: Vec<u32> =
-                (0..).zip(&self.triangles).filter(|(_, t)| beside(t)).map(|(t, _)| t).collect();
-            if round > 1 {
-                for &t in &touched {
-                    for v in self.triangles[t as usize] {
-                        if let Some(place) = (v as usize).checked_sub(first) {
-                            is_back[place] = true;
-                        }
-                    }
-                }
-            }
-            suspects.extend(touched);
-            suspects.sort_unstable();
-            suspects.dedup();
-            if last {
+            if round == UNDOINGS {
                 is_back.fill(true);
             }
+            let mut is_moved = vec![false; ends.len()];
             for (place, [a, b]) in ends.iter().enumerate().filter(|(place, _)| is_back[*place]) {
                 let [p, q] = [a, b].map(|v| self.vertices.positions[*v as usize]);
                 let vertex = Vertex { position: p.midpoint(q), normal: DVec3::ZERO, kind: VertexKind::Sharp };
                 let v = (first + place) as u32;
-                cuts.entry(v).or_insert_with(|| self.vertices.get(v));
-                self.vertices.set(v, vertex);
+                let old = self.vertices.get(v);
+                if vertex.position != old.position {
+                    is_moved[place] = true;
+                    cuts.entry(v).or_insert(old);
+                    self.vertices.set(v, vertex);
+                }
             }
+            // all other pairs are as they were when they did not cross
+            let beside = |t: &[u32; 3]| t.iter().any(|&v| place_of(v).is_some_and(|place| is_moved[place]));
+            let touched = (0..).zip(&self.triangles).filter(|(_, t)| beside(t)).map(|(t, _)| t);
+            suspects = touched.chain(pairs.iter().flatten().copied()).collect();
+            suspects.sort_unstable();
+            suspects.dedup();
         }
         self.restore(&cuts);
     }
@@ -176,15 +184,12 @@ impl<'a> Draft<'a> {
         }
     }
 
-    /// The triangles that have a vertex from `first` on and are not surely clear of others, ascending: they
-    /// have a doubtful corner, or do not face as the surface does at all of their corners.
-    fn doubtful_since(&self, first: usize) -> Vec<u32> {
+    /// The triangles that are not surely clear of others, ascending: they have a doubtful corner, or do not face as
+    /// the surface does at all of their corners.
+    fn doubtful(&self) -> Vec<u32> {
         let Vertices { positions, normals, doubtful, .. } = &self.vertices;
         let is_doubtful = |t: &[u32; 3]| {
             let t = t.map(|v| v as usize);
-            if t.iter().all(|&v| v < first) {
-                return false;
-            }
             let [a, b, c] = t.map(|v| positions[v]);
             let facing = (b - a).cross(c - a);
             let least = AGREEING * facing.length();
@@ -202,11 +207,21 @@ impl<'a> Draft<'a> {
         parts.concat()
     }
 
+    /// Whether triangles cross, of which one is not surely clear of others.
+    pub fn crosses_itself(&self) -> bool {
+        !crossing_pairs(&self.vertices.positions, &self.triangles, &self.doubtful(), self.size).is_empty()
+    }
+
+    /// The work done so far.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
     /// Mends the mesh around the given edges, merges vertices that are too close, and mends folded triangles.
     ///
     /// # Errors
     /// [`MeshError::TooManyVertices`] if refining and mending made too many.
-    pub fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<(), MeshError> {
+    fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<(), MeshError> {
         let mut budget = match self.care {
             Care::Sharp => u64::MAX,
             Care::Apart => ((MENDING * self.work.evaluations as f64) as u64).max(LEAST_MENDING),

@@ -28,6 +28,9 @@ const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
 /// The distance from the edges to mend over which changes may spread, in edges.
 const RINGS: usize = 3;
 
+/// A triangle whose height is at most this share of its longest side is flat.
+const FLAT: f64 = 1e-9;
+
 /// The mesh around the edges to mend.
 pub(super) struct Patch<'a> {
     pub field: &'a dyn Field,
@@ -288,15 +291,24 @@ impl<'a> Patch<'a> {
         (step, unit(-gradient))
     }
 
-    /// Moves a vertex onto a neighbour, so that they can be merged, unless triangles would cross or one of them
-    /// was moved before.
+    /// Whether a triangle has no area to speak of.
+    fn is_flat(&self, t: [u32; 3]) -> bool {
+        let [a, b, c] = corners(&self.vertices.positions, t);
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        (b - a).cross(c - a).length() <= FLAT * longest
+    }
+
+    /// Moves a vertex onto a neighbour, so that they can be merged, unless triangles would cross or become flat, or one
+    /// of them was moved before.
     pub fn join(&mut self, kept: u32, lost: u32) {
         if !self.fans.contains_key(&kept) || !self.mergeable(lost).contains(&kept) {
             return;
         }
         let (old, new) = (self.vertices.get(lost), self.vertices.get(kept));
         self.vertices.set(lost, new);
-        let crosses = self.crosses_around(lost);
+        let stays = |t: &[u32; 3]| !t.contains(&kept);
+        let flattens = self.fan(lost).filter(stays).any(|t| self.is_flat(t));
+        let crosses = flattens || self.crosses_around(lost);
         self.vertices.set(lost, old);
         if !crosses {
             self.put(lost, new);

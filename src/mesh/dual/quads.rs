@@ -175,6 +175,12 @@ impl<'a> Quads<'a> {
         parts.concat()
     }
 
+    /// The shortest side of a cell.
+    pub fn size(&self) -> f64 {
+        let ends = [1, 2].map(|n| self.lattice.position([n; 3]));
+        (ends[1] - ends[0]).min_element()
+    }
+
     /// The cell of a quad's corner.
     pub fn cell(&self, quad: &Quad, corner: usize) -> Aabb {
         let place = quad.places()[corner];

@@ -21,7 +21,6 @@ use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
 
 use super::super::intersections::crossing_pairs;
-use super::Care;
 use super::project;
 use super::quads::{Cut, NOTHING, Quad, Quads};
 use super::vertices::{Vertex, VertexKind, Vertices};
@@ -37,35 +36,26 @@ const SETTLING: usize = 4;
 /// Vertices in retreat keep this distance from the faces of their cells, in cells.
 const INSET: f64 = 0.05;
 
-/// The triangles of all quads and tubes, without crossings if care is taken. Adds the middles of fans and of bent sides to the
-/// vertices.
+/// The triangles of all quads and tubes, without crossings. Adds the middles of fans and of bent sides to the vertices.
+/// `crossings` are those of [`crossings`](fn@crossings).
 pub(super) fn secure(
     (mut quads, mut cut): (Quads<'_>, Cut),
     vertices: &mut Vertices,
     tubes: &[[u32; 3]],
     surface: &mut Surface<'_>,
-    care: Care,
+    mut crossings: Vec<[u32; 2]>,
 ) -> Vec<[u32; 3]> {
     let size = surface.size;
-    if care == Care::Sharp {
-        return assemble(&quads, &cut, vertices, tubes, &[]).0;
-    }
-    let suspects: Vec<u32> = cut
-        .doubtful
-        .iter()
-        .filter(|quad| !is_enveloped(&quads, vertices, quad, &cut))
-        .map(|quad| quad.hit)
-        .chain(cut.astray.iter().copied())
-        .collect();
+    let mut suspects = suspects(&quads, &cut, vertices);
     let cell_vertices = vertices.len();
     let mut lasting = cell_vertices;
     for round in 0.. {
         vertices.truncate(lasting);
-        let (triangles, suspects) = assemble(&quads, &cut, vertices, tubes, &suspects);
-        let pairs = if round < ROUNDS {
-            crossing_pairs(&vertices.positions, &triangles, &suspects, size)
-        } else {
-            Vec::new()
+        let (triangles, chosen) = assemble(&quads, &cut, vertices, tubes, &suspects);
+        let pairs = match round {
+            0 => std::mem::take(&mut crossings),
+            1..ROUNDS => crossing_pairs(&vertices.positions, &triangles, &chosen, size),
+            _ => Vec::new(),
         };
         if pairs.is_empty() {
             return triangles;
@@ -79,10 +69,43 @@ pub(super) fn secure(
                 quad.corners.iter().for_each(|&v| is_marked[v as usize] = true);
             }
         }
-        retreat(&mut quads, &mut cut, vertices, &is_marked, (surface, round));
+        // all others are as they were when they crossed nothing
+        suspects = retreat(&mut quads, &mut cut, vertices, &is_marked, (surface, round));
         lasting = vertices.len();
     }
     Vec::new()
+}
+
+/// The hits of quads that may cross others.
+fn suspects(quads: &Quads<'_>, cut: &Cut, vertices: &Vertices) -> Vec<u32> {
+    let doubtful = cut.doubtful.iter().filter(|quad| !is_enveloped(quads, vertices, quad, cut));
+    let (astray, fans) = (cut.astray.iter().copied(), cut.fans.keys().copied());
+    doubtful.map(|quad| quad.hit).chain(astray).chain(fans).collect()
+}
+
+/// The triangles as they are, which may cross.
+pub(super) fn as_joined(
+    quads: &Quads<'_>,
+    cut: &Cut,
+    vertices: &mut Vertices,
+    tubes: &[[u32; 3]],
+) -> Vec<[u32; 3]> {
+    assemble(quads, cut, vertices, tubes, &[]).0
+}
+
+/// The pairs of triangles that cross as they are.
+pub(super) fn crossings(
+    quads: &Quads<'_>,
+    cut: &Cut,
+    vertices: &mut Vertices,
+    tubes: &[[u32; 3]],
+) -> Vec<[u32; 2]> {
+    let count = vertices.len();
+    let suspects = suspects(quads, cut, vertices);
+    let (triangles, chosen) = assemble(quads, cut, vertices, tubes, &suspects);
+    let found = crossing_pairs(&vertices.positions, &triangles, &chosen, quads.size());
+    vertices.truncate(count);
+    found
 }
 
 /// All triangles, and the numbers of those that are to be compared with others, ascending.
@@ -95,30 +118,34 @@ fn assemble(
 ) -> (Vec<[u32; 3]>, Vec<u32>) {
     let mut triangles = Vec::with_capacity(cut.triangles.len() + tubes.len());
     let mut chosen: Vec<u32> = Vec::new();
+    let mut is_suspect = vec![false; cut.triangles.len() / 2];
+    suspects.iter().for_each(|&hit| is_suspect[hit as usize] = true);
     if cut.fans.is_empty() && !cut.triangles.contains(&NOTHING) {
         triangles.extend_from_slice(&cut.triangles);
         chosen.extend(suspects.iter().flat_map(|&hit| [2 * hit, 2 * hit + 1]));
     } else {
-        let mut is_suspect = vec![false; cut.triangles.len() / 2];
-        suspects.iter().for_each(|&hit| is_suspect[hit as usize] = true);
-        for (pair, is_suspect) in cut.triangles.chunks_exact(2).zip(is_suspect) {
+        for (pair, is_suspect) in cut.triangles.chunks_exact(2).zip(&is_suspect) {
             for t in pair.iter().filter(|t| **t != NOTHING) {
-                if is_suspect {
+                if *is_suspect {
                     chosen.push(triangles.len() as u32);
                 }
                 triangles.push(*t);
             }
         }
     }
-    let whole = triangles.len();
-    for (&hit, rim) in &cut.fans {
+    for (&number, rim) in &cut.fans {
         let centre = vertices.len() as u32;
-        let hit = quads.hits.get(hit);
+        let hit = quads.hits.get(number);
         let kind = if hit.is_cap { VertexKind::Cap } else { VertexKind::Sharp };
         vertices.push(Vertex { position: hit.position, normal: hit.normal, kind });
         let next = rim.iter().cycle().skip(1);
+        let first = triangles.len() as u32;
         triangles.extend(rim.iter().zip(next).map(|(&a, &b)| [centre, a, b]));
+        if is_suspect[number as usize] {
+            chosen.extend(first..triangles.len() as u32);
+        }
     }
+    let whole = triangles.len();
     triangles.extend_from_slice(tubes);
     chosen.extend(whole as u32..triangles.len() as u32);
     chosen.sort_unstable();
@@ -168,14 +195,15 @@ struct Retreat {
     cell: Aabb,
 }
 
-/// Moves the marked vertices into their cells and makes fans of their quads, with bent sides.
+/// Moves the marked vertices into their cells and makes fans of their quads, with bent sides. Returns the hits of these
+/// quads.
 fn retreat(
     quads: &mut Quads<'_>,
     cut: &mut Cut,
     vertices: &mut Vertices,
     is_marked: &[bool],
     (surface, round): (&mut Surface<'_>, usize),
-) {
+) -> Vec<u32> {
     let touched = quads.with_corners(is_marked);
     let mut sides: BTreeMap<[u32; 2], (SmallVec<[u32; 4]>, Aabb)> = BTreeMap::new();
     let mut cells: BTreeMap<u32, Retreat> = BTreeMap::new();
@@ -242,6 +270,7 @@ fn retreat(
             cut.fans.insert(quad.hit, rim);
         }
     }
+    touched.iter().map(|quad| quad.hit).collect()
 }
 
 /// Whether a quad lies in its envelope.

@@ -27,7 +27,7 @@ pub(super) enum VertexKind {
 }
 
 /// Vertices by their numbers.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Vertices {
     pub positions: Vec<DVec3>,
     pub normals: Vec<DVec3>,

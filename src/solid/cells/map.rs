@@ -13,7 +13,9 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use super::grid::{Cell, Cells, Found, SIDE};
-use crate::field::{Entry, Faces, Field, Normals, Path, Points, Sheet, Walls, clearance_by_ranges};
+use crate::field::{
+    Entry, Faces, Field, GradientsMut, Normals, Path, Points, Sheet, Walls, clearance_by_ranges,
+};
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::Unary;
@@ -25,7 +27,7 @@ use crate::solid::path::sweep::Sweep;
 use crate::solid::twin::Twin;
 
 /// Points that are looked up together.
-const RUN: usize = 64;
+pub(super) const RUN: usize = 64;
 
 /// So many neighbouring points of one cell are evaluated together.
 const SHORTEST_RUN: usize = 4;
@@ -51,9 +53,9 @@ pub enum Place {
 /// A solid specialised to the cells of a box.
 pub struct CellMap {
     solid: Solid,
-    twin: Twin,
-    parts: Arc<LeafTree>,
-    cells: Arc<Cells>,
+    pub(super) twin: Twin,
+    pub(super) parts: Arc<LeafTree>,
+    pub(super) cells: Arc<Cells>,
     /// Cells of the same box that keep what decides within [`AROUND`] of them. They are made when a gradient is first
     /// asked for off the surface.
     around: OnceLock<Cells>,
@@ -208,17 +210,35 @@ impl CellMap {
         self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
     }
 
-    /// What decides near a point that is in no cell of a surface; `None` far from all surfaces and outside the box.
-    fn program_around(&self, p: DVec3) -> Option<(&[u32], u32)> {
+    /// The program that gives the gradient at a point, and whether it is one of [`Self::programs_around`] rather than of
+    /// the cells; `None` far from all surfaces and outside the box.
+    #[inline]
+    pub(super) fn program_for(&self, p: DVec3) -> Option<(bool, u32)> {
+        match self.cells.find(p)?.cell {
+            Cell::Near(program) => Some((false, program)),
+            _ => self.program_around(p).map(|program| (true, program)),
+        }
+    }
+
+    /// What decides near a point that is in no cell of a surface.
+    fn program_around(&self, p: DVec3) -> Option<u32> {
         if self.solid.moves() {
             return None; // a map of its own for each stretch of time does not pay
         }
-        let reach = AROUND * self.cells.domain.size().max_element() / f64::from(SIDE);
-        let around = self.around.get_or_init(|| self.cells.with_margin(&self.parts, reach.max(self.margin)));
-        match around.find(p)?.cell {
-            Cell::Near(program) => Some((&around.programs, program)),
+        match self.cells_around().find(p)?.cell {
+            Cell::Near(program) => Some(program),
             Cell::Fluid | Cell::Inside | Cell::Divided(_) => None,
         }
+    }
+
+    fn cells_around(&self) -> &Cells {
+        let reach = AROUND * self.cells.domain.size().max_element() / f64::from(SIDE);
+        self.around.get_or_init(|| self.cells.with_margin(&self.parts, reach.max(self.margin)))
+    }
+
+    /// The programs of the cells that keep what decides within [`AROUND`] of them.
+    pub(super) fn programs_around(&self) -> &[u32] {
+        &self.cells_around().programs
     }
 
     /// The value of a program at up to [`RUN`] points.
@@ -398,15 +418,15 @@ impl Field for CellMap {
     }
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
-        let near = match self.cells.find(p).map(|found| found.cell) {
-            Some(Cell::Near(program)) => Some((&self.cells.programs[..], program)),
-            Some(_) => self.program_around(p),
-            None => None,
-        };
-        let Some((words, program)) = near else { return self.twin.omega_grad(p) };
+        let Some((is_around, program)) = self.program_for(p) else { return self.twin.omega_grad(p) };
+        let words = if is_around { self.programs_around() } else { &self.cells.programs };
         let (value, (leaf, negated)) = self.parts.leaves.decide(words, &mut (program as usize), p);
         let gradient = self.parts.leaves.gradient(leaf, p).1;
         (value, if negated { -gradient } else { gradient })
+    }
+
+    fn omega_grad_many(&self, points: Points<'_>, out: GradientsMut<'_>) {
+        self.gradients(points, out);
     }
 
     fn continuous(&self, p: DVec3) -> f64 {
@@ -527,6 +547,6 @@ impl Walls for CellMap {
 }
 
 #[inline]
-fn signed(value: f64, negated: bool) -> f64 {
+pub(super) fn signed(value: f64, negated: bool) -> f64 {
     if negated { -value } else { value }
 }

@@ -355,7 +355,13 @@ impl Leaves {
 
     pub fn values(&self, leaf: u32, points: [&[f64]; 3], out: &mut [f64]) {
         let (shape, constants, uniforms) = self.of(leaf);
-        shape.value(self.store.engine).many(points, constants, uniforms, out);
+        shape.value(self.store.engine).many(points, constants, uniforms, [out]);
+    }
+
+    /// Value and gradient at many points.
+    pub fn gradients(&self, leaf: u32, points: [&[f64]; 3], out: [&mut [f64]; 4]) {
+        let (shape, constants, uniforms) = self.of(leaf);
+        shape.gradient(self.store.engine).many(points, constants, uniforms, out);
     }
 
     /// What a leaf is along a whole path that is passed during the stretch of time; `None` unless it is a

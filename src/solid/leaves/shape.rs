@@ -235,13 +235,21 @@ impl Evaluator {
         }
     }
 
-    pub fn many(&self, points: [&[f64]; 3], constants: &[f64], uniforms: &[f64], out: &mut [f64]) {
+    /// All outputs at many points.
+    pub fn many<const N: usize>(
+        &self,
+        points: [&[f64]; 3],
+        constants: &[f64],
+        uniforms: &[f64],
+        mut out: [&mut [f64]; N],
+    ) {
         if let Some(code) = &self.code {
             return code.call_many(points, constants, uniforms, out);
         }
-        for (i, out) in out.iter_mut().enumerate() {
-            let p = points.map(|column| column[i]);
-            self.interpret(p, constants, uniforms, std::slice::from_mut(out));
+        for i in 0..points[0].len() {
+            let mut found = [0.0; N];
+            self.interpret(points.map(|column| column[i]), constants, uniforms, &mut found);
+            out.iter_mut().zip(found).for_each(|(column, value)| column[i] = value);
         }
     }
 

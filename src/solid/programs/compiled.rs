@@ -477,49 +477,67 @@ impl LeafProgram {
         unsafe { entry(p.x, p.y, p.z, out.as_mut_ptr(), parameters.as_ptr(), uniforms.as_ptr()) }
     }
 
-    /// The one output at many points: whole blocks, then the rest through one padded block.
+    /// All outputs at many points: whole blocks, then the rest through one padded block.
     ///
     /// # Panics
-    /// If the columns differ in length, or the program has several outputs, other parameters or other
+    /// If the columns differ in length, or the program has not N outputs, other parameters or other
     /// uniforms.
-    pub fn call_many(&self, points: [&[f64]; 3], parameters: &[f64], uniforms: &[f64], out: &mut [f64]) {
-        let count = out.len();
+    pub fn call_many<const N: usize>(
+        &self,
+        points: [&[f64]; 3],
+        parameters: &[f64],
+        uniforms: &[f64],
+        mut out: [&mut [f64]; N],
+    ) {
+        let count = points[0].len();
         assert!(uniforms.len() >= self.uniforms, "leaf program");
-        assert_eq!((1, parameters.len()), (self.batch.outputs, self.parameters), "leaf program");
-        assert!(points.iter().all(|c| c.len() == count), "column lengths");
+        assert_eq!((N, parameters.len()), (self.batch.outputs, self.parameters), "leaf program");
+        assert!(
+            points.iter().all(|c| c.len() == count) && out.iter().all(|c| c.len() == count),
+            "column lengths"
+        );
         const LANES: usize = Precision::F64.lanes();
         let whole = count / LANES * LANES;
+        let numbers = [parameters, uniforms];
         if whole > 0 {
-            self.blocks(points.map(<[f64]>::as_ptr), out.as_mut_ptr(), whole / LANES, [parameters, uniforms]);
+            let columns = out.each_mut().map(|c| c.as_mut_ptr());
+            self.blocks(points.map(<[f64]>::as_ptr), columns, whole / LANES, numbers);
         }
         if whole < count {
             let mut inputs = [[0.0; LANES]; 3];
-            let mut output = [0.0; LANES];
+            let mut outputs = [[0.0; LANES]; N];
             for (padded, column) in inputs.iter_mut().zip(points) {
                 padded[..count - whole].copy_from_slice(&column[whole..]);
             }
-            self.blocks(
-                inputs.each_ref().map(|c| c.as_ptr()),
-                output.as_mut_ptr(),
-                1,
-                [parameters, uniforms],
-            );
-            out[whole..].copy_from_slice(&output[..count - whole]);
+            let inputs = inputs.each_ref().map(|c| c.as_ptr());
+            self.blocks(inputs, outputs.each_mut().map(|c| c.as_mut_ptr()), 1, numbers);
+            for (column, padded) in out.iter_mut().zip(outputs) {
+                column[whole..].copy_from_slice(&padded[..count - whole]);
+            }
         }
     }
 
     /// The columns hold at least `blocks` whole blocks, and there are all parameters and uniforms: both
     /// callers above have seen to it.
-    fn blocks(&self, [x, y, z]: [*const f64; 3], out: *mut f64, blocks: usize, numbers: [&[f64]; 2]) {
+    fn blocks<const N: usize>(
+        &self,
+        points: [*const f64; 3],
+        out: [*mut f64; N],
+        blocks: usize,
+        numbers: [&[f64]; 2],
+    ) {
         let [parameters, uniforms] = numbers.map(<[f64]>::as_ptr);
-        // the program only reads the first three
-        let columns = [x.cast_mut(), y.cast_mut(), z.cast_mut(), out];
+        let mut columns = [std::ptr::null_mut::<f64>(); 3 + MAX_OUTPUTS];
+        for (column, point) in columns.iter_mut().zip(points) {
+            *column = point.cast_mut(); // the program only reads the first three
+        }
+        columns[3..3 + N].copy_from_slice(&out);
         type Entry = unsafe extern "C" fn(*const *mut f64, usize, *const f64, *const f64);
         // SAFETY: `compile` asked for a batch program with parameters and uniforms in `f64`, whose entry has
         // this signature, and `self.batch` keeps it mapped while it runs.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.batch.entry()) };
         // SAFETY: the program reads `blocks` blocks of three columns, its parameters and its uniforms, whose
-        // numbers were checked, and writes as many blocks to `out`, which is borrowed exclusively.
+        // numbers were checked, and writes as many blocks to N columns, which are borrowed exclusively.
         unsafe { entry(columns.as_ptr(), blocks, parameters, uniforms) }
     }
 }
