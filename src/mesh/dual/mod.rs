@@ -94,8 +94,9 @@ pub fn dual_contouring(
     Ok(draft.finish())
 }
 
-/// So many pairs of triangles may cross before edges are cut, and mending may still part them all. In the examples at 32
-/// and 96 cells it parted up to 43 that were there after cuts, and never more than that.
+/// So many pairs of triangles may cross before edges are cut, and mending is tried. In the examples at 32 and 96 cells it
+/// parted all of at most 4; the bottle's 319 and the 156 to 957 of a thousand joined parts it never parted. Between these
+/// numbers the choice costs time, and no quality.
 const MENDABLE: usize = 100;
 
 /// What a mesh is made for. Few meshes cross themselves, and care against that costs sharpness and time, so it is

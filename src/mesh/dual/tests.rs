@@ -206,7 +206,7 @@ fn threads_change_no_bit() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 25, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
 
     /// Noise has every case, every neighbourhood of cases, faces passed twice and every way to meet
     /// the border.
