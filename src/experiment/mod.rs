@@ -94,7 +94,7 @@ impl Experiment {
             )
         })?;
         let bodies = bodies::compile(&program, &scene, &parameters, engine)?;
-        let warnings = too_long.into_iter().collect();
+        let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters)).collect();
         Ok(Self { program, scene, parameters, time_step, bodies, fluid, warnings })
     }
 

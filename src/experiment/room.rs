@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{Experiment, refuse};
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic, Span};
+use crate::field::Field;
 use crate::geom::Aabb;
 use crate::lower::Scene;
 use crate::solid::Bounds;
@@ -13,8 +14,44 @@ use crate::sph::{MAX_SITES, SeedError};
 /// Points along the longest side of a box whose volume is estimated by sampling.
 const SAMPLES: f64 = 40.0;
 
+/// Halvings after which the border of an empty slab is known, to a part in 10¹² of the box.
+const HALVINGS: usize = 40;
+
 /// The least part of a fluid outside the box that is worth a warning: less is an edge between samples.
 const PART_OUTSIDE: f64 = 0.02;
+
+/// What is left of a box if slabs along its faces in which a field is proven to be negative are taken away; all of it if
+/// the whole is. Of a half-space, `z <= 0.5`, what lies in the box remains.
+fn without_empty_sides(field: &dyn Field, whole: Aabb) -> Aabb {
+    if field.range(&whole).hi < 0.0 {
+        return whole;
+    }
+    let mut left = whole;
+    for axis in 0..3 {
+        for low in [true, false] {
+            let size = left.size()[axis];
+            // the box from its lower or upper face to the part `from..to` of the side
+            let cut = |from: f64, to: f64| {
+                let mut cut = left;
+                let [near, far] = if low { [from, to] } else { [1.0 - to, 1.0 - from] };
+                (cut.min[axis], cut.max[axis]) = (left.min[axis] + near * size, left.min[axis] + far * size);
+                cut
+            };
+            // the empty slab ends between what is proven and what is not
+            let (mut empty, mut doubtful) = (0.0, 1.0);
+            for _ in 0..HALVINGS {
+                let part = 0.5 * (empty + doubtful);
+                let is_empty = field.range(&cut(0.0, part)).hi < 0.0;
+                *(if is_empty { &mut empty } else { &mut doubtful }) = part;
+            }
+            if empty > 0.0 {
+                let end = left.min[axis] + if low { empty * size } else { (1.0 - empty) * size };
+                *(if low { &mut left.min[axis] } else { &mut left.max[axis] }) = end;
+            }
+        }
+    }
+    left
+}
 
 impl Experiment {
     /// The box in which the shape of the fluid lies, m.
@@ -27,7 +64,7 @@ impl Experiment {
         };
         let bounds = match self.fluid.bounds() {
             Bounds::Within(bounds) => *bounds,
-            Bounds::Unbounded => domain,
+            Bounds::Unbounded => without_empty_sides(&self.fluid, domain),
             Bounds::Empty => {
                 let message = "the shape of the fluid is empty";
                 let empty = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message);

@@ -273,6 +273,30 @@ scene pool {{
     }
 }
 
+/// A half-space has no bounds of its own, but those that the box leaves it. (Of 4000 particles 859 were taken away with the
+/// corners of the box, and nothing came in their place.)
+#[test]
+fn a_number_of_particles_fills_a_half_space_in_a_container() {
+    let text = "rfm 1
+solid tank = cylinder(0.5, 1).move([0.5, 0.5, 0])
+scene still {
+  box { max: [1, 1, 1] }
+  container { solid: tank }
+  fluid water { shape: z <= 0.5, density: 1000, particles: 4000 }
+  run { until: 1 s }
+}";
+    let program = Program::from_source("tank.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let experiment = Experiment::new(&program, "still", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    let simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
+    assert_eq!(simulation.particles().len(), 4000);
+    let mass = 4000.0 * simulation.parameters().particle_mass;
+    let whole = 1000.0 * std::f64::consts::PI * 0.25 * 0.5;
+    assert!((mass / whole - 1.0).abs() < 2e-3, "{mass} of {whole}");
+    let heights = &simulation.particles().position.z;
+    let mean = heights.iter().sum::<f64>() / heights.len() as f64;
+    assert!((mean / 0.25 - 1.0).abs() < 0.01, "{mean}");
+}
+
 /// A fluid that fills its vessel is packed and becomes a little lighter, and says so. Particles that are left out at the
 /// walls instead leave gaps, and the flow deviates by 63 %.
 #[test]

@@ -169,6 +169,7 @@ impl<'a> Lowering<'a> {
             size_span,
             viscosity: viscosity?,
             surface_tension: tension?,
+            tension_span: block.setting("surface_tension").map(|(_, value)| value.span),
             support_radius,
             velocity: velocity?,
             jitter: jitter?,

@@ -165,6 +165,8 @@ pub struct Fluid {
     pub viscosity: f64,
     /// Surface tension, N/m.
     pub surface_tension: f64,
+    /// Place of its value; `None` if it is the method's.
+    pub tension_span: Option<Span>,
     /// Support radius h, m; `None`: as many spacings as is usual for the method.
     pub support_radius: Option<f64>,
     /// Velocity at the start, m/s, as formulas of x, y and z.
