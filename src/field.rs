@@ -17,7 +17,8 @@ use glam::DVec3;
 use crate::{geom::Aabb, interval::Interval};
 
 pub(crate) use cut::{Cut, cut, is_inside};
-pub use faces::{Face, Faces, Part, nearest};
+pub(crate) use faces::surface_face;
+pub use faces::{Face, Faces, Part};
 pub use path::{Entry, Normals, Path, last_outside};
 pub(crate) use region::Region;
 pub(crate) use walls::clearance_by_ranges;

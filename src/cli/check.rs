@@ -428,49 +428,7 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
         let (range, doc) = (range.unwrap_or_default(), doc.unwrap_or_default());
         say!("  param {} = {}{range}{doc}", param.name, shown(param.value));
     }
-    for solid in facts {
-        say!("  solid {}", solid.name);
-        if let Some(time) = solid.time {
-            say!("    moves       at t = {time} s:");
-        }
-        if solid.empty {
-            say!("    empty");
-        }
-        if let Some(bounds) = &solid.bounds {
-            let [min, max] = corners(bounds);
-            say!("    bounds      {min} … {max}");
-            if solid.volume.is_none() && solid.is_measured {
-                say!("    volume      not found: too thin for {} cells along its longest side", VOLUME_CELLS);
-            }
-        } else if !solid.empty {
-            say!("    bounds      none found");
-        }
-        if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-            say!("    volume      {} ± {error:.1e}", significant(volume));
-        }
-        if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
-            say!("    area        {} ± {error:.1e}", significant(area));
-        }
-        if let (Some(components), Some(coarser), false) =
-            (solid.components, solid.components_coarser, solid.empty)
-        {
-            let half = VOLUME_CELLS / 2;
-            match coarser == components {
-                true => say!("    components  {components}"),
-                false => say!(
-                    "    components  {components}, but {coarser} with {half} cells instead of {VOLUME_CELLS}"
-                ),
-            }
-        }
-        if solid.resolved == Some(false) {
-            say!("    not resolved: volume, area and components are those of what {VOLUME_CELLS} cells show");
-        }
-        if let (Some(name), Some(bound), Some(tolerance)) =
-            (&solid.program, solid.error_bound, solid.tolerance)
-        {
-            say!("    program     {name}: ω to {bound:.1e}, tolerance {tolerance:e}");
-        }
-    }
+    facts.iter().for_each(print_solid);
     for scene in &module.scenes {
         let obstacles: Vec<&str> = scene.obstacles.iter().map(|o| o.name.as_str()).collect();
         let particles =
@@ -478,6 +436,49 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
         let around =
             if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
         say!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
+    }
+}
+
+/// Prints what is known of a solid.
+fn print_solid(solid: &Facts) {
+    say!("  solid {}", solid.name);
+    if let Some(time) = solid.time {
+        say!("    moves       at t = {time} s:");
+    }
+    if solid.empty {
+        say!("    empty");
+    }
+    if let Some(bounds) = &solid.bounds {
+        let [min, max] = corners(bounds);
+        say!("    bounds      {min} … {max}");
+        if solid.volume.is_none() && solid.is_measured {
+            say!("    volume      not found: too thin for {} cells along its longest side", VOLUME_CELLS);
+        }
+    } else if !solid.empty {
+        say!("    bounds      none found");
+    }
+    if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
+        say!("    volume      {} ± {error:.1e}", significant(volume));
+    }
+    if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
+        say!("    area        {} ± {error:.1e}", significant(area));
+    }
+    if let (Some(components), Some(coarser), false) =
+        (solid.components, solid.components_coarser, solid.empty)
+    {
+        let half = VOLUME_CELLS / 2;
+        match coarser == components {
+            true => say!("    components  {components}"),
+            false => say!(
+                "    components  {components}, but {coarser} with {half} cells instead of {VOLUME_CELLS}"
+            ),
+        }
+    }
+    if solid.resolved == Some(false) {
+        say!("    not resolved: volume, area and components are those of what {VOLUME_CELLS} cells show");
+    }
+    if let (Some(name), Some(bound), Some(tolerance)) = (&solid.program, solid.error_bound, solid.tolerance) {
+        say!("    program     {name}: ω to {bound:.1e}, tolerance {tolerance:e}");
     }
 }
 

@@ -241,16 +241,16 @@ FLUID_LIGHTER = "W0507":
 "A fluid that fills its vessel has no surface to which it could give way. Methods that keep it from being compressed (dfsph)
 pack its particles at the start, and make them lighter as far as those at curved walls would be too dense otherwise. Forces
 and momentum are smaller by as much. More particles leave smaller gaps; `method: wcsph` keeps all of the mass.";
-TENSION_STIRS = "W0509":
-"The surface tension of a divergence-free fluid (dfsph) is a force by normals and curvature. It is not the gradient of an
-energy, and gives particles at the surface a motion that does not end: a drop at rest simmers, spray may gain energy. The
-message says how fast that is, and it is told where that is not small against the speeds of the scene. `method: wcsph` damps
-it; with a `support_radius` of three spacings a seventh of the speed is left.";
 THIN_FOR_PARTICLES = "W0508":
 "A gap of an obstacle is thinner than the spacing of the particles, or a wall thinner than half of it. No particle finds room in
 such a gap. Through such a wall the fluid on one side feels that on the other more than its own second neighbours. The message
 says how thin it is, where, and what spacing shows it. Parts that extend over less than two spacings, and the tips of wedges, do
 not count.";
+TENSION_STIRS = "W0509":
+"The surface tension of a divergence-free fluid (dfsph) is a force by normals and curvature. It is not the gradient of an
+energy, and gives particles at the surface a motion that does not end: a drop at rest simmers, spray may gain energy. The
+message says how fast that is, and it is told where that is not small against the speeds of the scene. `method: wcsph` damps
+it; with a `support_radius` of three spacings a seventh of the speed is left.";
 FRAMES = "W0505":
 "Frames are saved so rarely that none lies between the start and the end of the run, or so often that they fill a disk.
 `save_every` is the simulated time between two of them, `until` that of the whole run.";

@@ -61,6 +61,9 @@ pub(super) struct Filling {
     pub fills_vessel: bool,
 }
 
+/// Particles on a lattice, what was carved, and the size of the lattice's cells, m.
+type Placed = (Particles, Carved, DVec3);
+
 /// The spacing of the particles of a scene at rest, m: the cube root of a particle's volume.
 ///
 /// # Errors
@@ -123,46 +126,64 @@ impl Experiment {
     }
 
     /// Places particles on the lattice that fits the fluid's volume best, m³, in a shape of which bodies take another
-    /// volume. Returns them, what was carved, and the size of the
-    /// lattice's cells.
-    fn fit(
+    /// volume.
+    fn fit(&self, obstacles: &[Obstacle], within: Aabb, volume: f64, taken: f64) -> Result<Placed, Error> {
+        // a hair smaller than the box, whose faces have ω = 0
+        let is_box = self.fluid.range(&within.grown(-1e-6 * within.size().min_element())).lo > 0.0;
+        let best = if is_box { self.fit_box(obstacles, within, volume, taken)? } else { None };
+        match best {
+            Some((error, placed)) if error < MANY_VACANCIES => Ok(placed),
+            best => self.fit_shape(obstacles, within, best, (volume, taken)),
+        }
+    }
+
+    /// A lattice of whole layers along each side of a box, of which bodies take a part, with the part of its sites that stays
+    /// vacant. `None` if none holds the stated number of particles.
+    fn fit_box(
         &self,
         obstacles: &[Obstacle],
         within: Aabb,
         volume: f64,
         taken: f64,
-    ) -> Result<(Particles, Carved, DVec3), Error> {
+    ) -> Result<Option<(f64, Placed)>, Error> {
+        let spacing = self.parameters.spacing();
+        let place = |spacing, sites| {
+            let cell = fitted_to(within.size(), spacing, sites);
+            let (particles, carved) = self.place(obstacles, Some(cell), None, Some(taken))?;
+            Ok((particles, carved, cell))
+        };
+        let Some(wanted) = self.scene.fluid.particles else {
+            return place(spacing, None).map(|placed| Some((0.0, placed)));
+        };
+        // the bodies take a part of the box, and its number of sites is that much larger
+        let share = volume / within.volume();
+        let mut sites = wanted as f64 / share;
+        let mut best: Option<(f64, Placed)> = None;
+        for _ in 0..TRIALS {
+            let placed = place(spacing * share.cbrt(), Some(sites))?;
+            let excess = (placed.0.len() as f64 / wanted as f64).ln();
+            if excess >= 0.0 && best.as_ref().is_none_or(|(least, _)| excess < *least) {
+                best = Some((excess, placed));
+            }
+            if (0.0..MANY_VACANCIES).contains(&excess) {
+                break;
+            }
+            sites *= (-excess).exp() * (1.0 + GOOD_ENOUGH);
+        }
+        Ok(best)
+    }
+
+    /// A lattice whose cells are as large as a shape of any kind asks for, or the one that is known with its error if none
+    /// fits better.
+    fn fit_shape(
+        &self,
+        obstacles: &[Obstacle],
+        within: Aabb,
+        mut best: Option<(f64, Placed)>,
+        (volume, taken): (f64, f64),
+    ) -> Result<Placed, Error> {
         let wanted = self.scene.fluid.particles;
         let spacing = self.parameters.spacing();
-        // a hair smaller than the box, whose faces have ω = 0
-        let is_box = self.fluid.range(&within.grown(-1e-6 * within.size().min_element())).lo > 0.0;
-        let mut best: Option<(f64, (Particles, Carved, DVec3))> = None;
-        if is_box {
-            // bodies take a part of the box, and its number of sites is that much larger
-            let share = volume / within.volume();
-            let (mut sites, spacing) = match wanted {
-                None => (None, spacing),
-                Some(wanted) => (Some(wanted as f64 / share), spacing * share.cbrt()),
-            };
-            for _ in 0..TRIALS {
-                let cell = fitted_to(within.size(), spacing, sites);
-                let (particles, carved) = self.place(obstacles, Some(cell), None, Some(taken))?;
-                let (Some(wanted), Some(least)) = (wanted, &mut sites) else {
-                    return Ok((particles, carved, cell));
-                };
-                let excess = (particles.len() as f64 / wanted as f64).ln();
-                if excess >= 0.0 && best.as_ref().is_none_or(|(least, _)| excess < *least) {
-                    best = Some((excess, (particles, carved, cell)));
-                }
-                if (0.0..MANY_VACANCIES).contains(&excess) {
-                    break;
-                }
-                *least *= (-excess).exp() * (1.0 + GOOD_ENOUGH);
-            }
-            if let Some((_, found)) = best.take_if(|(excess, _)| *excess < MANY_VACANCIES) {
-                return Ok(found);
-            }
-        }
         let mut size = spacing;
         // along how many axes the cells may change
         let free =
@@ -171,12 +192,12 @@ impl Experiment {
             let cell = self.cell(within, size);
             let (particles, carved) = self.place(obstacles, Some(cell), None, Some(taken))?;
             let number = particles.len() as f64;
-            let enough = wanted.is_none_or(|wanted| particles.len() >= wanted);
             let off = (number * cell.element_product() / volume).ln();
+            let ratio = wanted.map(|wanted| number / wanted as f64);
             // a number of particles is reached from above: some of them are left out. Cells that leave a part of the
             // fluid without sites, as where the last layer does not fit, crowd the others
-            let error = match wanted {
-                Some(wanted) if enough => (number / wanted as f64).ln() + off.abs(),
+            let error = match ratio {
+                Some(ratio) if ratio >= 1.0 => ratio.ln() + off.abs(),
                 Some(_) => f64::INFINITY,
                 None => off.abs(),
             };
@@ -186,9 +207,10 @@ impl Experiment {
             if error < GOOD_ENOUGH || free == 0.0 {
                 break;
             }
-            size *= match wanted {
-                Some(wanted) if enough => (number / wanted as f64).powf(0.7 / free),
-                Some(wanted) => (number / wanted as f64).powf(1.0 / free) * (1.0 - GOOD_ENOUGH),
+            size *= match ratio {
+                // with the number met, other cells may still fill the shape better
+                Some(ratio) if ratio >= 1.0 => ratio.powf(0.7 / free).max(1.0 + GOOD_ENOUGH),
+                Some(ratio) => ratio.powf(1.0 / free) * (1.0 - GOOD_ENOUGH),
                 None => (-off / free).exp(),
             };
             if wanted.is_none() {
@@ -196,17 +218,16 @@ impl Experiment {
                 size = size.clamp((1.0 - TOO_FAR) * spacing, (1.0 + TOO_FAR) * spacing);
             }
         }
-        match best {
-            Some((_, found)) => Ok(found),
-            None => Err(refuse(
+        best.map(|(_, placed)| placed).ok_or_else(|| {
+            refuse(
                 &self.program,
                 Diagnostic::error(
                     Code::SCENE_NO_ROOM,
                     self.scene.fluid.shape_span,
                     "no lattice fits the shape of the fluid",
                 ),
-            )),
-        }
+            )
+        })
     }
 
     /// Cells of about a size, m, of which whole layers reach from wall to wall where the fluid does.

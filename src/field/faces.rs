@@ -30,7 +30,7 @@ pub type Faces = SmallVec<[Part; 16]>;
 
 /// The face that is the obstacle's surface nearest to the point; `None` for a tree without faces. Of an intersection it
 /// is the farthest face, of a union the nearest.
-pub fn nearest(faces: &[Part]) -> Option<Face> {
+pub(crate) fn surface_face(faces: &[Part]) -> Option<Face> {
     fn of_tree(faces: &[Part], at: &mut usize) -> Option<Face> {
         let part = *faces.get(*at)?;
         *at += 1;

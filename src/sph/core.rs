@@ -299,20 +299,21 @@ impl Core {
         if dt < SHORTEST * self.longest_dt {
             return Err(self.stalled(dt));
         }
-        let dt = self.dt_beside_bodies(dt.min(most));
+        let dt = self.dt_beside_bodies(dt, most);
         // take equal steps to the instant, rather than full ones and a small rest
         Ok(if most.is_finite() { most / (most / dt - 1e-9).ceil().max(1.0) } else { dt })
     }
 
-    /// The longest step, s, at most `dt`, in which no body passes the fluid by.
-    fn dt_beside_bodies(&self, dt: f64) -> f64 {
+    /// The longest step, s, at most `usual` and `most`, in which no body passes the fluid by.
+    fn dt_beside_bodies(&self, usual: f64, most: f64) -> f64 {
         let parameters = &self.parameters;
         let limits = StepLimits {
             travel: BODY_TRAVEL * parameters.spacing(),
             reach: parameters.support_radius,
             for_acceleration: |a| parameters.force_dt(a),
         };
-        self.boundary.step_beside_bodies(&self.particles.position, &limits, self.time, dt)
+        let dt = usual.min(most);
+        self.boundary.step_beside_bodies(&self.particles.position, &limits, self.time, usual, dt)
     }
 
     /// The part of a checkpoint that all methods share.

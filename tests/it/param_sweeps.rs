@@ -302,6 +302,7 @@ fn a_run_and_a_sweep_have_folders_of_their_own() {
 }
 
 /// The row that was interrupted goes on from its own checkpoint, and ends as one that was not.
+#[cfg(unix)]
 #[test]
 fn an_interrupted_sweep_goes_on_within_its_row() {
     let folder = in_folder(&FALL.replace("save_every: 0.05 s", "save_every: 4 ms"));

@@ -1,4 +1,5 @@
-//! Warnings that take longer than a keystroke: they are looked for in a thread of their own, once a text rests.
+//! Warnings that take longer than a keystroke: they are looked for in a thread of their own, once a text rests. Solids of
+//! very many operations, and those that a second does not suffice for, are left to `rfm check`.
 //!
 //! Invariant: messages about a text are sent only while it is the newest one of its file. Who sends holds the lock, so that
 //! older messages never follow newer ones.
@@ -42,8 +43,8 @@ struct Text {
 struct State {
     /// The number of the newest text of each file.
     newest: HashMap<String, u64>,
-    /// The text that is looked at next: the one that was given last.
-    next: Option<Text>,
+    /// The newest text of each file that has not been looked at, the longest at rest first.
+    waiting: Vec<Text>,
     count: u64,
     is_over: bool,
 }
@@ -75,12 +76,12 @@ impl Shared {
     fn wait(&self) -> Option<Text> {
         let mut state = self.state();
         while !state.is_over {
-            let left = match &state.next {
+            let left = match state.waiting.first() {
                 Some(text) => REST.saturating_sub(text.since.elapsed()),
                 None => Duration::MAX,
             };
             if left.is_zero() {
-                return state.next.take();
+                return Some(state.waiting.remove(0));
             }
             state = match left {
                 Duration::MAX => self.changed.wait(state).unwrap_or_else(PoisonError::into_inner),
@@ -116,7 +117,8 @@ impl Background {
         state.count += 1;
         let number = state.count;
         state.newest.insert(uri.as_str().to_string(), number);
-        state.next = Some(Text { uri: uri.clone(), text, version, since: Instant::now(), number });
+        state.waiting.retain(|waiting| waiting.uri != *uri);
+        state.waiting.push(Text { uri: uri.clone(), text, version, since: Instant::now(), number });
         self.shared.changed.notify_one();
     }
 
@@ -124,7 +126,7 @@ impl Background {
     pub fn forget(&self, uri: &Uri) {
         let mut state = self.shared.state();
         state.newest.remove(uri.as_str());
-        state.next.take_if(|next| next.uri == *uri);
+        state.waiting.retain(|waiting| waiting.uri != *uri);
     }
 }
 
@@ -151,7 +153,8 @@ fn look(shared: &Shared, text: &Text, encoding: Encoding) -> Option<PublishDiagn
         if started.elapsed() > MOST_TIME {
             break;
         }
-        let solid = program.solid_with(&named.name, Engine::Auto).ok()?;
+        // why a solid cannot be compiled is among the messages of the text
+        let Ok(solid) = program.solid_with(&named.name, Engine::Auto) else { continue };
         if solid.graph(rfm::solid::ProgramKind::Value).0.len() <= MOST_OPERATIONS {
             found.extend(lints::of_solid(program, named, &solid, &mut searches));
         }

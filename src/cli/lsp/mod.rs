@@ -29,9 +29,10 @@ use lsp_types::request::{
 };
 use lsp_types::{
     CodeActionKind, CodeActionOptions, CodeActionProviderCapability, CompletionOptions,
-    ExecuteCommandOptions, Hover, HoverContents, HoverProviderCapability, InitializeParams, Location,
-    MarkupContent, MarkupKind, OneOf, Position, PrepareRenameResponse, RenameOptions, ServerCapabilities,
-    SignatureHelpOptions, TextDocumentPositionParams, TextDocumentSyncCapability, TextDocumentSyncKind, Uri,
+    ExecuteCommandOptions, GotoDefinitionParams, Hover, HoverContents, HoverParams, HoverProviderCapability,
+    InitializeParams, Location, MarkupContent, MarkupKind, OneOf, Position, PrepareRenameResponse,
+    ReferenceParams, RenameOptions, ServerCapabilities, SignatureHelpOptions, TextDocumentPositionParams,
+    TextDocumentSyncCapability, TextDocumentSyncKind, Uri,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -172,90 +173,85 @@ impl Server<'_> {
         let parameters = request.params;
         match request.method.as_str() {
             Formatting::METHOD => {
-                let asked = read::<<Formatting as lsp_types::request::Request>::Params>(parameters)?;
+                let asked = asked::<Formatting>(parameters)?;
                 given(edits::layout(self.document(&asked.text_document.uri)?))
             }
-            HoverRequest::METHOD => {
-                let asked = read::<<HoverRequest as lsp_types::request::Request>::Params>(parameters)?;
-                let (document, byte) = self.place(&asked.text_document_position_params)?;
-                given(hover::at(document, byte).map(|(words, place)| Hover {
-                    contents: HoverContents::Markup(MarkupContent {
-                        kind: MarkupKind::Markdown,
-                        value: words,
-                    }),
-                    range: Some(document.range(place)),
-                }))
-            }
-            GotoDefinition::METHOD => {
-                let asked = read::<<GotoDefinition as lsp_types::request::Request>::Params>(parameters)?;
-                let position = &asked.text_document_position_params;
-                let (document, byte) = self.place(position)?;
-                let found = document.names.at(byte).and_then(|mention| match &mention.meaning {
-                    Meaning::Defined(place) => Some(place.clone()),
-                    Meaning::Standard | Meaning::Key(_) => None,
-                });
-                given(
-                    found.map(|place| {
-                        Location::new(position.text_document.uri.clone(), document.range(place))
-                    }),
-                )
-            }
-            References::METHOD => {
-                let asked = read::<<References as lsp_types::request::Request>::Params>(parameters)?;
-                let position = &asked.text_document_position;
-                let (document, byte) = self.place(position)?;
-                let uri = &position.text_document.uri;
-                given(edits::renamable(document, byte).map(|(_, place)| {
-                    let wanted =
-                        |found: &&names::Mention| asked.context.include_declaration || found.place != *place;
-                    let uses = document.names.uses(place).filter(wanted);
-                    uses.map(|found| Location::new(uri.clone(), document.range(found.place.clone())))
-                        .collect::<Vec<_>>()
-                }))
-            }
+            HoverRequest::METHOD => given(self.hover(&asked::<HoverRequest>(parameters)?)?),
+            GotoDefinition::METHOD => given(self.definition(&asked::<GotoDefinition>(parameters)?)?),
+            References::METHOD => given(self.references(&asked::<References>(parameters)?)?),
             Completion::METHOD => {
-                let asked = read::<<Completion as lsp_types::request::Request>::Params>(parameters)?;
+                let asked = asked::<Completion>(parameters)?;
                 let (document, byte) = self.place(&asked.text_document_position)?;
                 given(complete::at(document, byte))
             }
             SignatureHelpRequest::METHOD => {
-                let asked =
-                    read::<<SignatureHelpRequest as lsp_types::request::Request>::Params>(parameters)?;
+                let asked = asked::<SignatureHelpRequest>(parameters)?;
                 let (document, byte) = self.place(&asked.text_document_position_params)?;
                 given(complete::signature_help(document, byte))
             }
             DocumentSymbolRequest::METHOD => {
-                let asked =
-                    read::<<DocumentSymbolRequest as lsp_types::request::Request>::Params>(parameters)?;
+                let asked = asked::<DocumentSymbolRequest>(parameters)?;
                 given(symbols::of(self.document(&asked.text_document.uri)?))
             }
             CodeActionRequest::METHOD => {
-                let asked = read::<<CodeActionRequest as lsp_types::request::Request>::Params>(parameters)?;
+                let asked = asked::<CodeActionRequest>(parameters)?;
                 let uri = &asked.text_document.uri;
                 given(edits::fixes(uri, self.document(uri)?, asked.range))
             }
             PrepareRenameRequest::METHOD => {
-                let asked: TextDocumentPositionParams = read(parameters)?;
-                let (document, byte) = self.place(&asked)?;
-                given(
-                    edits::renamable(document, byte).map(|(mention, _)| {
-                        PrepareRenameResponse::Range(document.range(mention.place.clone()))
-                    }),
-                )
+                given(self.renamable(&asked::<PrepareRenameRequest>(parameters)?)?)
             }
             Rename::METHOD => {
-                let asked = read::<<Rename as lsp_types::request::Request>::Params>(parameters)?;
+                let asked = asked::<Rename>(parameters)?;
                 let position = &asked.text_document_position;
                 let (document, byte) = self.place(position)?;
                 let edits = edits::rename(&position.text_document.uri, document, byte, &asked.new_name);
                 given(edits.map_err(|why| Refusal::new(ErrorCode::InvalidParams, why))?)
             }
             ExecuteCommand::METHOD => {
-                let asked = read::<<ExecuteCommand as lsp_types::request::Request>::Params>(parameters)?;
+                let asked = asked::<ExecuteCommand>(parameters)?;
                 self.command(&asked.command, asked.arguments)
             }
             method => Err(Refusal::new(ErrorCode::MethodNotFound, format!("{method} is not served"))),
         }
+    }
+
+    fn hover(&self, asked: &HoverParams) -> Result<Option<Hover>, Refusal> {
+        let (document, byte) = self.place(&asked.text_document_position_params)?;
+        Ok(hover::at(document, byte).map(|(value, place)| Hover {
+            contents: HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value }),
+            range: Some(document.range(place)),
+        }))
+    }
+
+    fn definition(&self, asked: &GotoDefinitionParams) -> Result<Option<Location>, Refusal> {
+        let position = &asked.text_document_position_params;
+        let (document, byte) = self.place(position)?;
+        let found = document.names.at(byte).and_then(|mention| match &mention.meaning {
+            Meaning::Defined(place) => Some(place.clone()),
+            Meaning::Standard | Meaning::Key(_) => None,
+        });
+        Ok(found.map(|place| Location::new(position.text_document.uri.clone(), document.range(place))))
+    }
+
+    fn references(&self, asked: &ReferenceParams) -> Result<Option<Vec<Location>>, Refusal> {
+        let position = &asked.text_document_position;
+        let (document, byte) = self.place(position)?;
+        let uri = &position.text_document.uri;
+        Ok(edits::renamable(document, byte).map(|(_, place)| {
+            let wanted = |found: &&names::Mention| asked.context.include_declaration || found.place != *place;
+            let uses = document.names.uses(place).filter(wanted);
+            uses.map(|found| Location::new(uri.clone(), document.range(found.place.clone()))).collect()
+        }))
+    }
+
+    fn renamable(
+        &self,
+        asked: &TextDocumentPositionParams,
+    ) -> Result<Option<PrepareRenameResponse>, Refusal> {
+        let (document, byte) = self.place(asked)?;
+        Ok(edits::renamable(document, byte)
+            .map(|(mention, _)| PrepareRenameResponse::Range(document.range(mention.place.clone()))))
     }
 
     fn command(&self, command: &str, mut arguments: Vec<Value>) -> Result<Value, Refusal> {
@@ -265,7 +261,7 @@ impl Server<'_> {
                 format!("there is no such command: {command}"),
             ));
         }
-        let wanted: preview::Wanted = read(arguments.remove(0))?;
+        let wanted: preview::Wanted = from_json(arguments.remove(0))?;
         let document = self.document(&wanted.uri)?;
         given(preview::slice(document, &wanted).map_err(|why| Refusal::new(ErrorCode::RequestFailed, why))?)
     }
@@ -341,7 +337,14 @@ fn publication(messages: lsp_types::PublishDiagnosticsParams) -> Message {
     Message::Notification(Notification::new(PublishDiagnostics::METHOD.to_string(), messages))
 }
 
-fn read<T: DeserializeOwned>(parameters: Value) -> Result<T, Refusal> {
+/// What a request asks.
+fn asked<R: lsp_types::request::Request<Params: DeserializeOwned>>(
+    parameters: Value,
+) -> Result<R::Params, Refusal> {
+    from_json(parameters)
+}
+
+fn from_json<T: DeserializeOwned>(parameters: Value) -> Result<T, Refusal> {
     serde_json::from_value(parameters).map_err(|error| Refusal::new(ErrorCode::InvalidParams, error))
 }
 

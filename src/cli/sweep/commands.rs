@@ -78,7 +78,7 @@ pub(in crate::cli) fn mesh(shared: &Shared, options: &Mesh) -> Result<(), Failur
 
 /// `rfm run --sweep`.
 pub(in crate::cli) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
-    refuse(&[("--dry-run", options.dry_run)])?;
+    refuse(&[("--dry-run", options.dry_run), ("-o -", is_stdout(options.output.as_deref()))])?;
     if options.output.is_some() && options.sweep.into.is_some() {
         return Err(Failure::usage("-o and --into both name the folder of the sweep: give one of them"));
     }

@@ -225,6 +225,8 @@ impl Task<'_> {
         };
         let known = known?;
         if self.force {
+            // first, so that no index names what is gone if this is cut short
+            new.write(&self.folder)?;
             self.remove_values_that_are_gone(&known)?;
             return Ok(new);
         }

@@ -49,13 +49,15 @@ pub(super) fn secure(
     let mut suspects = suspects(&quads, &cut, vertices);
     let cell_vertices = vertices.len();
     let mut lasting = cell_vertices;
-    for round in 0.. {
+    let mut round = 0;
+    loop {
         vertices.truncate(lasting);
         let (triangles, chosen) = assemble(&quads, &cut, vertices, tubes, &suspects);
         let pairs = match round {
             0 => std::mem::take(&mut crossings),
             1..ROUNDS => crossing_pairs(&vertices.positions, &triangles, &chosen, size),
-            _ => Vec::new(),
+            // what still crosses does so for good
+            ROUNDS.. => Vec::new(),
         };
         if pairs.is_empty() {
             return triangles;
@@ -72,8 +74,8 @@ pub(super) fn secure(
         // all others are as they were when they crossed nothing
         suspects = retreat(&mut quads, &mut cut, vertices, &is_marked, (surface, round));
         lasting = vertices.len();
+        round += 1;
     }
-    Vec::new()
 }
 
 /// The hits of quads that may cross others.
@@ -195,6 +197,9 @@ struct Retreat {
     cell: Aabb,
 }
 
+/// Sides by their ends: the hits of the quads beside each, and the face between the cells of its ends.
+type Sides = BTreeMap<[u32; 2], (SmallVec<[u32; 4]>, Aabb)>;
+
 /// Moves the marked vertices into their cells and makes fans of their quads, with bent sides. Returns the hits of these
 /// quads.
 fn retreat(
@@ -205,9 +210,24 @@ fn retreat(
     (surface, round): (&mut Surface<'_>, usize),
 ) -> Vec<u32> {
     let touched = quads.with_corners(is_marked);
-    let mut sides: BTreeMap<[u32; 2], (SmallVec<[u32; 4]>, Aabb)> = BTreeMap::new();
-    let mut cells: BTreeMap<u32, Retreat> = BTreeMap::new();
+    let (cells, sides) = around(quads, &touched, is_marked);
+    into_cells(quads, vertices, cells, surface, round);
+    bend(quads, vertices, sides, surface, round);
     for quad in &touched {
+        cut.triangles[2 * quad.hit as usize..][..2].fill(NOTHING);
+        if let Some(rim) = quads.rim(quad) {
+            cut.fans.insert(quad.hit, rim);
+        }
+    }
+    touched.iter().map(|quad| quad.hit).collect()
+}
+
+/// The cells of the marked vertices, and the sides that end in one: each side with the hits of the quads beside it, and the
+/// face between its cells.
+fn around(quads: &Quads<'_>, touched: &[Quad], is_marked: &[bool]) -> (BTreeMap<u32, Retreat>, Sides) {
+    let mut sides = Sides::new();
+    let mut cells: BTreeMap<u32, Retreat> = BTreeMap::new();
+    for quad in touched {
         for i in 0..4 {
             let (a, b) = (quad.corners[i], quad.corners[(i + 1) % 4]);
             if is_marked[a as usize] {
@@ -222,6 +242,17 @@ fn retreat(
             }
         }
     }
+    (cells, sides)
+}
+
+/// Moves vertices into their cells, onto the surface in the first rounds.
+fn into_cells(
+    quads: &Quads<'_>,
+    vertices: &mut Vertices,
+    cells: BTreeMap<u32, Retreat>,
+    surface: &mut Surface<'_>,
+    round: usize,
+) {
     let ends_of_tunnels: BTreeSet<u32> = quads.seconds.values().copied().collect();
     for (v, Retreat { hits, count, cell }) in cells {
         let place = v as usize;
@@ -244,6 +275,16 @@ fn retreat(
             vertices.set(v, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
         }
     }
+}
+
+/// Gives each side a vertex in its middle, in the face that it crosses.
+fn bend(
+    quads: &mut Quads<'_>,
+    vertices: &mut Vertices,
+    sides: Sides,
+    surface: &mut Surface<'_>,
+    round: usize,
+) {
     for (ends, (hits, face)) in sides {
         let &[first, second] = &hits[..] else { continue };
         let [p, q] = [first, second].map(|hit| quads.hits.get(hit));
@@ -264,13 +305,6 @@ fn retreat(
             quads.middles.insert((hit, ends), middle);
         }
     }
-    for quad in &touched {
-        cut.triangles[2 * quad.hit as usize..][..2].fill(NOTHING);
-        if let Some(rim) = quads.rim(quad) {
-            cut.fans.insert(quad.hit, rim);
-        }
-    }
-    touched.iter().map(|quad| quad.hit).collect()
 }
 
 /// Whether a quad lies in its envelope.

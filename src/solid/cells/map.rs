@@ -216,7 +216,9 @@ impl CellMap {
     pub(super) fn program_for(&self, p: DVec3) -> Option<(bool, u32)> {
         match self.cells.find(p)?.cell {
             Cell::Near(program) => Some((false, program)),
-            _ => self.program_around(p).map(|program| (true, program)),
+            Cell::Fluid | Cell::Inside | Cell::Divided(_) => {
+                self.program_around(p).map(|program| (true, program))
+            }
         }
     }
 

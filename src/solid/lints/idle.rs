@@ -26,7 +26,7 @@ const OPERATIONS_OF_ONE: usize = 8_000_000;
 /// What a leaf costs beside its operations, for its range and the signs of its operands, in operations.
 const OPERATIONS_BESIDE: usize = 4;
 
-/// What a value costs less than a range.
+/// How many values cost as much as a range.
 const VALUES_PER_RANGE: usize = 4;
 
 /// Boxes that are smaller than this part of the solid decide nothing: the surfaces touch.

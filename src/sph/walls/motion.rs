@@ -20,6 +20,10 @@ const PARTS: usize = 4;
 /// Most attempts at a step. Each is shorter than the one before.
 const ATTEMPTS: usize = 30;
 
+/// Part of a usual step below which none is made shorter for a body: what still moves too far jumps, however short the
+/// step (`floor(t)`), and is passed in one step of the usual length.
+const JUMP: f64 = 1e-3;
+
 /// What a step may be beside bodies.
 pub(in crate::sph) struct StepLimits<A> {
     /// How far a body may move in a step, m.
@@ -54,17 +58,21 @@ impl<A: Fn(f64) -> f64> StepLimits<A> {
 }
 
 impl Boundary {
-    /// The longest step, s, at most `dt`, that bodies near the fluid allow from a time, s, on.
+    /// The longest step, s, at most `dt`, that bodies near the fluid allow from a time, s, on. Without bodies steps are
+    /// `usual`, s, long, if no instant is nearer.
     pub fn step_beside_bodies<A: Fn(f64) -> f64>(
         &self,
         position: &Vectors,
         limits: &StepLimits<A>,
         time: f64,
+        usual: f64,
         mut dt: f64,
     ) -> f64 {
         let [x, y, z] = position.components().map(|column| &column[..]);
         let fluid = box_around([x, y, z]);
+        let shortest = JUMP * usual;
         for k in 0..self.obstacles.len() {
+            let before = dt;
             for _ in 0..ATTEMPTS {
                 let Some(places) = self.places(k, time, dt) else { break };
                 // no part of a box moves more than its corners, and most steps are short enough for all of the fluid
@@ -73,6 +81,10 @@ impl Boundary {
                     longest = limits.longest(self.motion_near(k, position, limits.reach, &places, dt), dt);
                 }
                 if longest >= dt {
+                    break;
+                }
+                if longest < shortest {
+                    dt = before;
                     break;
                 }
                 dt = longest;
@@ -104,7 +116,8 @@ impl Boundary {
             .map(|((x, y), z)| {
                 let block = box_around([x, y, z]);
                 let motion = of_corners(&block, places, dt);
-                if field.is_far(&block, reach + motion.way) { Motion::default() } else { motion }
+                // a map of cells knows nothing beyond its own reach, so the fluid's box grows by the way
+                if field.is_far(&block.grown(motion.way), reach) { Motion::default() } else { motion }
             })
             .reduce(Motion::default, Motion::or)
     }
