@@ -39,6 +39,12 @@ impl Dimension {
     pub const TENSION: Self = Self::new(0, 1, -2, 0);
     /// Energy, J.
     pub const ENERGY: Self = Self::new(2, 1, -2, 0);
+    /// Force, N.
+    pub const FORCE: Self = Self::new(1, 1, -2, 0);
+    /// Pressure, Pa.
+    pub const PRESSURE: Self = Self::new(-1, 1, -2, 0);
+    /// Mass flow, kg/s.
+    pub const MASS_FLOW: Self = Self::new(0, 1, -1, 0);
 
     /// The dimension m^length · kg^mass · s^time · rad^angle.
     pub const fn new(length: i8, mass: i8, time: i8, angle: i8) -> Self {
@@ -47,7 +53,7 @@ impl Dimension {
 
     /// The SI unit as a scene writes it; `None` for a plain number.
     pub fn unit(self) -> Option<&'static str> {
-        const UNITS: [(Dimension, &str); 10] = [
+        const UNITS: [(Dimension, &str); 13] = [
             (Dimension::LENGTH, "m"),
             (Dimension::MASS, "kg"),
             (Dimension::TIME, "s"),
@@ -58,6 +64,9 @@ impl Dimension {
             (Dimension::VISCOSITY, "Pa·s"),
             (Dimension::TENSION, "N/m"),
             (Dimension::ENERGY, "J"),
+            (Dimension::FORCE, "N"),
+            (Dimension::PRESSURE, "Pa"),
+            (Dimension::MASS_FLOW, "kg/s"),
         ];
         UNITS.into_iter().find(|(dimension, _)| *dimension == self).map(|(_, unit)| unit)
     }
@@ -202,8 +211,6 @@ fn split_power(text: &str) -> Option<(&str, i8)> {
 
 fn base_unit(word: &str) -> Option<Unit> {
     let unit = |factor: f64, dimension: Dimension| Some(Unit { factor, dimension });
-    const FORCE: Dimension = Dimension::new(1, 1, -2, 0);
-    const PRESSURE: Dimension = Dimension::new(-1, 1, -2, 0);
     match word {
         "m" => unit(1.0, Dimension::LENGTH),
         "km" => unit(1e3, Dimension::LENGTH),
@@ -218,11 +225,11 @@ fn base_unit(word: &str) -> Option<Unit> {
         "min" => unit(60.0, Dimension::TIME),
         "h" => unit(3600.0, Dimension::TIME),
         "Hz" => unit(1.0, Dimension::new(0, 0, -1, 0)),
-        "N" => unit(1.0, FORCE),
-        "kN" => unit(1e3, FORCE),
-        "Pa" => unit(1.0, PRESSURE),
-        "kPa" => unit(1e3, PRESSURE),
-        "MPa" => unit(1e6, PRESSURE),
+        "N" => unit(1.0, Dimension::FORCE),
+        "kN" => unit(1e3, Dimension::FORCE),
+        "Pa" => unit(1.0, Dimension::PRESSURE),
+        "kPa" => unit(1e3, Dimension::PRESSURE),
+        "MPa" => unit(1e6, Dimension::PRESSURE),
         "J" => unit(1.0, Dimension::ENERGY),
         "kJ" => unit(1e3, Dimension::ENERGY),
         "rad" => unit(1.0, Dimension::ANGLE),

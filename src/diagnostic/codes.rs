@@ -141,7 +141,7 @@ SCENE_KEY = "E0301":
       run      { dt: 2 ms, until: 5 s, save_every: 0.05 s, checkpoint_every: 0.5 s }
       probe gauge { height: [1, 0.5], every: 10 ms }
       probe depth { pressure: [1, 0.5, 0.1] }         # velocity: [1, 0.5, 0.1]
-      probe load  { force: post, about: [1, 1, 0] }   # force, and torque about a point
+      probe load  { force: post, about: [1, 1, 0], from: 1 s, known: [0, 0, 9 N] }   # `about` is for the torque
       probe drain { flux { point: [1, 0, 0], normal: [1, 0, 0] } }
       probe sum   { energy: water }                   # or audit: water
       tolerance: 1e-6
@@ -149,7 +149,8 @@ SCENE_KEY = "E0301":
 
 `fill` is `below` or `middle`; without `particles` the shape is filled, without `dt` a stable step is derived.
 `spacing` may stand in place of `mass`. There are also `container { solid: … }`, `walls: no_slip`, `truth { … }` and
-`solver { precision: f64 }`. Each method has keys of its own: `rfm explain --methods` lists them.";
+`solver { precision: f64 }`. `from` in a probe asks for the mean of its samples from that time on, with its standard error;
+`known` states what it is to be, and the run says how far off it is. Each method has keys of its own: `rfm explain --methods` lists them.";
 SCENE_MISSING = "E0302":
 "The scene lacks something without which it cannot be run: a box with its far corner `max`, a fluid with a `shape`, or
 the `solid` of an obstacle. All other keys have defaults.";

@@ -17,6 +17,7 @@ mod deviation;
 mod every;
 mod filling;
 mod fingerprint;
+mod mean;
 mod parameters;
 mod probes;
 mod room;
@@ -37,6 +38,7 @@ pub use bodies::Body;
 pub use deviation::{Deviation, Deviations};
 pub use every::Every;
 pub use filling::spacing;
+pub use mean::Mean;
 pub use parameters::TimeStep;
 pub use probes::{probe_column, probe_of};
 

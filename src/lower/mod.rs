@@ -37,8 +37,8 @@ use std::sync::OnceLock;
 pub use imports::{Imported, unread};
 pub use module::{Module, NamedSolid, ParamValue};
 pub use scene::{
-    Bounce, Container, Fluid, Gravity, Measured, Obstacle, Opening, Picture, Probe, Run, Scene, Skin, Solver,
-    Tolerance, Truth,
+    AskedMean, Bounce, Container, Fluid, Gravity, Measured, Obstacle, Opening, Picture, Probe, Run, Scene,
+    Skin, Solver, Tolerance, Truth,
 };
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Source, SourceId, Span};

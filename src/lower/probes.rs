@@ -5,15 +5,15 @@
 use glam::DVec3;
 
 use super::lowering::Lowering;
-use super::scene::{Block, Measured, Probe};
+use super::scene::{AskedMean, Block, Measured, Probe};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::Aabb;
 use crate::quantity::{Bound, Dimension};
 use crate::syntax::ast::{Entry, Expr, ExprKind};
 
 const MEASURED: [&str; 7] = ["height", "pressure", "velocity", "force", "flux", "energy", "audit"];
-pub(in crate::lower) const PROBE_KEYS: [&str; 9] =
-    ["height", "pressure", "velocity", "force", "flux", "energy", "audit", "about", "every"];
+pub(in crate::lower) const PROBE_KEYS: [&str; 11] =
+    ["height", "pressure", "velocity", "force", "flux", "energy", "audit", "about", "every", "from", "known"];
 pub(in crate::lower) const FLUX_KEYS: [&str; 2] = ["point", "normal"];
 
 /// What the probes of a scene may refer to.
@@ -22,6 +22,8 @@ pub(super) struct Surroundings<'a> {
     /// Names of the bodies, in the order of their numbers.
     pub bodies: Vec<&'a str>,
     pub fluid: &'a str,
+    /// The end of the run, s.
+    pub until: f64,
 }
 
 impl<'a> Lowering<'a> {
@@ -47,11 +49,61 @@ impl<'a> Lowering<'a> {
                 None => Some(None),
                 Some(_) => self.number_key(&block, "every", Dimension::TIME, None, Bound::Positive).map(Some),
             };
-            if let (Some(measured), Some(every)) = (self.measured(&block, around), every) {
-                probes.push(Probe { name: label.text.clone(), span: label.span, measured, every });
+            let Some(measured) = self.measured(&block, around) else { continue };
+            if let (Some(every), Some(mean)) = (every, self.mean(&block, measured, around.until)) {
+                probes.push(Probe { name: label.text.clone(), span: label.span, measured, every, mean });
             }
         }
         probes
+    }
+
+    /// Reads `from` and `known`, which ask for a mean; the outer `None` is a mistake that was reported.
+    fn mean(&mut self, block: &Block<'_>, measured: Measured, until: f64) -> Option<Option<AskedMean>> {
+        let start = block.setting("from").map(|(_, value)| value.span);
+        let known = block.setting("known");
+        if start.is_none() && known.is_none() {
+            return Some(None);
+        }
+        let from = self.number_key(block, "from", Dimension::TIME, Some(0.0), Bound::NotNegative);
+        let known = match known {
+            Some((_, value)) => self.known(block, value, measured),
+            None => Some(Vec::new()),
+        };
+        if let (Some(from), Some(span)) = (from, start)
+            && from >= until
+        {
+            let message = format!("the mean begins at {from} s, and the run ends at {until} s");
+            self.report(
+                Diagnostic::error(Code::OUT_OF_RANGE, span, message)
+                    .help("state an earlier `from`, or a later `until` in the block `run`"),
+            );
+            return None;
+        }
+        Some(Some(AskedMean { from: from?, known: known? }))
+    }
+
+    /// Reads what is known of a mean: a number, or a vector where a probe measures one.
+    fn known(&mut self, block: &Block<'_>, value: &Expr, measured: Measured) -> Option<Vec<f64>> {
+        let mut number = |dimension| self.quantity_expr(value, dimension, "known").map(|known| vec![known]);
+        match measured {
+            Measured::Height(_) => number(Dimension::LENGTH),
+            Measured::Pressure(_) => number(Dimension::PRESSURE),
+            Measured::Flux { .. } => number(Dimension::MASS_FLOW),
+            Measured::Velocity(_) | Measured::Force { .. } => {
+                let is_force = matches!(measured, Measured::Force { .. });
+                let dimension = if is_force { Dimension::FORCE } else { Dimension::SPEED };
+                let known = self.vector_key(block, "known", dimension, DVec3::ZERO)?;
+                Some(known.to_array().into())
+            }
+            Measured::Energy | Measured::Audit => {
+                let message = "`known` has no meaning for the energy and the audit";
+                self.report(
+                    Diagnostic::error(Code::SCENE_KEY, value.span, message)
+                        .help("their means are told with `from` alone"),
+                );
+                None
+            }
+        }
     }
 
     fn measured(&mut self, block: &Block<'_>, around: &Surroundings<'_>) -> Option<Measured> {

@@ -389,6 +389,32 @@ fn probes_write_tables_with_units() {
     assert!(names(&here.join("out/probes")).is_empty());
 }
 
+/// A drop that falls: from 20 ms on its mean velocity is −g times the mean of the times.
+#[test]
+fn means_of_probes_are_told_with_their_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let text = scene("paper", "dt: 1 ms, until: 100 ms, save_every: 50 ms").replace(
+        "probe wind { velocity: [0.5, 0.52, 0.45] }",
+        "probe wind { velocity: [0.5, 0.52, 0.42], every: 1 ms, from: 20 ms, known: [0, 0, -0.5] }",
+    );
+    std::fs::write(here.join("drop.rfm"), text.replace("0.3).move", "0.01).move")).unwrap();
+    let output = run(here, &["out"]);
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(here.join("out/summary.json")).unwrap()).unwrap();
+    let [means] = &summary["probes"].as_array().unwrap()[..] else { panic!("{summary}") };
+    assert_eq!((&means["probe"], &means["samples"]), (&"wind".into(), &81.into()));
+    let mean = means["mean"][2].as_f64().unwrap();
+    assert!((mean + 9.81 * 0.06).abs() < 0.01, "{mean}");
+    let deviation = means["deviation"].as_f64().unwrap();
+    assert!((deviation - (mean + 0.5).abs() / 0.5).abs() < 0.01, "{deviation}");
+    // it grows evenly, so that the means of eight blocks lie g·10 ms apart
+    let error = means["error"][2].as_f64().unwrap();
+    assert!((error / (9.81 * 0.01 * (6.0_f64 / 8.0).sqrt()) - 1.0).abs() < 0.05, "{error}");
+    let told = output.expect(0).stdout;
+    assert!(told.contains("probe wind, mean from 0.02 s on: velocity x "), "{told}");
+}
+
 fn text_without_probes() -> String {
     let text = scene("paper", "dt: 1 ms, until: 5 ms, save_every: 5 ms");
     let lines: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("probe")).collect();

@@ -10,6 +10,7 @@ mod folder;
 mod forecast;
 mod frames;
 mod goal;
+mod means;
 pub(super) mod pictures;
 mod probe_plot;
 mod probes;
@@ -122,7 +123,8 @@ fn conclude(
     stopped: Option<Stop>,
 ) -> Result<(), Failure> {
     let Recording { frames, probes, watch, experiment, .. } = recording;
-    let summary = Summary::of(watch, experiment, simulation, frames.count(), stopped.is_none());
+    let summary =
+        Summary::of(watch, experiment, simulation, probes.means()?, (frames.count(), stopped.is_none()));
     output::write(&folder.join("summary.json"), |out| {
         serde_json::to_writer_pretty(&mut *out, &summary)?;
         writeln!(out)

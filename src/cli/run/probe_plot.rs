@@ -91,14 +91,16 @@ pub(super) fn drawn(name: &str, probe: &Probe, table: &str) -> String {
     out
 }
 
+/// The numbers of a table without its header.
+pub(super) fn rows(table: &str) -> Vec<Vec<f64>> {
+    let numbers = |line: &str| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
+    table.lines().skip(1).map(numbers).collect()
+}
+
 /// The times and the columns of a table. Energies that depend on where heights are measured from are counted from the
 /// start: their own size would flatten all others.
 fn columns(probe: &Probe, table: &str) -> (Vec<f64>, Vec<Series>) {
-    let rows: Vec<Vec<f64>> = table
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
-        .collect();
+    let rows = rows(table);
     let stride = rows.len().div_ceil(MOST_POINTS).max(1);
     let column = |k: usize| -> Vec<f64> {
         let shown = rows.iter().step_by(stride);

@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 
 use super::super::plot;
 use super::super::{Failure, output};
-use super::probe_plot::drawn;
+use super::means::Means;
+use super::probe_plot::{drawn, rows};
 use crate::cli::output::Shown;
 use crate::cli::saved::{HISTORY, OWN_TABLES};
 use rfm::experiment::{Every, probe_column, probe_of};
-use rfm::lower::Scene;
+use rfm::lower::{AskedMean, Scene};
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
 
 const FOLDER: &str = "probes";
@@ -39,6 +40,8 @@ pub(super) struct Probes {
 struct Recorder {
     name: String,
     gauge: Gauge,
+    /// The mean that the scene asks for.
+    mean: Option<AskedMean>,
     clock: Every,
     path: PathBuf,
     file: File,
@@ -66,7 +69,8 @@ impl Probes {
             };
             let gauge = gauge.map_err(|e| Failure::usage(format!("probe `{}`: {e}", probe.name)))?;
             let every = probe.every.unwrap_or(scene.run.save_every);
-            stated.push(Recorder::start(&folder, &probe.name, gauge, every, simulation, resumed)?);
+            let recorder = Recorder::start(&folder, &probe.name, gauge, every, simulation, resumed)?;
+            stated.push(Recorder { mean: probe.mean.clone(), ..recorder });
         }
         let every = scene.run.save_every / SAMPLES_PER_FRAME;
         let folder = run_folder.join(HISTORY);
@@ -106,8 +110,7 @@ impl Probes {
     /// Draws the samples as SVG and PNG beside each file.
     pub fn plot(&self) -> Result<(), Failure> {
         for recorder in &self.stated {
-            let text = std::fs::read_to_string(&recorder.path)
-                .map_err(|e| Failure::usage(format!("cannot read `{}`: {e}", recorder.path.shown())))?;
+            let text = recorder.text()?;
             for ending in ["svg", "png"] {
                 let path = recorder.path.with_extension(ending);
                 let picture = plot::end(drawn(&recorder.name, &recorder.gauge.probe, &text), &path)?;
@@ -115,6 +118,16 @@ impl Probes {
             }
         }
         Ok(())
+    }
+
+    /// The means that the scene asks for, over the samples so far.
+    pub fn means(&self) -> Result<Vec<Means>, Failure> {
+        let mut means = Vec::new();
+        for recorder in &self.stated {
+            let Some(asked) = &recorder.mean else { continue };
+            means.extend(Means::of(&recorder.name, &recorder.gauge.probe, asked, &rows(&recorder.text()?)));
+        }
+        Ok(means)
     }
 
     pub fn count(&self) -> usize {
@@ -142,7 +155,13 @@ impl Recorder {
         let file = OpenOptions::new().append(true).open(&path).map_err(|e| not_written(&path, &e))?;
         // a new probe begins with the present instant
         let clock = Every::after(every, if kept.is_empty() { -every } else { simulation.time() });
-        Ok(Self { name: name.to_string(), gauge, clock, path, file })
+        Ok(Self { name: name.to_string(), gauge, mean: None, clock, path, file })
+    }
+
+    /// The table so far.
+    fn text(&self) -> Result<String, Failure> {
+        std::fs::read_to_string(&self.path)
+            .map_err(|e| Failure::usage(format!("cannot read `{}`: {e}", self.path.shown())))
     }
 }
 

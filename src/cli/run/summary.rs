@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::findings;
 use super::frames::Frames;
+use super::means::Means;
 use super::probes::Probes;
 use super::watch::Watch;
 use crate::cli::output::Shown;
@@ -62,6 +63,9 @@ pub(super) struct Summary {
     /// Relative L2 deviation of the front on the floor from the scene's `truth`, over all saved instants.
     #[serde(skip_serializing_if = "Option::is_none")]
     front_error: Option<f64>,
+    /// The means of those probes of which the scene asks for them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    probes: Vec<Means>,
     passes: Vec<&'static str>,
     /// The lowest and the highest corner of the scene's box, m.
     #[serde(rename = "box")]
@@ -77,8 +81,8 @@ impl Summary {
         watch: &Watch,
         experiment: &Experiment,
         simulation: &Simulation,
-        frames: usize,
-        finished: bool,
+        probes: Vec<Means>,
+        (frames, finished): (usize, bool),
     ) -> Self {
         let domain = experiment.domain();
         let steps = simulation.steps();
@@ -119,6 +123,7 @@ impl Summary {
             pressure_error: deviation.pressure,
             velocity_error: deviation.velocity,
             front_error: deviation.front,
+            probes,
             passes: pass_names(simulation),
             domain: [domain.min.to_array(), domain.max.to_array()],
             threads: rayon::current_num_threads(),
@@ -171,6 +176,9 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         if let Some(error) = error {
             say!("{what}: {:.2} % from what is known (relative L2 over the saved instants)", 100.0 * error);
         }
+    }
+    for means in &summary.probes {
+        say!("{}", means.line());
     }
     let probes = match probes.count() {
         0 => String::new(),

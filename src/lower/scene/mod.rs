@@ -216,6 +216,17 @@ pub struct Probe {
     pub measured: Measured,
     /// Simulated time between samples, s; `None`: that between frames.
     pub every: Option<f64>,
+    /// The mean that is taken of the samples; `None` if it is not asked for.
+    pub mean: Option<AskedMean>,
+}
+
+/// A mean over the samples of a probe, and what it is to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AskedMean {
+    /// The time of the first sample that counts, s.
+    pub from: f64,
+    /// What is known of the first figures of each sample, in SI units; empty if nothing is.
+    pub known: Vec<f64>,
 }
 
 /// What a probe measures, with numbers in SI units.

@@ -64,10 +64,12 @@ impl<'a> Lowering<'a> {
         let container_name = container.iter().map(|c| &c.name[..]);
         let bodies: Vec<&str> = container_name.chain(obstacles.iter().map(|o| &o.name[..])).collect();
         let picture = self.picture(&block, &bodies);
-        let probes = match (&domain, &fluid) {
-            (Some((domain, ..)), Some(FluidAndMethod { fluid, .. })) => {
-                self.probes(&block, &Surroundings { domain: *domain, bodies, fluid: &fluid.name })
+        let probes = match (&domain, &fluid, &run) {
+            (Some((domain, ..)), Some(FluidAndMethod { fluid, .. }), Some(Run { until, .. })) => {
+                let around = Surroundings { domain: *domain, bodies, fluid: &fluid.name, until: *until };
+                self.probes(&block, &around)
             }
+            // what they may refer to has mistakes that were reported
             _ => Vec::new(),
         };
         let tolerance = block.setting("tolerance").and_then(|(_, value)| self.tolerance(value));

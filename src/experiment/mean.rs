@@ -1,0 +1,82 @@
+//! Means over samples that depend on each other, with their errors.
+
+/// Samples are joined to so many blocks, whose means are taken to be independent.
+const BLOCKS: usize = 8;
+
+/// Fewest samples of a block.
+const LEAST_OF_BLOCK: usize = 4;
+
+/// A mean over time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mean {
+    /// The mean.
+    pub value: f64,
+    /// Its standard error; `None` where there are too few samples to tell.
+    pub error: Option<f64>,
+    /// Number of samples.
+    pub samples: usize,
+}
+
+impl Mean {
+    /// The mean of samples that are evenly spaced in time, in their order; those that are not finite do not count. `None`
+    /// if none is left.
+    ///
+    /// What follows each other in a flow is alike, so that σ/√n is too small an error. The samples are therefore joined to
+    /// eight blocks, and the error is that of the mean of their means (H. Flyvbjerg, H. G. Petersen, J. Chem. Phys. 91, 1989). It
+    /// holds if whatever swings does so within a block.
+    pub fn of(samples: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let samples: Vec<f64> = samples.into_iter().filter(|value| value.is_finite()).collect();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        if samples.is_empty() {
+            return None;
+        }
+        let length = samples.len() / BLOCKS;
+        let error = (length >= LEAST_OF_BLOCK).then(|| {
+            let means: Vec<f64> = samples.rchunks_exact(length).take(BLOCKS).map(mean).collect();
+            let middle = mean(&means);
+            let squares: f64 = means.iter().map(|value| (value - middle).powi(2)).sum();
+            (squares / (BLOCKS * (BLOCKS - 1)) as f64).sqrt()
+        });
+        Some(Self { value: mean(&samples), error, samples: samples.len() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_pcg::Pcg64;
+    use rand_pcg::rand_core::{Rng, SeedableRng};
+
+    use super::*;
+
+    /// Samples that forget slowly: x' = a x + noise has the mean 0, and the mean of n samples the variance
+    /// σ²/(n (1 − a)²) for many samples.
+    #[test]
+    fn errors_heed_that_samples_depend_on_each_other() {
+        let (memory, count) = (0.9, 4000);
+        let (mut within, mut ratio) = (0, 0.0);
+        for seed in 0..200 {
+            let mut random = Pcg64::seed_from_u64(seed);
+            let mut uniform = || (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+            let mut x = 0.0;
+            let samples = (0..count).map(|_| {
+                x = memory * x + uniform();
+                x
+            });
+            let found = Mean::of(samples).unwrap();
+            let error = found.error.unwrap();
+            within += usize::from(found.value.abs() < error);
+            ratio += error / 200.0;
+        }
+        let expected = (1.0 / 12.0_f64).sqrt() / (1.0 - memory) / f64::from(count).sqrt();
+        // Student's distribution with seven degrees of freedom: 65 % lie within one standard error
+        assert!((110..150).contains(&within), "{within} of 200");
+        assert!((ratio / expected - 1.0).abs() < 0.1, "{ratio} {expected}");
+    }
+
+    #[test]
+    fn a_few_samples_have_a_mean_without_an_error() {
+        let found = Mean::of([1.0, f64::NAN, 3.0]).unwrap();
+        assert_eq!(found, Mean { value: 2.0, error: None, samples: 2 });
+        assert_eq!(Mean::of([f64::NAN]), None);
+    }
+}
