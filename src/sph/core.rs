@@ -52,7 +52,7 @@ pub(super) struct Core {
     /// The greatest speed of sound in the fluid as it is compressed now, m/s; 0 if the method has none that
     /// grows with compression.
     pub sound: f64,
-    /// Impulses of particles on obstacles, if a probe asks for them.
+    /// Impulses of the fluid on obstacles, if a probe asks for them.
     pub contacts: Option<Contacts>,
     /// The longest step that was allowed so far, s.
     longest_dt: f64,
@@ -148,10 +148,22 @@ impl Core {
         })?;
         std::mem::swap(position, &mut self.spare);
         self.near_is_known = false;
+        self.settle_contacts();
+        Ok(())
+    }
+
+    /// Adds up what obstacles have received since this was done last.
+    pub fn settle_contacts(&mut self) {
         if let Some(contacts) = &mut self.contacts {
             contacts.settle(self.parameters.particle_mass);
         }
-        Ok(())
+    }
+
+    /// Notes that the fluid's pressure and friction are among what obstacles receive.
+    pub fn contacts_hold_pressure(&mut self) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.with_pressure = true;
+        }
     }
 
     /// Sorts all that belongs to particles into the order of the columns: position, velocity, acceleration,

@@ -55,6 +55,7 @@ mod particles;
 mod pass;
 mod plan;
 mod probes;
+mod reaction;
 mod scales;
 mod seed;
 mod simulation;

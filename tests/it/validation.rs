@@ -3,10 +3,10 @@
 
 use std::ops::ControlFlow;
 
-use rfm::experiment::{Deviation, Deviations};
+use rfm::experiment::{Deviation, Deviations, probe_of};
 use rfm::glam::DVec3;
 use rfm::lower::Scene;
-use rfm::sph::Simulation;
+use rfm::sph::{Probe, Simulation};
 use rfm::{Engine, Experiment, Program};
 
 use crate::tool::{rfm, root};
@@ -465,6 +465,81 @@ fn water_leaves_a_tank_with_the_speed_of_a_fall() {
 fn a_channel_that_closes_on_itself_has_its_profile() {
     // eight spacings across; twenty deviate by 1.6 %
     velocity_within("poiseuille", &[("particles", 2413.0)], 0.05);
+}
+
+/// A block of water flies against a plate and slides or sticks there. Nothing else acts on it, so that the plate takes what
+/// it loses.
+#[test]
+fn an_obstacle_takes_the_momentum_that_the_fluid_loses() {
+    for (method, fluid, walls) in [
+        ("wcsph", "", "free_slip"),
+        ("dfsph", "", "free_slip"),
+        ("wcsph", ", viscosity: 5", "no_slip"),
+        ("dfsph", ", viscosity: 5", "no_slip"),
+        ("paper", ", viscosity: 5", "free_slip"),
+    ] {
+        let text = format!(
+            "rfm 1
+solid plate = box([-1, -5, -5], [0.1, 5, 5])
+scene hit {{
+  box {{ min: [-0.5, -1, -1], max: [2, 1, 1] }}
+  obstacle {{ solid: plate, restitution: 0.5 }}
+  walls: {walls}
+  fluid water {{
+    shape: box([0.15, -0.1, -0.1], [0.35, 0.1, 0.1]), density: 1000, spacing: 0.025,
+    velocity: [-3 m/s, 1 m/s, 0]{fluid}
+  }}
+  gravity: [0, 0, 0]
+  method: {method}
+  run {{ until: 0.1 s }}
+}}"
+        );
+        let program = Program::from_source("hit.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+        let experiment = Experiment::new(&program, "hit", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+        let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
+        let momentum = |simulation: &Simulation| {
+            let velocity = &simulation.particles().velocity;
+            let sum = [&velocity.x, &velocity.y, &velocity.z].map(|column| column.iter().sum::<f64>());
+            simulation.parameters().particle_mass * DVec3::from_array(sum)
+        };
+        let start = momentum(&simulation);
+        let mut gauge = simulation.gauge(Probe::Force { obstacle: 0, about: DVec3::ZERO }).unwrap();
+        simulation.sample(&mut gauge);
+        let mut taken = DVec3::ZERO;
+        while simulation.time() < 0.1 {
+            let before = simulation.time();
+            simulation.step().unwrap_or_else(|e| panic!("{method}: {e}"));
+            let force = simulation.sample(&mut gauge);
+            taken += (simulation.time() - before) * DVec3::new(force[0], force[1], force[2]);
+        }
+        let lost = start - momentum(&simulation);
+        println!("{method} {walls}: taken {taken}, lost {lost}");
+        assert!(lost.length() > 10.0, "{method}: {lost}");
+        // wcsph changes velocities by the mean of the forces at both ends of a step, and the force is told at its end
+        assert!((taken - lost).length() < 0.005 * lost.length(), "{method} {walls}: {taken} {lost}");
+    }
+}
+
+/// A jet that spreads on a plate, and the lift of a body under water: means of forces, as the scenes state them.
+#[test]
+fn forces_on_bodies_are_those_of_momentum_and_of_archimedes() {
+    for (name, params, within) in [("jet", ("across", 5.0), 0.06), ("buoyancy", ("layers", 10.0), 0.04)] {
+        let program = program(name, &[params]);
+        let scene = &program.module().scenes[0];
+        let probe = &scene.probes[0];
+        let Some(asked) = &probe.mean else { panic!("{name}: no mean is asked for") };
+        let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap();
+        let mut simulation = experiment.start().unwrap().simulation;
+        let mut gauge = simulation.gauge(probe_of(&probe.measured)).unwrap();
+        simulation.advance(asked.from, |_| ControlFlow::Continue(())).unwrap();
+        simulation.sample(&mut gauge);
+        simulation.advance(scene.run.until, |_| ControlFlow::Continue(())).unwrap();
+        // the time since the last sample is that of the mean
+        let force = simulation.sample(&mut gauge);
+        let [force, known] = [&force[..], &asked.known].map(|v| DVec3::new(v[0], v[1], v[2]));
+        println!("{name}: {force}, known {known}");
+        assert!((force - known).length() < within * known.length(), "{name}: {force} {known}");
+    }
 }
 
 #[test]

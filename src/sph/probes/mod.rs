@@ -54,10 +54,10 @@ pub enum Probe {
     },
     /// Force of the fluid on an obstacle, N, and its torque about a point, N·m.
     ///
-    /// The force consists of the fluid's pressure on the obstacle's faces, the friction where the fluid
-    /// sticks to walls, and the contacts of particles, averaged over the time since the last sample. With the
-    /// paper's method there are contacts only. `dfsph` averages pressures over its relaxation time, so the
-    /// force of an impact appears that much later.
+    /// It is the momentum that the obstacle has taken from particles since the last sample, by pressure, friction and
+    /// contacts, over that time; with the paper's method there are contacts only. At the start, and for `wcsph` with
+    /// differences of pressure, whose forces do not cancel in pairs, pressure and friction are instead those of the particles
+    /// in front of the obstacle's faces.
     Force {
         /// Number of the obstacle, from 0.
         obstacle: usize,
@@ -149,10 +149,15 @@ impl Gauge {
                 vec![kinetic, potential, elastic, kinetic + potential + elastic]
             }
             Probe::Force { obstacle, about } => {
-                let mut force = force::on_surface(core, obstacle, about);
                 let (time, total) =
                     (core.time, core.contacts.as_ref().map_or([0.0; 6], |c| c.total(obstacle)));
                 let passed = time - self.last[0];
+                let is_complete = core.contacts.as_ref().is_some_and(|c| c.with_pressure);
+                let mut force = if is_complete && passed > 0.0 {
+                    [0.0; 6]
+                } else {
+                    force::on_surface(core, obstacle, about)
+                };
                 if passed > 0.0 {
                     let impulse = force::about(std::array::from_fn(|k| total[k] - self.last[1 + k]), about);
                     force.iter_mut().zip(impulse).for_each(|(force, impulse)| *force += impulse / passed);

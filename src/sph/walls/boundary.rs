@@ -268,7 +268,7 @@ impl Boundary {
     }
 
     /// What the walls of the box take of the kernel of a particle.
-    fn of_box<F: Friction>(&self, wall: &Wall, p: DVec3) -> Coverage<F> {
+    pub(super) fn of_box<F: Friction>(&self, wall: &Wall, p: DVec3) -> Coverage<F> {
         let mut whole = Coverage::<F>::default();
         for axis in 0..3 {
             for (distance, side) in
@@ -289,7 +289,13 @@ impl Boundary {
     }
 
     /// Adds what an obstacle takes of the kernel of a particle by its faces.
-    fn with_faces<F: Friction>(&self, wall: &Wall, p: DVec3, whole: Coverage<F>, k: usize) -> Coverage<F> {
+    pub(super) fn with_faces<F: Friction>(
+        &self,
+        wall: &Wall,
+        p: DVec3,
+        whole: Coverage<F>,
+        k: usize,
+    ) -> Coverage<F> {
         let (obstacle, field) = (&self.obstacles[k], self.field(k));
         let mut faces = Faces::new();
         field.faces(p, wall.h, &mut faces);

@@ -57,6 +57,9 @@ pub(in crate::sph) trait Friction: Copy + Default {
     /// The acceleration by viscosity, m/s², of a fluid with a velocity, m/s, from the acceleration by the
     /// fluid alone and the kinematic viscosity, m²/s.
     fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3;
+
+    /// The part of it that walls give to which the fluid sticks.
+    fn by_walls(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3;
 }
 
 impl Friction for () {
@@ -72,6 +75,10 @@ impl Friction for () {
 
     fn complete(&self, drag: DVec3, _: DVec3, _: f64) -> DVec3 {
         drag
+    }
+
+    fn by_walls(&self, _: DVec3, _: DVec3, _: f64) -> DVec3 {
+        DVec3::ZERO
     }
 }
 
@@ -120,9 +127,19 @@ impl Friction for WallDrag {
     }
 
     fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3 {
-        let friction = drag / (1.0 - self.slippery).max(LEAST_FREE)
-            - 2.0 * viscosity * (self.tensor * velocity - self.haul);
+        let friction = self.mirrored(drag) - 2.0 * viscosity * (self.tensor * velocity - self.haul);
         friction / (1.0 - self.beyond).max(LEAST_FREE)
+    }
+
+    fn by_walls(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3 {
+        self.complete(drag, velocity, viscosity) - self.mirrored(drag)
+    }
+}
+
+impl WallDrag {
+    /// The acceleration by the fluid, which goes on behind walls along which it slips.
+    fn mirrored(&self, drag: DVec3) -> DVec3 {
+        drag / (1.0 - self.slippery).max(LEAST_FREE)
     }
 }
 

@@ -13,6 +13,7 @@ mod coverage;
 mod friction;
 mod kernel;
 mod motion;
+mod shares;
 mod symmetric;
 mod volume;
 mod way_out;

@@ -9,6 +9,7 @@ use crate::sph::{
     pairs::{PairPass, Real},
     params::Parameters,
     particles::Vectors,
+    reaction::Reaction,
     walls::Friction,
 };
 
@@ -209,6 +210,8 @@ pub(super) struct Drag<'a, const LAMINAR: bool> {
     /// The factor α·h/2·c of the artificial viscosity, m²/s.
     pub artificial: f64,
     pub gravity: DVec3,
+    /// Where what walls do is noted, if it is to be.
+    pub reaction: Option<Reaction<'a>>,
 }
 
 impl<const LAMINAR: bool> PairPass<3, 3, 3> for Drag<'_, LAMINAR> {
@@ -239,7 +242,11 @@ impl<const LAMINAR: bool> PairPass<3, 3, 3> for Drag<'_, LAMINAR> {
         let along = mass_steepness / rest_density * DVec3::from_array(sums);
         let mut drag = 10.0 * self.kinematic * along;
         if LAMINAR && let Some((wall, _)) = self.walls.near(i) {
-            drag = wall.friction.complete(drag, self.velocity.get(i), self.kinematic);
+            let velocity = self.velocity.get(i);
+            if let Some(reaction) = &self.reaction {
+                reaction.add(i, wall.friction.by_walls(drag, velocity, self.kinematic), 0.0);
+            }
+            drag = wall.friction.complete(drag, velocity, self.kinematic);
         }
         (drag + self.artificial * along + self.gravity).to_array()
     }

@@ -58,6 +58,7 @@ use crate::sph::{
     error::StepError,
     params::Parameters,
     particles::{Particles, Vectors},
+    reaction::Reaction,
 };
 
 /// The relaxation time, in steps, where the fastest particle moves as far in a step as it may.
@@ -110,7 +111,8 @@ pub struct DivergenceFree {
 impl Scheme for DivergenceFree {
     fn step(&mut self, core: &mut Core, most: f64) -> Result<f64, StepError> {
         let dt = core.next_dt(most)?;
-        self.find_other_accelerations(core);
+        core.contacts_hold_pressure();
+        self.find_other_accelerations(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);
         self.find_displacements(core, dt);
@@ -206,7 +208,7 @@ impl DivergenceFree {
     }
 
     /// Finds the accelerations by gravity, viscosity and surface tension.
-    fn find_other_accelerations(&mut self, core: &mut Core) {
+    fn find_other_accelerations(&mut self, core: &mut Core, dt: f64) {
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let g = core.parameters.gravity;
         let Vectors { x, y, z } = &mut acceleration;
@@ -220,12 +222,14 @@ impl DivergenceFree {
         if kinematic > 0.0 || artificial > 0.0 {
             let (constants, velocity) = (Constants::of(parameters), &core.particles.velocity);
             let fields = [&velocity.x[..], &velocity.y, &velocity.z];
-            let (out, walls) = ([&mut x[..], y, z], &self.walls);
+            let (out, walls, reaction) = ([&mut x[..], y, z], &self.walls, Reaction::of(core, dt));
             if kinematic > 0.0 {
-                let pass = Drag::<true> { constants, walls, velocity, kinematic, artificial, gravity: g };
+                let pass =
+                    Drag::<true> { constants, walls, velocity, kinematic, artificial, gravity: g, reaction };
                 core.sum(&pass, fields, out);
             } else {
-                let pass = Drag::<false> { constants, walls, velocity, kinematic, artificial, gravity: g };
+                let pass =
+                    Drag::<false> { constants, walls, velocity, kinematic, artificial, gravity: g, reaction };
                 core.sum(&pass, fields, out);
             }
         } else {
@@ -260,6 +264,9 @@ impl DivergenceFree {
             most_iterations: self.numbers.most_iterations,
         };
         self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal);
+        if let Some(reaction) = Reaction::of(core, dt) {
+            self.forces.note_walls(reaction, &self.walls, rest);
+        }
         for ((free, rate), debt) in self.free.iter().zip(&self.forces.rate).zip(&mut self.debt) {
             let left = free + dt * rate;
             *debt = (*debt + dt * (left - *debt / relaxation)).max(0.0);

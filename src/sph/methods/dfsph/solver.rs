@@ -8,6 +8,7 @@ use crate::sph::{
     core::{CHUNK, Core},
     params::Parameters,
     particles::Vectors,
+    reaction::Reaction,
 };
 
 /// Factor by which walls and disorder make the system stiffer than the even fluid of [`stiffness`].
@@ -217,6 +218,17 @@ impl Solver {
         };
         let Vectors { x, y, z } = velocity;
         core.sum(&pass, [&x[..], y, z], [&mut self.rate]);
+    }
+
+    /// Notes what walls have of a(s), where it changes velocities of a fluid with this rest density, kg/m³: a(s) = M·(a of the
+    /// pairs − 2ρ₀s·∇λ).
+    pub fn note_walls(&self, reaction: Reaction<'_>, walls: &Walls, rest_density: f64) {
+        for (i, wall, completion) in walls.found() {
+            let i = *i as usize;
+            let (push, factor) = (self.push.get(i), -2.0 * rest_density * self.s[i]);
+            let of_pairs = completion.inverse() * push - factor * wall.gradient;
+            reaction.add(i, push - of_pairs, factor);
+        }
     }
 
     /// Memory of this solver, bytes.

@@ -63,6 +63,11 @@ impl Walls {
         }
     }
 
+    /// The particles near walls: the index of each, what walls take of its kernel, and its M.
+    pub fn found(&self) -> &[(u32, WallsNear, DMat3)] {
+        &self.found
+    }
+
     /// Memory of this table, bytes.
     pub fn bytes(&self) -> usize {
         4 * self.place.capacity() + size_of::<(u32, WallsNear, DMat3)>() * self.found.capacity()

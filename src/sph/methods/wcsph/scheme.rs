@@ -61,6 +61,7 @@ use crate::sph::{
     pairs::{PairPass, Real},
     params::Parameters,
     particles::Vectors,
+    reaction::Reaction,
     walls::{Friction, WallDrag},
 };
 
@@ -260,7 +261,7 @@ impl Weakly {
         let [mut places, mut drift] = std::mem::take(&mut self.found);
         std::mem::swap(&mut self.rate, &mut self.earlier_rate);
         let out = [&mut x[..], y, z, &mut self.rate, &mut places, &mut drift, &mut self.filled, cx, cy, cz];
-        let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess);
+        let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, dt);
         match (rates.laminar > 0.0, rates.artificial > 0.0, rates.even) {
             (true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
             (true, true, false) => core.sum(&Pairs::<true, true, false>(rates), fields, out),
@@ -274,6 +275,10 @@ impl Weakly {
         core.acceleration = acceleration;
         core.particles.pressure = pressure;
         core.spare = predicted;
+        core.settle_contacts();
+        if dt > 0.0 && self.numbers.gradients == Gradients::Pairs {
+            core.contacts_hold_pressure();
+        }
         if dt > 0.0 {
             self.correct_densities(core, &places, &drift, dt);
         }
@@ -364,6 +369,8 @@ struct Rates<'a> {
     lattice: f64,
     /// Whether particles are kept even, see [`is_kept_even`].
     even: bool,
+    /// Where what walls do is noted, if it is to be.
+    reaction: Option<Reaction<'a>>,
 }
 
 impl<'a> Rates<'a> {
@@ -373,6 +380,7 @@ impl<'a> Rates<'a> {
         velocity: &'a Vectors,
         pressure: &'a [f64],
         excess: &'a [f64],
+        dt: f64,
     ) -> Self {
         let parameters = &core.parameters;
         let kernel = Wendland::new(parameters.support_radius);
@@ -398,6 +406,8 @@ impl<'a> Rates<'a> {
             return_rate: return_rate(core),
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
             even: is_kept_even(numbers),
+            // differences of pressure do not cancel, so that a particle's neighbours take part in what remains
+            reaction: Reaction::of(core, dt).filter(|_| numbers.gradients == Gradients::Pairs),
         }
     }
 }
@@ -475,10 +485,12 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let mut spread = steepness * squares / 3.0;
         let mut compression = -steepness * departing;
         let mut drag = 10.0 * laminar * steepness * DVec3::new(ux, uy, uz);
+        let mut rubbing = DVec3::ZERO;
         let velocity = rates.velocity.get(i);
         // a fluid without viscosity feels no friction, and most have none
         let wall = if LAMINAR {
             rates.core.coverage::<WallDrag>(i).map(|wall| {
+                rubbing = wall.friction.by_walls(drag, velocity, laminar);
                 drag = wall.friction.complete(drag, velocity, laminar);
                 wall.without_friction()
             })
@@ -490,6 +502,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let mut places = by_weight;
         // how fast the wall approaches, in units of the kernel that it takes
         let mut wall_rate = 0.0;
+        let by_pairs = push - 2.0 * rates.pressure[i] * crowding;
         if let Some(wall) = &wall {
             crowding += wall.gradient;
             spread += wall.share();
@@ -509,6 +522,9 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         if let Some(wall) = &wall {
             let balanced = if rates.differences { 1.0 } else { depth };
             push = push.lerp(wall.completion() * push, balanced);
+            if let Some(reaction) = &rates.reaction {
+                reaction.add(i, (push - by_pairs) / density + rubbing, -2.0 * rates.pressure[i] / density);
+            }
         }
         let acceleration = mean * (push / density + drag) + parameters.gravity;
         let crowding = depth * crowding;

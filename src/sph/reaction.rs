@@ -1,0 +1,31 @@
+//! What walls do to particles in a step, noted for the obstacles that feel it.
+
+use glam::DVec3;
+
+use super::{contacts::Contacts, core::Core};
+
+/// The notes of a step. Forces of particles on each other cancel, so with what walls add to these, and with contacts, the
+/// momentum of the fluid changes by gravity and by what is noted alone.
+#[derive(Clone, Copy)]
+pub struct Reaction<'a> {
+    core: &'a Core,
+    contacts: &'a Contacts,
+    /// Length of the step, s.
+    dt: f64,
+}
+
+impl<'a> Reaction<'a> {
+    /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces, or for the start of a run.
+    pub fn of(core: &'a Core, dt: f64) -> Option<Self> {
+        let contacts = core.contacts.as_ref().filter(|_| dt > 0.0)?;
+        Some(Self { core, contacts, dt })
+    }
+
+    /// Notes that walls accelerate a particle, m/s², by a factor times ∇λ, m²/s², and otherwise.
+    pub fn add(&self, i: usize, acceleration: DVec3, factor: f64) {
+        let at = self.core.particles.position.get(i);
+        self.core.boundary.divide(self.core.wall(), at, acceleration, factor, |obstacle, share| {
+            self.contacts.add(i, obstacle, self.dt * share, at);
+        });
+    }
+}
