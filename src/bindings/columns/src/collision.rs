@@ -10,7 +10,10 @@ use rfm::glam::DVec3;
 use rfm::solid::Bounds;
 use rfm::sph::{self, Contact, Undefined, push_out};
 
-use crate::memory::{BLOCK, Vectors};
+use crate::memory::Vectors;
+
+/// Particles that are looked at together.
+pub const PARTICLES: usize = 512;
 
 /// How a solid answers to what hits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -244,10 +247,10 @@ impl Particles {
         let known = obstacle.known();
         let walls = &*known.walls;
         let mut found = Found::default();
-        let mut places = [[0.0; BLOCK]; 3];
-        let mut omega = [0.0; BLOCK];
-        for start in part.clone().step_by(BLOCK) {
-            let block = start..(start + BLOCK).min(part.end);
+        let mut places = [[0.0; PARTICLES]; 3];
+        let mut omega = [0.0; PARTICLES];
+        for start in part.clone().step_by(PARTICLES) {
+            let block = start..(start + PARTICLES).min(part.end);
             if !self.gather(&block, known.bounds.as_ref(), &mut places) {
                 continue;
             }
@@ -271,7 +274,12 @@ impl Particles {
     }
 
     /// Copies the places of a block. False if all of them are outside a box, and all numbers finite.
-    fn gather(&self, block: &Range<usize>, bounds: Option<&Aabb>, places: &mut [[f64; BLOCK]; 3]) -> bool {
+    fn gather(
+        &self,
+        block: &Range<usize>,
+        bounds: Option<&Aabb>,
+        places: &mut [[f64; PARTICLES]; 3],
+    ) -> bool {
         let [x, y, z] = places;
         for (k, i) in block.clone().enumerate() {
             [x[k], y[k], z[k]] = self.0.get(0, i);
