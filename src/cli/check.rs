@@ -11,7 +11,7 @@ use super::failure::{Failure, complain, note, warn};
 use super::findings::{self, Message, message};
 use super::mesh::hidden;
 use super::{choose, input, lints, output, section};
-use crate::cli::output::Shown;
+use crate::cli::output::{Shown, significant};
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
@@ -446,10 +446,10 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
             say!("    bounds      none found");
         }
         if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-            say!("    volume      {} ± {error:.1e}", significant(volume));
+            say!("    volume      {} ± {error:.1e}", significant(volume, 6));
         }
         if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
-            say!("    area        {} ± {error:.1e}", significant(area));
+            say!("    area        {} ± {error:.1e}", significant(area, 6));
         }
         if let (Some(components), Some(coarser), false) =
             (solid.components, solid.components_coarser, solid.empty)
@@ -478,14 +478,6 @@ fn print(file: &str, program: &Program, facts: &[Facts]) {
         let around =
             if obstacles.is_empty() { String::new() } else { format!(" around {}", obstacles.join(", ")) };
         say!("  scene {}: {particles} of {}{around}, {} s", scene.name, scene.fluid.name, scene.run.until);
-    }
-}
-
-/// A figure with six digits: in full where that is readable, otherwise with an exponent.
-fn significant(figure: f64) -> String {
-    match figure.abs() {
-        size if (1e-2..1e7).contains(&size) || size == 0.0 => format!("{figure:.6}"),
-        _ => format!("{figure:.5e}"),
     }
 }
 
