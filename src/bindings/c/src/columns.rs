@@ -340,7 +340,7 @@ pub unsafe extern "C" fn rfm_collide(
         // SAFETY: the caller promises so many particles
         let mut particles = Particles::new(unsafe { Vectors::new(count, [positions, velocities]) });
         let mut counts = Collisions::default();
-        // a block at a time, so that little is remembered
+        // a part at a time, so that little is remembered
         for start in (0..count).step_by(PARTICLES) {
             let found = particles.look(start..(start + PARTICLES).min(count), &this.obstacle, &bounce);
             particles.put(&found);

@@ -12,8 +12,12 @@ use rfm::sph::{self, Contact, Undefined, push_out};
 
 use crate::memory::Vectors;
 
-/// Particles that are looked at together.
-pub const PARTICLES: usize = 512;
+/// Particles whose ω is found together.
+const BLOCK: usize = 512;
+
+/// Particles of a part, where what is remembered of those that are hit should be little. All of them together are asked
+/// whether they are outside; a solid of many parts answers a few hundred in the time of one.
+pub const PARTICLES: usize = 16 * BLOCK;
 
 /// How a solid answers to what hits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -247,17 +251,16 @@ impl Particles {
         let known = obstacle.known();
         let walls = &*known.walls;
         let mut found = Found::default();
-        let mut places = [[0.0; PARTICLES]; 3];
-        let mut omega = [0.0; PARTICLES];
-        for start in part.clone().step_by(PARTICLES) {
-            let block = start..(start + PARTICLES).min(part.end);
+        let mut places = [[0.0; BLOCK]; 3];
+        let mut omega = [0.0; BLOCK];
+        for start in part.clone().step_by(BLOCK) {
+            let block = start..(start + BLOCK).min(part.end);
             if !self.gather(&block, known.bounds.as_ref(), &mut places) {
                 continue;
             }
             let [x, y, z] = places.each_ref().map(|column| &column[..block.len()]);
             // most particles are outside, and together they cost a fraction of what each costs alone
             Field::omega_many(walls, Points::new(x, y, z), &mut omega[..block.len()]);
-            let before = found.moved.len();
             for (k, i) in block.clone().enumerate() {
                 let mut velocity = self.velocity(i);
                 if omega[k] < 0.0 && velocity.is_finite() {
@@ -267,19 +270,14 @@ impl Particles {
                 let collision = collide(&obstacle.solid, walls, bounce, &mut position, &mut velocity);
                 found.add(i, collision, position, velocity);
             }
-            self.confirm(&mut found, before, &obstacle.solid, bounce);
         }
+        self.confirm(&mut found, &obstacle.solid, bounce);
         found.counts.hits = found.moved.len();
         found
     }
 
     /// Copies the places of a block. False if all of them are outside a box, and all numbers finite.
-    fn gather(
-        &self,
-        block: &Range<usize>,
-        bounds: Option<&Aabb>,
-        places: &mut [[f64; PARTICLES]; 3],
-    ) -> bool {
+    fn gather(&self, block: &Range<usize>, bounds: Option<&Aabb>, places: &mut [[f64; BLOCK]; 3]) -> bool {
         let [x, y, z] = places;
         for (k, i) in block.clone().enumerate() {
             [x[k], y[k], z[k]] = self.0.get(0, i);
@@ -292,8 +290,8 @@ impl Particles {
     }
 
     /// Sees to it that particles that were put outside are outside by ω, too, which has other rounding errors.
-    fn confirm(&self, found: &mut Found, before: usize, solid: &Solid, bounce: &Bounce) {
-        let moved = found.moved.split_off(before);
+    fn confirm(&self, found: &mut Found, solid: &Solid, bounce: &Bounce) {
+        let moved = std::mem::take(&mut found.moved);
         if moved.is_empty() {
             return;
         }
