@@ -322,6 +322,19 @@ impl<'t> Slip<'t> {
         is_vector.then(|| self.unexpected().help(format!("a vector has square brackets: write `[{inner}]`")))
     }
 
+    /// `param a = 1 0..2`
+    fn range_without_in(&self) -> Option<Diagnostic> {
+        let before = self.on_its_line().trim_end();
+        let is_param = before.trim_start().starts_with("param ") && before.contains('=');
+        let line = self.text[self.at..].lines().next().unwrap_or_default();
+        let range = line.split(['"', '#']).next().unwrap_or_default().trim();
+        let is_range = self.found.starts_with(|c: char| c.is_ascii_digit()) && range.contains("..");
+        (is_param && is_range).then(|| {
+            self.unexpected()
+                .help(format!("a range follows `in`: write `{} in {range}`", before.trim_start()))
+        })
+    }
+
     /// `sphere { <0, 0, 0>, 1 }`
     fn arguments_in_braces(&self) -> Option<Diagnostic> {
         let called = last_word(self.before());
@@ -339,8 +352,8 @@ impl<'t> Slip<'t> {
     /// A character that has no meaning where it stands.
     fn mark(&self) -> Option<Diagnostic> {
         let (before, after) = (self.before(), self.after());
-        if let Some(vector) = self.vector_in_brackets() {
-            return Some(vector);
+        if let Some(known) = self.vector_in_brackets().or_else(|| self.range_without_in()) {
+            return Some(known);
         }
         let help = match self.found {
             "*" if before.ends_with('*') => "a power is written `x^2`",

@@ -349,6 +349,20 @@ fn meshes_read_back_as_reported() {
 }
 
 #[test]
+fn commands_of_other_programs_lead_to_those_that_do_the_same() {
+    let told = |command: &str| rfm(root(), &[command, PAWN]).expect(2).stderr;
+    for (command, does) in [("slice", "check FILE --slice z=0.5"), ("simulate", "run FILE"), ("new", "init")]
+    {
+        let text = told(command);
+        assert!(text.contains(&format!("`rfm {does}` does that")), "{text}");
+        // what is told is a command
+        let name = does.split(' ').next().unwrap();
+        rfm(root(), &[name, "--help"]).expect(0);
+    }
+    assert!(!told("xyzzy").contains("does that"));
+}
+
+#[test]
 fn figures_of_a_small_solid_have_their_digits() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("small.rfm"), "rfm 1\nsolid small = sphere(1 mm)\n").unwrap();

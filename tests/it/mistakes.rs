@@ -189,6 +189,8 @@ const VALUES: &[&str] = &[
     "solid a = sphere(1)\nsolid s = a + box()",
     "solid s = sphere(1)*box()",
     "solid s = sphere(1)/box()",
+    "param k = 3.5 1..5  \"a size\"\nsolid s = sphere(k)",
+    "param k = 8 mm 1 mm .. 1 cm\nsolid s = sphere(k)",
     "param d = 8 mm in 1 cm .. 2 cm\nsolid s = sphere(d)",
     "param a = 45 deg in 90 deg .. 0 deg\nsolid s = box().rotate_z(a)",
     "",
