@@ -1,6 +1,7 @@
 // A solid that moves, in C++17, with handles that free themselves and errors that are thrown.
 
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <memory>
 #include <stdexcept>
@@ -54,9 +55,9 @@ int main(int count, char **arguments) {
         // two threads ask the same solid, each at its own time
         std::vector<double> heights(2);
         std::vector<std::thread> threads;
-        for (int k = 0; k < 2; k++) {
+        for (std::size_t k = 0; k < 2; k++) {
             threads.emplace_back([&, k] {
-                Solid then = at(gate, 2.0 * k);
+                Solid then = at(gate, 2.0 * static_cast<double>(k));
                 double low[3], high[3];
                 if (rfm_bounds(then.get(), low, high) == RFM_WITHIN) heights[k] = low[2];
             });
@@ -65,13 +66,13 @@ int main(int count, char **arguments) {
         std::printf("the gate %s\n", heights[1] > heights[0] + 1e-6 ? "has risen" : "stands still");
         // single precision, one column after the other
         std::vector<float> x(100, 0.0f), y(100, 0.0f), z(100), omega(100);
-        for (int i = 0; i < 100; i++) z[i] = 0.01f * static_cast<float>(i);
+        for (std::size_t i = 0; i < 100; i++) z[i] = 0.01f * static_cast<float>(i);
         RfmError *error = nullptr;
         RfmStatus status = rfm_omega_many_f32(gate.get(), 100, {x.data(), y.data(), z.data(), sizeof(float)},
                                               {omega.data(), sizeof(float)}, &error);
         check(status, error);
         int same = 0;
-        for (int i = 0; i < 100; i++) same += omega[i] == rfm_omega_f32(gate.get(), x[i], y[i], z[i]);
+        for (std::size_t i = 0; i < 100; i++) same += omega[i] == rfm_omega_f32(gate.get(), x[i], y[i], z[i]);
         std::printf("%d of 100 values have the bits of single points\n", same);
         load("no/such.rfm");
     } catch (const std::runtime_error &error) {

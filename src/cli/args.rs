@@ -229,7 +229,13 @@ pub(super) struct Mesh {
     #[arg(short, long, value_name = "FILE", help = output_help())]
     pub output: Option<PathBuf>,
     /// Cells along the longest side
-    #[arg(long, value_name = "N", default_value_t = 128, conflicts_with = "cell")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 128,
+        conflicts_with = "cell",
+        allow_negative_numbers = true
+    )]
     pub cells: usize,
     /// Size of a cell instead of their number, in metres or with a unit; with --fluid half the radius by
     /// default
@@ -375,7 +381,7 @@ pub(super) struct Run {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Stop after this many steps, counted from the run's beginning
-    #[arg(long, value_name = "N", conflicts_with = "until")]
+    #[arg(long, value_name = "N", conflicts_with = "until", allow_negative_numbers = true)]
     pub steps: Option<u64>,
     /// Stop at this simulated time, in seconds or with a unit: 500ms
     #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true)]

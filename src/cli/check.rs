@@ -11,7 +11,7 @@ use super::failure::{Failure, complain, note, warn};
 use super::findings::{self, Message, message};
 use super::mesh::hidden;
 use super::{choose, input, lints, output, section};
-use crate::cli::output::Shown;
+use crate::cli::output::{Shown, significant};
 use rfm::diagnostic::{Code, Diagnostic, Diagnostics};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
@@ -458,10 +458,10 @@ fn print_solid(solid: &Facts) {
         say!("    bounds      none found");
     }
     if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-        say!("    volume      {} ± {error:.1e}", significant(volume));
+        say!("    volume      {} ± {error:.1e}", significant(volume, 6));
     }
     if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
-        say!("    area        {} ± {error:.1e}", significant(area));
+        say!("    area        {} ± {error:.1e}", significant(area, 6));
     }
     if let (Some(components), Some(coarser), false) =
         (solid.components, solid.components_coarser, solid.empty)
@@ -479,14 +479,6 @@ fn print_solid(solid: &Facts) {
     }
     if let (Some(name), Some(bound), Some(tolerance)) = (&solid.program, solid.error_bound, solid.tolerance) {
         say!("    program     {name}: ω to {bound:.1e}, tolerance {tolerance:e}");
-    }
-}
-
-/// A figure with six digits: in full where that is readable, otherwise with an exponent.
-fn significant(figure: f64) -> String {
-    match figure.abs() {
-        size if (1e-2..1e7).contains(&size) || size == 0.0 => format!("{figure:.6}"),
-        _ => format!("{figure:.5e}"),
     }
 }
 

@@ -42,6 +42,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Parser;
+use clap::error::{ContextKind, ContextValue};
 use rfm::diagnostic::{is_hidden, printable};
 
 use failure::{Failure, note};
@@ -60,11 +61,34 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             }
             // clap reports help and version as errors; printing them fails only if nobody reads
             let _ = error.print();
+            if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand)
+                && let Some(command) = elsewhere(word)
+            {
+                note(format!("`rfm {command}` does that"));
+            }
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
     outlive_size_limits();
     command(arguments).map_or_else(Failure::report, |()| ExitCode::SUCCESS)
+}
+
+/// The command that does what one of this name does in other programs; `None` if the name is not known from there.
+fn elsewhere(word: &str) -> Option<&'static str> {
+    Some(match word {
+        "slice" | "section" | "plot" | "cut" => "check FILE --slice z=0.5",
+        "info" | "list" | "lint" | "validate" | "volume" => "check FILE",
+        "stl" | "obj" | "export" | "convert" | "triangulate" | "tessellate" => "mesh FILE -o part.stl",
+        "simulate" | "sim" | "solve" | "start" | "resume" | "continue" => "run FILE",
+        "show" | "open" | "display" | "preview" | "serve" => "view FILE",
+        "picture" | "image" | "film" | "animate" | "movie" | "draw" => "render FILE",
+        "compile" | "generate" | "emit" | "codegen" => "build FILE -o part.c",
+        "evaluate" | "sample" | "value" => "eval FILE --at 0,0,0",
+        "sweep" => "run FILE --sweep NAME=1..2:5",
+        "new" | "create" => "init",
+        "format" => "fmt FILE",
+        _ => return None,
+    })
 }
 
 /// Lets a write beyond the limit for the size of a file fail as one to a full disk does. Without this the system ends the

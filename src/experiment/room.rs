@@ -54,8 +54,20 @@ fn without_empty_sides(field: &dyn Field, whole: Aabb) -> Aabb {
 }
 
 impl Experiment {
-    /// The box in which the shape of the fluid lies, m.
+    /// The box in which the shape of the fluid lies, m. No particle of the stated size may be larger than what of it lies
+    /// in the domain.
     pub(super) fn reach(&self) -> Result<Aabb, Error> {
+        let bounds = self.extent()?;
+        let size = bounds.intersection(&self.scene.domain).size();
+        let is_stated = self.scene.fluid.size_span.is_some();
+        if is_stated && self.parameters.spacing() > size.max_element() {
+            return Err(refuse(&self.program, self.too_coarse()));
+        }
+        Ok(bounds)
+    }
+
+    /// The box in which the shape of the fluid lies, m, whatever the size of its particles.
+    fn extent(&self) -> Result<Aabb, Error> {
         let (fluid, domain) = (&self.scene.fluid, self.scene.domain);
         let no_room = |message: String| {
             let diagnostic = Diagnostic::error(Code::SCENE_NO_ROOM, fluid.shape_span, message);
@@ -142,7 +154,7 @@ impl Experiment {
 
     /// The size of the box around the fluid's shape within the domain, m.
     fn size_of_shape(&self) -> DVec3 {
-        self.reach().map_or(DVec3::ZERO, |bounds| bounds.intersection(&self.scene.domain).size())
+        self.extent().map_or(DVec3::ZERO, |bounds| bounds.intersection(&self.scene.domain).size())
     }
 
     /// The message for a shape in which not one particle fits.

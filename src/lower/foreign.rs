@@ -2,7 +2,7 @@
 
 use super::lowering::Lowering;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::syntax::ast::{Argument, Expr, Name};
+use crate::syntax::ast::{Argument, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
 impl Lowering<'_> {
@@ -13,6 +13,31 @@ impl Lowering<'_> {
         let Words { what, help } = function(&name.text, &written.unwrap_or_default())?;
         let message = format!("unknown function or shape `{}`", name.text);
         Some(Diagnostic::error(Code::UNKNOWN_NAME, name.span, message).at(what).help(help))
+    }
+
+    /// The message for `math.sqrt(x)` and the like; `None` if something here has the name of the module.
+    pub fn function_of_a_module(
+        &self,
+        receiver: &Expr,
+        function: &Name,
+        arguments: &[Argument],
+    ) -> Option<Diagnostic> {
+        let ExprKind::Name(module) = &receiver.kind else { return None };
+        let is_local = self.scope.locals.iter().any(|local| local.name == *module);
+        let is_known = is_local || self.names.candidates(self.scope.source, false).contains(module);
+        if is_known || !MODULES.contains(&module.as_str()) {
+            return None;
+        }
+        let diagnostic =
+            Diagnostic::error(Code::UNKNOWN_NAME, receiver.span, format!("unknown name `{module}`"))
+                .at("functions stand alone here");
+        let written: Option<Vec<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
+        let written = written.unwrap_or_default();
+        let known = super::builtins::exists(&function.text);
+        match self::function(&function.text, &written).filter(|_| !known) {
+            Some(Words { help, .. }) => Some(diagnostic.help(help)),
+            None => Some(diagnostic.help(format!("write `{}({})`", function.text, written.join(", ")))),
+        }
     }
 
     /// The message for a method that other tools have; `None` if the name is not known from there.
@@ -34,6 +59,9 @@ impl Lowering<'_> {
         Some(diagnostic.at(what).help(help))
     }
 }
+
+/// What functions of mathematics belong to elsewhere.
+const MODULES: [&str; 8] = ["math", "Math", "cmath", "np", "numpy", "std", "glm", "torch"];
 
 /// The help for a value that other languages have; `None` if the name is not known from there.
 pub(super) fn value(name: &str) -> Option<&'static str> {

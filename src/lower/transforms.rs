@@ -120,6 +120,9 @@ impl<'a> Lowering<'a> {
         if self.has_failed(receiver) {
             return Value::Failed;
         }
+        if let Some(foreign) = self.function_of_a_module(receiver, method, arguments) {
+            return self.fail(foreign);
+        }
         let shape = self.field(receiver);
         let known = METHODS.into_iter().find(|(name, _)| *name == method.text);
         let Some((_, transform)) = known else {

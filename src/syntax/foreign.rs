@@ -56,7 +56,7 @@ pub(super) fn item(word: &str) -> Option<&'static str> {
             "it belongs to a scene: write `scene name { … }`"
         }
         "include" | "use" | "from" | "require" => {
-            "files cannot be included: copy the definitions into this file"
+            "files are imported by name, as in `import \"parts.rfm\" as parts`; their solids are then `parts.…`"
         }
         "for" | "while" | "repeat" => {
             "shapes repeat within a solid: write `solid row = any i in 0..6: sphere(0.3).move([i, 0, 0])`"

@@ -307,9 +307,54 @@ impl<'t> Slip<'t> {
         Some(self.unexpected().help(format!("a solid has no braces: write `solid {name} = {shape}`")))
     }
 
+    /// `(1, 0, 0)` in place of `[1, 0, 0]`
+    fn vector_in_brackets(&self) -> Option<Diagnostic> {
+        let before = self.before();
+        let open = unclosed(before).filter(|_| self.found == ",")?;
+        let callee = last_word(before[..open].trim_end());
+        // a comma within a call separates its arguments
+        if !(callee.is_empty() || KEYWORDS.contains(&callee)) {
+            return None;
+        }
+        let behind = &self.text[self.at..];
+        let inner = [&before[open + 1..], behind[..closing(behind)?].trim_end()].concat();
+        let is_vector = !inner.contains(['\n', ';']) && matches!(inner.split(',').count(), 2 | 3);
+        is_vector.then(|| self.unexpected().help(format!("a vector has square brackets: write `[{inner}]`")))
+    }
+
+    /// `param a = 1 0..2`
+    fn range_without_in(&self) -> Option<Diagnostic> {
+        let before = self.on_its_line().trim_end();
+        let is_param = before.trim_start().starts_with("param ") && before.contains('=');
+        let line = self.text[self.at..].lines().next().unwrap_or_default();
+        let range = line.split(['"', '#']).next().unwrap_or_default().trim();
+        let is_range = self.found.starts_with(|c: char| c.is_ascii_digit()) && range.contains("..");
+        (is_param && is_range).then(|| {
+            self.unexpected()
+                .help(format!("a range follows `in`: write `{} in {range}`", before.trim_start()))
+        })
+    }
+
+    /// `sphere { <0, 0, 0>, 1 }`
+    fn arguments_in_braces(&self) -> Option<Diagnostic> {
+        let called = last_word(self.before());
+        let inner = self.after().split_once('}')?.0.trim();
+        let is_call = self.found == "{" && !called.is_empty() && !KEYWORDS.contains(&called);
+        if !is_call || self.in_braces() || inner.is_empty() || inner.contains(['\n', ';', '{', '(', ':']) {
+            return None;
+        }
+        let inner = inner.replace('<', "[").replace('>', "]");
+        // a sphere with a centre is a ball
+        let called = if called == "sphere" && inner.starts_with('[') { "ball" } else { called };
+        Some(self.unexpected().help(format!("arguments have round brackets: write `{called}({inner})`")))
+    }
+
     /// A character that has no meaning where it stands.
     fn mark(&self) -> Option<Diagnostic> {
         let (before, after) = (self.before(), self.after());
+        if let Some(known) = self.vector_in_brackets().or_else(|| self.range_without_in()) {
+            return Some(known);
+        }
         let help = match self.found {
             "*" if before.ends_with('*') => "a power is written `x^2`",
             "," if number_ends(before) && after.starts_with(|c: char| c.is_ascii_digit()) => {
@@ -331,6 +376,7 @@ impl<'t> Slip<'t> {
                 return Some(self.syntax("a block has no `:`").help(format!("write `{key} {{ … }}`")));
             }
             "{" if self.solid_in_braces().is_some() => return self.solid_in_braces(),
+            "{" if self.arguments_in_braces().is_some() => return self.arguments_in_braces(),
             "{" if before.ends_with(')') || !self.in_braces() => {
                 "shapes are joined by `or`, `and` and `\\`: write `solid part = sphere(1) \\ sphere(0.5)`"
             }
@@ -382,6 +428,33 @@ fn first_part(line: &str) -> &str {
         }
     }
     line.trim()
+}
+
+/// The bracket that a text opens last without closing it, if it is a round one.
+fn unclosed(text: &str) -> Option<usize> {
+    let mut open = Vec::new();
+    for (at, c) in text.char_indices() {
+        match c {
+            '(' | '[' | '{' => open.push((at, c)),
+            ')' | ']' | '}' => drop(open.pop()),
+            _ => {}
+        }
+    }
+    open.last().filter(|(_, bracket)| *bracket == '(').map(|(at, _)| *at)
+}
+
+/// Where the round bracket ends that was open before a text.
+fn closing(text: &str) -> Option<usize> {
+    let mut depth = 0;
+    text.char_indices().find_map(|(at, c)| {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' if depth == 0 => return Some(at),
+            ')' | ']' | '}' => depth -= 1,
+            _ => {}
+        }
+        None
+    })
 }
 
 /// The last operand of a text: what stands behind a bracket that is still open, a sign or a word that joins.

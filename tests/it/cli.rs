@@ -349,6 +349,43 @@ fn meshes_read_back_as_reported() {
 }
 
 #[test]
+fn commands_of_other_programs_lead_to_those_that_do_the_same() {
+    let told = |command: &str| rfm(root(), &[command, PAWN]).expect(2).stderr;
+    for (command, does) in [("slice", "check FILE --slice z=0.5"), ("simulate", "run FILE"), ("new", "init")]
+    {
+        let text = told(command);
+        assert!(text.contains(&format!("`rfm {does}` does that")), "{text}");
+        // what is told is a command
+        let name = does.split(' ').next().unwrap();
+        rfm(root(), &[name, "--help"]).expect(0);
+    }
+    assert!(!told("xyzzy").contains("does that"));
+}
+
+#[test]
+fn figures_of_a_small_solid_have_their_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("small.rfm"), "rfm 1\nsolid small = sphere(1 mm)\n").unwrap();
+    let text =
+        rfm(folder.path(), &["mesh", "small.rfm", "--cells", "64", "-o", "small.stl"]).expect(0).stdout;
+    let figure = |name: &str| -> f64 {
+        let (_, after) = text.split_once(&format!("{name}: ")).unwrap();
+        after.split([',', '\n']).next().unwrap().parse().unwrap()
+    };
+    let (volume, area) = (4e-9 / 3.0 * std::f64::consts::PI, 4e-6 * std::f64::consts::PI);
+    assert!((figure("volume") / volume - 1.0).abs() < 2e-3, "{text}");
+    assert!((figure("area") / area - 1.0).abs() < 2e-3, "{text}");
+}
+
+#[test]
+fn a_negative_number_of_cells_is_told_what_is_expected() {
+    let said = rfm(root(), &["mesh", PAWN, "--cells", "-5", "-o", "pawn.stl"]);
+    assert_eq!(said.code, 2);
+    let text = said.stderr;
+    assert!(text.contains("'-5' for '--cells <N>'") && !text.contains("-- -5"), "{text}");
+}
+
+#[test]
 fn quality_and_sharp_creases() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pawn.stl").to_str().unwrap().to_string();

@@ -11,7 +11,7 @@ use crate::tool::root;
 const URI: &str = "file:///files/test.rfm";
 
 /// An editor with one file.
-struct Editor {
+pub struct Editor {
     server: Child,
     to: Option<ChildStdin>,
     from: BufReader<ChildStdout>,
@@ -21,7 +21,7 @@ struct Editor {
 }
 
 impl Editor {
-    fn new(encodings: &[&str]) -> Self {
+    pub fn new(encodings: &[&str]) -> Self {
         let mut server = Command::new(env!("CARGO_BIN_EXE_rfm"))
             .arg("lsp")
             .stdin(Stdio::piped())
@@ -45,6 +45,11 @@ impl Editor {
         let mut editor = Self::new(&[]);
         editor.open(text);
         editor
+    }
+
+    /// The number of the process that answers.
+    pub fn server(&self) -> u32 {
+        self.server.id()
     }
 
     fn write(&mut self, message: &Value) {
@@ -102,9 +107,14 @@ impl Editor {
     }
 
     fn open(&mut self, text: &str) -> &[Value] {
+        self.give(text);
+        self.await_messages()
+    }
+
+    /// Opens a text, or another one in its place, without waiting for its messages.
+    pub fn give(&mut self, text: &str) {
         let file = json!({ "uri": URI, "languageId": "rfm", "version": 1, "text": text });
         self.tell("textDocument/didOpen", json!({ "textDocument": file }));
-        self.await_messages()
     }
 
     fn change(&mut self, text: &str) -> &[Value] {
@@ -117,7 +127,7 @@ impl Editor {
     }
 
     /// Asks about the place of a file.
-    fn at(&mut self, method: &str, line: u32, character: u32) -> Value {
+    pub fn at(&mut self, method: &str, line: u32, character: u32) -> Value {
         let position = json!({ "line": line, "character": character });
         let mut more = json!({ "textDocument": { "uri": URI }, "position": position });
         match method {
@@ -126,6 +136,13 @@ impl Editor {
             _ => {}
         }
         self.ask(&format!("textDocument/{method}"), more)
+    }
+
+    /// Asks about the whole file.
+    pub fn about(&mut self, method: &str) -> Value {
+        let options = json!({ "tabSize": 4, "insertSpaces": true });
+        let file = json!({ "textDocument": { "uri": URI }, "options": options });
+        self.ask(&format!("textDocument/{method}"), file)
     }
 
     fn labels(&mut self, line: u32, character: u32) -> Vec<String> {
@@ -137,7 +154,7 @@ impl Editor {
         self.at("hover", line, character)["contents"]["value"].as_str().unwrap_or("").to_string()
     }
 
-    fn end(mut self) {
+    pub fn end(mut self) {
         assert!(self.ask("shutdown", Value::Null).is_null());
         self.tell("exit", Value::Null);
         drop(self.to.take());

@@ -73,6 +73,12 @@ const WORDS: &[&str] = &[
     "import \"parts.rfm\"",
     "include <parts.scad>",
     "return sphere(1)",
+    "solid s = math.sqrt(x) <= 1",
+    "solid s = np.log(x) <= 1",
+    "solid s = numpy.where(x <= 0, 1, 2)",
+    "solid s = sphere { <0, 0, 0>, 1 }",
+    "solid s = torus { 1, 0.2 }",
+    "use \"parts.rfm\"",
 ];
 
 /// Choices, lists, maps of space, profiles and joints.
@@ -124,6 +130,9 @@ const SIGNS: &[&str] = &[
     "solid s = x ** 2 <= 1",
     "solid s = sphere(<0, 0, 0>, 1)",
     "solid s = sphere(0,5)",
+    "let v = (1, 0, 0)\nsolid s = sphere(1).move(v)",
+    "let a = 1\nsolid s = sphere(1).move((a, 0, -a))",
+    "let corners = [(0, 0), (1, 0), (0, 1)]\nsolid s = polygon(corners)",
     "solid s = sphere(1_000)",
     "solid s = sphere(1.5f)",
     "solid s = sphere(10%)",
@@ -180,6 +189,8 @@ const VALUES: &[&str] = &[
     "solid a = sphere(1)\nsolid s = a + box()",
     "solid s = sphere(1)*box()",
     "solid s = sphere(1)/box()",
+    "param k = 3.5 1..5  \"a size\"\nsolid s = sphere(k)",
+    "param k = 8 mm 1 mm .. 1 cm\nsolid s = sphere(k)",
     "param d = 8 mm in 1 cm .. 2 cm\nsolid s = sphere(d)",
     "param a = 45 deg in 90 deg .. 0 deg\nsolid s = box().rotate_z(a)",
     "",
@@ -200,6 +211,8 @@ const SCENES: &[&str] = &[
     "fluid { shape: ball([0.5, 0.5, 1], 0.2), spacing: 5 cm }",
     "fluid { shape: box([-1, 0, 0.5], [1, 1, 2]), spacing: 5 cm }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 }",
+    "fluid { shape: box([0.3, 0.3, 0.5], [0.7, 0.7, 0.9]), spacing: 5 }",
+    "fluid { shape: box([0.3, 0.3, 0.5], [0.7, 0.7, 0.9]), mass: 100 kg }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 1 mm), spacing: 2 cm }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), particles: 1e9 }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), particles: 500, spacing: 5 cm }",
@@ -218,6 +231,8 @@ const SCENES: &[&str] = &[
     "gravity: -9.81",
     "gravity = [0, 0, -9.81]",
     "obstacle { solid: pots }",
+    "obstacle: post",
+    "fluid: water",
     "method: sph",
     "run { dt: 10 }",
     "run { until: 1 s, save_every: 2 s }",
@@ -296,6 +311,7 @@ fn is_accepted(code: &str) -> bool {
         let first = entries.split([':', ' ']).next().unwrap_or_default();
         match first {
             "box" => text.replace("box { max: [1, 1, 1] }", entries),
+            "obstacle" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
             "fluid" => text.replace("fluid { shape: ball([0.5, 0.5, 0.5], 0.2) }", entries),
             "gravity" => text.replace("  fluid", &format!("  {entries}\n  fluid")),
             "max" => text.replace("max: [1, 1, 1]", entries),

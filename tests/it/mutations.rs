@@ -1,4 +1,5 @@
-//! Files with random damage: whatever a file holds, reading it neither panics nor takes long or much memory.
+//! Files with random damage: whatever a file holds, reading it, laying it out and asking a language server about it neither
+//! panics nor takes long or much memory.
 //!
 //! `RFM_MUTATIONS=3600 cargo test --test it mutations` goes on for so many seconds, with other mutations each time. A case
 //! that fails is printed as it stands.
@@ -11,16 +12,19 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use rfm::diagnostic::Source;
 use rfm::lower::Options;
+use rfm::syntax::{Spelling, format};
 use rfm::{Engine, Experiment, Program};
 
+use crate::lsp::Editor;
 use crate::tool::root;
 
 /// Longest time for one file, and the most memory, bytes, that the process may come to.
 const LONGEST: Duration = Duration::from_secs(2);
 const MOST_MEMORY: f64 = 1e9;
 
-/// Files that are read if no time is stated.
+/// Files that are read if no time is stated. One of some is laid out, too, and opened in an editor.
 const FEW: usize = 3000;
+const ALL_STAGES_EVERY: usize = 10;
 
 /// Longer files are cut: mutations join files to each other.
 const LONGEST_FILE: usize = 20_000;
@@ -165,6 +169,12 @@ impl Mutator {
         text.into_iter().collect()
     }
 
+    /// Places in a text, as an editor counts them, some of them behind its end.
+    fn places(&mut self, text: &str) -> [(u32, u32); 2] {
+        let lines = text.lines().count() as u64 + 2;
+        std::array::from_fn(|_| ((self.random.next_u64() % lines) as u32, self.below(90) as u32))
+    }
+
     fn change(&mut self, text: &mut Vec<char>) {
         let span = self.span(text.len());
         match self.below(8) {
@@ -224,6 +234,44 @@ fn read(text: &str) {
     }
 }
 
+/// Lays a file out: its layout is its own layout. That it has the same tree and comments is what [`format`] itself compares;
+/// it would say that the file cannot be formatted.
+fn lay_out(text: &str) {
+    for spelling in [Spelling::Written, Spelling::Unicode, Spelling::Ascii] {
+        match format(&Source::file("m.rfm", text), spelling) {
+            Ok(once) => {
+                let twice = format(&Source::file("m.rfm", once.as_str()), spelling);
+                assert!(
+                    twice.is_ok_and(|twice| twice == once),
+                    "{spelling:?}: the layout has another layout"
+                );
+            }
+            Err(broken) => {
+                let bug = broken.iter().find(|message| message.message.contains("changing its meaning"));
+                assert!(bug.is_none(), "{spelling:?}: {bug:?}");
+            }
+        }
+    }
+}
+
+/// Opens a file in an editor, or changes the open one to it, and asks about random places.
+fn look(editor: &mut Editor, text: &str, places: &[(u32, u32)]) {
+    editor.give(text);
+    const QUESTIONS: [&str; 7] =
+        ["hover", "completion", "signatureHelp", "definition", "references", "prepareRename", "rename"];
+    for &(line, character) in places {
+        for question in QUESTIONS {
+            // names that cannot be changed are refused; a server that forgot the file has failed on its text
+            let answer = editor.at(question, line, character);
+            assert_ne!(answer["message"], "the file is not open", "{question} at {line}:{character}");
+        }
+    }
+    for question in ["formatting", "documentSymbol"] {
+        let answer = editor.about(question);
+        assert!(answer["code"].is_null(), "{question}: {answer}");
+    }
+}
+
 fn corpus() -> Vec<Vec<char>> {
     fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
@@ -242,10 +290,10 @@ fn corpus() -> Vec<Vec<char>> {
     paths.iter().filter_map(|path| std::fs::read_to_string(path).ok()).map(|t| t.chars().collect()).collect()
 }
 
-/// The processor time of this thread, or the time where the system does not tell.
+/// The processor time of this process, or the time where the system does not tell.
 #[cfg(unix)]
 fn processor_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
 }
 
@@ -254,12 +302,96 @@ fn processor_time() -> Duration {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }
 
-/// The most memory that this process has had, bytes; 0 where the system does not tell.
-fn peak_memory() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+/// The processor time of another process; `None` where the system does not tell.
+fn processor_time_of(process: u32) -> Option<Duration> {
+    let all = std::fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // in hundredths of a second, behind the name in brackets and eleven other fields
+    let fields = all.rsplit_once(')')?.1.split_whitespace().skip(11).take(2);
+    let hundredths = fields.map(|field| field.parse::<u64>().ok()).sum::<Option<u64>>()?;
+    Some(Duration::from_millis(10 * hundredths))
+}
+
+/// How long something takes: by the clock, or in processor time if that is less. The clock runs while other programs
+/// compute, and the processor time of a process, which has that of all its threads, while other tests do.
+fn time(work: impl FnOnce()) -> Result<Duration, String> {
+    let (clock, processor) = (Instant::now(), processor_time());
+    let done = catch_unwind(AssertUnwindSafe(work));
+    let spent = clock.elapsed().min(processor_time() - processor);
+    done.map(|()| spent).map_err(|panic| {
+        let text = panic.downcast_ref::<String>().cloned();
+        text.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string())).unwrap_or_default()
+    })
+}
+
+/// The most memory that a process has had, bytes; 0 where the system does not tell.
+fn peak_memory(process: u32) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()).unwrap_or_default()
         * 1024.0
+}
+
+/// The most memory that this process and the language server have had.
+fn memory(editor: &Editor) -> [f64; 2] {
+    [std::process::id(), editor.server()].map(peak_memory)
+}
+
+/// What is done with a file, one after the other.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    Read,
+    LayOut,
+    Edit,
+}
+
+const STAGES: [Stage; 3] = [Stage::Read, Stage::LayOut, Stage::Edit];
+
+impl Stage {
+    fn time(self, text: &str, places: &[(u32, u32)], editor: &mut Editor) -> Result<Duration, String> {
+        match self {
+            Self::Read => time(|| read(text)),
+            Self::LayOut => time(|| lay_out(text)),
+            // the processor time is that of the server
+            Self::Edit => {
+                let (clock, processor) = (Instant::now(), processor_time_of(editor.server()));
+                time(|| look(editor, text, places))?;
+                let processor =
+                    processor_time_of(editor.server()).zip(processor).map(|(end, start)| end - start);
+                Ok(processor.map_or(clock.elapsed(), |spent| clock.elapsed().min(spent)))
+            }
+        }
+    }
+}
+
+/// What fails on a file, if anything does.
+fn failures(
+    stages: &[Stage],
+    text: &str,
+    places: &[(u32, u32)],
+    editor: &mut Editor,
+    slowest: &mut [Duration; 3],
+) -> Vec<String> {
+    let before = memory(editor);
+    let mut found = Vec::new();
+    for (&stage, slowest) in stages.iter().zip(slowest) {
+        match stage.time(text, places, editor) {
+            Err(why) => found.push(format!("{stage:?} panics: {why}")),
+            // a busy machine is slower: it counts if it is slow three times
+            Ok(spent) if spent > LONGEST => {
+                if (0..2).all(|_| stage.time(text, places, editor).is_ok_and(|again| again > LONGEST)) {
+                    found.push(format!("{stage:?} takes {:.1} s", spent.as_secs_f64()));
+                }
+            }
+            Ok(spent) => *slowest = spent.max(*slowest),
+        }
+    }
+    for (process, (after, before)) in ["reading", "the server"].iter().zip(memory(editor).iter().zip(before))
+    {
+        if after - before > MOST_MEMORY {
+            found.push(format!("{process} takes {:.1} GB", (after - before) / 1e9));
+        }
+    }
+    found
 }
 
 #[test]
@@ -270,41 +402,36 @@ fn damaged_files_neither_panic_nor_take_long() {
     let mut mutator = Mutator { random: Pcg64::seed_from_u64(seed), corpus: corpus() };
     assert!(mutator.corpus.len() > 150);
     let started = Instant::now();
+    let mut editor = Editor::new(&[]);
     let mut count = 0;
-    let mut slowest = Duration::ZERO;
+    let mut slowest = [Duration::ZERO; 3];
     let mut failed = Vec::new();
-    let memory_before = peak_memory();
+    let memory_before = memory(&editor);
     while seconds.map_or(count < FEW, |seconds| started.elapsed().as_secs() < seconds) {
         let text = mutator.file();
-        let before = peak_memory();
-        let time = |text: &str| {
-            let started = processor_time();
-            catch_unwind(AssertUnwindSafe(|| read(text))).map(|()| processor_time() - started)
-        };
-        let found = match time(&text) {
-            Err(_) => Some("panics".to_string()),
-            // a busy machine is slower: it counts if it is slow three times
-            Ok(spent) if spent > LONGEST => (0..2)
-                .all(|_| time(&text).is_ok_and(|again| again > LONGEST))
-                .then(|| format!("takes {:.1} s", spent.as_secs_f64())),
-            Ok(spent) => {
-                slowest = slowest.max(spent);
-                None
-            }
-        };
-        let grown = peak_memory() - before;
-        let found = found.or((grown > MOST_MEMORY).then(|| format!("takes {:.1} GB", grown / 1e9)));
-        if let Some(what) = found {
-            println!("──── {what}\n{text}\n────");
-            failed.push(what);
+        let places = mutator.places(&text);
+        let all = seconds.is_some() || count % ALL_STAGES_EVERY == 0;
+        let stages = if all { &STAGES[..] } else { &STAGES[..1] };
+        let found = failures(stages, &text, &places, &mut editor, &mut slowest);
+        if !found.is_empty() {
+            println!("──── {found:?}\n{text}\n────");
+            failed.extend(found);
+            // a server that failed may have ended
+            editor = Editor::new(&[]);
         }
         count += 1;
     }
+    let memory_after = memory(&editor);
+    editor.end();
     println!(
-        "{count} files in {:.0} s, the slowest {:.3} s, {:.0} MB more than before",
+        "{count} files in {:.0} s; the slowest reading {:.3} s, layout {:.3} s, editor {:.3} s; {:.0} MB more than \
+         before, the server {:.0} MB",
         started.elapsed().as_secs_f64(),
-        slowest.as_secs_f64(),
-        (peak_memory() - memory_before) / 1e6
+        slowest[0].as_secs_f64(),
+        slowest[1].as_secs_f64(),
+        slowest[2].as_secs_f64(),
+        (memory_after[0] - memory_before[0]) / 1e6,
+        memory_after[1] / 1e6
     );
     assert!(failed.is_empty(), "{} of {count} files (seed {seed}): {failed:?}", failed.len());
 }

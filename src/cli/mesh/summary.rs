@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::super::output::significant;
 use super::simplified::Simplified;
 use rfm::mesh::{Quality, Report};
 
@@ -140,7 +141,7 @@ impl MeshSummary {
             self.components,
             self.euler
         );
-        say!("volume: {:.9}, area: {:.9}", self.volume, self.area);
+        say!("volume: {}, area: {}", significant(self.volume, 9), significant(self.area, 9));
         say!(
             "distance of the vertices from the surface: {:.1e} at most, {:.1e} rms",
             self.max_distance,

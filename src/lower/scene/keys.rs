@@ -86,7 +86,7 @@ impl<'a> Lowering<'a> {
             } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
                 let (is, form) = match entry {
                     Entry::Block { .. } => ("has a value", format!("{}: …", key.text)),
-                    Entry::Setting { .. } => ("is a block", block_form(&key.text)),
+                    Entry::Setting { value, .. } => ("is a block", block_form(&key.text, value)),
                 };
                 let message = format!("`{}` {is}", key.text);
                 self.report(
@@ -281,11 +281,15 @@ impl<'a> Lowering<'a> {
 }
 
 /// How a block is written.
-fn block_form(key: &str) -> String {
+fn block_form(key: &str, value: &Expr) -> String {
+    if let ("obstacle" | "container", ExprKind::Name(solid)) = (key, &value.kind) {
+        return format!("{key} {{ solid: {solid} }}");
+    }
     match key {
         "flux" => "flux { point: [0.5, 0.5, 0.5], normal: [1, 0, 0] }".into(),
         "box" => "box { min: [0, 0, 0], max: [1, 1, 1] }".into(),
         "run" => "run { until: 2 s }".into(),
+        "fluid" => "fluid water { shape: ball([0.5, 0.5, 0.5], 0.2), particles: 10000 }".into(),
         "picture" => "picture { camera: [0, -1, 0.3], cut: y <= 0 }".into(),
         key => format!("{key} {{ … }}"),
     }

@@ -1,6 +1,6 @@
 //! Questions about many points, and collisions.
 
-use rfm_columns::{BLOCK, Bounce, Collisions, Column, Job, Number, Particles, Vectors};
+use rfm_columns::{Bounce, Collisions, Column, Job, Number, PARTICLES, Particles, Vectors};
 
 use crate::error::{RfmError, RfmStatus, attempt};
 use crate::solid::{RfmSolid, solid as solid_of};
@@ -340,9 +340,9 @@ pub unsafe extern "C" fn rfm_collide(
         // SAFETY: the caller promises so many particles
         let mut particles = Particles::new(unsafe { Vectors::new(count, [positions, velocities]) });
         let mut counts = Collisions::default();
-        // a block at a time, so that little is remembered
-        for start in (0..count).step_by(BLOCK) {
-            let found = particles.look(start..(start + BLOCK).min(count), &this.obstacle, &bounce);
+        // a part at a time, so that little is remembered
+        for start in (0..count).step_by(PARTICLES) {
+            let found = particles.look(start..(start + PARTICLES).min(count), &this.obstacle, &bounce);
             particles.put(&found);
             counts = counts.and(found.counts);
         }

@@ -10,7 +10,14 @@ use rfm::glam::DVec3;
 use rfm::solid::Bounds;
 use rfm::sph::{self, Contact, Undefined, push_out};
 
-use crate::memory::{BLOCK, Vectors};
+use crate::memory::Vectors;
+
+/// Particles whose ω is found together.
+const BLOCK: usize = 512;
+
+/// Particles of a part, where what is remembered of those that are hit should be little. All of them together are asked
+/// whether they are outside; a solid of many parts answers a few hundred in the time of one.
+pub const PARTICLES: usize = 16 * BLOCK;
 
 /// How a solid answers to what hits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -254,7 +261,6 @@ impl Particles {
             let [x, y, z] = places.each_ref().map(|column| &column[..block.len()]);
             // most particles are outside, and together they cost a fraction of what each costs alone
             Field::omega_many(walls, Points::new(x, y, z), &mut omega[..block.len()]);
-            let before = found.moved.len();
             for (k, i) in block.clone().enumerate() {
                 let mut velocity = self.velocity(i);
                 if omega[k] < 0.0 && velocity.is_finite() {
@@ -264,8 +270,8 @@ impl Particles {
                 let collision = collide(&obstacle.solid, walls, bounce, &mut position, &mut velocity);
                 found.add(i, collision, position, velocity);
             }
-            self.confirm(&mut found, before, &obstacle.solid, bounce);
         }
+        self.confirm(&mut found, &obstacle.solid, bounce);
         found.counts.hits = found.moved.len();
         found
     }
@@ -284,8 +290,8 @@ impl Particles {
     }
 
     /// Sees to it that particles that were put outside are outside by ω, too, which has other rounding errors.
-    fn confirm(&self, found: &mut Found, before: usize, solid: &Solid, bounce: &Bounce) {
-        let moved = found.moved.split_off(before);
+    fn confirm(&self, found: &mut Found, solid: &Solid, bounce: &Bounce) {
+        let moved = std::mem::take(&mut found.moved);
         if moved.is_empty() {
             return;
         }

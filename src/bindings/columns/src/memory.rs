@@ -7,8 +7,12 @@ use std::ops::Range;
 
 use crate::number::Number;
 
-/// Points that are copied at a time.
-pub const BLOCK: usize = 512;
+/// Numbers that a column of copied points has room for.
+pub const BLOCK: usize = 256;
+
+/// Bytes of a column that are copied at a time. Rows are read while nothing is computed, so that the processor waits for
+/// those that it has not fetched on its own; with more bytes it waits, with fewer the calls cost more.
+const BYTES_AT_A_TIME: usize = 1024;
 
 /// Numbers at equal distances in memory.
 #[derive(Debug)]
@@ -204,8 +208,9 @@ impl<T: Number, const N: usize> Job<T, N> {
     fn run_in_blocks(&self, part: Range<usize>, evaluate: &impl Fn([&[T]; 3], [&mut [T]; N])) {
         let mut gathered = [[T::default(); BLOCK]; 3];
         let mut computed = [[T::default(); BLOCK]; N];
-        for start in part.clone().step_by(BLOCK) {
-            let block = start..(start + BLOCK).min(part.end);
+        let size = (BYTES_AT_A_TIME / size_of::<T>()).min(BLOCK);
+        for start in part.clone().step_by(size) {
+            let block = start..(start + size).min(part.end);
             self.gather(&block, &mut gathered);
             let mut points = gathered.each_ref().map(|column| &column[..block.len()]);
             for (points, column) in points.iter_mut().zip(self.points) {

@@ -87,6 +87,62 @@ def test_a_mesh_becomes_one_of_pyvista(pawn):
     assert found.volume == pytest.approx(mesh.volume) and np.array_equal(found.points, mesh.vertices)
 
 
+def test_trimesh_reads_saved_meshes_as_closed(pawn, tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    mesh = pawn.mesh(32)
+    # with its normals a vertex at a crease is several, unless trimesh is told to keep those of the file
+    for ending, how in (("stl", {}), ("ply", {}), ("obj", {"maintain_order": True})):
+        mesh.save(tmp_path / f"pawn.{ending}")
+        found = trimesh.load(tmp_path / f"pawn.{ending}", force="mesh", **how)
+        assert found.is_watertight and len(found.vertices) == len(mesh.vertices), ending
+        assert found.volume == pytest.approx(mesh.volume, rel=1e-5), ending
+
+
+def test_normals_of_an_obj_are_those_of_each_face_at_a_crease(pawn, tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    pawn.mesh(32).save(tmp_path / "pawn.obj")
+    found = trimesh.load(tmp_path / "pawn.obj", force="mesh")
+    foot = found.faces[(found.vertices[found.faces][..., 2] < 1e-9).all(axis=1)]
+    assert len(foot) > 100 and np.allclose(found.vertex_normals[foot], [0, 0, -1], atol=1e-6)
+    # the rim of the foot is also that of its side, whose normals are level or point up
+    side = found.faces[(found.vertices[found.faces][..., 2] < 0.05).all(axis=1)]
+    on_rim = (found.vertices[side][..., 2] < 1e-9) & ~(found.face_normals[:, 2] < -0.99)[
+        (found.vertices[found.faces][..., 2] < 0.05).all(axis=1)
+    ][:, None]
+    assert on_rim.any() and (found.vertex_normals[side][on_rim][:, 2] > -0.5).all()
+
+
+def test_meshio_reads_what_has_one_normal_for_a_vertex(pawn, tmp_path):
+    meshio = pytest.importorskip("meshio")
+    mesh = pawn.mesh(32)
+    for ending in ("stl", "ply"):
+        mesh.save(tmp_path / f"pawn.{ending}")
+        found = meshio.read(tmp_path / f"pawn.{ending}")
+        assert len(found.points) == len(mesh.vertices), ending
+        assert found.cells_dict["triangle"].shape == mesh.triangles.shape, ending
+    # meshio has no normals of corners, so it reads the OBJ of a mesh without creases only
+    ball = rfm.load("rfm 1\nsolid ball = sphere(1)")["ball"].mesh(16)
+    ball.save(tmp_path / "ball.obj")
+    found = meshio.read(tmp_path / "ball.obj")
+    assert np.allclose(found.point_data["obj:vn"], found.points, atol=1e-6)
+    assert np.array_equal(found.cells_dict["triangle"], ball.triangles)
+
+
+def test_vtk_reads_saved_meshes(pawn, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    mesh = pawn.mesh(32)
+    for ending in ("stl", "ply", "obj", "vtp"):
+        mesh.save(tmp_path / f"pawn.{ending}")
+        found = pyvista.read(tmp_path / f"pawn.{ending}")
+        assert found.n_cells == len(mesh.triangles), ending
+        # corners with normals of their own are points of their own, in the same place
+        closed = found.clean() if ending == "obj" else found
+        assert closed.n_open_edges == 0 and closed.volume == pytest.approx(mesh.volume, rel=1e-5), ending
+        if ending != "stl":
+            normals = np.asarray(found.point_data.active_normals)
+            assert np.allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6), ending
+
+
 def test_a_package_that_is_not_there_is_named(pawn, monkeypatch):
     for name in ("trimesh", "pyvista", "meshio"):
         monkeypatch.setitem(sys.modules, name, None)
