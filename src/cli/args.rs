@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
+use super::render::Surface;
 use super::sweep::options::{Again, SweepOptions};
 pub(super) use super::values::{CameraFlag, CutFlag};
 use super::values::{
@@ -123,13 +124,14 @@ pub(super) struct Check {
     /// Files to check; `-` is standard input
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Plot ω over a plane: x=…, y=… or z=…
-    #[arg(long, value_name = "AXIS=VALUE", value_parser = plane)]
-    pub slice: Option<Plane>,
-    /// The solid to plot [default: the only one, or the first obstacle of the scene]
-    #[arg(short, long, value_name = "NAME", requires = "slice")]
-    pub solid: Option<String>,
-    /// Where the plot goes: .svg or .png [default: SOLID.AXIS=VALUE.svg]
+    /// Plot ω over a plane: x=…, y=… or z=…; several planes make a sheet: z=0.2,z=0.8,y=1.5
+    #[arg(long, value_name = "AXIS=VALUE", value_parser = plane, value_delimiter = ',')]
+    pub slice: Vec<Plane>,
+    /// The solid to plot; of several their sections are drawn together, hatched [default: the only one, or the first
+    /// obstacle of the scene]
+    #[arg(short, long, value_name = "NAME", requires = "slice", value_delimiter = ',')]
+    pub solid: Vec<String>,
+    /// Where the plot goes: .svg or .png [default: SOLID.AXIS=VALUE.svg; a sheet: slices.svg]
     #[arg(short, long, value_name = "FILE", requires = "slice")]
     pub output: Option<PathBuf>,
     /// Draw the plot in the terminal
@@ -412,6 +414,10 @@ pub(super) struct Run {
     /// Draw an obstacle as clear glass, so that the fluid behind it is seen; may be repeated
     #[arg(long, help_heading = "Pictures", value_name = "NAME", value_delimiter = ',')]
     pub glass: Vec<String>,
+    /// Draw the surface of the fluid in place of its particles: `clear` shows what is in the fluid, `opaque` does not
+    /// [default without a word: clear]
+    #[arg(long, help_heading = "Pictures", value_name = "LOOK", num_args = 0..=1, require_equals = true, default_missing_value = "clear", value_enum)]
+    pub surface: Option<Surface>,
     /// Write no pictures
     #[arg(long)]
     pub no_pictures: bool,

@@ -116,7 +116,7 @@ impl Box3 {
 }
 
 pub(super) fn run(shared: &Shared, options: &Check) -> Result<(), Failure> {
-    if options.slice.is_some() && options.files.len() > 1 {
+    if !options.slice.is_empty() && options.files.len() > 1 {
         return Err(Failure::usage("--slice plots one file at a time"));
     }
     options.output.as_deref().map(output::Picture::of).transpose()?;
@@ -191,8 +191,8 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
                     print(&file, &program, &facts);
                 }
                 document.solids.extend(facts);
-                if let Some(plane) = options.slice {
-                    let list = section::plot(shared, options, &program, plane)?;
+                if !options.slice.is_empty() {
+                    let list = section::plot(shared, options, &program)?;
                     document.ok &= !findings::fail(&list, &options.deny);
                     if !is_for_people(shared, options) {
                         show(shared, options, &mut document, &Diagnostics { list, ..diagnostics });

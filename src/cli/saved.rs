@@ -1,5 +1,6 @@
 //! What `rfm run` left in a folder: the list of its frames, and the figures of its summary.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -63,14 +64,20 @@ pub(super) fn collection(folder: &Path) -> Result<Vec<FrameEntry>, Failure> {
 /// The meshes of the obstacles, and which of them belongs to each frame.
 pub(super) type Meshes = (Vec<PathBuf>, Vec<Option<usize>>);
 
+/// Entries of a list by the bits of their times: runs may have very many.
+pub(super) fn by_time(entries: Vec<FrameEntry>) -> HashMap<u64, FrameEntry> {
+    // of several at one time the first counts
+    entries.into_iter().rev().map(|entry| (entry.time.to_bits(), entry)).collect()
+}
+
 /// The meshes of the obstacles: one, or if they move one for each frame.
 pub(super) fn obstacles(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Meshes, Failure> {
     let moving = folder.join("obstacle.pvd");
     if moving.is_file() {
-        let listed = listed(&moving)?;
+        let listed = by_time(listed(&moving)?);
         let mut files = Vec::new();
         let mesh_of = entries.iter().map(|(_, entry)| {
-            let there = listed.iter().find(|mesh| mesh.time == entry.time);
+            let there = listed.get(&entry.time.to_bits());
             if let Some(mesh) = there.filter(|mesh| folder.join(&mesh.file).is_file()) {
                 files.push(folder.join(&mesh.file));
             }

@@ -76,7 +76,7 @@ fn view(mesh: &Mesh, drawn: Drawn) -> MeshView<'_> {
 /// A whole mesh of a material.
 pub(super) fn surface(mesh: &Mesh, material: Material) -> MeshView<'_> {
     let (vertices, normals) = (&mesh.positions, &mesh.normals);
-    MeshView { vertices, normals, triangles: &mesh.triangles, cut: None, material }
+    MeshView { vertices, normals, triangles: &mesh.triangles, values: &[], cut: None, material }
 }
 
 /// The cut that takes away one side of a plane across an axis.

@@ -12,8 +12,8 @@ use super::{choose, output};
 use rfm::diagnostic::{Code, Diagnostic};
 use rfm::field::Field;
 use rfm::geom::Aabb;
-use rfm::slice::{self, Plane, Window};
-use rfm::solid::Bounds;
+use rfm::slice::{self, Cut as SolidCut, Panel, Plane, Window};
+use rfm::solid::{Bounds, Chosen};
 use rfm::{Program, Solid};
 
 /// Points along each side of the window at which a section is sought.
@@ -25,43 +25,86 @@ const BESIDE: f64 = 1e-5;
 /// A plane that shares more than this part of the window with a face of the solid lies within that face.
 const OF_A_FACE: f64 = 2e-3;
 
-/// Plots a solid in a plane. Returns warnings about what the plot shows.
-pub(super) fn plot(
+/// Plots what the flags ask for. Returns warnings about what the plot shows.
+pub(super) fn plot(shared: &Shared, options: &Check, program: &Program) -> Result<Vec<Diagnostic>, Failure> {
+    let names: Vec<Option<&str>> = match &options.solid[..] {
+        [] => vec![None],
+        names => names.iter().map(|name| Some(name.as_str())).collect(),
+    };
+    let solid = |name: &Option<&str>| Ok(choose::solid(shared, program, *name)?.at(options.time));
+    let solids = names.iter().map(solid).collect::<Result<Vec<Solid>, Failure>>()?;
+    match (&options.slice[..], &solids[..]) {
+        ([plane], [solid]) => plot_one(shared, options, program, (solid, *plane)),
+        (planes, solids) => plot_sheet(shared, options, program, (solids, planes)),
+    }
+}
+
+/// A solid as it is drawn in a plane.
+struct Seen<'a> {
+    /// What is drawn; if no program keeps the tolerance, which was reported, it is the solid's own ω.
+    field: Beside<'a>,
+    title: String,
+    /// The shift of the plane out of a face.
+    is_aside: bool,
+    warning: Option<Diagnostic>,
+}
+
+impl Seen<'_> {
+    /// What is drawn: only what is moved needs to be.
+    fn field(&self) -> &dyn Field {
+        if self.is_aside { &self.field } else { self.field.field }
+    }
+
+    fn cut(&self) -> SolidCut<'_> {
+        SolidCut { name: self.title.clone(), field: self.field() }
+    }
+}
+
+/// Looks at a solid in a plane.
+fn seen<'a>(
+    program: &Program,
+    solid: &'a Solid,
+    chosen: Option<&'a Chosen>,
+    (plane, window): (Plane, Window),
+) -> Seen<'a> {
+    let aside = out_of_a_face(solid, plane, window);
+    let shown = Plane::new(plane.axis, plane.value + aside.unwrap_or(0.0));
+    let found = match aside {
+        Some(_) => Some((Code::SECTION_IN_FACE, in_a_face(solid, plane))),
+        None => meets(solid, plane, window).map(|message| (Code::NO_SECTION, message)),
+    };
+    let named = program.module().solids.iter().find(|named| named.name == solid.name());
+    let warning =
+        found.zip(named).map(|((code, message), named)| Diagnostic::warning(code, named.span, message));
+    let field: &dyn Field = match chosen {
+        Some(chosen) => chosen,
+        None => solid,
+    };
+    let title = match aside {
+        Some(_) => format!("{}, just outside its face", solid.name()),
+        None => solid.name().to_string(),
+    };
+    let field = Beside { field, by: shown.point(DVec2::ZERO) - plane.point(DVec2::ZERO) };
+    Seen { field, title, is_aside: aside.is_some(), warning }
+}
+
+/// Plots a solid in a plane.
+fn plot_one(
     shared: &Shared,
     options: &Check,
     program: &Program,
-    plane: Plane,
+    (solid, plane): (&Solid, Plane),
 ) -> Result<Vec<Diagnostic>, Failure> {
-    let solid = choose::solid(shared, program, options.solid.as_deref())?.at(options.time);
-    let window = match options.window {
-        Some([u0, v0, u1, v1]) => Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)),
-        None => plane.window(&around(&solid)?),
-    };
-    let aside = out_of_a_face(&solid, plane, window);
-    let shown = Plane::new(plane.axis, plane.value + aside.unwrap_or(0.0));
-    let found = match aside {
-        Some(_) => Some((Code::SECTION_IN_FACE, in_a_face(&solid, plane))),
-        None => meets(&solid, plane, window).map(|message| (Code::NO_SECTION, message)),
-    };
-    let named = program.module().solids.iter().find(|named| named.name == solid.name());
-    let warnings: Vec<Diagnostic> = found
-        .zip(named)
-        .map(|((code, message), named)| Diagnostic::warning(code, named.span, message))
-        .into_iter()
-        .collect();
-    // if no program keeps the tolerance, which was reported, the solid's own ω is drawn
-    let chosen = program.within_tolerance(&solid).and_then(Result::ok);
-    let field: &dyn Field = chosen.as_ref().map_or(&solid as &dyn Field, |chosen| chosen);
-    let beside = Beside { field, by: shown.point(DVec2::ZERO) - plane.point(DVec2::ZERO) };
-    let (field, title): (&dyn Field, String) = match aside {
-        Some(_) => (&beside, format!("{}, just outside its face", solid.name())),
-        None => (field, solid.name().to_string()),
-    };
+    let window = window(options, plane, std::slice::from_ref(solid))?;
+    let chosen = program.within_tolerance(solid).and_then(Result::ok);
+    let seen = seen(program, solid, chosen.as_ref(), (plane, window));
+    let (field, title) = (seen.field(), seen.title.as_str());
+    let warnings = Vec::from_iter(seen.warning.clone());
     if options.term {
         // drawn to memory first, so that a reader who leaves early is no error of the drawing
         let mut drawing = Vec::new();
         let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-        slice::terminal::draw(field, &title, plane, window, 78, colour, &mut drawing)
+        slice::terminal::draw(field, title, plane, window, 78, colour, &mut drawing)
             .map_err(Failure::usage)?;
         let mut out = anstream::stdout();
         out.write_all(&drawing)?;
@@ -74,12 +117,81 @@ pub(super) fn plot(
         Some(path) => path.clone(),
         None => PathBuf::from(format!("{}.{}.svg", solid.name(), plane.to_string().replace(' ', ""))),
     };
-    let picture = picture(field, &title, plane, window, &path)?;
+    let picture = picture(field, title, plane, window, &path)?;
     output::write(&path, |out| out.write_all(&picture))?;
     if !shared.json && options.message_format == MessageFormat::Human {
         say!("slice {plane} of {} written to {}", solid.name(), path.shown());
     }
     Ok(warnings)
+}
+
+/// Plots several planes, or several solids, or both, in one drawing.
+fn plot_sheet(
+    shared: &Shared,
+    options: &Check,
+    program: &Program,
+    (solids, planes): (&[Solid], &[Plane]),
+) -> Result<Vec<Diagnostic>, Failure> {
+    if options.term {
+        return Err(Failure::usage("--term draws one solid in one plane: name one of each, or leave it out"));
+    }
+    if options.window.is_some() && planes.iter().any(|plane| plane.axis != planes[0].axis) {
+        return Err(Failure::usage(
+            "--window states a part of a plane, and these planes lie across different axes: plot them one by one",
+        ));
+    }
+    let chosen: Vec<_> =
+        solids.iter().map(|solid| program.within_tolerance(solid).and_then(Result::ok)).collect();
+    let mut all = Vec::new();
+    for plane in planes {
+        let window = window(options, *plane, solids)?;
+        let of = |(solid, chosen)| seen(program, solid, Option::as_ref(chosen), (*plane, window));
+        all.push((*plane, window, solids.iter().zip(&chosen).map(of).collect::<Vec<_>>()));
+    }
+    let panels: Vec<Panel<'_>> = all
+        .iter()
+        .map(|(plane, window, seen)| Panel {
+            plane: *plane,
+            window: *window,
+            cuts: seen.iter().map(Seen::cut).collect(),
+        })
+        .collect();
+    let path = options.output.clone().unwrap_or_else(|| PathBuf::from("slices.svg"));
+    let names: Vec<&str> = solids.iter().map(Solid::name).collect();
+    let (title, samples, mut bytes) = (names.join(", "), slice::DEFAULT_SAMPLES, Vec::new());
+    match output::Picture::of(&path)? {
+        output::Picture::Svg => slice::write_sheet_svg(&title, &panels, samples, &mut bytes),
+        output::Picture::Png => slice::write_sheet_png(&title, &panels, samples, 2.0, &mut bytes),
+    }
+    .map_err(Failure::usage)?;
+    output::write(&path, |out| out.write_all(&bytes))?;
+    if !shared.json && options.message_format == MessageFormat::Human {
+        let planes: Vec<String> = planes.iter().map(ToString::to_string).collect();
+        say!("slices {} of {title} written to {}", planes.join(", "), path.shown());
+    }
+    let mut warnings: Vec<Diagnostic> =
+        all.into_iter().flat_map(|(_, _, seen)| seen).filter_map(|seen| seen.warning).collect();
+    // a sheet may show a solid where it is not, as long as it shows it somewhere
+    if solids.len() > 1 || planes.len() > 1 {
+        let missed = |warning: &Diagnostic| warning.code == Code::NO_SECTION;
+        let panels = planes.len();
+        let is_nowhere = |warning: &Diagnostic, all: &[Diagnostic]| {
+            all.iter().filter(|other| missed(other) && other.primary.span == warning.primary.span).count()
+                == panels
+        };
+        let all = warnings.clone();
+        warnings.retain(|warning| !missed(warning) || is_nowhere(warning, &all));
+    }
+    Ok(warnings)
+}
+
+/// The part of a plane that is drawn.
+fn window(options: &Check, plane: Plane, solids: &[Solid]) -> Result<Window, Failure> {
+    if let Some([u0, v0, u1, v1]) = options.window {
+        return Ok(Window::new(DVec2::new(u0, v0), DVec2::new(u1, v1)));
+    }
+    let bounds = solids.iter().map(around).collect::<Result<Vec<Aabb>, Failure>>()?;
+    Ok(plane.window(&bounds.iter().fold(Aabb::EMPTY, |all, one| all.union(one))))
 }
 
 /// A field as it is a little beside each place.

@@ -15,6 +15,7 @@ mod collection;
 mod error;
 mod frame;
 mod storage;
+mod values;
 
 use std::fmt;
 
@@ -28,6 +29,7 @@ use crate::mesh::Mesh;
 pub use collection::{CollectionError, FrameEntry, read_collection};
 pub use error::FrameError;
 pub use frame::{PointArray, read_arrays, read_mesh, read_points};
+pub use values::values_at;
 
 /// The parameters of a surface. Lengths are in metres and absolute.
 #[derive(Debug, Clone, Copy, PartialEq)]

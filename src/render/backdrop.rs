@@ -16,6 +16,7 @@ use super::{
     particles::{self, Disc, by_band, columns, discs},
     raster::{BAND_ROWS, Band, Canvas, Corner, Frame, Scratch, mix},
     shade::Material,
+    spare::{Spare, Workspace},
 };
 use crate::geom::Aabb;
 
@@ -42,12 +43,14 @@ pub struct Backdrop {
     /// The clear meshes in each band, by their material.
     glass: Vec<[Option<Sheet>; 2]>,
     edges: Vec<Edge>,
-    /// All of it as pixels, without light and shadow.
-    still: Plain,
+    /// All of it as pixels, without light and shadow, and the nearness of the foremost sub-pixel of each.
+    pixels: Vec<u8>,
+    nearness: Vec<f32>,
     floor: Option<Floor>,
     balls: Balls,
     title: Layer,
     bar: Option<Layer>,
+    spare: Spare,
     /// The number of triangles of the meshes that are not drawn because a corner is not finite, lies behind the
     /// eye, or does not exist.
     pub skipped_triangles: usize,
@@ -64,18 +67,11 @@ pub struct Moving<'a> {
     pub balls: bool,
 }
 
-/// A picture without light and shadow: its pixels, and the nearness of the foremost sub-pixel of each.
-#[derive(Debug, Clone, Default)]
-struct Plain {
-    pixels: Vec<u8>,
-    nearness: Vec<f32>,
-}
-
 /// What is drawn over a canvas.
 #[derive(Default)]
-struct Actors {
+struct Actors<'a> {
     meshes: Vec<Facets>,
-    discs: Vec<Vec<Disc>>,
+    discs: &'a [Vec<Disc>],
 }
 
 impl Backdrop {
@@ -90,7 +86,8 @@ impl Backdrop {
         legend: &Legend<'_>,
     ) -> Result<Self, RenderError> {
         let (width, height) = camera.subpixels();
-        let facets: Vec<Facets> = meshes.iter().map(|mesh| Facets::new(mesh, &camera)).collect();
+        let values = legend.scale.map_or(Scale::speeds(1.0), |scale| scale.unlabelled());
+        let facets: Vec<Facets> = meshes.iter().map(|mesh| Facets::new(mesh, &camera, &values)).collect();
         let floor_corners = floor_corners(bounds, &camera);
         let mut canvas = Canvas::new(width, height, PAPER);
         canvas.draw(|band| {
@@ -112,10 +109,12 @@ impl Backdrop {
         let middle = camera.look(bounds.centre()).map_or(0.0, |seen| seen.nearness);
         let pixels = camera.magnification(middle) / SUBPIXELS as f64;
         let mut backdrop = Self {
-            scale: legend.scale.map_or(Scale::speeds(1.0), |scale| scale.unlabelled()),
+            scale: values,
             glass,
             edges: edges(bounds, &camera),
-            still: Plain { pixels: vec![0; 3 * width * height / 4], nearness: vec![0.0; width * height / 4] },
+            pixels: Vec::new(),
+            nearness: Vec::new(),
+            spare: Spare::default(),
             floor,
             balls: Balls::new(bounds.size().length(), pixels),
             title: overlay::title(legend.title, f64::from(camera.width) / scale, scale)?,
@@ -124,9 +123,10 @@ impl Backdrop {
             camera,
             canvas,
         };
-        let mut still = std::mem::take(&mut backdrop.still);
-        backdrop.draw(&Actors::default(), true, &mut still);
-        backdrop.still = still;
+        let mut pixels = vec![0; 3 * width * height / 4];
+        let mut nearness = vec![0.0; width * height / 4];
+        backdrop.draw(&Actors::default(), true, &mut pixels, &mut nearness);
+        (backdrop.pixels, backdrop.nearness) = (pixels, nearness);
         Ok(backdrop)
     }
 
@@ -148,16 +148,22 @@ impl Backdrop {
     /// The picture with all that moves in it, and the caption of its moment. Particles are treated as by
     /// [`Backdrop::frame`]; triangles that cannot be drawn are left out.
     pub fn frame_with(&self, moving: &Moving<'_>, moment: &Caption) -> Image {
+        self.spare.lend(|workspace| self.frame_in(moving, moment, workspace))
+    }
+
+    fn frame_in(&self, moving: &Moving<'_>, moment: &Caption, workspace: &mut Workspace) -> Image {
         let total = moving.particles.positions.len();
-        let discs =
-            if moving.balls { discs(&moving.particles, &self.camera, &self.scale) } else { Vec::new() };
-        let skipped = if moving.balls { total - discs.len() } else { 0 };
-        let actors = Actors {
-            meshes: moving.meshes.iter().map(|mesh| Facets::new(mesh, &self.camera)).collect(),
-            discs: by_band(&discs, self.glass.len()),
-        };
-        let mut plain = self.still.clone();
-        self.draw(&actors, false, &mut plain);
+        let Workspace { discs: found, order, by_band: bands, nearness, padded, light } = workspace;
+        found.clear();
+        if moving.balls {
+            discs(&moving.particles, &self.camera, &self.scale, found);
+        }
+        let skipped = found.iter().filter(|disc| disc.is_none()).count();
+        by_band(found, self.glass.len(), order, bands);
+        let meshes = moving.meshes.iter().map(|mesh| Facets::new(mesh, &self.camera, &self.scale)).collect();
+        let mut pixels = self.pixels.clone();
+        nearness.clone_from(&self.nearness);
+        self.draw(&Actors { meshes, discs: bands }, false, &mut pixels, nearness);
         let mut floor = self.floor.clone();
         if let Some(floor) = &mut floor {
             moving.meshes.iter().for_each(|mesh| floor.add_mesh(mesh));
@@ -165,7 +171,7 @@ impl Backdrop {
                 floor.add_balls(&moving.particles);
             }
         }
-        let mut image = self.lit(plain, floor.as_ref());
+        let mut image = self.lit(pixels, nearness, floor.as_ref(), padded, light);
         image.skipped = skipped;
         // our own digits and letters always make a caption
         let scale = unit(&self.camera);
@@ -178,15 +184,17 @@ impl Backdrop {
 
     /// The picture without particles and without a caption.
     pub fn still(&self) -> Image {
-        self.lit(self.still.clone(), self.floor.as_ref())
+        self.spare.lend(|Workspace { padded, light, .. }| {
+            self.lit(self.pixels.clone(), &self.nearness, self.floor.as_ref(), padded, light)
+        })
     }
 
     /// Draws over the canvas, and writes the pixels that may change by it, or all.
-    fn draw(&self, actors: &Actors, all: bool, plain: &mut Plain) {
+    fn draw(&self, actors: &Actors<'_>, all: bool, pixels: &mut [u8], nearness: &mut [f32]) {
         let width = self.canvas.width;
         let (stride, height) = (width / SUBPIXELS, self.canvas.nearness.len() / width);
         let size = stride * BAND_ROWS / SUBPIXELS;
-        let pieces = plain.pixels.par_chunks_mut(3 * size).zip(plain.nearness.par_chunks_mut(size));
+        let pieces = pixels.par_chunks_mut(3 * size).zip(nearness.par_chunks_mut(size));
         pieces.enumerate().for_each_init(Scratch::default, |scratch, (k, (pixels, nearness))| {
             let rows = k * BAND_ROWS..((k + 1) * BAND_ROWS).min(height);
             let columns = if all { 0..width } else { actors.columns(k, width) };
@@ -216,19 +224,25 @@ impl Backdrop {
     }
 
     /// The picture with light and shadow, the title and the legend.
-    fn lit(&self, mut plain: Plain, floor: Option<&Floor>) -> Image {
+    fn lit(
+        &self,
+        mut pixels: Vec<u8>,
+        nearness: &[f32],
+        floor: Option<&Floor>,
+        padded: &mut Vec<f32>,
+        light: &mut Vec<f32>,
+    ) -> Image {
         let width = self.camera.width as usize;
-        let mut light = self.balls.light(&plain.nearness, width);
+        self.balls.light(nearness, width, padded, light);
         if let Some(floor) = floor {
-            floor.shade(&self.camera, &plain.nearness, &mut light, width);
+            floor.shade(&self.camera, nearness, light, width);
         }
-        plain.pixels.par_chunks_mut(3 * width).zip(light.par_chunks(width)).for_each(|(row, light)| {
+        pixels.par_chunks_mut(3 * width).zip(light.par_chunks(width)).for_each(|(row, light)| {
             for (pixel, light) in row.chunks_exact_mut(3).zip(light).filter(|(_, light)| **light < 1.0) {
                 pixel.iter_mut().for_each(|channel| *channel = (f32::from(*channel) * light + 0.5) as u8);
             }
         });
-        let mut image =
-            Image { width: self.camera.width, height: self.camera.height, pixels: plain.pixels, skipped: 0 };
+        let mut image = Image { width: self.camera.width, height: self.camera.height, pixels, skipped: 0 };
         self.write_on(&mut image);
         image
     }
@@ -250,7 +264,7 @@ fn unit(camera: &Camera) -> f64 {
     f64::from(camera.height) / 960.0
 }
 
-impl Actors {
+impl Actors<'_> {
     /// The columns of sub-pixels of a band that may change, as whole pixels.
     fn columns(&self, k: usize, width: usize) -> Range<usize> {
         let parts = self.meshes.iter().map(|facets| facets.columns(k * BAND_ROWS));

@@ -1,16 +1,14 @@
 //! A triangle as it lies on the screen.
 
-use super::{
-    Rgb,
-    raster::Corner,
-    shade::{self, Material, Veil},
-};
+use super::{raster::Corner, shade};
 
 /// A triangle on the screen.
 #[derive(Debug)]
 pub(super) struct Facet {
     pub corners: [Corner; 3],
     pub rows: (i64, i64),
+    /// The numbers of the corners in the mesh.
+    pub vertices: [u32; 3],
     /// The normals in the camera's frame, towards the side that is seen.
     pub normals: [[f32; 3]; 3],
     /// How far the corners lie beyond the cut, times their nearness: this changes evenly over the screen.
@@ -18,17 +16,17 @@ pub(super) struct Facet {
 }
 
 impl Facet {
-    /// The colour at the place that has these weights of the corners.
-    pub fn colour(&self, weights: [f32; 3], material: Material) -> Rgb {
-        shade::solid(material, self.normal(weights))
+    /// The colour that the corners give to the place that has these weights of them; `None` if corners have none.
+    pub fn tint(&self, weights: [f32; 3], tints: &[[f32; 3]]) -> Option<[f32; 3]> {
+        if tints.is_empty() {
+            return None;
+        }
+        let corners = self.vertices.map(|vertex| tints[vertex as usize]);
+        Some(std::array::from_fn(|i| (0..3).map(|k| weights[k] * corners[k][i]).sum()))
     }
 
-    /// The colour and the opacity at the place that has these weights of the corners.
-    pub fn veil(&self, weights: [f32; 3], material: Material) -> Veil {
-        shade::veil(material, self.normal(weights))
-    }
-
-    fn normal(&self, [u, v, w]: [f32; 3]) -> [f32; 3] {
+    /// The unit normal at the place that has these weights of the corners.
+    pub fn normal(&self, [u, v, w]: [f32; 3]) -> [f32; 3] {
         let [a, b, c] = self.normals;
         let n: [f32; 3] = std::array::from_fn(|i| u * a[i] + v * b[i] + w * c[i]);
         let length = shade::dot(n, n).sqrt();

@@ -24,15 +24,17 @@ impl Sheet {
         Self { frame, front: none.clone(), back: none }
     }
 
-    /// Adds a triangle. `veil` takes the weights of the corners.
-    pub fn hang(&mut self, corners: &[Corner; 3], veil: impl Fn([f32; 3]) -> Veil) {
+    /// Adds a triangle. `veil` takes the weights of the corners, and gives `None` where the triangle is cut away.
+    pub fn hang(&mut self, corners: &[Corner; 3], veil: impl Fn([f32; 3]) -> Option<Veil>) {
         let (front, back) = (&mut self.front, &mut self.back);
         self.frame.fragments(corners, |at, near, weights| {
-            if near > front[at].0 {
-                front[at] = (near, veil(weights));
+            let (is_front, is_back) = (near > front[at].0, back[at].0 == 0.0 || near < back[at].0);
+            let Some(veil) = (is_front || is_back).then(|| veil(weights)).flatten() else { return };
+            if is_front {
+                front[at] = (near, veil);
             }
-            if back[at].0 == 0.0 || near < back[at].0 {
-                back[at] = (near, veil(weights));
+            if is_back {
+                back[at] = (near, veil);
             }
         });
     }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::{
+    Scale,
     camera::Camera,
     mesh::{Facets, MeshView},
     raster::Canvas,
@@ -11,7 +12,7 @@ use super::{
 /// The part of the points that a mesh hides from the camera, 0 … 1; 0 without points.
 pub fn hidden(camera: &Camera, mesh: &MeshView<'_>, points: &[DVec3]) -> f64 {
     let (width, height) = camera.subpixels();
-    let facets = Facets::new(mesh, camera);
+    let facets = Facets::new(mesh, camera, &Scale::speeds(1.0));
     let mut canvas = Canvas::new(width, height, [0; 3]);
     canvas.draw(|band| facets.draw(band));
     let is_hidden = |p: &DVec3| {
@@ -26,7 +27,7 @@ pub fn hidden(camera: &Camera, mesh: &MeshView<'_>, points: &[DVec3]) -> f64 {
 mod tests {
     use super::*;
     use crate::geom::Aabb;
-    use crate::render::{Cut, Rgb, shade};
+    use crate::render::{Cut, Material, Rgb, shade};
 
     /// A closed box as a mesh.
     fn block(low: DVec3, high: DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
@@ -41,7 +42,7 @@ mod tests {
         let camera = Camera::new(&bounds, DVec3::X, (320, 240)).unwrap();
         let (vertices, triangles) = block(DVec3::splat(-0.5), DVec3::splat(0.5));
         let mesh = MeshView { vertices: &vertices, triangles: &triangles, cut, ..MeshView::default() };
-        let facets = Facets::new(&mesh, &camera);
+        let facets = Facets::new(&mesh, &camera, &Scale::speeds(1.0));
         let (width, height) = camera.subpixels();
         let mut canvas = Canvas::new(width, height, [255; 3]);
         canvas.draw(|band| facets.draw(band));
@@ -59,7 +60,7 @@ mod tests {
         assert!((stone.1 - at(0.5)).abs() < 1e-6);
         // the half towards the eye is gone, and the face at x = 0.1 has the colour of a section
         let open = seen(plane(DVec3::X, 0.1));
-        assert_eq!(open.0, shade::section([0.0, 0.0, 1.0]));
+        assert_eq!(open.0, shade::section(Material::Stone, [0.0, 0.0, 1.0]));
         assert!((open.1 - at(0.1)).abs() < 1e-6, "{} {}", open.1, at(0.1));
         // a cut behind the solid takes all of it, one in front of it nothing
         assert_eq!(seen(plane(DVec3::X, -0.7)), ([255; 3], 0.0));

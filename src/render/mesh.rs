@@ -3,13 +3,13 @@
 use glam::DVec3;
 
 use super::{
-    Cut,
+    Cut, Rgb, Scale,
     camera::{Camera, Seen},
     facet::Facet,
     glass::Sheet,
     raster::{BAND_ROWS, Band, Corner},
     section::SeenCut,
-    shade::Material,
+    shade::{self, Material},
 };
 
 /// A triangle mesh by reference.
@@ -21,7 +21,10 @@ pub struct MeshView<'a> {
     pub normals: &'a [DVec3],
     /// Three indices of vertices for each triangle. Both sides are drawn.
     pub triangles: &'a [[u32; 3]],
-    /// The plane that cuts the mesh open, which must then be closed. Clear meshes are not cut.
+    /// Values that choose the colours, one for each vertex, in the unit of the [`Scale`]. If there are fewer, the mesh has the
+    /// colour of its material.
+    pub values: &'a [f64],
+    /// The plane that cuts the mesh open, which must then be closed. Clear meshes are cut without a face.
     pub cut: Option<Cut>,
     /// What the mesh is made of.
     pub material: Material,
@@ -31,65 +34,82 @@ pub struct MeshView<'a> {
 #[derive(Debug)]
 pub struct Facets {
     facets: Vec<Facet>,
-    /// The numbers of the facets that may reach each band.
-    by_band: Vec<Vec<u32>>,
+    by_band: Vec<Part>,
+    /// The colours of the vertices; empty if they have that of the material.
+    tints: Vec<[f32; 3]>,
     pub material: Material,
     cut: Option<SeenCut>,
     /// The number of triangles with a bad index or a corner that the camera cannot see.
     pub skipped: usize,
 }
 
+/// The facets that may reach a band.
+#[derive(Debug, Clone)]
+struct Part {
+    /// Their numbers.
+    facets: Vec<u32>,
+    /// The columns of sub-pixels between which they lie.
+    columns: (i64, i64),
+}
+
+impl Part {
+    const NONE: Self = Self { facets: Vec::new(), columns: (i64::MAX, i64::MIN) };
+}
+
 impl Facets {
-    pub fn new(mesh: &MeshView<'_>, camera: &Camera) -> Self {
+    pub fn new(mesh: &MeshView<'_>, camera: &Camera, scale: &Scale<'_>) -> Self {
         let seen: Vec<_> = mesh.vertices.iter().map(|vertex| camera.look(*vertex)).collect();
         let smooth = mesh.normals.len() >= mesh.vertices.len();
+        let in_frame = |n: DVec3| camera.turn(n).as_vec3().to_array();
+        let shown = |normal: &DVec3| normal.try_normalize().map(in_frame);
+        let turned: Vec<_> = mesh.normals.iter().filter(|_| smooth).map(shown).collect();
         let facet = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|index| index as usize);
             let corners: [Seen; 3] = [(*seen.get(a)?)?, (*seen.get(b)?)?, (*seen.get(c)?)?];
             let points = [a, b, c].map(|i| mesh.vertices[i]);
             let face = (points[1] - points[0]).cross(points[2] - points[0]);
-            let given = if smooth { [a, b, c].map(|i| mesh.normals[i]) } else { [face; 3] };
             // the winding decides which side is outside only if the normals do not
-            let outward = if face.dot(given[0] + given[1] + given[2]) < 0.0 { -face } else { face };
+            let is_inward = smooth && face.dot(mesh.normals[a] + mesh.normals[b] + mesh.normals[c]) < 0.0;
+            let outward = if is_inward { -face } else { face };
             let side = if outward.dot(camera.to_eye(points[0])) < 0.0 { -1.0 } else { 1.0 };
-            let normals = given.map(|n| {
-                let n = n.try_normalize().or_else(|| outward.try_normalize()).unwrap_or(DVec3::Z);
-                camera.turn(side * n).as_vec3().to_array()
-            });
+            let flat = || in_frame(outward.try_normalize().unwrap_or(DVec3::Z));
+            let given = if smooth { [a, b, c].map(|i| turned[i]) } else { [Some(flat()); 3] };
+            let normals = given.map(|normal| normal.unwrap_or_else(flat).map(|x| side * x));
             let beyond =
                 |i: usize| mesh.cut.map_or(-1.0, |cut| (corners[i].nearness * cut.beyond(points[i])) as f32);
             let beyond = [0, 1, 2].map(beyond);
             let corners = corners.map(Corner::new);
-            Some(Facet { corners, rows: Corner::rows(&corners), normals, beyond })
+            Some(Facet { corners, rows: Corner::rows(&corners), vertices: *triangle, normals, beyond })
         };
         let facets: Vec<_> = mesh.triangles.iter().filter_map(facet).collect();
         let skipped = mesh.triangles.len() - facets.len();
-        let cut = mesh.cut.and_then(|cut| SeenCut::new(&cut, camera));
+        let cut = mesh.cut.and_then(|cut| SeenCut::new(&cut, mesh.material, camera));
         let bands = camera.subpixels().1.div_ceil(BAND_ROWS);
-        Self { by_band: by_band(&facets, bands), facets, material: mesh.material, cut, skipped }
+        let coloured = mesh.values.iter().filter(|_| mesh.values.len() >= mesh.vertices.len());
+        let tints = coloured.map(|value| scale.colour(*value).map(f32::from)).collect();
+        Self { by_band: by_band(&facets, bands), facets, tints, material: mesh.material, cut, skipped }
     }
 
     /// The facets that may reach the band that begins at a row, in their order.
     fn in_band(&self, top: usize) -> impl Iterator<Item = &Facet> + Clone {
-        let here = self.by_band.get(top / BAND_ROWS).map_or(&[][..], Vec::as_slice);
+        let here = self.by_band.get(top / BAND_ROWS).map_or(&[][..], |part| &part.facets);
         here.iter().map(|&k| &self.facets[k as usize])
     }
 
     /// The columns of sub-pixels between which the facets in the band that begins at a row lie; empty without any.
     pub fn columns(&self, top: usize) -> (i64, i64) {
-        let none = (i64::MAX, i64::MIN);
-        self.in_band(top)
-            .map(|facet| Corner::columns(&facet.corners))
-            .fold(none, |all, (left, right)| (all.0.min(left), all.1.max(right)))
+        self.by_band.get(top / BAND_ROWS).unwrap_or(&Part::NONE).columns
     }
 
     /// Draws an opaque mesh.
     pub fn draw(&self, band: &mut Band<'_>) {
         let here = self.in_band(band.top);
         match &self.cut {
-            Some(cut) => cut.draw(&here.collect::<Vec<_>>(), self.material, band),
+            Some(cut) => {
+                cut.draw(&here.collect::<Vec<_>>(), |facet, weights| self.colour(facet, weights), band);
+            }
             None => here.for_each(|facet| {
-                band.triangle(&facet.corners, |weights| facet.colour(weights, self.material));
+                band.triangle(&facet.corners, |weights| self.colour(facet, weights));
             }),
         }
     }
@@ -97,19 +117,32 @@ impl Facets {
     /// Adds a clear mesh to sheets.
     pub fn hang(&self, sheet: &mut Sheet) {
         for facet in self.in_band(sheet.frame.top()) {
-            sheet.hang(&facet.corners, |weights| facet.veil(weights, self.material));
+            sheet.hang(&facet.corners, |weights| {
+                let tint = facet.tint(weights, &self.tints);
+                let veil = || shade::veil(self.material, tint, facet.normal(weights));
+                (!facet.is_beyond(weights)).then(veil)
+            });
         }
+    }
+
+    /// The colour of a facet at the place that has these weights of its corners.
+    fn colour(&self, facet: &Facet, weights: [f32; 3]) -> Rgb {
+        shade::solid(self.material, facet.tint(weights, &self.tints), facet.normal(weights))
     }
 }
 
 /// The facets that may reach each band.
-fn by_band(facets: &[Facet], bands: usize) -> Vec<Vec<u32>> {
-    let mut found = vec![Vec::new(); bands];
+fn by_band(facets: &[Facet], bands: usize) -> Vec<Part> {
+    let mut found = vec![Part::NONE; bands];
     for (k, facet) in (0..).zip(facets) {
         let band = |row: i64| (row.max(0) as usize) / BAND_ROWS;
         if facet.rows.1 >= 0 {
             let here = found.iter_mut().take(band(facet.rows.1) + 1).skip(band(facet.rows.0));
-            here.for_each(|list| list.push(k));
+            let (left, right) = Corner::columns(&facet.corners);
+            here.for_each(|part| {
+                part.facets.push(k);
+                part.columns = (part.columns.0.min(left), part.columns.1.max(right));
+            });
         }
     }
     found

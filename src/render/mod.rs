@@ -33,6 +33,7 @@ mod particles;
 mod raster;
 mod section;
 mod shade;
+mod spare;
 
 use std::{fmt, io};
 

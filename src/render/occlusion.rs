@@ -59,14 +59,16 @@ impl Balls {
         Self { reach: reach.max().unwrap_or(0), lines }
     }
 
-    /// How bright the pixels of a picture are, 0 … 1. Nearness 0 is the paper, which stays bright.
-    pub fn light(&self, nearness: &[f32], width: usize) -> Vec<f32> {
-        let mut light = vec![1.0; nearness.len()];
+    /// Finds how bright the pixels of a picture are, 0 … 1. Nearness 0 is the paper, which stays bright. `padded` is memory
+    /// for it.
+    pub fn light(&self, nearness: &[f32], width: usize, padded: &mut Vec<f32>, light: &mut Vec<f32>) {
+        light.clear();
+        light.resize(nearness.len(), 1.0);
         let all: f32 = self.lines.iter().map(|line| line.weight).sum();
         if all == 0.0 || width == 0 {
-            return light;
+            return;
         }
-        let padded = Padded::new(nearness, width, self.reach);
+        let padded = Padded::new(nearness, width, self.reach, padded);
         light.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
             for (k, part) in row.chunks_mut(RUN).enumerate() {
                 let points = padded.run(k * RUN, y, 0, 0);
@@ -79,11 +81,10 @@ impl Balls {
                 }
             }
         });
-        light
     }
 
     /// How full the balls of a run of pixels are beyond one half, times two, summed over the lines with their weights.
-    fn filled(&self, padded: &Padded, (x, y): (usize, usize)) -> [f32; RUN] {
+    fn filled(&self, padded: &Padded<'_>, (x, y): (usize, usize)) -> [f32; RUN] {
         let points = padded.run(x, y, 0, 0);
         // paper has no depth, and is left out afterwards
         let scale: [f32; RUN] = std::array::from_fn(|i| 1.0 / (points[i] * points[i]).max(f32::MIN_POSITIVE));
@@ -107,17 +108,19 @@ impl Balls {
 }
 
 /// The nearness of a picture with paper around it.
-struct Padded {
-    nearness: Vec<f32>,
+struct Padded<'a> {
+    nearness: &'a [f32],
     width: usize,
     border: usize,
 }
 
-impl Padded {
-    fn new(nearness: &[f32], width: usize, border: usize) -> Self {
+impl<'a> Padded<'a> {
+    /// Puts it into `padded`.
+    fn new(nearness: &[f32], width: usize, border: usize, padded: &'a mut Vec<f32>) -> Self {
         let wide = width + RUN + 2 * border;
         let rows = nearness.len() / width;
-        let mut padded = vec![0.0; wide * (rows + 2 * border)];
+        padded.clear();
+        padded.resize(wide * (rows + 2 * border), 0.0);
         let inner = padded.chunks_exact_mut(wide).skip(border);
         for (to, from) in inner.zip(nearness.chunks_exact(width)) {
             to[border..border + width].copy_from_slice(from);
@@ -149,7 +152,9 @@ mod tests {
             height(at(i % WIDTH), at(i / WIDTH)).map_or(0.0, |z| (1.0 / (FAR - z)) as f32)
         };
         let nearness: Vec<f32> = (0..WIDTH * WIDTH).map(near).collect();
-        Balls::new(2.0, PIXELS).light(&nearness, WIDTH)
+        let (mut padded, mut light) = (vec![0.3; 7], vec![0.4; 9]);
+        Balls::new(2.0, PIXELS).light(&nearness, WIDTH, &mut padded, &mut light);
+        light
     }
 
     /// How much darker a picture is at (x, y), both in metres.

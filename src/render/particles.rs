@@ -36,8 +36,8 @@ pub struct Disc {
 /// The least radius in sub-pixels. Smaller discs could fall between the middles of sub-pixels and flicker.
 const MIN_RADIUS: f32 = 0.9;
 
-/// The discs of all particles that the camera sees, in the particles' order.
-pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, scale: &Scale) -> Vec<Disc> {
+/// Finds the discs of all particles, in their order; `None` for those that the camera does not see.
+pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, scale: &Scale, found: &mut Vec<Option<Disc>>) {
     let radius = if particles.radius.is_finite() { particles.radius.max(0.0) } else { 0.0 };
     let disc = |i: usize| {
         let seen = camera.look(particles.positions.get(i))?;
@@ -52,8 +52,7 @@ pub fn discs(particles: &ParticlesView<'_>, camera: &Camera, scale: &Scale) -> V
             colour: scale.colour(value).map(f32::from),
         })
     };
-    let seen: Vec<_> = (0..particles.positions.len()).into_par_iter().map(disc).collect();
-    seen.into_iter().flatten().collect()
+    (0..particles.positions.len()).into_par_iter().map(disc).collect_into_vec(found);
 }
 
 /// The columns of a band's sub-pixels that discs may reach; empty without discs.
@@ -114,16 +113,25 @@ impl Hidden {
     }
 }
 
-/// The discs that may reach each band, near ones first: most of the others are then hidden and need no shading. Equally
-/// near ones keep their order.
-pub(super) fn by_band(discs: &[Disc], bands: usize) -> Vec<Vec<Disc>> {
+/// Puts into `found` the discs that may reach each band, near ones first: most of the others are then hidden and need no
+/// shading. Equally near ones keep their order. `order` is memory for it.
+pub(super) fn by_band(
+    discs: &[Option<Disc>],
+    bands: usize,
+    order: &mut Vec<u64>,
+    found: &mut Vec<Vec<Disc>>,
+) {
     // nearness is positive, so its bits have its order; the index makes every key another one
-    let key = |(i, disc): (usize, &Disc)| u64::from(!disc.nearness.to_bits()) << 32 | i as u64;
-    let mut keys: Vec<u64> = discs.par_iter().enumerate().map(key).collect();
-    keys.par_sort_unstable();
-    let mut found = vec![Vec::new(); bands];
-    for key in keys {
-        let disc = discs[(key & u64::from(u32::MAX)) as usize];
+    let key = |(i, disc): (usize, &Option<Disc>)| {
+        disc.as_ref().map(|disc| u64::from(!disc.nearness.to_bits()) << 32 | i as u64)
+    };
+    order.clear();
+    order.extend(discs.iter().enumerate().filter_map(key));
+    order.par_sort_unstable();
+    found.resize_with(bands, Vec::new);
+    found.iter_mut().for_each(Vec::clear);
+    for key in order {
+        let Some(disc) = discs[(*key & u64::from(u32::MAX)) as usize] else { continue };
         // `as` rounds down and saturates
         let band = |y: f32| (y / BAND_ROWS as f32) as usize;
         if disc.y + disc.reach() + 1.0 < 0.0 {
@@ -132,7 +140,6 @@ pub(super) fn by_band(discs: &[Disc], bands: usize) -> Vec<Vec<Disc>> {
         let (first, last) = (band(disc.y - disc.reach() - 1.0), band(disc.y + disc.reach() + 1.0));
         found.iter_mut().take(last.saturating_add(1)).skip(first).for_each(|list| list.push(disc));
     }
-    found
 }
 
 impl Disc {

@@ -198,6 +198,12 @@ impl Frame {
     pub fn fragments(self, corners: &[Corner; 3], mut fragment: impl FnMut(usize, f32, [f32; 3])) {
         let [a, b, mut c] = *corners;
         let mut b = b;
+        // most triangles of a fine mesh lie between the middles of sub-pixels
+        let columns = covered([a.x, b.x, c.x], self.left, self.left + self.width);
+        let rows = covered([a.y, b.y, c.y], self.top, self.bottom);
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
         let area = edge(a, b, (c.x, c.y));
         if area == 0 {
             return;
@@ -209,8 +215,7 @@ impl Frame {
         }
         let bias = [(b, c), (c, a), (a, b)].map(|(p, q)| i64::from(!is_top_or_left(p, q)));
         let scale = 1.0 / area.abs() as f32;
-        let columns = covered([a.x, b.x, c.x], self.left, self.left + self.width);
-        for y in covered([a.y, b.y, c.y], self.top, self.bottom) {
+        for y in rows {
             let start = (centre(columns.start), centre(y));
             let mut w = [edge(b, c, start), edge(c, a, start), edge(a, b, start)];
             let step = [(b, c), (c, a), (a, b)].map(|(p, q)| -STEPS * (q.y - p.y));

@@ -24,13 +24,13 @@ pub(super) struct SeenCut {
 
 impl SeenCut {
     /// `None` if the eye lies in the plane, which then hides nothing.
-    pub fn new(cut: &Cut, camera: &Camera) -> Option<Self> {
-        let colour = shade::section(camera.turn(cut.normal).as_vec3().to_array());
+    pub fn new(cut: &Cut, material: Material, camera: &Camera) -> Option<Self> {
+        let colour = shade::section(material, camera.turn(cut.normal).as_vec3().to_array());
         camera.nearness_of(cut).map(|nearness| Self { nearness, colour })
     }
 
     /// Draws what the cut leaves of a mesh, and the face that it opens.
-    pub fn draw(&self, facets: &[&Facet], material: Material, band: &mut Band<'_>) {
+    pub fn draw(&self, facets: &[&Facet], ink: impl Fn(&Facet, [f32; 3]) -> Rgb, band: &mut Band<'_>) {
         let mut left = vec![0.0_f32; band.nearness.len()];
         let mut colour = vec![[0; 3]; band.nearness.len()];
         // how often the ray has entered the part that is cut away, less how often it has left it
@@ -43,7 +43,7 @@ impl SeenCut {
                     inside[at] += entry;
                 } else if near > left[at] {
                     left[at] = near;
-                    colour[at] = facet.colour(weights, material);
+                    colour[at] = ink(facet, weights);
                 }
             });
         }

@@ -44,20 +44,23 @@ const STONE: [f32; 3] = [203.0, 195.0, 184.0];
 /// The colour of faces that a cut has opened: that of brick.
 const SECTION: [f32; 3] = [214.0, 170.0, 146.0];
 
+/// The colour of fluid that a cut has opened.
+const WATER_SECTION: [f32; 3] = [142.0, 183.0, 217.0];
+
 /// The colour of water.
 const WATER: [f32; 3] = [72.0, 138.0, 196.0];
 
-/// The colour of a point of a surface that hides what is behind it.
-pub fn solid(material: Material, normal: [f32; 3]) -> Rgb {
+/// The colour of a point of a surface that hides what is behind it. A tint stands for the colour of the material.
+pub fn solid(material: Material, tint: Option<[f32; 3]>, normal: [f32; 3]) -> Rgb {
     match material {
-        Material::Stone | Material::Glass => stone(normal),
-        Material::Water | Material::ClearWater => water(normal),
+        Material::Stone | Material::Glass => stone(tint.unwrap_or(STONE), normal),
+        Material::Water | Material::ClearWater => water(tint.unwrap_or(WATER), normal),
     }
 }
 
 /// The colour and the opacity of a point of a clear surface. Clear things hide more of what is behind them where they are
 /// seen at a flat angle: their outline shows, and their middle does not.
-pub fn veil(material: Material, normal: [f32; 3]) -> Veil {
+pub fn veil(material: Material, tint: Option<[f32; 3]>, normal: [f32; 3]) -> Veil {
     let flat = 1.0 - normal[2].clamp(0.0, 1.0);
     let (least, rim) = match material {
         Material::Stone | Material::Water => (1.0, 0.0),
@@ -66,29 +69,33 @@ pub fn veil(material: Material, normal: [f32; 3]) -> Veil {
     };
     let gleam = power_16(dot(normal, GLEAM));
     let opacity = (least + rim + 0.35 * gleam).min(1.0);
-    let [r, g, b] = solid(material, normal);
+    let [r, g, b] = solid(material, tint, normal);
     [r, g, b, byte(255.0 * opacity)]
 }
 
 /// The colour of a point of the fluid's surface.
-fn water(normal: [f32; 3]) -> Rgb {
+fn water(colour: [f32; 3], normal: [f32; 3]) -> Rgb {
     let light = 0.56 + 0.08 * normal[1] + 0.5 * dot(normal, LAMP).max(0.0);
     let gleam = 70.0 * power_16(power_2(dot(normal, GLEAM)));
-    WATER.map(|channel| byte(channel * light + gleam))
+    colour.map(|channel| byte(channel * light + gleam))
 }
 
 /// The colour of a point of the obstacle's surface.
-fn stone(normal: [f32; 3]) -> Rgb {
+fn stone(colour: [f32; 3], normal: [f32; 3]) -> Rgb {
     // some light depends on the height of the normal, so that undersides keep their shape
     let light = AMBIENT + 0.06 * normal[1] + DIFFUSE * dot(normal, LAMP).max(0.0);
     let gleam = 14.0 * power_16(dot(normal, GLEAM));
-    STONE.map(|channel| byte(channel * light + gleam))
+    colour.map(|channel| byte(channel * light + gleam))
 }
 
 /// The colour of a face that a cut has opened. It is flat, so nobody takes it for a surface of the obstacle.
-pub fn section(normal: [f32; 3]) -> Rgb {
+pub fn section(material: Material, normal: [f32; 3]) -> Rgb {
     let light = 0.78 + 0.22 * dot(normal, LAMP).max(0.0);
-    SECTION.map(|channel| byte(channel * light))
+    let colour = match material {
+        Material::Stone | Material::Glass => SECTION,
+        Material::Water | Material::ClearWater => WATER_SECTION,
+    };
+    colour.map(|channel| byte(channel * light))
 }
 
 /// The colour of a point of a particle. The rim is darker, so that neighbours of one colour stay apart.
@@ -132,6 +139,7 @@ mod tests {
 
     #[test]
     fn faces_towards_the_lamp_are_brighter() {
+        let stone = |normal| stone(STONE, normal);
         assert!(stone(LAMP)[0] > stone([0.0, 0.0, 1.0])[0]);
         assert!(stone([0.0, 0.0, 1.0])[0] > stone([0.8, -0.6, 0.0])[0]);
         assert_eq!(ball([0.0; 3], [f32::NAN; 3]), [0; 3]);

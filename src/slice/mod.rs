@@ -18,6 +18,8 @@ mod paths;
 mod plane;
 mod png;
 mod sample;
+mod sections;
+mod sheet;
 mod svg;
 pub mod terminal;
 
@@ -32,6 +34,8 @@ pub use self::{
     isolines::{Polyline, isolines},
     plane::{Axis, Plane, Window},
     sample::{Samples, sample},
+    sections::Cut,
+    sheet::{Panel, write_sheet_png, write_sheet_svg},
 };
 use crate::field::Field;
 

@@ -17,8 +17,8 @@ use super::{
 };
 use crate::field::Field;
 
-const LEFT: f64 = 72.0;
-const TOP: f64 = 44.0;
+pub const LEFT: f64 = 72.0;
+pub const TOP: f64 = 44.0;
 const BELOW: f64 = 52.0;
 /// The colour bar: the gap before it, its width, and the room for its title.
 const BAR: [f64; 3] = [26.0, 16.0, 22.0];
@@ -27,8 +27,34 @@ const NUMBERS: [f64; 2] = [18.0, 6.8];
 /// The largest height of a band in the colour bar, and the least for a legible number.
 const BAND: [f64; 2] = [26.0, 15.0];
 
+/// A part of a document.
+pub struct Drawing {
+    pub size: DVec2,
+    pub body: String,
+}
+
+impl Drawing {
+    /// The drawing as a document.
+    pub fn document(&self, title: &str) -> String {
+        let (DVec2 { x: width, y: height }, title) = (self.size, escaped(title));
+        format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="Ubuntu, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif" font-weight="300" fill="{INK}">
+<title>{title}</title>
+<rect width="{width}" height="{height}" fill="#fff"/>
+{}</svg>
+"##,
+            self.body
+        )
+    }
+}
+
 /// The slice as an SVG document. `name` becomes part of the title. The samples must be those of the field.
 pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
+    drawing(field, name, samples, "").document(&format!("{name}, {}", samples.plane))
+}
+
+/// The slice as a part of a document. `id` keeps the patterns of several apart.
+pub fn drawing(field: &dyn Field, name: &str, samples: &Samples, id: &str) -> Drawing {
     let frame = PlotFrame::new(samples.window, DVec2::new(LEFT, TOP));
     let scale = Scale::for_samples(samples);
     let bar = Bar::new(&frame, &scale);
@@ -36,21 +62,17 @@ pub fn svg(field: &dyn Field, name: &str, samples: &Samples) -> String {
     let height = frame.bottom().max(bar.bottom) + BELOW;
 
     let mut out = format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="Ubuntu, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif" font-weight="300" fill="{INK}">
-<title>{0}, {1}</title>
-<rect width="{width}" height="{height}" fill="#fff"/>
-<text x="{LEFT}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1}</tspan></text>
+        r##"<text x="{LEFT}" y="{2}" font-size="16">{0}<tspan fill="#555" dx="9">{1}</tspan></text>
 "##,
         escaped(name),
         samples.plane,
         TOP - 16.0
     );
     bands_and_lines(&mut out, field, samples, &frame, &scale);
-    undefined_cells(&mut out, samples, &frame);
+    undefined_cells(&mut out, samples, &frame, id);
     axes::draw(&mut out, &frame, samples.plane);
     bar.draw(&mut out, &scale);
-    out.push_str("</svg>\n");
-    out
+    Drawing { size: DVec2::new(width, height), body: out }
 }
 
 fn bands_and_lines(out: &mut String, field: &dyn Field, samples: &Samples, frame: &PlotFrame, scale: &Scale) {
@@ -137,7 +159,7 @@ fn labels(
 
 /// Draws grey hatching over every cell with a corner that has no value. Cells side by side make
 /// one rectangle.
-fn undefined_cells(out: &mut String, samples: &Samples, frame: &PlotFrame) {
+fn undefined_cells(out: &mut String, samples: &Samples, frame: &PlotFrame, id: &str) {
     if samples.undefined() == 0 {
         return;
     }
@@ -158,8 +180,8 @@ fn undefined_cells(out: &mut String, samples: &Samples, frame: &PlotFrame) {
     let [r, g, b] = UNDEFINED;
     let _ = writeln!(
         out,
-        r##"<pattern id="undefined" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="6" height="6" fill="rgb({r},{g},{b})"/><rect width="1.2" height="6" fill="#8c8c8c"/></pattern>
-<path d="{path}" fill="url(#undefined)" shape-rendering="crispEdges"/>"##
+        r##"<pattern id="undefined{id}" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="6" height="6" fill="rgb({r},{g},{b})"/><rect width="1.2" height="6" fill="#8c8c8c"/></pattern>
+<path d="{path}" fill="url(#undefined{id})" shape-rendering="crispEdges"/>"##
     );
 }
 
@@ -236,7 +258,7 @@ impl Bar {
     }
 }
 
-fn on_page(frame: &PlotFrame, points: &[DVec2]) -> Vec<DVec2> {
+pub fn on_page(frame: &PlotFrame, points: &[DVec2]) -> Vec<DVec2> {
     points.iter().map(|&uv| frame.page(uv)).collect()
 }
 

@@ -18,6 +18,7 @@
 //! | `operations` | R₀ and other operations that are functions of a file, each written once for all languages |
 //! | `statements` | a graph as a list of declarations |
 //! | `c`, `c_blocks`, `c_chunks`, `rust`, `shader` | whole files: heads, parameters, one point and columns |
+//! | `march` | functions for a ray-marcher: sign, gradient and range of ω |
 //! | `object`, `c_object` | object code with its header |
 //! | `names` | which names a file may use |
 //!
@@ -29,6 +30,7 @@ mod c_blocks;
 mod c_chunks;
 mod c_object;
 mod language;
+mod march;
 mod names;
 mod object;
 mod operations;
@@ -37,6 +39,7 @@ mod rust;
 mod shader;
 mod statements;
 
+pub use march::{Marched, marched};
 pub use object::{Object, ObjectError, object};
 
 use std::fmt;

@@ -138,18 +138,9 @@ fn function(
         if *question == Question::Gradient { ": (gradient, omega)" } else { "" }
     ));
     lines.push((shader.head)(result, &name, &arguments.join(", ")));
-    if let Some((graph, roots)) = &program.uniforms {
-        let forms = Forms::default();
-        let writer = Writer { values: "s", ..writer };
-        let made = writer.statements(&Part { graph, inputs: &[], outputs: roots, forms: &forms })?;
-        operations.extend(made.operations);
-        lines.push("    // what depends on time and params alone".into());
-        lines.extend(made.lines.iter().map(|line| format!("    {line}")));
-        let values = made.outputs.iter().enumerate();
-        lines.extend(
-            values.map(|(i, text)| format!("    {}", (language.declare)(number, &format!("u{i}"), text))),
-        );
-    }
+    let (hoisted, called) = hoisted(program, &writer)?;
+    lines.extend(hoisted);
+    operations.extend(called);
     lines.extend(statements.iter().map(|line| format!("    {line}")));
     lines.push(match question {
         Question::Gradient => {
@@ -161,8 +152,25 @@ fn function(
     Ok(lines)
 }
 
+/// The numbers that depend on time and params alone, and the functions of the file that they call.
+pub(super) fn hoisted(
+    program: &Program,
+    writer: &Writer<'_>,
+) -> Result<(Vec<String>, BTreeSet<Operation>), SourceError> {
+    let Some((graph, roots)) = &program.uniforms else { return Ok(Default::default()) };
+    let (forms, number) = (Forms::default(), writer.language.number(PRECISION));
+    let writer = Writer { values: "s", ..*writer };
+    let made = writer.statements(&Part { graph, inputs: &[], outputs: roots, forms: &forms })?;
+    let mut lines = vec!["    // what depends on time and params alone".to_string()];
+    lines.extend(made.lines.iter().map(|line| format!("    {line}")));
+    let values = made.outputs.iter().enumerate();
+    let declared = |(i, text): (usize, &String)| (writer.language.declare)(number, &format!("u{i}"), text);
+    lines.extend(values.map(|value| format!("    {}", declared(value))));
+    Ok((lines, made.operations))
+}
+
 /// The parameters of every function: the point, the time of a solid that moves, open params.
-fn arguments(file: &File<'_>, shader: &Shader) -> Vec<String> {
+pub(super) fn arguments(file: &File<'_>, shader: &Shader) -> Vec<String> {
     let mut arguments = vec![(shader.parameter)(shader.vectors[1], "p")];
     if file.moves {
         arguments.push((shader.parameter)(shader.language.number(PRECISION), "t"));

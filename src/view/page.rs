@@ -23,6 +23,7 @@ const PROGRAM: &[&str] = &[
     include_str!("page/shaders.js"),
     include_str!("page/slice.js"),
     include_str!("page/motion.js"),
+    include_str!("page/exact.js"),
     include_str!("page/scene.js"),
     include_str!("page/camera.js"),
     include_str!("page/overlay.js"),
@@ -36,7 +37,13 @@ const PROGRAM: &[&str] = &[
 /// A self-contained document that is being written.
 pub struct Page<'a> {
     out: &'a mut dyn Write,
+    /// Blocks that are not written yet, each behind its length.
+    waiting: Vec<u8>,
 }
+
+/// Blocks that are written together have about this many bytes: browsers take milliseconds for each group, and runs may have
+/// very many small frames.
+const GROUP: usize = 1 << 18;
 
 impl<'a> Page<'a> {
     /// Begins a document with what it shows besides blocks, which becomes JSON.
@@ -51,18 +58,30 @@ impl<'a> Page<'a> {
         let json = serde_json::to_string(setting)?.replace('<', "\\u003c");
         out.write_all(json.as_bytes())?;
         out.write_all(b"</script>\n")?;
-        Ok(Self { out })
+        Ok(Self { out, waiting: Vec::new() })
     }
 
-    /// Adds a block, deflated and as base64.
+    /// Adds a block, deflated and as base64, together with those around it if it is small.
     ///
     /// # Errors
-    /// Those of the stream.
+    /// Those of the stream, and blocks of 4 GiB and more.
     pub fn block(&mut self, block: &[u8]) -> io::Result<()> {
+        let length = u32::try_from(block.len()).map_err(io::Error::other)?;
+        self.waiting.extend(length.to_le_bytes());
+        self.waiting.extend(block);
+        if self.waiting.len() >= GROUP { self.group() } else { Ok(()) }
+    }
+
+    /// Writes the blocks that wait.
+    fn group(&mut self) -> io::Result<()> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
         self.out.write_all(b"<script type=\"application/octet-stream\">")?;
         let base64 = EncoderWriter::new(&mut *self.out, &BASE64_STANDARD);
         let mut deflated = DeflateEncoder::new(base64, Compression::new(7));
-        deflated.write_all(block)?;
+        deflated.write_all(&self.waiting)?;
+        self.waiting.clear();
         deflated.finish()?.finish()?;
         self.out.write_all(b"</script>\n")
     }
@@ -71,7 +90,8 @@ impl<'a> Page<'a> {
     ///
     /// # Errors
     /// Those of the stream.
-    pub fn end(self) -> io::Result<()> {
+    pub fn end(mut self) -> io::Result<()> {
+        self.group()?;
         let (_, tail) = parts();
         self.out.write_all(tail.replace("/*PROGRAM*/", &PROGRAM.concat()).as_bytes())
     }

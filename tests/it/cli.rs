@@ -226,6 +226,28 @@ fn slices_are_pictures() {
     let mut reader = png::Decoder::new(std::io::BufReader::new(picture)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     assert!(reader.next_frame(&mut pixels).unwrap().width > 300);
+    // several planes and solids in one sheet, with a legend where several are cut
+    let sheet = |words: &[&str]| {
+        let words = [&["check"][..], words, &["-o", "sheet.svg"]].concat();
+        rfm(folder.path(), &words).expect(0);
+        std::fs::read_to_string(folder.path().join("sheet.svg")).unwrap()
+    };
+    let planes = sheet(&[pawn, "--slice", "y=1.5,z=0.5,x=1.5"]);
+    assert_eq!(["y = 1.5<", "z = 0.5<", "x = 1.5<"].map(|plane| planes.matches(plane).count()), [1; 3]);
+    let paddle = root().join("examples/paddle.rfm");
+    let paddle = paddle.to_str().unwrap();
+    let solids = sheet(&[paddle, "-s", "paddle,stirrer", "--slice", "z=0.2,y=0.05"]);
+    for (text, count) in [(">paddle<", 2), (">stirrer<", 2), ("z = 0.2<", 1), ("fill=\"url(#hatch1-1)\"", 2)]
+    {
+        assert_eq!(solids.matches(text).count(), count, "{text}");
+    }
+    for words in [
+        &["check", pawn, "--slice", "y=1.5,z=1", "--term"][..],
+        &["check", pawn, "--slice", "y=1.5,z=1", "--window", "0,0,1,1"],
+        &["check", paddle, "--slice", "z=0.2", "-s", "paddle,paddel"],
+    ] {
+        rfm(folder.path(), words).expect(2);
+    }
     let term = rfm(folder.path(), &["check", pawn, "--slice", "y=1.5", "--term"]).expect(0);
     assert!(term.stdout.lines().count() > 10 && !term.stdout.contains('\x1b'));
 }

@@ -135,6 +135,49 @@ fn colours_have_the_range_that_is_asked_for() {
 }
 
 #[test]
+fn the_surface_of_the_fluid_has_the_colours_of_particles_and_is_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    run(here);
+    rfm(here, &["mesh", "drop.out", "--fluid", "--frames", "5..6"]).expect(0);
+    let picture = |flags: &[&str]| {
+        let mut arguments = vec!["render", "drop.out", "-o", "one.png", "--frames", "5", "--size", "640x480"];
+        arguments.extend(flags);
+        rfm(here, &arguments).expect(0);
+        here.join("one.png")
+    };
+    // the middle of the fluid, which a cut opens, is paler than its surface
+    let opened = |picture: &Path| {
+        let pixels = pixels(&std::fs::read(picture).unwrap());
+        let is_pale = |p: &&[u8]| p[0] > 100 && (50..90).contains(&(i32::from(p[2]) - i32::from(p[0])));
+        pixels.chunks(3).filter(is_pale).count()
+    };
+    let [blue, red, ..] = shares(&picture(&["--surface=opaque", "--cut", "none"]));
+    assert!(blue > 0.01 && red == 0.0, "water: {blue} {red}");
+    let whole = opened(&here.join("one.png"));
+    let cut = opened(&picture(&["--surface=opaque", "--cut", "y=0.5"]));
+    assert!(cut > 1500 && cut > 10 * whole, "{cut} {whole}");
+    for kind in ["--surface=opaque", "--surface"] {
+        let red = ["--by", "speed", "--range", "-9..-8", "--cut", "none"];
+        let [blue, red, ..] = shares(&picture(&[&[kind][..], &red].concat()));
+        assert!(blue < 0.001 && (red > 0.01 || kind == "--surface"), "{kind}: {blue} {red}");
+    }
+    // a run draws its own
+    let run = |out: &str, flags: &[&str]| {
+        let first = ["run", "drop.rfm", "-o", out, "--steps", "1"];
+        rfm(here, &[&first[..], flags].concat()).expect(0);
+        std::fs::read(here.join(out).join("pictures/frame_000000.png")).unwrap()
+    };
+    let blue = |file: &[u8]| {
+        let is_blue = |p: &&[u8]| i32::from(p[2]) > i32::from(p[0]) + 70;
+        pixels(file).chunks(3).filter(is_blue).count()
+    };
+    let (particles, surface) = (run("a", &[]), run("b", &["--surface=opaque"]));
+    assert!(particles != surface && blue(&surface) > 5000, "{}", blue(&surface));
+    assert!(run("c", &["--surface"]) != surface);
+}
+
+#[test]
 fn obstacles_are_hidden_by_name_and_cut() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

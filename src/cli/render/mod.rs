@@ -21,7 +21,7 @@ mod solid;
 
 use super::args::Shared;
 use super::failure::Failure;
-pub(super) use options::Render;
+pub(super) use options::{Render, Surface};
 
 pub(super) fn run(shared: &Shared, options: &Render) -> Result<(), Failure> {
     if options.subject.is_dir() { scene::run(shared, options) } else { solid::run(shared, options) }

@@ -64,8 +64,8 @@ pub(in crate::cli) struct Render {
     /// How many times as large as if the whole box were seen [default: that of --camera, or 1]
     #[arg(long, value_name = "FACTOR", value_parser = zoom)]
     pub zoom: Option<f64>,
-    /// Cut obstacles open at a plane, the side towards the eye being taken away; `auto` cuts those that hide much of the
-    /// fluid of the first frame, `none` none [default: auto; of a solid none]
+    /// Cut obstacles and the surface of the fluid open at a plane, the side towards the eye being taken away; `auto` cuts
+    /// obstacles that hide much of the fluid of the first frame, `none` none [default: auto; of a solid none]
     #[arg(long, value_name = "AXIS=VALUE|auto|none", value_parser = cut)]
     pub cut: Option<CutFlag>,
     /// The text over the picture [default: the run, its scene and what was cut]
@@ -84,7 +84,7 @@ pub(in crate::cli) struct Render {
     /// Draw the particles, too, within the surface
     #[arg(long, help_heading = "Runs", requires = "surface")]
     pub particles: bool,
-    /// Colour particles by this array of the frames [default: speed]
+    /// Colour particles by this array of the frames, and the surface if there is one [default: speed, and water]
     #[arg(long, help_heading = "Runs", value_name = "ARRAY")]
     pub by: Option<String>,
     /// The values at the ends of the colours, in SI units [default: those of the chosen frames without the outermost

@@ -14,14 +14,15 @@ use crate::cli::args::Shared;
 use crate::cli::failure::{Failure, note};
 use crate::cli::output::{self, Shown};
 use crate::cli::saved::{self, RunFigures};
-use crate::cli::scenery::{self, Drawn};
+use crate::cli::scenery::{self, Drawn, half_towards_eye};
 use crate::cli::survey::Survey;
+use crate::cli::values::CutFlag;
 use rfm::diagnostic::nearest;
 use rfm::field::Points;
-use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh};
+use rfm::fluid_surface::{FrameEntry, read_arrays, read_mesh, values_at};
 use rfm::geom::Aabb;
 use rfm::mesh::Mesh;
-use rfm::render::{Backdrop, Caption, Image, Legend, Moving, ParticlesView, Scale};
+use rfm::render::{Backdrop, Caption, Cut, Image, Legend, MeshView, Moving, ParticlesView, Scale};
 use rfm::view::{Array, Levels};
 
 /// Pictures in a second of a film.
@@ -69,6 +70,9 @@ struct RunScene {
     /// The file of the fluid's surface in each frame, and how it is drawn; none where it is not.
     surfaces: Vec<PathBuf>,
     surface: Option<Surface>,
+    /// Whether the surface has the colours of particles, and the plane that cuts it open.
+    tinted: bool,
+    cut: Option<Cut>,
     balls: bool,
     /// The scene without particles, and without obstacles that move.
     still: Backdrop,
@@ -108,6 +112,11 @@ impl RunScene {
             None => Vec::new(),
         };
         let balls = options.surface.is_none() || options.particles;
+        let tinted = options.surface.is_some() && options.by.is_some();
+        let cut = match &options.cut {
+            Some(CutFlag::Plane(plane)) => Some(half_towards_eye(plane, &camera)),
+            Some(CutFlag::Auto | CutFlag::None) | None => None,
+        };
         let stands = meshes.len() <= 1 && mesh_of.iter().all(|mesh| *mesh == mesh_of[0]);
         let bodies = match meshes.first() {
             Some(file) if stands => bodies_of(file, drawn.len())?,
@@ -117,7 +126,7 @@ impl RunScene {
         let label = if unit.is_empty() { shown.name.clone() } else { format!("{}, {unit}", shown.name) };
         let map = options.colours.unwrap_or_default();
         let scale = Scale { label: &label, low: range.low, high: range.high, map };
-        let legend = Legend { title: &title, scale: balls.then_some(scale) };
+        let legend = Legend { title: &title, scale: (balls || tinted).then_some(scale) };
         let still = scenery::backdrop(&camera, &domain, &legend, drawn.iter().copied().zip(&bodies))?;
         Ok(Self {
             folder: folder.to_path_buf(),
@@ -131,6 +140,8 @@ impl RunScene {
             range,
             surfaces,
             surface: options.surface,
+            tinted,
+            cut,
             balls,
             still: still.coloured(&scale),
             spent: AtomicU64::new(0),
@@ -148,17 +159,22 @@ impl RunScene {
             None => Vec::new(),
         };
         let water = self.surfaces.get(k).map(|file| surface_of(file)).transpose()?;
+        let tints = match &water {
+            // as far as particles reach in the surface
+            Some(water) if self.tinted => values_at(&water.positions, &points, &values, 4.0 * self.radius),
+            Some(_) | None => Vec::new(),
+        };
         let [x, y, z] = [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect::<Vec<f64>>());
         let particles =
             ParticlesView { positions: Points::new(&x, &y, &z), values: &values, radius: self.radius };
         let started = Instant::now();
         let bodies = scenery::sharp(self.drawn.iter().copied().zip(&bodies));
         let mut meshes = scenery::views(&bodies);
-        meshes.extend(
-            self.surface
-                .zip(water.as_ref())
-                .map(|(surface, mesh)| scenery::surface(mesh, surface.material())),
-        );
+        meshes.extend(self.surface.zip(water.as_ref()).map(|(surface, mesh)| MeshView {
+            values: &tints,
+            cut: self.cut,
+            ..scenery::surface(mesh, surface.material())
+        }));
         let moving = Moving { meshes: &meshes, particles, balls: self.balls };
         let image = self.still.frame_with(&moving, &Caption { time: entry.time, step: None });
         self.spent.fetch_add(started.elapsed().as_micros() as u64, Ordering::Relaxed);
@@ -220,9 +236,9 @@ fn surfaces(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Vec<PathBu
             folder.join("surface").shown()
         )));
     }
-    let known = saved::listed(&list)?;
+    let known = saved::by_time(saved::listed(&list)?);
     let of_frame = |(number, entry): &(usize, FrameEntry)| {
-        let found = known.iter().find(|surface| surface.time == entry.time);
+        let found = known.get(&entry.time.to_bits());
         let file =
             found.map(|surface| folder.join("surface").join(&surface.file)).filter(|file| file.is_file());
         file.ok_or_else(|| {

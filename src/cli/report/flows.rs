@@ -275,13 +275,13 @@ impl Study<'_> {
 
 /// The fluid of a run, where it is now.
 fn seen(file: &Path, experiment: &Experiment, simulation: &Simulation) -> Result<Figure, Failure> {
-    let look = Look { file, camera: None, cut: None, hide: &[], glass: &[] };
+    let look = Look { file, camera: None, cut: None, hide: &[], glass: &[], surface: None };
     let solids = experiment.bodies().iter().map(|body| body.solid.clone()).collect();
     let bodies = Bodies::of(solids, experiment.domain(), CELLS);
     let mut pictures = Pictures::new(look, experiment, &bodies.meshes_at(0.0)?)?;
     pictures.show(&bodies.meshes_at(simulation.time())?);
     let mut png = Vec::new();
-    pictures.image(simulation).write_png(&mut png)?;
+    pictures.image(simulation)?.write_png(&mut png)?;
     let (method, particles) = (experiment.parameters().method.name(), simulation.particles().len());
     let time = simulation.time();
     Ok(Figure::png(

@@ -223,7 +223,7 @@ impl FrameCost {
             if bodies.move_about() {
                 pictures.show(&meshes);
             }
-            pictures.image(simulation).write_png(&mut out)?;
+            pictures.image(simulation)?.write_png(&mut out)?;
             seconds += started.elapsed().as_secs_f64();
             bytes += out.len() as f64;
         }

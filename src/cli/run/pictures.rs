@@ -13,12 +13,14 @@ use super::super::args::{CutFlag, Run};
 use super::super::values::CameraFlag;
 use super::super::{Failure, output};
 use crate::cli::output::Shown;
+use crate::cli::render::Surface;
 use crate::cli::scenery::{self, Drawn, half, out_of_the_way};
 use rfm::field::Walls;
+use rfm::fluid_surface::Reconstruction;
 use rfm::geom::Aabb;
 use rfm::lower::Opening;
 use rfm::mesh::Mesh;
-use rfm::render::{self, Camera, Scale};
+use rfm::render::{self, Camera, Cut, MeshView, Scale};
 use rfm::sph::Simulation;
 use rfm::{Experiment, Solid};
 
@@ -41,13 +43,15 @@ pub(in crate::cli) struct Look<'a> {
     pub cut: Option<&'a CutFlag>,
     pub hide: &'a [String],
     pub glass: &'a [String],
+    /// How the surface of the fluid is drawn, if it is.
+    pub surface: Option<Surface>,
 }
 
 impl<'a> Look<'a> {
     /// What the flags of a run ask for.
     pub fn of(options: &'a Run) -> Self {
-        let Run { file, camera, cut, hide, glass, .. } = options;
-        Self { file, camera: *camera, cut: cut.as_ref(), hide, glass }
+        let Run { file, camera, cut, hide, glass, surface, .. } = options;
+        Self { file, camera: *camera, cut: cut.as_ref(), hide, glass, surface: *surface }
     }
 }
 
@@ -60,6 +64,8 @@ pub(in crate::cli) struct Pictures {
     domain: Aabb,
     radius: f64,
     bodies: Vec<Body>,
+    /// How the surface of the fluid is drawn in place of the particles, and the plane that cuts it open.
+    surface: Option<(Surface, Option<Cut>)>,
     pub(in crate::cli) count: usize,
 }
 
@@ -87,7 +93,8 @@ impl Pictures {
         };
         let solids = experiment.bodies().iter().map(|body| &body.solid);
         let bodies: Vec<Body> = solids.zip(opened).map(body).collect();
-        let legend = render::Legend { title: &title, scale: Some(Scale::speeds(fastest)) };
+        let scale = look.surface.is_none().then(|| Scale::speeds(fastest));
+        let legend = render::Legend { title: &title, scale };
         let still = bodies.iter().zip(meshes).filter(|(body, _)| !body.solid.moves());
         let scene =
             scenery::backdrop(&camera, &domain, &legend, still.map(|(body, mesh)| (body.drawn, mesh)))?;
@@ -97,6 +104,7 @@ impl Pictures {
             domain,
             radius: 0.5 * experiment.parameters().spacing(),
             bodies,
+            surface: look.surface.map(|surface| (surface, plane(look, experiment, &camera))),
             count: 0,
         })
     }
@@ -107,13 +115,13 @@ impl Pictures {
     }
 
     pub fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
-        let image = self.image(simulation);
+        let image = self.image(simulation)?;
         output::write(path, |mut out| image.write_png(&mut out))?;
         self.count += 1;
         Ok(())
     }
 
-    pub fn image(&self, simulation: &Simulation) -> render::Image {
+    pub fn image(&self, simulation: &Simulation) -> Result<render::Image, Failure> {
         let particles = simulation.particles();
         let speeds: Vec<f64> = particles.velocity.iter().map(DVec3::length).collect();
         let places: Vec<DVec3> = particles.position.iter().collect();
@@ -123,9 +131,24 @@ impl Pictures {
             values: &speeds,
             radius: self.radius,
         };
-        let moving = render::Moving { meshes: &scenery::views(&self.moving), particles, balls: true };
         let moment = render::Caption { time: simulation.time(), step: Some(simulation.steps()) };
-        self.scene.frame_with(&moving, &moment)
+        let mut meshes = scenery::views(&self.moving);
+        let water = self.water(simulation)?;
+        if let (Some((surface, cut)), Some(water)) = (self.surface, &water) {
+            meshes.push(MeshView { cut, ..scenery::surface(water, surface.material()) });
+        }
+        let moving = render::Moving { meshes: &meshes, particles, balls: self.surface.is_none() };
+        Ok(self.scene.frame_with(&moving, &moment))
+    }
+
+    /// The surface of the fluid as it is now, if it is drawn.
+    fn water(&self, simulation: &Simulation) -> Result<Option<Mesh>, Failure> {
+        if self.surface.is_none() {
+            return Ok(None);
+        }
+        let places = simulation.particles().position.iter().filter(|p| p.is_finite());
+        let made = Reconstruction::of_radius(self.radius).mesh(&places.collect::<Vec<_>>());
+        made.map(Some).map_err(|error| Failure::usage(format!("--surface: {error}")))
     }
 
     /// The places with every ball in front of the walls: a particle is a point and may touch them, and half of its ball
@@ -173,6 +196,15 @@ fn camera(look: Look<'_>, experiment: &Experiment, size: (u32, u32)) -> Result<C
         None => (stated.camera, (stated.look_at, stated.zoom)),
     };
     scenery::camera(&experiment.domain(), towards_eye, aim, size)
+}
+
+/// The plane that the flags or the scene state for all that is drawn.
+fn plane(look: Look<'_>, experiment: &Experiment, camera: &Camera) -> Option<Cut> {
+    match (look.cut, experiment.scene().picture.cut) {
+        (Some(CutFlag::Plane(plane)), _) => Some(scenery::half_towards_eye(plane, camera)),
+        (None, Opening::Half { axis, at, below }) => Some(half(DVec3::AXES[axis], at, below)),
+        (Some(CutFlag::Auto | CutFlag::None), _) | (None, Opening::Automatic | Opening::None) => None,
+    }
 }
 
 /// How each body is drawn.

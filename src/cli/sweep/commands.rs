@@ -57,8 +57,8 @@ pub(in crate::cli) fn check(shared: &Shared, options: &Check) -> Result<(), Fail
     let again = [options.again.resume, options.again.force];
     task(shared, Command::Check, file, &options.sweep, again, format!("{single:?}")).go(|shared, folder| {
         let slice = PathBuf::from("slice.svg");
-        let output =
-            options.slice.and_then(|_| within(folder, Some(options.output.as_ref().unwrap_or(&slice))));
+        let wanted = (!options.slice.is_empty()).then(|| options.output.as_ref().unwrap_or(&slice));
+        let output = wanted.and_then(|output| within(folder, Some(output)));
         checks::run(shared, &Check { output, ..single.clone() })
     })
 }

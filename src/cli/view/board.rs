@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 use tungstenite::{Bytes, Message};
 
+use super::exact::Field;
 use rfm::view::{Plot, Setting};
 
 /// The longest time after which a page that waits looks whether it is still wanted.
@@ -16,6 +17,7 @@ const LOOK: Duration = Duration::from_millis(500);
 pub(super) enum Topic {
     Setting,
     Mesh,
+    Field,
     Slice,
     Frame,
     Plots,
@@ -23,7 +25,8 @@ pub(super) enum Topic {
 }
 
 impl Topic {
-    const ALL: [Self; 6] = [Self::Setting, Self::Mesh, Self::Slice, Self::Frame, Self::Plots, Self::Status];
+    const ALL: [Self; 7] =
+        [Self::Setting, Self::Mesh, Self::Field, Self::Slice, Self::Frame, Self::Plots, Self::Status];
 
     /// Whether the page says when it has taken such a message.
     pub fn is_answered(self) -> bool {
@@ -48,7 +51,7 @@ pub(super) struct Status {
 struct News {
     setting: Option<Setting>,
     /// For each topic the newest message, with the number of messages of the topic so far.
-    newest: [(u64, Option<Message>); 6],
+    newest: [(u64, Option<Message>); 7],
 }
 
 /// The newest of everything that pages are told.
@@ -59,7 +62,7 @@ pub(super) struct Board {
 }
 
 /// What a page has been sent: for each topic the number of its newest message.
-pub(super) type Sent = [u64; 6];
+pub(super) type Sent = [u64; 7];
 
 impl Board {
     /// What the page shows besides frames; `None` until the file has been read for the first time.
@@ -75,6 +78,10 @@ impl Board {
 
     pub fn set_status(&self, status: &Status) {
         self.put(Topic::Status, told("status", status));
+    }
+
+    pub fn set_field(&self, field: &Field) {
+        self.put(Topic::Field, told("field", field));
     }
 
     pub fn set_plots(&self, plots: Vec<Plot>) {

@@ -13,6 +13,7 @@
 mod board;
 mod browser;
 mod command;
+mod exact;
 mod folder;
 mod model;
 mod plots;

@@ -153,13 +153,8 @@ impl Subject {
             Some(scene) => (self.solids_of(checked, scene)?, scene.domain),
             None => {
                 let solid = self.solid_of(checked)?;
-                let bounds = solid.bounds().aabb().ok_or_else(|| {
-                    format!(
-                        "`{}` is empty, or could not be proven to end: there is nothing to show",
-                        solid.name()
-                    )
-                })?;
-                (vec![solid], bounds.grown(1e-3 * bounds.size().max_element()))
+                let domain = around(&solid)?;
+                (vec![solid], domain)
             }
         };
         let cells = match detail {
@@ -170,6 +165,17 @@ impl Subject {
         let meshes = bodies.meshes_at(0.0).map_err(message)?;
         let mesh = pack_mesh(&split_creases(&Mesh::joined(&meshes)), run);
         Ok(Standing { mesh, solids: bodies.solids().to_vec(), domain })
+    }
+
+    /// The box in which a scene or a solid is shown.
+    ///
+    /// # Errors
+    /// Why a solid has none.
+    pub fn domain(&self, checked: &Checked) -> Result<Aabb, String> {
+        match &checked.scene {
+            Some(scene) => Ok(scene.domain),
+            None => around(&self.solid_of(checked)?),
+        }
     }
 
     fn solids_of(&self, checked: &Checked, scene: &Scene) -> Result<Vec<Solid>, String> {
@@ -239,6 +245,14 @@ impl Subject {
             plots: running.is_none().then(Vec::new),
         }
     }
+}
+
+/// The box in which a solid is shown.
+fn around(solid: &Solid) -> Result<Aabb, String> {
+    let bounds = solid.bounds().aabb().ok_or_else(|| {
+        format!("`{}` is empty, or could not be proven to end: there is nothing to show", solid.name())
+    })?;
+    Ok(bounds.grown(1e-3 * bounds.size().max_element()))
 }
 
 impl Checked {
@@ -317,7 +331,7 @@ fn plain(diagnostics: &Diagnostics) -> String {
     render(diagnostics, Style::Plain)
 }
 
-fn refused(error: Error) -> String {
+pub(super) fn refused(error: Error) -> String {
     match error {
         Error::Diagnostics(diagnostics) => plain(&diagnostics),
         other => other.to_string(),

@@ -14,6 +14,7 @@ use super::super::args::{Shared, View};
 use super::super::failure::Failure;
 use super::board::{Board, Status, Topic};
 use super::command::{Command, settled};
+use super::exact::Field;
 use super::model::{Checked, Detail, Running, Stamp, Standing, Subject};
 use super::section;
 use rfm::Solid;
@@ -87,8 +88,8 @@ impl Session {
         };
         // a page that is asked for before the first run needs something to show
         let checked = session.subject.checked(&session.values).ok();
-        let scene = checked.as_ref().and_then(|checked| checked.scene.as_ref());
-        let bounds = scene.map_or(Aabb::new(DVec3::ZERO, DVec3::ONE), |scene| scene.domain);
+        let bounds = checked.as_ref().and_then(|checked| session.subject.domain(checked).ok());
+        let bounds = bounds.unwrap_or(Aabb::new(DVec3::ZERO, DVec3::ONE));
         session.board.set_setting(session.subject.setting(checked.as_ref(), &bounds, None));
         let (send, receive) = channel();
         thread::Builder::new()
@@ -242,6 +243,8 @@ impl Session {
             self.status.playing &= self.running.is_some();
             return;
         };
+        let standing = self.standing.as_ref().map_or(&[][..], |(solids, _)| solids);
+        self.board.set_field(&Field::of(&checked, standing));
         let running = checked.scene.as_ref().map(|scene| self.subject.start(&checked, scene)).transpose();
         match running {
             Ok(running) => {
@@ -396,7 +399,7 @@ impl Session {
                 format!("{state} · step {}{speed}{found}", running.simulation.steps())
             }
         };
-        if self.running.is_some() || self.status.error.is_some() {
+        if self.checked.is_some() || self.status.error.is_some() {
             self.status.text = state;
         }
         self.board.set_status(&self.status);

@@ -16,68 +16,77 @@ const CREASE: f64 = 0.866;
 
 /// The mesh with a vertex for each smooth piece of the surface around every vertex.
 pub fn split_creases(mesh: &Mesh) -> Mesh {
-    let faces: Vec<DVec3> = mesh.triangles.iter().map(|t| twice_area(mesh, *t)).collect();
+    let faces: Vec<Option<DVec3>> = mesh.triangles.iter().map(|t| unit(twice_area(mesh, *t))).collect();
     let corners = smooth_corners(mesh, &faces);
     let mut split = Mesh { caps: Vec::new(), ..mesh.clone() };
     // for each vertex the piece that keeps its number
     let mut first: Vec<Option<u32>> = vec![None; mesh.positions.len()];
     let mut others: HashMap<u32, u32, FxBuildHasher> = HashMap::default();
-    let mut sums: Vec<DVec3> = vec![DVec3::ZERO; mesh.positions.len()];
     let mut is_split = vec![false; mesh.positions.len()];
     for (number, triangle) in mesh.triangles.iter().enumerate() {
         for (k, &v) in triangle.iter().enumerate() {
             let piece = corners[3 * number + k];
-            let own = *first[v as usize].get_or_insert(piece);
-            let vertex = if piece == own {
-                v
-            } else {
-                is_split[v as usize] = true;
-                *others.entry(piece).or_insert_with(|| {
-                    split.positions.push(mesh.positions[v as usize]);
-                    split.normals.push(mesh.normals[v as usize]);
-                    sums.push(DVec3::ZERO);
-                    is_split.push(true);
-                    split.positions.len() as u32 - 1
-                })
-            };
-            split.triangles[number][k] = vertex;
-            sums[vertex as usize] += angle(mesh, *triangle, k) * unit(faces[number]).unwrap_or(DVec3::ZERO);
+            if piece == *first[v as usize].get_or_insert(piece) {
+                continue;
+            }
+            is_split[v as usize] = true;
+            split.triangles[number][k] = *others.entry(piece).or_insert_with(|| {
+                split.positions.push(mesh.positions[v as usize]);
+                split.normals.push(mesh.normals[v as usize]);
+                is_split.push(true);
+                split.positions.len() as u32 - 1
+            });
         }
     }
-    for (normal, sum) in
-        split.normals.iter_mut().zip(&sums).zip(&is_split).filter(|(_, s)| **s).map(|(n, _)| n)
-    {
-        *normal = unit(*sum).unwrap_or(*normal);
+    let mut sums: Vec<DVec3> = vec![DVec3::ZERO; split.positions.len()];
+    for ((triangle, whole), face) in split.triangles.iter().zip(&mesh.triangles).zip(&faces) {
+        for (k, &v) in triangle.iter().enumerate().filter(|(_, v)| is_split[**v as usize]) {
+            sums[v as usize] += angle(mesh, *whole, k) * face.unwrap_or(DVec3::ZERO);
+        }
     }
+    let new = split.normals.iter_mut().zip(&sums).zip(&is_split).filter(|(_, is_split)| **is_split);
+    new.for_each(|((normal, sum), _)| *normal = unit(*sum).unwrap_or(*normal));
     split
 }
 
 /// For each corner of each triangle the number of its piece: corners at one vertex have the same number if their
 /// triangles are joined across edges without a crease.
-fn smooth_corners(mesh: &Mesh, faces: &[DVec3]) -> Vec<u32> {
+fn smooth_corners(mesh: &Mesh, faces: &[Option<DVec3>]) -> Vec<u32> {
     let mut pieces: Vec<u32> = (0..3 * mesh.triangles.len() as u32).collect();
-    // the half edges that wait for their neighbour, with the corners at their two ends
-    let mut waiting: HashMap<(u32, u32), (usize, usize), FxBuildHasher> = HashMap::default();
-    for (number, triangle) in mesh.triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
-            let here = (3 * number + k, 3 * number + (k + 1) % 3);
-            let Some(there) = waiting.remove(&(to, from)) else {
-                waiting.insert((from, to), here);
-                continue;
-            };
-            if is_smooth(faces[number], faces[there.0 / 3]) {
-                join(&mut pieces, here.0, there.1);
-                join(&mut pieces, here.1, there.0);
-            }
+    let following = |corner: u32| corner - corner % 3 + (corner % 3 + 1) % 3;
+    let vertex = |corner: u32| mesh.triangles[corner as usize / 3][corner as usize % 3];
+    // the half edges that wait for their neighbour, as the corners that they begin at, in a list for each vertex
+    let mut waiting: Vec<u32> = vec![NONE; mesh.positions.len()];
+    let mut behind: Vec<u32> = vec![NONE; pieces.len()];
+    for here in 0..pieces.len() as u32 {
+        let (from, to) = (vertex(here), vertex(following(here)));
+        // the neighbour runs along the edge the other way
+        let (mut before, mut there) = (NONE, waiting[to as usize]);
+        while there != NONE && vertex(following(there)) != from {
+            (before, there) = (there, behind[there as usize]);
+        }
+        if there == NONE {
+            behind[here as usize] = std::mem::replace(&mut waiting[from as usize], here);
+            continue;
+        }
+        match before {
+            NONE => waiting[to as usize] = behind[there as usize],
+            before => behind[before as usize] = behind[there as usize],
+        }
+        if is_smooth(faces[here as usize / 3], faces[there as usize / 3]) {
+            join(&mut pieces, here as usize, following(there) as usize);
+            join(&mut pieces, following(here) as usize, there as usize);
         }
     }
     (0..pieces.len()).map(|corner| root(&mut pieces, corner)).collect()
 }
 
-/// Whether two faces may belong to one curved surface. A face without area has no direction of its own.
-fn is_smooth(a: DVec3, b: DVec3) -> bool {
-    match (unit(a), unit(b)) {
+/// The end of a list of corners.
+const NONE: u32 = u32::MAX;
+
+/// Whether two faces with these normals may belong to one curved surface. A face without area has no normal.
+fn is_smooth(a: Option<DVec3>, b: Option<DVec3>) -> bool {
+    match (a, b) {
         (Some(a), Some(b)) => a.dot(b) > CREASE,
         (None, _) | (_, None) => true,
     }

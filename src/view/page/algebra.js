@@ -18,6 +18,18 @@ function times(a, b) {
   return c;
 }
 
+/** The inverse of a 4 × 4 matrix, by elimination with pivots. */
+function inverse(m) {
+  const rows = [0, 1, 2, 3].map((row) => [0, 1, 2, 3, 4, 5, 6, 7].map((k) => (k < 4 ? m[4 * k + row] : k - 4 === row ? 1 : 0)));
+  for (let k = 0; k < 4; k++) {
+    const pivot = rows.slice(k).reduce((best, row, i) => (Math.abs(row[k]) > Math.abs(rows[best][k]) ? k + i : best), k);
+    [rows[k], rows[pivot]] = [rows[pivot], rows[k]];
+    rows[k] = rows[k].map((x) => x / rows[k][k]);
+    rows.forEach((row, i) => { if (i !== k) rows[i] = row.map((x, j) => x - row[k] * rows[k][j]); });
+  }
+  return Float32Array.from({ length: 16 }, (_, i) => rows[i % 4][4 + Math.floor(i / 4)]);
+}
+
 /** A point through a 4 × 4 matrix, with four coordinates. */
 function transformed(m, p) {
   return [0, 1, 2, 3].map((row) => m[row] * p[0] + m[4 + row] * p[1] + m[8 + row] * p[2] + m[12 + row]);

@@ -21,6 +21,14 @@ function opened(bytes) {
   return [head, new Planes(bytes.subarray(4 + length))];
 }
 
+/** The blocks of a group, each behind its length. */
+function* blocksOf(bytes) {
+  for (let at = 0; at < bytes.length; ) {
+    const length = new DataView(bytes.buffer, bytes.byteOffset + at).getUint32(0, true);
+    yield bytes.subarray(at + 4, (at += 4 + length));
+  }
+}
+
 /** The value of every level of a range. */
 const valuesOf = ({ low, high }) => Float64Array.from({ length: 256 }, (_, level) => low + (level / 254) * (high - low));
 

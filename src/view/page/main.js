@@ -11,11 +11,12 @@ class Viewer {
     this.timeline = new Timeline();
     this.plots = new Plots(byId("plots"), (time) => this.seek(time));
     this.meshes = [];
+    this.values = new Map();
     this.errors = [];
     this.run = { number: 0, playing: false, speed: 1 };
     this.stats = { draws: 0, milliseconds: 0 };
     this.look = {
-      colours: sceneColours(), obstacle: "opaque", particles: true, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
+      colours: sceneColours(), obstacle: "opaque", surface: "automatic", particles: true, box: true, array: 0, map: "blue–yellow–red", fixed: null, blend: true,
       cutting: { axis: "none", part: 0.5, flipped: false, solid: true, fluid: true }, turns: false, gravityInRoom: true,
       slicing: { axis: "none", part: 0.5 }, arrows: false, arrowLength: 1, trails: false, trailFrames: 12,
     };
@@ -35,6 +36,7 @@ class Viewer {
   take(setting) {
     this.setting = setting;
     const { look } = this;
+    this.values = new Map(setting.params.map(({ name, value }) => [name, value]));
     look.boxBounds = setting.box;
     look.lattice = setting.lattice ?? setting.box;
     look.radius = setting.radius || 0;
@@ -51,23 +53,23 @@ class Viewer {
     this.changed();
   }
 
-  /** Reads the blocks of a saved page, one after another. */
+  /** Reads the blocks of a saved page, one group after another. */
   async read() {
-    const blocks = [...document.querySelectorAll('script[type="application/octet-stream"]')];
+    const groups = [...document.querySelectorAll('script[type="application/octet-stream"]')];
     let before = null;
-    for (const [number, block] of blocks.entries()) {
-      const [head, planes] = opened(await inflated(block.textContent));
-      block.remove();
-      if (head.kind === "mesh") this.meshes.push(meshOf(head, planes));
-      else {
-        before = frameOf(head, planes, before);
-        this.timeline.add(before);
+    for (const [number, group] of groups.entries()) {
+      for (const block of blocksOf(await inflated(group.textContent))) {
+        const [head, planes] = opened(block);
+        if (head.kind === "mesh") this.meshes.push(meshOf(head, planes));
+        else {
+          before = frameOf(head, planes, before);
+          this.timeline.add(before);
+        }
       }
-      if (number % 8 === 0 || number === blocks.length - 1) {
-        this.state(number < blocks.length - 1 ? `reading ${number + 1} of ${blocks.length}` : "");
-        this.timelineChanged();
-        this.changed();
-      }
+      group.remove();
+      this.state(number < groups.length - 1 ? `reading ${number + 1} of ${groups.length}` : "");
+      this.timelineChanged();
+      this.changed();
     }
     this.timeline.speed = this.timeline.natural();
     this.showSpeed();
@@ -94,6 +96,11 @@ class Viewer {
       }
       case "mesh":
         this.meshes = [content];
+        break;
+      case "field":
+        this.field = content;
+        this.isTried = false;
+        this.scene.exact.set(content);
         break;
       case "slice":
         this.slice = content;
@@ -268,6 +275,23 @@ class Viewer {
     }
   }
 
+  /** Shows the obstacle with another value of a param. */
+  tryParam(name, value) {
+    const exact = this.scene.exact.isShown({ ...this.look, onlyMesh: false }) && !this.field.fixed.includes(name);
+    this.isTried = !exact;
+    if (!exact) return this.send({ do: "try", name, value });
+    this.values.set(name, value);
+    const began = performance.now();
+    this.draw();
+    this.scene.wait();
+    const took = performance.now() - began;
+    byId("latency").textContent = `the obstacle followed in ${took.toFixed(0)} ms, without a mesh`;
+    // from near it may take longer than where it was measured
+    if (took > 4 * SLOW) this.scene.exact.milliseconds = took;
+    // what is shown besides it is found by the program
+    if (this.look.slicing.axis !== "none") this.send({ do: "try", name, value });
+  }
+
   /** Asks for ω in the plane that is chosen. */
   askSlice() {
     const { slicing } = this.look;
@@ -309,6 +333,8 @@ class Viewer {
     if (whole) look.free = whole;
     const frames = timeline.shown(look.blend && !this.live);
     scene.moving = this.dragging || timeline.playing;
+    // a param that the formula has no uniform for is seen in the mesh alone
+    Object.assign(look, { time: frames?.from.time ?? 0, values: this.values, onlyMesh: this.isTried });
     scene.setMesh(this.meshes[frames?.from.mesh ?? 0] ?? null);
     const view = camera.view();
     const page = size.map((x) => x / ratio);
@@ -318,6 +344,7 @@ class Viewer {
     const seen = { view, all: times(projection, view) };
     drawOverlay(overlay.getContext("2d"), size, ratio, look, camera, seen, null);
     this.plots.draw(timeline.time, look.colours, ratio);
+    if (byId("surface-said")) byId("surface-said").textContent = scene.exact.said(look);
     this.film?.add(canvas, overlay);
     this.stats.draws++;
     this.stats.milliseconds = performance.now() - began;

@@ -34,7 +34,8 @@ function buildPanel(place, viewer) {
   if (setting.params?.length) groups.push(paramsGroup(viewer));
   if (setting.live) groups.push(boxGroup(viewer));
   if (setting.arrays.length) groups.push(colourGroup(viewer));
-  groups.push(group(setting.arrays.length ? "Obstacle" : "Solid", true, choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); })));
+  groups.push(group(setting.arrays.length ? "Obstacle" : "Solid", true, choice("obstacle", ["opaque", "transparent", "hidden"], look.obstacle, (value) => { look.obstacle = value; again(); }),
+    ...(setting.live ? [row("surface", choice("surface", ["automatic", "exact", "mesh"], look.surface, (value) => { look.surface = value; again(); })), element("p", { className: "note", id: "surface-said" })] : [])));
   groups.push(cutGroup(viewer));
   if (setting.live) groups.push(sliceGroup(viewer));
   if (setting.arrays.length) groups.push(motionGroup(viewer));
@@ -156,7 +157,8 @@ function paramsGroup(viewer) {
     const tell = (what, value) => {
       number.value = inUnit(param, value);
       track.value = to(clamp(value, low, high));
-      viewer.send({ do: what, name: param.name, value });
+      if (what === "try") viewer.tryParam(param.name, value);
+      else viewer.send({ do: what, name: param.name, value });
     };
     const rounded = (value) => {
       // three digits of the range are as fine as a slider is

@@ -29,6 +29,9 @@ class Scene {
     this.edges = 0;
     this.slice = new SliceView(this);
     this.motion = new MotionView(this);
+    const field = this.exact?.field;
+    this.exact = new ExactView(this);
+    if (field) this.exact.set(field);
   }
 
   program(vertex, fragment) {
@@ -112,6 +115,11 @@ class Scene {
     this.gl.bufferData(this.gl.ARRAY_BUFFER, data, this.gl.DYNAMIC_DRAW);
   }
 
+  /** Waits until the picture has been drawn. */
+  wait() {
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
   /** Draws everything. `look` says how; `frames` are the two between which the time lies, of the frames of `timeline`. */
   draw(look, view, projection, frames, timeline) {
     const gl = this.gl;
@@ -122,7 +130,9 @@ class Scene {
     gl.enable(gl.DEPTH_TEST);
     gl.depthMask(true);
     gl.disable(gl.BLEND);
-    if (this.solid && look.obstacle === "opaque") this.drawMesh(look, view, projection, 1);
+    if (look.obstacle === "opaque") this.exact.measure(look, view, projection, look.time, look.values);
+    if (this.exact.isShown(look)) this.exact.draw(look, view, projection, look.time, look.values);
+    else if (this.solid && look.obstacle === "opaque") this.drawMesh(look, view, projection, 1);
     if (frames && look.particles) this.drawPoints(look, view, projection, frames);
     if (frames && look.arrows && look.velocity) this.motion.drawArrows(look, view, projection, frames);
     this.drawLines(look, view, projection);

@@ -56,6 +56,15 @@ void main() {
   gl_Position = projection * p;
 }`;
 
+/** The colour of a surface with a normal, seen from a direction. */
+const SHADED = `
+vec3 shaded(vec3 base, vec3 n, vec3 eye) {
+  vec3 lamp = normalize(vec3(-0.4, 0.65, 0.75));
+  float light = max(dot(n, lamp), 0.0), sky = 0.5 + 0.5 * n.y;
+  float gloss = pow(max(dot(n, normalize(lamp + eye)), 0.0), 30.0);
+  return base * (0.4 + 0.22 * sky + 0.42 * light) + 0.08 * gloss;
+}`;
+
 const MESH_FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 normal, seen, place;
@@ -63,6 +72,7 @@ uniform vec3 base, section;
 uniform float opacity, parallel;
 uniform vec4 cut;
 out vec4 colour;
+${SHADED}
 void main() {
   if (dot(cut.xyz, place) > cut.w) discard;
   vec3 n = normalize(normal);
@@ -72,13 +82,9 @@ void main() {
     if (opacity > 0.99) { colour = vec4(section, 1.0); return; }
     n = -n;
   }
-  float light = max(dot(n, normalize(vec3(-0.4, 0.65, 0.75))), 0.0);
-  float sky = 0.5 + 0.5 * n.y;
-  vec3 halfway = normalize(normalize(vec3(-0.4, 0.65, 0.75)) + eye);
-  float gloss = pow(max(dot(n, halfway), 0.0), 30.0);
   float rim = 1.0 - abs(dot(n, eye));
   float alpha = opacity > 0.99 ? 1.0 : mix(opacity, min(1.0, opacity + 0.55), rim * rim * rim);
-  colour = vec4((base * (0.4 + 0.22 * sky + 0.42 * light) + 0.08 * gloss) * alpha, alpha);
+  colour = vec4(shaded(base, n, eye) * alpha, alpha);
 }`;
 
 const LINES_VERTEX = `#version 300 es

@@ -7,6 +7,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
 use crate::browser::Browser;
+use crate::exact;
 use crate::live;
 use crate::pictures::{Picture, compare};
 use crate::program::{Viewer, rfm};
@@ -42,6 +43,10 @@ pub const ALL: &[(&str, Case)] = &[
     ("solids as GLSL have the numbers of `rfm eval`", shaders::shaders),
     ("a run is followed, stopped, stepped and begun again", live::live),
     ("the obstacle follows a slider", live::slider),
+    ("the exact surface agrees with the mesh", exact::beside_the_mesh),
+    ("the exact surface moves with time", exact::in_motion),
+    ("the exact surface of what is thin, and a mesh where there is none", exact::thin),
+    ("ranges of ω on the graphics processor hold its values", exact::ranges),
     ("the box turns and gravity stays", live::turned),
     ("a mistake in the file is shown and mended", live::mended),
     ("a solid without a scene", live::solid),
@@ -68,7 +73,7 @@ impl Room {
     }
 
     /// The scene alone, without text, which every system draws by its own letters.
-    fn scene(&mut self) -> Vec<u8> {
+    pub fn scene(&mut self) -> Vec<u8> {
         let data = self.browser.eval("(viewer.draw(), viewer.canvas.toDataURL('image/png'))");
         BASE64_STANDARD.decode(data.as_str().unwrap().split_once(',').unwrap().1).unwrap()
     }

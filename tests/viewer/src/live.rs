@@ -35,6 +35,7 @@ pub fn slider(room: &mut Room) {
     room.browser.wait_for("window.viewer && viewer.meshes.length === 1 && viewer.timeline.frames.length > 1");
     room.browser.eval("viewer.play(false)");
     room.browser.wait_for("!viewer.run.playing");
+    room.browser.choose("#surface", "mesh");
     let mut times = Vec::new();
     for k in 0..9 {
         let began = Instant::now();
@@ -105,7 +106,12 @@ pub fn solid(room: &mut Room) {
     room.browser.open(&viewer.address);
     room.browser.wait_for("window.viewer && viewer.meshes.length === 1");
     room.shot("solid");
+    let state = room.browser.eval("document.getElementById('state').textContent");
+    assert_eq!(state, "", "nothing is starting");
+    let off = room.browser.number("Math.hypot(...viewer.camera.centre)");
+    assert!(off < 1e-3, "the hoop is in the middle of the picture, {off}");
     assert_eq!(room.browser.eval("document.querySelector('#value-r').value"), "5");
+    room.browser.choose("#surface", "mesh");
     room.browser.eval("viewer.old = viewer.scene.shown.mesh");
     room.browser.eval("(() => { const track = document.getElementById('param-r'); track.value = 0.1; track.dispatchEvent(new Event('input')); })()");
     room.browser.wait_for("viewer.scene.shown.mesh !== viewer.old");

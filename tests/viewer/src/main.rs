@@ -5,6 +5,7 @@
 
 mod browser;
 mod cases;
+mod exact;
 mod live;
 mod pictures;
 mod program;

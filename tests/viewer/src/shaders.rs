@@ -9,7 +9,7 @@ use crate::cases::Room;
 use crate::program::rfm;
 
 /// A formula of x, y and z between −1.5 and 1.5 for every operation of the language, by the function that it is about.
-const FORMULAS: &[(&str, &str)] = &[
+pub const FORMULAS: &[(&str, &str)] = &[
     ("+ - * /", "(x + 2*y)*z - x/(y*y + 0.5)"),
     ("neg", "-(x - y*z)"),
     ("abs", "abs(x) - abs(y*z)"),

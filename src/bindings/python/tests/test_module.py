@@ -174,10 +174,17 @@ def pages(shown):
     """The viewer's pages in a text for a notebook, and the heads of their blocks."""
     found = re.findall(r'<iframe sandbox="allow-scripts allow-downloads" style="[^"]*" srcdoc="([^"]*)"></iframe>', shown)
     pages = [html.unescape(page) for page in found]
-    blocks = [re.findall(r'<script type="application/octet-stream">([^<]*)</script>', page) for page in pages]
-    raw = [[zlib.decompress(base64.b64decode(block), -15) for block in page] for page in blocks]
-    heads = [[json.loads(b[4 : 4 + int.from_bytes(b[:4], "little")]) for b in page] for page in raw]
+    groups = [re.findall(r'<script type="application/octet-stream">([^<]*)</script>', page) for page in pages]
+    heads = [[head for group in page for head in heads_of(zlib.decompress(base64.b64decode(group), -15))] for page in groups]
     return pages, heads
+
+
+def heads_of(group):
+    """The heads of the blocks of a group, each of which stands behind its length."""
+    while group:
+        end = 4 + int.from_bytes(group[:4], "little")
+        block, group = group[4:end], group[end:]
+        yield json.loads(block[4 : 4 + int.from_bytes(block[:4], "little")])
 
 
 def test_notebooks_see_the_viewer(pawn):

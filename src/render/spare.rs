@@ -1,0 +1,38 @@
+//! Memory that pictures take turns in. What is large and new is cleared by the system page by page, which costs as much as
+//! drawing in it does.
+//!
+//! Invariant: what a picture finds in it does not show: every part is written before it is read.
+
+use std::sync::Mutex;
+
+use super::particles::Disc;
+
+/// What a picture needs besides its pixels.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    /// The discs of all particles, and in which order they are drawn.
+    pub discs: Vec<Option<Disc>>,
+    pub order: Vec<u64>,
+    pub by_band: Vec<Vec<Disc>>,
+    pub nearness: Vec<f32>,
+    /// The nearness with a border.
+    pub padded: Vec<f32>,
+    pub light: Vec<f32>,
+}
+
+/// The workspaces that no picture uses.
+#[derive(Debug, Default)]
+pub(super) struct Spare(Mutex<Vec<Workspace>>);
+
+impl Spare {
+    /// Draws in a workspace that then waits for the next picture.
+    pub fn lend<T>(&self, draw: impl FnOnce(&mut Workspace) -> T) -> T {
+        // a list of spare memory is whole whenever it is unlocked
+        let lock = || self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let free = lock().pop();
+        let mut workspace = free.unwrap_or_default();
+        let drawn = draw(&mut workspace);
+        lock().push(workspace);
+        drawn
+    }
+}
