@@ -18,22 +18,28 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// The mean of samples that are evenly spaced in time, in their order; those that are not finite do not count. `None`
-    /// if none is left.
+    /// The mean of samples in the order of time, each with the time, s, for which it stands; those that are not finite do not
+    /// count. `None` if none is left.
     ///
-    /// What follows each other in a flow is alike, so that σ/√n is too small an error. The samples are therefore joined to
+    /// Samples of a flow that follow each other are alike, so that σ/√n is too small an error. They are therefore joined to
     /// eight blocks, and the error is that of the mean of their means (H. Flyvbjerg, H. G. Petersen, J. Chem. Phys. 91, 1989). It
     /// holds if whatever swings does so within a block.
-    pub fn of(samples: impl IntoIterator<Item = f64>) -> Option<Self> {
-        let samples: Vec<f64> = samples.into_iter().filter(|value| value.is_finite()).collect();
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    pub fn of(samples: impl IntoIterator<Item = (f64, f64)>) -> Option<Self> {
+        let samples: Vec<(f64, f64)> =
+            samples.into_iter().filter(|(value, time)| value.is_finite() && *time > 0.0).collect();
+        let mean = |samples: &[(f64, f64)]| {
+            let (sum, times) = samples
+                .iter()
+                .fold((0.0, 0.0), |(sum, times), (value, time)| (sum + value * time, times + time));
+            sum / times
+        };
         if samples.is_empty() {
             return None;
         }
         let length = samples.len() / BLOCKS;
         let error = (length >= LEAST_OF_BLOCK).then(|| {
             let means: Vec<f64> = samples.rchunks_exact(length).take(BLOCKS).map(mean).collect();
-            let middle = mean(&means);
+            let middle = means.iter().sum::<f64>() / BLOCKS as f64;
             let squares: f64 = means.iter().map(|value| (value - middle).powi(2)).sum();
             (squares / (BLOCKS * (BLOCKS - 1)) as f64).sqrt()
         });
@@ -60,7 +66,7 @@ mod tests {
             let mut x = 0.0;
             let samples = (0..count).map(|_| {
                 x = memory * x + uniform();
-                x
+                (x, 0.1)
             });
             let found = Mean::of(samples).unwrap();
             let error = found.error.unwrap();
@@ -75,8 +81,8 @@ mod tests {
 
     #[test]
     fn a_few_samples_have_a_mean_without_an_error() {
-        let found = Mean::of([1.0, f64::NAN, 3.0]).unwrap();
-        assert_eq!(found, Mean { value: 2.0, error: None, samples: 2 });
-        assert_eq!(Mean::of([f64::NAN]), None);
+        let found = Mean::of([(1.0, 1.0), (f64::NAN, 9.0), (3.0, 3.0)]).unwrap();
+        assert_eq!(found, Mean { value: 2.5, error: None, samples: 2 });
+        assert_eq!(Mean::of([(f64::NAN, 1.0)]), None);
     }
 }

@@ -26,8 +26,8 @@ struct Hit {
 
 impl Contacts {
     /// The state before any contact, for a number of obstacles.
-    pub fn of(obstacles: usize) -> Self {
-        Self { with_pressure: false, totals: vec![[0.0; 6]; obstacles], now: Mutex::default() }
+    pub fn of(obstacles: usize, with_pressure: bool) -> Self {
+        Self { with_pressure, totals: vec![[0.0; 6]; obstacles], now: Mutex::default() }
     }
 
     /// Notes that an obstacle changed the velocity of a particle at a place.

@@ -159,13 +159,6 @@ impl Core {
         }
     }
 
-    /// Notes that the fluid's pressure and friction are among what obstacles receive.
-    pub fn contacts_hold_pressure(&mut self) {
-        if let Some(contacts) = &mut self.contacts {
-            contacts.with_pressure = true;
-        }
-    }
-
     /// Sorts all that belongs to particles into the order of the columns: position, velocity, acceleration,
     /// number, and the columns `kept` of the method.
     pub fn sort(&mut self, kept: &mut [&mut Vec<f64>]) {

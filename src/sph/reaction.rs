@@ -1,11 +1,10 @@
 //! What walls do to particles in a step, noted for the obstacles that feel it.
 
-use glam::DVec3;
-
-use super::{contacts::Contacts, core::Core};
+use super::{contacts::Contacts, core::Core, walls::Pushed};
 
 /// The notes of a step. Forces of particles on each other cancel, so with what walls add to these, and with contacts, the
-/// momentum of the fluid changes by gravity and by what is noted alone.
+/// momentum of the fluid changes by gravity and by what is noted alone. What surface tension does where it meets a wall is not
+/// noted, nor the viscosity of a fluid along a wall on which it slips.
 #[derive(Clone, Copy)]
 pub struct Reaction<'a> {
     core: &'a Core,
@@ -21,10 +20,13 @@ impl<'a> Reaction<'a> {
         Some(Self { core, contacts, dt })
     }
 
-    /// Notes that walls accelerate a particle, m/s², by a factor times ∇λ, m²/s², and otherwise.
-    pub fn add(&self, i: usize, acceleration: DVec3, factor: f64) {
+    /// Notes what walls do to a particle.
+    pub fn add(&self, i: usize, pushed: Pushed) {
+        if pushed == Pushed::default() {
+            return;
+        }
         let at = self.core.particles.position.get(i);
-        self.core.boundary.divide(self.core.wall(), at, acceleration, factor, |obstacle, share| {
+        self.core.boundary.divide(self.core.wall(), at, &pushed, |obstacle, share| {
             self.contacts.add(i, obstacle, self.dt * share, at);
         });
     }

@@ -253,7 +253,7 @@ impl Simulation {
     /// [`SetupError::Obstacle`] if the probe names an obstacle that does not exist.
     pub fn gauge(&mut self, probe: Probe) -> Result<Gauge, SetupError> {
         self.prepare(probe)?;
-        Ok(Gauge::new(probe))
+        Ok(Gauge::beginning(probe, &self.core))
     }
 
     /// Prepares a probe of a run that goes on from a checkpoint, with the [memory](Gauge::memory) that it had
@@ -274,7 +274,7 @@ impl Simulation {
         {
             contacts.restore(totals);
         }
-        Ok(Gauge::remembering(probe, memory))
+        Ok(Gauge::remembering(probe, memory).unwrap_or_else(|| Gauge::beginning(probe, &self.core)))
     }
 
     fn prepare(&mut self, probe: Probe) -> Result<(), SetupError> {
@@ -283,7 +283,8 @@ impl Simulation {
             if obstacle >= obstacles {
                 return Err(SetupError::Obstacle { index: obstacle });
             }
-            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles));
+            let with_pressure = self.core.parameters.method.numerics().notes_reactions();
+            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles, with_pressure));
         }
         Ok(())
     }

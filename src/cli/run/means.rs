@@ -5,6 +5,9 @@ use rfm::lower::AskedMean;
 use rfm::sph::Probe;
 use serde::Serialize;
 
+/// Instants this part of a time later are the same.
+const ROUNDING: f64 = 1e-9;
+
 /// The means of a probe's figures.
 #[derive(Debug, Serialize)]
 pub(super) struct Means {
@@ -14,56 +17,71 @@ pub(super) struct Means {
     samples: usize,
     /// Names of the figures, with their units.
     columns: Vec<String>,
-    mean: Vec<f64>,
+    mean: Vec<Option<f64>>,
     /// The standard errors; null where there are too few samples to tell.
     error: Vec<Option<f64>>,
     /// What the scene knows of the first figures; empty if it states nothing.
     known: Vec<f64>,
-    /// How far the first figures are from what is known, as a part of it.
+    /// How far the first figures are from what is known, as a part of it, or in their unit if it is zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     deviation: Option<f64>,
 }
 
+/// Columns that text shows: of forces not the torques.
+const SHOWN: usize = 3;
+
 impl Means {
-    /// The means of a table's rows, each of which begins with its time; `None` if no row counts.
-    pub fn of(name: &str, probe: &Probe, asked: &AskedMean, rows: &[Vec<f64>]) -> Option<Self> {
-        let counted: Vec<&Vec<f64>> =
-            rows.iter().filter(|row| row.first().is_some_and(|time| *time >= asked.from)).collect();
-        let mut means = Vec::new();
-        for column in 1..=probe.columns().len() {
-            means.push(Mean::of(counted.iter().filter_map(|row| row.get(column).copied()))?);
-        }
+    /// The means of a table's rows, each of which begins with its time. A row stands for the time since the one before it.
+    pub fn of(name: &str, probe: &Probe, asked: &AskedMean, rows: &[Vec<f64>]) -> Self {
+        let time = |row: &[f64]| row.first().copied().unwrap_or(f64::NAN);
+        let mean_of = |column: usize| {
+            let pairs = rows.windows(2).filter(|pair| time(&pair[1]) > asked.from * (1.0 + ROUNDING));
+            Mean::of(pairs.map(|pair| {
+                let value = pair[1].get(column).copied().unwrap_or(f64::NAN);
+                (value, time(&pair[1]) - time(&pair[0]))
+            }))
+        };
+        let means: Vec<Option<Mean>> = (1..=probe.columns().len()).map(mean_of).collect();
         let known = asked.known.clone();
-        let off = known.iter().zip(&means).map(|(known, mean)| (mean.value - known).powi(2)).sum::<f64>();
+        let off: Option<f64> =
+            known.iter().zip(&means).map(|(known, mean)| Some((mean.as_ref()?.value - known).powi(2))).sum();
         let size = known.iter().map(|known| known * known).sum::<f64>();
-        Some(Self {
+        let size = if size > 0.0 { size } else { 1.0 };
+        Self {
             probe: name.to_string(),
             from: asked.from,
-            samples: means.iter().map(|mean| mean.samples).min().unwrap_or_default(),
+            samples: means.iter().map(|mean| mean.map_or(0, |mean| mean.samples)).max().unwrap_or_default(),
             columns: probe.columns().iter().map(|(name, unit)| format!("{name} [{unit}]")).collect(),
-            mean: means.iter().map(|mean| mean.value).collect(),
-            error: means.iter().map(|mean| mean.error).collect(),
-            deviation: (size > 0.0).then(|| (off / size).sqrt()),
+            mean: means.iter().map(|mean| mean.map(|mean| mean.value)).collect(),
+            error: means.iter().map(|mean| mean.and_then(|mean| mean.error)).collect(),
+            deviation: off.filter(|_| !known.is_empty()).map(|off| (off / size).sqrt()),
             known,
-        })
+        }
     }
 
     /// The means as a line of text.
     pub fn line(&self) -> String {
         let mut line = format!("probe {}, mean from {} s on:", self.probe, self.from);
-        let figures = self.columns.iter().zip(&self.mean).zip(&self.error);
+        if self.mean.iter().all(Option::is_none) {
+            return line + " no value was sampled";
+        }
+        let figures = self.columns.iter().zip(&self.mean).zip(&self.error).take(SHOWN);
         for (k, ((column, mean), error)) in figures.enumerate() {
+            let mean = mean.unwrap_or(f64::NAN);
             let (name, unit) = column.split_once(" [").unwrap_or((column, ""));
             let unit = unit.trim_end_matches(']');
             let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
             let separator = if k == 0 { "" } else { "," };
             line += &match error {
-                Some(error) => format!("{separator} {name} {} ± {error:.1e}{unit}", rounded(*mean, *error)),
+                Some(error) => format!("{separator} {name} {} ± {error:.1e}{unit}", rounded(mean, *error)),
                 None => format!("{separator} {name} {mean:.4e}{unit}"),
             };
         }
         if let Some(deviation) = self.deviation {
-            line += &format!("; {:.2} % from what is known", 100.0 * deviation);
+            line += &match self.known.iter().all(|known| *known == 0.0) {
+                true => format!("; {deviation:.2e} from what is known"),
+                false => format!("; {:.2} % from what is known", 100.0 * deviation),
+            };
         }
         line
     }
@@ -86,11 +104,25 @@ mod tests {
             .collect();
         let asked = AskedMean { from: 0.5, known: vec![2.0] };
         let probe = Probe::Pressure { at: glam::DVec3::ZERO };
-        let means = Means::of("p", &probe, &asked, &rows).unwrap();
-        assert_eq!((means.samples, means.columns[0].as_str()), (50, "pressure [Pa]"));
-        assert!((means.mean[0] - 2.05).abs() < 1e-12 && (means.deviation.unwrap() - 0.025).abs() < 1e-12);
+        let means = Means::of("p", &probe, &asked, &rows);
+        // the row at the start stands for the time before it
+        assert_eq!((means.samples, means.columns[0].as_str()), (49, "pressure [Pa]"));
+        let expected = 2.0 + 0.1 * 25.0 / 49.0;
+        assert!((means.mean[0].unwrap() - expected).abs() < 1e-9, "{:?}", means.mean);
+        assert!((means.deviation.unwrap() / (expected / 2.0 - 1.0) - 1.0).abs() < 1e-9);
         assert!(means.line().starts_with("probe p, mean from 0.5 s on: pressure 2.05"), "{}", means.line());
-        assert!(means.line().ends_with(" Pa; 2.50 % from what is known"), "{}", means.line());
-        assert!(Means::of("p", &probe, &AskedMean { from: 2.0, known: vec![] }, &rows).is_none());
+        assert!(means.line().ends_with(" Pa; 2.55 % from what is known"), "{}", means.line());
+        let none = Means::of("p", &probe, &AskedMean { from: 2.0, known: vec![0.0] }, &rows);
+        assert_eq!((none.samples, none.deviation), (0, None));
+        assert!(none.line().ends_with(": no value was sampled"), "{}", none.line());
+    }
+
+    #[test]
+    fn a_row_counts_as_long_as_it_stands_for() {
+        let rows = [vec![0.0, 9.0], vec![1.0, 4.0], vec![4.0, 8.0]];
+        let probe = Probe::Height { x: 0.0, y: 0.0 };
+        let means = Means::of("h", &probe, &AskedMean { from: 0.0, known: vec![0.0] }, &rows);
+        assert_eq!((means.mean[0], means.deviation), (Some(7.0), Some(7.0)));
+        assert!(means.line().ends_with("; 7.00e0 from what is known"), "{}", means.line());
     }
 }

@@ -125,7 +125,7 @@ impl Probes {
         let mut means = Vec::new();
         for recorder in &self.stated {
             let Some(asked) = &recorder.mean else { continue };
-            means.extend(Means::of(&recorder.name, &recorder.gauge.probe, asked, &rows(&recorder.text()?)));
+            means.push(Means::of(&recorder.name, &recorder.gauge.probe, asked, &rows(&recorder.text()?)));
         }
         Ok(means)
     }

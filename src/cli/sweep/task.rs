@@ -225,9 +225,12 @@ impl Task<'_> {
         };
         let known = known?;
         if self.force {
-            // first, so that no index names what is gone if this is cut short
-            new.write(&self.folder)?;
+            // if this is cut short, the index still names all folders, and none of them as whole
+            let undone = known.rows.iter().map(|row| Row { exit: 130, ..row.clone() }).collect();
+            let known = Index { rows: undone, ..known };
+            known.write(&self.folder)?;
             self.remove_values_that_are_gone(&known)?;
+            new.write(&self.folder)?;
             return Ok(new);
         }
         if !self.resume {

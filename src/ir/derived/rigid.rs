@@ -17,6 +17,9 @@ use crate::ir::op::{Binary, Unary};
 /// Relative difference between numbers that count as equal.
 const SAME: f64 = 1e-10;
 
+/// Rounding of a plane's offset over the length of its normal: planes are found from their values at a distance of one.
+const ROUNDED: f64 = 16.0 * f64::EPSILON;
+
 /// Least angle, rad, between planes that count as independent.
 const INDEPENDENT: f64 = 1e-3;
 
@@ -109,6 +112,7 @@ impl RigidMotion {
             (normal - now.normal).length() <= SAME * length
                 && (offset - now.offset).abs()
                     <= SAME * (start.offset.abs() + now.offset.abs() + length * translation.length())
+                        + ROUNDED * length
         };
         let is_turn = (rotation.determinant() - 1.0).abs() < SAME;
         (is_turn && self.at_start.iter().zip(&now).all(is_one)).then_some(placement)
@@ -263,6 +267,17 @@ mod tests {
                     let (now, then) = (solid.at(time).omega(p), solid.at(0.0).omega(placement.back(p)));
                     assert!((now - then).abs() < 1e-9 * (1.0 + now.abs()), "{text} at {time}: {now} {then}");
                 }
+            }
+        }
+    }
+
+    /// A body that has just set out has moved by less than the rounding of its planes, of which one goes through the origin.
+    #[test]
+    fn the_first_steps_of_a_motion_are_found() {
+        for speed in [3, 4, 5, 7] {
+            let solid = solid(&format!("box([-1,-5,-5],[0,5,5]).move([{speed}*max(t - 0.3, 0), 0, 0])"));
+            for time in [0.3, 0.1 + 0.2, 0.3 + 1e-15, 0.3 + 1e-12] {
+                assert!(motion(&solid).placement(time).is_some(), "{speed} at {time}");
             }
         }
     }

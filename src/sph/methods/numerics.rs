@@ -96,4 +96,10 @@ pub(in crate::sph) trait Numerics: Sync {
     fn kept_compression(&self) -> Option<f64> {
         None
     }
+
+    /// Whether each step notes what walls do to particles, see `Reaction`. Without that, forces on obstacles are those of
+    /// contacts, and of the pressure in front of their surfaces.
+    fn notes_reactions(&self) -> bool {
+        false
+    }
 }

@@ -1,7 +1,7 @@
 //! The force of a fluid on an obstacle by its state alone: ∫ p n, and friction, over the pieces of its surface that the
 //! fluid touches.
 //!
-//! It holds for a fluid at rest. In a jet on a plate of eight spacings, pressures of particles at the wall swing, and as they
+//! It is near the truth in a fluid at rest, and used where no step notes what walls do. In a jet on a plate of eight spacings, pressures of particles at the wall swing, and as they
 //! are never negative their mean is too large: this force was 1.8 times what the jet lost of its momentum.
 //!
 //! The pressure of a piece is the mean of the particles in front of it, each continued to the piece by the balance

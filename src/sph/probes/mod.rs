@@ -42,7 +42,7 @@ pub enum Probe {
         /// y of the place, m.
         y: f64,
     },
-    /// Pressure at a place, Pa; zero if no fluid is within the support radius.
+    /// Pressure at a place, Pa; zero if no fluid is within the support radius. With `dfsph` it is a mean over several steps.
     Pressure {
         /// The place, m.
         at: DVec3,
@@ -57,7 +57,8 @@ pub enum Probe {
     /// It is the momentum that the obstacle has taken from particles since the last sample, by pressure, friction and
     /// contacts, over that time; with the paper's method there are contacts only. At the start, and for `wcsph` with
     /// differences of pressure, whose forces do not cancel in pairs, pressure and friction are instead those of the particles
-    /// in front of the obstacle's faces.
+    /// in front of the obstacle's faces. What surface tension does where the surface meets the obstacle does not count, so a
+    /// drop that hangs seems to push.
     Force {
         /// Number of the obstacle, from 0.
         obstacle: usize,
@@ -131,9 +132,19 @@ impl Gauge {
         &self.last
     }
 
-    /// A probe with the memory of an earlier one; a memory of the wrong length is ignored.
-    pub fn remembering(probe: Probe, memory: &[f64]) -> Self {
-        Self { probe, last: memory.try_into().unwrap_or([0.0; 7]) }
+    /// A probe with the memory of an earlier one; `None` if the memory has the wrong length.
+    pub(super) fn remembering(probe: Probe, memory: &[f64]) -> Option<Self> {
+        memory.try_into().ok().map(|last| Self { probe, last })
+    }
+
+    /// A probe whose first sample begins now.
+    pub(super) fn beginning(probe: Probe, core: &Core) -> Self {
+        let mut last = [0.0; 7];
+        if let (Probe::Force { obstacle, .. }, Some(contacts)) = (probe, &core.contacts) {
+            last[0] = core.time;
+            last[1..].copy_from_slice(&contacts.total(obstacle));
+        }
+        Self { probe, last }
     }
 
     pub(super) fn sample(&mut self, core: &Core, audit: &Audit) -> Vec<f64> {

@@ -58,7 +58,7 @@ pub(in crate::sph) trait Friction: Copy + Default {
     /// fluid alone and the kinematic viscosity, m²/s.
     fn complete(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3;
 
-    /// The part of it that walls give to which the fluid sticks.
+    /// The part of that acceleration that comes from the walls to which the fluid sticks.
     fn by_walls(&self, drag: DVec3, velocity: DVec3, viscosity: f64) -> DVec3;
 }
 

@@ -27,4 +27,5 @@ pub(super) use friction::{Friction, WallDrag};
 pub(super) use kernel::Wall;
 pub use kernel::WallKernel;
 pub(super) use motion::StepLimits;
+pub(super) use shares::Pushed;
 pub(super) use volume::Maps;

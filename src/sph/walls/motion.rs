@@ -20,6 +20,9 @@ const PARTS: usize = 4;
 /// Most attempts at a step. Each is shorter than the one before.
 const ATTEMPTS: usize = 30;
 
+/// Part of the attempt before that an attempt at a step is at least.
+const SHORTER: f64 = 0.25;
+
 /// Part of a usual step below which none is made shorter for a body: what still moves too far jumps, however short the
 /// step (`floor(t)`), and is passed in one step of the usual length.
 const JUMP: f64 = 1e-3;
@@ -83,11 +86,12 @@ impl Boundary {
                 if longest >= dt {
                     break;
                 }
-                if longest < shortest {
+                // not at once, because a shorter step may show that the body is far
+                dt = longest.max(SHORTER * dt);
+                if dt < shortest {
                     dt = before;
                     break;
                 }
-                dt = longest;
             }
         }
         dt

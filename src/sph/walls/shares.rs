@@ -4,9 +4,21 @@ use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
 use super::{boundary::Boundary, coverage::Coverage, kernel::Wall};
+use crate::geom::Aabb;
 
-/// Beside walls along their normals, walls share equally in a force along them by this part of it.
-const ALONG: f64 = 1e-3;
+/// Part of a force that walls share in directions in which none of them acts.
+const BESIDE: f64 = 1e-3;
+
+/// What all walls together do to a particle.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::sph) struct Pushed {
+    /// The acceleration by pressure, m/s².
+    pub by_pressure: DVec3,
+    /// The factor, m²/s², with which ∇λ of each wall is part of that. What is left completes forces at walls.
+    pub factor: f64,
+    /// The acceleration by friction, m/s².
+    pub by_friction: DVec3,
+}
 
 /// A wall near a particle.
 struct Near {
@@ -19,33 +31,26 @@ struct Near {
 }
 
 impl Boundary {
-    /// Divides the acceleration of a particle by all walls, m/s², among the obstacles near it, and tells the acceleration by
-    /// each. A factor times ∇λ, m²/s², is the part that acts in each wall's own direction.
+    /// Divides what walls do to a particle among the obstacles near it, and tells the acceleration by each, m/s².
     ///
-    /// The rest, by which forces are completed at walls, is divided by the walls' normals: in a corner each wall has what
-    /// acts along its own. All shares, that of the box included, add up to the whole.
-    pub fn divide(
-        &self,
-        wall: &Wall,
-        p: DVec3,
-        acceleration: DVec3,
-        factor: f64,
-        mut tell: impl FnMut(usize, DVec3),
-    ) {
+    /// What completes pressures at walls is divided by the walls' normals, and friction by the directions along the walls: in
+    /// a corner each wall has what it can give. All shares, that of the box included, add up to the whole.
+    pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, DVec3)) {
         let near = self.near(wall, p);
-        if let [only] = &near[..] {
-            if let Some(obstacle) = only.obstacle {
-                tell(obstacle, acceleration);
+        if let [] | [_] = &near[..] {
+            if let Some(obstacle) = near.first().and_then(|only| only.obstacle) {
+                tell(obstacle, pushed.by_pressure + pushed.by_friction);
             }
             return;
         }
+        let Pushed { by_pressure, factor, by_friction } = *pushed;
         let together: DVec3 = near.iter().map(|near| near.gradient).sum();
-        let weights: SmallVec<[DMat3; 4]> = near.iter().map(Near::weight).collect();
-        let all = weights.iter().fold(DMat3::ZERO, |all, weight| all + *weight);
-        let rest = all.inverse() * (acceleration - factor * together);
-        for (near, weight) in near.iter().zip(weights) {
+        let [across, along] = [Near::across, Near::along]
+            .map(|weight| near.iter().fold(DMat3::ZERO, |all, near| all + weight(near)).inverse());
+        let (rest, friction) = (across * (by_pressure - factor * together), along * by_friction);
+        for near in &near {
             if let Some(obstacle) = near.obstacle {
-                tell(obstacle, factor * near.gradient + weight * rest);
+                tell(obstacle, factor * near.gradient + near.across() * rest + near.along() * friction);
             }
         }
     }
@@ -66,7 +71,11 @@ impl Boundary {
             found.push(near(Some(0), &Coverage::default()));
             return found;
         }
+        let place = Aabb::new(p, p);
         for k in 0..self.obstacles.len() {
+            if self.field(k).is_far(&place, wall.h) {
+                continue;
+            }
             let coverage = self.with_faces(wall, p, Coverage::<()>::default(), k);
             if coverage.part > 0.0 {
                 found.push(near(Some(k), &coverage));
@@ -78,10 +87,18 @@ impl Boundary {
 
 impl Near {
     /// λ·(n⊗n), and a little in all directions.
-    fn weight(&self) -> DMat3 {
+    fn across(&self) -> DMat3 {
+        self.part * (self.square_of_normal() + BESIDE * DMat3::IDENTITY)
+    }
+
+    /// λ·(1 − n⊗n), and a little in all directions.
+    fn along(&self) -> DMat3 {
+        self.part * ((1.0 + BESIDE) * DMat3::IDENTITY - self.square_of_normal())
+    }
+
+    fn square_of_normal(&self) -> DMat3 {
         let n = self.gradient.normalize_or_zero();
-        let along = DMat3::from_cols(n.x * n, n.y * n, n.z * n);
-        self.part * (along + ALONG * DMat3::IDENTITY)
+        DMat3::from_cols(n.x * n, n.y * n, n.z * n)
     }
 }
 
@@ -118,30 +135,48 @@ mod tests {
         }
     }
 
-    fn shares(boundary: &Boundary, p: DVec3, acceleration: DVec3, factor: f64) -> [DVec3; 2] {
+    fn shares(boundary: &Boundary, p: DVec3, pushed: Pushed) -> [DVec3; 2] {
         let mut shares = [DVec3::ZERO; 2];
         let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
-        boundary.divide(&wall, p, acceleration, factor, |k, share| shares[k] += share);
+        boundary.divide(&wall, p, &pushed, |k, share| shares[k] += share);
         shares
     }
 
     #[test]
     fn one_wall_has_all() {
         let push = DVec3::new(3.0, 1.0, 2.0);
-        assert_eq!(shares(&boundary(9.0), DVec3::new(0.2, 0.0, 2.0), push, -7.0), [push, DVec3::ZERO]);
+        let pushed = Pushed { by_pressure: push, factor: -7.0, by_friction: push };
+        assert_eq!(shares(&boundary(9.0), DVec3::new(0.2, 0.0, 2.0), pushed), [2.0 * push, DVec3::ZERO]);
     }
 
     #[test]
     fn in_a_corner_each_wall_has_what_acts_along_its_normal() {
-        let [left, right] = shares(&boundary(9.0), DVec3::new(0.2, 0.0, 0.3), DVec3::new(3.0, 0.0, 5.0), 0.0);
-        assert!((left.x - 3.0).abs() < 0.01 && left.z.abs() < 0.02, "{left}");
+        let (p, push) = (DVec3::new(0.2, 0.0, 0.3), DVec3::new(3.0, 0.0, 5.0));
+        let [left, right] = shares(&boundary(9.0), p, Pushed { by_pressure: push, ..Pushed::default() });
+        assert!((left.x - 3.0).abs() < 0.02 && left.z.abs() < 0.02, "{left}");
         assert_eq!(right, DVec3::ZERO);
+        // what acts along x is the floor's, which is that of the box
+        let [left, _] = shares(&boundary(9.0), p, Pushed { by_friction: push, ..Pushed::default() });
+        assert!(left.x.abs() < 0.02 && (left.z - 5.0).abs() < 0.02, "{left}");
+    }
+
+    #[test]
+    fn shares_add_up_to_the_whole() {
+        let pushed = Pushed {
+            by_pressure: DVec3::new(3.0, -2.0, 5.0),
+            factor: -4.0,
+            by_friction: DVec3::new(-1.0, 7.0, 2.0),
+        };
+        let [left, right] = shares(&boundary(1.2), DVec3::new(0.5, 0.0, 2.0), pushed);
+        assert!((left + right - pushed.by_pressure - pushed.by_friction).length() < 1e-9, "{left} {right}");
+        assert!(left.length() > 1.0 && right.length() > 1.0, "{left} {right}");
     }
 
     #[test]
     fn between_two_walls_each_presses_by_itself() {
         // in the middle the pressure on both is the same, and the particle stays
-        let [left, right] = shares(&boundary(1.0), DVec3::new(0.5, 0.0, 2.0), DVec3::ZERO, -4.0);
+        let [left, right] =
+            shares(&boundary(1.0), DVec3::new(0.5, 0.0, 2.0), Pushed { factor: -4.0, ..Pushed::default() });
         assert!(left.x > 1.0 && (left + right).length() < 1e-12, "{left} {right}");
     }
 }

@@ -123,6 +123,10 @@ fn c_of_every_operation_has_the_bits_of_rfm() {
     let mut solids = solids_of_every_operation();
     solids.drain(1..3);
     for compiler in compilers() {
+        if compiler == "clang" {
+            // a fold of 25 steps written by hand takes clang 14 half a minute, and twice as long with each step more
+            solids.remove(1);
+        }
         let counts = compare_c(compiler, &solids, FEW);
         assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
     }

@@ -165,4 +165,8 @@ impl Numerics for Dfsph {
     fn kept_compression(&self) -> Option<f64> {
         Some(self.tolerance)
     }
+
+    fn notes_reactions(&self) -> bool {
+        true
+    }
 }

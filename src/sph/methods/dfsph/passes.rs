@@ -10,7 +10,7 @@ use crate::sph::{
     params::Parameters,
     particles::Vectors,
     reaction::Reaction,
-    walls::Friction,
+    walls::{Friction, Pushed},
 };
 
 use super::walls::{Walls, WallsNear};
@@ -244,7 +244,8 @@ impl<const LAMINAR: bool> PairPass<3, 3, 3> for Drag<'_, LAMINAR> {
         if LAMINAR && let Some((wall, _)) = self.walls.near(i) {
             let velocity = self.velocity.get(i);
             if let Some(reaction) = &self.reaction {
-                reaction.add(i, wall.friction.by_walls(drag, velocity, self.kinematic), 0.0);
+                let by_friction = wall.friction.by_walls(drag, velocity, self.kinematic);
+                reaction.add(i, Pushed { by_friction, ..Pushed::default() });
             }
             drag = wall.friction.complete(drag, velocity, self.kinematic);
         }

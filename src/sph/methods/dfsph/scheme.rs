@@ -111,7 +111,6 @@ pub struct DivergenceFree {
 impl Scheme for DivergenceFree {
     fn step(&mut self, core: &mut Core, most: f64) -> Result<f64, StepError> {
         let dt = core.next_dt(most)?;
-        core.contacts_hold_pressure();
         self.find_other_accelerations(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);

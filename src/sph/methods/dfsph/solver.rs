@@ -1,5 +1,6 @@
 //! The solver of a linear system for s ≥ 0, of which there are two: one for velocities and one for places.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::passes::{Constants, Continuation, Push, Squeeze};
@@ -9,6 +10,7 @@ use crate::sph::{
     params::Parameters,
     particles::Vectors,
     reaction::Reaction,
+    walls::Pushed,
 };
 
 /// Factor by which walls and disorder make the system stiffer than the even fluid of [`stiffness`].
@@ -223,12 +225,12 @@ impl Solver {
     /// Notes what walls have of a(s), where it changes velocities of a fluid with this rest density, kg/m³: a(s) = M·(a of the
     /// pairs − 2ρ₀s·∇λ).
     pub fn note_walls(&self, reaction: Reaction<'_>, walls: &Walls, rest_density: f64) {
-        for (i, wall, completion) in walls.found() {
+        walls.found().par_iter().with_min_len(CHUNK / 4).for_each(|(i, wall, completion)| {
             let i = *i as usize;
             let (push, factor) = (self.push.get(i), -2.0 * rest_density * self.s[i]);
             let of_pairs = completion.inverse() * push - factor * wall.gradient;
-            reaction.add(i, push - of_pairs, factor);
-        }
+            reaction.add(i, Pushed { by_pressure: push - of_pairs, factor, by_friction: DVec3::ZERO });
+        });
     }
 
     /// Memory of this solver, bytes.

@@ -62,7 +62,7 @@ use crate::sph::{
     params::Parameters,
     particles::Vectors,
     reaction::Reaction,
-    walls::{Friction, WallDrag},
+    walls::{Friction, Pushed, WallDrag},
 };
 
 /// The method's numbers, with derived values where the scene states none.
@@ -276,9 +276,6 @@ impl Weakly {
         core.particles.pressure = pressure;
         core.spare = predicted;
         core.settle_contacts();
-        if dt > 0.0 && self.numbers.gradients == Gradients::Pairs {
-            core.contacts_hold_pressure();
-        }
         if dt > 0.0 {
             self.correct_densities(core, &places, &drift, dt);
         }
@@ -485,12 +482,12 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let mut spread = steepness * squares / 3.0;
         let mut compression = -steepness * departing;
         let mut drag = 10.0 * laminar * steepness * DVec3::new(ux, uy, uz);
-        let mut rubbing = DVec3::ZERO;
+        let mut by_friction = DVec3::ZERO;
         let velocity = rates.velocity.get(i);
         // a fluid without viscosity feels no friction, and most have none
         let wall = if LAMINAR {
             rates.core.coverage::<WallDrag>(i).map(|wall| {
-                rubbing = wall.friction.by_walls(drag, velocity, laminar);
+                by_friction = wall.friction.by_walls(drag, velocity, laminar);
                 drag = wall.friction.complete(drag, velocity, laminar);
                 wall.without_friction()
             })
@@ -502,7 +499,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let mut places = by_weight;
         // how fast the wall approaches, in units of the kernel that it takes
         let mut wall_rate = 0.0;
-        let by_pairs = push - 2.0 * rates.pressure[i] * crowding;
+        let crowding_by_pairs = crowding;
         if let Some(wall) = &wall {
             crowding += wall.gradient;
             spread += wall.share();
@@ -518,12 +515,16 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         let density = rest + smooth * rates.excess[i];
         // where pressures do not act by differences, their own pressure pushes particles apart, and walls push
         // as their mirrored images do; without EVEN the sums contain the part of the pairs already
+        let pairs = push;
         push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
         if let Some(wall) = &wall {
+            let (pressure, by_pairs) =
+                (rates.pressure[i], pairs - 2.0 * rates.pressure[i] * crowding_by_pairs);
             let balanced = if rates.differences { 1.0 } else { depth };
             push = push.lerp(wall.completion() * push, balanced);
             if let Some(reaction) = &rates.reaction {
-                reaction.add(i, (push - by_pairs) / density + rubbing, -2.0 * rates.pressure[i] / density);
+                let by_pressure = (push - by_pairs) / density;
+                reaction.add(i, Pushed { by_pressure, factor: -2.0 * pressure / density, by_friction });
             }
         }
         let acceleration = mean * (push / density + drag) + parameters.gravity;
