@@ -484,7 +484,7 @@ fn obstacles_take_the_momentum_that_the_fluid_loses() {
 solid plate = box([-1, -5, -5], [0.1, 5, 5])
 solid floor = box([-1, -5, -5], [5, 5, -0.12])
 scene hit {{
-  box {{ min: [-0.5, -1, -1], max: [2, 1, 1] }}
+  box {{ min: [-0.5, -4, -1], max: [4, 4, 4] }}
   obstacle {{ solid: plate, restitution: 0.5 }}
   obstacle {{ solid: floor, restitution: 0.5 }}
   walls: {walls}

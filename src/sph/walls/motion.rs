@@ -120,8 +120,11 @@ impl Boundary {
             .map(|((x, y), z)| {
                 let block = box_around([x, y, z]);
                 let motion = of_corners(&block, places, dt);
-                // a map of cells knows nothing beyond its own reach, so the fluid's box grows by the way
-                if field.is_far(&block.grown(motion.way), reach) { Motion::default() } else { motion }
+                // a map of cells knows nothing beyond its own reach, so the fluid's box grows by the way; where it
+                // leaves the map, the formula's range tells
+                let passed = block.grown(motion.way);
+                let is_far = field.is_far(&passed, reach) || field.range(&passed.grown(reach)).hi < 0.0;
+                if is_far { Motion::default() } else { motion }
             })
             .reduce(Motion::default, Motion::or)
     }
