@@ -155,6 +155,7 @@ pub fn thin(room: &mut Room) {
         "rfm 1\nsolid many = any i in 0..400: ball([0.1*i, 0.3*random(1, i), 0.3*random(2, i)], 0.04)\n";
     std::fs::write(room.folder.join("many.rfm"), many).unwrap();
     let _viewer = open(room, &["many.rfm"]);
+    room.browser.wait_for("document.getElementById('surface-said').textContent");
     let said = room.browser.eval("document.getElementById('surface-said').textContent");
     assert!(said.as_str().unwrap().contains("operations"), "{said}");
 }
