@@ -33,6 +33,8 @@ pub(super) struct Language {
     /// The root and the magnitude.
     pub root: [&'static str; 2],
     pub magnitude: [&'static str; 2],
+    /// The sign between two conditions of which one at least holds. Both are computed, so that loops stay free of branches.
+    pub either: &'static str,
     /// The largest whole number that is not above a number, and the nearest one, the even one of two.
     pub floor: [&'static str; 2],
     pub round: [&'static str; 2],
@@ -144,6 +146,7 @@ pub(super) static C: Language = Language {
     },
     root: ["sqrt", "sqrtf"],
     magnitude: ["fabs", "fabsf"],
+    either: "|",
     floor: ["floor", "floorf"],
     round: ["rint", "rintf"],
     function: |function, precision, math, operands| {
@@ -186,6 +189,7 @@ pub(super) static RUST: Language = Language {
     },
     root: ["f64::sqrt", "f32::sqrt"],
     magnitude: ["f64::abs", "f32::abs"],
+    either: "|",
     floor: ["f64::floor", "f32::floor"],
     round: ["f64::round_ties_even", "f32::round_ties_even"],
     function: |function, precision, math, operands| match math {
@@ -222,6 +226,7 @@ pub(super) static WGSL: Language = Language {
     },
     root: ["sqrt", "sqrt"],
     magnitude: ["abs", "abs"],
+    either: "|",
     floor: ["floor", "floor"],
     round: ["round", "round"],
     function: |function, _, _, operands| shader_call(function, "atan2", operands),
@@ -252,6 +257,7 @@ pub(super) static GLSL: Language = Language {
     },
     root: ["sqrt", "sqrt"],
     magnitude: ["abs", "abs"],
+    either: "||",
     floor: ["floor", "floor"],
     round: ["roundEven", "roundEven"],
     function: |function, _, _, operands| shader_call(function, "atan", operands),
