@@ -275,7 +275,9 @@ fn solids(
         facts.push(found);
     }
     searches.tell();
-    diagnostics.list.extend(lints::of_scenes(shared, program).map_err(choose::usage)?);
+    diagnostics
+        .list
+        .extend(lints::of_scenes(shared.engine.into(), program, &mut searches).map_err(choose::usage)?);
     Ok(facts)
 }
 

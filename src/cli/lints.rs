@@ -1,36 +1,53 @@
-//! Warnings about solids and scenes that are valid and most likely not meant: `rfm check` looks for all of them, and editors
-//! are told of those about solids once a text rests.
+//! Warnings about solids and scenes that are valid and most likely not meant: `rfm check` looks for all of them, editors are
+//! told of them once a text rests, and a run tells of those that its fluid would meet.
 
-use super::args::Shared;
 use super::failure::note;
-use rfm::diagnostic::{Code, Diagnostic, Span};
+use rfm::diagnostic::{Code, Diagnostic, Diagnostics, Span};
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::ir::Node;
 use rfm::lower::{NamedSolid, Obstacle, Scene};
 use rfm::solid::{Break, Breakage, ThinPart, Uneven};
 use rfm::syntax::ast::Item;
-use rfm::{Error, Program, Solid, experiment};
+use rfm::{Engine, Error, Experiment, Program, Solid, experiment};
 
-/// What all solids of a file share.
+/// What all solids and scenes of a file share.
 pub(super) struct Searches {
     /// Operations that are left for operands without effect.
-    budget: usize,
+    idle: usize,
+    /// Operations that are left for walls and gaps.
+    thin: usize,
     /// The names of solids of which some operands were not looked at to the end.
     cut: Vec<String>,
+    /// The walls and gaps of the shapes that were looked at: scenes that compare something share their obstacles.
+    known: Vec<(Search, [Option<ThinPart>; 2])>,
 }
 
 /// Operations that are spent on operands without effect in all solids of a file together, at most: about a second.
 const IDLE_OPERATIONS: usize = 30_000_000;
 
+/// Operations that are spent on the walls and gaps of all scenes together, at most: some seconds.
+const THIN_OPERATIONS: usize = 2_500_000_000;
+
 impl Searches {
     pub fn new() -> Self {
-        Self { budget: IDLE_OPERATIONS, cut: Vec::new() }
+        Self { idle: IDLE_OPERATIONS, thin: THIN_OPERATIONS, cut: Vec::new(), known: Vec::new() }
     }
 
-    /// Searches that end sooner, for texts that are being written.
+    /// Searches that end sooner, for texts that are being written and runs that wait for them.
     pub fn short() -> Self {
-        Self { budget: IDLE_OPERATIONS / 10, ..Self::new() }
+        Self { idle: IDLE_OPERATIONS / 10, thin: THIN_OPERATIONS / 10, ..Self::new() }
+    }
+
+    /// The thinnest wall and the thinnest gap of an obstacle that particles at a spacing do not show.
+    fn thin_parts(&mut self, solid: &Solid, search: Search) -> [Option<ThinPart>; 2] {
+        if let Some((_, parts)) = self.known.iter().find(|(other, _)| *other == search) {
+            return *parts;
+        }
+        let (_, spacing, domain) = search;
+        let parts = solid.thin_parts([THIN_WALL * spacing, spacing], &domain, &mut self.thin);
+        self.known.push((search, parts));
+        parts
     }
 
     /// Says which searches came to no end.
@@ -54,14 +71,13 @@ pub(super) fn of_solid(
     solid: &Solid,
     searches: &mut Searches,
 ) -> Vec<Diagnostic> {
-    let subject = Subject { named, text: definition(program, named) };
+    let subject = Subject { name: &named.name, at: named.span, text: definition(program, named) };
     let around = solid.bounds().aabb().map(|bounds| bounds.grown(0.05 * bounds.size().max_element()));
     let uses = |scene: &&Scene| scene.obstacles.iter().any(|obstacle| obstacle.name == named.name);
     let of_scene = program.module().scenes.iter().find(uses).map(|scene| scene.domain);
     let jumps = around.or(of_scene).map_or_else(Vec::new, |over| solid.jumps(&over));
-    let mut singular = of_scene.or(around).map_or_else(Vec::new, |over| solid.singularities(&over));
-    singular.retain(|place| jumps.iter().all(|jump| jump.span != place.span));
-    let idle = solid.idle_operands(named.span.source, &mut searches.budget);
+    let singular = of_scene.or(around).map_or_else(Vec::new, |over| singular(solid, &over, &jumps));
+    let idle = solid.idle_operands(named.span.source, &mut searches.idle);
     if idle.is_cut {
         searches.cut.push(named.name.clone());
     }
@@ -72,6 +88,13 @@ pub(super) fn of_solid(
     if jumps.is_empty() {
         found.extend(solid.uneven_operands().first().map(|uneven| subject.uneven(uneven)));
     }
+    found
+}
+
+/// The places in a box at which ω is singular outside of a solid and does not jump.
+fn singular(solid: &Solid, over: &Aabb, jumps: &[Break]) -> Vec<Break> {
+    let mut found = solid.singularities(over);
+    found.retain(|place| jumps.iter().all(|jump| jump.span != place.span));
     found
 }
 
@@ -90,11 +113,23 @@ fn definition(program: &Program, named: &NamedSolid) -> Option<Span> {
 
 /// A solid that warnings are about.
 struct Subject<'a> {
-    named: &'a NamedSolid,
+    name: &'a str,
+    /// The place of its name.
+    at: Span,
+    /// Its formula.
     text: Option<Span>,
 }
 
-impl Subject<'_> {
+impl<'a> Subject<'a> {
+    /// A body of a scene by its name. If this is that of a solid of the file, warnings stand at its formula, else at the place
+    /// in the scene.
+    fn of(program: &Program, name: &'a str, place: Span) -> Self {
+        match program.module().solids.iter().find(|named| named.name == name) {
+            Some(named) => Self { name, at: named.span, text: definition(program, named) },
+            None => Self { name, at: place, text: Some(place) },
+        }
+    }
+
     /// A warning at a part of the formula. What is written elsewhere, in a `let` or another solid that shares it, stands
     /// beside the name of the solid.
     fn warning(&self, code: Code, span: Option<Span>, message: String, what: String) -> Diagnostic {
@@ -105,16 +140,16 @@ impl Subject<'_> {
         });
         match (own, span) {
             (Some(own), _) => Diagnostic::warning(code, own, message).at(what),
-            (None, Some(span)) if span.source == self.named.span.source => {
+            (None, Some(span)) if span.source == self.at.source => {
                 let at = format!("{what}; it is first written here");
-                Diagnostic::warning(code, self.named.span, message).label(span, at)
+                Diagnostic::warning(code, self.at, message).label(span, at)
             }
-            (None, _) => Diagnostic::warning(code, self.named.span, message).at(what),
+            (None, _) => Diagnostic::warning(code, self.at, message).at(what),
         }
     }
 
     fn idle(&self, span: Span) -> Diagnostic {
-        let message = format!("solid `{}` is the same without one of its operands", self.named.name);
+        let message = format!("solid `{}` is the same without one of its operands", self.name);
         let what = "it changes no point of the shape".into();
         self.warning(Code::IDLE_OPERAND, Some(span), message, what)
             .help("remove it, or look for a slip in its size or place")
@@ -124,14 +159,13 @@ impl Subject<'_> {
         let [steep, flat] = uneven.gradients;
         let message = format!(
             "operands of solid `{}` have gradients of very different size at the surface: {steep:.1e} and {flat:.1e}",
-            self.named.name
+            self.name
         );
         let what = format!("|∇ω| is {steep:.1e} or more here");
         let warning = self
             .warning(Code::UNEVEN_OPERANDS, uneven.steep, message, what)
             .help("write `normalise(…)` around the steeper one, or lengths in place of their powers");
-        match uneven.flat.filter(|flat| flat.source == self.named.span.source && uneven.steep != Some(*flat))
-        {
+        match uneven.flat.filter(|flat| flat.source == self.at.source && uneven.steep != Some(*flat)) {
             Some(other) => warning.label(other, format!("and {flat:.1e} or less here")),
             None => warning,
         }
@@ -146,7 +180,7 @@ impl Subject<'_> {
                 ("passes through infinity", "keep the divisor from zero, for example by `max(…, 1e-9)`")
             }
         };
-        let name = &self.named.name;
+        let name = &self.name;
         let message = format!("ω of solid `{name}` {how} from one sign to the other at {}", point(jump.at));
         let what = format!("{} of this does", jump.operation);
         self.warning(Code::JUMP, jump.span, message, what).help(help)
@@ -157,7 +191,7 @@ impl Subject<'_> {
             Breakage::NoValue | Breakage::Jump => "no value",
             Breakage::Pole => "no bound",
         };
-        let name = &self.named.name;
+        let name = &self.name;
         let message = format!("ω of solid `{name}` has {what} outside of it, at {}", point(found.at));
         let at = format!("{} of this has none there", found.operation);
         self.warning(Code::SINGULAR, found.span, message, at)
@@ -169,50 +203,70 @@ impl Subject<'_> {
 type Search = (Node, f64, Aabb);
 
 /// Warnings about obstacles that the particles of their scenes are too large for.
-pub(super) fn of_scenes(shared: &Shared, program: &Program) -> Result<Vec<Diagnostic>, Error> {
+pub(super) fn of_scenes(
+    engine: Engine,
+    program: &Program,
+    searches: &mut Searches,
+) -> Result<Vec<Diagnostic>, Error> {
     let mut found = Vec::new();
-    // scenes that compare something share their obstacles
-    let mut known: Vec<(Search, [Option<ThinPart>; 2])> = Vec::new();
-    let mut budget = THIN_OPERATIONS;
     for scene in &program.module().scenes {
         if scene.obstacles.is_empty() || scene.obstacles.len() > MOST_OBSTACLES {
             continue;
         }
-        let spacing = experiment::spacing(program, scene, shared.engine.into())?;
+        let spacing = experiment::spacing(program, scene, engine)?;
         for obstacle in &scene.obstacles {
-            let search = (obstacle.shape, spacing, scene.domain);
-            let [wall, gap] = match known.iter().find(|(other, _)| *other == search) {
-                Some((_, parts)) => *parts,
-                None => {
-                    let solid = program.compile(&obstacle.name, obstacle.shape, shared.engine.into())?;
-                    let parts =
-                        solid.at(0.0).thin_parts([THIN_WALL * spacing, spacing], &scene.domain, &mut budget);
-                    known.push((search, parts));
-                    parts
-                }
-            };
-            let both = [(wall, "wall", THIN_WALL), (gap, "gap", 1.0)];
-            let parts =
-                both.into_iter().filter_map(|(part, what, of_spacing)| Some((part?, what, of_spacing)));
-            found.extend(
-                parts.map(|(part, what, of_spacing)| {
-                    thin((scene, spacing), obstacle, &part, (what, of_spacing))
-                }),
-            );
+            let solid = program.compile(&obstacle.name, obstacle.shape, engine)?.at(0.0);
+            let parts = searches.thin_parts(&solid, (obstacle.shape, spacing, scene.domain));
+            found.extend(too_thin((scene, spacing), obstacle, parts));
         }
     }
     Ok(found)
+}
+
+/// Warnings about the bodies of an experiment that its fluid would meet: places at which their formulas jump or have no
+/// value, and walls and gaps that its particles are too large for.
+pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) -> Diagnostics {
+    let (scene, spacing) = (experiment.scene(), experiment.parameters().spacing());
+    let sources = experiment.program().sources().clone();
+    let mut found = Diagnostics { list: Vec::new(), sources };
+    if scene.obstacles.len() > MOST_OBSTACLES {
+        return found;
+    }
+    let container = scene.container.iter().map(|container| (&container.name, container.span, None));
+    let obstacles = scene.obstacles.iter().map(|obstacle| (&obstacle.name, obstacle.span, Some(obstacle)));
+    for ((name, span, obstacle), body) in container.chain(obstacles).zip(experiment.bodies()) {
+        let subject = Subject::of(experiment.program(), name, span);
+        let jumps = body.solid.jumps(&scene.domain);
+        found.list.extend(jumps.iter().map(|jump| subject.jump(jump)));
+        found
+            .list
+            .extend(singular(&body.solid, &scene.domain, &jumps).iter().map(|place| subject.singular(place)));
+        // the walls of a container have the outside behind them, and its gaps are shown by the fluid's number
+        if let Some(obstacle) = obstacle {
+            let parts = searches.thin_parts(&body.solid, (obstacle.shape, spacing, scene.domain));
+            found.list.extend(too_thin((scene, spacing), obstacle, parts));
+        }
+    }
+    found
 }
 
 /// Walls that are thinner than this part of the spacing are told of. A particle stays half a spacing away from each face:
 /// through such a wall it is nearer to those on the other side than to its own second neighbours.
 const THIN_WALL: f64 = 0.5;
 
-/// Operations that are spent on the walls and gaps of all scenes together, at most: some seconds.
-const THIN_OPERATIONS: usize = 2_500_000_000;
-
 /// Scenes with more obstacles are not looked at.
 const MOST_OBSTACLES: usize = 50;
+
+/// What there is to say of the thinnest wall and the thinnest gap of an obstacle.
+fn too_thin(
+    scene: (&Scene, f64),
+    obstacle: &Obstacle,
+    [wall, gap]: [Option<ThinPart>; 2],
+) -> impl Iterator<Item = Diagnostic> {
+    [(wall, "wall", THIN_WALL), (gap, "gap", 1.0)]
+        .into_iter()
+        .filter_map(move |(part, what, of_spacing)| Some(thin(scene, obstacle, &part?, (what, of_spacing))))
+}
 
 fn thin(
     (scene, spacing): (&Scene, f64),

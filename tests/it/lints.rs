@@ -317,3 +317,21 @@ fn a_search_that_is_cut_says_so() {
     }
     assert_eq!(solid.idle_operands(source, &mut { whole }), all);
 }
+
+/// A run tells of what its fluid meets, once: it is not told again when the run goes on.
+#[test]
+fn a_run_tells_of_what_its_fluid_meets() {
+    for (case, code) in [("no_value_in_the_fluid", "W0418"), ("wall_thinner_than_the_spacing", "W0508")] {
+        let folder = tempfile::tempdir().unwrap();
+        let file = root().join(format!("tests/cases/scene_error/{case}.rfm"));
+        let end = |until: &'static str| {
+            let more = if until == "2ms" { &["--resume"][..] } else { &[] };
+            let run = ["run", file.to_str().unwrap(), "-o", "out", "--until", until];
+            rfm(folder.path(), &[&run, more].concat()).expect(0).stderr
+        };
+        let at_start = end("1ms");
+        assert!(at_start.contains(&format!("warning[{code}]")), "{at_start}");
+        let later = end("2ms");
+        assert!(!later.contains(code), "{later}");
+    }
+}

@@ -479,6 +479,21 @@ fn behind_an_import_stands_what_it_defines() {
     editor.end();
 }
 
+/// A wall that the particles of a scene are too large for is told of once the text rests.
+#[test]
+fn what_particles_do_not_show_is_told() {
+    let file = root().join("tests/cases/scene_error/wall_thinner_than_the_spacing.rfm");
+    let text = std::fs::read_to_string(file).unwrap();
+    let mut editor = Editor::with(&text);
+    assert!(editor.messages.is_empty(), "{:?}", editor.messages);
+    let line = text.lines().position(|line| line.contains("obstacle")).unwrap();
+    assert!(!editor.await_messages().is_empty());
+    for message in &editor.messages {
+        assert_eq!((&message["code"], &message["range"]["start"]["line"]), (&json!("W0508"), &json!(line)));
+    }
+    editor.end();
+}
+
 /// Warnings that take longer come once a text rests, and never about an older one.
 #[test]
 fn what_takes_longer_is_told_when_the_text_rests() {

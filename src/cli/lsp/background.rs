@@ -159,6 +159,10 @@ fn look(shared: &Shared, text: &Text, encoding: Encoding) -> Option<PublishDiagn
             found.extend(lints::of_solid(program, named, &solid, &mut searches));
         }
     }
+    if shared.is_newest(text) && started.elapsed() < MOST_TIME {
+        // why a scene cannot be compiled is among the messages of the text, too
+        found.extend(lints::of_scenes(Engine::Auto, program, &mut searches).unwrap_or_default());
+    }
     if found.is_empty() {
         return None;
     }

@@ -24,7 +24,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use super::args::{Run, Shared};
-use super::{Failure, choose, input, note, output, progress};
+use super::{Failure, choose, input, lints, note, output, progress};
 use crate::cli::output::Shown;
 use checkpoints::Checkpoints;
 use folder::Hold;
@@ -59,7 +59,10 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
     let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint)).transpose()?;
     let (mut simulation, carved) = match &resumed {
         Some(checkpoint) => (experiment.resume(checkpoint).map_err(Failure::usage)?, 0),
-        None => start(&experiment)?,
+        None => {
+            input::show(&lints::of_experiment(&experiment, &mut lints::Searches::short()));
+            start(&experiment)?
+        }
     };
     let goal = Goal::of(options, &experiment)?;
     frames_fit(options, goal, &experiment)?;
