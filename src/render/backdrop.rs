@@ -341,7 +341,13 @@ mod tests {
     const MOMENT: Caption = Caption { time: 0.0, step: None };
     const LEGEND: Legend<'_> = Legend {
         title: "test",
-        scale: Some(Scale { label: "speed, m/s", low: 0.0, high: 1.0, map: ColourMap::BlueYellowRed }),
+        scale: Some(Scale {
+            label: "speed, m/s",
+            low: 0.0,
+            high: 1.0,
+            open: [false; 2],
+            map: ColourMap::BlueYellowRed,
+        }),
     };
 
     fn cube() -> Aabb {

@@ -25,19 +25,22 @@ pub struct Scale<'a> {
     pub low: f64,
     /// The value at the high end of the map.
     pub high: f64,
+    /// Whether smaller and larger values may be shown, in the colours of the ends. The bar then ends in a tip.
+    pub open: [bool; 2],
     /// The colours.
     pub map: ColourMap,
 }
 
 impl<'a> Scale<'a> {
-    /// Speeds from rest to `fastest`, in m/s.
+    /// Speeds from rest to `fastest`, in m/s, and beyond.
     pub fn speeds(fastest: f64) -> Self {
-        Self { label: "speed, m/s", low: 0.0, high: fastest, map: ColourMap::default() }
+        let open = [false, true];
+        Self { label: "speed, m/s", low: 0.0, high: fastest, open, map: ColourMap::default() }
     }
 
     /// The scale without its label, which then need not live as long as the text.
     pub(super) fn unlabelled(&self) -> Scale<'static> {
-        Scale { label: "", low: self.low, high: self.high, map: self.map }
+        Scale { label: "", ..*self }
     }
 
     /// The colour of a value.
@@ -97,6 +100,8 @@ fn escaped(text: &str) -> String {
 pub const BAR_WIDTH: f64 = 124.0;
 /// The height of the colour bar's layer, in units.
 pub const BAR_HEIGHT: f64 = 420.0;
+/// The length of the tip in which the colour bar ends where values beyond it are shown, in units.
+const TIP: f64 = 12.0;
 
 /// The colour bar.
 pub fn bar(values: &Scale<'_>, scale: f64) -> Result<Layer, RenderError> {
@@ -109,7 +114,21 @@ pub fn bar(values: &Scale<'_>, scale: f64) -> Result<Layer, RenderError> {
     }
     let _ = write!(
         body,
-        r#"</linearGradient><rect x="{left}" y="{top}" width="{width}" height="{height}" fill="url(#g)" stroke="{INK}"/><g font-size="16"><text x="{left}" y="{}">{}</text>"#,
+        r#"</linearGradient><rect x="{left}" y="{top}" width="{width}" height="{height}" fill="url(#g)" stroke="{INK}"/>"#
+    );
+    let ends = [(stops[0], top + height, TIP), (stops[stops.len() - 1], top, -TIP)];
+    for (([r, g, b], y, tip), _) in ends.into_iter().zip(values.open).filter(|(_, is_open)| *is_open) {
+        let _ = write!(
+            body,
+            r#"<path d="M{left} {y}l{} {tip}l{} {}z" fill="rgb({r},{g},{b})" stroke="{INK}" stroke-linejoin="round"/>"#,
+            0.5 * width,
+            0.5 * width,
+            -tip
+        );
+    }
+    let _ = write!(
+        body,
+        r#"<g font-size="16"><text x="{left}" y="{}">{}</text>"#,
         top - 18.0,
         escaped(values.label)
     );

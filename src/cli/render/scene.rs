@@ -96,7 +96,8 @@ impl RunScene {
         let survey = Survey::of(folder, &entries)?;
         let domain = survey.domain(figures.as_ref());
         let radius = survey.radius(figures.as_ref(), entries.len());
-        let (shown, range) = shown(options, &survey)?;
+        let (shown, found) = shown(options, &survey)?;
+        let range = options.range.map_or(found, |(low, high)| Levels { low, high });
         let camera = camera(options, &domain)?;
         let (meshes, mesh_of) = saved::obstacles(folder, &entries)?;
         let bodies = Bodies::at_start(folder, &first, &meshes, figures.as_ref())?;
@@ -125,7 +126,8 @@ impl RunScene {
         let unit = &shown.unit;
         let label = if unit.is_empty() { shown.name.clone() } else { format!("{}, {unit}", shown.name) };
         let map = options.colours.unwrap_or_default();
-        let scale = Scale { label: &label, low: range.low, high: range.high, map };
+        let open = [found.low < range.low, found.high > range.high];
+        let scale = Scale { label: &label, low: range.low, high: range.high, open, map };
         let legend = Legend { title: &title, scale: (balls || tinted).then_some(scale) };
         let still = scenery::backdrop(&camera, &domain, &legend, drawn.iter().copied().zip(&bodies))?;
         Ok(Self {
@@ -278,7 +280,7 @@ fn at_times(
     Ok(found)
 }
 
-/// The array that is shown, and its range.
+/// The array that is shown, and the range of its values in all frames.
 fn shown(options: &Render, survey: &Survey) -> Result<(Array, Levels), Failure> {
     let name = options.by.as_deref().unwrap_or("speed");
     let names = || survey.arrays.iter().map(|(name, _)| name.as_str());
@@ -289,6 +291,5 @@ fn shown(options: &Render, survey: &Survey) -> Result<(Array, Levels), Failure> 
             "--by {name}: the frames have no such number at each particle; there is {there}{near}"
         )));
     };
-    let range = options.range.map_or(*found, |(low, high)| Levels { low, high });
-    Ok((Array::named(name, None), range))
+    Ok((Array::named(name, None), *found))
 }

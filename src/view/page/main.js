@@ -217,13 +217,13 @@ class Viewer {
     const { look, setting, timeline, camera } = this;
     const array = setting.arrays[look.array];
     if (array) {
+      const ranges = timeline.frames.map((frame) => frame.ranges[look.array]);
+      const found = { low: Math.min(...ranges.map((r) => r.low)), high: Math.max(...ranges.map((r) => r.high)) };
       // most arrays of a run that goes on have no range of their own: that of its frames
-      if (array.range) look.range = look.fixed ?? array.range;
-      else {
-        const ranges = timeline.frames.map((frame) => frame.ranges[look.array]);
-        const range = { low: Math.min(...ranges.map((r) => r.low)), high: Math.max(...ranges.map((r) => r.high)) };
-        look.range = look.fixed ?? (ranges.length ? range : { low: 0, high: 1 });
-      }
+      look.range = look.fixed ?? array.range ?? (ranges.length ? found : { low: 0, high: 1 });
+      // frames and the program round ranges differently
+      const slack = 1e-5 * (found.high - found.low);
+      look.isOpen = [found.low < look.range.low - slack, found.high > look.range.high + slack];
       look.legend = (look.particles || look.arrows || look.trails) && timeline.frames.length ? array : null;
       this.showRange();
     }

@@ -43,6 +43,18 @@ function drawLegend(context, page, look) {
   context.strokeStyle = look.colours.soft;
   context.lineWidth = 1;
   context.strokeRect(left - 0.5, top - 0.5, width + 1, height + 1);
+  // values beyond an end have its colour: the bar ends in a tip there
+  for (const [isOpen, part, y, tip] of [[look.isOpen[0], 0, top + height, 7], [look.isOpen[1], 1, top, -7]]) {
+    if (!isOpen) continue;
+    context.fillStyle = `rgb(${colourAt(look.map, part).join()})`;
+    context.beginPath();
+    context.moveTo(left - 0.5, y);
+    context.lineTo(left + width / 2, y + tip);
+    context.lineTo(left + width + 0.5, y);
+    context.closePath();
+    context.fill();
+    context.stroke();
+  }
   context.fillStyle = look.colours.text;
   context.textAlign = "left";
   const { name, unit } = look.legend;
