@@ -7,8 +7,6 @@ use glam::DVec3;
 /// Impulses that obstacles have received from particles since the start.
 #[derive(Debug, Default)]
 pub struct Contacts {
-    /// Whether the pressure and the friction of the fluid are among them, and not only hits.
-    pub with_pressure: bool,
     /// Impulse and moment of impulse about the origin of each obstacle, N·s and N·m·s.
     totals: Vec<[f64; 6]>,
     /// Hits of the present step, in the order in which threads find them.
@@ -26,8 +24,8 @@ struct Hit {
 
 impl Contacts {
     /// The state before any contact, for a number of obstacles.
-    pub fn of(obstacles: usize, with_pressure: bool) -> Self {
-        Self { with_pressure, totals: vec![[0.0; 6]; obstacles], now: Mutex::default() }
+    pub fn of(obstacles: usize) -> Self {
+        Self { totals: vec![[0.0; 6]; obstacles], now: Mutex::default() }
     }
 
     /// Notes that an obstacle changed the velocity of a particle at a place.

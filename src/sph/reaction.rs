@@ -14,10 +14,11 @@ pub struct Reaction<'a> {
 }
 
 impl<'a> Reaction<'a> {
-    /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces, or for the start of a run.
+    /// The notes of a step of the length `dt`, s; `None` if no probe asks for forces, if the method notes none, or for the
+    /// start of a run.
     pub fn of(core: &'a Core, dt: f64) -> Option<Self> {
-        let contacts = core.contacts.as_ref().filter(|_| dt > 0.0)?;
-        Some(Self { core, contacts, dt })
+        let is_noted = dt > 0.0 && core.parameters.method.numerics().notes_reactions();
+        core.contacts.as_ref().filter(|_| is_noted).map(|contacts| Self { core, contacts, dt })
     }
 
     /// Notes what walls do to a particle.

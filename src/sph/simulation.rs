@@ -283,8 +283,7 @@ impl Simulation {
             if obstacle >= obstacles {
                 return Err(SetupError::Obstacle { index: obstacle });
             }
-            let with_pressure = self.core.parameters.method.numerics().notes_reactions();
-            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles, with_pressure));
+            self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles));
         }
         Ok(())
     }

@@ -1,8 +1,9 @@
 //! The force of a fluid on an obstacle by its state alone: ∫ p n, and friction, over the pieces of its surface that the
 //! fluid touches.
 //!
-//! It is near the truth in a fluid at rest, and used where no step notes what walls do. In a jet on a plate of eight spacings, pressures of particles at the wall swing, and as they
-//! are never negative their mean is too large: this force was 1.8 times what the jet lost of its momentum.
+//! It is near the truth in a fluid at rest, and used where no step notes what walls do. In a jet on a plate of eight
+//! spacings, pressures of particles at the wall swing, and as they are never negative their mean is too large: this
+//! force was 1.8 times what the jet lost of its momentum.
 //!
 //! The pressure of a piece is the mean of the particles in front of it, each continued to the piece by the balance
 //! of the fluid, ∇p = ρ(g − a), with the weights V·W (Shepard 1968). So a pressure that is linear in space gives its

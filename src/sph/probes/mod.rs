@@ -163,7 +163,7 @@ impl Gauge {
                 let (time, total) =
                     (core.time, core.contacts.as_ref().map_or([0.0; 6], |c| c.total(obstacle)));
                 let passed = time - self.last[0];
-                let is_complete = core.contacts.as_ref().is_some_and(|c| c.with_pressure);
+                let is_complete = core.parameters.method.numerics().notes_reactions();
                 let mut force = if is_complete && passed > 0.0 {
                     [0.0; 6]
                 } else {

@@ -232,7 +232,7 @@ impl Numerics for Wcsph {
         self.sound_speed(scales).powi(2) / 7.0 * ((x.powi(8) - 1.0) / 8.0 - (x - 1.0))
     }
 
-    /// Differences of pressure do not cancel, so that nobody says what walls do.
+    /// Differences of pressure do not cancel, so that a particle's neighbours take part in what remains.
     fn notes_reactions(&self) -> bool {
         self.gradients == Gradients::Pairs
     }

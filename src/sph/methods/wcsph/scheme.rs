@@ -403,8 +403,7 @@ impl<'a> Rates<'a> {
             return_rate: return_rate(core),
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
             even: is_kept_even(numbers),
-            // differences of pressure do not cancel, so that a particle's neighbours take part in what remains
-            reaction: Reaction::of(core, dt).filter(|_| numbers.gradients == Gradients::Pairs),
+            reaction: Reaction::of(core, dt),
         }
     }
 }
