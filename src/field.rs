@@ -17,8 +17,8 @@ use glam::DVec3;
 use crate::{geom::Aabb, interval::Interval};
 
 pub(crate) use cut::{Cut, cut, is_inside};
-pub(crate) use faces::surface_face;
 pub use faces::{Face, Faces, Part};
+pub(crate) use faces::{standing_faces, surface_face};
 pub use path::{Entry, Normals, Path, last_outside};
 pub(crate) use region::Region;
 pub(crate) use walls::clearance_by_ranges;

@@ -1,6 +1,10 @@
 //! Axis-aligned boxes and rigid motions in the scene's coordinates, in metres.
 
+mod eigen;
+
 use glam::{DMat3, DVec3};
+
+pub(crate) use eigen::eigen;
 
 /// An axis-aligned box, in metres. It has `min ≤ max` in each coordinate unless it is empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,6 +112,9 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// A body that is where it was.
+    pub const IDENTITY: Self = Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
+
     /// The place in the body at the start of a point that is in it now.
     pub fn back(&self, p: DVec3) -> DVec3 {
         self.rotation.transpose() * (p - self.translation)

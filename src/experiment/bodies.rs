@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::vector_field;
+use super::{rigid_parts, vector_field};
 use crate::compile::Error;
 use crate::field::{Moving, Walls};
 use crate::ir::Node;
@@ -53,7 +53,11 @@ fn body(
 ) -> Result<Body, Error> {
     let whole = program.compile(name, shape, engine)?;
     let solid = whole.at(0.0);
+    let has_maps = whole.moves() && parameters.walls_have_density();
+    let parts =
+        if has_maps { rigid_parts::of(program, (name, shape), scene.run.until, engine)? } else { Vec::new() };
     let obstacle = Obstacle {
+        parts,
         field: at_rest(&solid, scene, parameters),
         moving: whole.moves().then(|| in_motion(&whole, scene, parameters)),
         restitution: skin.bounce.restitution,

@@ -286,6 +286,7 @@ impl Experiment {
         let spacing = cell.map_or(self.parameters.spacing(), |cell| cell.element_product().cbrt());
         let mut clearance = CLEARANCE * spacing;
         let cells = taken.zip(cell).map(|(taken, cell)| (taken / cell.element_product()).round() as usize);
+        let mut squeezed = 0;
         let carved = match (self.parameters.makes_room_at_start(), cells) {
             (true, Some(cells)) => {
                 carve_cells(&mut particles, domain, obstacles, (spacing, clearance), cells)
@@ -293,13 +294,14 @@ impl Experiment {
             (makes_room, _) => {
                 if makes_room {
                     // particles that are too near may move; only those that find no place are removed
-                    make_room(&mut particles, domain, obstacles, clearance);
+                    squeezed = make_room(&mut particles, domain, obstacles, clearance);
                     clearance *= 0.5;
                 }
                 carve(&mut particles, domain, obstacles, clearance)
             }
         };
-        let carved = carved.map_err(|e| self.no_fluid(&e))?;
+        let mut carved = carved.map_err(|e| self.no_fluid(&e))?;
+        carved.too_close += squeezed;
         Ok((particles, carved))
     }
 

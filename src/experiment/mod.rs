@@ -20,6 +20,7 @@ mod fingerprint;
 mod mean;
 mod parameters;
 mod probes;
+mod rigid_parts;
 mod room;
 
 use std::sync::Arc;

@@ -28,6 +28,31 @@ pub enum Part {
 /// A tree of faces in prefix order: each node is followed by its parts. It is empty if no surface is near.
 pub type Faces = SmallVec<[Part; 16]>;
 
+/// The faces of a tree that a body outside may touch: all parts of unions, and of an intersection the one of which it is
+/// farthest.
+pub(crate) fn standing_faces(faces: &[Part]) -> SmallVec<[Face; 8]> {
+    /// Adds those of the tree that begins at a part, and returns where the next one begins.
+    fn of_tree(faces: &[Part], at: usize, found: &mut SmallVec<[Face; 8]>) -> usize {
+        let Some(part) = faces.get(at) else { return at };
+        match *part {
+            Part::Face(face) => {
+                found.push(face);
+                at + 1
+            }
+            Part::Any(parts) => (0..parts).fold(at + 1, |next, _| of_tree(faces, next, found)),
+            Part::All(parts) => {
+                let mut within = SmallVec::new();
+                let end = (0..parts).fold(at + 1, |next, _| of_tree(faces, next, &mut within));
+                found.extend(within.into_iter().max_by(|a, b| a.distance.total_cmp(&b.distance)));
+                end
+            }
+        }
+    }
+    let mut found = SmallVec::new();
+    of_tree(faces, 0, &mut found);
+    found
+}
+
 /// The face that is the obstacle's surface nearest to the point; `None` for a tree without faces. Of an intersection it
 /// is the farthest face, of a union the nearest.
 pub(crate) fn surface_face(faces: &[Part]) -> Option<Face> {

@@ -529,9 +529,10 @@ impl Walls for CellMap {
 
     fn is_far(&self, over: &Aabb, reach: f64) -> bool {
         let domain = self.cells.domain;
-        let within = domain.contains(over.min) && domain.contains(over.max);
-        within
-            && reach <= self.reach
+        if !(domain.contains(over.min) && domain.contains(over.max)) {
+            return self.twin.is_far(over, reach);
+        }
+        reach <= self.reach
             && self
                 .cells
                 .touched(over, MOST_TOUCHED)

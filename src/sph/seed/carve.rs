@@ -1,9 +1,10 @@
 //! What obstacles leave of a fluid at its start: particles inside are taken away, those beside a surface keep a distance.
 
 use glam::DVec3;
+use smallvec::SmallVec;
 
 use crate::{
-    field::{Face, Faces, surface_face},
+    field::{Face, Faces, standing_faces, surface_face},
     geom::Aabb,
 };
 
@@ -108,7 +109,7 @@ pub fn carve_cells(
     for (i, _) in leaves.iter().enumerate().filter(|(_, leaves)| !**leaves) {
         kept.push(particles.position.get(i), particles.velocity.get(i));
     }
-    move_out(&mut kept, domain, obstacles, clearance, spacing);
+    carved.too_close += move_out(&mut kept, domain, obstacles, clearance, spacing);
     *particles = kept;
     // beside edges and where obstacles meet, the estimate of a distance may be wrong
     let last = carve(particles, domain, obstacles, 0.4 * clearance)?;
@@ -156,17 +157,25 @@ fn surface(obstacle: &Obstacle, p: DVec3, reach: f64) -> Result<Option<Face>, Se
     })
 }
 
-/// Moves particles that are nearer to an obstacle than `clearance`, m, to that distance. A lattice that a
-/// surface cuts keeps its volume this way; if those particles were removed, a gap would remain along the
-/// wall.
-pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], clearance: f64) {
-    move_out(particles, domain, obstacles, clearance, 0.0);
+/// Moves particles that are nearer to an obstacle than `clearance`, m, to that distance, and returns how many are removed
+/// because they have no room between two walls. A lattice that a surface cuts keeps its volume this way; if the others were
+/// removed, too, a gap would remain along the wall.
+pub fn make_room(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], clearance: f64) -> usize {
+    move_out(particles, domain, obstacles, clearance, 0.0)
 }
 
 /// [`make_room`] for particles that are no more than `depth`, m, inside obstacles, too.
-fn move_out(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], clearance: f64, depth: f64) {
+fn move_out(
+    particles: &mut Particles,
+    domain: &Aabb,
+    obstacles: &[Obstacle],
+    clearance: f64,
+    depth: f64,
+) -> usize {
+    let mut kept = Particles::default();
     for i in 0..particles.len() {
-        let mut p = particles.position.get(i);
+        let start = particles.position.get(i);
+        let mut p = start;
         for obstacle in obstacles {
             // a place without a value is told of when particles are carved
             let Ok(Some(face)) = surface(obstacle, p, clearance.max(depth)) else { continue };
@@ -176,11 +185,64 @@ fn move_out(particles: &mut Particles, domain: &Aabb, obstacles: &[Obstacle], cl
                 p += (wanted - face.distance) * face.normal;
             }
         }
-        if domain.contains(p) {
-            particles.position.set(i, p);
+        let at = if domain.contains(p) { p } else { start };
+        let slot = if at == start { None } else { slot(at, domain, obstacles, 2.0 * clearance) };
+        match slot {
+            None => kept.push(at, particles.velocity.get(i)),
+            Some(slot) if slot.width < LEAST_SLOT * 2.0 * clearance => {}
+            Some(slot) => kept.push(at + slot.to_middle, particles.velocity.get(i)),
         }
     }
+    let removed = particles.len() - kept.len();
+    *particles = kept;
+    removed
 }
+
+/// The part of a spacing that two walls that face each other leave a particle at least. In a narrower slot most of the
+/// kernel's support is wall, and the pressure of the fluid beside it would throw the particle out.
+const LEAST_SLOT: f64 = 0.75;
+
+/// The room between two walls that face each other.
+struct Slot {
+    /// The distance between the walls, m.
+    width: f64,
+    /// The way from a point to the middle, m.
+    to_middle: DVec3,
+}
+
+/// The narrowest slot around a point between two faces of obstacles or of the box, if it is narrower than `most`, m.
+fn slot(p: DVec3, domain: &Aabb, obstacles: &[Obstacle], most: f64) -> Option<Slot> {
+    let mut walls: SmallVec<[Face; 16]> = SmallVec::new();
+    for axis in 0..3 {
+        let mut normal = DVec3::ZERO;
+        normal[axis] = 1.0;
+        let low = Face { distance: p[axis] - domain.min[axis], normal, mean_curvature: 0.0 };
+        let high = Face { distance: domain.max[axis] - p[axis], normal: -normal, mean_curvature: 0.0 };
+        walls.extend([low, high]);
+    }
+    let mut faces = Faces::new();
+    for obstacle in obstacles {
+        faces.clear();
+        obstacle.field.faces(p, most, &mut faces);
+        walls.extend(standing_faces(&faces));
+    }
+    let near: SmallVec<[Face; 16]> =
+        walls.into_iter().filter(|wall| (0.0..most).contains(&wall.distance)).collect();
+    let mut narrowest: Option<Slot> = None;
+    for (k, a) in near.iter().enumerate() {
+        for b in &near[k + 1..] {
+            let width = a.distance + b.distance;
+            let is_narrower = width < narrowest.as_ref().map_or(most, |slot| slot.width);
+            if is_narrower && a.normal.dot(b.normal) < OPPOSITE {
+                narrowest = Some(Slot { width, to_middle: 0.5 * (b.distance - a.distance) * a.normal });
+            }
+        }
+    }
+    narrowest
+}
+
+/// The cosine between the normals of two walls that face each other, at most.
+const OPPOSITE: f64 = -0.5;
 
 #[cfg(test)]
 mod tests {
@@ -245,6 +307,29 @@ mod tests {
             let cells = (8.0 * f64::powi(side / spacing, 3)).round() as usize;
             carve_cells(&mut particles, &domain, &[obstacle], (spacing, 0.5 * spacing), cells).unwrap();
             assert!(closest(&particles) > 0.5 * spacing, "{side}: {}", closest(&particles) / spacing);
+        }
+    }
+
+    /// A particle between a floor and a slab above it: in a narrow slot there is none, in a wider one it lies in the middle.
+    #[test]
+    fn narrow_slots_hold_no_particle() {
+        let spacing = 0.1;
+        let domain = Aabb::new(DVec3::ZERO, DVec3::ONE);
+        for (height, is_free) in [(0.055, false), (0.07, false), (0.08, true), (0.095, true)] {
+            let slab = Closures {
+                omega: move |p: DVec3| (p.z - height).min(height + 0.3 - p.z),
+                gradient: move |p: DVec3| if p.z < height + 0.15 { DVec3::Z } else { -DVec3::Z },
+            };
+            let obstacle = Obstacle::at_rest(Arc::new(slab), 0.01);
+            let lattice = FluidBlock {
+                cell: Some(DVec3::splat(spacing)),
+                ..FluidBlock::filling(FluidShape::Box(domain))
+            };
+            let mut particles = lattice.seed(&Parameters::default(), domain).unwrap();
+            carve_cells(&mut particles, &domain, &[obstacle], (spacing, 0.5 * spacing), 300).unwrap();
+            let below: Vec<f64> = particles.position.iter().map(|p| p.z).filter(|z| *z < height).collect();
+            assert_eq!(!below.is_empty(), is_free, "{height}: {below:?}");
+            assert!(below.iter().all(|z| (z - 0.5 * height).abs() < 1e-12), "{height}: {below:?}");
         }
     }
 

@@ -32,7 +32,7 @@ use super::{
     coverage::Coverage,
     friction::Friction,
     kernel::Wall,
-    volume::{Known, Maps},
+    volume::{Known, Maps, RigidPart},
 };
 
 /// Number of particles whose paths are first tested together.
@@ -61,6 +61,9 @@ pub struct Obstacle {
     pub field: Arc<dyn Walls>,
     /// The motion of the body; `None` if it is at rest.
     pub moving: Option<Arc<dyn Moving>>,
+    /// The parts of a body that moves, if they move differently and each without deformation; empty if it moves as a whole,
+    /// or if that is not known. What it takes of the kernels of particles then follows from its volume.
+    pub parts: Vec<RigidPart>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
     /// Coefficient of friction μ: when a particle hits the body, its speed along the face falls by μ times
@@ -86,6 +89,7 @@ impl Obstacle {
         Self {
             field,
             moving: None,
+            parts: Vec::new(),
             restitution: 0.5,
             friction: 0.0,
             resolution,
@@ -127,7 +131,7 @@ impl Boundary {
         self.during.clear();
         self.during
             .extend(self.obstacles.iter().map(|o| o.moving.as_ref().map(|moving| moving.during(from, to))));
-        self.maps.move_to(to);
+        self.maps.move_to(from, to);
     }
 
     /// The field of an obstacle during the present step.
@@ -228,8 +232,9 @@ impl Boundary {
 
     /// Prepares the maps of what obstacles take of kernels with the support radius h, m.
     pub fn map_obstacles(&mut self, h: f64) {
-        let obstacles: Vec<_> =
-            self.obstacles.iter().map(|obstacle| (&obstacle.field, obstacle.moving.as_ref())).collect();
+        let obstacles: Vec<_> = (self.obstacles.iter())
+            .map(|obstacle| (&obstacle.field, obstacle.moving.as_ref(), &obstacle.parts[..]))
+            .collect();
         self.maps = Maps::new(&obstacles, &self.domain, h, self.time);
     }
 
@@ -251,6 +256,14 @@ impl Boundary {
                     let mut coverage = none.with_bodies(wall, &none, &taken);
                     coverage.set_in_motion(self.field(k).wall_velocity(p));
                     whole = whole.or(&coverage);
+                }
+                Known::Parts(parts) => {
+                    let none = Coverage::<()>::default();
+                    for (taken, velocity) in &parts {
+                        let mut coverage = none.with_bodies(wall, &none, taken);
+                        coverage.set_in_motion(*velocity);
+                        whole = whole.or(&coverage);
+                    }
                 }
                 Known::ByFaces => whole = self.with_faces(wall, p, whole, k),
             }

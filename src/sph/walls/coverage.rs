@@ -19,6 +19,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::field::{Face, Faces, Part};
+use crate::geom::eigen;
 
 use super::{
     friction::{Friction, LEAST_FREE},
@@ -161,12 +162,15 @@ impl<F: Friction> Coverage<F> {
     /// (1 − K)⁻¹, by which a sum over the fluid alone becomes what it would be if the fluid continued behind
     /// the walls. No direction is stretched by more than 1/[`LEAST_FREE`].
     pub fn completion(&self) -> DMat3 {
-        let free = DMat3::from_diagonal(DVec3::splat((1.0 - self.part).max(LEAST_FREE)));
-        let moment = free - self.spread.to_matrix();
-        // along a face's normal K is hardly more than ½ in the fluid; in corners the sum of several is
-        // limited
-        let largest = DMat3::from_diagonal(DVec3::splat(1.0 / LEAST_FREE));
-        if moment.determinant() < LEAST_FREE.powi(3) { largest } else { moment.inverse() }
+        let moment = DMat3::from_diagonal(DVec3::splat(1.0 - self.part)) - self.spread.to_matrix();
+        if is_positive_definite(&(moment - DMat3::from_diagonal(DVec3::splat(LEAST_FREE)))) {
+            return moment.inverse();
+        }
+        // along the normal of one wall K is hardly more than ½ in the fluid; between two that face each other, and in
+        // corners, their sum may come near to 1
+        let (free, directions) = eigen(moment);
+        let stretches = free.max(DVec3::splat(LEAST_FREE)).recip();
+        directions * DMat3::from_diagonal(stretches) * directions.transpose()
     }
 
     /// Two walls combined by a rule, which says how their λ combine, and the derivatives by both.
@@ -247,6 +251,12 @@ fn common(a: f64, b: f64, cosine: f64) -> (f64, f64, f64) {
     };
     let mix = |square: f64, parallel: f64| (1.0 - weight) * square + weight * parallel;
     (mix(a * b, limit), mix(b, da), mix(a, db))
+}
+
+/// Whether all eigenvalues of a symmetric matrix are positive (Sylvester's criterion).
+fn is_positive_definite(m: &DMat3) -> bool {
+    let [x, y] = [m.x_axis, m.y_axis];
+    x.x > 0.0 && x.x * y.y > x.y * y.x && m.determinant() > 0.0
 }
 
 /// arcsin x for 0 ≤ x ≤ 1, with an error of at most 7e-5 (Abramowitz & Stegun 1964, 4.4.45). The rule that
@@ -390,6 +400,24 @@ mod tests {
                 println!("cosine {cosine}, {}: {worst:.4}", if all { "all" } else { "any" });
                 assert!(worst < 0.03, "{cosine} {all}: {worst}");
             }
+        }
+    }
+
+    /// Between two walls, in an edge and in a corner no direction is stretched beyond the limit, and those in which a single
+    /// wall stretches keep what it makes of them.
+    #[test]
+    fn no_direction_is_stretched_beyond_the_limit() {
+        let across = Symmetric::square(DVec3::new(0.6, 0.8, 0.0));
+        let along = DVec3::new(-0.8, 0.6, 0.0);
+        for (part, spread) in [(0.3, 0.1), (0.5, 0.45), (0.6, 0.39), (0.6, 0.7), (0.9, 0.05), (1.0, 0.0)] {
+            let wall: super::Coverage =
+                super::Coverage { part, spread: spread * across, ..Default::default() };
+            let completion = wall.completion();
+            let stretch = |direction: DVec3| (completion * direction).dot(direction);
+            let limited = |free: f64| 1.0 / free.max(LEAST_FREE);
+            assert!((stretch(DVec3::new(0.6, 0.8, 0.0)) - limited(1.0 - part - spread)).abs() < 1e-12);
+            assert!((stretch(along) - limited(1.0 - part)).abs() < 1e-12);
+            assert!((stretch(DVec3::Z) - limited(1.0 - part)).abs() < 1e-12);
         }
     }
 }

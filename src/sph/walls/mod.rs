@@ -29,3 +29,4 @@ pub use kernel::WallKernel;
 pub(super) use motion::StepLimits;
 pub(super) use shares::Pushed;
 pub(super) use volume::Maps;
+pub use volume::RigidPart;

@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
+    field::Moving,
     geom::{Aabb, Placement},
     sph::particles::Vectors,
 };
@@ -74,10 +75,10 @@ impl Boundary {
         let [x, y, z] = position.components().map(|column| &column[..]);
         let fluid = box_around([x, y, z]);
         let shortest = JUMP * usual;
-        for k in 0..self.obstacles.len() {
+        for (k, moving) in self.movers() {
             let before = dt;
             for _ in 0..ATTEMPTS {
-                let Some(places) = self.places(k, time, dt) else { break };
+                let Some(places) = places(moving, time, dt) else { break };
                 // no part of a box moves more than its corners, and most steps are short enough for all of the fluid
                 let mut longest = limits.longest(of_corners(&fluid, &places, dt), dt);
                 if longest < dt {
@@ -97,17 +98,13 @@ impl Boundary {
         dt
     }
 
-    /// Where a body is in the course of a step; `None` if it is at rest, or its motion is not known.
-    fn places(&self, k: usize, time: f64, dt: f64) -> Option<[Placement; PARTS + 1]> {
-        let moving = self.obstacles[k].moving.as_ref()?;
-        if !(dt.is_finite() && moving.moves()) {
-            return None;
-        }
-        let mut places = [moving.placement(time)?; PARTS + 1];
-        for (part, place) in places.iter_mut().enumerate().skip(1) {
-            *place = moving.placement(time + dt * part as f64 / PARTS as f64)?;
-        }
-        Some(places)
+    /// What moves: bodies, or their parts, with the numbers of the bodies.
+    fn movers(&self) -> impl Iterator<Item = (usize, &dyn Moving)> {
+        self.obstacles.iter().enumerate().flat_map(|(k, obstacle)| {
+            let whole = obstacle.moving.iter().filter(|_| obstacle.parts.is_empty());
+            let parts = obstacle.parts.iter().filter_map(|part| part.moving.as_ref());
+            whole.chain(parts).map(move |moving| (k, &**moving))
+        })
     }
 
     /// How a body moves where fluid is near it.
@@ -120,14 +117,24 @@ impl Boundary {
             .map(|((x, y), z)| {
                 let block = box_around([x, y, z]);
                 let motion = of_corners(&block, places, dt);
-                // a map of cells knows nothing beyond its own reach, so the fluid's box grows by the way; where it
-                // leaves the map, the formula's range tells
-                let passed = block.grown(motion.way);
-                let is_far = field.is_far(&passed, reach) || field.range(&passed.grown(reach)).hi < 0.0;
+                // the fluid's box grows, not the reach, beyond which a map of cells knows nothing
+                let is_far = field.is_far(&block.grown(motion.way), reach);
                 if is_far { Motion::default() } else { motion }
             })
             .reduce(Motion::default, Motion::or)
     }
+}
+
+/// Where a body is in the course of a step; `None` if it is at rest, or its motion is not known.
+fn places(moving: &dyn Moving, time: f64, dt: f64) -> Option<[Placement; PARTS + 1]> {
+    if !(dt.is_finite() && moving.moves()) {
+        return None;
+    }
+    let mut places = [moving.placement(time)?; PARTS + 1];
+    for (part, place) in places.iter_mut().enumerate().skip(1) {
+        *place = moving.placement(time + dt * part as f64 / PARTS as f64)?;
+    }
+    Some(places)
 }
 
 /// How the corners of a box would move if they belonged to the body.

@@ -1,4 +1,5 @@
-//! The maps of all obstacles of a scene: one of those at rest, and one of each that moves without deformation.
+//! The maps of all obstacles of a scene: one of those at rest, and one of each, or of each part of one, that moves without
+//! deformation.
 
 use std::sync::Arc;
 
@@ -13,8 +14,17 @@ use crate::{
 /// How far beyond the box the map of a moving body reaches, in diagonals of the box. Bodies turn about places outside.
 const BEYOND: f64 = 2.0;
 
-/// An obstacle: its field at the time 0, and its motion.
-pub(in crate::sph) type Mapped<'a> = (&'a Arc<dyn Walls>, Option<&'a Arc<dyn Moving>>);
+/// A part of an obstacle that moves without deformation, otherwise than its other parts.
+#[derive(Clone)]
+pub struct RigidPart {
+    /// The field of the part at the time 0, ω > 0 inside.
+    pub field: Arc<dyn Walls>,
+    /// Its motion; `None` if it is at rest.
+    pub moving: Option<Arc<dyn Moving>>,
+}
+
+/// An obstacle: its field at the time 0, its motion, and the parts that move differently, if there are any.
+pub(in crate::sph) type Mapped<'a> = (&'a Arc<dyn Walls>, Option<&'a Arc<dyn Moving>>, &'a [RigidPart]);
 
 /// What obstacles take of kernels.
 #[derive(Default)]
@@ -27,10 +37,51 @@ pub(in crate::sph) struct Maps {
 enum Body {
     /// In the map of all that are at rest.
     AtRest,
-    /// In a map of its own, made where it is at the time 0. It is elsewhere now; `None` if it has another shape.
-    Moving { map: Box<VolumeMap>, motion: Arc<dyn Moving>, placement: Option<Placement> },
+    /// In a map of its own.
+    Whole(Box<Rigid>),
+    /// In a map for each part.
+    Parts(Vec<Rigid>),
     /// Nowhere.
     Unknown,
+}
+
+/// A map that was made where a body is at the time 0. It is elsewhere now.
+struct Rigid {
+    map: VolumeMap,
+    /// `None` if it is at rest.
+    motion: Option<Arc<dyn Moving>>,
+    /// Where it is; `None` if it has another shape.
+    placement: Option<Placement>,
+    /// The field of a moving part during the present step.
+    during: Option<Box<dyn Walls>>,
+}
+
+impl Rigid {
+    fn new(field: &Arc<dyn Walls>, motion: Option<&Arc<dyn Moving>>, around: &Aabb, h: f64) -> Option<Self> {
+        let map = VolumeMap::new(vec![field.clone()], around, h)?;
+        Some(Self { map, motion: motion.cloned(), placement: Some(Placement::IDENTITY), during: None })
+    }
+
+    fn move_to(&mut self, time: f64) {
+        if let Some(motion) = &self.motion {
+            self.placement = motion.placement(time);
+        }
+    }
+
+    /// What it takes of the kernel at a place.
+    fn at(&self, p: DVec3) -> Known {
+        let Some(placement) = &self.placement else { return Known::ByFaces };
+        let there = placement.back(p);
+        if !self.map.reaches(there) {
+            return Known::ByFaces;
+        }
+        self.map.at(there).map_or(Known::Nothing, |taken| Known::Taken(taken.turned(&placement.rotation)))
+    }
+
+    /// The velocity of a point that it carries along, m/s.
+    fn velocity(&self, p: DVec3) -> DVec3 {
+        self.during.as_ref().map_or(DVec3::ZERO, |field| field.wall_velocity(p))
+    }
 }
 
 /// What the maps know of an obstacle at a place.
@@ -38,6 +89,8 @@ pub(in crate::sph) enum Known {
     /// It is one of those at rest, see [`Maps::at_rest`].
     AtRest,
     Taken(Taken),
+    /// What each of its parts takes, and the velocity at which this moves, m/s.
+    Parts(Vec<(Taken, DVec3)>),
     /// It is not near.
     Nothing,
     /// Only its faces tell.
@@ -45,42 +98,52 @@ pub(in crate::sph) enum Known {
 }
 
 impl Maps {
-    /// The maps of obstacles in a box, for a support radius, m: of each its field at the time 0, and its motion. They are
-    /// where they are at a time, s.
+    /// The maps of obstacles in a box, for a support radius, m, as they are at a time, s.
     pub fn new(obstacles: &[Mapped<'_>], domain: &Aabb, h: f64, time: f64) -> Self {
-        let at_rest = obstacles.iter().filter(|(_, motion)| motion.is_none());
-        let at_rest = VolumeMap::new(at_rest.map(|&(field, _)| field.clone()).collect(), domain, h);
+        let at_rest = obstacles.iter().filter(|(_, motion, _)| motion.is_none());
+        let at_rest = VolumeMap::new(at_rest.map(|&(field, ..)| field.clone()).collect(), domain, h);
         let around = domain.grown(BEYOND * domain.size().length());
-        let body = |&(field, motion): &Mapped<'_>| match motion {
+        let body = |&(field, motion, parts): &Mapped<'_>| match motion {
             None if at_rest.is_some() => Body::AtRest,
+            Some(_) if !parts.is_empty() => {
+                let maps = parts.iter().map(|part| Rigid::new(&part.field, part.moving.as_ref(), &around, h));
+                maps.collect::<Option<Vec<_>>>().map_or(Body::Unknown, Body::Parts)
+            }
             Some(motion) if motion.placement(0.0).is_some() => {
-                VolumeMap::new(vec![field.clone()], &around, h).map_or(Body::Unknown, |map| Body::Moving {
-                    map: Box::new(map),
-                    motion: motion.clone(),
-                    placement: motion.placement(time),
-                })
+                let whole = Rigid::new(field, Some(motion), &around, h);
+                whole.map_or(Body::Unknown, |whole| Body::Whole(Box::new(whole)))
             }
             None | Some(_) => Body::Unknown,
         };
-        Self { bodies: obstacles.iter().map(body).collect(), at_rest }
+        let mut maps = Self { bodies: obstacles.iter().map(body).collect(), at_rest };
+        maps.move_to(time, time);
+        maps
     }
 
-    /// Moves the bodies to where they are at a time, s.
-    pub fn move_to(&mut self, time: f64) {
+    /// Moves the bodies to where they are at the end of a step between two times, s.
+    pub fn move_to(&mut self, from: f64, to: f64) {
         for body in &mut self.bodies {
-            if let Body::Moving { motion, placement, .. } = body {
-                *placement = motion.placement(time);
+            match body {
+                Body::AtRest | Body::Unknown => {}
+                Body::Whole(whole) => whole.move_to(to),
+                Body::Parts(parts) => {
+                    for part in parts {
+                        part.move_to(to);
+                        part.during = part.motion.as_ref().map(|motion| motion.during(from, to));
+                    }
+                }
             }
         }
     }
 
     /// Memory of the maps, bytes.
     pub fn bytes(&self) -> usize {
-        let moving = self.bodies.iter().map(|body| match body {
-            Body::Moving { map, .. } => map.bytes(),
+        let of_body = |body: &Body| match body {
             Body::AtRest | Body::Unknown => 0,
-        });
-        self.at_rest.as_ref().map_or(0, VolumeMap::bytes) + moving.sum::<usize>()
+            Body::Whole(whole) => whole.map.bytes(),
+            Body::Parts(parts) => parts.iter().map(|part| part.map.bytes()).sum(),
+        };
+        self.at_rest.as_ref().map_or(0, VolumeMap::bytes) + self.bodies.iter().map(of_body).sum::<usize>()
     }
 
     /// What the obstacles at rest take of the kernel at a place in the box.
@@ -92,14 +155,19 @@ impl Maps {
     pub fn of(&self, k: usize, p: DVec3) -> Known {
         match self.bodies.get(k) {
             Some(Body::AtRest) => Known::AtRest,
-            Some(Body::Moving { map, placement: Some(placement), .. }) => {
-                let there = placement.back(p);
-                if !map.reaches(there) {
-                    return Known::ByFaces;
+            Some(Body::Whole(whole)) => whole.at(p),
+            Some(Body::Parts(parts)) => {
+                let mut taken = Vec::new();
+                for part in parts {
+                    match part.at(p) {
+                        Known::Taken(by_part) => taken.push((by_part, part.velocity(p))),
+                        Known::Nothing => {}
+                        Known::AtRest | Known::Parts(_) | Known::ByFaces => return Known::ByFaces,
+                    }
                 }
-                map.at(there).map_or(Known::Nothing, |taken| Known::Taken(taken.turned(&placement.rotation)))
+                if taken.is_empty() { Known::Nothing } else { Known::Parts(taken) }
             }
-            Some(Body::Moving { placement: None, .. } | Body::Unknown) | None => Known::ByFaces,
+            Some(Body::Unknown) | None => Known::ByFaces,
         }
     }
 }

@@ -1,5 +1,5 @@
 //! What bodies take of the kernels near them, by their volume: λ = ∫ W, ∇λ and K = ∫ y ⊗ ∇W over all bodies at rest in the
-//! box, and over each body that moves without changing its shape.
+//! box, and over each body, or part of one, that moves without changing its shape.
 //!
 //! The box has a lattice with [`CELLS`](lattice::CELLS) cells along a support radius. How far bodies fill its cells is found from their
 //! fields ([`fractions`]), and what the filled cells add to a node from a table ([`stencil`]). Between the nodes λ is a
@@ -23,4 +23,5 @@ mod stencil;
 mod tests;
 
 pub(in crate::sph) use self::map::Taken;
+pub use self::maps::RigidPart;
 pub(in crate::sph) use self::maps::{Known, Maps};

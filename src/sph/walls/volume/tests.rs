@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{
     map::{Taken, VolumeMap},
-    maps::{Known, Maps},
+    maps::{Known, Maps, RigidPart},
 };
 use crate::sph::{
     scenes::{half_space, pawn, random_cloud, sphere},
@@ -156,8 +156,8 @@ fn moving_bodies_take_their_map_along() {
     let solid = program.unwrap().solid("s").unwrap();
     let field: Arc<dyn Walls> = Arc::new(solid.at(0.0));
     let motion: Arc<dyn crate::field::Moving> = Arc::new(solid.clone());
-    let mut maps = Maps::new(&[(&field, Some(&motion))], &cube(2.0), H, 0.0);
-    maps.move_to(0.7);
+    let mut maps = Maps::new(&[(&field, Some(&motion), &[])], &cube(2.0), H, 0.0);
+    maps.move_to(0.0, 0.7);
     let there = map(Arc::new(solid.at(0.7)), cube(2.0));
     let mut seen = 0;
     for place in random_cloud(300, 1.2).iter() {
@@ -168,4 +168,46 @@ fn moving_bodies_take_their_map_along() {
         seen += 1;
     }
     assert!(seen > 100, "{seen}");
+}
+
+/// Plates of one body that rise differently: each takes what it would alone, also beside the middle of a plate that is
+/// thinner than the kernel, and carries its own velocity.
+#[test]
+fn parts_of_a_body_take_their_maps_along() {
+    let plate = "box([-0.05, -0.6, -0.6], [0.05, 0.6, 0.6])";
+    let text = format!(
+        "rfm 1\nlet plate = {plate}\nsolid slow = plate.move([-0.3, 0, 0.1*t])\nsolid fast = plate.move([0.3, 0, 0.3*t])\n\
+         solid both = slow or fast"
+    );
+    let program = crate::Program::from_source("plates.rfm", text).unwrap();
+    let [slow, fast, both] = ["slow", "fast", "both"].map(|name| program.solid(name).unwrap());
+    let parts = [&slow, &fast]
+        .map(|solid| RigidPart { field: Arc::new(solid.at(0.0)), moving: Some(Arc::new(solid.clone())) });
+    let field: Arc<dyn Walls> = Arc::new(both.at(0.0));
+    let motion: Arc<dyn crate::field::Moving> = Arc::new(both.clone());
+    let mut maps = Maps::new(&[(&field, Some(&motion), &parts)], &cube(2.0), H, 0.0);
+    maps.move_to(0.4, 0.5);
+    let there = [&slow, &fast].map(|solid| map(Arc::new(solid.at(0.5)), cube(2.0)));
+    let mut before: Option<f64> = None;
+    for k in 0..200 {
+        let place = DVec3::new(-0.6 + 0.006 * f64::from(k), 0.05, 0.62);
+        let found = match maps.of(0, place) {
+            Known::Parts(found) => found,
+            Known::Nothing => Vec::new(),
+            Known::AtRest | Known::Taken(_) | Known::ByFaces => panic!("{place}"),
+        };
+        let exact = there.iter().map(|map| map.at(place).map_or(0.0, |taken| taken.part)).sum::<f64>();
+        let part = found.iter().map(|(taken, _)| taken.part).sum::<f64>();
+        assert!((part - exact).abs() < 0.01, "{place}: {part} {exact}");
+        for (taken, velocity) in &found {
+            let rise = if place.x < 0.0 { 0.1 } else { 0.3 };
+            assert!(
+                taken.part < 1e-6 || (*velocity - rise * DVec3::Z).length() < 1e-12,
+                "{place}: {velocity}"
+            );
+        }
+        // a step of a fortieth of the kernel
+        assert!(before.is_none_or(|before| (part - before).abs() < 0.1), "{place}: {before:?} {part}");
+        before = Some(part);
+    }
 }
