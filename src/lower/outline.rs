@@ -22,6 +22,9 @@ const SMOOTH: f64 = 0.965_925_826_289_068_3;
 /// Sines below this are those of rounded angles.
 const STRAIGHT: f64 = 1e-14;
 
+/// Corners farther from the origin than this are refused: products of their distances must not overflow.
+const FARTHEST: f64 = 1e150;
+
 pub(super) type Point = [f64; 2];
 
 const CORNERS: PathKind = PathKind {
@@ -48,6 +51,8 @@ pub(super) enum Flaw {
     /// The edges that begin at two corners touch.
     Touch(usize, usize),
     NoArea,
+    /// A corner lies so far away that areas would overflow.
+    TooFar(usize),
 }
 
 impl Lowering<'_> {
@@ -97,6 +102,11 @@ impl Lowering<'_> {
                 format!("the outline touches itself: the edges behind corners {i} and {j} meet"),
             ),
             Flaw::NoArea => (written.span, "the polygon has no area".to_string()),
+            Flaw::TooFar(i) => {
+                let message =
+                    format!("corner {i} of the polygon is farther than {FARTHEST:e} from the origin");
+                return Diagnostic::error(Code::OUT_OF_RANGE, self.user_span(spots[i].place), message);
+            }
         };
         let diagnostic = Diagnostic::error(Code::OUTLINE, self.user_span(at), message);
         diagnostic.help(
@@ -162,6 +172,9 @@ fn side(a: Point, b: Point, c: Point) -> f64 {
 /// The first flaw of an outline.
 pub(super) fn flaw(points: &[Point]) -> Option<Flaw> {
     let n = points.len();
+    if let Some(i) = (0..n).find(|&i| points[i].iter().any(|c| c.abs() > FARTHEST)) {
+        return Some(Flaw::TooFar(i));
+    }
     if let Some(i) = (1..n).find(|&i| points[i] == points[i - 1]) {
         return Some(Flaw::Repeated(i));
     }
@@ -303,6 +316,8 @@ mod tests {
         let bow = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
         assert_eq!(flaw(&bow), Some(Flaw::Touch(0, 2)));
         assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [0.5, 0.0]]), Some(Flaw::TurnsBack(0)));
+        // areas of such corners would be infinite
+        assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [-1e308, 1.0]]), Some(Flaw::TooFar(2)));
         assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), Some(Flaw::Repeated(2)));
         assert_eq!(flaw(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), None);
     }
