@@ -210,9 +210,11 @@ fn escaped(json: &str) -> Cow<'_, str> {
 
 /// A figure with so many digits behind the point where that is readable, otherwise as many digits in all, with an exponent.
 pub(super) fn significant(figure: f64, digits: usize) -> String {
-    match figure.abs() {
-        size if (1e-2..1e7).contains(&size) || size == 0.0 => format!("{figure:.digits$}"),
-        _ => format!("{figure:.*e}", digits - 1),
+    let size = figure.abs();
+    if (1e-2..1e7).contains(&size) || size == 0.0 {
+        format!("{figure:.digits$}")
+    } else {
+        format!("{figure:.*e}", digits - 1)
     }
 }
 

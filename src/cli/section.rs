@@ -9,7 +9,7 @@ use super::args::{Check, MessageFormat, Shared};
 use super::failure::Failure;
 use super::output::Shown;
 use super::{choose, output};
-use rfm::diagnostic::{Code, Diagnostic};
+use rfm::diagnostic::{Code, Diagnostic, Span};
 use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::slice::{self, Cut as SolidCut, Panel, Plane, Window};
@@ -169,19 +169,15 @@ fn plot_sheet(
         let planes: Vec<String> = planes.iter().map(ToString::to_string).collect();
         say!("slices {} of {title} written to {}", planes.join(", "), path.shown());
     }
-    let mut warnings: Vec<Diagnostic> =
+    let all: Vec<Diagnostic> =
         all.into_iter().flat_map(|(_, _, seen)| seen).filter_map(|seen| seen.warning).collect();
     // a sheet may show a solid where it is not, as long as it shows it somewhere
-    if solids.len() > 1 || planes.len() > 1 {
-        let missed = |warning: &Diagnostic| warning.code == Code::NO_SECTION;
-        let panels = planes.len();
-        let is_nowhere = |warning: &Diagnostic, all: &[Diagnostic]| {
-            all.iter().filter(|other| missed(other) && other.primary.span == warning.primary.span).count()
-                == panels
-        };
-        let all = warnings.clone();
-        warnings.retain(|warning| !missed(warning) || is_nowhere(warning, &all));
-    }
+    let missed = |warning: &Diagnostic| warning.code == Code::NO_SECTION;
+    let is_nowhere = |solid: Span| {
+        all.iter().filter(|other| missed(other) && other.primary.span == solid).count() == planes.len()
+    };
+    let warnings =
+        all.iter().filter(|warning| !missed(warning) || is_nowhere(warning.primary.span)).cloned().collect();
     Ok(warnings)
 }
 

@@ -26,6 +26,7 @@ mod leftovers;
 mod lints;
 mod looks;
 mod lsp;
+mod mesh_command;
 mod mesh_properties;
 mod meshes;
 mod mistakes;
