@@ -153,6 +153,39 @@ fn every_example_is_in_the_gallery() {
     }
 }
 
+/// What `examples/pictures/make` makes are the pictures of the gallery, each with the command that stands beside it.
+#[test]
+fn one_script_makes_every_picture_of_the_gallery() {
+    let (gallery, script) = (text("examples/README.md"), text("examples/pictures/make"));
+    let mut made: Vec<String> = script
+        .lines()
+        .filter_map(|line| {
+            let mut words = line.split(' ');
+            match (words.next()?, words.next()?) {
+                ("section", name) => Some(format!("{name}-slice.png")),
+                ("flow", name) if !name.contains('$') => Some(format!("{name}.png")),
+                ("truth", name) => Some(format!("validation/{name}.png")),
+                _ => None,
+            }
+        })
+        .collect();
+    made.push("pawn-film.gif".into());
+    let shown = gallery.split("](pictures/").skip(1).filter_map(|part| Some(part.split_once(')')?.0));
+    let mut shown: Vec<&str> = shown.filter(|name| name.contains('.')).collect();
+    made.sort();
+    shown.sort_unstable();
+    assert_eq!(made, shown);
+    for line in script.lines() {
+        if let Some(call) = line.strip_prefix("section ") {
+            let (_, call) = call.split_once(' ').unwrap();
+            assert!(
+                gallery.contains(&format!("`rfm check examples/{call} ")) || call.contains("validation"),
+                "{call}"
+            );
+        }
+    }
+}
+
 #[test]
 fn the_first_page_stays_short() {
     let lines = text("README.md").lines().count();
