@@ -240,10 +240,11 @@ fn solids(
     let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
     let (start, named_solids) = (Instant::now(), &program.module().solids);
     for named in named_solids {
-        if !facts.is_empty() && start.elapsed().as_secs_f64() > budget {
-            let measured = facts.len();
+        let elapsed = start.elapsed().as_secs_f64();
+        if is_over(facts.len(), named_solids.len(), elapsed, budget) {
             note(format!(
-                "{measured} of {} solids were measured in {budget} s; --budget SECONDS gives more time",
+                "{} of {} solids were measured in {elapsed:.1} s; --budget SECONDS gives more time than {budget} s",
+                facts.len(),
                 named_solids.len()
             ));
             break;
@@ -279,6 +280,13 @@ fn solids(
         .list
         .extend(lints::of_scenes(shared.engine.into(), program, &mut searches).map_err(choose::usage)?);
     Ok(facts)
+}
+
+/// Whether no more solids are measured: the budget is spent, or a tenth of it has shown that there are so many solids that
+/// it would reach a tenth of them at most.
+fn is_over(measured: usize, all: usize, elapsed: f64, budget: f64) -> bool {
+    let is_hopeless = elapsed > 0.1 * budget && elapsed * all as f64 > 10.0 * budget * measured as f64;
+    measured > 0 && (elapsed > budget || is_hopeless)
 }
 
 /// Why a solid is not measured, if that would take longer than the budget.

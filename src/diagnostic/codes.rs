@@ -232,6 +232,13 @@ SINGULAR = "W0418":
 "Outside of the solid, in the scene that has it as an obstacle or close to it, ω has no value: a divisor is zero there, or a
 root or a logarithm is taken of a negative number. What comes near is neither inside nor outside, and a run stops there. Keep
 the formula away from that place by `max`, or choose another one by `where`: `where(x > 0, ln(max(x, 1e-9)), -20)`.";
+NO_EDGE = "W0419":
+"`.round(radius)` makes arcs of the edges at which the parts of a shape are joined by `and`, `or` and `\\`. This shape is one
+formula, or its parts are joined further inside: `min`, `max` and `blend` keep their edges, and `.taper` makes one formula of what it
+narrows. Round the shape before that.
+
+    rfm 1
+    solid tablet = box().round(0.1).taper(1, 0.5)";
 FLUID_IN_OBSTACLE = "W0501":
 "Part of the fluid's shape lies inside an obstacle or outside the box. Those particles are carved off before the
 run starts.";

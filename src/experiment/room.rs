@@ -120,6 +120,13 @@ impl Experiment {
                 })
             }
             SeedError::TooLarge { sites }
+                if sites.is_finite() && fluid.size_span.is_none() && self.is_covered() =>
+            {
+                let message = "the shape of the fluid lies within the obstacles: none of it is free";
+                Diagnostic::error(Code::OBSTACLE_FILLS_BOX, fluid.shape_span, message)
+                    .help("move the shape of the fluid out of the obstacles, or make it larger")
+            }
+            SeedError::TooLarge { sites }
                 if sites.is_finite() && fluid.size_span.is_none() && fluid.particles.is_some() =>
             {
                 let message = format!("so many particles are too many: at most {MAX_SITES:.0e} are possible");
@@ -150,6 +157,14 @@ impl Experiment {
             | SeedError::Undefined { .. } => no_room(at, error.to_string()),
         };
         refuse(&self.program, diagnostic)
+    }
+
+    /// Whether bodies cover all of the fluid's shape, as far as samples show.
+    fn is_covered(&self) -> bool {
+        let Ok(bounds) = self.extent() else { return false };
+        samples(&bounds.intersection(&self.scene.domain))
+            .filter(|at| self.fluid.omega(*at) > 0.0)
+            .all(|at| self.bodies.iter().any(|body| body.solid.omega(at) > 0.0))
     }
 
     /// The size of the box around the fluid's shape within the domain, m.

@@ -220,6 +220,13 @@ impl<'a> Lowering<'a> {
         let at = self.user_span(first.value.span);
         let diagnostic = Diagnostic::error(Code::ARGUMENTS, at, message).at("one too many");
         let signature = signature(function);
+        // a rod between two points
+        let ends = matches!(&first.value.kind, ExprKind::Number(_)) && function.name.text == "capsule";
+        if ends && self.names.is_standard(self.scope.source, "capsule") {
+            let help = "a rod between two points is a tube: write `sweep([[0, 0, 0], [1, 0, 0]], 0.1)`";
+            self.report(diagnostic.help(help));
+            return;
+        }
         self.report(diagnostic.help(match example(&function.name.text) {
             Some(example) if self.names.is_standard(self.scope.source, &function.name.text) => {
                 format!("its parameters are {signature}: write for example `{example}`")
@@ -232,7 +239,11 @@ impl<'a> Lowering<'a> {
         let name = &function.name.text;
         let message = format!("`{name}` needs a value for `{parameter}`");
         let at = self.user_span(span);
-        let help = format!("its parameters are {}", signature(function));
+        let is_standard = self.names.is_standard(self.scope.source, name);
+        let help = match example(name).filter(|_| is_standard) {
+            Some(call) => format!("its parameters are {}: write for example `{call}`", signature(function)),
+            None => format!("its parameters are {}", signature(function)),
+        };
         self.report(Diagnostic::error(Code::ARGUMENTS, at, message).help(help));
     }
 
@@ -285,6 +296,19 @@ fn example(name: &str) -> Option<&'static str> {
         "torus" => "torus(1, 0.25)",
         "layer" => "layer(z, 0, 1)",
         "half_space" => "half_space([0, 0, 1], [0, 0, 2])",
+        "extrude" => "polygon([[0, 0], [2, 0], [1, 1]]).extrude(0, 1)",
+        "loft" => "a.loft(b, 0, 1)",
+        "twist" => "box().twist(0.5)",
+        "taper" => "box().taper(1, 0.5)",
+        "bend" => "box().bend(2)",
+        "shell" => "sphere(1).shell(0.1)",
+        "offset" => "sphere(1).offset(0.1)",
+        "polar_repeat" => "sphere(0.3).move([1, 0, 0]).polar_repeat(6)",
+        "blend" => "blend(a, b, 0.1)",
+        "chamfer" => "chamfer(a, b, 0.1)",
+        "smooth_or" => "smooth_or(a, b, 0.1)",
+        "smooth_and" => "smooth_and(a, b, 0.1)",
+        "smooth_without" => "smooth_without(a, b, 0.1)",
         _ => return None,
     })
 }

@@ -133,7 +133,15 @@ impl Lowering<'_> {
             Meaning::Value(build) => {
                 self.values(arguments).map_or(Value::Failed, |values| build(self, &values, arguments, span))
             }
-            Meaning::Unary(op) => number(self.numbers(arguments).map(|a| self.unary(op, a[0], span))),
+            Meaning::Unary(op) => {
+                let operand = self.numbers(arguments);
+                if let (Some(a), "sin" | "cos" | "tan") = (&operand, builtin.name)
+                    && let Some(angle) = self.known_value(a[0])
+                {
+                    self.warn_of_degrees(angle, &arguments[0].value);
+                }
+                number(operand.map(|a| self.unary(op, a[0], span)))
+            }
             Meaning::Number(build) => number(self.numbers(arguments).map(|a| build(self, &a, span))),
             Meaning::NumberOfVectors(build) => number(self.vectors(arguments).map(|v| build(self, &v, span))),
             Meaning::Vector(build) => {
@@ -151,7 +159,13 @@ impl Lowering<'_> {
     ) -> Option<Diagnostic> {
         if let Some(named) = arguments.iter().find_map(|a| a.name.as_ref()) {
             let message = format!("`{name}` takes its arguments by position");
-            return Some(Diagnostic::error(Code::ARGUMENTS, named.span, message));
+            let diagnostic = Diagnostic::error(Code::ARGUMENTS, named.span, message);
+            let written: Option<Vec<&str>> = arguments.iter().map(|a| self.written(&a.value)).collect();
+            let call = match example(name) {
+                Some(call) => call.to_string(),
+                None => format!("{name}({})", written.unwrap_or_else(|| vec!["…"]).join(", ")),
+            };
+            return Some(diagnostic.help(format!("write for example `{call}`")));
         }
         if (fewest..=most).contains(&arguments.len()) {
             return None;
@@ -163,7 +177,12 @@ impl Lowering<'_> {
         };
         let plural = if expected == "1" { "" } else { "s" };
         let message = format!("`{name}` takes {expected} argument{plural}, found {}", arguments.len());
-        Some(Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message))
+        let diagnostic = Diagnostic::error(Code::ARGUMENTS, self.user_span(span), message);
+        Some(match (name, example(name)) {
+            ("round", _) => diagnostic.help("edges are rounded by a method of shapes: `box().round(0.1)`"),
+            (_, Some(call)) => diagnostic.help(format!("write for example `{call}`")),
+            (_, None) => diagnostic,
+        })
     }
 
     /// The values of all arguments; `None` if one of them failed.
@@ -306,6 +325,25 @@ impl Lowering<'_> {
         let message = format!("{what} must be positive, found {number}");
         self.fail(Diagnostic::error(Code::OUT_OF_RANGE, at, message))
     }
+}
+
+/// A call of a builtin whose arguments are not plain from its name.
+fn example(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "arc" => "arc([0, 0], 1, 0°, 90°)",
+        "spline" => "spline([[0, 0], [1, 0.4], [2, 0]])",
+        "helix" => "helix(1, 0.5, 3)",
+        "rounded" => "rounded([[0, 0], [2, 0], [2, 1]], 0.2)",
+        "sweep" => "sweep([[0, 0, 0], [1, 0, 0], [1, 1, 0]], 0.1)",
+        "text" => "text(\"R\", 1)",
+        "polygon" => "polygon([[0, 0], [2, 0], [1, 1]])",
+        "mesh" => "mesh(\"part.stl\", 1 mm)",
+        "height_map" => "height_map(\"ground.csv\", [0, 0], [4, 3])",
+        "where" => "where(x <= 0, 1, 2)",
+        "clamp" => "clamp(z, 0, 1)",
+        "random" => "random(1, i)",
+        _ => return None,
+    })
 }
 
 /// One step of the generator SplitMix64 (Steele, Lea and Flood 2014): every bit of the result depends on all bits.

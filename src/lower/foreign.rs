@@ -55,7 +55,8 @@ impl Lowering<'_> {
             let call = foreign::method_call(&method.text, &written[1..].join(", "))?;
             return Some(diagnostic.at(format!("`.{known}` here")).help(format!("write `{call}`")));
         }
-        let Words { what, help } = joined(&method.text, &written)?;
+        let Words { what, help } =
+            of_a_profile(&method.text, written[0]).or_else(|| joined(&method.text, &written))?;
         Some(diagnostic.at(what).help(help))
     }
 }
@@ -102,6 +103,19 @@ fn written(what: &str, call: &str) -> Option<Words> {
     Some(Words { what: what.into(), help: format!("write `{call}`") })
 }
 
+/// What makes a solid of a profile, as a method.
+fn of_a_profile(name: &str, profile: &str) -> Option<Words> {
+    match name {
+        "rotate_extrude" | "rotateExtrude" | "lathe" | "revolved" => {
+            written("`.revolve` here", &format!("{profile}.revolve()"))
+        }
+        "linear_extrude" | "linearExtrude" | "extruded" | "prism" | "pad" => {
+            written("`.extrude` here", &format!("{profile}.extrude(0, 1)"))
+        }
+        _ => None,
+    }
+}
+
 /// Shapes that are joined, as a function of all of them or as a method of the first.
 fn joined(name: &str, a: &[&str]) -> Option<Words> {
     let chain = |op: &str| match a {
@@ -128,8 +142,8 @@ fn joined(name: &str, a: &[&str]) -> Option<Words> {
             _ => written("`not` here", "not a"),
         },
         "smooth_union" | "smin" | "opSmoothUnion" | "blend" | "fillet" | "rounding" => words(
-            "`blend` or `smooth_or` here",
-            "write `blend(a, b, 0.1)` for a fillet of radius 0.1, or `smooth_or(a, b, 0.1)`",
+            "`blend`, `smooth_or` or `.round` here",
+            "write `blend(a, b, 0.1)` for a fillet of radius 0.1 between two shapes, `(a or b).round(0.1)` for all edges of a shape",
         ),
         "smax" | "smooth_intersection" | "opSmoothIntersection" => {
             written("`smooth_and` here", "smooth_and(a, b, 0.1)")

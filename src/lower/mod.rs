@@ -23,6 +23,7 @@ mod names;
 mod outline;
 mod paths;
 mod probes;
+mod rounding;
 mod scene;
 mod slips;
 mod transforms;
@@ -211,7 +212,11 @@ impl<'a> Lowering<'a> {
         }
         // a param that is given by another one has a value of its own, and so do ranges: nothing is fixed by them
         let fixed = self.module.fixed.clone();
-        let value = self.constant_expr(&param.value, "the value of a param");
+        let value = if self.is_one_number(param) {
+            self.constant_expr(&param.value, "the value of a param")
+        } else {
+            None
+        };
         let range = param.range.as_ref().map(|(low, high)| {
             (
                 self.constant_expr(low, "the range of a param"),
@@ -295,6 +300,24 @@ impl<'a> Lowering<'a> {
         false
     }
 
+    /// Whether a param is not written as a vector or a text. If it is, this is reported.
+    fn is_one_number(&mut self, param: &Param) -> bool {
+        let (found, help) = match &param.value.kind {
+            ExprKind::Vector(_) => {
+                let written = self.written(&param.value).unwrap_or("[0, 0, 1]");
+                let name = &param.name.text;
+                ("a vector", format!("write `let {name} = {written}`, or a param for each number of it"))
+            }
+            ExprKind::Text(_) => {
+                ("a text", "a description stands last: `param r = 1 \"radius\"`".to_string())
+            }
+            _ => return true,
+        };
+        let message = format!("a param is one number, found {found}");
+        self.report(Diagnostic::error(Code::WRONG_TYPE, param.value.span, message).help(help));
+        false
+    }
+
     /// Whether a param's value is a finite number within its range. If not, this is reported.
     fn param_fits(&mut self, param: &Param, given: &ParamValue, overridden: bool) -> bool {
         let (value, shown) = (given.value, given.shown(given.value));
@@ -304,10 +327,22 @@ impl<'a> Lowering<'a> {
         {
             let [low, high] = [low, high].map(|end| given.shown(end));
             let message = format!("the range {low} .. {high} holds no number");
-            self.report(
-                Diagnostic::error(Code::OUT_OF_RANGE, first.span.to(last.span), message)
-                    .help(format!("write `{high} .. {low}`")),
-            );
+            // `1 .. 10 mm`: one end has the unit that both were to have
+            let one_unit = match (unit_of(first), unit_of(last)) {
+                (None, Some((_, unit))) => self.written(first).map(|first| (first, unit)),
+                _ => None,
+            };
+            let help = match (one_unit, self.written(last)) {
+                (Some((first, unit)), Some(last)) => {
+                    let (name, value) = (&given.name, self.written(&param.value).unwrap_or("…"));
+                    format!(
+                        "each end has a unit of its own: write `param {name} = {value} in {first} {unit} .. {last}`"
+                    )
+                }
+                _ => format!("write `{high} .. {low}`"),
+            };
+            let at = first.span.to(last.span);
+            self.report(Diagnostic::error(Code::OUT_OF_RANGE, at, message).help(help));
         } else if let Some((low, high)) = given.range
             && !(low <= value && value <= high)
         {

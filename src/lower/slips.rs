@@ -136,6 +136,28 @@ impl Lowering<'_> {
         self.report(warning.help(help));
     }
 
+    /// Warns of an angle above a whole turn that is known now and made of a number that is usual in degrees, as in
+    /// `cos(360/n*i)`.
+    pub fn warn_of_degrees(&mut self, angle: f64, expr: &Expr) {
+        const USUAL: [f64; 9] = [30.0, 45.0, 60.0, 72.0, 90.0, 120.0, 180.0, 270.0, 360.0];
+        let Some((number, at)) = large_number(expr).filter(|_| self.has_no_unit(expr)) else { return };
+        if angle.abs() <= std::f64::consts::TAU
+            || !USUAL.contains(&number)
+            || expr.span.source != SourceId::File
+        {
+            return;
+        }
+        let written = self.written(at).unwrap_or("…").to_string();
+        let message =
+            format!("an angle of {angle} rad is {:.1} turns", (angle / std::f64::consts::TAU).abs());
+        let help = format!(
+            "are degrees meant? write `{}`, or `{}` for radians",
+            with_unit(&written, "deg"),
+            with_unit(&written, "rad")
+        );
+        self.report(Diagnostic::warning(Code::LARGE_ANGLE, at.span, message).help(help));
+    }
+
     /// Warns of a number above a whole turn in an angle that depends on t, as in `.rotate_z(45*t)`.
     pub fn warn_of_fast_turn(&mut self, expr: &Expr) {
         let Some((rate, at)) = large_number(expr).filter(|_| self.has_no_unit(expr)) else { return };
@@ -220,6 +242,7 @@ impl Lowering<'_> {
             ("at", _) => ".at([2*x, y, z])".into(),
             ("turned", _) => ".turned(0.5*z)".into(),
             ("repeat", _) => ".repeat([2, 0, 0], [6, 1, 1])".into(),
+            ("round", _) => ".round(0.1)".into(),
             _ => format!(".{method}(45 deg)"),
         }
     }

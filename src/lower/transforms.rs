@@ -24,6 +24,8 @@ enum Transform {
     Turned,
     /// Copies on a lattice.
     Repeat,
+    /// Arcs in place of edges.
+    Round,
 }
 
 /// A coordinate axis, by its number.
@@ -34,7 +36,7 @@ enum Axis3 {
     Z = 2,
 }
 
-const METHODS: [(&str, Transform); 10] = [
+const METHODS: [(&str, Transform); 11] = [
     ("move", Transform::Move),
     ("rotate_x", Transform::RotateAbout(Axis3::X)),
     ("rotate_y", Transform::RotateAbout(Axis3::Y)),
@@ -45,6 +47,7 @@ const METHODS: [(&str, Transform); 10] = [
     ("at", Transform::At),
     ("turned", Transform::Turned),
     ("repeat", Transform::Repeat),
+    ("round", Transform::Round),
 ];
 
 impl Transform {
@@ -59,6 +62,7 @@ impl Transform {
             Self::At => &["place"],
             Self::Turned => &["angle"],
             Self::Repeat => &["step", "counts"],
+            Self::Round => &["radius", "inner"],
         }
     }
 
@@ -66,7 +70,13 @@ impl Transform {
     fn needed(self) -> usize {
         match self {
             Self::Rotate | Self::Repeat => 2,
-            Self::Move | Self::RotateAbout(_) | Self::Scale | Self::Mirror | Self::At | Self::Turned => 1,
+            Self::Move
+            | Self::RotateAbout(_)
+            | Self::Scale
+            | Self::Mirror
+            | Self::At
+            | Self::Turned
+            | Self::Round => 1,
         }
     }
 }
@@ -152,6 +162,9 @@ impl<'a> Lowering<'a> {
                 return self.fail(self.wrong_arguments(method, parameters, arguments, span));
             };
             let value = self.expr(&argument.value);
+            if transform == Transform::Round && !self.no_angle(&argument.value) {
+                return Value::Failed;
+            }
             if parameters[slot] == "angle" && transform != Transform::Turned {
                 if !self.no_length(&argument.value) {
                     return Value::Failed;
@@ -236,6 +249,7 @@ impl<'a> Lowering<'a> {
                 let counts = self.constant_vector(&values[1].0, values[1].1, "a number of copies")?;
                 self.repeated(shape, (step, *at), (counts, values[1].1), span)
             }
+            Transform::Round => self.rounded_shape(shape, values, span),
             Transform::Rotate => {
                 let axis = self.constant_vector(first, *at, "an axis")?;
                 let angle = self.angle(&values[1].0, values[1].1)?;

@@ -21,6 +21,14 @@ impl Lowering<'_> {
     /// The greatest of the fields of capsules around the segments of a path. At a joint two of them are equal on the
     /// whole ball around it, where R₀ would change the gradient by a factor and the greatest one does not.
     pub fn sweep(&mut self, values: &[Value], arguments: &[Argument], span: Span) -> Value {
+        if let Value::Number(node) = values[1]
+            && self.depends_on_place(node)
+        {
+            let at = self.user_span(arguments[1].value.span);
+            let message = "a tube has a radius, found a shape";
+            let help = "tubes are round: write `sweep([[0, 0, 0], [1, 0, 0]], 0.1)`; profiles go along z by `.extrude(z0, z1)`, and around it by `.revolve()`";
+            return self.fail(Diagnostic::error(Code::WRONG_TYPE, at, message).help(help));
+        }
         let path = self.spots(&values[0], &arguments[0].value, &PATH);
         let radius = self.above_zero(&values[1], &arguments[1], "the radius of a tube");
         let (Some((spots, _)), Some(radius)) = (path, radius) else { return Value::Failed };

@@ -1,6 +1,8 @@
 //! Mistakes that deserve better words than a list of what the grammar would accept: most of them are the habits of
 //! another language.
 
+mod heads;
+
 use super::foreign;
 use super::words::{ITEM_WORDS, KEYWORDS, token_at};
 use crate::diagnostic::{Code, Diagnostic, Span, nearest};
@@ -183,6 +185,9 @@ impl<'t> Slip<'t> {
         if let Some(written) = foreign::quantity(number, word) {
             return unknown.help(format!("write `{written}`"));
         }
+        if word == "pi" {
+            return unknown.help(format!("a product has a sign: write `{number}*pi`"));
+        }
         if word.starts_with('_') {
             let digits: String = word.chars().filter(|c| *c != '_').collect();
             return unknown.help(format!("digits are not grouped: write `{number}{digits}`"));
@@ -353,6 +358,9 @@ impl<'t> Slip<'t> {
     fn mark(&self) -> Option<Diagnostic> {
         let (before, after) = (self.before(), self.after());
         if let Some(known) = self.vector_in_brackets().or_else(|| self.range_without_in()) {
+            return Some(known);
+        }
+        if let Some(known) = self.mark_in_a_head() {
             return Some(known);
         }
         let help = match self.found {

@@ -43,6 +43,7 @@ mod properties;
 mod ranges;
 mod render;
 mod reports;
+mod rounding;
 mod run;
 mod simplify;
 mod source;

@@ -116,6 +116,25 @@ const SHAPES: &[&str] = &[
     "solid s = blend(sphere(1), box(), 0)",
     "solid s = sphere(1).blend(box())",
     "solid s = box().rotate([0, 0, 1], 45 deg, 2)",
+    "solid s = box().round()",
+    "solid s = box().round(0)",
+    "solid s = box().round(0.1, -1)",
+    "solid s = box().round(45 deg)",
+    "solid s = box().round(x)",
+    "solid s = sphere(1).round(0.1)",
+    "solid s = round(box(), 0.1)",
+    "solid s = box().fillet(0.1)",
+    "solid s = any i in 0..6: ball([cos(360/6*i), sin(60*i), 0], 0.2)",
+    "solid s = sweep(helix(1, 0.5, 3))",
+    "solid s = sweep(helix(radius = 1, pitch = 0.5, turns = 3), 0.1)",
+    "solid s = sweep(helix(1, 0.5, 3), polygon([[0, 0], [0.1, 0], [0, 0.1]]))",
+    "solid s = text(\"Hi\").extrude(0, 1)",
+    "solid s = polygon([[0, 0], [1, 0], [1, 1]]).extrude(1)",
+    "solid s = polygon([[0, 0], [1, 0], [1, 1]]).rotate_extrude()",
+    "solid s = capsule([0, 0, 0], [1, 0, 0], 0.1)",
+    "param c = [0, 0, 1]\nsolid s = ball(c, 1)",
+    "param name = \"pawn\"\nsolid s = sphere(1)",
+    "param r = 5 mm in 1 .. 10 mm\nsolid s = sphere(r)",
 ];
 
 /// Signs that mean something elsewhere.
@@ -148,6 +167,12 @@ const SIGNS: &[&str] = &[
     "solid s = sphere(1)\u{200b}",
     "solid s\u{202e} = sphere(1)",
     "param a = 1 \"\u{1b}[31mred\u{9b}0m\u{202e}\"\nsolid s = sphere(b)",
+    "solid s = |x| + |y| + |z| <= 1",
+    "solid s = sin(2pi*x) <= 0 and box()",
+    "solid s = any i in 0..4, j in 0..4: cylinder(0.2, 1).move([i, j, 0])",
+    "let f(x) = x^2\nsolid s = f(x) <= 1",
+    "fn f(a) { a^2 }\nsolid s = f(x) <= 1",
+    "solid my-part = sphere(1)",
 ];
 
 /// Arguments, angles, lengths, and what is rarely meant.
@@ -258,6 +283,14 @@ const SCENES: &[&str] = &[
     "picture: [0, -1, 0]",
     "camera: [0, -1, 0]",
     "until: 1 s",
+    "gravity: 9.81",
+    "fluid { shape: box([0.45, 0.45, 0.1], [0.55, 0.55, 0.2]), particles: 200 }",
+    "obstacle { post }",
+    "obstacle { solid: post, velocity: [1, 0, 0] }",
+    "obstacle { solid: post, density: 500 }",
+    "inlet { velocity: [1, 0, 0] }",
+    "time_step: 0.001 s",
+    "box: [0, 0, 0] .. [1, 1, 1]",
 ];
 
 fn program(text: &str) -> Result<Program, Diagnostics> {

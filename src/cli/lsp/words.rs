@@ -121,6 +121,10 @@ const METHODS: &[(&str, &str)] = &[
     ("at", "other coordinates in place of x, y and z: `.at([x - 0.3*z, y, z])`"),
     ("turned", "the shape turned about z by an angle that may differ from point to point"),
     ("repeat", "copies on a lattice: `.repeat([dx, dy, dz], [nx, ny, nz])`"),
+    (
+        "round",
+        "arcs of a radius in place of the edges that `and`, `or` and `\\` make; another radius for those that point inwards, or 0",
+    ),
 ];
 
 /// The functions of the language, standard solids among them.

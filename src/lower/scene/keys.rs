@@ -22,6 +22,30 @@ const INNER: [(&str, &[&str]); 4] = [
     ("solver", &["precision"]),
 ];
 
+/// What other programs have in a block and this one has not, with what there is in its place.
+const ABSENT: [(&str, &[&str], &str); 4] = [
+    (
+        "an obstacle",
+        &["velocity", "motion", "speed", "angular_velocity", "omega"],
+        "a solid moves by the time t: `solid gate = box().move([0, 0, 0.1*t])`, or `.rotate_z(pi*t)`",
+    ),
+    (
+        "an obstacle",
+        &["density", "mass", "inertia"],
+        "obstacles rest, or move as their formula says: they neither float nor fall",
+    ),
+    (
+        "a scene",
+        &["inlet", "outlet", "inflow", "outflow", "source", "sink", "emitter", "periodic"],
+        "there are no inlets, outlets and periodic boxes: begin with the fluid that is needed",
+    ),
+    (
+        "a fluid",
+        &["color", "colour", "material", "name"],
+        "pictures colour particles by their speed; `rfm render` and `rfm view` choose otherwise",
+    ),
+];
+
 /// Keys of the scene that are often written in one of its blocks.
 const OUTER: [&str; 3] = ["walls", "gravity", "method"];
 
@@ -66,22 +90,29 @@ impl<'a> Lowering<'a> {
                 let diagnostic = Diagnostic::error(Code::SCENE_KEY, key.span, message)
                     .help(format!("its keys are {}", known.join(", ")))
                     .suggest(&key.text, known.iter().copied());
-                let elsewhere = foreign::key(&key.text).filter(|own| known.contains(own));
-                let inner = INNER
+                let own = foreign::key(&key.text);
+                let elsewhere = own.filter(|own| known.contains(own));
+                let inner_key = own.unwrap_or(key.text.as_str());
+                let inner =
+                    INNER.iter().find(|(block, keys)| known.contains(block) && keys.contains(&inner_key));
+                let absent = ABSENT
                     .iter()
-                    .find(|(block, keys)| known.contains(block) && keys.contains(&key.text.as_str()));
+                    .find(|(block, keys, _)| *block == what && keys.contains(&key.text.as_str()));
                 let is_outer = OUTER.contains(&key.text.as_str());
                 self.report(match (elsewhere, inner) {
                     (Some(own), _) => diagnostic
                         .help(format!("`{}` is called `{own}` here", key.text))
                         .edit(key.span, &key.text, own, false),
                     (None, Some((block, _))) => diagnostic
-                        .help(format!("it is a key of `{block}`: write `{block} {{ {}: … }}`", key.text)),
+                        .help(format!("it is a key of `{block}`: write `{block} {{ {inner_key}: … }}`")),
                     (None, None) if is_outer => diagnostic.help(format!(
                         "it is a key of the scene: write `{}: …` outside of this block",
                         key.text
                     )),
-                    (None, None) => diagnostic,
+                    (None, None) => match absent {
+                        Some((.., help)) => diagnostic.help(*help),
+                        None => diagnostic,
+                    },
                 });
             } else if matches!(entry, Entry::Block { .. }) != BLOCKS.contains(&key.text.as_str()) {
                 let (is, form) = match entry {
@@ -139,6 +170,9 @@ impl<'a> Lowering<'a> {
         let message = format!("`{key}` is a vector `[a, b, c]`, found a number");
         let diagnostic = Diagnostic::error(Code::WRONG_TYPE, value.span, message);
         let written = self.written(value).unwrap_or("1").to_string();
+        // a number for gravity is how strong it is, and it points down
+        let down = if key == "gravity" && !written.starts_with('-') { "-" } else { "" };
+        let written = format!("{down}{written}");
         self.report(diagnostic.help(format!("write `{key}: [0, 0, {written}]`")));
         None
     }

@@ -17,7 +17,7 @@ use super::unit::LengthUnit;
 /// The entry of the table of formats.
 pub const FORMAT: Format = Format {
     ending: "obj",
-    purpose: "Shared vertices with normals, text",
+    purpose: "Shared vertices with normals of corners, text; meshio and others with one normal for a vertex read .ply",
     only_metres: false,
     write,
     write_text: None,

@@ -1,0 +1,107 @@
+//! Slips in the heads of items, folds and blocks.
+
+use super::super::foreign;
+use super::{Slip, fits, last_word};
+use crate::diagnostic::Diagnostic;
+
+/// What begins a fold.
+const FOLDS: [&str; 6] = ["any", "all", "sum", "product", "min", "max"];
+
+impl Slip<'_> {
+    /// A mark that stands where the head of something is written otherwise.
+    pub(super) fn mark_in_a_head(&self) -> Option<Diagnostic> {
+        match self.found {
+            "|" => self.absolute_value(),
+            "{" => self.function_in_braces(),
+            "," => self.two_variables(),
+            "(" => self.function_by_let(),
+            "-" => self.name_with_a_dash(),
+            "." => self.box_as_a_range(),
+            "}" => self.block_without_a_key(),
+            _ => None,
+        }
+    }
+
+    /// `|x|`
+    fn absolute_value(&self) -> Option<Diagnostic> {
+        let (inner, _) = self.after().lines().next()?.split_once('|')?;
+        let inner = if fits(&[inner.trim()]) && !inner.contains(['(', ')']) { inner.trim() } else { "x" };
+        (!self.ends_an_operand()).then(|| {
+            self.unexpected().help(format!("the absolute value is a function: write `abs({inner})`"))
+        })
+    }
+
+    /// `fn f(x) { x^2 }`
+    fn function_in_braces(&self) -> Option<Diagnostic> {
+        let head = self.before().trim_end_matches('=').trim_end();
+        let (start, call) = head.rsplit_once("fn ")?;
+        let is_head = start.trim().is_empty() && head.ends_with(')') && !call.contains('\n');
+        let inner =
+            self.after().split('}').next()?.trim().trim_start_matches("return ").trim_end_matches(';');
+        let is_one = fits(&[inner]) && !inner.contains([';', '{', '=']);
+        let body = if is_one { inner } else { "…" };
+        (is_head && fits(&[call]))
+            .then(|| self.unexpected().help(format!("a function has no braces: write `fn {call} = {body}`")))
+    }
+
+    /// `any i in 0..4, j in 0..4: …`
+    fn two_variables(&self) -> Option<Diagnostic> {
+        let line = self.on_its_line();
+        let word = |fold: &&str| line.rfind(&format!("{fold} ")).map(|at| (at, fold.len()));
+        let (at, length) = FOLDS.iter().filter_map(word).max()?;
+        let head = line[at..].trim();
+        let (second, _) = self.after().lines().next()?.split_once(':')?;
+        let is_head = head.contains(" in ") && !head.contains([':', ',']) && second.contains(" in ");
+        (is_head && fits(&[head, second])).then(|| {
+            let fold = &head[..length];
+            self.unexpected()
+                .help(format!("a fold has one variable: write `{head}: {fold} {}: …`", second.trim()))
+        })
+    }
+
+    /// `let f(x) = x^2`
+    fn function_by_let(&self) -> Option<Diagnostic> {
+        let head = self.on_its_line().trim();
+        let name = head.strip_prefix("let ").or_else(|| head.strip_prefix("solid "))?.trim();
+        let (arguments, _) = self.after().lines().next()?.split_once(')')?;
+        (last_word(name) == name && !name.is_empty() && fits(&[name, arguments])).then(|| {
+            self.unexpected().help(format!("a function begins with `fn`: write `fn {name}({arguments}) = …`"))
+        })
+    }
+
+    /// `solid my-part = …`
+    fn name_with_a_dash(&self) -> Option<Diagnostic> {
+        let (item, first) = self.on_its_line().trim().split_once(' ')?;
+        let rest = self.after();
+        let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        let first = first.trim();
+        let is_name = ["solid", "let", "param", "fn", "scene"].contains(&item)
+            && last_word(first) == first
+            && end > 0
+            && fits(&[first, &rest[..end]]);
+        is_name.then(|| {
+            let name = format!("{first}_{}", &rest[..end]);
+            self.unexpected().help(format!("names are made of letters, digits and `_`: call it `{name}`"))
+        })
+    }
+
+    /// `box: [0, 0, 0] .. [1, 1, 1]`
+    fn box_as_a_range(&self) -> Option<Diagnostic> {
+        let (key, low) = self.on_its_line().split_once(':')?;
+        let high = self.after().lines().next()?.trim_start_matches('.').trim().trim_end_matches(',');
+        let low = low.trim().trim_end_matches('.').trim_end();
+        let are_vectors = [low, high].into_iter().all(|end| end.starts_with('[') && end.ends_with(']'));
+        let is_box = matches!(foreign::key(key.trim()).unwrap_or(key.trim()), "box");
+        (is_box && are_vectors && fits(&[low, high]))
+            .then(|| self.unexpected().help(format!("write `box {{ min: {low}, max: {high} }}`")))
+    }
+
+    /// `obstacle { post }`
+    fn block_without_a_key(&self) -> Option<Diagnostic> {
+        let (head, name) = self.on_its_line().rsplit_once('{')?;
+        let (block, name) = (head.trim(), name.trim());
+        let is_name = !name.is_empty() && last_word(name) == name;
+        (["obstacle", "container"].contains(&last_word(block)) && is_name && fits(&[name]))
+            .then(|| self.unexpected().help(format!("write `{} {{ solid: {name} }}`", last_word(block))))
+    }
+}
