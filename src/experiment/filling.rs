@@ -1,8 +1,9 @@
 //! How particles fill the shape of a fluid so that they weigh what it does.
 //!
 //! A lattice seldom divides a shape. Its cells are therefore fitted: in a box that the fluid fills they are
-//! stretched along each axis so that whole layers reach from face to face, elsewhere their size is varied until
-//! their number times their volume is that of the fluid. What is left of the difference goes into the mass of the
+//! stretched along each axis so that whole layers reach from face to face, and where a number of particles is stated,
+//! some rows hold one more than the others ([`Rows`]). Elsewhere their size is varied until
+//! their number times their volume is that of the fluid, or so many sites are taken as are stated, the deepest. What is left of the difference goes into the mass of the
 //! particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
 //!
 //! A fluid without a surface that must not be compressed is packed once it is placed, and loses some of its mass: see
@@ -12,6 +13,7 @@
 //! says, from below or from the middle.
 
 use glam::DVec3;
+use smallvec::SmallVec;
 
 use super::{Experiment, refuse};
 use crate::compile::Error;
@@ -20,7 +22,7 @@ use crate::field::{Field, Region};
 use crate::geom::Aabb;
 use crate::lower::Scene;
 use crate::solid::Bounds;
-use crate::sph::{Carved, FluidBlock, FluidShape, Obstacle, Particles, carve, carve_cells, make_room};
+use crate::sph::{Carved, FluidBlock, FluidShape, Obstacle, Particles, Rows, carve, carve_cells, make_room};
 use crate::{Engine, Program, Solid};
 
 /// Least distance of particles from obstacles at the start, over the spacing.
@@ -37,9 +39,6 @@ const LEAST_ROOM: f64 = 1.03;
 
 /// Lattices that are tried for one shape, at most.
 const TRIALS: usize = 8;
-
-/// How much worse vacancies of a lattice are than cells that are longer than wide by the same part.
-const VACANCIES: f64 = 4.0;
 
 /// Part of a lattice's sites from which on the search for a better lattice goes on, where a number of particles is
 /// stated and the others stay vacant.
@@ -59,6 +58,19 @@ pub(super) struct Filling {
     pub volume: Option<f64>,
     /// Whether that is all the room that there is, for a fluid that must not be compressed.
     pub fills_vessel: bool,
+}
+
+/// Where particles may be placed.
+#[derive(Clone, Copy)]
+enum Sites {
+    /// On a lattice with the stated spacing.
+    Stated,
+    /// On a lattice with cells of this size, m.
+    Cells(DVec3),
+    /// As many as are wanted of a lattice with cells of this size, m, where the shape is deepest.
+    Deepest(DVec3, usize),
+    /// In rows that fill a box.
+    Rows(Rows),
 }
 
 /// Particles on a lattice, what was carved, and the size of the lattice's cells, m.
@@ -94,7 +106,7 @@ impl Experiment {
         let mass = self.parameters.particle_mass;
         let within = self.reach()?.intersection(&self.scene.domain);
         let as_stated = || {
-            let (particles, carved) = self.place(obstacles, None, fluid.particles, None)?;
+            let (particles, carved) = self.place(obstacles, Sites::Stated, fluid.particles, None)?;
             Ok(Filling { particles, carved, mass, volume: None, fills_vessel: false })
         };
         if fluid.particles.is_some() && fluid.size_span.is_some() {
@@ -131,14 +143,15 @@ impl Experiment {
         // a hair smaller than the box, whose faces have ω = 0
         let is_box = self.fluid.range(&within.grown(-1e-6 * within.size().min_element())).lo > 0.0;
         let best = if is_box { self.fit_box(obstacles, within, volume, taken)? } else { None };
-        match best {
-            Some((error, placed)) if error < MANY_VACANCIES => Ok(placed),
-            best => self.fit_shape(obstacles, within, best, (volume, taken)),
+        match (best, self.scene.fluid.particles) {
+            (Some((error, placed)), _) if error < MANY_VACANCIES => Ok(placed),
+            (best, Some(wanted)) => self.fit_number(obstacles, within, best, (volume, taken), wanted),
+            (_, None) => self.fit_shape(obstacles, within, volume, taken),
         }
     }
 
-    /// A lattice of whole layers along each side of a box, of which bodies take a part, with the part of its sites that stays
-    /// vacant. `None` if none holds the stated number of particles.
+    /// A lattice of whole layers along each side of a box, of which bodies take a part, or rows where a number of particles is
+    /// stated, with the part of its sites that stays vacant. `None` if none holds that number.
     fn fit_box(
         &self,
         obstacles: &[Obstacle],
@@ -146,97 +159,121 @@ impl Experiment {
         volume: f64,
         taken: f64,
     ) -> Result<Option<(f64, Placed)>, Error> {
-        let spacing = self.parameters.spacing();
-        let place = |spacing, sites| {
-            let cell = fitted_to(within.size(), spacing, sites);
-            let (particles, carved) = self.place(obstacles, Some(cell), None, Some(taken))?;
-            Ok((particles, carved, cell))
-        };
         let Some(wanted) = self.scene.fluid.particles else {
-            return place(spacing, None).map(|placed| Some((0.0, placed)));
+            let cell = fitted_to(within.size(), self.parameters.spacing());
+            let (particles, carved) = self.place(obstacles, Sites::Cells(cell), None, Some(taken))?;
+            return Ok(Some((0.0, (particles, carved, cell))));
         };
         // the bodies take a part of the box, and its number of sites is that much larger
-        let share = volume / within.volume();
-        let mut sites = wanted as f64 / share;
+        let mut sites = wanted as f64 * within.volume() / volume;
         let mut best: Option<(f64, Placed)> = None;
         for _ in 0..TRIALS {
-            let placed = place(spacing * share.cbrt(), Some(sites))?;
-            let excess = (placed.0.len() as f64 / wanted as f64).ln();
+            let rows = Rows::filling(within, sites.round() as usize);
+            let (placed, carved) = self.place(obstacles, Sites::Rows(rows), None, Some(taken))?;
+            let excess = (placed.len() as f64 / wanted as f64).ln();
+            sites += wanted as f64 - placed.len() as f64;
             if excess >= 0.0 && best.as_ref().is_none_or(|(least, _)| excess < *least) {
-                best = Some((excess, placed));
+                best = Some((excess, (placed, carved, rows.cell())));
             }
-            if (0.0..MANY_VACANCIES).contains(&excess) {
+            if (0.0..GOOD_ENOUGH).contains(&excess) {
                 break;
             }
-            sites *= (-excess).exp() * (1.0 + GOOD_ENOUGH);
         }
         Ok(best)
     }
 
-    /// A lattice whose cells are as large as a shape of any kind asks for, or the one that is known with its error if none
-    /// fits better.
+    /// The lattice whose cells times their number come nearest to the volume of a shape of any kind, m³, of which bodies take
+    /// another volume.
     fn fit_shape(
+        &self,
+        obstacles: &[Obstacle],
+        within: Aabb,
+        volume: f64,
+        taken: f64,
+    ) -> Result<Placed, Error> {
+        let spacing = self.parameters.spacing();
+        let mut size = spacing;
+        let free = self.free_axes(within).len() as f64;
+        let mut best: Option<(f64, Placed)> = None;
+        for _ in 0..TRIALS {
+            let cell = self.cell(within, size);
+            let (particles, carved) = self.place(obstacles, Sites::Cells(cell), None, Some(taken))?;
+            let off = (particles.len() as f64 * cell.element_product() / volume).ln();
+            if best.as_ref().is_none_or(|(least, _)| off.abs() < *least) {
+                best = Some((off.abs(), (particles, carved, cell)));
+            }
+            if off.abs() < GOOD_ENOUGH || free == 0.0 {
+                break;
+            }
+            // a sheet thinner than the spacing weighs what it does by the mass of its particles
+            size = (size * (-off / free).exp()).clamp((1.0 - TOO_FAR) * spacing, (1.0 + TOO_FAR) * spacing);
+        }
+        best.map(|(_, placed)| placed).ok_or_else(|| self.no_lattice())
+    }
+
+    /// Places a number of particles, each as large as a cell, in a shape of any kind, or takes what is known with its error
+    /// if nothing fits better.
+    fn fit_number(
         &self,
         obstacles: &[Obstacle],
         within: Aabb,
         mut best: Option<(f64, Placed)>,
         (volume, taken): (f64, f64),
+        wanted: usize,
     ) -> Result<Placed, Error> {
-        let wanted = self.scene.fluid.particles;
-        let spacing = self.parameters.spacing();
-        let mut size = spacing;
-        // along how many axes the cells may change
-        let free =
-            (self.cell(within, 2.0 * spacing) / self.cell(within, spacing)).map(f64::log2).element_sum();
+        let mut room = volume / wanted as f64;
         for _ in 0..TRIALS {
-            let cell = self.cell(within, size);
-            let (particles, carved) = self.place(obstacles, Some(cell), None, Some(taken))?;
-            let number = particles.len() as f64;
-            let off = (number * cell.element_product() / volume).ln();
-            let ratio = wanted.map(|wanted| number / wanted as f64);
-            // a number of particles is reached from above: some of them are left out. Cells that leave a part of the
-            // fluid without sites, as where the last layer does not fit, crowd the others
-            let error = match ratio {
-                Some(ratio) if ratio >= 1.0 => ratio.ln() + off.abs(),
-                Some(_) => f64::INFINITY,
-                None => off.abs(),
-            };
+            let cell = self.cell_with_room(within, room);
+            let number = wanted + (taken / cell.element_product()).round() as usize;
+            let sites = Sites::Deepest(cell, number);
+            let (particles, carved) = self.place(obstacles, sites, None, Some(taken))?;
+            let ratio = particles.len() as f64 / wanted as f64;
+            // too few leave the number unmet; of too many some are left out, and cells that differ from the room of a
+            // particle crowd it
+            let off = (wanted as f64 * cell.element_product() / volume).ln().abs();
+            let error = if ratio < 1.0 { f64::INFINITY } else { ratio.ln() + off };
             if best.as_ref().is_none_or(|(least, _)| error < *least) {
                 best = Some((error, (particles, carved, cell)));
             }
-            if error < GOOD_ENOUGH || free == 0.0 {
+            if error < GOOD_ENOUGH {
                 break;
             }
-            size *= match ratio {
-                // with the number met, other cells may still fill the shape better
-                Some(ratio) if ratio >= 1.0 => ratio.powf(0.7 / free).max(1.0 + GOOD_ENOUGH),
-                Some(ratio) => ratio.powf(1.0 / free) * (1.0 - GOOD_ENOUGH),
-                None => (-off / free).exp(),
-            };
-            if wanted.is_none() {
-                // a sheet thinner than the spacing weighs what it does by the mass of its particles
-                size = size.clamp((1.0 - TOO_FAR) * spacing, (1.0 + TOO_FAR) * spacing);
-            }
+            room *= if ratio < 1.0 { ratio.max(0.5) * (1.0 - GOOD_ENOUGH) } else { ratio.min(2.0) };
         }
-        best.map(|(_, placed)| placed).ok_or_else(|| {
-            refuse(
-                &self.program,
-                Diagnostic::error(
-                    Code::SCENE_NO_ROOM,
-                    self.scene.fluid.shape_span,
-                    "no lattice fits the shape of the fluid",
-                ),
-            )
-        })
+        best.map(|(_, placed)| placed).ok_or_else(|| self.no_lattice())
+    }
+
+    fn no_lattice(&self) -> Error {
+        let message = "no lattice fits the shape of the fluid";
+        refuse(&self.program, Diagnostic::error(Code::SCENE_NO_ROOM, self.scene.fluid.shape_span, message))
+    }
+
+    /// The axes along which the fluid does not reach from wall to wall, so that the size of cells is free.
+    fn free_axes(&self, within: Aabb) -> SmallVec<[usize; 3]> {
+        let domain = self.scene.domain;
+        (0..3).filter(|&k| within.min[k] > domain.min[k] || within.max[k] < domain.max[k]).collect()
+    }
+
+    /// Cells with about this volume, m³, of which whole layers reach from wall to wall where the fluid does.
+    fn cell_with_room(&self, within: Aabb, room: f64) -> DVec3 {
+        let free = self.free_axes(within);
+        if free.is_empty() {
+            return fitted_to(within.size(), room.cbrt());
+        }
+        let mut cell = self.cell(within, 1.0);
+        let across: f64 = (0..3).filter(|axis| !free.contains(axis)).map(|axis| cell[axis]).product();
+        let size = (room / across).powf(1.0 / free.len() as f64);
+        free.iter().for_each(|&axis| cell[axis] = size);
+        cell
     }
 
     /// Cells of about a size, m, of which whole layers reach from wall to wall where the fluid does.
     fn cell(&self, within: Aabb, size: f64) -> DVec3 {
-        let domain = self.scene.domain;
+        let free = self.free_axes(within);
         DVec3::from_array(std::array::from_fn(|axis| {
-            let spans = within.min[axis] <= domain.min[axis] && within.max[axis] >= domain.max[axis];
             let length = within.size()[axis];
-            if spans { length / (length / self.parameters.spacing()).round().max(1.0) } else { size }
+            let layers = || (length / self.parameters.spacing()).round().max(1.0);
+            if free.contains(&axis) { size } else { length / layers() }
         }))
     }
 
@@ -260,20 +297,45 @@ impl Experiment {
         Aabb::new(min, min + layers * cell * (1.0 + 1e-12))
     }
 
-    /// Places particles at rest on a lattice with these cells, or with the spacing, and removes those that obstacles
-    /// leave no room for: as many as the volume, m³, has cells that they take of the shape, if it is known.
+    /// [`Self::lattice_box`] with a further layer on each side that is no wall.
+    fn with_outer_layers(&self, within: Aabb, cell: DVec3) -> Aabb {
+        let (domain, mut bounds) = (self.scene.domain, self.lattice_box(within, cell));
+        for axis in 0..3 {
+            if within.min[axis] > domain.min[axis] {
+                bounds.min[axis] -= cell[axis];
+            }
+            if within.max[axis] < domain.max[axis] {
+                bounds.max[axis] += cell[axis];
+            }
+        }
+        bounds
+    }
+
+    /// Places particles at rest, and removes those that obstacles leave no room for: as many as the volume, m³, has cells
+    /// that they take of the shape, if it is known.
     fn place(
         &self,
         obstacles: &[Obstacle],
-        cell: Option<DVec3>,
+        sites: Sites,
         count: Option<usize>,
         taken: Option<f64>,
     ) -> Result<(Particles, Carved), Error> {
         let (fluid, domain) = (&self.scene.fluid, &self.scene.domain);
         let reach = self.reach()?;
-        let bounds = cell.map_or(reach, |cell| self.lattice_box(reach.intersection(domain), cell));
+        let within_field = |bounds| FluidShape::Field { field: &self.fluid, bounds, fill: fluid.fill };
+        let (shape, cell) = match sites {
+            Sites::Stated => (within_field(reach), None),
+            Sites::Cells(cell) => {
+                (within_field(self.lattice_box(reach.intersection(domain), cell)), Some(cell))
+            }
+            Sites::Deepest(cell, number) => {
+                let bounds = self.with_outer_layers(reach.intersection(domain), cell);
+                (FluidShape::Deepest { field: &self.fluid, bounds, number }, Some(cell))
+            }
+            Sites::Rows(rows) => (FluidShape::Rows(rows), Some(rows.cell())),
+        };
         let block = FluidBlock {
-            shape: FluidShape::Field { field: &self.fluid, bounds, fill: fluid.fill },
+            shape,
             cell,
             count,
             // a number alone says how fine the fluid is; with a size it is to be met
@@ -365,31 +427,25 @@ fn thinned(particles: &Particles, number: usize) -> Particles {
     kept
 }
 
-/// The size of cells with a spacing about as given that fill a box; with a number of sites, not fewer than so many.
-fn fitted_to(size: DVec3, spacing: f64, sites: Option<f64>) -> DVec3 {
+/// The size of cells with a spacing about as given that fill a box.
+fn fitted_to(size: DVec3, spacing: f64) -> DVec3 {
     let layers = (size / spacing).to_array().map(f64::floor);
-    let stretch = |counts: DVec3| {
+    let badness = |counts: DVec3| {
         let cell = size / counts;
-        cell.max_element() / cell.min_element()
+        let stretch = cell.max_element() / cell.min_element();
+        stretch.ln() + (cell.element_product() / spacing.powi(3)).ln().abs()
     };
-    let mut best: Option<(f64, DVec3)> = None;
+    let mut best = (f64::INFINITY, DVec3::ONE);
     for choice in 0..64 {
         // from one layer fewer to two more
         let pick = |axis: usize| (layers[axis] + f64::from(choice >> (2 * axis) & 3) - 1.0).max(1.0);
         let counts = DVec3::new(pick(0), pick(1), pick(2));
-        let cells = counts.element_product();
-        let excess = match sites {
-            Some(sites) if cells < sites * (1.0 - 1e-9) => continue,
-            Some(sites) => VACANCIES * (cells / sites).ln(),
-            // as near as may be to the spacing that is asked for
-            None => (size.element_product() / cells / spacing.powi(3)).ln().abs(),
-        };
-        let badness = stretch(counts).ln() + excess;
-        if best.is_none_or(|(least, _)| badness < least) {
-            best = Some((badness, counts));
+        let found = badness(counts);
+        if found < best.0 {
+            best = (found, counts);
         }
     }
-    size / best.map_or(DVec3::from_array(layers.map(|layers| layers + 2.0)), |(_, counts)| counts)
+    size / best.1
 }
 
 #[cfg(test)]
@@ -399,17 +455,11 @@ mod tests {
     #[test]
     fn cells_fill_a_box_with_whole_layers() {
         let size = DVec3::new(1.0, 0.5, 0.26);
-        let cell = fitted_to(size, 0.05, None);
+        let cell = fitted_to(size, 0.05);
         let counts = size / cell;
         assert_eq!(counts.round(), DVec3::new(20.0, 10.0, 5.0));
         assert!((counts - counts.round()).abs().max_element() < 1e-12);
-        // enough layers for a number of particles
-        let cell = fitted_to(size, 0.05, Some(1001.0));
-        assert_eq!((size / cell).round(), DVec3::new(21.0, 10.0, 5.0));
         // a box thinner than the spacing holds one layer
-        assert_eq!(
-            (DVec3::new(1.0, 1.0, 0.01) / fitted_to(DVec3::new(1.0, 1.0, 0.01), 0.1, None)).round().z,
-            1.0
-        );
+        assert_eq!((DVec3::new(1.0, 1.0, 0.01) / fitted_to(DVec3::new(1.0, 1.0, 0.01), 0.1)).round().z, 1.0);
     }
 }

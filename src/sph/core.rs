@@ -192,6 +192,11 @@ impl Core {
         &self.wall
     }
 
+    /// Changes how walls enter the sums, and returns how they did.
+    pub fn exchange_wall(&mut self, wall: Wall) -> Wall {
+        std::mem::replace(&mut self.wall, wall)
+    }
+
     /// Gravity at a particle, m/s², at the end of the present step.
     pub fn gravity(&self, i: usize) -> DVec3 {
         let field = self

@@ -85,7 +85,9 @@ pub use particles::{Particles, Vectors};
 pub use pass::Pass;
 pub use probes::{Gauge, Probe};
 pub use scales::{Scales, Slip};
-pub use seed::{Carved, Fill, FluidBlock, FluidShape, MAX_SITES, SeedError, carve, carve_cells, make_room};
+pub use seed::{
+    Carved, Fill, FluidBlock, FluidShape, MAX_SITES, Rows, SeedError, carve, carve_cells, make_room,
+};
 pub use simulation::Simulation;
 pub use stats::Stats;
 #[doc(hidden)]

@@ -107,7 +107,7 @@ fn water_at_rest_in_a_hollow_sphere() {
 
 #[test]
 fn water_over_a_pawn_stays_out_of_it() {
-    // sixteen layers deviate by 1 %, although the collar is thinner than the support radius
+    // sixteen layers deviate by 1.5 %, although the collar is thinner than the support radius
     pressure_within("hydrostatic_pawn", 3170.0, 0.03);
 }
 
@@ -122,7 +122,7 @@ fn a_splash_makes_no_energy_and_keeps_its_volume() {
         // an estimate of pressure at the surface, of which eight layers have much
         assert!(energy < 5e-3, "{method}: {energy}");
         assert!(volume.abs() < 0.01, "{method}: {volume}");
-        // a fall from the top, twice, and a particle that others push ahead
+        // a jet: at 64 spacings across the fastest particle of a slice has 9.4 m/s
         assert!(speed < 2.2 * (2.0 * G * 0.8f64).sqrt(), "{method}: {speed}");
     }
 }
@@ -205,8 +205,8 @@ scene enclosed {
   truth     { velocity: [-y*turn, x*turn, 0], from: 1.5 s }
 }";
 
-/// A number of particles is met by vacancies of a lattice that fills the whole shape. A lattice whose top layers are left out
-/// instead holds the fluid's mass in less room: 13 % too dense, for the 3000 particles beside a post.
+/// A number of particles fills the whole shape. A lattice whose top layers are left out instead holds the fluid's mass in less
+/// room: 13 % too dense, for the 3000 particles beside a post.
 #[test]
 fn a_number_of_particles_fills_the_shape() {
     let reach = "0 <= x <= 0.4 and 0 <= y <= 1 and 0 <= z <= 0.8";
@@ -243,8 +243,60 @@ scene dam {{
         assert!((mass / whole - 1.0).abs() < 2e-3, "{mass} of {whole}");
         let compression = simulation.audit().compression();
         println!("{number} particles, post at {post}: {compression:?}");
-        // vacancies, and a post that cuts cells
-        assert!(compression.mean < 0.03, "{compression:?}");
+        // a post that cuts cells
+        assert!(compression.mean < 0.003, "{compression:?}");
+    }
+}
+
+/// Ordinary shapes whose sides no lattice divides, some with a vessel of the same shape around them: a tank, a jet, a column
+/// of honey, a bent tube.
+const SHAPES: [(&str, &str, usize); 4] = [
+    ("box([0, 0, 0], [0.6, 0.2, 0.15])", "box { max: [0.6, 0.2, 0.4] }", 3000),
+    ("cylinder(0.05, 1.1).move([0.02, 0, 0.45])", "box { min: [-0.5, -0.5, 0], max: [0.5, 0.5, 1.6] }", 2000),
+    (
+        "cylinder(0.12, 0.5).move([0.02, 0.01, 0.5])",
+        "box { min: [-0.6, -0.6, 0], max: [0.6, 0.6, 1.2] }",
+        2000,
+    ),
+    (
+        "tube and (x <= 0 and z <= 0.8 or x >= 0 and z <= 0.6)",
+        "box { min: [-0.45, -0.15, 0], max: [0.45, 0.15, 1.05] }\n  container { solid: tube }",
+        3000,
+    ),
+];
+
+/// A fluid with a stated number of particles starts as dense as it is, so it neither bursts nor grows. (With vacancies in a
+/// lattice that was too dense elsewhere, these started 2, 12, 10 and 13 % too dense and grew by 1 to 3 % of their volume; with
+/// `dfsph` the fluid in the tube paid a debt of its start and doubled its energy in four steps.)
+#[test]
+fn a_number_of_particles_is_as_dense_as_the_fluid() {
+    for (shape, room, number) in SHAPES {
+        for method in ["wcsph", "dfsph"] {
+            let text = format!(
+                "rfm 1
+let bend = torus(0.3, 0.1).rotate_x(90 deg).move([0, 0, 0.45]) and z <= 0.46
+solid tube = bend or cylinder(0.1, 0.6).move([-0.3, 0, 0.45]) or cylinder(0.1, 0.6).move([0.3, 0, 0.45])
+scene start {{
+  {room}
+  fluid water {{ shape: {shape}, density: 1000, particles: {number} }}
+  method: {method}
+  run {{ until: 1 s }}
+}}"
+            );
+            let program = Program::from_source("start.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+            let experiment =
+                Experiment::new(&program, "start", Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+            let mut simulation = experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation;
+            assert_eq!(simulation.particles().len(), number);
+            let compression = simulation.audit().compression();
+            println!("{method}, {shape}: {compression:?}");
+            assert!(compression.mean < 0.003 && compression.p99 < 0.03, "{method} {shape}: {compression:?}");
+            simulation.advance(0.2, |_| ControlFlow::Continue(())).unwrap_or_else(|e| panic!("{e}"));
+            let (excess, volume) = (simulation.audit().energy_excess(), simulation.audit().volume_change());
+            println!("  energy {excess:?}, volume {volume:.1e}");
+            assert!(excess.is_some_and(|excess| excess < 0.01), "{method} {shape}: {excess:?}");
+            assert!(volume.abs() < 0.006, "{method} {shape}: {volume}");
+        }
     }
 }
 

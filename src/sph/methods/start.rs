@@ -9,7 +9,12 @@ use crate::sph::core::Core;
 pub(in crate::sph) fn start(core: &mut Core, is_new: bool) -> Box<dyn Scheme> {
     match core.parameters.method {
         Method::Paper(numbers) => Box::new(paper::PaperScheme::start(numbers, core)),
-        Method::Wcsph(numbers) => Box::new(wcsph::Weakly::start(&numbers, core)),
+        Method::Wcsph(numbers) => {
+            if is_new {
+                dfsph::spread(core);
+            }
+            Box::new(wcsph::Weakly::start(&numbers, core))
+        }
         Method::Dfsph(numbers) => Box::new(dfsph::DivergenceFree::start(numbers, core, is_new)),
     }
 }

@@ -12,7 +12,9 @@ use rand_pcg::{
 use crate::{field::Field, geom::Aabb};
 
 use super::super::{params::Parameters, particles::Particles};
+use super::deepest::deepest;
 use super::error::SeedError;
+use super::rows::Rows;
 
 /// More lattice sites than this are a mistake in the scene, not a fluid.
 pub const MAX_SITES: f64 = 5e7;
@@ -42,6 +44,17 @@ pub enum FluidShape<'a> {
         /// Which part is filled if there is more room than particles.
         fill: Fill,
     },
+    /// As many sites of a lattice as are wanted, those that lie deepest in the region where ω > 0.
+    Deepest {
+        /// Positive inside the shape.
+        field: &'a dyn Field,
+        /// The box of the lattice, m, which is a little larger than the shape.
+        bounds: Aabb,
+        /// How many sites are wanted.
+        number: usize,
+    },
+    /// The box that rows fill. They have a number and a size of their own.
+    Rows(Rows),
     /// A ball around a centre, as large as the number of particles makes it.
     Drop {
         /// Centre of the ball, m.
@@ -112,6 +125,19 @@ impl FluidBlock<'_> {
                     inside.sort_by(|a, b| b.0.total_cmp(&a.0));
                 }
                 inside.into_iter().map(|(_, at)| at).collect()
+            }
+            FluidShape::Deepest { field, bounds, number } => {
+                let mut all = lattice(bounds, cell)?;
+                all.retain(|&at| container.contains(at));
+                deepest(field, all, cell.element_product().cbrt(), number)?
+            }
+            FluidShape::Rows(rows) => {
+                let sites = rows.len() as f64;
+                let affordable = sites <= MAX_SITES;
+                if !affordable {
+                    return Err(SeedError::TooLarge { sites });
+                }
+                rows.sites()
             }
             FluidShape::Drop { centre } => {
                 let count = self.count.ok_or(SeedError::NoCount)?;

@@ -2,8 +2,11 @@
 
 mod block;
 mod carve;
+mod deepest;
 mod error;
+mod rows;
 
 pub use block::{Fill, FluidBlock, FluidShape, MAX_SITES};
 pub use carve::{carve, carve_cells, make_room};
 pub use error::{Carved, SeedError};
+pub use rows::Rows;

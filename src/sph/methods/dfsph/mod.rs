@@ -7,6 +7,7 @@ mod start;
 mod walls;
 
 pub(super) use scheme::DivergenceFree;
+pub(super) use start::spread;
 
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::numerics::Numerics;

@@ -89,7 +89,7 @@ pub struct DivergenceFree {
     /// Finds pressures that displace particles.
     places: Solver,
     /// The density, kg/m³, that each particle would have gained by what the solver of forces left.
-    debt: Vec<f64>,
+    pub(super) debt: Vec<f64>,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
     spread: Vec<f64>,
     /// Σ V ∇W + ∇λ, 1/m; zero at the surface.
