@@ -58,22 +58,28 @@ pub(super) fn run(shared: &Shared, options: &Eval) -> Result<(), Failure> {
 
 /// Reads CSV with the columns x, y and z, some thousand points at a time. Other columns are ignored.
 fn read_points(
-    reader: impl BufRead,
+    mut reader: impl BufRead,
     name: &str,
     mut take: impl FnMut(&[DVec3]) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let mut columns: Option<[usize; 3]> = None;
     let mut points = Vec::with_capacity(CHUNK);
-    for (number, line) in reader.lines().enumerate() {
-        let line = line.map_err(|e| Failure::usage(format!("cannot read `{name}`: {e}")))?;
-        let line = line.trim_start_matches('\u{FEFF}').trim();
+    let (mut text, mut number) = (String::new(), 0);
+    loop {
+        text.clear();
+        let length = reader.read_line(&mut text);
+        if length.map_err(|e| Failure::usage(format!("cannot read `{name}`: {e}")))? == 0 {
+            break;
+        }
+        number += 1;
+        let line = text.trim_start_matches('\u{FEFF}').trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-        let bad = |what: String| Failure::usage(format!("{name}:{}: {what}", number + 1));
+        let cells = || line.split(',').map(str::trim);
+        let bad = |what: String| Failure::usage(format!("{name}:{number}: {what}"));
         let Some(at) = columns else {
-            let find = |axis: &str| cells.iter().position(|cell| cell.trim_matches('"') == axis);
+            let find = |axis: &str| cells().position(|cell| cell.trim_matches('"') == axis);
             columns = match (find("x"), find("y"), find("z")) {
                 (Some(x), Some(y), Some(z)) => Some([x, y, z]),
                 _ => return Err(bad(format!("expected the header `x,y,z`, found `{line}`"))),
@@ -82,7 +88,8 @@ fn read_points(
         };
         let mut point = [0.0; 3];
         for (value, column) in point.iter_mut().zip(at) {
-            let cell = cells.get(column).ok_or_else(|| bad(format!("the row has {} cells", cells.len())))?;
+            let cell =
+                cells().nth(column).ok_or_else(|| bad(format!("the row has {} cells", cells().count())))?;
             *value = cell.parse().map_err(|_| bad(format!("`{cell}` is not a number")))?;
         }
         points.push(DVec3::from_array(point));
@@ -377,20 +384,59 @@ fn push_number(text: &mut String, value: f64) {
     if value == 0.0 {
         return text.push('0');
     }
-    let start = text.len();
-    let _ = write!(text, "{value:.16e}"); // writing to a string does not fail
-    let Some(e) = text[start..].find('e') else { return };
-    let exponent: i32 = text[start + e + 1..].parse().unwrap_or(0);
-    if !(-5..16).contains(&exponent) {
+    if value < 0.0 {
+        text.push('-');
+    }
+    let magnitude = value.abs();
+    if !(1e-5..1e16).contains(&magnitude) {
+        let _ = write!(text, "{magnitude:.16e}"); // writing to a string does not fail
         return;
     }
-    // the same digits without an exponent: d.ddd becomes ddd.d or 0.00ddd
-    text.truncate(start + e);
-    let first = start + usize::from(value < 0.0);
-    text.remove(first + 1);
-    match exponent {
-        0.. => text.insert(first + 1 + exponent as usize, '.'),
-        ..0 => text.insert_str(first, &"0.0000"[..1 + exponent.unsigned_abs() as usize]),
+    let (mut number, exponent) = digits(magnitude);
+    let mut digits = [b'0'; 17];
+    for digit in digits.iter_mut().rev() {
+        *digit += (number % 10) as u8;
+        number /= 10;
+    }
+    let before = usize::try_from(exponent + 1).unwrap_or(0);
+    let (whole, part) = digits.split_at(before);
+    if exponent < 0 {
+        text.push_str(&"0.0000"[..1 + exponent.unsigned_abs() as usize]);
+        text.extend(part.iter().map(|&digit| char::from(digit)));
+    } else {
+        text.extend(whole.iter().map(|&digit| char::from(digit)));
+        text.push('.');
+        text.extend(part.iter().map(|&digit| char::from(digit)));
+    }
+}
+
+/// The first 17 digits of a number between 1e-5 and 1e16, and its decimal exponent: d·10ᵏ⁻¹⁶ with 10¹⁶ ≤ d < 10¹⁷. The
+/// arithmetic is exact, and halves go to the even digit, as the formats of the standard library have it.
+fn digits(magnitude: f64) -> (u64, i32) {
+    const LEAST: u128 = 10_u128.pow(16);
+    let bits = magnitude.to_bits();
+    // m·2ᵉ
+    let m = u128::from(bits & ((1 << 52) - 1) | 1 << 52);
+    let e = (bits >> 52) as i32 - 1075;
+    // the power of ten below it, or a neighbour where the logarithm was rounded
+    let mut k = magnitude.log10().floor() as i32;
+    loop {
+        // below 2⁵³·10²² < 2¹²⁷
+        let scaled = m * 10_u128.pow((16 - k) as u32);
+        let d = match u32::try_from(-e) {
+            Ok(0) | Err(_) => scaled << e,
+            Ok(shift) => {
+                let (down, rest, half) = (scaled >> shift, scaled & ((1 << shift) - 1), 1 << (shift - 1));
+                down + u128::from(rest > half || rest == half && down % 2 == 1)
+            }
+        };
+        if d < LEAST {
+            k -= 1;
+        } else if d >= 10 * LEAST {
+            k += 1;
+        } else {
+            return (d as u64, k);
+        }
     }
 }
 
@@ -415,6 +461,32 @@ mod tests {
             [1.0 / 3.0, 1e-5, 9.9e-6, 1e15, 1e16, -12.5, 1e-300, -2.5e17, 123456.789, 5e-324, f64::MAX]
         {
             assert_eq!(number(value).parse::<f64>(), Ok(value));
+        }
+    }
+
+    #[test]
+    fn digits_are_those_of_the_standard_library() {
+        let check = |value: f64| {
+            let expected = format!("{value:.16e}");
+            let (head, exponent) = expected.split_once('e').unwrap();
+            let expected = (head.replace('.', "").parse::<u64>().unwrap(), exponent.parse::<i32>().unwrap());
+            assert_eq!(digits(value), expected, "{value:e}");
+        };
+        let mut seed = 5_u64;
+        for i in 0..20_000 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            // 2⁻¹⁶ to 2⁵³
+            let power = 1023 - 16 + i % 69;
+            check(f64::from_bits(power << 52 | seed >> 12));
+            // a few bits after the point: the digit after the last is a five, and nothing follows
+            check(1.0 + (2 * i + 1) as f64 / 131_072.0);
+        }
+        for k in -5..16 {
+            let power: f64 = format!("1e{k}").parse().unwrap();
+            [power, power.next_up()].into_iter().for_each(check);
+            if k > -5 {
+                check(power.next_down());
+            }
         }
     }
 }

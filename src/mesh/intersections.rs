@@ -177,34 +177,41 @@ impl Cubes {
     }
 }
 
+/// A number below a power of two, up to 2³², that differs for most cubes.
+fn mixed(cube: Cube, below: usize) -> usize {
+    let mix = (cube[0] as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        ^ (cube[1] as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f)
+        ^ (cube[2] as u64).wrapping_mul(0x1656_67b1_9e37_79f9);
+    (mix >> 32) as usize & (below - 1)
+}
+
 /// A few bits that tell of most cubes that they are not marked.
 struct Filter(Vec<u64>);
 
 impl Filter {
     const BITS: usize = 1 << 18;
 
-    fn place(cube: Cube) -> usize {
-        let mix = (cube[0] as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-            ^ (cube[1] as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f)
-            ^ (cube[2] as u64).wrapping_mul(0x1656_67b1_9e37_79f9);
-        (mix >> 46) as usize % Self::BITS
-    }
-
     fn mark(&mut self, cube: Cube) {
-        let place = Self::place(cube);
+        let place = mixed(cube, Self::BITS);
         self.0[place / 64] |= 1 << (place % 64);
     }
 
     fn may_hold(&self, cube: Cube) -> bool {
-        let place = Self::place(cube);
+        let place = mixed(cube, Self::BITS);
         self.0[place / 64] >> (place % 64) & 1 == 1
     }
 }
 
 /// The triangles in the cubes that some of them touch.
+///
+/// Those that were found lie side by side, ordered by a number that is mixed from their cube's. Cubes with the same
+/// number share their triangles, which only makes a few more to look at: every answer compares places.
 pub(super) struct Neighbours {
     cubes: Cubes,
-    by_cube: FxHashMap<Cube, SmallVec<[u32; 12]>>,
+    /// Where the triangles of each number begin; the number after the last is their end.
+    starts: Vec<u32>,
+    found: Vec<u32>,
+    added: FxHashMap<Cube, SmallVec<[u32; 4]>>,
 }
 
 impl Neighbours {
@@ -215,21 +222,44 @@ impl Neighbours {
         (suspects, margin): (&[u32], f64),
         cubes: Cubes,
     ) -> Self {
-        let mut by_cube: FxHashMap<Cube, SmallVec<[u32; 12]>> = FxHashMap::default();
-        for (cube, t) in places(positions, triangles, (suspects, margin), &cubes) {
-            by_cube.entry(cube).or_default().push(t);
+        let places = places(positions, triangles, (suspects, margin), &cubes);
+        let numbers = places.len().next_power_of_two();
+        let mut starts = vec![0; numbers + 1];
+        for (cube, _) in &places {
+            starts[mixed(*cube, numbers)] += 1;
         }
-        Self { cubes, by_cube }
+        let mut end = 0;
+        for start in &mut starts {
+            end += *start;
+            *start = end;
+        }
+        // from the ends of the stretches to their beginnings
+        let mut found = vec![0; places.len()];
+        for (cube, t) in places.into_iter().rev() {
+            let start = &mut starts[mixed(cube, numbers)];
+            *start -= 1;
+            found[*start as usize] = t;
+        }
+        Self { cubes, starts, found, added: FxHashMap::default() }
     }
 
     /// Adds a triangle that is new or has moved. It is found by its new box and by its old one.
     pub fn add(&mut self, t: u32, bounds: &Aabb) {
         for cube in self.cubes.touched(bounds) {
-            let list = self.by_cube.entry(cube).or_default();
+            if self.found_in(cube).contains(&t) {
+                continue;
+            }
+            let list = self.added.entry(cube).or_default();
             if !list.contains(&t) {
                 list.push(t);
             }
         }
+    }
+
+    /// The triangles that were found in a cube, and perhaps others.
+    fn found_in(&self, cube: Cube) -> &[u32] {
+        let number = mixed(cube, self.starts.len() - 1);
+        &self.found[self.starts[number] as usize..self.starts[number + 1] as usize]
     }
 
     /// Whether one of some triangles, each of which was found or added where it is now, crosses any other.
@@ -247,7 +277,10 @@ impl Neighbours {
 
     /// The triangles that share a cube with a box, some of them more than once.
     pub fn around(&self, bounds: &Aabb) -> impl Iterator<Item = u32> + use<'_> {
-        self.cubes.touched(bounds).flat_map(|cube| self.by_cube.get(&cube).into_iter().flatten().copied())
+        self.cubes.touched(bounds).flat_map(|cube| {
+            let added = self.added.get(&cube).into_iter().flatten();
+            self.found_in(cube).iter().chain(added).copied()
+        })
     }
 }
 

@@ -117,6 +117,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::field::Sheet;
     use crate::interval::Interval;
     use crate::mesh::Resolution;
 
@@ -177,5 +178,40 @@ mod tests {
             gradient: |p: DVec3| (DVec3::splat(0.05) - p).normalize_or_zero(),
         };
         assert_eq!(thin(&speck, 20).count, 1);
+    }
+
+    /// A round bar of which nothing is known across it, with what is known of its slope along it.
+    struct Bar {
+        along: Interval,
+        asked: std::sync::atomic::AtomicUsize,
+    }
+
+    impl Field for Bar {
+        fn omega(&self, p: DVec3) -> f64 {
+            0.52 - p.truncate().length()
+        }
+        fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
+            (self.omega(p), -p.truncate().normalize_or_zero().extend(0.0))
+        }
+        fn range(&self, over: &Aabb) -> Interval {
+            let nearest = glam::DVec2::ZERO.clamp(over.min.truncate(), over.max.truncate()).length();
+            let farthest = over.min.abs().max(over.max.abs()).truncate().length();
+            Interval::new(0.52 - farthest - 1e-12, 0.52 - nearest + 1e-12)
+        }
+        fn sheets(&self, _: &Aabb, visit: &mut dyn FnMut(Sheet<'_>)) -> bool {
+            self.asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            visit(Sheet { slopes: [Interval::ALL, Interval::ALL, self.along], at: &|p| self.omega_grad(p) });
+            true
+        }
+    }
+
+    #[test]
+    fn an_axis_along_which_nothing_changes_is_not_divided() {
+        let [known, unknown] = [0.0, 1e-300].map(|most| {
+            let bar = Bar { along: Interval::new(-most, most), asked: 0.into() };
+            assert_eq!(thin(&bar, 12), ThinCells::NONE);
+            bar.asked.into_inner()
+        });
+        assert!(5 * known < unknown, "{known} questions, {unknown}");
     }
 }

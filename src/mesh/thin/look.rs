@@ -27,6 +27,9 @@ const PARALLEL: f64 = 0.9;
 /// Distances from a surface, in cells, at which ω must have both signs for one of them.
 const BESIDE: [f64; 3] = [1e-2, 1e-4, 1e-6];
 
+/// What outward rounding may leave of a slope that is zero.
+const NO_SLOPE: f64 = f64::MIN_POSITIVE;
+
 /// Steps of Newton's method onto a face at most.
 const STEPS: usize = 8;
 
@@ -200,7 +203,7 @@ impl Look<'_> {
     }
 
     /// Divides a box until its faces are proven to be known, or are one or several parallel ones, or as often as
-    /// `halvings` allows.
+    /// `halvings` allows. An axis along which all of them run stays whole: every part would show the same.
     fn divide(&self, over: &Aabb, seen: &Seen, halvings: u32, findings: &mut Findings) {
         let range = self.field.range(over);
         if is_decided(range) {
@@ -208,7 +211,11 @@ impl Look<'_> {
         }
         let mut normals: Normals = SmallVec::new();
         let (mut known, mut flat) = (true, true);
+        let mut varies = [false; 3];
         let all = self.field.sheets(over, &mut |sheet| {
+            for (varies, slope) in varies.iter_mut().zip(sheet.slopes) {
+                *varies |= slope.lo < -NO_SLOPE || slope.hi > NO_SLOPE;
+            }
             let way = seen.around.iter().find(|normal| agrees(&sheet.slopes, **normal, KNOWN));
             known &= way.is_some();
             let middle = middle(&sheet);
@@ -233,8 +240,17 @@ impl Look<'_> {
             return;
         }
         let centre = over.centre();
-        for corner in over.corners() {
-            self.divide(&Aabb::new(corner.min(centre), corner.max(centre)), seen, halvings - 1, findings);
+        for number in 0..8_usize {
+            let is_upper = |axis: usize| number >> axis & 1 == 1;
+            if (0..3).any(|axis| is_upper(axis) && !varies[axis]) {
+                continue;
+            }
+            let mut part = *over;
+            for axis in (0..3).filter(|&axis| varies[axis]) {
+                let bound = if is_upper(axis) { &mut part.min } else { &mut part.max };
+                bound[axis] = centre[axis];
+            }
+            self.divide(&part, seen, halvings - 1, findings);
         }
     }
 
