@@ -2,9 +2,9 @@
 //!
 //! A lattice seldom divides a shape. Its cells are therefore fitted: in a box that the fluid fills they are
 //! stretched along each axis so that whole layers reach from face to face, and where a number of particles is stated,
-//! some rows hold one more than the others ([`Rows`]). Elsewhere their size is varied until
-//! their number times their volume is that of the fluid, or so many sites are taken as are stated, the deepest. What is left of the difference goes into the mass of the
-//! particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
+//! some rows hold one more than the others ([`Rows`]). Elsewhere their size is varied until their number times their
+//! volume is that of the fluid, or as many sites are taken as are stated, the deepest. What is left of the difference
+//! goes into the mass of the particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
 //!
 //! A fluid without a surface that must not be compressed is packed once it is placed, and loses some of its mass: see
 //! [`Parameters::fills_vessel`](crate::sph::Parameters::fills_vessel).

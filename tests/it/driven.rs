@@ -38,10 +38,11 @@ scene flow {{
     let both = mean_turn(&format!("{drum}.rotate_z(2*t)"), ", surface_velocity: [-2*y, 2*x, 0]");
     let still = mean_turn(drum, "");
     assert!(still.abs() < 1e-3 && belt > 0.05, "{still} {belt}");
-    // the map of what a body takes of kernels turns with it, and is right to 0.0006; in eight spacings that makes a hundredth
+    // the map of what a body takes of kernels turns with it, and is right to 0.0006; so particles that are moved apart beside the
+    // drum begin elsewhere, some by 0.4 spacings, which makes more than a hundredth of eight spacings
     assert!((turning / belt - 1.0).abs() < 0.02, "{turning} {belt}");
     // what is stated takes the place of what the motion says
-    assert!((both / belt - 1.0).abs() < 0.01, "{both} {belt}");
+    assert!((both / turning - 1.0).abs() < 1e-6, "{both} {turning}");
 }
 
 /// A run of a scene that is given as text: its simulation at the end, or the error that ended it.

@@ -474,7 +474,7 @@ fn curves_with_mistakes_are_explained() {
         ("sweep([[0, 0], [1, 1]], 0.1)", "three coordinates"),
         ("sweep([[0, 0, 0]], 0.1)", "two points or more"),
         ("sweep([[0, 0, 0], [1, 0, 0]], 0)", "must be positive"),
-        ("sweep([[0, 0, 0], [1, 0, 0]], x)", "must be a constant"),
+        ("sweep([[0, 0, 0], [1, 0, 0]], x)", "a tube has a radius, found a shape"),
         ("sweep([[0, 0, 0], [1, 0, 0]], 1e-162)", "scale the numbers"),
         ("sweep([[0, 0, 0], [1, 0, 0]], 1e200)", "scale the numbers"),
         ("sweep(helix(1, 1, 0), 0.1)", "cannot be 0"),
