@@ -52,7 +52,7 @@ struct Side {
 
 /// What a part of the shape is made of.
 enum Joint {
-    /// The same points as another part.
+    /// Another node holds the same points.
     Same(Side),
     /// R₀ operations, which have edges to round.
     And([Side; 2]),

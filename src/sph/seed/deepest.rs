@@ -105,7 +105,7 @@ mod tests {
         }
     }
 
-    /// Of a layer at one depth as many stay as are wanted, evenly.
+    /// If not all sites of a layer at one depth are wanted, those that stay are spread evenly.
     #[test]
     fn a_layer_is_parted() {
         let sheet = Closures {
