@@ -16,7 +16,6 @@ mod object;
 mod operations;
 mod r0;
 mod range;
-mod range_instructions;
 mod request;
 mod translate;
 
@@ -24,7 +23,7 @@ pub use host_functions::Library;
 pub use machine::{CodegenError, target_description};
 pub(crate) use memory::Code;
 pub use object::{ObjectProgram, object};
-pub(crate) use range_instructions::{
+pub(crate) use range::{
     REACH as RANGE_REACH, knows as range_is_known, stays_finite as range_stays_finite,
     supports as range_is_supported,
 };

@@ -26,6 +26,9 @@ pub enum Shape {
     /// this rounding; `f64` only, and only for graphs that `range_is_supported`
     /// names.
     Range(Rounding),
+    /// The ranges of the outputs, as [`Shape::Range`], of which the others are derivatives of the first: NaN where that
+    /// may jump.
+    Slopes(Rounding),
 }
 
 /// What is to be compiled.
@@ -46,7 +49,7 @@ pub struct Request<'a> {
     /// Whether the function takes one more argument, a pointer to the parameters of the graph.
     pub parameters: bool,
     /// Whether it takes another one after that, a pointer to the graph's uniforms: numbers of the program's
-    /// type, or for [`Shape::Range`] pairs of bounds. No program knows time itself, see
+    /// type, or for ranges pairs of bounds. No program knows time itself, see
     /// `ir::hoisted`.
     pub uniforms: bool,
 }

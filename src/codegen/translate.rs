@@ -13,8 +13,7 @@ use super::emitter::{Emitter, Hosts};
 use super::host_functions::{HostFunction, Library};
 use super::machine::{CodegenError, target};
 use super::memory::Code;
-use super::range;
-use super::range_instructions::Instructions;
+use super::range::{self, Instructions};
 use super::request::{Request, Shape, pointers};
 use crate::ir::{Axis, Expr, Node};
 use crate::precision::Precision;
@@ -55,6 +54,7 @@ fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), Codegen
         let symbol = function.symbol(request.precision, Library::Rfm);
         linker.symbol(symbol, function.address(request.precision));
     }
+    range::register(&mut linker);
     let mut module = JITModule::new(linker);
     let named = Named { name: "program", linkage: Linkage::Local, library: Library::Rfm };
     let Defined { id, size, listing } = define(&mut module, request, named, listing)?;
@@ -100,7 +100,7 @@ pub(super) fn define(
         return Err(CodegenError::Unsupported("a table cannot be written into an object file".into()));
     }
     let instructions = match request.shape {
-        Shape::Range(_) => Instructions::of(request.graph)
+        Shape::Range(_) | Shape::Slopes(_) => Instructions::of(request.graph)
             .ok_or_else(|| CodegenError::Bug("a range program of this formula".into()))?,
         Shape::Point | Shape::Batch => Instructions::default(),
     };
@@ -109,13 +109,25 @@ pub(super) fn define(
     context.func = Function::with_name_signature(UserFuncName::user(0, 0), module.make_signature());
     declare_parameters(&mut context.func, module, request);
 
-    let hosts = declare_hosts(module, &mut context.func, (request, named.library), &needed);
+    let hosts = match request.shape {
+        Shape::Point | Shape::Batch => {
+            declare_hosts(module, &mut context.func, (request, named.library), &needed)
+        }
+        Shape::Range(_) | Shape::Slopes(_) => Ok(Hosts::default()),
+    };
     let hosts = hosts.map_err(|e| bug(&e))?;
+    let find_range = match request.shape {
+        Shape::Point | Shape::Batch => Ok(None),
+        Shape::Range(rounding) | Shape::Slopes(rounding) => {
+            range::declare(module, &mut context.func, &instructions, rounding)
+        }
+    };
+    let find_range = find_range.map_err(|e| bug(&e))?;
     let mut shared = FunctionBuilderContext::new();
     let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
     match request.shape {
         Shape::Point => point(&mut builder, request, &needed, &hosts),
-        Shape::Range(rounding) => range::emit(&mut builder, request, &instructions, rounding),
+        Shape::Range(_) | Shape::Slopes(_) => range::emit(&mut builder, request, &instructions, find_range),
         Shape::Batch => {
             batch(&mut builder, request, &needed, &hosts, module.target_config().pointer_type());
         }
@@ -145,7 +157,7 @@ fn declare_parameters(function: &mut Function, module: &impl Module, request: Re
     });
     let mut parameters = match request.shape {
         Shape::Point => vec![scalar, scalar, scalar, pointer],
-        Shape::Batch | Shape::Range(_) => vec![pointer, pointer],
+        Shape::Batch | Shape::Range(_) | Shape::Slopes(_) => vec![pointer, pointer],
     };
     parameters.extend([request.parameters, request.uniforms].into_iter().filter(|&is| is).map(|_| pointer));
     function.signature.params = parameters;

@@ -121,6 +121,12 @@ impl UnaryFunction {
         }
     }
 
+    /// The bounds of its range, low and high, from those of its operand.
+    pub(crate) fn bounds(self, [lo, hi]: [f64; 2]) -> [f64; 2] {
+        let found = self.range(Interval::new(lo, hi));
+        [found.lo, found.hi]
+    }
+
     /// [f′, ½f″] over an interval, from the operand's range and that of f. `None` for functions without such
     /// a rule: along a path only their range is known.
     pub(super) fn slope_and_bend(self, a: Interval, value: Interval) -> Option<[Interval; 2]> {
@@ -276,6 +282,12 @@ impl BinaryFunction {
                 Interval::new(lo.next_down(), hi.next_up()).widened(3)
             }
         }
+    }
+
+    /// The bounds of its range, low and high, from those of its operands.
+    pub(crate) fn bounds(self, [a_low, a_high]: [f64; 2], [b_low, b_high]: [f64; 2]) -> [f64; 2] {
+        let found = self.range(Interval::new(a_low, a_high), Interval::new(b_low, b_high));
+        [found.lo, found.hi]
     }
 
     /// A bound of |f(â, b̂) − f(a, b)| for operands in two intervals that are off by `errors` at most, and

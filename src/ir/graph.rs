@@ -277,7 +277,7 @@ impl Graph {
     }
 
     /// The nodes a root depends on, in order; cheap when the root uses little of a large graph.
-    pub(super) fn cone(&self, root: Node) -> Vec<Node> {
+    pub(crate) fn cone(&self, root: Node) -> Vec<Node> {
         let mut seen = FxHashSet::from_iter([root]);
         let mut cone = vec![root];
         let mut next = 0;

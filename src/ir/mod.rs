@@ -38,7 +38,9 @@ pub use bounds::error::{Arithmetic, Error, ErrorAnalysis, Inputs};
 pub use bounds::float::FloatType;
 pub use bounds::magnitude::Magnitudes;
 pub use bounds::range::RangeEvaluator;
-pub(crate) use bounds::range::{Affine, RangeRule, Region};
+pub(crate) use bounds::range::{
+    Affine, Limits, RangeRule, Region, SQUARES_OVERFLOW, SQUARES_UNDERFLOW, WEIGHT_ROUNDING,
+};
 pub(crate) use contraction::{
     Contracted, Contractor, LinearForm, SURFACE_ROUNDING, Wanted, contract_linear, contract_linear_around,
     reach,

@@ -94,6 +94,15 @@ impl<'a> Region<'a> {
     }
 }
 
+/// The points to which something is restricted: where no node that is not a number, and divides another, is nearer to 0
+/// than `least_divisor`, roots are those of numbers that are not negative, and no value of a function of the library
+/// is larger than `largest_call`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    pub least_divisor: f64,
+    pub largest_call: f64,
+}
+
 /// A graph prepared for the evaluation of ranges.
 #[derive(Debug, Clone)]
 pub struct RangeEvaluator {
@@ -138,16 +147,16 @@ impl RangeEvaluator {
         values
     }
 
-    /// The ranges of all nodes over the points of a region at which no node that is not a number, and divides
-    /// another, is nearer to 0 than `least_divisor`.
-    pub(crate) fn all_without_poles(&self, region: &Region<'_>, least_divisor: f64) -> Vec<Interval> {
+    /// The ranges of all nodes over the points of a region that are within limits.
+    pub(crate) fn all_within(&self, region: &Region<'_>, limits: Limits) -> Vec<Interval> {
         let mut values = Vec::new();
-        self.fill(region, &mut values, Some(least_divisor));
+        self.fill(region, &mut values, Some(limits));
         values
     }
 
-    fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>, least_divisor: Option<f64>) {
-        let steepest = least_divisor.map(|least| Interval::new(-1.0 / least, 1.0 / least));
+    fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>, limits: Option<Limits>) {
+        let up_to = |most: f64| Interval::new(-most, most);
+        let steepest = limits.map(|limits| up_to(1.0 / limits.least_divisor));
         values.clear();
         for &rule in &self.rules {
             // a coordinate is always a number, even if nothing else is known of it
@@ -173,6 +182,17 @@ impl RangeEvaluator {
                         && values[b.index()].width() > 0.0 =>
                 {
                     values[a.index()] * steepest
+                }
+                RangeRule::Plain(Expr::Unary(Unary::Sqrt, a))
+                    if limits.is_some() && values[a.index()].lo < 0.0 =>
+                {
+                    Interval::new(0.0, values[a.index()].hi.max(0.0)).sqrt()
+                }
+                RangeRule::Plain(
+                    expr @ (Expr::Unary(Unary::Call(_), _) | Expr::Binary(Binary::Call(_), ..)),
+                ) if let Some(limits) = limits => {
+                    let (value, most) = (plain(expr, values, region), up_to(limits.largest_call));
+                    Interval::new(value.lo.clamp(most.lo, most.hi), value.hi.clamp(most.lo, most.hi))
                 }
                 RangeRule::Plain(Expr::Lookup(_, at)) if at.into_iter().any(unknown) => Interval::ALL,
                 RangeRule::Plain(Expr::Lookup(lookup, at)) => {
@@ -311,10 +331,10 @@ fn is_infinite(a: Interval) -> bool {
 }
 
 /// Operands beyond this have squares whose sum may overflow.
-const SQUARES_OVERFLOW: f64 = 6.7e153; // 2⁵¹¹
+pub(crate) const SQUARES_OVERFLOW: f64 = 6.7e153; // 2⁵¹¹
 
 /// Results below this may have operands whose squares lose digits to underflow.
-const SQUARES_UNDERFLOW: f64 = 3.0e-151; // 2⁻⁵⁰⁰
+pub(crate) const SQUARES_UNDERFLOW: f64 = 3.0e-151; // 2⁻⁵⁰⁰
 
 /// The range of u ∧ v: exact at the ends, and what the half-angle form of `ir::r0` makes of extreme operands.
 fn conjunction(a: Interval, b: Interval) -> Interval {
@@ -353,7 +373,7 @@ fn minimum_weight(a: Interval, b: Interval) -> Interval {
 }
 
 /// How far the weights of R₀ may be from their exact values by rounding, in all its forms.
-const WEIGHT_ROUNDING: f64 = 1e-14;
+pub(crate) const WEIGHT_ROUNDING: f64 = 1e-14;
 
 /// The range of 1 − u/√(u² + v²), the derivative of u ∧ v by u.
 pub(in crate::ir) fn conjunction_weight(u: Interval, v: Interval) -> Interval {

@@ -139,7 +139,7 @@ impl Division {
 /// What is known of a box, and what is left of the solid in it.
 fn judged(parts: &LeafTree, over: &Aabb, words: &[u32]) -> (Verdict, Vec<u32>) {
     let mut left = Vec::new();
-    let verdict = prune(words, &mut |leaf| parts.leaves.range(leaf, over), &mut left);
+    let verdict = prune(words, &mut |leaf| parts.leaves.range_among_many(leaf, over), &mut left);
     (verdict, left)
 }
 

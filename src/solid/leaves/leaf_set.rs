@@ -10,7 +10,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::pruning::{Verdict, prune};
-use super::shape::{Motion, Shape, SlopeProgram};
+use super::shape::{Demand, Motion, Shape, SlopeProgram};
 use super::words::{self, Word};
 use crate::field::{Path, Sheet};
 use crate::geom::Aabb;
@@ -177,11 +177,21 @@ impl Leaves {
 
     /// An interval that contains the leaf's value at every point of a box, at all times of the stretch.
     pub fn range(&self, leaf: u32, over: &Aabb) -> Interval {
+        self.range_on(Demand::Few, leaf, over)
+    }
+
+    /// [`Self::range`] for those who ask for very many, by machine code where it pays. Its bounds may differ by
+    /// roundings.
+    pub fn range_among_many(&self, leaf: u32, over: &Aabb) -> Interval {
+        self.range_on(Demand::Many, leaf, over)
+    }
+
+    fn range_on(&self, demand: Demand, leaf: u32, over: &Aabb) -> Interval {
         let (shape, constants, uniforms) = self.of(leaf);
         if uniforms.is_empty() {
             let by_code = self.store.engine != Engine::Interpreter && self.store.leaves[leaf as usize].tame;
             if by_code
-                && let Some(range) = shape.range_code().and_then(|code| code.call(over, constants, &[]))
+                && let Some(range) = shape.range_code(demand).and_then(|code| code.call(over, constants, &[]))
             {
                 return range;
             }
@@ -192,7 +202,7 @@ impl Leaves {
         let own = first..first + uniforms.len();
         let by_code = self.store.engine != Engine::Interpreter && ranges.tame[leaf as usize];
         if by_code
-            && let Some(code) = shape.range_code()
+            && let Some(code) = shape.range_code(demand)
             && let Some(range) = code.call(over, constants, &ranges.pairs[own.clone()])
         {
             return range;
@@ -227,7 +237,7 @@ impl Leaves {
             slopes.push((leaf, slopes_of));
             range
         };
-        if prune(tree, &mut |leaf| self.range(leaf, over), &mut near) != Verdict::Near
+        if prune(tree, &mut |leaf| self.range_among_many(leaf, over), &mut near) != Verdict::Near
             || prune(&near, &mut range, &mut left) != Verdict::Near
         {
             return;
@@ -253,7 +263,7 @@ impl Leaves {
     fn range_by_slopes(&self, leaf: u32, over: &Aabb) -> (Interval, [Interval; 3]) {
         let slopes = self.slopes(leaf, over);
         let centre = over.centre();
-        let mut range = self.range(leaf, &Aabb::new(centre, centre));
+        let mut range = self.range_among_many(leaf, &Aabb::new(centre, centre));
         for (axis, slope) in slopes.into_iter().enumerate() {
             // programs round a formula, and so move its surface a little
             let slack = SURFACE_ROUNDING * over.min[axis].abs().max(over.max[axis].abs());

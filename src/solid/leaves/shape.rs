@@ -8,8 +8,8 @@ use crate::codegen;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::{
-    self, Contractor, EnclosureEvaluator, Given, Graph, Hoisted, Interpreter, Node, Outside, RangeEvaluator,
-    Region, Uniforms,
+    self, Binary, Contractor, EnclosureEvaluator, Expr, Given, Graph, Hoisted, Interpreter, Node, Outside,
+    RangeEvaluator, Region, Unary, Uniforms,
 };
 use crate::simplify::simplify;
 use crate::solid::engine::Engine;
@@ -20,6 +20,22 @@ use crate::solid::programs::compiled::{LeafProgram, RangeProgram};
 /// bounds of a leaf never depend on what was asked before.
 const MANY_LEAVES: usize = 8;
 
+/// The operations of all leaves of a shape from which on machine code pays for those who ask for some ten thousand
+/// ranges, as the search for thin parts and the cell map do.
+const MANY_OPERATIONS: usize = 24;
+
+/// What a function of the library costs, in operations.
+const OPERATIONS_OF_A_CALL: usize = 8;
+
+/// How many ranges are asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Demand {
+    /// A few for each leaf.
+    Few,
+    /// As many as a grid of cells needs.
+    Many,
+}
+
 /// A shape of leaves.
 pub struct Shape {
     /// What depends on time alone was taken out of it.
@@ -27,6 +43,8 @@ pub struct Shape {
     root: Node,
     pub parameters: usize,
     pub leaves: usize,
+    /// What a range costs, in operations.
+    operations: usize,
     /// `None` for a leaf at rest.
     pub motion: Option<Motion>,
     pub range: RangeEvaluator,
@@ -49,16 +67,17 @@ pub struct SlopeProgram {
 }
 
 impl SlopeProgram {
-    /// `None` for few leaves, and where only the interpreter knows the operations.
+    /// `None` where it does not pay, and where only the interpreter knows the operations.
     fn new(shape: &Shape, engine: Engine) -> Option<Self> {
-        if engine == Engine::Interpreter || shape.leaves < MANY_LEAVES || shape.motion.is_some() {
+        if engine == Engine::Interpreter || shape.motion.is_some() || !shape.pays(Demand::Many) {
             return None;
         }
         let mut graph = shape.graph.clone();
-        let derivatives = ir::gradient(&mut graph, shape.root);
-        let (graph, roots, _) = simplify(&graph, &derivatives);
-        let code = RangeProgram::of_all(&graph, &[roots[0], roots[1], roots[2]], shape.parameters).ok()?;
-        let ranges = RangeEvaluator::new(&graph, roots[0]);
+        let [x, y, z] = ir::gradient(&mut graph, shape.root);
+        let (graph, roots, _) = simplify(&graph, &[shape.root, x, y, z]);
+        let function = *roots.first()?;
+        let code = RangeProgram::of_slopes(&graph, roots.try_into().ok()?, shape.parameters).ok()?;
+        let ranges = RangeEvaluator::new(&graph, function);
         Some(Self { graph, ranges, code })
     }
 
@@ -68,9 +87,11 @@ impl SlopeProgram {
         codegen::range_stays_finite(&self.graph, &self.ranges, numbers)
     }
 
-    /// Enclosures of the derivatives of a tame leaf over a box; `None` if it reaches too far out.
+    /// Enclosures of the derivatives of a tame leaf over a box; `None` if it reaches too far out, or the leaf may
+    /// jump or be undefined there.
     pub fn over(&self, over: &Aabb, parameters: &[f64]) -> Option<[Interval; 3]> {
-        self.code.call_all(over, parameters, &[])
+        let [_, x, y, z] = self.code.call_all(over, parameters, &[])?;
+        Some([x, y, z])
     }
 }
 
@@ -88,6 +109,17 @@ pub struct Motion {
 pub struct Evaluator {
     code: Option<LeafProgram>,
     interpreter: Interpreter,
+}
+
+/// What a node costs, in operations.
+fn operations(expr: &Expr) -> usize {
+    match expr {
+        Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => 0,
+        Expr::Unary(Unary::Call(_), _) | Expr::Binary(Binary::Call(_), ..) | Expr::Lookup(..) => {
+            OPERATIONS_OF_A_CALL
+        }
+        Expr::Unary(..) | Expr::Binary(..) => 1,
+    }
 }
 
 impl Motion {
@@ -114,6 +146,7 @@ impl Shape {
             (graph, root, None)
         };
         let range = RangeEvaluator::new(&graph, root);
+        let operations = graph.exprs().iter().map(operations).sum();
         let (range_code, value, gradient) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
         let (contact, polynomial, enclosures) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
         let slopes = OnceLock::new();
@@ -122,6 +155,7 @@ impl Shape {
             root,
             parameters,
             leaves: 0,
+            operations,
             motion,
             range,
             range_code,
@@ -152,10 +186,18 @@ impl Shape {
         self.motion.as_ref().map_or((&self.graph, self.root), |motion| (&motion.graph, motion.root))
     }
 
+    /// Whether ranges come from machine code.
+    fn pays(&self, demand: Demand) -> bool {
+        match demand {
+            // those of a leaf that moves are asked for again and again
+            Demand::Few => self.leaves >= MANY_LEAVES || self.motion.is_some(),
+            Demand::Many => self.leaves * self.operations >= MANY_OPERATIONS || self.pays(Demand::Few),
+        }
+    }
+
     #[inline]
-    pub fn range_code(&self) -> Option<&RangeProgram> {
-        // the ranges of a leaf that moves are asked for again and again
-        if self.leaves < MANY_LEAVES && self.motion.is_none() {
+    pub fn range_code(&self, demand: Demand) -> Option<&RangeProgram> {
+        if !self.pays(demand) {
             return None;
         }
         let compile = || RangeProgram::with_parameters(&self.graph, self.root, self.parameters).ok();

@@ -265,7 +265,7 @@ impl RangeProgram {
         if !codegen::range_is_supported(graph, root) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        Self::new(graph, &[root], rounding, None)
+        Self::new(graph, &[root], Shape::Range(rounding), None)
     }
 
     /// A program of a graph with uniforms. It may be called with those for which
@@ -277,7 +277,7 @@ impl RangeProgram {
         if !codegen::range_is_known(graph) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        Self::new(graph, &[root], ROUNDING, None)
+        Self::new(graph, &[root], Shape::Range(ROUNDING), None)
     }
 
     /// A program that takes its constants as parameters. It may be called with those for which
@@ -286,26 +286,38 @@ impl RangeProgram {
     /// # Errors
     /// Those of [`RangeProgram::compile`].
     pub fn with_parameters(graph: &Graph, root: Node, parameters: usize) -> Result<Self, CodegenError> {
-        Self::of_all(graph, &[root], parameters)
-    }
-
-    /// A program as of [`RangeProgram::with_parameters`] for several nodes, see [`RangeProgram::call_all`].
-    ///
-    /// # Errors
-    /// Those of [`RangeProgram::compile`].
-    pub(crate) fn of_all(graph: &Graph, outputs: &[Node], parameters: usize) -> Result<Self, CodegenError> {
         if !codegen::range_is_known(graph) {
             return Err(CodegenError::Unsupported("ranges of this formula".into()));
         }
-        Self::new(graph, outputs, ROUNDING, Some(parameters))
+        Self::new(graph, &[root], Shape::Range(ROUNDING), Some(parameters))
+    }
+
+    /// A program as of [`RangeProgram::with_parameters`] for a function and its derivatives, see
+    /// [`RangeProgram::call_all`]. It has no answer for boxes in which the function may jump.
+    ///
+    /// # Errors
+    /// Those of [`RangeProgram::compile`].
+    pub(crate) fn of_slopes(
+        graph: &Graph,
+        outputs: [Node; 4],
+        parameters: usize,
+    ) -> Result<Self, CodegenError> {
+        if !codegen::range_is_known(graph) {
+            return Err(CodegenError::Unsupported("ranges of this formula".into()));
+        }
+        Self::new(graph, &outputs, Shape::Slopes(ROUNDING), Some(parameters))
     }
 
     fn new(
         graph: &Graph,
         outputs: &[Node],
-        rounding: Rounding,
+        shape: Shape,
         parameters: Option<usize>,
     ) -> Result<Self, CodegenError> {
+        let rounding = match shape {
+            Shape::Range(rounding) | Shape::Slopes(rounding) => rounding,
+            Shape::Point | Shape::Batch => return Err(CodegenError::Bug("not a range program".into())),
+        };
         let given = parameters.unwrap_or(0);
         let is_given = |expr| !matches!(expr, Expr::Parameter(i) if i as usize >= given);
         if !graph.nodes().all(|(_, expr)| is_given(expr)) {
@@ -314,7 +326,7 @@ impl RangeProgram {
         if rounding == Rounding::Upward && ROUNDING != Rounding::Upward {
             return Err(CodegenError::Unsupported("rounding upwards".into()));
         }
-        let (precision, shape, forms) = (Precision::F64, Shape::Range(rounding), &Forms::all(Form::Stable));
+        let (precision, forms) = (Precision::F64, &Forms::all(Form::Stable));
         let with_parameters = parameters.is_some();
         let uniforms = uniforms_of(graph);
         let request = Request {
@@ -331,7 +343,7 @@ impl RangeProgram {
     }
 
     /// The range over a box, for uniforms within these bounds; `None` if the box reaches too far out, or a divisor
-    /// may vanish in it.
+    /// may vanish in it, or a root or a function may be undefined.
     ///
     /// # Panics
     /// If there are not as many parameters or uniforms as the program has.
@@ -382,7 +394,7 @@ impl RangeProgram {
             }
             Rounding::Upward => self.call_rounding_upwards(&input, out, [third, fourth]),
         }
-        // a divisor may vanish
+        // what the program says where it has no answer
         if ranges.as_flattened().iter().any(|bound| bound.is_nan()) {
             return None;
         }
@@ -400,7 +412,8 @@ impl RangeProgram {
         // SAFETY: `new` asked for a range program, whose entry follows the C convention of this system with
         // these four pointers (the last are unused without parameters and uniforms); `self.code` keeps it
         // mapped while it runs; it reads six numbers, its parameters and its uniforms, checked by the caller,
-        // writes two for each output, for which the caller has made room, and calls nothing. The stack is aligned at the start of the block, stays so, and is put
+        // writes two for each output, for which the caller has made room, and calls nothing but `find_range`, for which
+        // it puts the rounding back itself. The stack is aligned at the start of the block, stays so, and is put
         // back, as is the control register, before its end.
         unsafe {
             std::arch::asm!(

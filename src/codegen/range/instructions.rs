@@ -4,8 +4,12 @@
 
 use glam::DVec3;
 
+use super::calls::RangeFunction;
 use crate::geom::Aabb;
-use crate::ir::{Affine, Axis, Binary, Expr, Graph, Node, RangeEvaluator, RangeRule, Region, Unary};
+use crate::ir::{
+    Affine, Axis, Binary, BinaryFunction, Expr, Graph, Limits, Node, RangeEvaluator, RangeRule, Region,
+    Unary, UnaryFunction,
+};
 
 /// Boxes within this distance of the origin are answered by machine code.
 pub const REACH: f64 = 1e9;
@@ -18,6 +22,9 @@ const LARGEST_OPERAND: f64 = 1e150;
 
 /// Divisors nearer to 0 are left to the interpreter.
 pub(super) const LEAST_DIVISOR: f64 = 1e-60;
+
+/// Values of called functions from here on are left to it, too.
+pub(super) const LARGEST_CALL: f64 = 1e60;
 
 /// Whether machine code can answer for this graph.
 pub fn supports(graph: &Graph, root: Node) -> bool {
@@ -51,6 +58,8 @@ pub(super) enum Instruction {
     Quotient(Node, Node),
     /// The share of the first in the smaller of both: a derivative.
     Share(Node, Node),
+    /// Of one operand, which then stands twice, or of two.
+    Call(RangeFunction, [Node; 2]),
 }
 
 /// The operations on one range.
@@ -62,6 +71,7 @@ pub(super) enum RangeUnary {
     Sign,
     Floor,
     Round,
+    Atan,
 }
 
 /// The operations on two ranges.
@@ -75,11 +85,14 @@ pub(super) enum RangeBinary {
     Max,
     And,
     Or,
+    AndWeight,
+    OrWeight,
+    Atan2,
 }
 
 /// The instructions for all nodes of a graph, in its order.
 #[derive(Default)]
-pub(super) struct Instructions(pub Vec<Instruction>);
+pub(in crate::codegen) struct Instructions(pub(super) Vec<Instruction>);
 
 impl Instructions {
     /// `None` if the graph has an operation that range programs do not have.
@@ -99,7 +112,7 @@ impl Instruction {
             }
             RangeRule::Plain(Expr::Parameter(i)) => Self::Parameter(i),
             RangeRule::Plain(Expr::Uniform(i)) => Self::Uniform(i),
-            RangeRule::Plain(Expr::Unary(op, a)) => Self::Unary(RangeUnary::of(op)?, a),
+            RangeRule::Plain(Expr::Unary(op, a)) => Self::unary(op, a),
             RangeRule::Plain(Expr::Binary(Binary::Div, a, b)) => match graph.expr(b) {
                 Expr::Constant(_) | Expr::Parameter(_) => Self::Divide(a, b),
                 Expr::Coordinate(_)
@@ -111,23 +124,26 @@ impl Instruction {
             RangeRule::Plain(Expr::Binary(Binary::DivOrZero, a, b)) => Self::Quotient(a, b),
             RangeRule::Plain(Expr::Binary(Binary::MinWeight, a, b)) => Self::Share(a, b),
             RangeRule::Plain(Expr::Binary(Binary::MaxWeight, a, b)) => Self::Share(b, a),
+            RangeRule::Plain(Expr::Binary(Binary::Call(function @ BinaryFunction::Pow), a, b)) => {
+                Self::Call(RangeFunction::Binary(function), [a, b])
+            }
             RangeRule::Plain(Expr::Binary(op, a, b)) => Self::Binary(RangeBinary::of(op)?, a, b),
             RangeRule::Plain(Expr::Lookup(..)) => return None,
         })
     }
-}
 
-impl RangeUnary {
-    fn of(op: Unary) -> Option<Self> {
-        match op {
-            Unary::Neg => Some(Self::Neg),
-            Unary::Abs => Some(Self::Abs),
-            Unary::Sqrt => Some(Self::Sqrt),
-            Unary::Floor => Some(Self::Floor),
-            Unary::Round => Some(Self::Round),
-            Unary::Sign => Some(Self::Sign),
-            Unary::Call(_) => None,
-        }
+    fn unary(op: Unary, a: Node) -> Self {
+        let op = match op {
+            Unary::Neg => RangeUnary::Neg,
+            Unary::Abs => RangeUnary::Abs,
+            Unary::Sqrt => RangeUnary::Sqrt,
+            Unary::Floor => RangeUnary::Floor,
+            Unary::Round => RangeUnary::Round,
+            Unary::Sign => RangeUnary::Sign,
+            Unary::Call(UnaryFunction::Atan) => RangeUnary::Atan,
+            Unary::Call(function) => return Self::Call(RangeFunction::Unary(function), [a, a]),
+        };
+        Self::Unary(op, a)
     }
 }
 
@@ -142,22 +158,26 @@ impl RangeBinary {
             Binary::Max | Binary::PlainMax => Some(Self::Max),
             Binary::And => Some(Self::And),
             Binary::Or => Some(Self::Or),
+            Binary::AndWeight => Some(Self::AndWeight),
+            Binary::OrWeight => Some(Self::OrWeight),
+            Binary::Call(BinaryFunction::Atan2) => Some(Self::Atan2),
             Binary::Div
             | Binary::DivOrZero
             | Binary::MinWeight
             | Binary::MaxWeight
-            | Binary::AndWeight
-            | Binary::OrWeight
-            | Binary::Call(_) => None,
+            | Binary::Call(BinaryFunction::Pow) => None,
         }
     }
 }
 
-/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms. A quotient by
-/// a node that may vanish is as large as [`LEAST_DIVISOR`] allows; one by a number that is zero is not finite.
+/// Whether no bound can overflow for a box within [`REACH`], for these parameters and uniforms, as far as the
+/// program has an answer. A quotient by a node that may vanish is as large as [`LEAST_DIVISOR`] allows; one by a
+/// number that is zero is not finite. Roots are those of positive numbers, and called functions are below
+/// [`LARGEST_CALL`].
 pub fn stays_finite(graph: &Graph, evaluator: &RangeEvaluator, numbers: Region<'_>) -> bool {
     let space = Aabb::new(DVec3::splat(-REACH), DVec3::splat(REACH));
-    let ranges = evaluator.all_without_poles(&Region { space: &space, ..numbers }, LEAST_DIVISOR);
+    let limits = Limits { least_divisor: LEAST_DIVISOR, largest_call: LARGEST_CALL };
+    let ranges = evaluator.all_within(&Region { space: &space, ..numbers }, limits);
     let within = |node: Node, limit: f64| {
         let range = ranges[node.index()];
         range.lo > -limit && range.hi < limit

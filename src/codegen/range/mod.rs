@@ -6,21 +6,32 @@
 //! after each operation. The rules are those of `ir::bounds::range`. Bounds may be wider by a few ulp, those
 //! of R₀ by a few ulp of its larger operand.
 //!
-//! Only graphs and boxes are taken for which `range_instructions` has shown that neither infinity nor NaN can
-//! arise: min and max need not look for them. For others the interpreter answers. Whether a divisor may vanish
-//! is found out by the program itself, which then answers NaN.
+//! Only graphs and boxes are taken for which `instructions` has shown that neither infinity nor NaN can arise: min
+//! and max need not look for them. For others the interpreter answers. Whether a divisor may vanish, a root may be
+//! that of a negative number or a called function be undefined is found out by the program itself, which then
+//! answers NaN.
 
-use std::collections::HashMap;
+mod angles;
+mod calls;
+mod instructions;
+mod steps;
+
+use std::collections::{HashMap, HashSet};
 
 use cranelift_codegen::ir::condcodes::FloatCC;
-use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
+use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, StackSlot, Value, types};
 use cranelift_frontend::FunctionBuilder;
 
+use instructions::{Instruction, LEAST_DIVISOR, RangeBinary, RangeUnary};
+
 use super::emitter::{Emitter, Hosts};
-use super::range_instructions::{Instruction, Instructions, LEAST_DIVISOR, RangeBinary, RangeUnary};
-use super::request::{Request, Rounding, pointers};
+use super::request::{Request, Rounding, Shape, pointers};
 use crate::ir::{Affine, Node, Unary};
 use crate::precision::Precision;
+
+pub(super) use calls::{declare, register};
+pub(super) use instructions::Instructions;
+pub use instructions::{REACH, knows, stays_finite, supports};
 
 /// Relative errors of one rounded operation, in either rounding: 2⁻⁵².
 const ULP: f64 = f64::EPSILON;
@@ -38,6 +49,9 @@ const R0_MARGIN: f64 = 16.0 * ULP;
 /// root of what is lost.
 const R0_UNDERFLOW: f64 = 1e-147;
 
+/// Sums of squares may reach so far below zero in [`Rounding::Nearest`].
+const LOST_BELOW_ZERO: f64 = 1e-290;
+
 /// `fn(box: *const [f64; 6], out: *mut [f64; 2])`: the low x, y, z and the high ones in, (low, high) of each
 /// output out; pointers to parameters, and to a pair (low, high) for each uniform, come after them as far as
 /// there are any.
@@ -45,7 +59,7 @@ pub(super) fn emit(
     builder: &mut FunctionBuilder<'_>,
     request: Request<'_>,
     Instructions(instructions): &Instructions,
-    rounding: Rounding,
+    host: Option<FuncRef>,
 ) {
     let block = builder.create_block();
     builder.append_block_params_for_function_params(block);
@@ -54,20 +68,17 @@ pub(super) fn emit(
     let arguments = builder.block_params(block).to_vec();
     let (input, output) = (arguments[0], arguments[1]);
     let [parameters, uniforms] = pointers(request, &arguments[2..]);
-    let hosts = Hosts::default(); // no instruction calls a function
+    let hosts = Hosts::default(); // no instruction calls a function for one number
     let emitter = Emitter::new(builder, Precision::F64, (request.graph, request.forms), &hosts);
     let (numbers, values) = (HashMap::new(), HashMap::new());
-    let mut ranges = Ranges { emitter, rounding, numbers, values, pole: None };
-    // bound by bound: two numbers that were just written cannot be read as one vector before they reach the
-    // cache
+    let (rounding, smooth) = match request.shape {
+        Shape::Slopes(rounding) => (rounding, request.graph.cone(request.outputs[0]).into_iter().collect()),
+        Shape::Range(rounding) => (rounding, HashSet::new()),
+        Shape::Point | Shape::Batch => unreachable!("only ranges come here"),
+    };
+    let mut ranges = Ranges { emitter, rounding, host, numbers, values, pole: None, bounds: None };
     let axes: [Value; 3] = std::array::from_fn(|i| {
-        let mut bound = |place: usize| {
-            let flags = MemFlagsData::new();
-            ranges.emitter.builder.ins().load(types::F64, flags, input, 8 * place as i32)
-        };
-        let (low, high) = (bound(i), bound(i + 3));
-        let low = ranges.emitter.builder.ins().splat(types::F64X2, low);
-        let pair = ranges.emitter.builder.ins().insertlane(low, high, 1);
+        let pair = ranges.load_pair(input, [8 * i as i32, 8 * (i as i32 + 3)]);
         ranges.flip(pair, BoundLane::Low)
     });
     for ((node, _), &instruction) in std::iter::zip(request.graph.nodes(), instructions) {
@@ -86,7 +97,13 @@ pub(super) fn emit(
             Instruction::Share(a, b) => ranges.share(ranges.values[&a], ranges.values[&b]),
             Instruction::Divide(a, number) => ranges.divide(ranges.values[&a], ranges.numbers[&number]),
             Instruction::Quotient(a, b) => ranges.quotient(ranges.values[&a], ranges.values[&b]),
+            Instruction::Call(function, operands) => {
+                ranges.call(function, operands.map(|node| ranges.values[&node]))
+            }
         };
+        if smooth.contains(&node) {
+            ranges.forbid_jumps(instruction, value);
+        }
         ranges.values.insert(node, value);
     }
     for (i, node) in request.outputs.iter().enumerate() {
@@ -115,10 +132,14 @@ enum BoundLane {
 struct Ranges<'a, 'f> {
     emitter: Emitter<'a, 'f>,
     rounding: Rounding,
+    /// The function that finds ranges which are not computed here.
+    host: Option<FuncRef>,
     numbers: HashMap<Node, RangeNumber>,
     values: HashMap<Node, Value>,
-    /// A mask: all ones if a divisor may be too near to 0. `None` if nothing is divided by.
+    /// A mask: ones in a lane if there is no answer. `None` if there always is one.
     pole: Option<Value>,
+    /// Where the bounds are that a function is called with.
+    bounds: Option<StackSlot>,
 }
 
 impl Ranges<'_, '_> {
@@ -135,6 +156,7 @@ impl Ranges<'_, '_> {
                 self.lanes(low, high)
             }
             RangeUnary::Round => self.emitter.builder.ins().nearest(a),
+            RangeUnary::Atan => self.atan(a),
         }
     }
 
@@ -175,6 +197,12 @@ impl Ranges<'_, '_> {
             }
             RangeBinary::And => self.r0(a, b, BoundLane::High),
             RangeBinary::Or => self.r0(a, b, BoundLane::Low),
+            RangeBinary::Atan2 => self.atan2(a, b).0,
+            RangeBinary::AndWeight => self.weight(a, b).0,
+            RangeBinary::OrWeight => {
+                let (a, b) = (self.swap(a), self.swap(b));
+                self.weight(a, b).0
+            }
         }
     }
 
@@ -193,6 +221,15 @@ impl Ranges<'_, '_> {
         let flags = MemFlagsData::new();
         let pair = self.emitter.builder.ins().load(types::F64X2, flags, base, 16 * i as i32);
         self.flip(pair, BoundLane::Low)
+    }
+
+    /// Two numbers in memory. They are read one by one: as long as they have just been written they cannot be read
+    /// as one vector.
+    fn load_pair(&mut self, base: Value, offsets: [i32; 2]) -> Value {
+        let [low, high] = offsets
+            .map(|offset| self.emitter.builder.ins().load(types::F64, MemFlagsData::new(), base, offset));
+        let low = self.emitter.builder.ins().splat(types::F64X2, low);
+        self.emitter.builder.ins().insertlane(low, high, 1)
     }
 
     /// A constant with two different lanes.
@@ -293,21 +330,6 @@ impl Ranges<'_, '_> {
         self.up(quotient)
     }
 
-    /// From 0 to 1, or one of them where the ranges do not overlap.
-    fn share(&mut self, a: Value, b: Value) -> Value {
-        let turned = self.swap(b);
-        // b.hi − a.lo and a.hi − b.lo, whose signs are exact
-        let gaps = self.fadd(a, turned);
-        let zero = self.emitter.constant(0.0);
-        let [b_is_less, a_is_less] = [BoundLane::Low, BoundLane::High].map(|lane| {
-            let gap = self.both(gaps, lane);
-            self.emitter.compare(FloatCC::LessThan, gap, zero)
-        });
-        let (any, all) = (self.pair(0.0, 1.0), self.pair(-1.0, 1.0));
-        let share = self.emitter.select(a_is_less, all, any);
-        self.emitter.select(b_is_less, zero, share)
-    }
-
     /// By a range that is meant not to hold 0: times its reciprocals [−1/hi, 1/lo], which are
     /// −1 over the bounds of −b.
     fn quotient(&mut self, a: Value, b: Value) -> Value {
@@ -316,17 +338,22 @@ impl Ranges<'_, '_> {
         let nearest = self.min(b, turned);
         let limit = self.emitter.constant(-LEAST_DIVISOR);
         let is_near = self.emitter.compare(FloatCC::GreaterThan, nearest, limit);
-        self.pole = Some(match self.pole {
-            Some(pole) => self.emitter.builder.ins().bor(pole, is_near),
-            None => is_near,
-        });
+        self.fail_where(is_near);
         let minus_one = self.emitter.constant(-1.0);
         let reciprocals = self.emitter.builder.ins().fdiv(minus_one, turned);
         let reciprocals = self.up(reciprocals);
         self.multiply(a, reciprocals)
     }
 
-    /// A range, or NaN where a divisor may be too near to 0.
+    /// There is no answer where a mask has ones.
+    fn fail_where(&mut self, mask: Value) {
+        self.pole = Some(match self.pole {
+            Some(pole) => self.emitter.builder.ins().bor(pole, mask),
+            None => mask,
+        });
+    }
+
+    /// A range, or NaN where there is no answer.
     fn unless_at_a_pole(&mut self, range: Value) -> Value {
         let Some(pole) = self.pole else { return range };
         let unknown = self.emitter.constant(f64::NAN);
@@ -380,7 +407,11 @@ impl Ranges<'_, '_> {
     }
 
     fn sqrt(&mut self, v: Value) -> Value {
-        // `stays_finite` has shown that the operand is not negative, but rounding here may be a little wider
+        // what rounding may have put below zero
+        let lost = if self.rounding == Rounding::Upward { 0.0 } else { LOST_BELOW_ZERO };
+        let most = self.pair(lost, f64::INFINITY);
+        let is_negative = self.emitter.compare(FloatCC::LessThan, most, v);
+        self.fail_where(is_negative);
         let limit = self.pair(-0.0, f64::MAX);
         let v = self.min(v, limit);
         let magnitude = self.emitter.abs(v);
