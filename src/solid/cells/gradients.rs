@@ -6,7 +6,7 @@ use super::map::{CellMap, RUN, signed};
 use crate::field::{Field, GradientsMut, Points};
 use crate::solid::leaves::words::Word;
 
-/// Where a point's program is: in the map's cells, or in those that know more of their surroundings.
+/// Where a point's program is: in the map's cells, or in what knows more of their surroundings.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Source {
     Cells,
@@ -60,9 +60,9 @@ impl CellMap {
             let keys = &mut keys[..count];
             keys.sort_unstable();
             for group in keys.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-                let words = match group[0].0 {
-                    Source::Cells => &self.cells.programs[..],
-                    Source::Around => self.programs_around(),
+                let (words, begin) = match group[0].0 {
+                    Source::Cells => (&self.cells.programs[..], group[0].1),
+                    Source::Around => (self.words_around(group[0].1), 0),
                     Source::Twin => {
                         for &(.., i) in group {
                             let (omega, gradient) = self.twin.omega_grad(points.get(i));
@@ -73,7 +73,7 @@ impl CellMap {
                     }
                 };
                 gathered.fill(points, group.iter().map(|key| key.2));
-                self.gradients_of((words, group[0].1), &gathered, group.iter().map(|key| key.2), &mut out);
+                self.gradients_of((words, begin), &gathered, group.iter().map(|key| key.2), &mut out);
             }
         }
     }

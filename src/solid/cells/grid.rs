@@ -21,7 +21,7 @@ use crate::solid::leaves::pruning::{Verdict, prune};
 use crate::solid::leaves::words::{Word, leaf_count};
 
 /// Levels of the flat grid: 2⁶ cells along a side.
-const DEPTH: u32 = 6;
+pub(super) const DEPTH: u32 = 6;
 pub const SIDE: u32 = 1 << DEPTH;
 
 /// Cells of the flat grid are divided further only where more leaves than this are left.
@@ -122,29 +122,15 @@ impl Cell {
     }
 }
 
-/// How a box is divided.
-struct Division {
-    margin: f64,
-    deepest: u32,
-    /// Whether all threads take part.
-    parallel: bool,
-}
-
-impl Division {
-    fn deep(margin: f64) -> Self {
-        Self { margin, deepest: MAX_DEPTH, parallel: true }
-    }
-}
-
 /// What is known of a box, and what is left of the solid in it.
-fn judged(parts: &LeafTree, over: &Aabb, words: &[u32]) -> (Verdict, Vec<u32>) {
+pub(super) fn judged(parts: &LeafTree, over: &Aabb, words: &[u32]) -> (Verdict, Vec<u32>) {
     let mut left = Vec::new();
     let verdict = prune(words, &mut |leaf| parts.leaves.range_among_many(leaf, over), &mut left);
     (verdict, left)
 }
 
 /// The box of a cell.
-fn bounds(domain: &Aabb, depth: u32, at: UVec3) -> Aabb {
+pub(super) fn bounds(domain: &Aabb, depth: u32, at: UVec3) -> Aabb {
     let size = domain.size() / f64::from(1u32 << depth);
     let corner = domain.min + size * at.as_dvec3();
     Aabb::new(corner, corner + size)
@@ -163,15 +149,7 @@ impl Cells {
     /// Divides a box; `margin` is positive.
     pub fn new(parts: &LeafTree, domain: Aabb, margin: f64) -> Self {
         let (mut cells, level) = Self::begin(parts, domain, margin);
-        cells.refine(level, parts, Division::deep(margin), |_| false);
-        cells
-    }
-
-    /// Divides the same box with another margin, no deeper than the flat grid. The calling thread does it alone, because
-    /// others may wait for the result, and it must not take over work that waits, too.
-    pub fn with_margin(&self, parts: &LeafTree, margin: f64) -> Self {
-        let (mut cells, level) = Self::begin(parts, self.domain, margin);
-        cells.refine(level, parts, Division { margin, deepest: DEPTH, parallel: false }, |_| false);
+        cells.refine(level, parts, margin, |_| false);
         cells
     }
 
@@ -179,9 +157,8 @@ impl Cells {
     /// left may change: those in which a leaf that moves matters at some time.
     pub fn lasting(parts: &LeafTree, domain: Aabb, margin: f64) -> (Self, Vec<Pending>) {
         let (mut cells, level) = Self::begin(parts, domain, margin);
-        let left = cells.refine(level, parts, Division::deep(margin), |cell| {
-            cell.depth == RESTLESS_DEPTH && cell.is_restless(parts)
-        });
+        let left = cells
+            .refine(level, parts, margin, |cell| cell.depth == RESTLESS_DEPTH && cell.is_restless(parts));
         (cells, left)
     }
 
@@ -189,7 +166,7 @@ impl Cells {
     /// time.
     pub fn completed(&self, left: &[Pending], parts: &LeafTree, margin: f64) -> Self {
         let mut cells = self.clone();
-        cells.refine(left.to_vec(), parts, Division::deep(margin), |_| false);
+        cells.refine(left.to_vec(), parts, margin, |_| false);
         cells
     }
 
@@ -222,7 +199,7 @@ impl Cells {
         &mut self,
         mut level: Vec<Pending>,
         parts: &LeafTree,
-        Division { margin, deepest, parallel }: Division,
+        margin: f64,
         leave: impl Fn(&Pending) -> bool,
     ) -> Vec<Pending> {
         let domain = self.domain;
@@ -239,7 +216,7 @@ impl Cells {
             let Some(depth) = level.first().map(|cell: &Pending| cell.depth) else { return all_left };
             let leaves: Vec<usize> = level.iter().map(|cell| leaf_count(&cell.words)).collect();
             spent += 8 * leaves.iter().sum::<usize>();
-            if spent > MOST_RANGES || depth >= deepest {
+            if spent > MOST_RANGES || depth >= MAX_DEPTH {
                 level.into_iter().for_each(|cell| self.finish(cell, &mut known));
                 return all_left;
             }
@@ -253,11 +230,7 @@ impl Cells {
                 std::array::from_fn(|k| judge(depth + 1, octant(cell.at, k), &cell.words))
             };
             // collected in order: the map is the same for any number of threads
-            let octants: Vec<_> = if parallel {
-                divided.par_iter().map(octants).collect()
-            } else {
-                divided.iter().map(octants).collect()
-            };
+            let octants: Vec<_> = divided.par_iter().map(octants).collect();
             level = Vec::new();
             for ((cell, count), octants) in divided.into_iter().zip(octants) {
                 let first = self.divide(&cell);
@@ -393,7 +366,7 @@ impl Cells {
     }
 }
 
-fn octant(at: UVec3, k: usize) -> UVec3 {
+pub(super) fn octant(at: UVec3, k: usize) -> UVec3 {
     let k = k as u32;
     2 * at + UVec3::new(k & 1, k >> 1 & 1, k >> 2)
 }

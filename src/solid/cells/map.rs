@@ -8,10 +8,11 @@
 //! jumps between cells. A map with a reach also answers for distance, normal and curvature up to that
 //! distance from the surface.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::around::Surroundings;
 use super::grid::{Cell, Cells, Found, SIDE};
 use crate::field::{
     Entry, Faces, Field, GradientsMut, Normals, Path, Points, Sheet, Walls, clearance_by_ranges,
@@ -56,9 +57,8 @@ pub struct CellMap {
     pub(super) twin: Twin,
     pub(super) parts: Arc<LeafTree>,
     pub(super) cells: Arc<Cells>,
-    /// Cells of the same box that keep what decides within [`AROUND`] of them. They are made when a gradient is first
-    /// asked for off the surface.
-    around: OnceLock<Cells>,
+    /// What decides within [`AROUND`] of the cells, for gradients off the surface.
+    around: Surroundings,
     reach: f64,
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
     /// still right.
@@ -126,7 +126,9 @@ impl CellMap {
     /// A map of cells that are right for the solid's stretch of time, and were grown by [`margin`].
     pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
         let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
-        let (solid, twin, around) = (solid.clone(), solid.twin(), OnceLock::new());
+        let beside = AROUND * cells.domain.size().max_element() / f64::from(SIDE);
+        let around = Surroundings::new(cells.domain, beside.max(margin));
+        let (solid, twin) = (solid.clone(), solid.twin());
         Some(Self { solid, twin, parts, cells, around, reach, margin })
     }
 
@@ -210,37 +212,24 @@ impl CellMap {
         self.parts.leaves.decide(&self.cells.programs, &mut (program as usize), p)
     }
 
-    /// The program that gives the gradient at a point, and whether it is one of [`Self::programs_around`] rather than of
-    /// the cells; `None` far from all surfaces and outside the box.
+    /// The program that gives the gradient at a point: where it begins in the cells' programs, or the number of a cell
+    /// of the [surroundings](Self::words_around) if `true` stands before it. `None` far from all surfaces and outside the
+    /// box.
     #[inline]
     pub(super) fn program_for(&self, p: DVec3) -> Option<(bool, u32)> {
         match self.cells.find(p)?.cell {
             Cell::Near(program) => Some((false, program)),
+            // surroundings of their own for each stretch of time do not pay
+            _ if self.solid.moves() => None,
             Cell::Fluid | Cell::Inside | Cell::Divided(_) => {
-                self.program_around(p).map(|program| (true, program))
+                self.around.find(&self.parts, p).map(|cell| (true, cell))
             }
         }
     }
 
-    /// What decides near a point that is in no cell of a surface.
-    fn program_around(&self, p: DVec3) -> Option<u32> {
-        if self.solid.moves() {
-            return None; // a map of its own for each stretch of time does not pay
-        }
-        match self.cells_around().find(p)?.cell {
-            Cell::Near(program) => Some(program),
-            Cell::Fluid | Cell::Inside | Cell::Divided(_) => None,
-        }
-    }
-
-    fn cells_around(&self) -> &Cells {
-        let reach = AROUND * self.cells.domain.size().max_element() / f64::from(SIDE);
-        self.around.get_or_init(|| self.cells.with_margin(&self.parts, reach.max(self.margin)))
-    }
-
-    /// The programs of the cells that keep what decides within [`AROUND`] of them.
-    pub(super) fn programs_around(&self) -> &[u32] {
-        &self.cells_around().programs
+    /// What decides within [`AROUND`] of a cell.
+    pub(super) fn words_around(&self, cell: u32) -> &[u32] {
+        self.around.words(&self.parts, cell)
     }
 
     /// The value of a program at up to [`RUN`] points.
@@ -421,7 +410,8 @@ impl Field for CellMap {
 
     fn omega_grad(&self, p: DVec3) -> (f64, DVec3) {
         let Some((is_around, program)) = self.program_for(p) else { return self.twin.omega_grad(p) };
-        let words = if is_around { self.programs_around() } else { &self.cells.programs };
+        let (words, program) =
+            if is_around { (self.words_around(program), 0) } else { (&self.cells.programs[..], program) };
         let (value, (leaf, negated)) = self.parts.leaves.decide(words, &mut (program as usize), p);
         let gradient = self.parts.leaves.gradient(leaf, p).1;
         (value, if negated { -gradient } else { gradient })

@@ -1,6 +1,7 @@
 //! A box divided into cells that know what of a solid matters in them; for a solid at rest and for one that
 //! moves.
 
+mod around;
 mod gradients;
 pub mod grid;
 pub mod map;
