@@ -51,7 +51,7 @@ pub(super) fn crossing_pairs(
     if suspects.is_empty() || !(size > 0.0 && size.is_finite()) {
         return Vec::new();
     }
-    let cubes = Cubes { size: CUBE * size };
+    let cubes = Cubes::new(CUBE * size);
     let mut is_suspect = vec![false; triangles.len()];
     suspects.iter().for_each(|&t| is_suspect[t as usize] = true);
     let mut places = places(positions, triangles, (suspects, 0.0), &cubes);
@@ -115,6 +115,7 @@ fn places(
             coarse.mark(cube.map(block_of));
         }
     }
+    let clear = clear_blocks(positions, &coarse, cubes);
     let parts: Vec<Vec<(Cube, u32)>> = triangles
         .par_chunks(TRIANGLES_PER_TASK)
         .enumerate()
@@ -122,30 +123,42 @@ fn places(
             let first = (part * TRIANGLES_PER_TASK) as u32;
             let mut near = Vec::new();
             for (t, triangle) in (first..).zip(triangles) {
+                // most triangles lie in one block, and that holds no suspect
+                let [a, b, c] = *triangle;
+                let blocks = [clear[a as usize], clear[b as usize], clear[c as usize]];
+                if blocks[0] == blocks[1] && blocks[0] == blocks[2] && blocks[0] != NOT_CLEAR {
+                    continue;
+                }
                 let bounds = bounds_of(corners(positions, *triangle));
                 if !bounds.is_finite() {
                     continue;
                 }
-                let (low, high) = (cubes.of(bounds.min), cubes.of(bounds.max));
-                // most triangles lie in one block, and that holds no suspect
-                let blocks = [low, high].map(|cube| cube.map(block_of));
-                if blocks[0] == blocks[1] && !coarse.may_hold(blocks[0]) {
-                    continue;
-                }
-                for z in low[2]..=high[2] {
-                    for y in low[1]..=high[1] {
-                        for x in low[0]..=high[0] {
-                            if filter.may_hold([x, y, z]) {
-                                near.push(([x, y, z], t));
-                            }
-                        }
-                    }
-                }
+                near.extend(
+                    cubes.touched(&bounds).filter(|cube| filter.may_hold(*cube)).map(|cube| (cube, t)),
+                );
             }
             near
         })
         .collect();
     parts.concat()
+}
+
+/// A vertex in a block that may hold a suspect, or so far out that blocks have no numbers.
+const NOT_CLEAR: u64 = 0;
+
+/// For each vertex the number of its block, or [`NOT_CLEAR`].
+fn clear_blocks(positions: &[DVec3], suspects: &Filter, cubes: &Cubes) -> Vec<u64> {
+    const NUMBERED: i32 = 1 << 20;
+    let find = |p: &DVec3| {
+        let block = cubes.of(*p).map(block_of);
+        let is_far = |b: &i32| !(-NUMBERED..NUMBERED).contains(b);
+        if !p.is_finite() || block.iter().any(is_far) || suspects.may_hold(block) {
+            return NOT_CLEAR;
+        }
+        let [x, y, z] = block.map(|b| (b + NUMBERED) as u64);
+        1 << 63 | z << 42 | y << 21 | x
+    };
+    positions.par_iter().with_min_len(TRIANGLES_PER_TASK).map(find).collect()
 }
 
 /// The number of a block of cubes, by that of a cube on an axis.
@@ -155,25 +168,55 @@ fn block_of(cube: i32) -> i32 {
 
 /// A division of space into cubes. Those beside a plane of zero coordinates are twice as long across it.
 pub(super) struct Cubes {
-    pub size: f64,
+    per_length: f64,
 }
 
 type Cube = [i32; 3];
 
 impl Cubes {
+    /// Cubes with sides of this length, which is positive.
+    pub fn new(size: f64) -> Self {
+        Self { per_length: 1.0 / size }
+    }
+
     fn of(&self, p: DVec3) -> Cube {
         // truncation keeps the order of numbers, and needs no call as rounding down does
-        (p / self.size).to_array().map(|x| x as i32)
+        let q = p * self.per_length;
+        [q.x as i32, q.y as i32, q.z as i32]
     }
 
     /// The cubes that a box touches.
-    pub fn touched(&self, bounds: &Aabb) -> impl Iterator<Item = Cube> + use<> {
+    pub fn touched(&self, bounds: &Aabb) -> Touched {
         let (low, high) = (self.of(bounds.min), self.of(bounds.max));
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| low[axis]..=high[axis]);
-        z.flat_map(move |k| {
-            let x = x.clone();
-            y.clone().flat_map(move |j| x.clone().map(move |i| [i, j, k]))
-        })
+        let is_empty = (0..3).any(|axis| low[axis] > high[axis]);
+        Touched { low, high, next: (!is_empty).then_some(low) }
+    }
+}
+
+/// The cubes that a box touches, x fastest, then y.
+pub(super) struct Touched {
+    low: Cube,
+    high: Cube,
+    next: Option<Cube>,
+}
+
+impl Iterator for Touched {
+    type Item = Cube;
+
+    #[inline]
+    fn next(&mut self) -> Option<Cube> {
+        let found = self.next?;
+        let mut next = found;
+        for axis in 0..3 {
+            if next[axis] < self.high[axis] {
+                next[axis] += 1;
+                self.next = Some(next);
+                return Some(found);
+            }
+            next[axis] = self.low[axis];
+        }
+        self.next = None;
+        Some(found)
     }
 }
 

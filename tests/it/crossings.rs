@@ -163,6 +163,22 @@ const GEAR: &str =
 const PRODUCT: &str =
     "solid s = x*y*z*(x - 0.3)*(y + 0.2)*(z - 0.4) >= 0.001 and box([-1, -1, -1], [1, 1, 1])";
 
+/// Two boxes nearly touch at an edge, and in one cell a tunnel leads through between them; the others only make the grid.
+const TUNNEL: &str = "
+    solid s = box([-0.046450, -0.044883, -0.035329], [0.046450, 0.044883, 0.035329]).rotate_x(1.6657).rotate_y(3.5890).move([0.377558, 0.203914, 0.003876]) or
+    box([-0.041889, -0.047315, -0.036260], [0.041889, 0.047315, 0.036260]).rotate_x(5.1055).rotate_y(2.6745).move([0.106832, 0.997788, 0.998774]) or
+    box([-0.044468, -0.047233, -0.032709], [0.044468, 0.047233, 0.032709]).rotate_x(3.6909).rotate_y(4.7064).move([0.337101, 0.004276, 0.687966]) or
+    box([-0.045889, -0.033901, -0.039898], [0.045889, 0.033901, 0.039898]).rotate_x(5.5051).rotate_y(5.9403).move([0.669655, 0.998109, 0.052329]) or
+    box([-0.048154, -0.049743, -0.043128], [0.048154, 0.049743, 0.043128]).rotate_x(0.8856).rotate_y(2.0341).move([0.997300, 0.046405, 0.187958]) or
+    box([-0.045981, -0.039437, -0.036015], [0.045981, 0.039437, 0.036015]).rotate_x(5.5290).rotate_y(0.2881).move([0.000675, 0.069123, 0.539757]) or
+    box([-0.034689, -0.048307, -0.044610], [0.034689, 0.048307, 0.044610]).rotate_x(5.2149).rotate_y(4.2999).move([0.827708, 0.988091, 0.033903]) or
+    box([-0.022572, -0.030678, -0.048394], [0.022572, 0.030678, 0.048394]).rotate_x(2.5702).rotate_y(3.0495).move([0.593484, 0.931728, 0.081347])";
+
+#[test]
+fn the_ends_of_a_tunnel_do_not_cross() {
+    check("tunnel", &solid(TUNNEL), 128);
+}
+
 #[test]
 fn examples_do_not_cross_themselves() {
     let folder = format!("{}/examples", env!("CARGO_MANIFEST_DIR"));

@@ -158,7 +158,7 @@ impl<'a> Draft<'a> {
             most.max(self.vertices.positions[v as usize].distance(cut.position))
         };
         let margin = cuts.iter().fold(0.0, farthest);
-        let cubes = Cubes { size: self.size };
+        let cubes = Cubes::new(self.size);
         let mut near = Neighbours::find(&self.vertices.positions, &self.triangles, (&touched, margin), cubes);
         let all: Vec<u32> = cuts.keys().copied().collect();
         let mut waiting = vec![&all[..]];

@@ -77,16 +77,25 @@ pub fn dual_contouring(
 
     let crossing = Crossing::find(field, &lattice, &near, progress, &mut work)?;
     let rings = Rings::new(crossing.crossed.vertices);
-    let (vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
-    let mut joined = join((field, &lattice), &crossing, &rings, &placed, vertices, grid, &mut work);
+    let placed_and_joined = |work: &mut Work| {
+        let (vertices, placed) = place(&crossing.placement(field, &lattice, &rings, grid.spacing()));
+        join((field, &lattice), &crossing, &rings, &placed, vertices, grid, work)
+    };
+    let mut joined = placed_and_joined(&mut work);
     let crossings = joined.crossings();
     if crossings.len() <= MENDABLE {
-        let mut sharp = Draft::new(field, grid, joined.triangles(), (work, Care::Sharp));
+        // a mesh that does not cross itself now hardly ever does so later: no copy is kept
+        let (triangles, kept) = match crossings.is_empty() {
+            true => (joined.into_triangles(), None),
+            false => (joined.triangles(), Some(joined)),
+        };
+        let mut sharp = Draft::new(field, grid, triangles, (work, Care::Sharp));
         sharp.refine_and_mend()?;
         if !sharp.crosses_itself() {
             return Ok(sharp.finish());
         }
         work = sharp.work();
+        joined = kept.unwrap_or_else(|| placed_and_joined(&mut work));
     }
     let triangles = joined.triangles_apart(crossings, &mut work);
     let mut draft = Draft::new(field, grid, triangles, (work, Care::Apart));
@@ -250,6 +259,13 @@ impl Joined<'_> {
         let Self { quads, cut, vertices, tubes } = self;
         let mut vertices = vertices.clone();
         let triangles = secure::as_joined(quads, cut, &mut vertices, tubes);
+        (vertices, triangles)
+    }
+
+    /// The vertices and triangles as they are, without a copy where none is needed.
+    fn into_triangles(self) -> (Vertices, Vec<[u32; 3]>) {
+        let Self { quads, cut, mut vertices, tubes } = self;
+        let triangles = secure::into_joined(&quads, cut, &mut vertices, &tubes);
         (vertices, triangles)
     }
 

@@ -112,7 +112,7 @@ impl<'a> Patch<'a> {
             own.sort_unstable();
             own.dedup();
             // vertices move by a cell at most
-            Neighbours::find(&vertices.positions, triangles, (&own, size), Cubes { size })
+            Neighbours::find(&vertices.positions, triangles, (&own, size), Cubes::new(size))
         });
         Self { field, bounds, size, vertices, triangles, fans, near, count: 0 }
     }

@@ -23,7 +23,7 @@ use super::super::{
 use super::loops::{CellLoops, LOOPS, Loop, Sheets};
 use super::project;
 use super::sharp::{self, SLIDE};
-use super::vertices::{Hit, Hits, Rings, Vertex, VertexKind};
+use super::vertices::{Hit, Hits, NONE, Rings, Vertex, VertexKind};
 use crate::field::Field;
 use crate::geom::Aabb;
 
@@ -36,6 +36,9 @@ const STEPS: usize = 4;
 /// The step of Newton's method onto a smooth surface that needs no other after it, in cells. It leaves its
 /// square times the curvature per cell, which is below 1/3 in a cell with normals within [`NEARLY_FLAT`].
 const LAST_STEP: f64 = 3e-6;
+
+/// A vertex of a smooth surface that lies farther than this from its cell, in cells, is astray.
+const ASTRAY: f64 = 0.05;
 
 /// The ends of a tunnel lie this far from a face into the cell, as a share of the way to the middle.
 const INTO_CELL: f64 = 0.25;
@@ -63,6 +66,8 @@ pub(super) struct Placed {
     pub tubes: Vec<[u32; 3]>,
     /// Vertices that share their cell with others.
     pub crowded: Vec<u32>,
+    /// Vertices of smooth cells or on the border that lie outside their own cells.
+    pub astray: Vec<u32>,
     pub gradients: u64,
 }
 
@@ -79,11 +84,18 @@ pub(super) struct PlacementScratch {
     table: Box<VertexTable>,
     gradients: GradientColumns,
     hits: Vec<Hit>,
+    /// The extended indices of the low corner of each vertex's cell; [`NONE`] for those of tunnels.
+    cells: Vec<[u32; 3]>,
 }
 
 impl Default for PlacementScratch {
     fn default() -> Self {
-        Self { table: vertex_table(), gradients: GradientColumns::default(), hits: Vec::new() }
+        Self {
+            table: vertex_table(),
+            gradients: GradientColumns::default(),
+            hits: Vec::new(),
+            cells: Vec::new(),
+        }
     }
 }
 
@@ -118,6 +130,8 @@ impl Placement<'_> {
     /// Places the vertices of a task's cells.
     pub fn place(&self, task: &Task<Sheets>, slots: Slots<'_>, scratch: &mut PlacementScratch) -> Placed {
         let mut output = Output { slots, scratch, placed: Placed::default() };
+        output.scratch.cells.clear();
+        output.scratch.cells.resize(output.slots.kinds.len(), [NONE; 3]);
         let mut next = 0;
         for (brick, sheets) in task.bricks.iter().zip(&task.kept) {
             brick.number_vertices(|number| self.crossed.get(number), &mut output.scratch.table);
@@ -154,7 +168,24 @@ impl Placement<'_> {
         }
         let Output { mut slots, scratch, mut placed } = output;
         self.settle_smooth(&mut slots, &mut scratch.gradients, &mut placed);
+        self.find_astray(&slots, &scratch.cells, &mut placed);
         placed
+    }
+
+    /// Notes the vertices that lie outside their cells.
+    fn find_astray(&self, slots: &Slots<'_>, cells: &[[u32; 3]], placed: &mut Placed) {
+        let places = (slots.first..).zip(&*slots.positions).zip(&*slots.kinds).zip(cells);
+        for (((v, p), kind), cell) in places {
+            if *kind == VertexKind::Sharp || *cell == [NONE; 3] {
+                continue;
+            }
+            let low = cell.map(|n| n as usize);
+            let (min, max) = (self.lattice.position(low), self.lattice.position(low.map(|n| n + 1)));
+            let margin = ASTRAY * (max - min);
+            if !(p.cmpge(min - margin) & p.cmple(max + margin)).all() {
+                placed.astray.push(v);
+            }
+        }
     }
 
     /// Adds the vertex of a loop.
@@ -197,6 +228,7 @@ impl Placement<'_> {
             height += of_hit.dot(self.hits.positions[number] - mean);
         }
         let low = cell_low(brick.low, cell);
+        scratch.cells[place] = low.map(|n| n as u32);
         let is_smooth = length > 0.0 && least_agreement > NEARLY_FLAT && !self.is_border(low);
         slots.positions[place] = mean + (0.5 * height / count as f64) * normal;
         slots.normals[place] = normal;

@@ -9,7 +9,7 @@
 //! Invariant: the triangles of a quad, fans included, have its sides as their border, so the mesh is as
 //! closed and manifold as the quads are.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -39,6 +39,10 @@ pub(super) struct Quads<'a> {
     pub middles: BTreeMap<(u32, [u32; 2]), u32>,
     /// The second vertex of a cell at a hit, by hit and first vertex.
     pub seconds: BTreeMap<(u32, u32), u32>,
+    /// Where the vertices at the ends of tunnels began: in their cells, at the passages.
+    pub tunnels: BTreeMap<u32, DVec3>,
+    /// For each vertex of a cell, whether it lies outside that cell or in one with other vertices.
+    is_away: Vec<bool>,
 }
 
 /// A quad around a crossed edge of the grid.
@@ -98,8 +102,16 @@ impl<'a> Quads<'a> {
                 middles.insert((hit, [pair[0].vertex, pair[1].vertex]), middle);
             }
         }
-        let seconds = placed.iter().flat_map(|part| part.seconds.iter().copied()).collect();
-        Self { field, lattice, signs, crossed, hits, rings, middles, seconds }
+        let seconds: BTreeMap<(u32, u32), u32> =
+            placed.iter().flat_map(|part| part.seconds.iter().copied()).collect();
+        let ends: BTreeSet<u32> = seconds.values().copied().collect();
+        let fallbacks = placed.iter().flat_map(|part| part.fallbacks.iter().copied());
+        let tunnels = fallbacks.filter(|(v, _)| ends.contains(v)).collect();
+        let mut is_away = vertices.doubtful.clone();
+        for &v in placed.iter().flat_map(|part| &part.astray) {
+            is_away[v as usize] = true;
+        }
+        Self { field, lattice, signs, crossed, hits, rings, middles, seconds, tunnels, is_away }
     }
 
     /// Cuts all quads.
@@ -120,7 +132,7 @@ impl<'a> Quads<'a> {
                         None => match self.cut_smooth(vertices, &quad) {
                             Some(along_first) => {
                                 pair.copy_from_slice(&halves(quad.corners, along_first));
-                                if !self.is_at_home(vertices, &quad, ASTRAY) {
+                                if quad.corners.iter().any(|&v| self.is_away[v as usize]) {
                                     cut.astray.push(quad.hit);
                                 }
                             }
@@ -190,14 +202,12 @@ impl<'a> Quads<'a> {
         Aabb::new(self.lattice.position(low), self.lattice.position(low.map(|n| n + 1)))
     }
 
-    /// Whether the corners of a quad lie in their own cells, give or take a part of a cell, and have them to
-    /// themselves.
-    pub fn is_at_home(&self, vertices: &Vertices, quad: &Quad, slack: f64) -> bool {
+    /// Whether the corners of a quad lie in their own cells, and have them to themselves.
+    pub fn is_at_home(&self, vertices: &Vertices, quad: &Quad) -> bool {
         (0..4).all(|i| {
             let (v, cell) = (quad.corners[i] as usize, self.cell(quad, i));
-            let (p, margin) = (vertices.positions[v], slack * cell.size());
-            let is_within = (p.cmpge(cell.min - margin) & p.cmple(cell.max + margin)).all();
-            is_within && !vertices.doubtful[v]
+            let p = vertices.positions[v];
+            (p.cmpge(cell.min) & p.cmple(cell.max)).all() && !vertices.doubtful[v]
         })
     }
 
@@ -228,13 +238,19 @@ impl<'a> Quads<'a> {
             return None;
         }
         let mut rim = Vec::new();
-        for i in 0..4 {
-            let (a, b) = (corners[i], corners[(i + 1) % 4]);
+        for (i, a) in corners.into_iter().enumerate() {
             rim.push(a);
             rim.extend(self.seconds.get(&(hit, a)));
-            rim.extend(self.middles.get(&(hit, [a.min(b), a.max(b)])));
+            rim.extend(self.middles.get(&(hit, self.side(quad, i))));
         }
         Some(rim)
+    }
+
+    /// The ends, ascending, of the side that leads on from a corner of a quad.
+    pub fn side(&self, quad: &Quad, corner: usize) -> [u32; 2] {
+        let (a, b) = (quad.corners[corner], quad.corners[(corner + 1) % 4]);
+        let a = self.seconds.get(&(quad.hit, a)).copied().unwrap_or(a);
+        [a.min(b), a.max(b)]
     }
 
     /// Whether the first diagonal cuts a quad on a smooth surface. `None` if the quad needs a closer look.
@@ -321,9 +337,6 @@ fn halves(quad: [u32; 4], along_first: bool) -> [[u32; 3]; 2] {
     let corner = |i: usize| quad[(i + usize::from(!along_first)) % 4];
     [[corner(0), corner(1), corner(2)], [corner(0), corner(2), corner(3)]]
 }
-
-/// A vertex of a smooth surface that lies farther than this from its cell, in cells, is astray.
-const ASTRAY: f64 = 0.05;
 
 /// A bulge below this share of a chord counts as flat, and the shorter diagonal makes the better triangles.
 const FLAT: f64 = 1e-3;

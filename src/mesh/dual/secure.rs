@@ -12,10 +12,11 @@
 //! and sides are bent so that they pass through the faces between cells. Each triangle then lies in one cell,
 //! and those of a cell are a cone over a closed curve on its faces. Wherever the tip of the cone is in the cell, it does
 //! not cross itself, so that tips and bends are put on the surface; where sheets share a cell and cross, they go back.
+//! The vertices at the ends of a tunnel go back together, to where they began in their cell.
 //!
 //! Invariant: retreats change no topology, and they spread until nothing crosses.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
@@ -71,10 +72,26 @@ pub(super) fn secure(
                 quad.corners.iter().for_each(|&v| is_marked[v as usize] = true);
             }
         }
+        mark_tunnels(tubes, &mut is_marked);
         // all others are as they were when they crossed nothing
         suspects = retreat(&mut quads, &mut cut, vertices, &is_marked, (surface, round));
         lasting = vertices.len();
         round += 1;
+    }
+}
+
+/// Marks all vertices at both ends of a tunnel of which one is marked.
+fn mark_tunnels(tubes: &[[u32; 3]], is_marked: &mut [bool]) {
+    let is_cut = |t: &[u32; 3], is_marked: &[bool]| {
+        let count = t.iter().filter(|v| is_marked[**v as usize]).count();
+        count == 1 || count == 2
+    };
+    while tubes.iter().any(|t| is_cut(t, is_marked)) {
+        for t in tubes {
+            if is_cut(t, is_marked) {
+                t.iter().for_each(|&v| is_marked[v as usize] = true);
+            }
+        }
     }
 }
 
@@ -95,6 +112,16 @@ pub(super) fn as_joined(
     assemble(quads, cut, vertices, tubes, &[]).0
 }
 
+/// [`as_joined`], where the quads are not needed any more.
+pub(super) fn into_joined(
+    quads: &Quads<'_>,
+    cut: Cut,
+    vertices: &mut Vertices,
+    tubes: &[[u32; 3]],
+) -> Vec<[u32; 3]> {
+    if is_plain(&cut, tubes) { cut.triangles } else { as_joined(quads, &cut, vertices, tubes) }
+}
+
 /// The pairs of triangles that cross as they are.
 pub(super) fn crossings(
     quads: &Quads<'_>,
@@ -104,10 +131,21 @@ pub(super) fn crossings(
 ) -> Vec<[u32; 2]> {
     let count = vertices.len();
     let suspects = suspects(quads, cut, vertices);
+    if is_plain(cut, tubes) {
+        let mut chosen: Vec<u32> = suspects.iter().flat_map(|&hit| [2 * hit, 2 * hit + 1]).collect();
+        chosen.sort_unstable();
+        chosen.dedup();
+        return crossing_pairs(&vertices.positions, &cut.triangles, &chosen, quads.size());
+    }
     let (triangles, chosen) = assemble(quads, cut, vertices, tubes, &suspects);
     let found = crossing_pairs(&vertices.positions, &triangles, &chosen, quads.size());
     vertices.truncate(count);
     found
+}
+
+/// Whether the triangles of all quads are those of the whole mesh.
+fn is_plain(cut: &Cut, tubes: &[[u32; 3]]) -> bool {
+    tubes.is_empty() && cut.fans.is_empty() && !cut.triangles.contains(&NOTHING)
 }
 
 /// All triangles, and the numbers of those that are to be compared with others, ascending.
@@ -238,7 +276,8 @@ fn around(quads: &Quads<'_>, touched: &[Quad], is_marked: &[bool]) -> (BTreeMap<
             }
             if is_marked[a as usize] || is_marked[b as usize] {
                 let face = quads.cell(quad, i).intersection(&quads.cell(quad, (i + 1) % 4));
-                sides.entry([a.min(b), a.max(b)]).or_insert_with(|| (SmallVec::new(), face)).0.push(quad.hit);
+                let ends = quads.side(quad, i);
+                sides.entry(ends).or_insert_with(|| (SmallVec::new(), face)).0.push(quad.hit);
             }
         }
     }
@@ -253,12 +292,14 @@ fn into_cells(
     surface: &mut Surface<'_>,
     round: usize,
 ) {
-    let ends_of_tunnels: BTreeSet<u32> = quads.seconds.values().copied().collect();
     for (v, Retreat { hits, count, cell }) in cells {
         let place = v as usize;
-        let is_end_of_tunnel = ends_of_tunnels.contains(&v);
+        if let Some(&position) = quads.tunnels.get(&v) {
+            vertices.set(v, Vertex { position, normal: DVec3::ZERO, kind: VertexKind::Sharp });
+            continue;
+        }
         let is_flat = cell.size().min_element() <= 0.0;
-        if is_end_of_tunnel || is_flat || vertices.kinds[place] == VertexKind::Cap {
+        if is_flat || vertices.kinds[place] == VertexKind::Cap {
             continue;
         }
         let inset = INSET * cell.size();
@@ -309,7 +350,7 @@ fn bend(
 
 /// Whether a quad lies in its envelope.
 fn is_enveloped(quads: &Quads<'_>, vertices: &Vertices, quad: &Quad, cut: &Cut) -> bool {
-    if !quads.is_at_home(vertices, quad, 0.0) {
+    if !quads.is_at_home(vertices, quad) {
         return false;
     }
     let [u, v, w] = [1, 2, 0].map(|step| (quad.axis + step) % 3);
