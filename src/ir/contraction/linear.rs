@@ -59,6 +59,14 @@ struct Constraint {
     most: f64,
     /// Middles of the slopes.
     normal: DVec3,
+    /// Its length.
+    length: f64,
+}
+
+impl Constraint {
+    fn new(slopes: [Interval; 3], most: f64, normal: DVec3) -> Self {
+        Self { slopes, most, normal, length: normal.length() }
+    }
 }
 
 pub const ZERO: Interval = Interval::point(0.0);
@@ -90,7 +98,10 @@ pub struct LinearProgram {
 impl LinearProgram {
     pub fn new(given: &[LinearForm], space: &Aabb) -> Self {
         let turned: Vec<&LinearForm> = given.iter().filter(|form| is_turned(form)).collect();
-        Self { constraints: constraints(&turned, space), reach: space.min.abs().max(space.max.abs()) }
+        Self {
+            constraints: constraints(&turned, space, Vec::new()),
+            reach: space.min.abs().max(space.max.abs()),
+        }
     }
 
     /// The values of slopes·p, computed with a number of this magnitude added. `None` if nothing is known that the
@@ -133,18 +144,21 @@ pub fn contract_linear(forms: &[LinearForm], space: &mut Aabb) -> bool {
     if turned.is_empty() {
         return true;
     }
+    let mut known = constraints(&turned, space, Vec::new());
     for _ in 0..MOST_ROUNDS {
         let before = *space;
         for axis in 0..3 {
             for upper in [true, false] {
                 let direction = DVec3::AXES[axis] * if upper { 1.0 } else { -1.0 };
-                let constraints = constraints(&turned, space);
-                let Some(most) = largest(&constraints, direction) else { continue };
+                let Some(most) = largest(&known, direction) else { continue };
                 if upper && most < space.max[axis] {
                     space.max[axis] = most;
                 } else if !upper && -most > space.min[axis] {
                     space.min[axis] = -most;
+                } else {
+                    continue;
                 }
+                known = constraints(&turned, space, known);
                 if space.min[axis] > space.max[axis] {
                     return false;
                 }
@@ -168,17 +182,15 @@ fn is_turned(form: &LinearForm) -> bool {
     is_known && form.slopes.iter().filter(|&&slope| slope != ZERO).count() > 1
 }
 
-/// The sides of the box in the order +x, +y, +z, −x, −y, −z, then both sides of each form.
-fn constraints(forms: &[&LinearForm], space: &Aabb) -> Vec<Constraint> {
-    let mut out = Vec::with_capacity(6 + 2 * forms.len());
+/// The sides of the box in the order +x, +y, +z, −x, −y, −z, then both sides of each form. They take the place of others
+/// that are not needed any more.
+fn constraints(forms: &[&LinearForm], space: &Aabb, mut out: Vec<Constraint>) -> Vec<Constraint> {
+    out.clear();
+    out.reserve(6 + 2 * forms.len());
     for (sign, corner) in [(1.0, space.max), (-1.0, -space.min)] {
         for axis in 0..3 {
             let normal = DVec3::AXES[axis] * sign;
-            out.push(Constraint {
-                slopes: normal.to_array().map(Interval::point),
-                most: corner[axis],
-                normal,
-            });
+            out.push(Constraint::new(normal.to_array().map(Interval::point), corner[axis], normal));
         }
     }
     let reach = space.min.abs().max(space.max.abs());
@@ -187,11 +199,11 @@ fn constraints(forms: &[&LinearForm], space: &Aabb) -> Vec<Constraint> {
         // programs round the sum of three products and a number
         let rounding = 4.0 * f64::EPSILON * (normal.abs().dot(reach) + form.offset);
         if form.range.hi.is_finite() {
-            out.push(Constraint { slopes: form.slopes, most: form.range.hi + rounding, normal });
+            out.push(Constraint::new(form.slopes, form.range.hi + rounding, normal));
         }
         if form.range.lo.is_finite() {
             let slopes = form.slopes.map(|slope| -slope);
-            out.push(Constraint { slopes, most: rounding - form.range.lo, normal: -normal });
+            out.push(Constraint::new(slopes, rounding - form.range.lo, -normal));
         }
     }
     out
@@ -216,9 +228,9 @@ fn largest(constraints: &[Constraint], direction: DVec3) -> Option<f64> {
 }
 
 fn inverse_of(constraints: &[Constraint], basis: [usize; 3]) -> Option<DMat3> {
-    let [a, b, c] = basis.map(|i| constraints[i].normal);
-    let matrix = DMat3::from_cols(a, b, c);
-    let scale = a.length() * b.length() * c.length();
+    let [a, b, c] = basis.map(|i| &constraints[i]);
+    let matrix = DMat3::from_cols(a.normal, b.normal, c.normal);
+    let scale = a.length * b.length * c.length;
     (matrix.determinant().abs() > 1e-10 * scale).then(|| matrix.inverse())
 }
 
@@ -236,8 +248,8 @@ fn most_violated(constraints: &[Constraint], basis: [usize; 3], inverse: &DMat3)
                 scale += (weights[k] * bounds[k]).abs();
             }
         }
-        let rest = rest / constraint.normal.length();
-        if rest < worst.0 && rest * constraint.normal.length() < -1e-11 * scale {
+        let rest = rest / constraint.length;
+        if rest < worst.0 && rest * constraint.length < -1e-11 * scale {
             worst = (rest, Some(i));
         }
     }
