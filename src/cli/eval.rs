@@ -392,37 +392,57 @@ fn push_number(text: &mut String, value: f64) {
         let _ = write!(text, "{magnitude:.16e}"); // writing to a string does not fail
         return;
     }
-    let (mut number, exponent) = digits(magnitude);
-    let mut digits = [b'0'; 17];
-    for digit in digits.iter_mut().rev() {
-        *digit += (number % 10) as u8;
-        number /= 10;
-    }
+    let (number, exponent) = digits(magnitude);
+    let written = in_decimal(number);
     let before = usize::try_from(exponent + 1).unwrap_or(0);
-    let (whole, part) = digits.split_at(before);
+    let (whole, part) = written.split_at(before);
+    let [whole, part] = [whole, part].map(|digits| std::str::from_utf8(digits).unwrap_or_default());
     if exponent < 0 {
         text.push_str(&"0.0000"[..1 + exponent.unsigned_abs() as usize]);
-        text.extend(part.iter().map(|&digit| char::from(digit)));
     } else {
-        text.extend(whole.iter().map(|&digit| char::from(digit)));
+        text.push_str(whole);
         text.push('.');
-        text.extend(part.iter().map(|&digit| char::from(digit)));
     }
+    text.push_str(part);
+}
+
+/// A number below 10¹⁷ with all of its 17 digits.
+fn in_decimal(number: u64) -> [u8; 17] {
+    const PART: u64 = 100_000_000;
+    let mut written = [b'0'; 17];
+    // numbers of 32 bits are divided faster
+    let parts = [(number / PART / PART) as u32, (number / PART % PART) as u32, (number % PART) as u32];
+    for (mut rest, place) in parts.into_iter().zip([0..1, 1..9, 9..17]) {
+        for digit in written[place].iter_mut().rev() {
+            *digit += (rest % 10) as u8;
+            rest /= 10;
+        }
+    }
+    written
 }
 
 /// The first 17 digits of a number between 1e-5 and 1e16, and its decimal exponent: d·10ᵏ⁻¹⁶ with 10¹⁶ ≤ d < 10¹⁷. The
 /// arithmetic is exact, and halves go to the even digit, as the formats of the standard library have it.
 fn digits(magnitude: f64) -> (u64, i32) {
     const LEAST: u128 = 10_u128.pow(16);
+    const POWERS: [u128; 23] = {
+        let mut powers = [1; 23];
+        let mut i = 1;
+        while i < powers.len() {
+            powers[i] = 10 * powers[i - 1];
+            i += 1;
+        }
+        powers
+    };
     let bits = magnitude.to_bits();
     // m·2ᵉ
     let m = u128::from(bits & ((1 << 52) - 1) | 1 << 52);
     let e = (bits >> 52) as i32 - 1075;
-    // the power of ten below it, or a neighbour where the logarithm was rounded
-    let mut k = magnitude.log10().floor() as i32;
+    // the power of ten below it or the one below that, by log₁₀ 2 ≈ 1233/4096
+    let mut k = ((e + 52) * 1233) >> 12;
     loop {
         // below 2⁵³·10²² < 2¹²⁷
-        let scaled = m * 10_u128.pow((16 - k) as u32);
+        let scaled = m * POWERS[(16 - k) as usize];
         let d = match u32::try_from(-e) {
             Ok(0) | Err(_) => scaled << e,
             Ok(shift) => {
