@@ -4,9 +4,9 @@
 //! Invariant: after every frame the collections list exactly the frames that are complete.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use super::super::args::Run;
+use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
 use super::pictures::{Look, Pictures};
@@ -201,11 +201,11 @@ impl FrameCost {
             return Ok(Self { seconds: 0.0, bytes: 0.0, per_particle: (0.0, 0.0) });
         }
         let mut out = Vec::new();
-        let started = Instant::now();
+        let started = Stopwatch::start();
         sph::write_vtp(&mut out, simulation.particles())?;
-        let per_particle = (started.elapsed().as_secs_f64(), out.len() as f64);
+        let per_particle = (started.seconds(), out.len() as f64);
         out.clear();
-        let started = Instant::now();
+        let started = Stopwatch::start();
         let mut bodies = Bodies::new(options, experiment);
         bodies.cells = Self::CELLS.min(options.mesh_cells);
         let meshes = bodies.meshes_at(0.0)?;
@@ -213,18 +213,18 @@ impl FrameCost {
         let (mut seconds, mut bytes) = (0.0, 0.0);
         if bodies.move_about() {
             mesh::vtp::write_bodies(&meshes, METRE, &mut out)?;
-            seconds += finer * started.elapsed().as_secs_f64();
+            seconds += finer * started.seconds();
             bytes += finer * out.len() as f64;
             out.clear();
         }
         if !options.no_pictures {
             let mut pictures = Pictures::new(Look::of(options), experiment, &meshes)?;
-            let started = Instant::now();
+            let started = Stopwatch::start();
             if bodies.move_about() {
                 pictures.show(&meshes);
             }
             pictures.image(simulation)?.write_png(&mut out)?;
-            seconds += started.elapsed().as_secs_f64();
+            seconds += started.seconds();
             bytes += out.len() as f64;
         }
         Ok(Self { seconds, bytes, per_particle })
