@@ -53,7 +53,7 @@ struct Forecast {
     disk_bytes_free: Option<f64>,
     milliseconds_per_step: f64,
     milliseconds_per_frame: f64,
-    /// Seconds before the first step: the fluid is placed and settled, and walls are mapped.
+    /// Seconds that are spent once: the fluid is placed and settled, walls are mapped, and what rests is drawn.
     seconds_to_start: f64,
     seconds: f64,
 }
@@ -90,6 +90,7 @@ pub(super) fn dry_run(
     let steps = goal.steps(time_step);
     let frames = if options.no_frames { 0 } else { 1 + goal.frames(experiment, time_step) };
     let cost = FrameCost::measured(options, measured, &simulation)?.scaled(scale);
+    let to_start = to_start + cost.first;
     let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(&simulation);
     let forecast = Forecast {
         schema: 1,
