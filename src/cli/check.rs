@@ -501,3 +501,24 @@ fn corners(bounds: &Box3) -> [String; 2] {
     let shown = |x: f64| format!("{:.digits$}", (unit * x).round() / unit + 0.0);
     [bounds.min, bounds.max].map(|corner| format!("({})", corner.map(shown).join(", ")))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::is_over;
+
+    #[test]
+    fn one_solid_is_measured_however_long_it_takes_and_no_more_when_the_budget_is_spent() {
+        assert!(!is_over(0, 3, 100.0, 10.0));
+        assert!(!is_over(1, 3, 9.9, 10.0));
+        assert!(is_over(1, 3, 10.1, 10.0));
+    }
+
+    #[test]
+    fn a_budget_that_reaches_few_of_many_solids_is_not_spent() {
+        // at this pace a hundred of two thousand would be measured, and of eight hundred an eighth
+        assert!(is_over(11, 2000, 1.1, 10.0));
+        assert!(!is_over(11, 800, 1.1, 10.0));
+        // a tenth of the budget has not passed
+        assert!(!is_over(9, 2000, 0.9, 10.0));
+    }
+}

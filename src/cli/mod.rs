@@ -33,6 +33,7 @@ mod run;
 mod saved;
 mod scenery;
 mod section;
+mod stopwatch;
 mod survey;
 mod sweep;
 mod values;

@@ -70,6 +70,29 @@ fn long_chains() {
     check(format!("rfm 1\nlet a = {}", "x".repeat(1_000_000)), 1, "unknown name `xxx");
 }
 
+/// A check whose time is up tells what it has: the solids that were measured, and how many there are.
+#[test]
+fn a_check_ends_early_with_what_it_has() {
+    let measured = |solids: usize| {
+        let balls: String = (1..=solids).map(|i| format!("solid ball{i} = sphere({i})\n")).collect();
+        let arguments = ["check", "--json", "--budget", "1 s", "-"];
+        let outcome = rfm_reading(root(), &arguments, format!("rfm 1\n{balls}").as_bytes()).expect(0);
+        let document = outcome.json();
+        assert_eq!(document["ok"], true);
+        let found = document["solids"].as_array().unwrap();
+        for (radius, solid) in (1..).map(f64::from).zip(found) {
+            let volume = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+            assert!((solid["volume"].as_f64().unwrap() / volume - 1.0).abs() < 0.01, "{solid}");
+        }
+        (found.len(), outcome.stderr)
+    };
+    let (found, said) = measured(5000);
+    assert!((1..5000).contains(&found), "{found}");
+    assert!(said.contains(&format!("{found} of 5000 solids were measured in ")), "{said}");
+    assert!(said.contains("--budget SECONDS gives more time than 1 s"), "{said}");
+    assert_eq!(measured(2), (2, String::new()));
+}
+
 #[test]
 fn many_mistakes() {
     let lines =

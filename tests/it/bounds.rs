@@ -205,7 +205,7 @@ fn config(cases: u32) -> ProptestConfig {
 
 #[test]
 fn convex_solids_at_any_angle_have_their_true_extent() {
-    let mut runner = TestRunner::new(config(300));
+    let mut runner = TestRunner::new(config(120));
     let found = std::cell::RefCell::new(Vec::new());
     let result = runner.run(&convex(), |(text, centre, reach)| {
         let Bounds::Within(bounds) = *solid(&text).bounds() else {

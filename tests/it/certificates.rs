@@ -114,7 +114,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 1500,
+        cases: 700,
         max_global_rejects: 20_000,
         failure_persistence: None,
         rng_seed: RngSeed::Fixed(1),

@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::super::args::{Report, Shared};
 use super::super::run::bodies::Bodies;
 use super::super::run::pictures::{Look, Pictures};
+use super::super::stopwatch::processor_seconds;
 use super::super::{Failure, choose, input, output, progress};
 use super::flow_plot;
 use super::flow_run::FlowRun;
@@ -298,21 +299,6 @@ fn work(size: Option<usize>) -> f64 {
 fn bar(sizes: &[Option<usize>], methods: usize) -> progress::Progress {
     let once: u64 = sizes.iter().map(|&size| work(size) as u64).sum();
     progress::bar(once * methods as u64, "running")
-}
-
-/// Seconds that all threads of this process have spent on processors; seconds of the clock where the system
-/// does not say.
-fn processor_seconds() -> f64 {
-    #[cfg(unix)]
-    {
-        let spent = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        spent.tv_sec as f64 + 1e-9 * spent.tv_nsec as f64
-    }
-    #[cfg(not(unix))]
-    {
-        static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
-        START.elapsed().as_secs_f64()
-    }
 }
 
 /// Shows the messages about a file, and returns the failure for them.

@@ -3,13 +3,13 @@
 //! A large scene is not seeded: a few steps of the same scene with larger particles are measured, and scaled up.
 
 use std::path::Path;
-use std::time::Instant;
 
 use serde::Serialize;
 
 use super::super::args::{Run, Shared};
 use super::super::failure::warn;
 use super::super::progress::duration;
+use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, input, output};
 use super::frames::{self, FrameCost};
 use super::goal::Goal;
@@ -28,7 +28,7 @@ const USUAL_NEIGHBOURS: f64 = 500.0;
 /// Number of steps before the clock starts: buffers grow in them, and solvers have no answer yet to start from.
 const FIRST: u32 = 2;
 
-/// Most steps that are timed, and the seconds after which no further step begins.
+/// Most steps that are timed, and the seconds of the clock after which no further step begins.
 const TRIAL: (u32, f64) = (20, 0.3);
 
 /// The output of `--dry-run`.
@@ -53,6 +53,8 @@ struct Forecast {
     disk_bytes_free: Option<f64>,
     milliseconds_per_step: f64,
     milliseconds_per_frame: f64,
+    /// Seconds that are spent once: the fluid is placed and settled, walls are mapped, and what rests is drawn.
+    seconds_to_start: f64,
     seconds: f64,
 }
 
@@ -67,12 +69,14 @@ pub(super) fn dry_run(
     let most = most_measured(experiment);
     let estimated = estimate > 1.5 * most;
     let smaller;
-    let (measured, mut simulation) = if estimated {
-        let found = coarser(shared, experiment, most)?;
-        smaller = found.0;
-        (&smaller, found.1)
+    let (measured, mut simulation, to_start) = if estimated {
+        let (coarse, simulation, seconds) = coarser(shared, experiment, most)?;
+        smaller = coarse;
+        (&smaller, simulation, seconds)
     } else {
-        (experiment, start(experiment)?.0)
+        let begun = Stopwatch::start();
+        let simulation = start(experiment)?.0;
+        (experiment, simulation, begun.seconds())
     };
     let per_step = seconds_per_step(&mut simulation)?;
     let (stats, parameters) = (simulation.stats(), experiment.parameters());
@@ -81,10 +85,12 @@ pub(super) fn dry_run(
     let reach = within_reach(experiment);
     let crowding = reach.min(particles as f64) / reach.min(stats.particles as f64);
     let per_step = scale * crowding * per_step;
+    let to_start = scale * to_start;
     let time_step = time_step(experiment, measured, &simulation);
     let steps = goal.steps(time_step);
     let frames = if options.no_frames { 0 } else { 1 + goal.frames(experiment, time_step) };
     let cost = FrameCost::measured(options, measured, &simulation)?.scaled(scale);
+    let to_start = to_start + cost.first;
     let disk = frames as f64 * cost.bytes + 2.0 * scale * frames::checkpoint_bytes(&simulation);
     let forecast = Forecast {
         schema: 1,
@@ -103,7 +109,8 @@ pub(super) fn dry_run(
         disk_bytes_free: free_disk(&folder::of(options)),
         milliseconds_per_step: per_step * 1e3,
         milliseconds_per_frame: cost.seconds * 1e3,
-        seconds: per_step * steps as f64 + cost.seconds * frames as f64,
+        seconds_to_start: to_start,
+        seconds: to_start + per_step * steps as f64 + cost.seconds * frames as f64,
     };
     warn_of_too_much(&forecast);
     if shared.json {
@@ -113,22 +120,27 @@ pub(super) fn dry_run(
     Ok(())
 }
 
-/// The scene with few large particles, started. With particles too large for what the scene has of gaps nothing may be
-/// left, so more of them are tried.
-fn coarser(shared: &Shared, experiment: &Experiment, most: f64) -> Result<(Experiment, Simulation), Failure> {
+/// The scene with few large particles, started, and the seconds that the start took. With particles too large for what the
+/// scene has of gaps nothing may be left, so more of them are tried.
+fn coarser(
+    shared: &Shared,
+    experiment: &Experiment,
+    most: f64,
+) -> Result<(Experiment, Simulation, f64), Failure> {
     let started = |particles: f64| {
         let smaller = experiment.coarser(particles, shared.engine.into())?;
+        let begun = Stopwatch::start();
         let start = smaller.start()?;
-        Ok((smaller, start))
+        Ok((smaller, start, begun.seconds()))
     };
     let found: Result<_, Error> =
         started(most).or_else(|_: Error| started(4.0 * most)).or_else(|_: Error| started(16.0 * most));
-    let (smaller, mut start) = found.map_err(refused)?;
+    let (smaller, mut start, seconds) = found.map_err(refused)?;
     // warnings that count particles, or depend on their size, would mislead
     let misleads = [Code::FLUID_IN_OBSTACLE, Code::FLUID_LIGHTER];
     start.warnings.list.retain(|warning| !misleads.contains(&warning.code));
     input::show(&start.warnings);
-    Ok((smaller, start.simulation))
+    Ok((smaller, start.simulation, seconds))
 }
 
 /// Particles of the rest spacing within the support radius of one.
@@ -148,13 +160,13 @@ fn seconds_per_step(simulation: &mut Simulation) -> Result<f64, Failure> {
     for _ in 0..FIRST {
         step()?;
     }
-    let started = Instant::now();
+    let started = Stopwatch::start();
     let mut trial = 0;
-    while trial == 0 || (trial < TRIAL.0 && started.elapsed().as_secs_f64() < TRIAL.1) {
+    while trial == 0 || (trial < TRIAL.0 && started.passed() < TRIAL.1) {
         step()?;
         trial += 1;
     }
-    Ok(started.elapsed().as_secs_f64() / f64::from(trial))
+    Ok(started.seconds() / f64::from(trial))
 }
 
 /// The length of a step, s: the fluid will become faster than it is at the start.
@@ -197,8 +209,9 @@ fn print(forecast: &Forecast) {
         free(forecast.disk_bytes_free)
     );
     say!(
-        "time          about {} ({:.3} ms per step, {:.0} ms per frame)",
+        "time          about {} ({:.1} s to start, {:.3} ms per step, {:.0} ms per frame)",
         duration(forecast.seconds),
+        forecast.seconds_to_start,
         forecast.milliseconds_per_step,
         forecast.milliseconds_per_frame
     );

@@ -14,7 +14,7 @@ use rfm::precision::Precision;
 use rfm::source::{self, Math, Options, Param, Target};
 use rfm::{Engine, Program, Solid};
 
-use crate::agreement::{EVERYTHING, left_fold};
+use crate::agreement::EVERYTHING;
 use crate::properties::expression;
 use crate::tool::{rfm, root};
 use compare::{Counts, Extra, compare, points};
@@ -25,7 +25,7 @@ const FEW: usize = 4000;
 const MANY: usize = 1_000_000;
 
 /// Lines of C of the longest file that is compiled in the usual run.
-const LONGEST_TEXT: usize = 2000;
+const LONGEST_TEXT: usize = 1000;
 
 fn exact(prefix: &str) -> Options {
     Options { prefix: Some(prefix.into()), sign: true, distance: true, math: Math::Rfm, ..Options::default() }
@@ -67,13 +67,25 @@ fn example_solids() -> Vec<Solid> {
     solids
 }
 
-/// The solids of examples without the longest: a compiler takes seconds for each of them, and their object files are
-/// compared all the same.
+/// The solids of examples, each once, without the longest: a compiler takes seconds for each of them, and their object
+/// files are compared all the same.
 fn short_examples() -> Vec<Solid> {
     let mut solids = example_solids();
-    solids.retain(|solid| c_text(solid, "s").lines().count() <= LONGEST_TEXT);
-    assert!(solids.len() >= 20, "{}", solids.len());
+    let mut known = std::collections::HashSet::new();
+    solids.retain(|solid| {
+        let text = c_text(solid, "s");
+        let functions = text.split_once("#include").map_or("", |(_, functions)| functions).to_string();
+        text.lines().count() <= LONGEST_TEXT && known.insert(functions)
+    });
+    assert!(solids.len() >= 15, "{}", solids.len());
     solids
+}
+
+/// A fold written by hand, in two forms: in `f32` its first operations are stable and the later ones scaled. (A long fold is
+/// no better: gcc takes 16 s for 90 steps, and clang 14 half a minute for 25.)
+fn wide_fold() -> String {
+    let step = |i: usize| format!("let u{i} = u{} or 1e15*{i}*x - y\n", i - 1);
+    format!("rfm 1\nlet u0 = 1e15*x - z\n{}solid fold = u19\n", (1..20).map(step).collect::<String>())
 }
 
 /// Every operation in every form, and folds whose operands leave the range of `f32`.
@@ -86,7 +98,7 @@ fn solids_of_every_operation() -> Vec<Solid> {
         .collect();
     let moving =
         "rfm 1\nsolid s = (box() \\ sphere(0.7)).rotate_z(3*t).move([sin(t), t^2, 0]) or t*x <= y/(1 + t)";
-    for text in [left_fold(90), moving.to_string(), "rfm 1\nsolid s = sphere(1) \\ z <= -1e300*x".into()] {
+    for text in [wide_fold(), moving.to_string(), "rfm 1\nsolid s = sphere(1) \\ z <= -1e300*x".into()] {
         let program = Program::from_source("s.rfm", text).unwrap_or_else(|e| panic!("{e}"));
         let name = program.module().solids[0].name.clone();
         solids.push(program.solid_with(&name, Engine::Jit).unwrap().at(0.8));
@@ -123,10 +135,6 @@ fn c_of_every_operation_has_the_bits_of_rfm() {
     let mut solids = solids_of_every_operation();
     solids.drain(1..3);
     for compiler in compilers() {
-        if compiler == "clang" {
-            // a fold of 25 steps written by hand takes clang 14 half a minute, and twice as long with each step more
-            solids.remove(1);
-        }
         let counts = compare_c(compiler, &solids, FEW);
         assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
     }
@@ -135,7 +143,7 @@ fn c_of_every_operation_has_the_bits_of_rfm() {
 #[test]
 fn c_of_random_solids_has_the_bits_of_rfm() {
     for compiler in compilers() {
-        let counts = compare_c(compiler, &random_solids(8), FEW);
+        let counts = compare_c(compiler, &random_solids(5), FEW);
         assert_eq!(counts.different, 0, "{compiler}: {counts:?}");
     }
 }

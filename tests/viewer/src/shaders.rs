@@ -49,6 +49,11 @@ pub const FORMULAS: &[(&str, &str)] = &[
     ("any all", "any i in 0..5: all k in 0..2: ball([0.4*i - 0.9, 0.3*k, 0], 0.4)"),
     ("polygon", "polygon([[-1, -1], [1, -0.7], [0.6, 0.9], [0, 0.1], [-0.8, 1]])"),
     ("turned", "cylinder(0.5, 1).rotate_x(0.4).move([0.1, 0.2, -0.3])"),
+    (
+        "rounded",
+        "(box([-1, -0.8, -0.5], [1, 0.8, 0.5]) \\ cylinder(0.3, 2).move([0, 0, -1]) or half_space([0, 0, 1], [0, 0, -1])).round(0.2, 0.1)",
+    ),
+    ("rounded to first order", "(ellipsoid(1, 0.6, 0.5) or cone(0.5, 1)).round(0.1)"),
     ("repeat", "sphere(0.2).repeat([0.7, 0.7, 0.7], [3, 3, 3])"),
 ];
 

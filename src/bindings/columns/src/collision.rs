@@ -15,8 +15,7 @@ use crate::memory::Vectors;
 /// Particles whose ω is found together.
 const BLOCK: usize = 512;
 
-/// Particles of a part, where what is remembered of those that are hit should be little. All of them together are asked
-/// whether they are outside; a solid of many parts answers a few hundred in the time of one.
+/// Particles of a part, where what is remembered of those that are hit should be little.
 pub const PARTICLES: usize = 16 * BLOCK;
 
 /// How a solid answers to what hits it.
@@ -45,11 +44,9 @@ impl Bounce {
     }
 }
 
-/// What became of a particle.
+/// What became of a particle that is not outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Collision {
-    /// It is outside the solid.
-    None,
     /// It was inside, and has been put back.
     Hit,
     /// It is inside, and there is no way out within reach. It was left as it is.
@@ -58,8 +55,8 @@ enum Collision {
     Undefined,
 }
 
-/// Puts a particle that is inside, or on the surface, back to the nearest place outside, and reflects its velocity
-/// relative to the surface's own. `walls` is the solid, or what has its sign and its surface.
+/// Puts a particle that is not outside back to the nearest place outside, and reflects its velocity relative to the
+/// surface's own. `walls` is the solid, or what has its sign and its surface.
 fn collide(
     solid: &Solid,
     walls: &dyn Walls,
@@ -70,10 +67,11 @@ fn collide(
     if !(position.is_finite() && velocity.is_finite()) {
         return Collision::Undefined;
     }
-    if walls.omega(*position) < 0.0 {
-        return Collision::None;
-    }
-    let contact = match way_out(walls, *position, bounce.reach) {
+    let contact = match through_one_face(walls, *position, bounce.reach) {
+        Some(contact) => Ok(Some(contact)),
+        None => way_out(walls, *position, bounce.reach),
+    };
+    let contact = match contact {
         Ok(Some(contact)) => contact,
         Ok(None) => return Collision::Stuck,
         Err(_) => return Collision::Undefined,
@@ -82,6 +80,42 @@ fn collide(
     *velocity = wall + sph::bounce(*velocity - wall, &contact, bounce.restitution, bounce.friction);
     *position = contact.point;
     Collision::Hit
+}
+
+/// The place outside that Newton's method finds behind a face, within some rounding errors of its surface. Most particles
+/// that are hit have passed one face: a flat one takes two gradients, a curved one four. `None` if another face is met on
+/// the way, or if no such place is found within reach.
+fn through_one_face(walls: &dyn Walls, from: DVec3, reach: f64) -> Option<Contact> {
+    let mut here = from;
+    let mut first = None;
+    let mut last = f64::INFINITY;
+    for _ in 0..8 {
+        let (w, gradient) = walls.omega_grad(here);
+        let slope = gradient.length();
+        let (normal, distance) = (-gradient / slope, w / slope);
+        let rounding = least_step(here);
+        // steps that do not shrink fast may have gone past a gap, or the formula is far from a distance
+        let is_close = distance.abs() <= rounding || distance.abs() <= 0.25 * last;
+        // an undefined or vanishing gradient ends it, too
+        if !(is_close && is_alike(*first.get_or_insert(normal), normal)) {
+            return None;
+        }
+        if w < 0.0 && (-distance).min(last) <= rounding {
+            let mut faces = Normals::default();
+            faces.add(normal);
+            let contact = Contact { fraction: 1.0, point: here, normal, faces };
+            return (here.distance(from) <= reach).then_some(contact);
+        }
+        // a little farther than the surface, so that a flat face takes two gradients
+        here += normal * (distance + 0.5 * rounding);
+        last = distance.abs();
+    }
+    None
+}
+
+/// Some rounding errors of a place, m: a particle on the surface would never leave it with less.
+fn least_step(at: DVec3) -> f64 {
+    (8.0 * f64::EPSILON * at.abs().max_element()).max(f64::MIN_POSITIVE)
 }
 
 /// The nearest place outside, with all faces that are passed on the way there: in a corner of a vessel a particle is
@@ -105,8 +139,7 @@ fn way_out(walls: &dyn Walls, from: DVec3, reach: f64) -> Result<Option<Contact>
         if found.is_none() {
             found = push_out(walls, here, reach, 0.0)?;
         }
-        let least = (8.0 * f64::EPSILON * here.abs().max_element()).max(f64::MIN_POSITIVE);
-        here += normal * (w / gradient.length()).max(least);
+        here += normal * (w / gradient.length()).max(least_step(here));
     }
     Ok(found.filter(|contact| contact.point.distance(from) <= reach).map(|mut contact| {
         let mut faces = Normals::default();
@@ -139,8 +172,8 @@ pub struct Obstacle {
 struct Known {
     /// Nothing outside this box is inside the solid.
     bounds: Option<Aabb>,
-    /// What has the sign and the surface of the solid, and one face after the other inside it; of a solid with many
-    /// parts it knows which of them matter where.
+    /// What has exactly the sign and the surface of the solid, and one face after the other inside it; of a solid with
+    /// many parts it knows which of them matter where.
     walls: Box<dyn Walls>,
 }
 
@@ -211,7 +244,6 @@ pub struct Found {
 impl Found {
     fn add(&mut self, i: usize, collision: Collision, position: DVec3, velocity: DVec3) {
         match collision {
-            Collision::None => {}
             Collision::Stuck => self.counts.stuck += 1,
             Collision::Undefined => self.counts.undefined += 1,
             Collision::Hit => self.moved.push((i, position, velocity)),
@@ -232,10 +264,6 @@ impl Particles {
     #[allow(clippy::len_without_is_empty)] // nobody asks
     pub fn len(&self) -> usize {
         self.0.len()
-    }
-
-    fn position(&self, i: usize) -> DVec3 {
-        DVec3::from_array(self.0.get(0, i))
     }
 
     fn velocity(&self, i: usize) -> DVec3 {
@@ -271,7 +299,6 @@ impl Particles {
                 found.add(i, collision, position, velocity);
             }
         }
-        self.confirm(&mut found, &obstacle.solid, bounce);
         found.counts.hits = found.moved.len();
         found
     }
@@ -287,25 +314,6 @@ impl Particles {
             let place = DVec3::new(x[k], y[k], z[k]);
             bounds.contains(place) || !(place.is_finite() && self.velocity(i).is_finite())
         })
-    }
-
-    /// Sees to it that particles that were put outside are outside by ω, too, which has other rounding errors.
-    fn confirm(&self, found: &mut Found, solid: &Solid, bounce: &Bounce) {
-        let moved = std::mem::take(&mut found.moved);
-        if moved.is_empty() {
-            return;
-        }
-        let [x, y, z] = [0, 1, 2].map(|axis| moved.iter().map(|hit| hit.1[axis]).collect::<Vec<_>>());
-        let mut omega = vec![0.0; x.len()];
-        solid.omega_many([&x, &y, &z], &mut omega);
-        for ((i, mut position, mut velocity), w) in moved.into_iter().zip(omega) {
-            if w < 0.0 {
-                found.moved.push((i, position, velocity));
-                continue;
-            }
-            (position, velocity) = (self.position(i), self.velocity(i));
-            found.add(i, collide(solid, solid, bounce, &mut position, &mut velocity), position, velocity);
-        }
     }
 
     /// Writes what [`Particles::look`] has found.
