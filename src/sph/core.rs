@@ -52,6 +52,8 @@ pub(super) struct Core {
     /// The greatest speed of sound in the fluid as it is compressed now, m/s; 0 if the method has none that
     /// grows with compression.
     pub sound: f64,
+    /// The longest step, s, that the present pressure allows, if that is more than its acceleration and sound do; else infinite.
+    pub pressure_dt: f64,
     /// Impulses of the fluid on obstacles, if a probe asks for them.
     pub contacts: Option<Contacts>,
     /// The longest step that was allowed so far, s.
@@ -92,6 +94,7 @@ impl Core {
             time: 0.0,
             speed,
             sound: 0.0,
+            pressure_dt: f64::INFINITY,
             contacts: None,
             longest_dt: 0.0,
             level: Level::new(),
@@ -291,7 +294,7 @@ impl Core {
         let limit = self.parameters.stable_dt(speed);
         let limit =
             if self.sound > 0.0 { limit.min(self.parameters.sound_dt(self.sound, speed)) } else { limit };
-        limit.min(self.parameters.present_force_dt(longest(&self.acceleration)))
+        limit.min(self.pressure_dt).min(self.parameters.present_force_dt(longest(&self.acceleration)))
     }
 
     /// The step to take now, s, at most `most`.

@@ -140,6 +140,28 @@ impl Wendland {
         sum * Self::new(ratio).weight
     }
 
+    /// s²·Σ V·(1 − cos πn_x)·2∂²W/∂x² over a cubic lattice of the spacing s, with `ratio` spacings per support radius. Under an even
+    /// pressure p, planes of particles that are displaced in turns to the left and to the right swing with ω² = C·p/(ρs²), where C is
+    /// this number. Of all motions that leave every density as it is this is the fastest.
+    pub fn lattice_stiffness(ratio: f64) -> f64 {
+        let kernel = Self::new(ratio);
+        let reach = ratio.ceil() as i32;
+        let bend = |x: i32, y: i32, z: i32| {
+            let along = f64::from(x * x);
+            let r2 = f64::from(x * x + y * y + z * z);
+            let q = (r2.sqrt() / ratio).min(1.0);
+            // W′/r and its slope over r
+            let steepness = -kernel.steepness * (1.0 - q).powi(3);
+            let change = 3.0 * kernel.steepness * (1.0 - q).powi(2) / (q * ratio * ratio);
+            steepness + along * change
+        };
+        let side = || -reach..=reach;
+        let planes = || side().filter(|x| x % 2 != 0);
+        let sum: f64 =
+            planes().flat_map(|x| side().flat_map(move |y| side().map(move |z| bend(x, y, z)))).sum();
+        4.0 * sum
+    }
+
     /// 1 − q for the squares of many distances, zero beyond the support.
     #[inline(always)]
     pub fn nearness<S: Simd, V: SimdFloat<S, Element: Real>>(&self, r2: V) -> V {
@@ -208,6 +230,27 @@ mod tests {
         close(k.spiky_gradient(0.05) * 0.05, -45.0 / (PI * 1e-4) / 4.0);
         close(k.viscosity_laplacian(0.05), 45.0 / (PI * 1e-5) / 2.0);
         assert!(k.spiky_gradient(0.0).is_finite());
+    }
+
+    /// Forces on a lattice whose planes are displaced in turns, from finite differences of the kernel.
+    #[test]
+    fn planes_of_a_lattice_are_as_stiff_as_the_forces_on_them() {
+        for ratio in [2.0, 2.2, 2.6, 3.0] {
+            let kernel = Wendland::new(ratio);
+            let (way, d) = (1e-4, 1e-5);
+            let value = |x: f64, y: i32, z: i32| kernel.at(x * x + f64::from(y * y + z * z));
+            let mut force = 0.0;
+            for (x, y, z) in
+                (-4..=4).flat_map(|x| (-4..=4).flat_map(move |y| (-4..=4).map(move |z| (x, y, z))))
+            {
+                // planes of even numbers are at +way, the others at −way
+                let apart = f64::from(x) + if x % 2 == 0 { 0.0 } else { 2.0 * way };
+                force -= (value(apart + d, y, z) - value(apart - d, y, z)) / d;
+            }
+            let (stiffness, known) = (-force / way, Wendland::lattice_stiffness(ratio));
+            // the kernel's third derivative jumps at its rim
+            assert!((stiffness / known - 1.0).abs() < 2e-3, "{ratio}: {stiffness} {known}");
+        }
     }
 
     #[test]

@@ -144,6 +144,9 @@ impl<'t> Slip<'t> {
     fn first_word(&self) -> Diagnostic {
         let word = self.found;
         let after = self.after().trim_start_matches([' ', '\t']);
+        if let Some(diagnostic) = self.block_without_braces() {
+            return diagnostic;
+        }
         if let Some(help) = foreign::item(word) {
             return self.unexpected().help(help);
         }

@@ -47,6 +47,7 @@ mod rounding;
 mod run;
 mod simplify;
 mod source;
+mod still;
 mod sweep;
 mod thin_parts;
 mod tidy;

@@ -286,6 +286,8 @@ const SCENES: &[&str] = &[
     "gravity: 9.81",
     "fluid { shape: box([0.45, 0.45, 0.1], [0.55, 0.55, 0.2]), particles: 200 }",
     "obstacle { post }",
+    "obstacle post\n  gravity: [0, 0, 0]",
+    "fluid oil\n  gravity: [0, 0, 0]",
     "obstacle { solid: post, velocity: [1, 0, 0] }",
     "obstacle { solid: post, density: 500 }",
     "inlet { velocity: [1, 0, 0] }",

@@ -2,7 +2,7 @@
 
 use super::super::foreign;
 use super::{Slip, fits, last_word};
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Code, Diagnostic, Span};
 
 /// What begins a fold.
 const FOLDS: [&str; 6] = ["any", "all", "sum", "product", "min", "max"];
@@ -94,6 +94,26 @@ impl Slip<'_> {
         let is_box = matches!(foreign::key(key.trim()).unwrap_or(key.trim()), "box");
         (is_box && are_vectors && fits(&[low, high]))
             .then(|| self.unexpected().help(format!("write `box {{ min: {low}, max: {high} }}`")))
+    }
+
+    /// `obstacle post` or `fluid water`, and a new line
+    pub(super) fn block_without_braces(&self) -> Option<Diagnostic> {
+        let line = self.before().lines().last()?;
+        let (block, name) = line.trim().split_once(' ')?;
+        let written = match block {
+            "obstacle" | "container" => format!("{block} {{ solid: {name} }}"),
+            "fluid" => format!("fluid {name} {{ shape: …, density: 1000 }}"),
+            "probe" => format!("probe {name} {{ energy: water, every: 0.1 s }}"),
+            _ => return None,
+        };
+        let is_name = last_word(name) == name && fits(&[name]);
+        let start = self.text[..self.at].trim_end().len() - line.trim().len();
+        let span = Span::new(self.span.source, start, start + line.trim().len());
+        (self.in_braces() && is_name).then(|| {
+            Diagnostic::error(Code::SYNTAX, span, format!("`{block}` has no block"))
+                .at("expected `{`")
+                .help(format!("write `{written}`"))
+        })
     }
 
     /// `obstacle { post }`

@@ -91,7 +91,7 @@ pub(in crate::sph::methods) fn spread(core: &mut Core) {
     let numbers =
         Dfsph { tolerance: SPREAD_TOLERANCE, most_iterations: SPREAD_ITERATIONS, ..Dfsph::default() };
     let own_wall = core.exchange_wall(numbers.wall(&core.parameters.scales()));
-    DivergenceFree::start(numbers, core, true);
+    DivergenceFree::at(numbers, core).settle_in(core);
     core.exchange_wall(own_wall);
     let Particles { density, id, .. } = &mut core.particles;
     density.clear();
@@ -152,7 +152,8 @@ impl DivergenceFree {
                 break;
             }
         }
-        if is_crowded {
+        // where nothing weighs on the particles there is no pressure that could come too late
+        if is_crowded || core.parameters.gravity == DVec3::ZERO {
             self.debt.fill(0.0);
         }
     }

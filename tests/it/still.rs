@@ -1,0 +1,83 @@
+//! Fluids at rest that are easily stirred: deep ones, and those whose steps are cut short.
+
+use rfm::glam::DVec3;
+use rfm::sph::Simulation;
+use rfm::{Engine, Experiment, Program};
+
+fn simulation(text: &str) -> Simulation {
+    let program = Program::from_source("still.rfm", text).unwrap_or_else(|e| panic!("{e}"));
+    let scene = &program.module().scenes[0];
+    let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap_or_else(|e| panic!("{e}"));
+    experiment.start().unwrap_or_else(|e| panic!("{e}")).simulation
+}
+
+/// A column of eight particles by eight, so many layers deep.
+fn column(layers: u32) -> String {
+    format!(
+        "rfm 1
+let spacing = 1/{layers}
+scene deep {{
+  box {{ min: [0, 0, 0], max: [8*spacing, 8*spacing, 1.5] }}
+  fluid water {{ shape: box([0, 0, 0], [8*spacing, 8*spacing, 1]), density: 1000, spacing: spacing, viscosity: 0 }}
+  method: dfsph
+  run {{ until: 0.1 s, save_every: 0.1 s }}
+}}"
+    )
+}
+
+/// Eighty layers on a lattice, whose first steps are the hardest that `dfsph` meets. (If densities came back
+/// within ten steps, however short, speeds and pressures would grow without bound.)
+#[test]
+fn a_deep_column_does_not_burst() {
+    let mut simulation = simulation(&column(80));
+    while simulation.time() < 0.1 {
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+    }
+    let speed = simulation.stats().max_speed;
+    let height = |p: DVec3| p.z;
+    let top = simulation.particles().position.iter().map(height).fold(0.0, f64::max);
+    println!("{} steps, at most {speed:.2} m/s, top at {top:.3} m", simulation.steps());
+    // a fall through the whole column would reach 4.4 m/s
+    assert!(speed < 2.0 && top < 1.1, "{speed} m/s, {top} m");
+}
+
+/// Planes of particles under the pressure p swing with ω² = 6.82·p/(ρs²), the greatest eigenvalue of the forces
+/// on a cubic lattice with 2.2 spacings in a support radius, and a step of more than 2/ω makes them grow.
+#[test]
+fn steps_are_short_enough_for_the_pressure() {
+    let layers = 40;
+    let mut simulation = simulation(&column(layers));
+    let spacing = 1.0 / f64::from(layers);
+    while simulation.time() < 0.1 {
+        let pressure = simulation.particles().pressure.iter().copied().fold(0.0, f64::max);
+        let before = simulation.time();
+        simulation.step().unwrap_or_else(|e| panic!("{e}"));
+        let limit = 2.0 * spacing / (6.82 * pressure / 1000.0).sqrt();
+        let step = simulation.time() - before;
+        assert!(step < 0.76 * limit, "{step} s at {before} s, {limit} s");
+    }
+    let deepest = simulation.particles().pressure.iter().copied().fold(0.0, f64::max);
+    assert!(deepest > 5000.0, "{deepest} Pa: the pressure never came");
+}
+
+/// Frames that follow each other closely make steps short. What keeps densities must not become a speed for that.
+#[test]
+fn short_steps_do_not_stir_a_fluid_at_rest() {
+    let text = "rfm 1
+scene calm {
+  box { max: [0.5, 0.5, 0.5] }
+  gravity: [0, 0, 0]
+  fluid water { shape: box([0, 0, 0], [0.5, 0.5, 0.3]), density: 1000, particles: 2000 }
+  method: dfsph
+  run { until: 20 ms, save_every: 0.1 ms }
+}";
+    let mut simulation = simulation(text);
+    let mut fastest = 0.0_f64;
+    for frame in 1..=200 {
+        let end = 1e-4 * f64::from(frame);
+        simulation.advance(end, |_| std::ops::ControlFlow::Continue(())).unwrap_or_else(|e| panic!("{e}"));
+        fastest = fastest.max(simulation.stats().max_speed);
+    }
+    assert!(simulation.steps() >= 200);
+    assert!(fastest < 1e-3, "{fastest} m/s");
+}
