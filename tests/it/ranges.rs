@@ -250,7 +250,7 @@ fn ends(random: &mut Random) -> [f64; 2] {
         let size = 10f64.powf(if random.unit() < 0.5 {
             4.0 * random.unit() - 3.0
         } else {
-            308.0 * random.unit() - 300.0
+            331.0 * random.unit() - 323.5 // numbers that have lost digits, too
         });
         let signed = if random.unit() < 0.5 { -size } else { size };
         if random.unit() < 0.1 { 0.0 } else { signed }

@@ -36,6 +36,11 @@ const MARGIN: f64 = 16.0 * ULP;
 /// What it is widened by where its tangent underflows.
 const LEAST: f64 = 1e-300;
 
+/// Points nearer to the origin than this are moved away from it by a factor: so close to the least number, a product
+/// with a tangent may be off by as much as itself.
+const TINY: f64 = 1e-280;
+const FACTOR: f64 = (1_u64 << 60) as f64;
+
 impl Ranges<'_, '_> {
     pub(super) fn atan(&mut self, a: Value) -> Value {
         let one = self.emitter.constant(1.0);
@@ -71,6 +76,10 @@ impl Ranges<'_, '_> {
         let (least, most) = (self.min(to_x, to_y), self.emitter.max(to_x, to_y));
         let [steep, none, eighth, quarter, half, zero] =
             [STEEP, -0.0, FRAC_PI_4, FRAC_PI_2, PI, 0.0].map(|c| self.emitter.constant(c));
+        let [tiny, factor, one] = [TINY, FACTOR, 1.0].map(|c| self.emitter.constant(c));
+        let is_tiny = self.emitter.compare(FloatCC::LessThan, most, tiny);
+        let factor = self.emitter.select(is_tiny, factor, one);
+        let (least, most) = (self.fmul(least, factor), self.fmul(most, factor));
 
         // tan(α − π/4) = (tan α − 1)/(tan α + 1)
         let limit = self.fmul(most, steep);
