@@ -52,7 +52,8 @@ pub(super) struct Core {
     /// The greatest speed of sound in the fluid as it is compressed now, m/s; 0 if the method has none that
     /// grows with compression.
     pub sound: f64,
-    /// The longest step, s, that the present pressure allows, if that is more than its acceleration and sound do; else infinite.
+    /// The longest step, s, that the present pressure allows, by more than its acceleration; infinite if the
+    /// method has no such limit.
     pub pressure_dt: f64,
     /// Impulses of the fluid on obstacles, if a probe asks for them.
     pub contacts: Option<Contacts>,
@@ -207,6 +208,11 @@ impl Core {
             .as_ref()
             .map(|field| field(self.particles.position.get(i), self.boundary.time));
         self.parameters.gravity + field.unwrap_or(DVec3::ZERO)
+    }
+
+    /// Whether any gravity pulls at the fluid.
+    pub fn has_weight(&self) -> bool {
+        self.gravity_field.is_some() || self.parameters.gravity != DVec3::ZERO
     }
 
     /// Adds to the accelerations the gravity that depends on the place, if there is any.

@@ -140,9 +140,10 @@ impl Wendland {
         sum * Self::new(ratio).weight
     }
 
-    /// s²·Σ V·(1 − cos πn_x)·2∂²W/∂x² over a cubic lattice of the spacing s, with `ratio` spacings per support radius. Under an even
-    /// pressure p, planes of particles that are displaced in turns to the left and to the right swing with ω² = C·p/(ρs²), where C is
-    /// this number. Of all motions that leave every density as it is this is the fastest.
+    /// C = s²·Σ V·2(1 − cos πn_x)·∂²W/∂x² over a cubic lattice of the spacing s, with `ratio` spacings per
+    /// support radius. Under an even pressure p, planes of particles that are displaced in turns to the left and
+    /// to the right swing with ω² = C·p/(ρs²). Of all motions that leave every density as it is, this is the
+    /// fastest.
     pub fn lattice_stiffness(ratio: f64) -> f64 {
         let kernel = Self::new(ratio);
         let reach = ratio.ceil() as i32;

@@ -78,8 +78,8 @@ const MOST_RELAXATION_STEPS: f64 = 100.0;
 /// cannot hold it. With all of it, and with a third, a column of eighty layers, eight wide, bursts at its start.
 const OWED: f64 = 0.6;
 
-/// The part of 2/ω that a step may be long, for the fastest motion that pressure causes and that the solver does not see. (A
-/// cube of eight layers lies still with 0.75 and bursts with 1, and so does one of eighty layers.)
+/// The part of 2/ω that a step may be long, for the fastest motion that pressure causes and that the solver
+/// does not see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
 const STABLE: f64 = 0.75;
 
 /// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
@@ -200,9 +200,9 @@ impl DivergenceFree {
         scheme
     }
 
-    /// The longest step, s, in which planes of particles that the present pressure holds together do not overshoot. The solver
-    /// does not see a motion that changes no density, so the forces on it are those of the last places, and it grows
-    /// where steps are longer than 2/ω.
+    /// The longest step, s, in which planes of particles that the present pressure holds together do not
+    /// overshoot. The solver does not see a motion that changes no density, so the forces on it are those of the
+    /// last places, and it grows where steps are longer than 2/ω.
     fn pressure_dt(&self, core: &Core) -> f64 {
         let rest = core.parameters.rest_density;
         let greatest = core.particles.pressure.iter().copied().fold(0.0, f64::max) / rest;

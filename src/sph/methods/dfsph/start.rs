@@ -153,7 +153,7 @@ impl DivergenceFree {
             }
         }
         // where nothing weighs on the particles there is no pressure that could come too late
-        if is_crowded || core.parameters.gravity == DVec3::ZERO {
+        if is_crowded || !core.has_weight() {
             self.debt.fill(0.0);
         }
     }
