@@ -11,29 +11,10 @@ use cranelift_codegen::ir::{
 use cranelift_jit::JITBuilder;
 use cranelift_module::{Linkage, Module, ModuleError};
 
+use super::functions::RangeFunction;
 use super::instructions::{Instruction, Instructions, LARGEST_CALL};
 use super::{BoundLane, Ranges};
 use crate::codegen::request::Rounding;
-use crate::ir::{BinaryFunction, UnaryFunction};
-
-/// A function whose range programs call for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::codegen) enum RangeFunction {
-    Unary(UnaryFunction),
-    Binary(BinaryFunction),
-}
-
-impl RangeFunction {
-    /// All of them, in the order of their numbers.
-    fn all() -> impl Iterator<Item = Self> {
-        let of_two = BinaryFunction::ALL.iter().copied().map(Self::Binary);
-        UnaryFunction::ALL.iter().copied().map(Self::Unary).chain(of_two)
-    }
-
-    fn number(self) -> usize {
-        Self::all().take_while(|other| *other != self).count()
-    }
-}
 
 /// The bounds of two operands, low and high, on entry; those of the result in the first two places on return.
 type Bounds = [f64; 4];

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::calls::RangeFunction;
+use super::functions::RangeFunction;
 use crate::geom::Aabb;
 use crate::ir::{
     Affine, Axis, Binary, BinaryFunction, Expr, Graph, Limits, Node, RangeEvaluator, RangeRule, Region,

@@ -13,6 +13,7 @@
 
 mod angles;
 mod calls;
+mod functions;
 mod instructions;
 mod steps;
 
