@@ -289,8 +289,8 @@ impl Core {
         }
     }
 
-    /// The longest step that this state allows, s: the least of the parameters' limits at the present
-    /// greatest speed and the force limit at the present greatest acceleration.
+    /// The longest step that this state allows, s: the least of the parameters' limits at the present greatest
+    /// speed, the force limit at the present greatest acceleration, and the limit by pressure of the last step.
     pub fn stable_dt(&self) -> f64 {
         self.stable_dt_at(longest(&self.particles.velocity))
     }

@@ -95,6 +95,8 @@ pub struct DivergenceFree {
     places: Solver,
     /// The density, kg/m³, that each particle would have gained by what the solver of forces left.
     pub(super) debt: Vec<f64>,
+    /// How stiff a lattice of these particles is, see [`Wendland::lattice_stiffness`].
+    stiffness: f64,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
     spread: Vec<f64>,
     /// Σ V ∇W + ∇λ, 1/m; zero at the surface.
@@ -186,6 +188,10 @@ impl DivergenceFree {
             forces: Solver::new(Continuation::Linear, &core.parameters, n),
             places: Solver::new(Continuation::Barrier, &core.parameters, n),
             debt: vec![0.0; n],
+            stiffness: Wendland::lattice_stiffness(
+                core.parameters.support_radius / core.parameters.spacing(),
+            )
+            .max(0.0),
             spread: vec![0.0; n],
             crowding: Vectors::default(),
             free: Vec::new(),
@@ -207,8 +213,7 @@ impl DivergenceFree {
         let rest = core.parameters.rest_density;
         let greatest = core.particles.pressure.iter().copied().fold(0.0, f64::max) / rest;
         let spacing = core.parameters.spacing();
-        let stiffness = Wendland::lattice_stiffness(core.parameters.support_radius / spacing).max(0.0);
-        STABLE * 2.0 * spacing / (stiffness * greatest).sqrt()
+        STABLE * 2.0 * spacing / (self.stiffness * greatest).sqrt()
     }
 
     /// Finds the order, walls, densities and factors for the present positions.
