@@ -58,7 +58,7 @@ pub(super) enum Instruction {
     Quotient(Node, Node),
     /// The share of the first in the smaller of both: a derivative.
     Share(Node, Node),
-    /// Of one operand, which then stands twice, or of two.
+    /// A called function. One with a single operand has it twice.
     Call(RangeFunction, [Node; 2]),
 }
 
