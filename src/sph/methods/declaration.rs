@@ -83,6 +83,8 @@ pub struct FluidDefaults {
     pub particles: Option<usize>,
     /// Support radius of the kernel.
     pub support: Support,
+    /// The same for a fluid with surface tension.
+    pub support_with_tension: Support,
     /// Precision of the sums over neighbours.
     pub precision: Precision,
     /// Whether the length of steps follows the state, unless the scene states it.

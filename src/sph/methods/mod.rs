@@ -12,6 +12,7 @@ mod negative_pressure;
 mod numerics;
 mod paper;
 mod reference;
+mod roughness;
 mod scheme;
 mod shifting;
 mod start;

@@ -34,10 +34,14 @@ pub fn methods_reference() -> String {
 fn section(text: &mut String, method: &MethodInfo) -> std::fmt::Result {
     let fluid = &method.fluid;
     writeln!(text, "\n## `{}`: {}\n", method.name, method.title)?;
-    let support = match fluid.support {
+    let length = |support| match support {
         Support::Metres(length) => format!("{length} m"),
         Support::Spacings(count) => format!("{count} particle spacings"),
     };
+    let mut support = length(fluid.support);
+    if fluid.support_with_tension != fluid.support {
+        let _ = write!(support, " ({} with surface tension)", length(fluid.support_with_tension));
+    }
     writeln!(
         text,
         "Unless the scene says otherwise, viscosity is {} Pa·s, surface tension {} N/m, the support radius {support}, and \

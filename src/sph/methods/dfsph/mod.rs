@@ -28,6 +28,10 @@ const IMPLICIT_FORCE_FACTOR: f64 = 0.1;
 /// layers bursts at its start.
 const SOLVED_FORCE_FACTOR: f64 = 0.15;
 
+/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
+/// a weakly compressible fluid, so that the same α damps alike.
+const NOMINAL_SOUND: f64 = 10.0;
+
 /// Numbers of the divergence-free method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dfsph {
@@ -46,7 +50,14 @@ pub struct Dfsph {
 
 impl Default for Dfsph {
     fn default() -> Self {
-        Self { tolerance: 1e-4, most_iterations: 100, artificial_viscosity: 0.04, shifting: 0.0 }
+        Self { tolerance: 1e-4, most_iterations: 100, artificial_viscosity: 0.06, shifting: 0.0 }
+    }
+}
+
+impl Dfsph {
+    /// The factor α·h/2·c of the artificial viscosity, m²/s.
+    fn artificial_factor(&self, scales: &Scales) -> f64 {
+        self.artificial_viscosity * 0.5 * scales.support_radius * NOMINAL_SOUND * scales.expected_speed
     }
 }
 
@@ -62,6 +73,7 @@ impl Declaration for Dfsph {
         particles: Some(10_000),
         // many neighbours make the solver slow
         support: Support::Spacings(2.2),
+        support_with_tension: Support::Spacings(2.2),
         precision: Precision::F32,
         adaptive: true,
     };
@@ -91,7 +103,7 @@ impl Declaration for Dfsph {
         Key {
             name: "artificial_viscosity",
             block: KeyBlock::Fluid,
-            about: "α of the artificial viscosity, which damps noise and waves",
+            about: "α of the artificial viscosity, which damps noise",
             value: Value::Number {
                 dimension: Dimension::NONE,
                 bound: Bound::NotNegative,
@@ -126,8 +138,17 @@ impl Declaration for Dfsph {
         (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
         (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
-    const SAVES: &'static [&'static str] =
-        &["specific pressure", "debt", "stiffness", "crowding x", "crowding y", "crowding z"];
+    const SAVES: &'static [&'static str] = &[
+        "specific pressure",
+        "debt",
+        "stiffness",
+        "crowding x",
+        "crowding y",
+        "crowding z",
+        "smooth velocity x",
+        "smooth velocity y",
+        "smooth velocity z",
+    ];
 }
 
 impl Numerics for Dfsph {
@@ -137,6 +158,11 @@ impl Numerics for Dfsph {
 
     fn courant_dt(&self, scales: &Scales, max_speed: f64) -> f64 {
         ADVECTION * scales.spacing() / max_speed
+    }
+
+    fn artificial_viscosity(&self, scales: &Scales) -> f64 {
+        // forces along lines are those of ten times the kinematic viscosity
+        self.artificial_factor(scales) / 10.0
     }
 
     fn force_factor(&self) -> f64 {

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 
 use crate::sph::{
     kernel::Wendland,
-    methods::shifting::depth,
+    methods::{roughness, shifting::depth},
     pairs::{PairPass, Real},
     params::Parameters,
     particles::Vectors,
@@ -198,10 +198,11 @@ impl PairPass<3, 1, 1> for Squeeze<'_> {
     }
 }
 
-/// Finds the acceleration by viscosity and by gravity. Viscosity is laminar (Monaghan & Gingold 1983), artificial
-/// (Monaghan 1992) or both; both act along the lines between particles.
+/// Finds the acceleration by viscosity and by gravity, and the smooth velocity around each particle. Viscosity is
+/// laminar (Monaghan & Gingold 1983), artificial (Monaghan 1992, of rough motion alone) or both; both act along the lines
+/// between particles.
 #[derive(Clone, Copy)]
-pub(super) struct Drag<'a, const LAMINAR: bool> {
+pub(super) struct Drag<'a, const LAMINAR: bool, const ARTIFICIAL: bool> {
     pub constants: Constants,
     pub walls: &'a Walls,
     pub velocity: &'a Vectors,
@@ -214,33 +215,51 @@ pub(super) struct Drag<'a, const LAMINAR: bool> {
     pub reaction: Option<Reaction<'a>>,
 }
 
-impl<const LAMINAR: bool> PairPass<3, 3, 3> for Drag<'_, LAMINAR> {
-    /// Both viscosities are one sum, but only the artificial one makes do with twelve bits.
+impl<const LAMINAR: bool, const ARTIFICIAL: bool> PairPass<6, 10, 6> for Drag<'_, LAMINAR, ARTIFICIAL> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
         d: [V; 3],
         r2: V,
-        own: &[V; 3],
-        other: [V; 3],
-        sums: &mut [V; 3],
+        own: &[V; 6],
+        other: [V; 6],
+        sums: &mut [V; 10],
     ) {
         let s = self.constants.kernel.nearness(r2);
-        let relative = [other[0] - own[0], other[1] - own[1], other[2] - own[2]];
-        let arriving = relative[2].mul_add(d[2], relative[1].mul_add(d[1], relative[0] * d[0]));
+        let f = s * s * s;
+        let approach = |k: usize| {
+            let x = (other[k] - own[k]) * d[0];
+            let x = (other[k + 1] - own[k + 1]).mul_add(d[1], x);
+            (other[k + 2] - own[k + 2]).mul_add(d[2], x)
+        };
+        let arriving = approach(0);
         // a particle has no line to itself
-        let least = V::Element::of(LEAST_DISTANCE * self.constants.kernel.h.powi(2));
-        let along = s * s * s * arriving;
-        let push = if LAMINAR { along / (r2 + least) } else { along * (r2 + least).approximate_recip() };
-        for k in 0..3 {
-            sums[k] = push.mul_add(d[k], sums[k]);
+        let r2 = r2 + V::Element::of(LEAST_DISTANCE * self.constants.kernel.h.powi(2));
+        if LAMINAR {
+            let push = f * arriving / r2;
+            for k in 0..3 {
+                sums[k] = push.mul_add(d[k], sums[k]);
+            }
+        }
+        if ARTIFICIAL {
+            // an artificial viscosity makes do with twelve bits
+            let push = f * roughness::damped(approach(3), arriving) * r2.approximate_recip();
+            for k in 0..3 {
+                sums[3 + k] = push.mul_add(d[k], sums[3 + k]);
+            }
+            // 1 + 4q = 5 − 4s
+            let weight = f * s * s.mul_add(V::Element::of(-4.0), V::Element::of(5.0));
+            for k in 0..3 {
+                sums[6 + k] = weight.mul_add(other[k], sums[6 + k]);
+            }
+            sums[9] += weight;
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
+    fn finish(&self, i: usize, [x, y, z, dx, dy, dz, sx, sy, sz, weights]: [f64; 10]) -> [f64; 6] {
         let Constants { mass_steepness, rest_density, .. } = self.constants;
-        let along = mass_steepness / rest_density * DVec3::from_array(sums);
-        let mut drag = 10.0 * self.kinematic * along;
+        let factor = mass_steepness / rest_density;
+        let mut drag = 10.0 * self.kinematic * factor * DVec3::new(x, y, z);
         if LAMINAR && let Some((wall, _)) = self.walls.near(i) {
             let velocity = self.velocity.get(i);
             if let Some(reaction) = &self.reaction {
@@ -249,6 +268,8 @@ impl<const LAMINAR: bool> PairPass<3, 3, 3> for Drag<'_, LAMINAR> {
             }
             drag = wall.friction.complete(drag, velocity, self.kinematic);
         }
-        (drag + self.artificial * along + self.gravity).to_array()
+        let a = drag + self.artificial * factor * DVec3::new(dx, dy, dz) + self.gravity;
+        let smooth = if ARTIFICIAL { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
+        [a.x, a.y, a.z, smooth.x, smooth.y, smooth.z]
     }
 }

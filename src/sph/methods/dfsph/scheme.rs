@@ -44,6 +44,7 @@
 use smallvec::{SmallVec, smallvec};
 
 use super::super::{
+    roughness::Roughness,
     scheme::Scheme,
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
@@ -82,10 +83,6 @@ const OWED: f64 = 0.6;
 /// does not see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
 const STABLE: f64 = 0.75;
 
-/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
-/// a weakly compressible fluid, so that the same α damps alike.
-const NOMINAL_SOUND: f64 = 10.0;
-
 /// The scheme. It keeps the pressures, and what is owed, between steps; the rest is working memory.
 pub struct DivergenceFree {
     pub(super) numbers: Dfsph,
@@ -104,6 +101,7 @@ pub struct DivergenceFree {
     /// What a solver shall take away: a rate of density, or an excess of density.
     free: Vec<f64>,
     tension: Tension,
+    roughness: Roughness,
     /// Displacements of this step that are not part of the velocity, m.
     pub(super) displacement: Vectors,
     /// Velocities with what displaces besides, m/s.
@@ -136,6 +134,7 @@ impl Scheme for DivergenceFree {
         checkpoint.set("debt", self.debt.clone());
         checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         save_crowding(&self.crowding, checkpoint);
+        self.roughness.save(checkpoint);
     }
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
@@ -145,7 +144,7 @@ impl Scheme for DivergenceFree {
             (self.forces.stiffness, self.places.stiffness) = (*forces, *places);
         }
         self.crowding = restore_crowding(checkpoint)?;
-        Ok(())
+        self.roughness.restore(checkpoint)
     }
 
     fn densities<'a>(&'a self, core: &'a Core) -> &'a [f64] {
@@ -160,6 +159,7 @@ impl Scheme for DivergenceFree {
             + self.forces.bytes()
             + self.places.bytes()
             + self.tension.bytes()
+            + self.roughness.bytes()
             + self.walls.bytes()
     }
 
@@ -196,6 +196,7 @@ impl DivergenceFree {
             crowding: Vectors::default(),
             free: Vec::new(),
             tension: Tension::default(),
+            roughness: Roughness::of(&core.particles.velocity, true),
             displacement: Vectors::default(),
             drift: Vectors::default(),
             loaded: vec![0.0; n],
@@ -219,6 +220,7 @@ impl DivergenceFree {
     /// Finds the order, walls, densities and factors for the present positions.
     pub(super) fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
         let mut columns: SmallVec<[&mut Vec<f64>; 8]> = smallvec![&mut self.forces.s, &mut self.debt];
+        columns.extend(self.roughness.columns());
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
         core.find_near();
@@ -240,24 +242,32 @@ impl DivergenceFree {
         let g = core.parameters.gravity;
         let Vectors { x, y, z } = &mut acceleration;
         let parameters = &core.parameters;
-        let artificial = self.numbers.artificial_viscosity
-            * 0.5
-            * parameters.support_radius
-            * NOMINAL_SOUND
-            * parameters.expected_speed;
+        let artificial = self.numbers.artificial_factor(&parameters.scales());
         let kinematic = parameters.viscosity / parameters.rest_density;
         if kinematic > 0.0 || artificial > 0.0 {
             let (constants, velocity) = (Constants::of(parameters), &core.particles.velocity);
-            let fields = [&velocity.x[..], &velocity.y, &velocity.z];
-            let (out, walls, reaction) = ([&mut x[..], y, z], &self.walls, Reaction::of(core, dt));
-            if kinematic > 0.0 {
-                let pass =
-                    Drag::<true> { constants, walls, velocity, kinematic, artificial, gravity: g, reaction };
-                core.sum(&pass, fields, out);
-            } else {
-                let pass =
-                    Drag::<false> { constants, walls, velocity, kinematic, artificial, gravity: g, reaction };
-                core.sum(&pass, fields, out);
+            let (rough, smooth) = self.roughness.split(velocity);
+            let fields = [&velocity.x[..], &velocity.y, &velocity.z, &rough.x, &rough.y, &rough.z];
+            let out = [&mut x[..], y, z, &mut smooth.x, &mut smooth.y, &mut smooth.z];
+            let (walls, reaction) = (&self.walls, Reaction::of(core, dt));
+            macro_rules! drag {
+                ($laminar:literal, $artificial:literal) => {{
+                    let pass = Drag::<$laminar, $artificial> {
+                        constants,
+                        walls,
+                        velocity,
+                        kinematic,
+                        artificial,
+                        gravity: g,
+                        reaction,
+                    };
+                    core.sum(&pass, fields, out);
+                }};
+            }
+            match (kinematic > 0.0, artificial > 0.0) {
+                (true, true) => drag!(true, true),
+                (true, false) => drag!(true, false),
+                (false, _) => drag!(false, true),
             }
         } else {
             x.fill(g.x);

@@ -41,7 +41,8 @@ pub struct Wcsph {
     pub sound_speed: Option<f64>,
     /// δ of the density diffusion (Molteni & Colagrossi 2009). Default 0.1; zero: the term is not computed.
     pub density_diffusion: f64,
-    /// α of the artificial viscosity (Monaghan 1992). Default 0.02; zero: the term is not computed.
+    /// α of the artificial viscosity (Monaghan 1992). With pairs of pressures it acts on rough motion alone; with
+    /// differences on all, which without it would gain energy. Default 0.1; zero: the term is not computed.
     pub artificial_viscosity: f64,
     /// How the pressures of two particles enter their acceleration.
     pub gradients: Gradients,
@@ -60,7 +61,7 @@ impl Default for Wcsph {
         Self {
             sound_speed: None,
             density_diffusion: 0.1,
-            artificial_viscosity: 0.02,
+            artificial_viscosity: 0.1,
             gradients: Gradients::Pairs,
             shifting: None,
             negative_pressure: NegativePressure::Clamp,
@@ -70,6 +71,11 @@ impl Default for Wcsph {
 }
 
 impl Wcsph {
+    /// The factor α·h/2·c of the artificial viscosity, m²/s.
+    fn artificial_factor(&self, scales: &Scales) -> f64 {
+        self.artificial_viscosity * 0.5 * scales.support_radius * self.sound_speed(scales)
+    }
+
     /// The strength of the shifting, stated or derived.
     pub fn shifting(&self) -> f64 {
         self.shifting.unwrap_or(match self.gradients {
@@ -83,14 +89,16 @@ impl Declaration for Wcsph {
     const NAME: &'static str = "wcsph";
     const TITLE: &'static str = "Weakly compressible";
     const PRESSURE: &'static str = "Tait's equation, density from the motion";
-    const KERNEL: &'static str = "Wendland C2; 74";
+    const KERNEL: &'static str = "Wendland C2; 113";
     const STEP: &'static str = "adaptive";
     const FLUID: FluidDefaults = FluidDefaults {
         viscosity: 1e-3,
         surface_tension: 0.0,
         particles: Some(10_000),
-        // many neighbours make pressures smooth
-        support: Support::Spacings(2.6),
+        // many neighbours make pressures smooth, and let rows of particles slide past each other
+        support: Support::Spacings(3.0),
+        // a surface that is bent is seen better from near
+        support_with_tension: Support::Spacings(2.6),
         precision: Precision::F32,
         adaptive: true,
     };
@@ -122,7 +130,7 @@ impl Declaration for Wcsph {
         Key {
             name: "artificial_viscosity",
             block: KeyBlock::Fluid,
-            about: "α of the artificial viscosity, which damps noise and waves",
+            about: "α of the artificial viscosity, which damps noise; with gradients by differences it damps waves too",
             value: Value::Number {
                 dimension: Dimension::NONE,
                 bound: Bound::NotNegative,
@@ -196,6 +204,9 @@ impl Declaration for Wcsph {
         "crowding x",
         "crowding y",
         "crowding z",
+        "smooth velocity x",
+        "smooth velocity y",
+        "smooth velocity z",
     ];
 }
 
@@ -210,6 +221,11 @@ impl Numerics for Wcsph {
 
     fn sound_speed(&self, scales: &Scales) -> f64 {
         self.sound_speed.unwrap_or(SOUND_OVER_SPEED * scales.expected_speed)
+    }
+
+    fn artificial_viscosity(&self, scales: &Scales) -> f64 {
+        // forces along lines are those of ten times the kinematic viscosity
+        self.artificial_factor(scales) / 10.0
     }
 
     /// The density ρ₀(1 + 7p/(c²ρ₀))^(1/7), the inverse of Tait's equation.

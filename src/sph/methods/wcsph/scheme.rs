@@ -36,7 +36,8 @@
 //! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a). Since a is the unknown, this is a
 //! linear system of three unknowns for each particle at a wall; the factor (1 − K)⁻¹ solves it. (Without it
 //! water at rest keeps moving along its walls, 3 cm/s in the mean after three seconds instead of 1 cm/s, and
-//! is 14 % too light at the floor.) Spray that hits a wall has no balance, so it has no such factor, and its
+//! is 14 % too light at the floor. Where the particles of the surface have no such factor, walls do not bear their
+//! share of its weight: the pressure of water eight layers deep is too high by a tenth of a layer, everywhere.) Spray that hits a wall has no balance, so it has no such factor, and its
 //! motion conserves energy. Along walls that let it slip the flow is mirrored: the part of the kernel inside
 //! them adds to the viscosity what the rest does.
 //!
@@ -48,6 +49,7 @@ use rayon::prelude::*;
 
 use super::super::{
     negative_pressure::NegativePressure,
+    roughness::{self, Roughness},
     scheme::Scheme,
     shifting::{depth, restore_crowding, return_rate, save_crowding, shift},
     tension::Tension,
@@ -71,7 +73,8 @@ struct Numbers {
     /// Speed of sound, m/s.
     sound_speed: f64,
     density_diffusion: f64,
-    artificial_viscosity: f64,
+    /// The factor α·h/2·c of the artificial viscosity, m²/s.
+    artificial: f64,
     gradients: Gradients,
     shifting: f64,
     negative_pressure: NegativePressure,
@@ -82,7 +85,7 @@ impl Numbers {
         Self {
             sound_speed: parameters.sound_speed(),
             density_diffusion: wcsph.density_diffusion,
-            artificial_viscosity: wcsph.artificial_viscosity,
+            artificial: wcsph.artificial_factor(&parameters.scales()),
             gradients: wcsph.gradients,
             shifting: wcsph.shifting(),
             negative_pressure: wcsph.negative_pressure,
@@ -108,6 +111,7 @@ pub struct Weakly {
     crowding: Vectors,
     /// Predicted ρ − ρ₀.
     excess: Vec<f64>,
+    roughness: Roughness,
     /// Working memory: the Q and the drift that a sum finds.
     found: [Vec<f64>; 2],
     tension: Tension,
@@ -128,7 +132,16 @@ impl Scheme for Weakly {
         add_scaled(&mut core.particles.velocity, &core.acceleration, 0.5 * dt);
         core.move_obstacles(dt);
         core.drift(dt, shift(self.numbers.shifting, &self.crowding, core))?;
-        core.sort(&mut [&mut self.places, &mut self.rate, &mut self.earlier_rate, &mut self.drift]);
+        let [sx, sy, sz] = self.roughness.columns();
+        core.sort(&mut [
+            &mut self.places,
+            &mut self.rate,
+            &mut self.earlier_rate,
+            &mut self.drift,
+            sx,
+            sy,
+            sz,
+        ]);
         self.find_rates(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, 0.5 * dt);
         self.find_pressure(core, dt);
@@ -143,6 +156,7 @@ impl Scheme for Weakly {
         }
         checkpoint.set(LAST_STEP, vec![self.last_dt]);
         save_crowding(&self.crowding, checkpoint);
+        self.roughness.save(checkpoint);
     }
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
@@ -154,7 +168,7 @@ impl Scheme for Weakly {
             self.last_dt = *last_dt;
         }
         self.crowding = restore_crowding(checkpoint)?;
-        Ok(())
+        self.roughness.restore(checkpoint)
     }
 
     fn densities<'a>(&'a self, _core: &'a Core) -> &'a [f64] {
@@ -167,6 +181,7 @@ impl Scheme for Weakly {
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + self.crowding.bytes()
             + self.tension.bytes()
+            + self.roughness.bytes()
     }
 }
 
@@ -190,10 +205,11 @@ impl Weakly {
             filled: vec![0.0; n],
             crowding: Vectors::default(),
             excess: Vec::new(),
+            roughness: Roughness::of(&core.particles.velocity, numbers.gradients == Gradients::Pairs),
             found: [vec![0.0; n], vec![0.0; n]],
             tension: Tension::default(),
         };
-        core.sort(&mut []);
+        core.sort(&mut scheme.roughness.columns());
         scheme.find_rates(core, 0.0);
         scheme.find_pressure(core, 0.0);
         scheme
@@ -255,12 +271,28 @@ impl Weakly {
 
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let Vectors { x: vx, y: vy, z: vz } = &predicted;
-        let fields = [&vx[..], vy, vz, &pressure, &self.excess];
+        let (Vectors { x: rx, y: ry, z: rz }, Vectors { x: sx, y: sy, z: sz }) =
+            self.roughness.split(&predicted);
+        let fields = [&vx[..], vy, vz, &pressure, &self.excess, rx, ry, rz];
         let Vectors { x, y, z } = &mut acceleration;
         let Vectors { x: cx, y: cy, z: cz } = &mut self.crowding;
         let [mut places, mut drift] = std::mem::take(&mut self.found);
         std::mem::swap(&mut self.rate, &mut self.earlier_rate);
-        let out = [&mut x[..], y, z, &mut self.rate, &mut places, &mut drift, &mut self.filled, cx, cy, cz];
+        let out = [
+            &mut x[..],
+            y,
+            z,
+            &mut self.rate,
+            &mut places,
+            &mut drift,
+            &mut self.filled,
+            cx,
+            cy,
+            cz,
+            sx,
+            sy,
+            sz,
+        ];
         let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, dt);
         match (rates.laminar > 0.0, rates.artificial > 0.0, rates.even) {
             (true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
@@ -335,6 +367,16 @@ fn tait(numbers: &Numbers, parameters: &Parameters, density: f64) -> f64 {
     numbers.negative_pressure.of(p)
 }
 
+/// Limits of Σ V W, with the part of a wall, between which a particle at the wall begins to take part in the balance
+/// of the fluid: spray has less, and a surface at rest more.
+const HELD: [f64; 2] = [0.7, 0.8];
+
+/// How far a particle at a wall takes part in the balance of the fluid, 0 to 1, from its Σ V W.
+fn held(filled: f64) -> f64 {
+    let [spray, surface] = HELD;
+    ((filled - spray) / (surface - spray)).clamp(0.0, 1.0)
+}
+
 /// What the pass over pairs needs besides the columns that it sums.
 #[derive(Clone, Copy)]
 struct Rates<'a> {
@@ -393,10 +435,7 @@ impl<'a> Rates<'a> {
             diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
             at_rest: at_rest(numbers, parameters),
             laminar: parameters.viscosity / parameters.rest_density,
-            artificial: numbers.artificial_viscosity
-                * smoothing
-                * numbers.sound_speed
-                * parameters.rest_density,
+            artificial: numbers.artificial * parameters.rest_density,
             density: &core.particles.density,
             clamped: numbers.negative_pressure == NegativePressure::Clamp,
             differences: numbers.gradients == Gradients::Differences,
@@ -415,7 +454,7 @@ impl<'a> Rates<'a> {
 #[derive(Clone, Copy)]
 struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
 
-impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 13, 10>
+impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 16, 13>
     for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
 {
     /// The artificial viscosity is a pressure between particles that approach, and a tension between those
@@ -426,9 +465,9 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         &self,
         d: [V; 3],
         r2: V,
-        own: &[V; 5],
-        other: [V; 5],
-        sums: &mut [V; 13],
+        own: &[V; 8],
+        other: [V; 8],
+        sums: &mut [V; 16],
     ) {
         let of = V::Element::of;
         let rates = &self.0;
@@ -441,7 +480,11 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         if ARTIFICIAL {
             let least = of(0.01 * (0.5 * rates.kernel.h).powi(2));
             // an artificial viscosity needs no more than the twelve bits of an estimate in single precision
-            push -= departing * of(rates.artificial) * (r2 + least).approximate_recip();
+            let rough = (own[5] - other[5]) * d[0];
+            let rough = (own[6] - other[6]).mul_add(d[1], rough);
+            let rough = (own[7] - other[7]).mul_add(d[2], rough);
+            push -=
+                roughness::damped(rough, departing) * of(rates.artificial) * (r2 + least).approximate_recip();
         }
         let push = push * f;
         for k in 0..3 {
@@ -456,7 +499,13 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
             sums[8] = f.mul_add(r2, sums[8]);
         }
         // 1 + 4q = 5 − 4s
-        sums[9] = (f * s).mul_add(s.mul_add(of(-4.0), of(5.0)), sums[9]);
+        let weight = f * s * s.mul_add(of(-4.0), of(5.0));
+        sums[9] = weight + sums[9];
+        if ARTIFICIAL {
+            for k in 0..3 {
+                sums[13 + k] = weight.mul_add(other[k], sums[13 + k]);
+            }
+        }
         if LAMINAR {
             // a particle has no line to itself
             let least = of(LEAST_DISTANCE * rates.kernel.h.powi(2));
@@ -467,8 +516,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         }
     }
 
-    fn finish(&self, i: usize, sums: [f64; 13]) -> [f64; 10] {
-        let [px, py, pz, departing, denser, cx, cy, cz, squares, weights, ux, uy, uz] = sums;
+    fn finish(&self, i: usize, sums: [f64; 16]) -> [f64; 13] {
+        let [px, py, pz, departing, denser, cx, cy, cz, squares, weights, ux, uy, uz, sx, sy, sz] = sums;
         let rates = &self.0;
         let Rates { parameters, steepness, laminar, .. } = *rates;
         let rest = parameters.rest_density;
@@ -519,7 +568,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         if let Some(wall) = &wall {
             let (pressure, by_pairs) =
                 (rates.pressure[i], pairs - 2.0 * rates.pressure[i] * crowding_by_pairs);
-            let balanced = if rates.differences { 1.0 } else { depth };
+            let balanced =
+                if rates.differences { 1.0 } else { depth.max(held(filled) * rates.calm(velocity)) };
             push = push.lerp(wall.completion() * push, balanced);
             if let Some(reaction) = &rates.reaction {
                 let by_pressure = (push - by_pairs) / density;
@@ -528,6 +578,9 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
         }
         let acceleration = mean * (push / density + drag) + parameters.gravity;
         let crowding = depth * crowding;
+        // differences of pressure make waves grow, so that all their motion is damped
+        let smooth =
+            if ARTIFICIAL && !rates.differences { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
         let mut drift = denser + depth * rates.returns(i, filled);
         let rate = if rates.differences {
             // densities follow the equation of continuity
@@ -549,11 +602,21 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<5, 
             crowding.x,
             crowding.y,
             crowding.z,
+            smooth.x,
+            smooth.y,
+            smooth.z,
         ]
     }
 }
 
 impl Rates<'_> {
+    /// How far a particle is at rest, 0 to 1: one if its speed is that of a fall through a sixteenth of a spacing or less,
+    /// zero from an eighth on.
+    fn calm(&self, velocity: DVec3) -> f64 {
+        let fall = 0.125 * 2.0 * self.parameters.gravity.length() * self.parameters.spacing();
+        if fall > 0.0 { (2.0 - 2.0 * velocity.length_squared() / fall).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
     /// The rate at which the density of a particle in the depth returns to what its place says, kg/m³/s.
     fn returns(&self, i: usize, filled: f64) -> f64 {
         let rest = self.parameters.rest_density;
