@@ -31,7 +31,7 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
     let (fluid, method) = (&scene.fluid, scene.method.fluid());
     // a length that is stated for the usual particles grows with those of another size
     let (stated, derived) = ((fluid.mass / fluid.density).cbrt(), (mass / fluid.density).cbrt());
-    let support = if fluid.surface_tension > 0.0 { method.support_with_tension } else { method.support };
+    let support = scene.method.support(fluid.surface_tension > 0.0);
     let usual = support.radius(stated) * (derived / stated);
     Parameters {
         rest_density: fluid.density,

@@ -16,7 +16,7 @@ scene flow {{
   box {{ min: [-1.1, -1.1, 0], max: [1.1, 1.1, 0.5] }}
   container {{ solid: vessel, walls: no_slip }}
   obstacle {{ solid: drum, walls: no_slip{surface} }}
-  fluid oil {{ shape: 0.25 <= x^2 + y^2 <= 1, density: 1000, spacing: 0.125, viscosity: 100, sound_speed: 10 }}
+  fluid oil {{ shape: 0.25 <= x^2 + y^2 <= 1, density: 1000, spacing: 0.125, support_radius: 2.6*0.125, viscosity: 100, sound_speed: 10 }}
   gravity: [0, 0, 0]
   run {{ until: 1 s, dt: 0.5 ms }}
 }}"

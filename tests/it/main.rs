@@ -58,3 +58,4 @@ mod validation;
 mod view;
 mod walls;
 mod watching;
+mod waves;

@@ -83,8 +83,6 @@ pub struct FluidDefaults {
     pub particles: Option<usize>,
     /// Support radius of the kernel.
     pub support: Support,
-    /// The same for a fluid with surface tension.
-    pub support_with_tension: Support,
     /// Precision of the sums over neighbours.
     pub precision: Precision,
     /// Whether the length of steps follows the state, unless the scene states it.
@@ -134,6 +132,13 @@ pub(in crate::sph) trait Declaration: Default + 'static {
     const PASSES: &'static [(Pass, Absence<Self>)];
     /// Columns of a checkpoint besides those that every method has.
     const SAVES: &'static [&'static str];
+    /// When [`Declaration::support`] is not that of the fluid's defaults, in words, and what it is then.
+    const OTHER_SUPPORT: Option<(Support, &'static str)> = None;
+
+    /// The support radius that suits these numbers, for a fluid with surface tension or without.
+    fn support(&self, _has_tension: bool) -> Support {
+        Self::FLUID.support
+    }
 }
 
 /// A source of values for keys: the reader of a scene implements it. Values out of range are reported to the
@@ -227,6 +232,8 @@ pub struct MethodInfo {
     pub passes: Vec<Pass>,
     /// Names of the columns that the method adds to a checkpoint.
     pub saves: &'static [&'static str],
+    /// Another support radius than that of the fluid's defaults, and when that is so.
+    pub other_support: Option<(Support, &'static str)>,
 }
 
 /// A key's declaration in words.
@@ -258,6 +265,7 @@ impl MethodInfo {
             keys: M::KEYS.iter().map(KeyInfo::of).collect(),
             passes: M::PASSES.iter().map(|(pass, _)| *pass).collect(),
             saves: M::SAVES,
+            other_support: M::OTHER_SUPPORT,
         }
     }
 

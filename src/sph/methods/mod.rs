@@ -67,6 +67,11 @@ macro_rules! methods {
                 match self { $(Self::$method(_) => $method::FLUID),* }
             }
 
+            /// The support radius that suits the method's numbers, for a fluid with surface tension or without.
+            pub fn support(&self, has_tension: bool) -> Support {
+                match self { $(Self::$method(numbers) => numbers.support(has_tension)),* }
+            }
+
             /// Sets the numbers of the method from the keys that a scene states.
             pub fn read(&mut self, reader: &mut dyn KeyReader) {
                 match self { $(Self::$method(numbers) => read(numbers, reader)),* }

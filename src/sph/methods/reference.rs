@@ -39,8 +39,8 @@ fn section(text: &mut String, method: &MethodInfo) -> std::fmt::Result {
         Support::Spacings(count) => format!("{count} particle spacings"),
     };
     let mut support = length(fluid.support);
-    if fluid.support_with_tension != fluid.support {
-        let _ = write!(support, " ({} with surface tension)", length(fluid.support_with_tension));
+    if let Some((other, when)) = method.other_support {
+        write!(support, " ({} {when})", length(other))?;
     }
     writeln!(
         text,

@@ -73,7 +73,6 @@ impl Declaration for Dfsph {
         particles: Some(10_000),
         // many neighbours make the solver slow
         support: Support::Spacings(2.2),
-        support_with_tension: Support::Spacings(2.2),
         precision: Precision::F32,
         adaptive: true,
     };

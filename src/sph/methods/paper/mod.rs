@@ -55,7 +55,6 @@ impl Declaration for Paper {
         surface_tension: 0.0728,
         particles: None,
         support: Support::Metres(0.1),
-        support_with_tension: Support::Metres(0.1),
         precision: Precision::F64,
         adaptive: false,
     };

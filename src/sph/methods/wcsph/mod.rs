@@ -71,6 +71,10 @@ impl Default for Wcsph {
 }
 
 impl Wcsph {
+    /// The support radius where pressures act by differences, which need no more, or where a bent surface must be seen
+    /// from near.
+    const NEAR: Support = Support::Spacings(2.6);
+
     /// The factor α·h/2·c of the artificial viscosity, m²/s.
     fn artificial_factor(&self, scales: &Scales) -> f64 {
         self.artificial_viscosity * 0.5 * scales.support_radius * self.sound_speed(scales)
@@ -97,8 +101,6 @@ impl Declaration for Wcsph {
         particles: Some(10_000),
         // many neighbours make pressures smooth, and let rows of particles slide past each other
         support: Support::Spacings(3.0),
-        // a surface that is bent is seen better from near
-        support_with_tension: Support::Spacings(2.6),
         precision: Precision::F32,
         adaptive: true,
     };
@@ -208,6 +210,12 @@ impl Declaration for Wcsph {
         "smooth velocity y",
         "smooth velocity z",
     ];
+    const OTHER_SUPPORT: Option<(Support, &'static str)> =
+        Some((Self::NEAR, "with surface tension or `gradients: differences`"));
+
+    fn support(&self, has_tension: bool) -> Support {
+        if has_tension || self.gradients == Gradients::Differences { Self::NEAR } else { Self::FLUID.support }
+    }
 }
 
 impl Numerics for Wcsph {
