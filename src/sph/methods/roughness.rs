@@ -5,11 +5,11 @@
 //! Π_ij ∝ α·h·c·(that of v′_ij·d and v_ij·d which is nearer to zero; zero if their signs differ)
 //! ```
 //!
-//! An artificial viscosity of the whole motion brakes waves too: with α = 0.02 and twenty layers a free wave loses half of its
-//! height in five periods. A velocity that is linear in space is its own mean v̄ in the depth of a fluid, so the
-//! viscosity of v′ leaves it alone, and a wave of length L loses (h/L)² times as much as before. Noise from particle to particle has no mean and is damped
-//! as before. Pairs still exchange equal and opposite momenta along their lines, and since v′·d never acts against
-//! v·d, each pair takes energy away.
+//! An artificial viscosity of the whole motion brakes waves too: with α = 0.02 and twenty layers a free wave loses
+//! half of its height in five periods. A velocity that is linear in space is its own mean v̄ in the depth of a fluid,
+//! so the viscosity of v′ leaves it alone, and damps a wave of length L by a part of the order (h/L)² of what it did.
+//! Noise from particle to particle has no mean, and is damped as before. Pairs still exchange equal and opposite
+//! momenta along their lines, and each pair takes energy away, because v′·d never acts against v·d.
 //!
 //! The mean is that of the step before, which the same sum finds on its way. In one step the noise of
 //! velocities changes little, and what gravity adds is the same for all.

@@ -36,10 +36,13 @@
 //! continued linearly by the fluid's own balance ∇p = ρ(g + viscous − a). Since a is the unknown, this is a
 //! linear system of three unknowns for each particle at a wall; the factor (1 − K)⁻¹ solves it. (Without it
 //! water at rest keeps moving along its walls, 3 cm/s in the mean after three seconds instead of 1 cm/s, and
-//! is 14 % too light at the floor. Where the particles of the surface have no such factor, walls do not bear their
-//! share of its weight: the pressure of water eight layers deep is too high by a tenth of a layer, everywhere.) Spray that hits a wall has no balance, so it has no such factor, and its
-//! motion conserves energy. Along walls that let it slip the flow is mirrored: the part of the kernel inside
-//! them adds to the viscosity what the rest does.
+//! is 14 % too light at the floor.) Spray that hits a wall has no balance, so it has no such factor, and its
+//! motion conserves energy. Particles of a surface at rest have one, or walls would not bear their share of its
+//! weight: the pressure of water eight layers deep was too high by a tenth of a layer, everywhere. Those of a
+//! surface that moves have none: a film that runs along a floor would gain energy by it, 0.5 % of what a tank had.
+//!
+//! Along walls that let it slip the flow is mirrored: the part of the kernel inside them adds to the viscosity
+//! what the rest does.
 //!
 //! Time: kick–drift–kick with one evaluation per step.
 
