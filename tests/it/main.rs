@@ -17,6 +17,7 @@ mod driven;
 mod editors;
 mod examples;
 mod files;
+mod fillings;
 mod findings;
 mod fluid_surface;
 mod hard_cases;
