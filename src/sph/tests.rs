@@ -239,7 +239,7 @@ fn a_run_that_would_never_end_is_an_error() {
     let mut simulation =
         Simulation::new(fall, one(DVec3::ONE, DVec3::ZERO), scenes::BOX, Vec::new()).unwrap();
     simulation.step().unwrap();
-    simulation.set_gravity(DVec3::new(0.0, 0.0, 1e15));
+    simulation.set_gravity(DVec3::new(0.0, 0.0, 1e14));
     let error = (0..3).find_map(|_| simulation.step().err()).unwrap();
     assert!(matches!(error, StepError::Stalled { id: 0, dt, .. } if dt < 1e-7), "{error}");
     assert!(error.to_string().contains("particle 0 is the fastest"), "{error}");
@@ -247,7 +247,7 @@ fn a_run_that_would_never_end_is_an_error() {
 
 #[test]
 fn wcsph_pairs_conserve_momentum_in_free_space() {
-    let wcsph = Wcsph { sound_speed: Some(10.0), artificial_viscosity: 0.1, ..Wcsph::default() };
+    let wcsph = Wcsph { sound_speed: Some(10.0), artificial_viscosity: Some(0.1), ..Wcsph::default() };
     let parameters = Parameters {
         gravity: DVec3::ZERO,
         surface_tension: 0.0,

@@ -7,6 +7,7 @@ use rfm::{Experiment, Program};
 /// A drum that turns drags the fluid that sticks to it as much as one at rest whose surface moves as fast.
 #[test]
 fn a_turning_drum_drags_the_fluid_along() {
+    // four spacings across: with a support of three, where the packed particles begin would weigh more
     let mean_turn = |drum: &str, surface: &str| {
         let text = format!(
             "rfm 1

@@ -35,16 +35,10 @@ pub(in crate::sph) trait Numerics: Sync {
         COURANT * scales.support_radius / (self.sound_speed(scales) + max_speed)
     }
 
-    /// The kinematic viscosity, m²/s, that an artificial viscosity has for noise; 0 if there is none.
-    fn artificial_viscosity(&self, _scales: &Scales) -> f64 {
-        0.0
-    }
-
     /// The longest step, s, that viscosity allows: (h/2)²/24ν. Forces along lines resist a compression three times
     /// as strongly as a shear. With (h/2)²/12ν, a flow in a channel bursts.
     fn viscous_dt(&self, scales: &Scales) -> f64 {
-        let kinematic = scales.viscosity / scales.rest_density + self.artificial_viscosity(scales);
-        (0.5 * scales.support_radius).powi(2) / (24.0 * kinematic)
+        (0.5 * scales.support_radius).powi(2) * scales.rest_density / (24.0 * scales.viscosity)
     }
 
     /// The longest step, s, that surface tension allows: ¼√(ρ(h/2)³/2πσ), for a ripple as short as the

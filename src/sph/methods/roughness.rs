@@ -6,8 +6,9 @@
 //! ```
 //!
 //! An artificial viscosity of the whole motion brakes waves too: with α = 0.02 and twenty layers a free wave loses
-//! half of its height in five periods. A velocity that is linear in space is its own mean v̄ in the depth of a fluid,
-//! so the viscosity of v′ leaves it alone, and damps a wave of length L by a part of the order (h/L)² of what it did.
+//! half of its height in five periods (`wcsph`). A velocity that is linear in space is its own mean v̄ in the depth of a
+//! fluid, so the viscosity of v′ leaves it alone, and damps a wave of length L by a part of the order (h/L)² of what it
+//! did. At a surface and beside walls the mean is one-sided, and smooth motion is damped a little there.
 //! Noise from particle to particle has no mean, and is damped as before. Pairs still exchange equal and opposite
 //! momenta along their lines, and each pair takes energy away, because v′·d never acts against v·d.
 //!
@@ -76,6 +77,12 @@ impl Roughness {
     pub fn bytes(&self) -> usize {
         self.smooth.bytes() + self.rough.bytes()
     }
+}
+
+/// The factor α·h/2·c of an artificial viscosity, m²/s, or as much of it as noise bears in a step of the length `dt`: with a
+/// greater one the step would turn noise round and make it grow. The limit is that of a viscosity ν = factor/10.
+pub(super) fn within_step(factor: f64, support_radius: f64, dt: f64) -> f64 {
+    factor.min(10.0 * (0.5 * support_radius).powi(2) / (24.0 * dt))
 }
 
 /// The difference of rough velocities along a line, as far as it takes energy from the whole motion, `whole`.

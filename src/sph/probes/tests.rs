@@ -34,7 +34,7 @@ fn water(method: Method) -> Parameters {
 }
 
 fn weakly() -> Method {
-    Method::Wcsph(Wcsph { sound_speed: Some(30.0), artificial_viscosity: 0.0, ..Wcsph::default() })
+    Method::Wcsph(Wcsph { sound_speed: Some(30.0), artificial_viscosity: Some(0.0), ..Wcsph::default() })
 }
 
 /// Particles at the middles of the cells of a lattice that fills a box.
@@ -160,7 +160,7 @@ fn energies_of_a_fall() {
     let method = Method::Wcsph(Wcsph {
         sound_speed: Some(30.0),
         density_diffusion: 0.0,
-        artificial_viscosity: 0.0,
+        artificial_viscosity: Some(0.0),
         ..Wcsph::default()
     });
     let parameters = Parameters { precision: crate::sph::Precision::F64, ..water(method) };

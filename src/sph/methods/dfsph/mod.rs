@@ -159,11 +159,6 @@ impl Numerics for Dfsph {
         ADVECTION * scales.spacing() / max_speed
     }
 
-    fn artificial_viscosity(&self, scales: &Scales) -> f64 {
-        // forces along lines are those of ten times the kinematic viscosity
-        self.artificial_factor(scales) / 10.0
-    }
-
     fn force_factor(&self) -> f64 {
         IMPLICIT_FORCE_FACTOR
     }

@@ -31,7 +31,7 @@
 //! density that is found next, up to the square of the displacement. (With the system of forces a breaking dam
 //! keeps three times the tolerance.)
 //!
-//! Artificial viscosity (Monaghan 1992) takes the noise of the particles' disorder, which nothing else would
+//! Artificial viscosity of rough motion ([`roughness`]) takes the noise of the particles' disorder, which nothing else would
 //! take from a fluid without viscosity. Both viscosities act along the lines between particles, and conserve
 //! momentum and angular momentum.
 //!
@@ -44,7 +44,7 @@
 use smallvec::{SmallVec, smallvec};
 
 use super::super::{
-    roughness::Roughness,
+    roughness::{self, Roughness},
     scheme::Scheme,
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
@@ -242,7 +242,11 @@ impl DivergenceFree {
         let g = core.parameters.gravity;
         let Vectors { x, y, z } = &mut acceleration;
         let parameters = &core.parameters;
-        let artificial = self.numbers.artificial_factor(&parameters.scales());
+        let artificial = roughness::within_step(
+            self.numbers.artificial_factor(&parameters.scales()),
+            parameters.support_radius,
+            dt,
+        );
         let kinematic = parameters.viscosity / parameters.rest_density;
         if kinematic > 0.0 || artificial > 0.0 {
             let (constants, velocity) = (Constants::of(parameters), &core.particles.velocity);

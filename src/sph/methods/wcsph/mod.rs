@@ -26,10 +26,9 @@ pub enum Gradients {
     /// Sums p_i + p_j: what one particle gains, the other loses, so momentum is conserved to rounding.
     #[default]
     Pairs,
-    /// Differences p_j − p_i in the fluid's depth: exact where the pressure is linear in space, and five to
-    /// ten times as accurate in fluids at rest, in viscous ones and in those without a free surface. They
-    /// need shifting and, at a free surface, an artificial viscosity of some 0.05: without it, waves gain
-    /// energy.
+    /// Differences p_j − p_i in the fluid's depth: exact where the pressure is linear in space, and better than
+    /// pairs in viscous flows and those without a free surface. They need shifting and, at a free surface, an
+    /// artificial viscosity of some 0.05: without it, waves gain energy.
     Differences,
 }
 
@@ -42,8 +41,9 @@ pub struct Wcsph {
     /// δ of the density diffusion (Molteni & Colagrossi 2009). Default 0.1; zero: the term is not computed.
     pub density_diffusion: f64,
     /// α of the artificial viscosity (Monaghan 1992). With pairs of pressures it acts on rough motion alone; with
-    /// differences on all, which without it would gain energy. Default 0.1; zero: the term is not computed.
-    pub artificial_viscosity: f64,
+    /// differences on all, which without it would gain energy. `None`: 0.1 with pairs, 0.02 with differences; zero: the term
+    /// is not computed.
+    pub artificial_viscosity: Option<f64>,
     /// How the pressures of two particles enter their acceleration.
     pub gradients: Gradients,
     /// How strongly particles drift to where there are fewer of them, which keeps them evenly distributed.
@@ -61,7 +61,7 @@ impl Default for Wcsph {
         Self {
             sound_speed: None,
             density_diffusion: 0.1,
-            artificial_viscosity: 0.1,
+            artificial_viscosity: None,
             gradients: Gradients::Pairs,
             shifting: None,
             negative_pressure: NegativePressure::Clamp,
@@ -71,13 +71,21 @@ impl Default for Wcsph {
 }
 
 impl Wcsph {
+    /// α of the artificial viscosity, stated or derived.
+    fn artificial_viscosity(&self) -> f64 {
+        self.artificial_viscosity.unwrap_or(match self.gradients {
+            Gradients::Pairs => 0.1,
+            Gradients::Differences => 0.02,
+        })
+    }
+
     /// The support radius where pressures act by differences, which need no more, or where a bent surface must be seen
     /// from near.
     const NEAR: Support = Support::Spacings(2.6);
 
     /// The factor α·h/2·c of the artificial viscosity, m²/s.
     fn artificial_factor(&self, scales: &Scales) -> f64 {
-        self.artificial_viscosity * 0.5 * scales.support_radius * self.sound_speed(scales)
+        self.artificial_viscosity() * 0.5 * scales.support_radius * self.sound_speed(scales)
     }
 
     /// The strength of the shifting, stated or derived.
@@ -136,9 +144,9 @@ impl Declaration for Wcsph {
             value: Value::Number {
                 dimension: Dimension::NONE,
                 bound: Bound::NotNegative,
-                get: |wcsph| Some(wcsph.artificial_viscosity),
-                set: |wcsph, alpha| wcsph.artificial_viscosity = alpha,
-                derived: "",
+                get: |wcsph| wcsph.artificial_viscosity,
+                set: |wcsph, alpha| wcsph.artificial_viscosity = Some(alpha),
+                derived: "0.1 with pairs, 0.02 with differences",
             },
         },
         Key {
@@ -191,7 +199,7 @@ impl Declaration for Wcsph {
         (Pass::PressureSolver, |_, _| Some(Pass::STATE)),
         (Pass::Viscosity, |_, scales| Pass::without_viscosity(scales)),
         (Pass::ArtificialViscosity, |wcsph, _| {
-            (wcsph.artificial_viscosity == 0.0).then_some("the artificial viscosity is zero")
+            (wcsph.artificial_viscosity() == 0.0).then_some("the artificial viscosity is zero")
         }),
         (Pass::Shifting, |wcsph, _| (wcsph.shifting() == 0.0).then_some("the shifting is zero")),
         (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
@@ -229,11 +237,6 @@ impl Numerics for Wcsph {
 
     fn sound_speed(&self, scales: &Scales) -> f64 {
         self.sound_speed.unwrap_or(SOUND_OVER_SPEED * scales.expected_speed)
-    }
-
-    fn artificial_viscosity(&self, scales: &Scales) -> f64 {
-        // forces along lines are those of ten times the kinematic viscosity
-        self.artificial_factor(scales) / 10.0
     }
 
     /// The density ρ₀(1 + 7p/(c²ρ₀))^(1/7), the inverse of Tait's equation.

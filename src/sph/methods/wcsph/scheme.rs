@@ -22,7 +22,8 @@
 //! Kernel: Wendland C2 (1995), under which particles do not clump. Density diffusion: Molteni & Colagrossi
 //! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
 //! Viscosity: laminar (Monaghan & Gingold 1983, with the factor 2(d + 2) = 10 of three dimensions) and artificial
-//! (Monaghan 1992). Both act along the lines between particles and so conserve angular momentum.
+//! (Monaghan 1992), with pairs of pressures that of rough motion alone ([`roughness`]). Both act along the lines between
+//! particles and so conserve angular momentum.
 //!
 //! With `gradients: differences` the depth of the fluid has gradients by differences instead, divided by what
 //! the sum makes of the gradient of a position, G = −⅓ Σ V r·∇W + ⅓ tr K (0.98 on a lattice at h = 2.6 spacings). A pressure that is linear in space has
@@ -248,30 +249,8 @@ impl Weakly {
         self.crowding.resize(n);
         self.filled.resize(n, 0.0);
         let mut pressure = std::mem::take(&mut core.particles.pressure);
-        let (numbers, parameters) = (&self.numbers, &core.parameters);
-        let even = is_kept_even(numbers);
-        // where particles are not kept even, only differences of the excess matter, so that of a fluid at
-        // rest is subtracted
-        let (at_rest, from) = (at_rest(numbers, parameters), core.boundary.domain.min);
-        let Vectors { x, y, z } = &core.particles.position;
-        let places = x.par_chunks(CHUNK).zip(y.par_chunks(CHUNK)).zip(z.par_chunks(CHUNK));
-        let columns = self.excess.par_chunks_mut(CHUNK).zip(pressure.par_chunks_mut(CHUNK));
-        columns.zip(places).for_each(|((excess, pressure), ((x, y), z))| {
-            for (excess, pressure) in excess.iter_mut().zip(pressure) {
-                *pressure = tait(numbers, parameters, *excess);
-                *excess -= parameters.rest_density;
-                if numbers.gradients == Gradients::Pairs {
-                    // where nothing pulls, a density below that at rest is as good as that at rest
-                    *excess = numbers.negative_pressure.of(*excess);
-                }
-            }
-            if !even {
-                for (((excess, x), y), z) in excess.iter_mut().zip(x).zip(y).zip(z) {
-                    *excess -= at_rest.dot(DVec3::new(*x, *y, *z) - from);
-                }
-            }
-        });
-
+        self.find_excess(core, &mut pressure);
+        let numbers = &self.numbers;
         let mut acceleration = std::mem::take(&mut core.acceleration);
         let Vectors { x: vx, y: vy, z: vz } = &predicted;
         let (Vectors { x: rx, y: ry, z: rz }, Vectors { x: sx, y: sy, z: sz }) =
@@ -318,6 +297,33 @@ impl Weakly {
         self.last_dt = dt;
         core.pull();
         self.tension.act(core);
+    }
+
+    /// Finds the pressures of the predicted densities, and makes of these densities what the sums read.
+    fn find_excess(&mut self, core: &Core, pressure: &mut [f64]) {
+        let (numbers, parameters) = (&self.numbers, &core.parameters);
+        let even = is_kept_even(numbers);
+        // where particles are not kept even, only differences of the excess matter, so that of a fluid at
+        // rest is subtracted
+        let (at_rest, from) = (at_rest(numbers, parameters), core.boundary.domain.min);
+        let Vectors { x, y, z } = &core.particles.position;
+        let places = x.par_chunks(CHUNK).zip(y.par_chunks(CHUNK)).zip(z.par_chunks(CHUNK));
+        let columns = self.excess.par_chunks_mut(CHUNK).zip(pressure.par_chunks_mut(CHUNK));
+        columns.zip(places).for_each(|((excess, pressure), ((x, y), z))| {
+            for (excess, pressure) in excess.iter_mut().zip(pressure) {
+                *pressure = tait(numbers, parameters, *excess);
+                *excess -= parameters.rest_density;
+                if numbers.gradients == Gradients::Pairs {
+                    // where nothing pulls, a density below that at rest is as good as that at rest
+                    *excess = numbers.negative_pressure.of(*excess);
+                }
+            }
+            if !even {
+                for (((excess, x), y), z) in excess.iter_mut().zip(x).zip(y).zip(z) {
+                    *excess -= at_rest.dot(DVec3::new(*x, *y, *z) - from);
+                }
+            }
+        });
     }
 
     /// Predicts densities for the end of a step of the length `dt`, by the rates of the last two instants
@@ -438,7 +444,8 @@ impl<'a> Rates<'a> {
             diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
             at_rest: at_rest(numbers, parameters),
             laminar: parameters.viscosity / parameters.rest_density,
-            artificial: numbers.artificial * parameters.rest_density,
+            artificial: roughness::within_step(numbers.artificial, parameters.support_radius, dt)
+                * parameters.rest_density,
             density: &core.particles.density,
             clamped: numbers.negative_pressure == NegativePressure::Clamp,
             differences: numbers.gradients == Gradients::Differences,
@@ -452,7 +459,7 @@ impl<'a> Rates<'a> {
 
 /// The pass over pairs, with laminar and artificial viscosity or without, and for particles that are kept
 /// even or not. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
-/// f·(ρ_j − ρ_i), f·d, f·d², W and f·((v_j − v_i)·d)·d/d². For particles that are not kept even it sums p_j + p_i
+/// f·(ρ_j − ρ_i), f·d, f·d², W, f·((v_j − v_i)·d)·d/d² and W·v_j; the artificial viscosity Π is that of rough velocities. For particles that are not kept even it sums p_j + p_i
 /// instead of p_j − p_i, and omits f·d and f·d².
 #[derive(Clone, Copy)]
 struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
@@ -572,7 +579,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
             let (pressure, by_pairs) =
                 (rates.pressure[i], pairs - 2.0 * rates.pressure[i] * crowding_by_pairs);
             let balanced =
-                if rates.differences { 1.0 } else { depth.max(held(filled) * rates.calm(velocity)) };
+                if rates.differences { 1.0 } else { depth.max(held(filled) * rates.calm(i, velocity)) };
             push = push.lerp(wall.completion() * push, balanced);
             if let Some(reaction) = &rates.reaction {
                 let by_pressure = (push - by_pairs) / density;
@@ -613,10 +620,10 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
 }
 
 impl Rates<'_> {
-    /// How far a particle is at rest, 0 to 1: one if its speed is that of a fall through a sixteenth of a spacing or less,
-    /// zero from an eighth on.
-    fn calm(&self, velocity: DVec3) -> f64 {
-        let fall = 0.125 * 2.0 * self.parameters.gravity.length() * self.parameters.spacing();
+    /// How far a particle is at rest in the scene, 0 to 1: one if its speed is that of a fall through a sixteenth of a
+    /// spacing or less, zero from an eighth on. Where nothing falls there is no weight to share, and it is zero.
+    fn calm(&self, i: usize, velocity: DVec3) -> f64 {
+        let fall = 0.125 * 2.0 * self.core.gravity(i).length() * self.parameters.spacing();
         if fall > 0.0 { (2.0 - 2.0 * velocity.length_squared() / fall).clamp(0.0, 1.0) } else { 0.0 }
     }
 
