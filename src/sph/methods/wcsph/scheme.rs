@@ -302,8 +302,8 @@ impl Weakly {
     /// Finds the pressures of the predicted densities, and makes of these densities what the sums read.
     fn find_excess(&mut self, core: &Core, pressure: &mut [f64]) {
         let (numbers, parameters) = (&self.numbers, &core.parameters);
-        let even = is_kept_even(numbers);
-        // where particles are not kept even, only differences of the excess matter, so that of a fluid at
+        let even = sums_crowding(numbers, core);
+        // where how particles crowd is not summed, only differences of the excess matter, so that of a fluid at
         // rest is subtracted
         let (at_rest, from) = (at_rest(numbers, parameters), core.boundary.domain.min);
         let Vectors { x, y, z } = &core.particles.position;
@@ -358,9 +358,10 @@ impl Weakly {
     }
 }
 
-/// Whether particles are kept evenly distributed: with differences of pressure, and with shifting.
-fn is_kept_even(numbers: &Numbers) -> bool {
-    numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences
+/// Whether how particles crowd is summed: where they are kept evenly distributed, with differences of pressure and with
+/// shifting, and where the growth of the density at rest depends on the place, as gravity does.
+fn sums_crowding(numbers: &Numbers, core: &Core) -> bool {
+    numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences || core.gravity_field.is_some()
 }
 
 /// ρ₀/c²·g: how the density of a fluid at rest grows with the depth, kg/m⁴.
@@ -393,14 +394,15 @@ struct Rates<'a> {
     core: &'a Core,
     velocity: &'a Vectors,
     pressure: &'a [f64],
-    /// ρ − ρ₀; where particles are not kept even, less the excess in a fluid at rest.
+    /// ρ − ρ₀; where how particles crowd is not summed, less the excess in a fluid at rest.
     excess: &'a [f64],
     kernel: Wendland,
     /// The factor V·c of V∇W = −V·c·(1 − q)³·r.
     steepness: f64,
     /// The factor 2δ·h/2·c·ρ₀ of the diffusion, over ρ₀.
     diffusion: f64,
-    at_rest: DVec3,
+    /// ρ₀/c², s²·kg/m⁵: how the density of a fluid at rest grows along gravity.
+    compressibility: f64,
     /// Kinematic viscosity ν = μ/ρ₀, m²/s.
     laminar: f64,
     /// The factor α·h/2·c·ρ₀ of the artificial viscosity.
@@ -415,7 +417,7 @@ struct Rates<'a> {
     return_rate: f64,
     /// Σ V W on a lattice.
     lattice: f64,
-    /// Whether particles are kept even, see [`is_kept_even`].
+    /// Whether how particles crowd is summed, see [`sums_crowding`].
     even: bool,
     /// Where what walls do is noted, if it is to be.
     reaction: Option<Reaction<'a>>,
@@ -442,7 +444,7 @@ impl<'a> Rates<'a> {
             kernel,
             steepness: parameters.particle_mass / parameters.rest_density * kernel.steepness,
             diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
-            at_rest: at_rest(numbers, parameters),
+            compressibility: parameters.rest_density / numbers.sound_speed.powi(2),
             laminar: parameters.viscosity / parameters.rest_density,
             artificial: roughness::within_step(numbers.artificial, parameters.support_radius, dt)
                 * parameters.rest_density,
@@ -451,7 +453,7 @@ impl<'a> Rates<'a> {
             differences: numbers.gradients == Gradients::Differences,
             return_rate: return_rate(core),
             lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
-            even: is_kept_even(numbers),
+            even: sums_crowding(numbers, core),
             reaction: Reaction::of(core, dt),
         }
     }
@@ -459,7 +461,8 @@ impl<'a> Rates<'a> {
 
 /// The pass over pairs, with laminar and artificial viscosity or without, and for particles that are kept
 /// even or not. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
-/// f·(ρ_j − ρ_i), f·d, f·d², W, f·((v_j − v_i)·d)·d/d² and W·v_j; the artificial viscosity Π is that of rough velocities. For particles that are not kept even it sums p_j + p_i
+/// f·(ρ_j − ρ_i), f·d, f·d², W, f·((v_j − v_i)·d)·d/d² and W·v_j; the artificial viscosity Π is that of rough velocities.
+/// Where how particles crowd is not summed it has p_j + p_i
 /// instead of p_j − p_i, and omits f·d and f·d².
 #[derive(Clone, Copy)]
 struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(Rates<'a>);
@@ -534,7 +537,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         let mut crowding = -steepness * DVec3::new(cx, cy, cz);
         let mut denser = rates.diffusion * steepness * denser;
         if EVEN {
-            denser -= rates.diffusion * rates.at_rest.dot(crowding);
+            denser -= rates.diffusion * rates.at_rest(i).dot(crowding);
         }
         let mut push = steepness * DVec3::new(px, py, pz);
         let mut spread = steepness * squares / 3.0;
@@ -620,6 +623,11 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
 }
 
 impl Rates<'_> {
+    /// How the density of a fluid at rest grows at a particle, kg/m⁴.
+    fn at_rest(&self, i: usize) -> DVec3 {
+        self.compressibility * self.core.gravity(i)
+    }
+
     /// How far a particle is at rest in the scene, 0 to 1: one if its speed is that of a fall through a sixteenth of a
     /// spacing or less, zero from an eighth on. Where nothing falls there is no weight to share, and it is zero.
     fn calm(&self, i: usize, velocity: DVec3) -> f64 {
