@@ -1,5 +1,7 @@
 //! The weakly compressible method: its numbers, keys and limits. The scheme is in [`scheme`].
 
+mod numbers;
+mod passes;
 mod scheme;
 
 pub(super) use scheme::Weakly;

@@ -1,0 +1,292 @@
+//! The sum over neighbours, and what is made of it for each particle.
+
+use fearless_simd::{Simd, SimdFloat};
+use glam::DVec3;
+
+use super::super::{
+    negative_pressure::NegativePressure,
+    roughness,
+    shifting::{depth, return_rate},
+};
+use super::Gradients;
+use super::numbers::{Numbers, sums_crowding};
+use crate::sph::{
+    core::Core,
+    kernel::Wendland,
+    pairs::{PairPass, Real},
+    params::Parameters,
+    particles::Vectors,
+    reaction::Reaction,
+    walls::{Friction, Pushed, WallDrag},
+};
+
+/// Squares of distances below this part of h² do not count as a direction.
+const LEAST_DISTANCE: f64 = 1e-6;
+
+/// Limits of Σ V W, with the part of a wall, between which a particle at the wall begins to take part in the balance
+/// of the fluid: spray has less, and a surface at rest more.
+const HELD: [f64; 2] = [0.7, 0.8];
+
+/// How far a particle at a wall takes part in the balance of the fluid, 0 to 1, from its Σ V W.
+fn held(filled: f64) -> f64 {
+    let [spray, surface] = HELD;
+    ((filled - spray) / (surface - spray)).clamp(0.0, 1.0)
+}
+
+/// What the pass over pairs needs besides the columns that it sums.
+#[derive(Clone, Copy)]
+pub(super) struct Rates<'a> {
+    parameters: &'a Parameters,
+    core: &'a Core,
+    velocity: &'a Vectors,
+    pressure: &'a [f64],
+    /// ρ − ρ₀; where how particles crowd is not summed, less the excess in a fluid at rest.
+    excess: &'a [f64],
+    kernel: Wendland,
+    /// The factor V·c of V∇W = −V·c·(1 − q)³·r.
+    steepness: f64,
+    /// The factor 2δ·h/2·c·ρ₀ of the diffusion, over ρ₀.
+    diffusion: f64,
+    /// ρ₀/c², s²·kg/m⁵: how the density of a fluid at rest grows along gravity.
+    compressibility: f64,
+    /// Kinematic viscosity ν = μ/ρ₀, m²/s.
+    pub laminar: f64,
+    /// The factor α·h/2·c·ρ₀ of the artificial viscosity.
+    pub artificial: f64,
+    /// Densities before the step, kg/m³.
+    density: &'a [f64],
+    /// Whether nothing pulls, so that a density below that at rest is as good as that at rest.
+    clamped: bool,
+    /// Whether pressures act by their differences in the fluid's depth.
+    differences: bool,
+    /// Rate at which densities return to what the places say, 1/s.
+    return_rate: f64,
+    /// Σ V W on a lattice.
+    lattice: f64,
+    /// Whether how particles crowd is summed, see [`sums_crowding`].
+    pub even: bool,
+    /// Where what walls do is noted, if it is to be.
+    reaction: Option<Reaction<'a>>,
+}
+
+impl<'a> Rates<'a> {
+    pub fn new(
+        core: &'a Core,
+        numbers: &Numbers,
+        velocity: &'a Vectors,
+        pressure: &'a [f64],
+        excess: &'a [f64],
+        dt: f64,
+    ) -> Self {
+        let parameters = &core.parameters;
+        let kernel = Wendland::new(parameters.support_radius);
+        let smoothing = 0.5 * parameters.support_radius;
+        Self {
+            parameters,
+            core,
+            velocity,
+            pressure,
+            excess,
+            kernel,
+            steepness: parameters.particle_mass / parameters.rest_density * kernel.steepness,
+            diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
+            compressibility: parameters.rest_density / numbers.sound_speed.powi(2),
+            laminar: parameters.viscosity / parameters.rest_density,
+            artificial: roughness::within_step(numbers.artificial, parameters.support_radius, dt)
+                * parameters.rest_density,
+            density: &core.particles.density,
+            clamped: numbers.negative_pressure == NegativePressure::Clamp,
+            differences: numbers.gradients == Gradients::Differences,
+            return_rate: return_rate(core),
+            lattice: Wendland::lattice_sum(parameters.support_radius / parameters.spacing()),
+            even: sums_crowding(numbers, core),
+            reaction: Reaction::of(core, dt),
+        }
+    }
+}
+
+/// The pass over pairs, with laminar and artificial viscosity or without, and with how particles crowd
+/// or without. With f = (1 − q)³ and d from the neighbour it sums f·(p_j − p_i + Π)·d, f·(v_i − v_j)·d,
+/// f·(ρ_j − ρ_i), f·d, f·d², W, f·((v_j − v_i)·d)·d/d² and W·v_j; the artificial viscosity Π is that of rough velocities.
+/// Where how particles crowd is not summed it has p_j + p_i instead of p_j − p_i, and omits f·d and f·d².
+#[derive(Clone, Copy)]
+pub(super) struct Pairs<'a, const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool>(pub Rates<'a>);
+
+impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 16, 13>
+    for Pairs<'_, LAMINAR, ARTIFICIAL, EVEN>
+{
+    /// The artificial viscosity is a pressure between particles that approach, and a tension between those
+    /// that part. With the pressure alone, noise at rest would hold up a part of the fluid's weight (3 % of
+    /// it with α = 0.1).
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        own: &[V; 8],
+        other: [V; 8],
+        sums: &mut [V; 16],
+    ) {
+        let of = V::Element::of;
+        let rates = &self.0;
+        let s = rates.kernel.nearness(r2);
+        let f = s * s * s;
+        let departing = (own[0] - other[0]) * d[0];
+        let departing = (own[1] - other[1]).mul_add(d[1], departing);
+        let departing = (own[2] - other[2]).mul_add(d[2], departing);
+        let mut push = if EVEN { other[3] - own[3] } else { other[3] + own[3] };
+        if ARTIFICIAL {
+            let least = of(0.01 * (0.5 * rates.kernel.h).powi(2));
+            // an artificial viscosity needs no more than the twelve bits of an estimate in single precision
+            let rough = (own[5] - other[5]) * d[0];
+            let rough = (own[6] - other[6]).mul_add(d[1], rough);
+            let rough = (own[7] - other[7]).mul_add(d[2], rough);
+            push -=
+                roughness::damped(rough, departing) * of(rates.artificial) * (r2 + least).approximate_recip();
+        }
+        let push = push * f;
+        for k in 0..3 {
+            sums[k] = push.mul_add(d[k], sums[k]);
+        }
+        sums[3] = f.mul_add(departing, sums[3]);
+        sums[4] = f.mul_add(other[4] - own[4], sums[4]);
+        if EVEN {
+            for k in 0..3 {
+                sums[5 + k] = f.mul_add(d[k], sums[5 + k]);
+            }
+            sums[8] = f.mul_add(r2, sums[8]);
+        }
+        // 1 + 4q = 5 − 4s
+        let weight = f * s * s.mul_add(of(-4.0), of(5.0));
+        sums[9] = weight + sums[9];
+        if ARTIFICIAL {
+            for k in 0..3 {
+                sums[13 + k] = weight.mul_add(other[k], sums[13 + k]);
+            }
+        }
+        if LAMINAR {
+            // a particle has no line to itself
+            let least = of(LEAST_DISTANCE * rates.kernel.h.powi(2));
+            let rubbing = f * departing / (r2 + least);
+            for k in 0..3 {
+                sums[10 + k] = d[k].mul_add(-rubbing, sums[10 + k]);
+            }
+        }
+    }
+
+    fn finish(&self, i: usize, sums: [f64; 16]) -> [f64; 13] {
+        let [px, py, pz, departing, denser, cx, cy, cz, squares, weights, ux, uy, uz, sx, sy, sz] = sums;
+        let rates = &self.0;
+        let Rates { parameters, steepness, laminar, .. } = *rates;
+        let rest = parameters.rest_density;
+        let mut crowding = -steepness * DVec3::new(cx, cy, cz);
+        let mut denser = rates.diffusion * steepness * denser;
+        if EVEN {
+            denser -= rates.diffusion * rates.at_rest(i).dot(crowding);
+        }
+        let mut push = steepness * DVec3::new(px, py, pz);
+        let mut spread = steepness * squares / 3.0;
+        let mut compression = -steepness * departing;
+        let mut drag = 10.0 * laminar * steepness * DVec3::new(ux, uy, uz);
+        let mut by_friction = DVec3::ZERO;
+        let velocity = rates.velocity.get(i);
+        // a fluid without viscosity feels no friction, and most have none
+        let wall = if LAMINAR {
+            rates.core.coverage::<WallDrag>(i).map(|wall| {
+                by_friction = wall.friction.by_walls(drag, velocity, laminar);
+                drag = wall.friction.complete(drag, velocity, laminar);
+                wall.without_friction()
+            })
+        } else {
+            rates.core.coverage::<()>(i)
+        };
+        let by_weight = parameters.particle_mass * rates.kernel.weight * weights;
+        let mut filled = by_weight / (rest * rates.lattice);
+        let mut places = by_weight;
+        // how fast the wall approaches, in units of the kernel that it takes
+        let mut wall_rate = 0.0;
+        let crowding_by_pairs = crowding;
+        if let Some(wall) = &wall {
+            crowding += wall.gradient;
+            spread += wall.share();
+            wall_rate = wall.gradient.dot(velocity) - wall.sweep;
+            // differences are steady only at a continuous wall
+            filled += if rates.differences { wall.part } else { wall.filled };
+            places += 2.0 * rest * wall.part;
+        }
+        // how far the particle belongs to the depth of the fluid
+        let depth = depth(if EVEN { spread } else { filled });
+        let smooth = if rates.differences { depth } else { 0.0 };
+        let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
+        let density = rest + smooth * rates.excess[i];
+        // where pressures do not act by differences, their own pressure pushes particles apart, and walls push
+        // as their mirrored images do; without EVEN the sums contain the part of the pairs already
+        let pairs = push;
+        push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
+        if let Some(wall) = &wall {
+            let (pressure, by_pairs) =
+                (rates.pressure[i], pairs - 2.0 * rates.pressure[i] * crowding_by_pairs);
+            let balanced =
+                if rates.differences { 1.0 } else { depth.max(held(filled) * rates.calm(i, velocity)) };
+            push = push.lerp(wall.completion() * push, balanced);
+            if let Some(reaction) = &rates.reaction {
+                let by_pressure = (push - by_pairs) / density;
+                reaction.add(i, Pushed { by_pressure, factor: -2.0 * pressure / density, by_friction });
+            }
+        }
+        let acceleration = mean * (push / density + drag) + parameters.gravity;
+        let crowding = depth * crowding;
+        // differences of pressure make waves grow, so that all their motion is damped
+        let smooth =
+            if ARTIFICIAL && !rates.differences { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
+        let mut drift = denser + depth * rates.returns(i, filled);
+        let rate = if rates.differences {
+            // densities follow the equation of continuity
+            compression += wall_rate;
+            drift += mean * density * compression;
+            places = 0.0;
+            0.0
+        } else {
+            rest * (compression + 2.0 * wall_rate)
+        };
+        [
+            acceleration.x,
+            acceleration.y,
+            acceleration.z,
+            rate,
+            places,
+            drift,
+            rest * filled,
+            crowding.x,
+            crowding.y,
+            crowding.z,
+            smooth.x,
+            smooth.y,
+            smooth.z,
+        ]
+    }
+}
+
+impl Rates<'_> {
+    /// How the density of a fluid at rest grows at a particle, kg/m⁴.
+    fn at_rest(&self, i: usize) -> DVec3 {
+        self.compressibility * self.core.gravity(i)
+    }
+
+    /// How far a particle is at rest in the scene, 0 to 1: one if its speed is that of a fall through a sixteenth of a
+    /// spacing or less, zero from an eighth on. Where nothing falls there is no weight to share, and it is zero.
+    fn calm(&self, i: usize, velocity: DVec3) -> f64 {
+        let fall = 0.125 * 2.0 * self.core.gravity(i).length() * self.parameters.spacing();
+        if fall > 0.0 { (2.0 - 2.0 * velocity.length_squared() / fall).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    /// The rate at which the density of a particle in the depth returns to what its place says, kg/m³/s.
+    fn returns(&self, i: usize, filled: f64) -> f64 {
+        let rest = self.parameters.rest_density;
+        let (mut target, density) = (rest * filled, self.density[i]);
+        if self.clamped && !self.differences {
+            target = target.max(rest.min(density));
+        }
+        self.return_rate * (target - density)
+    }
+}
