@@ -81,8 +81,9 @@ impl Roughness {
 
 /// The factor α·h/2·c of an artificial viscosity, m²/s, or as much of it as noise bears in a step of the length `dt`: with a
 /// greater one the step would turn noise round and make it grow. The limit is that of a viscosity ν = factor/10.
-pub(super) fn within_step(factor: f64, support_radius: f64, dt: f64) -> f64 {
-    factor.min(10.0 * (0.5 * support_radius).powi(2) / (24.0 * dt))
+pub(super) fn factor(alpha: f64, sound_speed: f64, support_radius: f64, dt: f64) -> f64 {
+    let smoothing = 0.5 * support_radius;
+    (alpha * smoothing * sound_speed).min(10.0 * smoothing.powi(2) / (24.0 * dt))
 }
 
 /// The difference of rough velocities along a line, as far as it takes energy from the whole motion, `whole`.

@@ -28,10 +28,6 @@ const IMPLICIT_FORCE_FACTOR: f64 = 0.1;
 /// layers bursts at its start.
 const SOLVED_FORCE_FACTOR: f64 = 0.15;
 
-/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
-/// a weakly compressible fluid, so that the same α damps alike.
-const NOMINAL_SOUND: f64 = 10.0;
-
 /// Numbers of the divergence-free method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dfsph {
@@ -51,13 +47,6 @@ pub struct Dfsph {
 impl Default for Dfsph {
     fn default() -> Self {
         Self { tolerance: 1e-4, most_iterations: 100, artificial_viscosity: 0.06, shifting: 0.0 }
-    }
-}
-
-impl Dfsph {
-    /// The factor α·h/2·c of the artificial viscosity, m²/s.
-    fn artificial_factor(&self, scales: &Scales) -> f64 {
-        self.artificial_viscosity * 0.5 * scales.support_radius * NOMINAL_SOUND * scales.expected_speed
     }
 }
 

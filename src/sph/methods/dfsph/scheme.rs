@@ -83,6 +83,10 @@ const OWED: f64 = 0.6;
 /// does not see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
 const STABLE: f64 = 0.75;
 
+/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
+/// a weakly compressible fluid, so that the same α damps alike.
+const NOMINAL_SOUND: f64 = 10.0;
+
 /// The scheme. It keeps the pressures, and what is owed, between steps; the rest is working memory.
 pub struct DivergenceFree {
     pub(super) numbers: Dfsph,
@@ -242,8 +246,9 @@ impl DivergenceFree {
         let g = core.parameters.gravity;
         let Vectors { x, y, z } = &mut acceleration;
         let parameters = &core.parameters;
-        let artificial = roughness::within_step(
-            self.numbers.artificial_factor(&parameters.scales()),
+        let artificial = roughness::factor(
+            self.numbers.artificial_viscosity,
+            NOMINAL_SOUND * parameters.expected_speed,
             parameters.support_radius,
             dt,
         );

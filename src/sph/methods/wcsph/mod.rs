@@ -85,11 +85,6 @@ impl Wcsph {
     /// from near.
     const NEAR: Support = Support::Spacings(2.6);
 
-    /// The factor α·h/2·c of the artificial viscosity, m²/s.
-    fn artificial_factor(&self, scales: &Scales) -> f64 {
-        self.artificial_viscosity() * 0.5 * scales.support_radius * self.sound_speed(scales)
-    }
-
     /// The strength of the shifting, stated or derived.
     pub fn shifting(&self) -> f64 {
         self.shifting.unwrap_or(match self.gradients {

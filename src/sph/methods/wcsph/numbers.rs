@@ -12,8 +12,7 @@ pub(super) struct Numbers {
     /// Speed of sound, m/s.
     pub sound_speed: f64,
     pub density_diffusion: f64,
-    /// The factor α·h/2·c of the artificial viscosity, m²/s.
-    pub artificial: f64,
+    pub artificial_viscosity: f64,
     pub gradients: Gradients,
     pub shifting: f64,
     pub negative_pressure: NegativePressure,
@@ -24,7 +23,7 @@ impl Numbers {
         Self {
             sound_speed: parameters.sound_speed(),
             density_diffusion: wcsph.density_diffusion,
-            artificial: wcsph.artificial_factor(&parameters.scales()),
+            artificial_viscosity: wcsph.artificial_viscosity(),
             gradients: wcsph.gradients,
             shifting: wcsph.shifting(),
             negative_pressure: wcsph.negative_pressure,
@@ -38,9 +37,9 @@ pub(super) fn sums_crowding(numbers: &Numbers, core: &Core) -> bool {
     numbers.shifting > 0.0 || numbers.gradients == Gradients::Differences || core.gravity_field.is_some()
 }
 
-/// ρ₀/c²·g: how the density of a fluid at rest grows with the depth, kg/m⁴.
-pub(super) fn at_rest(numbers: &Numbers, parameters: &Parameters) -> DVec3 {
-    parameters.rest_density / numbers.sound_speed.powi(2) * parameters.gravity
+/// ρ₀/c²·g: how the density of a fluid at rest grows along gravity, kg/m⁴.
+pub(super) fn at_rest(numbers: &Numbers, parameters: &Parameters, gravity: DVec3) -> DVec3 {
+    parameters.rest_density / numbers.sound_speed.powi(2) * gravity
 }
 
 /// The pressure p = c²ρ₀/7·((ρ/ρ₀)⁷ − 1), cut off at zero unless negative pressures are kept.

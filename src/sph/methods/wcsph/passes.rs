@@ -9,7 +9,7 @@ use super::super::{
     shifting::{depth, return_rate},
 };
 use super::Gradients;
-use super::numbers::{Numbers, sums_crowding};
+use super::numbers::{Numbers, at_rest, sums_crowding};
 use crate::sph::{
     core::Core,
     kernel::Wendland,
@@ -36,6 +36,7 @@ fn held(filled: f64) -> f64 {
 /// What the pass over pairs needs besides the columns that it sums.
 #[derive(Clone, Copy)]
 pub(super) struct Rates<'a> {
+    numbers: &'a Numbers,
     parameters: &'a Parameters,
     core: &'a Core,
     velocity: &'a Vectors,
@@ -47,8 +48,6 @@ pub(super) struct Rates<'a> {
     steepness: f64,
     /// The factor 2δ·h/2·c·ρ₀ of the diffusion, over ρ₀.
     diffusion: f64,
-    /// ρ₀/c², s²·kg/m⁵: how the density of a fluid at rest grows along gravity.
-    compressibility: f64,
     /// Kinematic viscosity ν = μ/ρ₀, m²/s.
     pub laminar: f64,
     /// The factor α·h/2·c·ρ₀ of the artificial viscosity.
@@ -72,7 +71,7 @@ pub(super) struct Rates<'a> {
 impl<'a> Rates<'a> {
     pub fn new(
         core: &'a Core,
-        numbers: &Numbers,
+        numbers: &'a Numbers,
         velocity: &'a Vectors,
         pressure: &'a [f64],
         excess: &'a [f64],
@@ -82,6 +81,7 @@ impl<'a> Rates<'a> {
         let kernel = Wendland::new(parameters.support_radius);
         let smoothing = 0.5 * parameters.support_radius;
         Self {
+            numbers,
             parameters,
             core,
             velocity,
@@ -90,10 +90,14 @@ impl<'a> Rates<'a> {
             kernel,
             steepness: parameters.particle_mass / parameters.rest_density * kernel.steepness,
             diffusion: 2.0 * numbers.density_diffusion * smoothing * numbers.sound_speed,
-            compressibility: parameters.rest_density / numbers.sound_speed.powi(2),
             laminar: parameters.viscosity / parameters.rest_density,
-            artificial: roughness::within_step(numbers.artificial, parameters.support_radius, dt)
-                * parameters.rest_density,
+            artificial: parameters.rest_density
+                * roughness::factor(
+                    numbers.artificial_viscosity,
+                    numbers.sound_speed,
+                    parameters.support_radius,
+                    dt,
+                ),
             density: &core.particles.density,
             clamped: numbers.negative_pressure == NegativePressure::Clamp,
             differences: numbers.gradients == Gradients::Differences,
@@ -131,18 +135,19 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         let rates = &self.0;
         let s = rates.kernel.nearness(r2);
         let f = s * s * s;
-        let departing = (own[0] - other[0]) * d[0];
-        let departing = (own[1] - other[1]).mul_add(d[1], departing);
-        let departing = (own[2] - other[2]).mul_add(d[2], departing);
+        // how fast they part, by the velocities that begin at this column
+        let parting = |k: usize| {
+            let x = (own[k] - other[k]) * d[0];
+            let x = (own[k + 1] - other[k + 1]).mul_add(d[1], x);
+            (own[k + 2] - other[k + 2]).mul_add(d[2], x)
+        };
+        let departing = parting(0);
         let mut push = if EVEN { other[3] - own[3] } else { other[3] + own[3] };
         if ARTIFICIAL {
             let least = of(0.01 * (0.5 * rates.kernel.h).powi(2));
+            let rough = roughness::damped(parting(5), departing);
             // an artificial viscosity needs no more than the twelve bits of an estimate in single precision
-            let rough = (own[5] - other[5]) * d[0];
-            let rough = (own[6] - other[6]).mul_add(d[1], rough);
-            let rough = (own[7] - other[7]).mul_add(d[2], rough);
-            push -=
-                roughness::damped(rough, departing) * of(rates.artificial) * (r2 + least).approximate_recip();
+            push -= rough * of(rates.artificial) * (r2 + least).approximate_recip();
         }
         let push = push * f;
         for k in 0..3 {
@@ -158,7 +163,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         }
         // 1 + 4q = 5 − 4s
         let weight = f * s * s.mul_add(of(-4.0), of(5.0));
-        sums[9] = weight + sums[9];
+        sums[9] += weight;
         if ARTIFICIAL {
             for k in 0..3 {
                 sums[13 + k] = weight.mul_add(other[k], sums[13 + k]);
@@ -182,7 +187,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         let mut crowding = -steepness * DVec3::new(cx, cy, cz);
         let mut denser = rates.diffusion * steepness * denser;
         if EVEN {
-            denser -= rates.diffusion * rates.at_rest(i).dot(crowding);
+            let at_rest = at_rest(rates.numbers, parameters, rates.core.gravity(i));
+            denser -= rates.diffusion * at_rest.dot(crowding);
         }
         let mut push = steepness * DVec3::new(px, py, pz);
         let mut spread = steepness * squares / 3.0;
@@ -268,11 +274,6 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
 }
 
 impl Rates<'_> {
-    /// How the density of a fluid at rest grows at a particle, kg/m⁴.
-    fn at_rest(&self, i: usize) -> DVec3 {
-        self.compressibility * self.core.gravity(i)
-    }
-
     /// How far a particle is at rest in the scene, 0 to 1: one if its speed is that of a fall through a sixteenth of a
     /// spacing or less, zero from an eighth on. Where nothing falls there is no weight to share, and it is zero.
     fn calm(&self, i: usize, velocity: DVec3) -> f64 {

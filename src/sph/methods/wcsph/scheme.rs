@@ -271,7 +271,7 @@ impl Weakly {
         let even = sums_crowding(numbers, core);
         // where how particles crowd is not summed, only differences of the excess matter, so that of a fluid at
         // rest is subtracted
-        let (at_rest, from) = (at_rest(numbers, parameters), core.boundary.domain.min);
+        let (at_rest, from) = (at_rest(numbers, parameters, parameters.gravity), core.boundary.domain.min);
         let Vectors { x, y, z } = &core.particles.position;
         let places = x.par_chunks(CHUNK).zip(y.par_chunks(CHUNK)).zip(z.par_chunks(CHUNK));
         let columns = self.excess.par_chunks_mut(CHUNK).zip(pressure.par_chunks_mut(CHUNK));
