@@ -36,6 +36,11 @@ impl Interval {
         self.lo <= x && x <= self.hi
     }
 
+    /// Whether both ends are finite.
+    pub fn is_bounded(&self) -> bool {
+        self.lo.is_finite() && self.hi.is_finite()
+    }
+
     /// The length of the interval.
     pub fn width(&self) -> f64 {
         self.hi - self.lo

@@ -161,12 +161,16 @@ pub fn factor(value: Interval, y: Interval, within: Interval) -> Option<Interval
     }
 }
 
-/// a/b = value. Where b may be zero the quotient is infinite, or 0 by definition.
+/// a/b = value. Where b may be zero the quotient is infinite, or 0 by definition; where b is infinite the quotient is 0,
+/// whatever a is.
 fn quotient(op: Binary, value: Interval, a: Interval, b: Interval) -> Option<[Interval; 2]> {
     if op == Binary::DivOrZero && b.contains(0.0) {
         return Some([a, b]);
     }
-    let is_finite = value.lo.is_finite() && value.hi.is_finite();
+    if !b.is_bounded() && value.contains(0.0) {
+        return Some([a, b]);
+    }
+    let is_finite = value.is_bounded();
     let left = if b.contains(0.0) && !is_finite { a } else { meet(a, (value * b).widened(1))? };
     let b = if is_finite || !b.contains(0.0) { factor(left, value, b)? } else { b };
     Some([left, b])
@@ -264,7 +268,8 @@ pub fn slab(value: Interval, e: Interval, first: (f64, f64), second: (f64, f64))
 /// aᵇ = value for a fixed exponent b that is not whole, or a base that is positive.
 fn general_power(value: Interval, a: Interval, b: Interval) -> Option<[Interval; 2]> {
     let fixed = b.lo == b.hi && b.lo != 0.0 && b.lo.is_finite();
-    if !fixed || a.lo < 0.0 && b.lo.fract() == 0.0 {
+    let has_negative_powers = b.lo.fract() == 0.0 && (a.lo < 0.0 || a.lo == 0.0 && b.lo < 0.0);
+    if !fixed || has_negative_powers || !a.lo.is_finite() {
         return Some([a, b]);
     }
     let (a, value) = (meet(a, POSITIVE)?, meet(value, POSITIVE)?);

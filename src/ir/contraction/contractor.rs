@@ -44,6 +44,8 @@ pub(super) struct Scratch {
     pub values: Vec<Interval>,
     /// Whether a node may be undefined somewhere.
     pub may_fail: Vec<bool>,
+    /// Whether a node may be infinite somewhere. What is read from outside is finite, even if nothing bounds it.
+    pub may_be_infinite: Vec<bool>,
     pub slopes: Vec<[Interval; 3]>,
     pub linear: Vec<[Interval; 4]>,
     /// What is known of some nodes beforehand, in their order.
@@ -122,16 +124,23 @@ impl Contractor {
 
     /// The numbers that each node may be. `None` if one that the root needs is undefined everywhere.
     pub(super) fn forward(&self, region: &Region<'_>, scratch: &mut Scratch) -> Option<()> {
-        let Scratch { values, may_fail, known, .. } = scratch;
+        let Scratch { values, may_fail, may_be_infinite, known, .. } = scratch;
         let mut known = known.iter().peekable();
         values.clear();
         may_fail.clear();
+        may_be_infinite.clear();
         for (i, rule) in self.rules[..=self.root.index()].iter().enumerate() {
             // an operand that is undefined where the node is not says nothing of the node
             let unknown = |node: Node| may_fail[node.index()];
             let is_open = rule.operands().zip(self.needs[i]).any(|(node, needed)| !needed && unknown(node));
-            let found = numbers(rule, |node| values[node.index()], region, &self.tables);
-            let fails = found.may_fail || rule.operands().any(unknown);
+            let of = |node: Node| values[node.index()];
+            let infinite = |node: Node| may_be_infinite[node.index()];
+            let found = numbers(rule, of, region, &self.tables);
+            let fails = found.may_fail
+                || rule.operands().any(unknown)
+                || rule.operands().any(infinite) && rule.fails_at_infinity(of, infinite);
+            let is_infinite =
+                found.range.is_some_and(|range| !range.is_bounded()) && rule.may_be_infinite(of, infinite);
             // a choice that is made leaves out what may be undefined
             let is_left_out = matches!(*rule, Rule::Plain(Expr::Binary(Binary::MulOrZero, _, b))
                 if is_zero(values[b.index()]) && !unknown(b));
@@ -148,6 +157,7 @@ impl Contractor {
             };
             values.push(value);
             may_fail.push(fails);
+            may_be_infinite.push(is_infinite);
         }
         Some(())
     }

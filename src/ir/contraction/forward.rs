@@ -195,10 +195,12 @@ impl Squared for Interval {
     }
 }
 
-/// aᵇ. A negative base has a power only where the exponent is whole.
+/// aᵇ. A negative base has a power only where the exponent is whole, or if it is infinite: (−∞)^0.1 is ∞. So it may have at
+/// 0 if the exponent is negative: (−0)^−1 is −∞.
 fn general_power(a: Interval, b: Interval) -> Numbers {
     let whole = b.lo == b.hi && b.lo.fract() == 0.0;
-    if a.lo < 0.0 && (whole || b.lo != b.hi) || b.contains(0.0) && !a.lo.is_finite() {
+    let may_be_whole = whole || b.lo != b.hi;
+    if may_be_whole && (a.lo < 0.0 || a.lo == 0.0 && b.lo < 0.0) || !a.lo.is_finite() {
         return Numbers { range: Some(Interval::ALL), may_fail: true };
     }
     partial(a, POSITIVE, |a| {

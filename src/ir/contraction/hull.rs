@@ -88,6 +88,46 @@ mod tests {
         (graph, nodes[nodes.len() - 1])
     }
 
+    /// Contracts a box in all ways, and compares with the formula at points, whose coordinates are parts of its sides.
+    fn cuts_off_no_point(
+        steps: &[(usize, usize, usize, f64)],
+        space: Aabb,
+        points: &[[f64; 3]],
+        negated: bool,
+    ) -> Result<(), TestCaseError> {
+        let (graph, root) = formula(steps);
+        let (interpreter, contractor) = (Interpreter::new(&graph, &[root]), Contractor::new(&graph, root));
+        let wanted = Wanted { region: Region::of(&space), negated };
+        let mut forms = Vec::new();
+        let mut left = space;
+        let mut verdict = contractor.contract(&wanted, &mut left, Some(&mut forms));
+        if verdict == Contracted::Somewhere && !contract_linear(&forms, &mut left) {
+            verdict = Contracted::Nowhere;
+        }
+        if verdict == Contracted::Somewhere {
+            let origin = left.centre();
+            forms.clear();
+            for contractor in [&contractor, &contractor] {
+                verdict = contractor.contract_by_slopes(&wanted, &mut left, (origin, &mut forms));
+            }
+            if verdict == Contracted::Somewhere && !contract_linear_around(origin, &forms, &mut left) {
+                verdict = Contracted::Nowhere;
+            }
+        }
+        for &at in points {
+            let p = (space.min + space.size() * DVec3::from_array(at)).clamp(space.min, space.max);
+            let mut omega = [0.0];
+            interpreter.eval_f64(p.to_array(), &mut omega);
+            let inside = if negated { omega[0] < 0.0 } else { omega[0] > 0.0 };
+            match verdict {
+                Contracted::Nowhere => prop_assert!(!inside, "{p} is inside, {omega:?}"),
+                Contracted::Everywhere => prop_assert!(inside, "{p} is not inside, {omega:?}"),
+                Contracted::Somewhere => prop_assert!(!inside || left.contains(p), "{p} not in {left:?}"),
+            }
+        }
+        Ok(())
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(3000))]
         /// Whatever the operations: a point at which the formula is positive is never cut off.
@@ -99,40 +139,9 @@ mod tests {
             points in prop::collection::vec(prop::array::uniform3(0.0..=1.0f64), 24),
             negated: bool,
         ) {
-            let (graph, root) = formula(&steps);
-            let (interpreter, contractor) = (Interpreter::new(&graph, &[root]), Contractor::new(&graph, root));
             let min = DVec3::from_array(lo);
             let space = Aabb::new(min, min + DVec3::from_array(size));
-            let wanted = Wanted { region: Region::of(&space), negated };
-            let mut forms = Vec::new();
-            let mut left = space;
-            let mut verdict = contractor.contract(&wanted, &mut left, Some(&mut forms));
-            if verdict == Contracted::Somewhere && !contract_linear(&forms, &mut left) {
-                verdict = Contracted::Nowhere;
-            }
-            if verdict == Contracted::Somewhere {
-                let origin = left.centre();
-                forms.clear();
-                for contractor in [&contractor, &contractor] {
-                    verdict = contractor.contract_by_slopes(&wanted, &mut left, (origin, &mut forms));
-                }
-                if verdict == Contracted::Somewhere
-                    && !contract_linear_around(origin, &forms, &mut left)
-                {
-                    verdict = Contracted::Nowhere;
-                }
-            }
-            for at in points {
-                let p = (space.min + space.size() * DVec3::from_array(at)).clamp(space.min, space.max);
-                let mut omega = [0.0];
-                interpreter.eval_f64(p.to_array(), &mut omega);
-                let inside = if negated { omega[0] < 0.0 } else { omega[0] > 0.0 };
-                match verdict {
-                    Contracted::Nowhere => prop_assert!(!inside, "{p} is inside, {omega:?}"),
-                    Contracted::Everywhere => prop_assert!(inside, "{p} is not inside, {omega:?}"),
-                    Contracted::Somewhere => prop_assert!(!inside || left.contains(p), "{p} not in {left:?}"),
-                }
-            }
+            cuts_off_no_point(&steps, space, &points, negated)?;
         }
     }
 
@@ -162,6 +171,64 @@ mod tests {
                 let holds = found.is_nan() || slope.lo - slack <= found && found <= slope.hi + slack;
                 prop_assert!(holds, "{found:e} not in {slope:?}");
             }
+        }
+    }
+
+    /// Numbers that are infinite somewhere: what they are multiplied by, divide or are raised to says nothing there.
+    #[test]
+    fn infinite_values_cut_off_nothing() {
+        type Steps = &'static [(usize, usize, usize, f64)];
+        let cases: [(Steps, [f64; 3], [f64; 3], bool); 6] = [
+            // max(−0^z·0, x) with z < 0: 0·∞
+            (
+                &[(47, 1, 0, 0.0), (35, 0, 2, 0.0), (21, 0, 3, 0.0), (0, 0, 0, 0.0), (28, 0, 7, 0.0)],
+                [0.59, 0.0, -2.6],
+                [0.0, 0.17, 0.0],
+                false,
+            ),
+            // (ln 0)^0.07 = (−∞)^0.07
+            (&[(4, 2, 0, 0.0), (13, 0, 0, 0.0), (53, 0, 0, 0.066)], [0.0; 3], [0.0; 3], false),
+            // ln(−5/−0^x) with x < 0: −5/−∞ is 0
+            (
+                &[
+                    (3, 1, 0, 0.0),
+                    (30, 2, 2, 0.0),
+                    (31, 1, 0, 0.0),
+                    (35, 1, 0, 0.0),
+                    (0, 0, 0, 0.0),
+                    (22, 2, 6, 0.0),
+                    (13, 0, 0, 0.0),
+                ],
+                [-2.7, 0.0, 0.0],
+                [0.0, 0.0, 2.9],
+                true,
+            ),
+            // max(round(cos y), −1.75)^sign(cos y) = (−0)^−1 = −∞
+            (
+                &[(7, 1, 0, 0.0), (5, 0, 0, 0.0), (3, 1, 0, 0.0), (44, 1, 0, -1.75), (35, 0, 5, 0.0)],
+                [0.0, -1.66, 0.0],
+                [0.0; 3],
+                true,
+            ),
+            // max(sinh(ln 0) ∨ ln 0, 0.9) and the same with a weight
+            (
+                &[(29, 3, 0, 0.0), (13, 0, 0, 0.0), (16, 0, 0, 0.0), (32, 0, 4, 0.0), (44, 0, 0, 0.89)],
+                [0.0; 3],
+                [0.0, 0.0, 3.4],
+                false,
+            ),
+            (
+                &[(29, 3, 0, 0.0), (13, 0, 0, 0.0), (16, 0, 0, 0.0), (33, 0, 4, 0.0), (44, 0, 0, 0.89)],
+                [0.0; 3],
+                [0.0, 0.0, 3.4],
+                false,
+            ),
+        ];
+        let points: Vec<[f64; 3]> = (0..9).map(|i| [f64::from(i) / 8.0; 3]).collect();
+        for (i, (steps, lo, size, negated)) in cases.into_iter().enumerate() {
+            let min = DVec3::from_array(lo);
+            let space = Aabb::new(min, min + DVec3::from_array(size));
+            cuts_off_no_point(steps, space, &points, negated).unwrap_or_else(|e| panic!("case {i}: {e}"));
         }
     }
 

@@ -1,9 +1,10 @@
 //! How the nodes of a graph are read.
 
+use crate::interval::Interval;
 use crate::ir::bounds::range::{Affine, RangeRule};
-use crate::ir::function::BinaryFunction;
+use crate::ir::function::{BinaryFunction, UnaryFunction};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
-use crate::ir::op::Binary;
+use crate::ir::op::{Binary, Unary};
 
 /// How a node is computed from others.
 #[derive(Debug, Clone, Copy)]
@@ -86,6 +87,55 @@ impl Rule {
         };
         let is_needed = [needs_first, needs_second];
         self.operands().zip(is_needed).filter_map(|(node, needed)| needed.then_some(node))
+    }
+
+    /// Whether a node with this rule may be infinite where its operands are numbers, if nothing bounds its range:
+    /// an operand is, or bounded operands overflow, or it has a pole.
+    pub fn may_be_infinite(self, of: impl Fn(Node) -> Interval, infinite: impl Fn(Node) -> bool) -> bool {
+        let has_pole = matches!(
+            self,
+            Self::Plain(
+                Expr::Unary(Unary::Call(UnaryFunction::Ln | UnaryFunction::Log2 | UnaryFunction::Log10), _)
+                    | Expr::Binary(Binary::Call(BinaryFunction::Pow), ..)
+            )
+        );
+        let is_read = self.operands().next().is_none();
+        let is_unbounded = |node| !of(node).is_bounded();
+        has_pole || self.operands().any(infinite) || !is_read && !self.operands().any(is_unbounded)
+    }
+
+    /// Whether it is undefined where one of its operands is infinite: ∞ − ∞, also within R₀, 0·∞, ∞/∞ or the sine of ∞.
+    pub fn fails_at_infinity(self, of: impl Fn(Node) -> Interval, infinite: impl Fn(Node) -> bool) -> bool {
+        match self {
+            Self::Plain(Expr::Binary(op, a, b)) => match op {
+                Binary::Add
+                | Binary::Sub
+                | Binary::Div
+                | Binary::DivOrZero
+                | Binary::And
+                | Binary::Or
+                | Binary::AndWeight
+                | Binary::OrWeight => infinite(a) && infinite(b),
+                Binary::Mul | Binary::MulOrZero => {
+                    infinite(a) && of(b).contains(0.0) || infinite(b) && of(a).contains(0.0)
+                }
+                Binary::Min
+                | Binary::Max
+                | Binary::PlainMin
+                | Binary::PlainMax
+                | Binary::MinWeight
+                | Binary::MaxWeight
+                | Binary::Call(BinaryFunction::Pow | BinaryFunction::Atan2) => false,
+            },
+            Self::Plain(Expr::Unary(Unary::Call(function), a)) => {
+                let is_wave =
+                    matches!(function, UnaryFunction::Sin | UnaryFunction::Cos | UnaryFunction::Tan);
+                is_wave && infinite(a)
+            }
+            Self::Plain(Expr::Lookup(_, at)) => at.into_iter().any(infinite),
+            // (±e + q)·(±e + s): the sum of an infinite e and a number is infinite
+            Self::Plain(_) | Self::Power { .. } | Self::Slab { .. } => false,
+        }
     }
 
     /// The degree of a node with this rule, given those of its operands.
