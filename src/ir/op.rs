@@ -210,7 +210,9 @@ impl Binary {
     }
 
     /// Its value, with R₀ in its stable form.
-    #[inline]
+    // Inlined always, with what it calls: the loops over columns are compiled for several instruction sets, and a call in
+    // them would be made for each number.
+    #[inline(always)]
     pub fn eval<T: Real>(self, a: T, b: T) -> T {
         let zero = T::from_f64(0.0);
         match self {
@@ -272,6 +274,7 @@ fn sign<T: Real>(a: T) -> T {
 
 /// The first operand if it was found to be the one sought; the other otherwise, but never a number for a NaN.
 #[allow(clippy::eq_op)]
+#[inline(always)]
 fn ordered<T: Real>(first: bool, a: T, b: T) -> T {
     if first {
         a
@@ -282,6 +285,7 @@ fn ordered<T: Real>(first: bool, a: T, b: T) -> T {
     }
 }
 
+#[inline(always)]
 fn weight<T: Real>(first: bool, a: T, b: T) -> T {
     if first {
         T::from_f64(1.0)
