@@ -110,11 +110,11 @@ fn steps_follow_a_body_in_a_fluid_at_rest() {
     assert!(leaves < 10, "{leaves} steps");
 }
 
-/// A piston comes along x, at 0.5 m/s, and a ball is in its way to the right wall, which it touches.
-fn piston(method: &str, until: f64) -> String {
+/// A piston comes along x at a speed in m/s, and a ball is in its way to the right wall, which it touches.
+fn piston(method: &str, speed: f64, until: f64) -> String {
     format!(
         "rfm 1\n\
-         solid piston = box([-1, -1, -1], [0.1, 2, 2]).move([0.5*t, 0, 0])\n\
+         solid piston = box([-1, -1, -1], [0.1, 2, 2]).move([{speed}*t, 0, 0])\n\
          solid stone = ball([0.7, 0.2, 0.2], 0.15)\n\
          scene pressed {{\n\
          box {{ max: [0.85, 0.4, 0.8] }}\n\
@@ -131,7 +131,7 @@ fn piston(method: &str, until: f64) -> String {
 fn a_piston_that_passes_a_stone_leaves_nothing_inside() {
     for method in ["paper", "wcsph", "dfsph"] {
         // at its end the piston has pushed halfway over the stone; above it there is room
-        let simulation = run(&piston(method, 1.2)).unwrap_or_else(|e| panic!("{method}: {e}"));
+        let simulation = run(&piston(method, 0.5, 1.2)).unwrap_or_else(|e| panic!("{method}: {e}"));
         let stats = simulation.stats();
         assert_eq!((stats.inside, stats.lost), (0, 0), "{method}");
     }
@@ -141,7 +141,7 @@ fn a_piston_that_passes_a_stone_leaves_nothing_inside() {
 fn walls_that_leave_no_room_end_the_run_and_say_so() {
     // the piston goes on to the right wall, and nothing is left of the box
     for method in ["paper", "wcsph", "dfsph"] {
-        let error = run(&piston(method, 2.0)).err().unwrap_or_else(|| panic!("{method}"));
+        let error = run(&piston(method, 2.0, 0.5)).err().unwrap_or_else(|| panic!("{method}"));
         match error {
             rfm::sph::StepError::NoRoom { .. } => {
                 assert!(error.to_string().contains("no room for particle"), "{error}");

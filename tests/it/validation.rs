@@ -145,7 +145,7 @@ fn still_water_comes_to_rest() {
         let off = (off / squares(&mut known.iter().copied())).sqrt();
         println!("its pressure is off by {:.2} %", 100.0 * off);
         // walls that do not bear their share of the surface would add a tenth of a layer, 2 %
-        assert!(off < if method == "wcsph" { 0.012 } else { 0.06 }, "{method}: {off}");
+        assert!(off < if method == "wcsph" { 0.012 } else { 0.02 }, "{method}: {off}");
         let volume = simulation.audit().volume_change();
         assert!(volume.abs() < 5e-3, "{method}: {volume}");
     }
@@ -164,8 +164,8 @@ fn compression_stays_near_what_the_method_accepts() {
 
 #[test]
 fn a_fluid_without_compression_bears_its_own_weight() {
-    // sixteen layers; forty deviate by 1.5 %
-    pressure_within("hydrostatic_dfsph", 256.0, 0.04);
+    // sixteen layers; forty deviate by 1 %, and single particles bear pressures that scatter by 3.5 %
+    pressure_within("hydrostatic_dfsph", 256.0, 0.03);
 }
 
 #[test]

@@ -129,6 +129,7 @@ impl Declaration for Dfsph {
     const SAVES: &'static [&'static str] = &[
         "specific pressure",
         "debt",
+        "own pressure",
         "stiffness",
         "crowding x",
         "crowding y",

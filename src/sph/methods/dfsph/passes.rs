@@ -156,6 +156,41 @@ impl PairPass<1, 3, 3> for Push<'_> {
     }
 }
 
+/// Finds the pressure at each particle as that of the fluid around it: the mean of what its neighbours' pressures continue to,
+/// Σ w·(p_j + ∇p·(x_i − x_j))/Σ w with the weights w = 1 − r/h, and ∇p = −ρ₀a by the acceleration that pressure gives the
+/// particle.
+#[derive(Clone, Copy)]
+pub(super) struct Field<'a> {
+    pub kernel: Wendland,
+    pub rest_density: f64,
+    /// a, m/s².
+    pub push: &'a Vectors,
+}
+
+impl PairPass<1, 5, 1> for Field<'_> {
+    #[inline(always)]
+    fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
+        &self,
+        d: [V; 3],
+        r2: V,
+        _: &[V; 1],
+        other: [V; 1],
+        sums: &mut [V; 5],
+    ) {
+        let weight = self.kernel.nearness(r2);
+        sums[0] += weight;
+        sums[1] = weight.mul_add(other[0], sums[1]);
+        for k in 0..3 {
+            sums[2 + k] = weight.mul_add(d[k], sums[2 + k]);
+        }
+    }
+
+    fn finish(&self, i: usize, [weights, pressure, x, y, z]: [f64; 5]) -> [f64; 1] {
+        let gradient = -self.rest_density * self.push.get(i);
+        [((pressure + gradient.dot(DVec3::new(x, y, z))) / weights).max(0.0)]
+    }
+}
+
 /// Finds the rate of density dρ/dt.
 #[derive(Clone, Copy)]
 pub(super) struct Squeeze<'a> {

@@ -35,9 +35,11 @@
 //! take from a fluid without viscosity. Both viscosities act along the lines between particles, and conserve
 //! momentum and angular momentum.
 //!
-//! The reported pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
+//! The pressure of a particle is G·ρ²s, because the sums make G·∇p of a pressure that is linear in
 //! space (G = 0.98 in the depth of a fluid that has left the lattice). It is averaged over τ, because the
-//! divergence of velocity that one step leaves is a pressure in the next.
+//! divergence of velocity that one step leaves is a pressure in the next. The reported one is that of the field around the
+//! particle ([`Field`]): what keeps the density of one particle differs from its neighbours' by a fifth of a layer's weight, in
+//! still water too, where these differences balance each other.
 //!
 //! Invariant: the densities are those of the present positions.
 
@@ -49,7 +51,7 @@ use super::super::{
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
-use super::passes::{Constants, Continuation, Densities, Drag};
+use super::passes::{Constants, Continuation, Densities, Drag, Field};
 use super::solver::{Errors, Goal, Solver};
 use super::walls::Walls;
 use super::{ADVECTION, Dfsph};
@@ -59,7 +61,7 @@ use crate::sph::{
     error::StepError,
     kernel::Wendland,
     params::Parameters,
-    particles::{Particles, Vectors},
+    particles::Vectors,
     reaction::Reaction,
 };
 
@@ -96,6 +98,8 @@ pub struct DivergenceFree {
     places: Solver,
     /// The density, kg/m³, that each particle would have gained by what the solver of forces left.
     pub(super) debt: Vec<f64>,
+    /// The pressure that each particle bears, Pa, averaged as the reported one is.
+    pub(super) own_pressure: Vec<f64>,
     /// How stiff a lattice of these particles is, see [`Wendland::lattice_stiffness`].
     stiffness: f64,
     /// G = −⅓ Σ V r·∇W + ⅓ tr K of each particle.
@@ -104,6 +108,8 @@ pub struct DivergenceFree {
     crowding: Vectors,
     /// What a solver shall take away: a rate of density, or an excess of density.
     free: Vec<f64>,
+    /// Pressures around the particles in this step, Pa.
+    field: Vec<f64>,
     tension: Tension,
     roughness: Roughness,
     /// Displacements of this step that are not part of the velocity, m.
@@ -136,6 +142,7 @@ impl Scheme for DivergenceFree {
     fn save(&self, checkpoint: &mut Checkpoint) {
         checkpoint.set("specific pressure", self.forces.s.clone());
         checkpoint.set("debt", self.debt.clone());
+        checkpoint.set("own pressure", self.own_pressure.clone());
         checkpoint.set("stiffness", vec![self.forces.stiffness, self.places.stiffness]);
         save_crowding(&self.crowding, checkpoint);
         self.roughness.save(checkpoint);
@@ -144,6 +151,7 @@ impl Scheme for DivergenceFree {
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         self.forces.s = checkpoint.of_particles("specific pressure")?;
         self.debt = checkpoint.of_particles("debt")?;
+        self.own_pressure = checkpoint.of_particles("own pressure")?;
         if let [forces, places] = checkpoint.get("stiffness")? {
             (self.forces.stiffness, self.places.stiffness) = (*forces, *places);
         }
@@ -156,7 +164,7 @@ impl Scheme for DivergenceFree {
     }
 
     fn bytes(&self) -> usize {
-        let columns = [&self.debt, &self.spread, &self.free, &self.loaded];
+        let columns = [&self.debt, &self.own_pressure, &self.spread, &self.free, &self.field, &self.loaded];
         let vectors = [&self.crowding, &self.displacement, &self.drift];
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + vectors.map(Vectors::bytes).iter().sum::<usize>()
@@ -192,6 +200,7 @@ impl DivergenceFree {
             forces: Solver::new(Continuation::Linear, &core.parameters, n),
             places: Solver::new(Continuation::Barrier, &core.parameters, n),
             debt: vec![0.0; n],
+            own_pressure: vec![0.0; n],
             stiffness: Wendland::lattice_stiffness(
                 core.parameters.support_radius / core.parameters.spacing(),
             )
@@ -199,6 +208,7 @@ impl DivergenceFree {
             spread: vec![0.0; n],
             crowding: Vectors::default(),
             free: Vec::new(),
+            field: Vec::new(),
             tension: Tension::default(),
             roughness: Roughness::of(&core.particles.velocity, true),
             displacement: Vectors::default(),
@@ -216,14 +226,15 @@ impl DivergenceFree {
     /// last places, and it grows where steps are longer than 2/ω.
     fn pressure_dt(&self, core: &Core) -> f64 {
         let rest = core.parameters.rest_density;
-        let greatest = core.particles.pressure.iter().copied().fold(0.0, f64::max) / rest;
+        let greatest = self.own_pressure.iter().copied().fold(0.0, f64::max) / rest;
         let spacing = core.parameters.spacing();
         STABLE * 2.0 * spacing / (self.stiffness * greatest).sqrt()
     }
 
     /// Finds the order, walls, densities and factors for the present positions.
     pub(super) fn settle(&mut self, core: &mut Core, kept: &mut [&mut Vec<f64>]) {
-        let mut columns: SmallVec<[&mut Vec<f64>; 8]> = smallvec![&mut self.forces.s, &mut self.debt];
+        let mut columns: SmallVec<[&mut Vec<f64>; 8]> =
+            smallvec![&mut self.forces.s, &mut self.debt, &mut self.own_pressure];
         columns.extend(self.roughness.columns());
         columns.extend(kept.iter_mut().map(|column| &mut **column));
         core.sort(&mut columns);
@@ -319,11 +330,30 @@ impl DivergenceFree {
         }
         add_scaled(&mut core.particles.velocity, &self.forces.push, dt);
         add_scaled(&mut core.acceleration, &self.forces.push, 1.0);
-        let Particles { pressure: p, density, .. } = &mut core.particles;
+        self.report_pressure(core, dt, relaxation);
+    }
+
+    /// Averages the pressures over the relaxation time.
+    fn report_pressure(&mut self, core: &mut Core, dt: f64, relaxation: f64) {
+        let (s, density) = (&self.forces.s, &core.particles.density);
+        self.free.clear();
+        self.free.extend(
+            s.iter()
+                .zip(density)
+                .zip(&self.spread)
+                .map(|((s, rho), g)| (1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho),
+        );
+        let Constants { kernel, rest_density, .. } = Constants::of(&core.parameters);
+        self.field.resize(self.free.len(), 0.0);
+        let pass = Field { kernel, rest_density, push: &self.forces.push };
+        core.sum(&pass, [&self.free], [&mut self.field]);
         // until the relaxation time has passed, the mean is taken since the start
         let share = (dt / relaxation.min(core.time + dt)).min(1.0);
-        for (((p, s), rho), g) in p.iter_mut().zip(&self.forces.s).zip(density).zip(&self.spread) {
-            *p += share * ((1.0 + depth(*g) * (g - 1.0)) * s * *rho * *rho - *p);
+        for (mean, now) in [(&mut self.own_pressure, &self.free), (&mut core.particles.pressure, &self.field)]
+        {
+            for (mean, now) in mean.iter_mut().zip(now) {
+                *mean += share * (now - *mean);
+            }
         }
     }
 

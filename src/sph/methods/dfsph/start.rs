@@ -112,6 +112,7 @@ impl DivergenceFree {
         (core.particles.velocity, core.speed) = (velocity, speed);
         core.acceleration.components_mut().into_iter().for_each(|column| column.fill(0.0));
         core.particles.pressure.fill(0.0);
+        self.own_pressure.fill(0.0);
         self.iterations = 0;
     }
 
