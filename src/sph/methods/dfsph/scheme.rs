@@ -106,7 +106,8 @@ pub struct DivergenceFree {
     spread: Vec<f64>,
     /// Σ V ∇W + ∇λ, 1/m; zero at the surface.
     crowding: Vectors,
-    /// What a solver shall take away: a rate of density, or an excess of density.
+    /// What a solver shall take away: a rate of density, or an excess of density. Between the two solves it holds the pressures
+    /// that the particles bear in this step, Pa.
     free: Vec<f64>,
     /// Pressures around the particles in this step, Pa.
     field: Vec<f64>,
