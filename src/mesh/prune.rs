@@ -76,6 +76,14 @@ impl Lattice {
         DVec3::new(self.coordinate(0, x), self.coordinate(1, y), self.coordinate(2, z))
     }
 
+    /// The box of the grid.
+    pub(super) fn whole(&self) -> Aabb {
+        let ends = |place: fn(&[f64]) -> Option<&f64>| {
+            DVec3::from_array(self.nodes.each_ref().map(|nodes| place(nodes).copied().unwrap_or(f64::NAN)))
+        };
+        Aabb::new(ends(<[f64]>::first), ends(<[f64]>::last))
+    }
+
     /// The part of a brick's nodes on one axis that lies in the grid, counted from the brick's first node.
     pub(super) fn own_nodes(&self, axis: usize, brick: usize) -> std::ops::Range<usize> {
         let first = brick * BRICK;

@@ -281,8 +281,13 @@ impl Look<'_> {
     fn is_surface(&self, foot: &Foot, size: f64) -> bool {
         BESIDE.iter().any(|beside| {
             let step = beside * size * foot.normal;
-            self.field.omega(foot.at - step) > 0.0 && self.field.omega(foot.at + step) <= 0.0
+            self.omega(foot.at - step) > 0.0 && self.omega(foot.at + step) <= 0.0
         })
+    }
+
+    /// ω of the solid as the grid closes it: nothing beyond the grid lies inside.
+    fn omega(&self, p: DVec3) -> f64 {
+        if self.lattice.whole().contains(p) { self.field.omega(p) } else { f64::NEG_INFINITY }
     }
 
     /// The count of this cell, with the thickness at a point that the grid does not know. Nothing if the grid
@@ -307,7 +312,7 @@ impl Look<'_> {
     /// face there turns its back. Infinite beyond two cells.
     fn across(&self, from: DVec3, way: DVec3, inside: bool) -> f64 {
         let step = THICKEST * self.bounds.size().min_element() / STEPS_ACROSS as f64;
-        let is_beyond = |t: f64| (self.field.omega(from + t * way) > 0.0) != inside;
+        let is_beyond = |t: f64| (self.omega(from + t * way) > 0.0) != inside;
         let ends = (0..STEPS_ACROSS).map(|i| step * (i as f64 + 0.5));
         let Some(mut far) = ends.into_iter().find(|t| is_beyond(*t)) else { return f64::INFINITY };
         let mut near = f64::max(far - step, 0.0);

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::around::Surroundings;
-use super::grid::{Cell, Cells, Found, SIDE};
+use super::grid::{Cell, Cells, Found, SIDE, judged};
 use crate::field::{
     Entry, Faces, Field, GradientsMut, Normals, Path, Points, Sheet, Walls, clearance_by_ranges,
 };
@@ -23,6 +23,7 @@ use crate::ir::Unary;
 use crate::solid::construction::Solid;
 use crate::solid::evaluation::Contact;
 use crate::solid::leaves::leaf_set::{LeafTree, Leaves};
+use crate::solid::leaves::pruning::Verdict;
 use crate::solid::leaves::words::Word;
 use crate::solid::path::sweep::Sweep;
 use crate::solid::twin::Twin;
@@ -33,7 +34,7 @@ pub(super) const RUN: usize = 64;
 /// So many neighbouring points of one cell are evaluated together.
 const SHORTEST_RUN: usize = 4;
 
-/// Cells that are looked at one by one for a range; for larger boxes the twin answers.
+/// Cells that are looked at one by one for a range; for larger boxes all leaves are.
 const MOST_TOUCHED: usize = 4096;
 
 /// How far off the surface, in longest sides of the flat grid's cells, gradients come from the leaves nearby and not
@@ -435,16 +436,23 @@ impl Field for CellMap {
 
     fn range(&self, over: &Aabb) -> Interval {
         let domain = self.cells.domain;
-        if domain.union(over) != domain || over.is_empty() {
-            return self.twin.range(over);
-        }
-        let Some(mut touched) = self.cells.touched(over, MOST_TOUCHED) else { return self.twin.range(over) };
+        let is_within = domain.union(over) == domain && !over.is_empty();
+        let touched = if is_within { self.cells.touched(over, MOST_TOUCHED) } else { None };
+        let verdict = match touched {
+            Some(mut touched) => match touched.next() {
+                Some(Cell::Fluid) if touched.all(|cell| cell == Cell::Fluid) => Verdict::Outside,
+                Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Verdict::Inside,
+                _ => Verdict::Near,
+            },
+            // leaf by leaf: a range program of thousands of leaves takes seconds to compile
+            None => judged(&self.parts, over, &self.parts.words).0,
+        };
         // what stands for ω where only its sign is known
         let free = self.cells.shortest_side(SIDE.ilog2());
-        match touched.next() {
-            Some(Cell::Fluid) if touched.all(|cell| cell == Cell::Fluid) => Interval::point(-free),
-            Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Interval::point(free),
-            _ => Interval::ALL,
+        match verdict {
+            Verdict::Inside => Interval::point(free),
+            Verdict::Outside => Interval::point(-free),
+            Verdict::Near => Interval::ALL,
         }
     }
 
