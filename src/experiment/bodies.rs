@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{rigid_parts, vector_field};
+use super::{rigid_parts, vector_field, wall_speed};
 use crate::compile::Error;
 use crate::field::{Moving, Walls};
 use crate::ir::Node;
@@ -28,30 +28,54 @@ pub struct Body {
     pub(super) obstacle: Obstacle,
 }
 
+/// The outside of a scene's container, or an obstacle, at all times.
+pub(super) struct Part<'a> {
+    name: &'a str,
+    shape: Node,
+    skin: Skin,
+    whole: Solid,
+}
+
 /// Compiles the outside of the container, if the scene has one, and the obstacles.
-pub(super) fn compile(
+pub(super) fn compile<'a>(
+    program: &Program,
+    scene: &'a Scene,
+    engine: Engine,
+) -> Result<Vec<Part<'a>>, Error> {
+    let container = scene.container.iter().map(|c| (&c.name, c.outside, c.skin));
+    let obstacles = scene.obstacles.iter().map(|o| (&o.name, o.shape, o.skin));
+    let part = |(name, shape, skin): (&'a String, Node, Skin)| {
+        Ok(Part { name, shape, skin, whole: program.compile(name, shape, engine)? })
+    };
+    container.chain(obstacles).map(part).collect()
+}
+
+/// The greatest speed, m/s, of walls that move.
+pub(super) fn greatest_speed(parts: &[Part<'_>], scene: &Scene) -> f64 {
+    let speed =
+        |part: &Part<'_>| wall_speed::greatest(&part.whole, part.skin.slip, &scene.domain, scene.run.until);
+    parts.iter().map(speed).fold(0.0, f64::max)
+}
+
+/// The parts as what a simulation needs.
+pub(super) fn of_parts(
     program: &Program,
     scene: &Scene,
     parameters: &Parameters,
     engine: Engine,
+    parts: Vec<Part<'_>>,
 ) -> Result<Vec<Body>, Error> {
-    let container = scene.container.iter().map(|c| (&c.name, c.outside, c.skin));
-    let obstacles = scene.obstacles.iter().map(|o| (&o.name, o.shape, o.skin));
-    container
-        .chain(obstacles)
-        .map(|(name, shape, skin)| body(program, scene, parameters, (name, shape), skin, engine))
-        .collect()
+    parts.into_iter().map(|part| body(program, scene, parameters, engine, part)).collect()
 }
 
 fn body(
     program: &Program,
     scene: &Scene,
     parameters: &Parameters,
-    (name, shape): (&str, Node),
-    skin: Skin,
     engine: Engine,
+    part: Part<'_>,
 ) -> Result<Body, Error> {
-    let whole = program.compile(name, shape, engine)?;
+    let Part { name, shape, skin, whole } = part;
     let solid = whole.at(0.0);
     let has_maps = whole.moves() && parameters.walls_have_density();
     let parts =

@@ -22,6 +22,7 @@ mod parameters;
 mod probes;
 mod rigid_parts;
 mod room;
+mod wall_speed;
 
 use std::sync::Arc;
 
@@ -77,7 +78,9 @@ impl Experiment {
 
     fn of_scene(program: Program, scene: Scene, engine: Engine) -> Result<Self, Error> {
         let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
-        let typical_speed = parameters::typical_speed(&program, &scene);
+        let parts = bodies::compile(&program, &scene, engine)?;
+        let by_walls = bodies::greatest_speed(&parts, &scene);
+        let typical_speed = parameters::typical_speed(&program, &scene).max(by_walls);
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let (time_step, too_long) = parameters::time_step(&scene, &parameters);
@@ -96,7 +99,12 @@ impl Experiment {
                 },
             )
         })?;
-        let bodies = bodies::compile(&program, &scene, &parameters, engine)?;
+        let bodies = bodies::of_parts(&program, &scene, &parameters, engine, parts)?;
+        for body in &bodies {
+            if let Some(Err(refusal)) = program.within_tolerance(&body.solid) {
+                return Err(refuse(&program, *refusal));
+            }
+        }
         let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters)).collect();
         Ok(Self { program, scene, parameters, time_step, bodies, fluid, warnings })
     }
@@ -126,7 +134,7 @@ impl Experiment {
         self.time_step
     }
 
-    /// A speed that the fluid can reach by its velocity at the start and a fall through the box, m/s.
+    /// A speed that the fluid can reach, m/s: by its velocity at the start and a fall through the box, or by walls that move.
     pub fn typical_speed(&self) -> f64 {
         self.parameters.expected_speed
     }

@@ -79,7 +79,8 @@ impl<'a> Lowering<'a> {
             );
             return None;
         }
-        Some(Some(AskedMean { from: from?, known: known? }))
+        let torque = block.setting("about").is_some();
+        Some(Some(AskedMean { from: from?, known: known?, torque }))
     }
 
     /// Reads what is known of a mean: a number, or a vector where a probe measures one.

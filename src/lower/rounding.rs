@@ -10,59 +10,18 @@
 
 use rustc_hash::FxHashMap;
 
+use super::joints::{Joint, Side};
 use super::lowering::Lowering;
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::geom::Aabb;
-use crate::ir::{self, Binary, Expr, Given, Graph, Interpreter, Node, Unary};
-
-/// How many places a part is looked at to find what its slope is like.
-const PLACES: u32 = 48;
-
-/// Fewer places with a slope tell nothing.
-const FEWEST_PLACES: usize = 16;
-
-/// What counts as rounding, relative to the terms of a sum.
-const ROUNDING: f64 = 1e-10;
+use crate::ir::{self, Binary, Node, Unary};
 
 /// Distances of first order level off at so many radii.
 const FARTHEST: f64 = 8.0;
 
 /// How far a rounded *or* reaches beyond both of its parts, as a part of the radius: 1 − 1/√2.
 const FILLET: f64 = 0.292_893_218_813_452_5;
-
-/// How a part's field becomes a distance, with g = |∇ω|.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Profile {
-    /// g is this number everywhere: ω/g.
-    Linear(f64),
-    /// ω is a square of distances, so that g² − 2ω·∂²ω/∂n² is the square of this number everywhere, which is g on the
-    /// surface: 2ω/(g + the number).
-    Quadratic(f64),
-    /// Something else: ω/√(g² + (ω/8r)²), which is right to first order.
-    Other,
-}
-
-/// A node, or what it is outside.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Side {
-    node: Node,
-    negated: bool,
-}
-
-/// What a part of the shape is made of.
-enum Joint {
-    /// Another node holds the same points.
-    Same(Side),
-    /// R₀ operations, which have edges to round.
-    And([Side; 2]),
-    Or([Side; 2]),
-    /// The least and the greatest, which stay as they are.
-    Least([Side; 2]),
-    Greatest([Side; 2]),
-    /// No joint: a formula.
-    Leaf,
-}
 
 /// The radius of edges that point outwards, and of those that point inwards if they are rounded.
 struct Radii {
@@ -147,65 +106,6 @@ impl Lowering<'_> {
         Some(Radii { outer, inner, length })
     }
 
-    /// The joints below a root, and an order in which parts come before what they are joined to.
-    fn skeleton(&self, root: Side) -> (Vec<Side>, FxHashMap<Side, Joint>) {
-        let mut joints = FxHashMap::default();
-        let mut waiting = vec![root];
-        while let Some(side) = waiting.pop() {
-            if joints.contains_key(&side) {
-                continue;
-            }
-            let joint = self.joint(side);
-            match &joint {
-                Joint::Same(part) => waiting.push(*part),
-                Joint::And(parts) | Joint::Or(parts) | Joint::Least(parts) | Joint::Greatest(parts) => {
-                    waiting.extend(parts);
-                }
-                Joint::Leaf => {}
-            }
-            joints.insert(side, joint);
-        }
-        // operands have lower numbers than what uses them
-        let mut order: Vec<Side> = joints.keys().copied().collect();
-        order.sort_by_key(|side| (side.node, side.negated));
-        (order, joints)
-    }
-
-    /// How a part is joined. Factors that are positive numbers change no distance; *not* turns *and* into *or*.
-    fn joint(&self, Side { node, negated }: Side) -> Joint {
-        let graph = &self.module.graph;
-        let side = |node: Node, turned: bool| Side { node, negated: negated != turned };
-        let both = |a: Node, b: Node| [side(a, false), side(b, false)];
-        let factor = |node: Node| graph.as_constant(node).filter(|factor| factor.is_normal());
-        match graph.expr(node) {
-            Expr::Unary(Unary::Neg, a) => Joint::Same(side(a, true)),
-            Expr::Binary(Binary::Mul, a, b) => match (factor(a), factor(b)) {
-                (Some(factor), _) => Joint::Same(side(b, factor < 0.0)),
-                (None, Some(factor)) => Joint::Same(side(a, factor < 0.0)),
-                (None, None) => Joint::Leaf,
-            },
-            Expr::Binary(Binary::Div, a, b) => match factor(b) {
-                Some(factor) => Joint::Same(side(a, factor < 0.0)),
-                None => Joint::Leaf,
-            },
-            Expr::Binary(Binary::And, a, b) if negated => Joint::Or(both(a, b)),
-            Expr::Binary(Binary::And, a, b) => Joint::And(both(a, b)),
-            Expr::Binary(Binary::Or, a, b) if negated => Joint::And(both(a, b)),
-            Expr::Binary(Binary::Or, a, b) => Joint::Or(both(a, b)),
-            Expr::Binary(Binary::Min, a, b) if negated => Joint::Greatest(both(a, b)),
-            Expr::Binary(Binary::Min, a, b) => Joint::Least(both(a, b)),
-            Expr::Binary(Binary::Max, a, b) if negated => Joint::Least(both(a, b)),
-            Expr::Binary(Binary::Max, a, b) => Joint::Greatest(both(a, b)),
-            Expr::Constant(_)
-            | Expr::Coordinate(_)
-            | Expr::Parameter(_)
-            | Expr::Uniform(_)
-            | Expr::Unary(..)
-            | Expr::Binary(..)
-            | Expr::Lookup(..) => Joint::Leaf,
-        }
-    }
-
     /// The least of two distances, or the greatest.
     fn plain(&mut self, op: Binary, parts: [Rounded; 2], span: Span) -> Rounded {
         let [a, b] = parts;
@@ -256,123 +156,19 @@ impl Lowering<'_> {
         self.unary(Unary::Sqrt, sum, span)
     }
 
-    /// The distance from the surface of a part, see [`Profile`]. It has the sign of the part's field everywhere.
+    /// The distance from the surface of a part: exact where that follows from its slope, and otherwise
+    /// ω/√(g² + (ω/8r)²), which is right to first order. It has the sign of the part's field everywhere.
     fn distance(&mut self, leaf: Node, within: Option<Aabb>, radii: &Radii, span: Span) -> Node {
-        let half = within.map_or(4.0 * radii.length, |within| within.size().max_element());
-        let middle = within.map_or([0.0; 3], |within| within.centre().to_array());
-        let is_one = |number: f64| (number - 1.0).abs() <= ROUNDING;
-        match self.profile(leaf, middle, half) {
-            Profile::Linear(slope) if is_one(slope) => leaf,
-            Profile::Linear(slope) => {
-                let slope = self.constant(slope);
-                self.binary(Binary::Div, leaf, slope, span)
-            }
-            Profile::Quadratic(at_surface) => {
-                let at_surface = self.constant(if is_one(at_surface) { 1.0 } else { at_surface });
-                let slope = self.slope_of_leaf(leaf, span);
-                let sum = self.binary(Binary::Add, slope, at_surface, span);
-                let twice = self.binary(Binary::Add, leaf, leaf, span);
-                self.binary(Binary::Div, twice, sum, span)
-            }
-            Profile::Other => {
-                let slope = self.slope_of_leaf(leaf, span);
-                let farthest = self.constant(FARTHEST);
-                let farthest = self.binary(Binary::Mul, farthest, radii.outer, span);
-                let part = self.binary(Binary::Div, leaf, farthest, span);
-                let [slope, part] = [slope, part].map(|a| self.binary(Binary::Mul, a, a, span));
-                let sum = self.binary(Binary::Add, slope, part, span);
-                let root = self.unary(Unary::Sqrt, sum, span);
-                self.binary(Binary::DivOrZero, leaf, root, span)
-            }
+        if let Some(distance) = self.exact_distance(leaf, (within, 4.0 * radii.length), span) {
+            return distance;
         }
+        let slope = self.slope_of_leaf(leaf, span);
+        let farthest = self.constant(FARTHEST);
+        let farthest = self.binary(Binary::Mul, farthest, radii.outer, span);
+        let part = self.binary(Binary::Div, leaf, farthest, span);
+        let [slope, part] = [slope, part].map(|a| self.binary(Binary::Mul, a, a, span));
+        let sum = self.binary(Binary::Add, slope, part, span);
+        let root = self.unary(Unary::Sqrt, sum, span);
+        self.binary(Binary::DivOrZero, leaf, root, span)
     }
-
-    /// |∇ω|, without the directions in which ω does not change.
-    fn slope_of_leaf(&mut self, leaf: Node, span: Span) -> Node {
-        let gradient = ir::gradient(&mut self.module.graph, leaf);
-        let parts: Vec<Node> =
-            gradient.into_iter().filter(|part| self.module.graph.as_constant(*part) != Some(0.0)).collect();
-        match *parts.as_slice() {
-            [] => self.constant(0.0),
-            [part] => self.unary(Unary::Abs, part, span),
-            _ => {
-                let squares: Vec<Node> =
-                    parts.iter().map(|&part| self.binary(Binary::Mul, part, part, span)).collect();
-                let sum = self.chain(Binary::Add, &squares, span);
-                self.unary(Unary::Sqrt, sum, span)
-            }
-        }
-    }
-
-    /// What a part's slope is like at some places within a cube, with the params as they are and otherwise. Whatever is
-    /// found here, the distance has the right sign: only its value may be of first order.
-    fn profile(&self, leaf: Node, middle: [f64; 3], half: f64) -> Profile {
-        let (mut graph, leaf) = self.module.graph.extract_cone(leaf);
-        let slopes = Slopes::of(&mut graph, leaf);
-        let params: Vec<f64> = self.module.params.iter().map(|param| param.value).collect();
-        let others: Vec<f64> = params.iter().map(|value| 1.37 * value).collect();
-        let has_params = !graph.parameters(leaf).is_empty();
-        let mut found = Vec::new();
-        for i in 0..PLACES {
-            let parameters = if has_params && i % 2 == 1 { &others } else { &params };
-            let point = std::array::from_fn(|axis| middle[axis] + half * spread(i, axis));
-            found.extend(slopes.at(point, 7.0 * spread(i, 3), parameters));
-        }
-        if found.len() < FEWEST_PLACES {
-            return Profile::Other;
-        }
-        let first = found[0];
-        if found.iter().all(|at| (at.slope - first.slope).abs() <= ROUNDING * first.slope) {
-            return Profile::Linear(first.slope);
-        }
-        let is_same = |at: &Slope| (at.square - first.square).abs() <= ROUNDING * (at.terms + first.terms);
-        if first.square > 0.0 && found.iter().all(is_same) {
-            // the one with the least rounding
-            let best = found.iter().min_by(|a, b| a.terms.total_cmp(&b.terms)).unwrap_or(&first);
-            return Profile::Quadratic(best.square.sqrt());
-        }
-        Profile::Other
-    }
-}
-
-/// What a field is like at a place: g, g² − 2ω·∂²ω/∂n², and the sizes of both terms together.
-#[derive(Debug, Clone, Copy)]
-struct Slope {
-    slope: f64,
-    square: f64,
-    terms: f64,
-}
-
-/// The program for [`Slope`].
-struct Slopes(Interpreter);
-
-impl Slopes {
-    fn of(graph: &mut Graph, leaf: Node) -> Self {
-        let gradient = ir::gradient(graph, leaf);
-        let squares = gradient.map(|part| graph.binary(Binary::Mul, part, part));
-        let sum = graph.binary(Binary::Add, squares[0], squares[1]);
-        let sum = graph.binary(Binary::Add, sum, squares[2]);
-        let slope = graph.unary(Unary::Sqrt, sum);
-        let [a, b, c] = ir::gradient(graph, slope);
-        let [x, y, z] = gradient;
-        Self(Interpreter::new(graph, &[leaf, slope, x, y, z, a, b, c]))
-    }
-
-    /// `None` where the field has no value or no slope.
-    fn at(&self, point: [f64; 3], time: f64, parameters: &[f64]) -> Option<Slope> {
-        let mut out = [0.0; 8];
-        self.0.eval_given(Given { point, time, parameters, uniforms: &[] }, &mut out);
-        let [omega, slope, x, y, z, a, b, c] = out;
-        let along = (x * a + y * b + z * c) / slope;
-        let bent = 2.0 * omega * along;
-        let found = Slope { slope, square: slope * slope - bent, terms: slope * slope + bent.abs() };
-        (slope > 0.0 && found.terms.is_finite()).then_some(found)
-    }
-}
-
-/// Numbers from −1 to 1 that fill cubes evenly: multiples of the powers of a generalised golden ratio.
-fn spread(i: u32, axis: usize) -> f64 {
-    const STEPS: [f64; 4] =
-        [0.856_674_883_854_502_9, 0.733_891_856_627_126_1, 0.628_706_721_037_908_6, 0.538_597_257_132_362_5];
-    2.0 * (0.5 + f64::from(i) * STEPS[axis]).fract() - 1.0
 }

@@ -26,6 +26,10 @@ enum Transform {
     Repeat,
     /// Arcs in place of edges.
     Round,
+    /// Faces moved outwards.
+    Offset,
+    /// Distances in place of the fields of its parts.
+    Distance,
 }
 
 /// A coordinate axis, by its number.
@@ -36,7 +40,7 @@ enum Axis3 {
     Z = 2,
 }
 
-const METHODS: [(&str, Transform); 11] = [
+const METHODS: [(&str, Transform); 13] = [
     ("move", Transform::Move),
     ("rotate_x", Transform::RotateAbout(Axis3::X)),
     ("rotate_y", Transform::RotateAbout(Axis3::Y)),
@@ -48,6 +52,8 @@ const METHODS: [(&str, Transform); 11] = [
     ("turned", Transform::Turned),
     ("repeat", Transform::Repeat),
     ("round", Transform::Round),
+    ("offset", Transform::Offset),
+    ("distance", Transform::Distance),
 ];
 
 impl Transform {
@@ -63,6 +69,8 @@ impl Transform {
             Self::Turned => &["angle"],
             Self::Repeat => &["step", "counts"],
             Self::Round => &["radius", "inner"],
+            Self::Offset => &["d"],
+            Self::Distance => &[],
         }
     }
 
@@ -76,7 +84,9 @@ impl Transform {
             | Self::Mirror
             | Self::At
             | Self::Turned
-            | Self::Round => 1,
+            | Self::Round
+            | Self::Offset => 1,
+            Self::Distance => 0,
         }
     }
 }
@@ -162,7 +172,7 @@ impl<'a> Lowering<'a> {
                 return self.fail(self.wrong_arguments(method, parameters, arguments, span));
             };
             let value = self.expr(&argument.value);
-            if transform == Transform::Round && !self.no_angle(&argument.value) {
+            if matches!(transform, Transform::Round | Transform::Offset) && !self.no_angle(&argument.value) {
                 return Value::Failed;
             }
             if parameters[slot] == "angle" && transform != Transform::Turned {
@@ -214,7 +224,7 @@ impl<'a> Lowering<'a> {
         span: Span,
     ) -> Option<Node> {
         let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
-        let (first, at) = &values[0];
+        let Some((first, at)) = values.first() else { return self.distance_of_shape(shape, span) };
         match transform {
             Transform::Move => {
                 let by = self.as_vector(first, *at)?;
@@ -250,6 +260,8 @@ impl<'a> Lowering<'a> {
                 self.repeated(shape, (step, *at), (counts, values[1].1), span)
             }
             Transform::Round => self.rounded_shape(shape, values, span),
+            Transform::Offset => self.offset_shape(shape, &values[0], span),
+            Transform::Distance => self.distance_of_shape(shape, span),
             Transform::Rotate => {
                 let axis = self.constant_vector(first, *at, "an axis")?;
                 let angle = self.angle(&values[1].0, values[1].1)?;

@@ -2,7 +2,7 @@
 
 use super::construction::Solid;
 use super::leaves::pruning::{Verdict, prune};
-use super::leaves::tree::Logic;
+use super::leaves::tree::{LeafNode, Logic};
 use super::leaves::words::Word;
 use crate::diagnostic::Span;
 use crate::geom::Aabb;
@@ -42,7 +42,7 @@ impl Solid {
         let omega = &self.inner.omega;
         let parts = self.parts()?;
         let (_, nodes) = Logic::of(&omega.graph, omega.root)?;
-        let info = |(leaf, &node): (usize, _)| LeafInfo {
+        let info = |(leaf, &LeafNode { node, .. }): (usize, &LeafNode)| LeafInfo {
             span: omega.graph.span(node),
             shape: parts.leaves.shape_of(leaf as u32),
             operations: parts.leaves.operations(leaf as u32),

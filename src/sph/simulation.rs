@@ -78,6 +78,7 @@ impl Simulation {
             obstacles,
             during: Vec::new(),
             time: 0.0,
+            step: 0.0,
             clearance,
             maps: Maps::default(),
         };

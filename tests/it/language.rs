@@ -219,15 +219,89 @@ fn joints_differ_from_the_plain_ones_near_the_edge_only() {
     }
 }
 
+/// Where a ray from inside leaves a solid, within a length at which it is outside.
+fn end_of(solid: &Solid, from: DVec3, way: DVec3, within: f64) -> f64 {
+    let (mut inside, mut outside) = (0.0, within);
+    assert!(solid.omega(from) > 0.0, "{from} is not inside");
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        if solid.omega(from + middle * way) > 0.0 { inside = middle } else { outside = middle }
+    }
+    inside
+}
+
 #[test]
-fn offsets_and_shells_keep_their_thickness_to_first_order() {
-    // of a ball (r² − d²)/2r + t·d/r the surface is t²/2r beyond r + t
-    let grown = solid("sphere(2).offset(0.1)");
-    let surface = 2.1 + 0.01 / 4.0;
-    assert!(grown.omega(DVec3::X * (surface - 1e-4)) > 0.0 && grown.omega(DVec3::X * (surface + 1e-4)) < 0.0);
-    let hollow = solid("sphere(2).shell(0.1)");
-    assert!(hollow.omega(DVec3::X * 1.95) > 0.0 && hollow.omega(DVec3::X * 1.89) < 0.0);
-    assert!(hollow.omega(DVec3::ZERO) < 0.0 && hollow.omega(DVec3::X * 2.01) < 0.0);
+fn offsets_move_faces_by_the_distance() {
+    // the plain shape, a place inside, and how far its surface is in some directions
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let centre = DVec3::new(0.5, 1.0, 1.5);
+    let turned = DVec3::new(0.5_f64.sqrt(), 0.5_f64.sqrt(), 0.0);
+    for (shape, from, ends) in [
+        ("sphere(2)", DVec3::ZERO, vec![(x, 2.0), (-y, 2.0), (turned, 2.0)]),
+        ("box([0, 0, 0], [1, 2, 3])", centre, vec![(x, 0.5), (-y, 1.0), (z, 1.5)]),
+        ("box([-1, -1, -1], [1, 1, 1]).rotate_z(45°)", DVec3::ZERO, vec![(turned, 1.0), (z, 1.0)]),
+        (
+            "(box([-1, -1, -1], [1, 1, 1]) \\ cylinder(0.4, 4).move([0, 0, -2]))",
+            0.7 * x,
+            vec![(x, 0.3), (-x, 0.3)],
+        ),
+        ("cone(1, 1)", 0.2 * z, vec![((x + z).normalize(), 0.8 * 0.5_f64.sqrt()), (-z, 0.2)]),
+        ("(half_space() or z <= 2)", DVec3::ZERO, vec![(z, 2.0)]),
+        (
+            "polygon([[0, 0], [2, 0], [2, 2], [1, 1], [0, 2]]).extrude(0, 1)",
+            turned,
+            vec![(y, 1.0), (-z, 0.5)],
+        ),
+    ] {
+        let from = if shape.starts_with("polygon") { DVec3::new(0.5, 0.4, 0.5) } else { from };
+        for d in [0.1, -0.1] {
+            let moved = solid(&format!("{shape}.offset({d})"));
+            for &(way, end) in &ends {
+                // the upper edges of the polygon are at 45° above the middle of its lower one
+                let expected = match shape.starts_with("polygon") && way == y {
+                    true => 1.5 - 0.4 + 2_f64.sqrt() * d,
+                    false => end + d,
+                };
+                let found = end_of(&moved, from, way, expected + 0.3);
+                assert!(
+                    (found - expected).abs() < 1e-12,
+                    "{shape}, {d}, {way}: {found}, expected {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn shells_are_as_thick_as_they_say() {
+    for (shape, inner) in [
+        ("sphere(2)", "sphere(1.9)"),
+        ("box([0, 0, 0], [1, 2, 3])", "box([0.1, 0.1, 0.1], [0.9, 1.9, 2.9])"),
+        ("(cylinder(1, 2) and z <= 1)", "cylinder(0.9, 0.8).move([0, 0, 0.1])"),
+    ] {
+        same_sign(&format!("{shape}.shell(0.1)"), &format!("{shape} \\ {inner}"), cube(3.0));
+    }
+}
+
+/// An offset by a length that depends on the place, of a formula without a known distance: right to first order.
+#[test]
+fn offsets_of_other_formulas_are_of_first_order() {
+    let bulge = solid("ellipsoid(1, 0.5, 0.5).offset(0.02 + 0.01*sin(z))");
+    // ω = (1 − 4y²)/4 + 0.02·2y
+    let expected = 0.02 + 0.2504_f64.sqrt();
+    assert!((end_of(&bulge, DVec3::ZERO, DVec3::Y, 1.0) - expected).abs() < 1e-12);
+}
+
+#[test]
+fn lofts_lead_straight_from_edge_to_edge() {
+    let square = |half: f64| {
+        format!("polygon([[-{half}, -{half}], [{half}, -{half}], [{half}, {half}], [-{half}, {half}]])")
+    };
+    let loft = format!("{}.loft({}, 0, 1)", square(0.5), square(0.25));
+    let pyramid = "(abs(x) <= 0.5 - z/4 and abs(y) <= 0.5 - z/4 and 0 <= z <= 1)";
+    same_sign(&loft, pyramid, cube(1.2));
+    let cone = "(x^2 + y^2 <= (1 - z/2)^2 and 0 <= z <= 1)";
+    same_sign("(x^2 + y^2 <= 1).loft(sqrt(x^2 + y^2) <= 0.5, 0, 1)", cone, cube(1.2));
 }
 
 #[test]

@@ -22,13 +22,16 @@ pub(super) struct Means {
     error: Vec<Option<f64>>,
     /// What the scene knows of the first figures; empty if it states nothing.
     known: Vec<f64>,
+    /// Columns that text shows.
+    #[serde(skip)]
+    shown: usize,
     /// How far the first figures are from what is known, as a part of it, or in their unit if it is zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     deviation: Option<f64>,
 }
 
-/// Columns that text shows: of forces not the torques.
-const SHOWN: usize = 3;
+/// Columns that text shows where no torque is asked for.
+const WITHOUT_TORQUE: usize = 3;
 
 impl Means {
     /// The means of a table's rows, each of which begins with its time. A row stands for the time since the one before it.
@@ -56,6 +59,7 @@ impl Means {
             error: means.iter().map(|mean| mean.and_then(|mean| mean.error)).collect(),
             deviation: off.filter(|_| !known.is_empty()).map(|off| (off / size).sqrt()),
             known,
+            shown: if asked.torque { usize::MAX } else { WITHOUT_TORQUE },
         }
     }
 
@@ -65,7 +69,7 @@ impl Means {
         if self.mean.iter().all(Option::is_none) {
             return line + " no value was sampled";
         }
-        let figures = self.columns.iter().zip(&self.mean).zip(&self.error).take(SHOWN);
+        let figures = self.columns.iter().zip(&self.mean).zip(&self.error).take(self.shown);
         for (k, ((column, mean), error)) in figures.enumerate() {
             let mean = mean.unwrap_or(f64::NAN);
             let (name, unit) = column.split_once(" [").unwrap_or((column, ""));
@@ -102,7 +106,7 @@ mod tests {
         let rows: Vec<Vec<f64>> = (0..100)
             .map(|i| vec![0.01 * f64::from(i), if i < 50 { 7.0 } else { 2.0 + 0.1 * f64::from(i % 2) }])
             .collect();
-        let asked = AskedMean { from: 0.5, known: vec![2.0] };
+        let asked = AskedMean { from: 0.5, known: vec![2.0], torque: false };
         let probe = Probe::Pressure { at: glam::DVec3::ZERO };
         let means = Means::of("p", &probe, &asked, &rows);
         // the row at the start stands for the time before it
@@ -112,7 +116,7 @@ mod tests {
         assert!((means.deviation.unwrap() / (expected / 2.0 - 1.0) - 1.0).abs() < 1e-9);
         assert!(means.line().starts_with("probe p, mean from 0.5 s on: pressure 2.05"), "{}", means.line());
         assert!(means.line().ends_with(" Pa; 2.55 % from what is known"), "{}", means.line());
-        let none = Means::of("p", &probe, &AskedMean { from: 2.0, known: vec![0.0] }, &rows);
+        let none = Means::of("p", &probe, &AskedMean { from: 2.0, known: vec![0.0], torque: false }, &rows);
         assert_eq!((none.samples, none.deviation), (0, None));
         assert!(none.line().ends_with(": no value was sampled"), "{}", none.line());
     }
@@ -121,8 +125,20 @@ mod tests {
     fn a_row_counts_as_long_as_it_stands_for() {
         let rows = [vec![0.0, 9.0], vec![1.0, 4.0], vec![4.0, 8.0]];
         let probe = Probe::Height { x: 0.0, y: 0.0 };
-        let means = Means::of("h", &probe, &AskedMean { from: 0.0, known: vec![0.0] }, &rows);
+        let means = Means::of("h", &probe, &AskedMean { from: 0.0, known: vec![0.0], torque: false }, &rows);
         assert_eq!((means.mean[0], means.deviation), (Some(7.0), Some(7.0)));
         assert!(means.line().ends_with("; 7.00e0 from what is known"), "{}", means.line());
+    }
+
+    #[test]
+    fn torques_are_told_where_their_point_is_stated() {
+        let rows = [vec![0.0; 7], vec![1.0; 7], vec![2.0; 7]];
+        let probe = Probe::Force { obstacle: 0, about: glam::DVec3::ZERO };
+        let line = |torque: bool| {
+            let asked = AskedMean { from: 0.0, known: Vec::new(), torque };
+            Means::of("f", &probe, &asked, &rows).line()
+        };
+        assert!(line(true).contains("torque z 1.5"), "{}", line(true));
+        assert!(line(false).contains("force z 1.5") && !line(false).contains("torque"), "{}", line(false));
     }
 }

@@ -227,6 +227,8 @@ pub struct AskedMean {
     pub from: f64,
     /// What is known of the first figures of each sample, in SI units; empty if nothing is.
     pub known: Vec<f64>,
+    /// Whether the torque of a force is asked for: its point is stated.
+    pub torque: bool,
 }
 
 /// What a probe measures, with numbers in SI units.

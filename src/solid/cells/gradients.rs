@@ -16,7 +16,7 @@ enum Source {
 }
 
 /// Some points, gathered in columns.
-struct Gathered {
+pub(super) struct Gathered {
     x: [f64; RUN],
     y: [f64; RUN],
     z: [f64; RUN],
@@ -24,9 +24,9 @@ struct Gathered {
 }
 
 impl Gathered {
-    const EMPTY: Self = Self { x: [0.0; RUN], y: [0.0; RUN], z: [0.0; RUN], count: 0 };
+    pub const EMPTY: Self = Self { x: [0.0; RUN], y: [0.0; RUN], z: [0.0; RUN], count: 0 };
 
-    fn fill(&mut self, points: Points<'_>, numbers: impl Iterator<Item = usize>) {
+    pub fn fill(&mut self, points: Points<'_>, numbers: impl Iterator<Item = usize>) {
         self.count = 0;
         for i in numbers {
             (self.x[self.count], self.y[self.count], self.z[self.count]) =
@@ -35,7 +35,7 @@ impl Gathered {
         }
     }
 
-    fn columns(&self) -> [&[f64]; 3] {
+    pub fn columns(&self) -> [&[f64]; 3] {
         [&self.x[..self.count], &self.y[..self.count], &self.z[..self.count]]
     }
 }
@@ -44,6 +44,10 @@ impl Gathered {
 struct Decided {
     values: [f64; RUN],
     words: [u32; RUN],
+}
+
+impl Decided {
+    const NONE: Self = Self { values: [0.0; RUN], words: [0; RUN] };
 }
 
 impl CellMap {
@@ -92,7 +96,7 @@ impl CellMap {
         numbers: impl Iterator<Item = usize> + Clone,
         out: &mut GradientsMut<'_>,
     ) {
-        let mut decided = Decided { values: [0.0; RUN], words: [0; RUN] };
+        let mut decided = Decided::NONE;
         self.decide_many(words, &mut (program as usize), points, &mut decided);
         for (value, i) in decided.values.iter().zip(numbers.clone()) {
             out.omega[i] = *value;
@@ -135,7 +139,7 @@ impl CellMap {
             Word::Any(parts) => (parts, false),
         };
         self.decide_many(words, at, points, out);
-        let mut next = Decided { values: [0.0; RUN], words: [0; RUN] };
+        let mut next = Decided::NONE;
         for _ in 1..parts {
             self.decide_many(words, at, points, &mut next);
             for k in 0..count {

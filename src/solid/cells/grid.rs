@@ -11,6 +11,7 @@
 //! tree has the same distance wherever that is less than r, found by the same leaf.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
@@ -341,8 +342,58 @@ impl Cells {
         bounds(&self.domain, depth, q.clamp(DVec3::ZERO, DVec3::splat(side - 1.0)).as_uvec3())
     }
 
-    /// The cells of the flat grid that a box within the domain touches; `None` if they are more than `most`.
-    pub fn touched(&self, over: &Aabb, most: usize) -> Option<impl Iterator<Item = Cell> + '_> {
+    /// Whether a box within the domain touches fluid alone, as far as the flat grid says, and no more than `most` of its
+    /// cells.
+    pub fn is_fluid(&self, over: &Aabb, most: usize) -> bool {
+        let touched = self.touched(over, most);
+        touched.is_some_and(|mut cells| cells.all(|(_, cell)| cell == Cell::Fluid))
+    }
+
+    /// Visits the undivided cells that a box within the domain touches, and perhaps some beside it, with their depths. The
+    /// visit ends where `visit` breaks it off. `None` if the box touches more than `most` cells of the flat grid.
+    pub fn visit<B>(
+        &self,
+        over: &Aabb,
+        most: usize,
+        visit: &mut impl FnMut(Cell, u32) -> ControlFlow<B>,
+    ) -> Option<ControlFlow<B>> {
+        // points that rounding puts into the next cell are in it
+        let wider = over.grown(1e-9 * self.shortest_side(MAX_DEPTH));
+        for (at, cell) in self.touched(over, most)? {
+            let found = match cell {
+                Cell::Divided(first) => self.visit_below((DEPTH, at, first), &wider, visit),
+                cell => visit(cell, DEPTH),
+            };
+            if found.is_break() {
+                return Some(found);
+            }
+        }
+        Some(ControlFlow::Continue(()))
+    }
+
+    fn visit_below<B>(
+        &self,
+        (depth, at, first): (u32, UVec3, u32),
+        over: &Aabb,
+        visit: &mut impl FnMut(Cell, u32) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        for k in 0..8 {
+            let at = octant(at, k);
+            let of_child = bounds(&self.domain, depth + 1, at);
+            if !(of_child.min.cmple(over.max).all() && over.min.cmple(of_child.max).all()) {
+                continue;
+            }
+            match Cell::unpack(self.children[first as usize + k]) {
+                Cell::Divided(below) => self.visit_below((depth + 1, at, below), over, visit)?,
+                cell => visit(cell, depth + 1)?,
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The cells of the flat grid that a box within the domain touches, with their numbers along the axes; `None` if they are
+    /// more than `most`.
+    fn touched(&self, over: &Aabb, most: usize) -> Option<impl Iterator<Item = (UVec3, Cell)> + '_> {
         let number = |p: DVec3| {
             let q = (p - self.domain.min) * self.per_length;
             q.clamp(DVec3::ZERO, DVec3::splat(f64::from(SIDE - 1))).as_uvec3()
@@ -352,10 +403,12 @@ impl Cells {
         if (size.x * size.y * size.z) as usize > most {
             return None;
         }
-        let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| (z * SIDE + y) * SIDE));
-        Some(rows.flat_map(move |row| {
-            let row = &self.grid[(row + low.x) as usize..=(row + high.x) as usize];
-            row.iter().map(|&word| Cell::unpack(word))
+        let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| (y, z)));
+        Some(rows.flat_map(move |(y, z)| {
+            (low.x..=high.x).map(move |x| {
+                let word = self.grid[((z * SIDE + y) * SIDE + x) as usize];
+                (UVec3::new(x, y, z), Cell::unpack(word))
+            })
         }))
     }
 

@@ -8,11 +8,12 @@
 //! jumps between cells. A map with a reach also answers for distance, normal and curvature up to that
 //! distance from the surface.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::around::Surroundings;
+use super::demanded::{Demanded, Keeps};
 use super::grid::{Cell, Cells, Found, SIDE, judged};
 use crate::field::{
     Entry, Faces, Field, GradientsMut, Normals, Path, Points, Sheet, Walls, clearance_by_ranges,
@@ -59,7 +60,9 @@ pub struct CellMap {
     pub(super) parts: Arc<LeafTree>,
     pub(super) cells: Arc<Cells>,
     /// What decides within [`AROUND`] of the cells, for gradients off the surface.
-    around: Surroundings,
+    around: Demanded,
+    /// What decides the value in the cells.
+    pub(super) values: Demanded,
     reach: f64,
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
     /// still right.
@@ -128,9 +131,10 @@ impl CellMap {
     pub(super) fn of(solid: &Solid, cells: Arc<Cells>, reach: f64) -> Option<Self> {
         let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
         let beside = AROUND * cells.domain.size().max_element() / f64::from(SIDE);
-        let around = Surroundings::new(cells.domain, beside.max(margin));
+        let around = Demanded::new(cells.domain, Keeps::Surface, beside.max(margin));
+        let values = Demanded::new(cells.domain, Keeps::Value, margin);
         let (solid, twin) = (solid.clone(), solid.twin());
-        Some(Self { solid, twin, parts, cells, around, reach, margin })
+        Some(Self { solid, twin, parts, cells, around, values, reach, margin })
     }
 
     /// How the box was divided.
@@ -233,23 +237,31 @@ impl CellMap {
         self.around.words(&self.parts, cell)
     }
 
-    /// The value of a program at up to [`RUN`] points.
-    fn run_many(&self, at: &mut usize, points: [&[f64]; 3], out: &mut [f64]) {
-        let word = Word::read(self.cells.programs[*at]);
+    /// The value of a tree at up to [`RUN`] points; `factor` is what a leaf's value is multiplied by.
+    pub(super) fn run_many(
+        &self,
+        words: &[u32],
+        at: &mut usize,
+        points: [&[f64]; 3],
+        factor: &impl Fn(u32) -> f64,
+        out: &mut [f64],
+    ) {
+        let word = Word::read(words[*at]);
         *at += 1;
         let (parts, all) = match word {
             Word::Leaf { leaf, negated } => {
                 self.parts.leaves.values(leaf, points, out);
-                return out.iter_mut().for_each(|v| *v = signed(*v, negated));
+                let factor = signed(factor(leaf), negated);
+                return out.iter_mut().for_each(|v| *v *= factor);
             }
             Word::All(parts) => (parts, true),
             Word::Any(parts) => (parts, false),
         };
-        self.run_many(at, points, out);
+        self.run_many(words, at, points, factor, out);
         let mut other = [0.0; RUN];
         let other = &mut other[..out.len()];
         for _ in 1..parts {
-            self.run_many(at, points, other);
+            self.run_many(words, at, points, factor, other);
             for (best, next) in out.iter_mut().zip(&*other) {
                 let wins = if all { *next < *best } else { *next > *best };
                 if wins || next.is_nan() {
@@ -309,7 +321,8 @@ impl CellMap {
                 let run = first + k..first + k + length;
                 if length >= SHORTEST_RUN {
                     let columns = [points.x, points.y, points.z].map(|c| &c[run.clone()]);
-                    self.run_many(&mut (program as usize), columns, &mut omega[run]);
+                    let (words, out) = (&self.cells.programs[..], &mut omega[run]);
+                    self.run_many(words, &mut (program as usize), columns, &|_| 1.0, out);
                 } else {
                     for i in run {
                         omega[i] = self.run(program, points.get(i)).0;
@@ -423,11 +436,11 @@ impl Field for CellMap {
     }
 
     fn continuous(&self, p: DVec3) -> f64 {
-        self.twin.omega(p)
+        self.value(p)
     }
 
     fn continuous_many(&self, points: Points<'_>, omega: &mut [f64]) {
-        self.twin.omega_many(points, omega);
+        self.values(points, omega);
     }
 
     fn omega_many(&self, points: Points<'_>, omega: &mut [f64]) {
@@ -435,43 +448,73 @@ impl Field for CellMap {
     }
 
     fn range(&self, over: &Aabb) -> Interval {
-        let domain = self.cells.domain;
-        let is_within = domain.union(over) == domain && !over.is_empty();
-        let touched = if is_within { self.cells.touched(over, MOST_TOUCHED) } else { None };
-        let verdict = match touched {
-            Some(mut touched) => match touched.next() {
-                Some(Cell::Fluid) if touched.all(|cell| cell == Cell::Fluid) => Verdict::Outside,
-                Some(Cell::Inside) if touched.all(|cell| cell == Cell::Inside) => Verdict::Inside,
-                _ => Verdict::Near,
-            },
+        self.range_by_cells(over).unwrap_or_else(|| {
             // leaf by leaf: a range program of thousands of leaves takes seconds to compile
-            None => judged(&self.parts, over, &self.parts.words).0,
-        };
-        // what stands for ω where only its sign is known
-        let free = self.cells.shortest_side(SIDE.ilog2());
-        match verdict {
-            Verdict::Inside => Interval::point(free),
-            Verdict::Outside => Interval::point(-free),
-            Verdict::Near => Interval::ALL,
-        }
+            let free = self.cells.shortest_side(SIDE.ilog2());
+            match judged(&self.parts, over, &self.parts.words).0 {
+                Verdict::Inside => Interval::point(free),
+                Verdict::Outside => Interval::point(-free),
+                Verdict::Near => Interval::ALL,
+            }
+        })
     }
 
     fn sheets(&self, over: &Aabb, visit: &mut dyn FnMut(Sheet<'_>)) -> bool {
-        let domain = self.cells.domain;
-        if domain.union(over) != domain || over.is_empty() {
+        if !self.is_within(over) {
             return self.twin.sheets(over, visit);
         }
-        let Some(touched) = self.cells.touched(over, MOST_TOUCHED) else {
-            return self.twin.sheets(over, visit);
-        };
         let mut known = Vec::new();
-        for cell in touched {
+        let of_cell = &mut |cell: Cell, _: u32| -> ControlFlow<()> {
             if let Cell::Near(program) = cell {
                 let tree = &self.cells.programs[program as usize..];
                 self.parts.leaves.sheets(tree, over, &mut known, visit);
             }
+            ControlFlow::Continue(())
+        };
+        if self.cells.visit(over, MOST_TOUCHED, of_cell).is_none() {
+            return self.twin.sheets(over, visit);
         }
         true
+    }
+}
+
+impl CellMap {
+    fn is_within(&self, over: &Aabb) -> bool {
+        let domain = self.cells.domain;
+        domain.union(over) == domain && !over.is_empty()
+    }
+
+    /// The range over a box from the cells that it touches: as soon as both signs are found, all numbers. `None` for a box
+    /// that is not in the domain, or touches too many cells.
+    fn range_by_cells(&self, over: &Aabb) -> Option<Interval> {
+        if !self.is_within(over) {
+            return None;
+        }
+        let (mut all, mut last): (Option<Interval>, _) = (None, None);
+        let of_cell = &mut |cell: Cell, depth: u32| {
+            // what stands for ω where only its sign is known
+            let free = self.cells.shortest_side(depth);
+            let range = match cell {
+                Cell::Fluid => Interval::point(-free),
+                Cell::Inside => Interval::point(free),
+                Cell::Near(program) if last == Some(program) => return ControlFlow::Continue(()),
+                Cell::Near(program) => {
+                    last = Some(program);
+                    self.parts.leaves.range_of_tree(&self.cells.programs, &mut (program as usize), over)
+                }
+                Cell::Divided(_) => Interval::ALL,
+            };
+            let hull = all.map_or(range, |all| all.hull(range));
+            all = Some(hull);
+            if hull.lo <= 0.0 && hull.hi > 0.0 {
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        };
+        match self.cells.visit(over, MOST_TOUCHED, of_cell)? {
+            ControlFlow::Break(()) => Some(Interval::ALL),
+            ControlFlow::Continue(()) => all,
+        }
     }
 }
 
@@ -530,11 +573,7 @@ impl Walls for CellMap {
         if !(domain.contains(over.min) && domain.contains(over.max)) {
             return self.twin.is_far(over, reach);
         }
-        reach <= self.reach
-            && self
-                .cells
-                .touched(over, MOST_TOUCHED)
-                .is_some_and(|mut cells| cells.all(|cell| cell == Cell::Fluid))
+        reach <= self.reach && self.cells.is_fluid(over, MOST_TOUCHED)
     }
 
     fn first_entry(&self, path: &Path) -> Option<Entry> {

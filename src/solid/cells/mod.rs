@@ -1,8 +1,9 @@
 //! A box divided into cells that know what of a solid matters in them; for a solid at rest and for one that
 //! moves.
 
-mod around;
+mod demanded;
 mod gradients;
 pub mod grid;
 pub mod map;
 pub mod moving;
+mod values;

@@ -11,11 +11,12 @@ use smallvec::SmallVec;
 
 use super::pruning::{Verdict, prune};
 use super::shape::{Demand, Motion, Shape, SlopeProgram};
+use super::tree::LeafNode;
 use super::words::{self, Word};
 use crate::field::{Path, Sheet};
 use crate::geom::Aabb;
 use crate::interval::Interval;
-use crate::ir::{Contractor, Enclosure, Expr, Graph, Node, Region, SURFACE_ROUNDING, Wanted};
+use crate::ir::{Contractor, Enclosure, Expr, Graph, Region, SURFACE_ROUNDING, Wanted};
 use crate::solid::engine::Engine;
 
 struct Leaf {
@@ -26,6 +27,8 @@ struct Leaf {
     first_uniform: u32,
     /// Whether machine code may answer for its range. For leaves that move [`Ranges`] says it.
     tame: bool,
+    /// What its value is multiplied by in the twin.
+    factor: f64,
 }
 
 /// The leaves of a solid at all times.
@@ -69,11 +72,12 @@ struct Ranges {
 type Uniform = SmallVec<[f64; 16]>;
 
 impl LeafStore {
-    pub fn new(engine: Engine, graph: &Graph, nodes: &[Node]) -> Self {
+    pub fn new(engine: Engine, graph: &Graph, nodes: &[LeafNode]) -> Self {
         let mut known: HashMap<Vec<Expr>, u32> = HashMap::new();
         let (shapes, leaves, constants) = (Vec::new(), Vec::new(), Vec::new());
         let mut out = Self { engine, shapes, leaves, constants, uniforms: 0, tame_slopes: OnceLock::new() };
-        for &node in nodes {
+        for &LeafNode { node, factor } in nodes {
+            let factor = if factor.is_normal() { factor } else { 1.0 };
             let (shape, root, constants) = graph.parametrised(node);
             let next = out.shapes.len() as u32;
             let number = *known.entry(shape.exprs().to_vec()).or_insert(next);
@@ -85,7 +89,7 @@ impl LeafStore {
             let still = shape.motion.is_none();
             let tame = still && shape.range_stays_finite(&constants, &[]);
             let (first, first_uniform) = (out.constants.len() as u32, out.uniforms as u32);
-            out.leaves.push(Leaf { shape: number, first, first_uniform, tame });
+            out.leaves.push(Leaf { shape: number, first, first_uniform, tame, factor });
             out.constants.extend(constants);
             out.uniforms += shape.uniforms();
         }
@@ -163,6 +167,11 @@ impl Leaves {
         self.store.shapes.len()
     }
 
+    /// What the twin multiplies a leaf's value by, a positive number.
+    pub fn factor(&self, leaf: u32) -> f64 {
+        self.store.leaves[leaf as usize].factor
+    }
+
     /// The number of a leaf's shape.
     pub fn shape_of(&self, leaf: u32) -> usize {
         self.store.leaves[leaf as usize].shape as usize
@@ -209,6 +218,31 @@ impl Leaves {
         }
         let uniforms = &ranges.uniforms[own];
         shape.range.eval_with(&Region { parameters: constants, uniforms, ..Region::of(over) })
+    }
+
+    /// An interval that contains the value of a tree in prefix form at every point of a box, at all times of the stretch; all
+    /// numbers if a leaf may be NaN. `at` is moved past the tree.
+    pub fn range_of_tree(&self, words: &[u32], at: &mut usize, over: &Aabb) -> Interval {
+        let word = Word::read(words[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                let range = self.range_among_many(leaf, over);
+                return if negated { -range } else { range };
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let mut range = self.range_of_tree(words, at, over);
+        for _ in 1..parts {
+            let next = self.range_of_tree(words, at, over);
+            range = match (range == Interval::ALL || next == Interval::ALL, all) {
+                (true, _) => Interval::ALL,
+                (false, true) => range.min(next),
+                (false, false) => range.max(next),
+            };
+        }
+        range
     }
 
     /// Enclosures of the leaf's derivatives over a box, at all times of the stretch.

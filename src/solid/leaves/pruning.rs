@@ -1,5 +1,7 @@
 //! What is left of a tree of leaves in a region.
 
+use std::ops::Range;
+
 use super::words::{PAYLOAD, Word};
 use crate::interval::Interval;
 
@@ -20,6 +22,25 @@ pub enum Verdict {
 /// unknown range may be NaN: it stays, and no conclusion is drawn past it.
 pub fn prune(words: &[u32], range: &mut impl FnMut(u32) -> Interval, left: &mut Vec<u32>) -> Verdict {
     Pruning { words, range, left }.tree(&mut 0).0
+}
+
+/// What may decide the value of a tree in a region where each leaf has a known range: a tree with the same value at
+/// every point of the region.
+///
+/// A part of "any of" that is below another one throughout drops out, and a part of "all of" that is above another one.
+/// A leaf with an unknown range may be NaN, which decides: it stays.
+pub fn deciding(words: &[u32], range: &mut impl FnMut(u32) -> Interval) -> Vec<u32> {
+    let mut left = Vec::new();
+    Pruning { words, range, left: &mut left }.value(&mut 0);
+    left
+}
+
+/// What is left of one part of several.
+struct Left {
+    /// Its words in what is left.
+    place: Range<usize>,
+    range: Interval,
+    may_be_nan: bool,
 }
 
 struct Pruning<'a, F> {
@@ -89,6 +110,47 @@ impl<F: FnMut(u32) -> Interval> Pruning<'_, F> {
     }
 }
 
+impl<F: FnMut(u32) -> Interval> Pruning<'_, F> {
+    /// What may decide the value of the tree at `at`.
+    fn value(&mut self, at: &mut usize) -> Left {
+        let start = self.left.len();
+        let code = self.words[*at];
+        *at += 1;
+        self.left.push(code);
+        let (parts, all) = match Word::read(code) {
+            Word::Leaf { leaf, negated } => {
+                let known = (self.range)(leaf);
+                let range = if negated { -known } else { known };
+                return Left { place: start..start + 1, range, may_be_nan: known == Interval::ALL };
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let found: Vec<Left> = (0..parts).map(|_| self.value(at)).collect();
+        let joined = |a: Interval, b: &Left| if all { a.min(b.range) } else { a.max(b.range) };
+        let none = if all { f64::INFINITY } else { f64::NEG_INFINITY };
+        let range = found.iter().fold(Interval { lo: none, hi: none }, joined);
+        let decides = |part: &&Left| {
+            let beaten = if all { part.range.lo > range.hi } else { part.range.hi < range.lo };
+            part.may_be_nan || !beaten
+        };
+        let (mut count, mut end) = (0, start + 1);
+        for part in found.iter().filter(decides) {
+            self.left.copy_within(part.place.clone(), end);
+            end += part.place.len();
+            count += 1;
+        }
+        self.left.truncate(end);
+        if count == 1 {
+            self.left.remove(start);
+        } else {
+            self.left[start] = code & !PAYLOAD | count;
+        }
+        let may_be_nan = found.iter().any(|part| part.may_be_nan);
+        Left { place: start..self.left.len(), range, may_be_nan }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,5 +195,58 @@ mod tests {
         // no conclusion is drawn past a leaf that may be NaN
         check(&tree, &[unknown, outside, near], (Near, Some(tree.clone())));
         check(&tree, &[unknown, inside, outside], (Near, Some(tree.clone())));
+    }
+
+    /// The value of a tree whose leaves have these values.
+    fn value(words: &[u32], at: &mut usize, values: &[f64]) -> f64 {
+        let word = Word::read(words[*at]);
+        *at += 1;
+        let (parts, all) = match word {
+            Word::Leaf { leaf, negated } => {
+                let value = values[leaf as usize];
+                return if negated { -value } else { value };
+            }
+            Word::All(parts) => (parts, true),
+            Word::Any(parts) => (parts, false),
+        };
+        let parts = (0..parts).map(|_| value(words, at, values)).collect::<Vec<f64>>();
+        parts.into_iter().reduce(|a, b| if all { a.min(b) } else { a.max(b) }).unwrap_or(f64::NAN)
+    }
+
+    #[test]
+    fn what_cannot_decide_the_value_drops_out() {
+        let tree = Logic::Any(vec![
+            Logic::All(vec![leaf(0, false), leaf(1, true)]),
+            leaf(2, false),
+            Logic::All(vec![leaf(3, false), leaf(4, false), leaf(0, true)]),
+        ]);
+        let mut words = Vec::new();
+        encode(&tree, &mut words);
+        let mut random = 1_u64;
+        let mut draw = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut shorter = 0;
+        for _ in 0..2000 {
+            let ranges: Vec<Interval> = (0..5)
+                .map(|_| {
+                    let (a, b) = (draw() - 0.5, draw() - 0.5);
+                    Interval { lo: a.min(b), hi: a.max(b) }
+                })
+                .collect();
+            let left = deciding(&words, &mut |leaf| ranges[leaf as usize]);
+            shorter += usize::from(left.len() < words.len());
+            for _ in 0..20 {
+                let values: Vec<f64> = ranges.iter().map(|r| r.lo + draw() * (r.hi - r.lo)).collect();
+                let (mut whole, mut part) = (0, 0);
+                assert_eq!(value(&left, &mut part, &values), value(&words, &mut whole, &values));
+                assert_eq!((part, whole), (left.len(), words.len()));
+            }
+        }
+        assert!(shorter > 1000, "{shorter} of 2000 trees were made shorter");
+        // a leaf that may be NaN stays, however far the others are above it
+        let ranges = |leaf: u32| if leaf == 2 { Interval::ALL } else { Interval { lo: 1.0, hi: 2.0 } };
+        assert!(deciding(&words, &mut { ranges }).contains(&(2 << 1)));
     }
 }

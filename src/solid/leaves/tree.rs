@@ -1,11 +1,11 @@
 //! A solid as leaves joined by "all of" and "any of".
 //!
 //! Negations are pushed down to the leaves and positive factors dropped. The tree has the sign of ω, not its
-//! value.
+//! value; with each leaf times its factors it has the value of the twin, but for rounding.
 
 use std::collections::HashMap;
 
-use crate::ir::{Graph, Node, SignRule};
+use crate::ir::{Binary, Expr, Graph, Node, SignRule};
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Logic {
@@ -21,33 +21,58 @@ const MOST_LEAVES: usize = 1 << 20;
 const DEEPEST: usize = 1000;
 
 impl Logic {
-    /// The tree of a root with the nodes of its leaves; `None` if it is too large to be written out.
-    pub fn of(graph: &Graph, root: Node) -> Option<(Self, Vec<Node>)> {
+    /// The tree of a root with its leaves; `None` if it is too large to be written out.
+    pub fn of(graph: &Graph, root: Node) -> Option<(Self, Vec<LeafNode>)> {
         let mut reader = Reader { graph, leaves: Vec::new(), numbers: Default::default(), written: 0 };
-        let tree = reader.read(root, false, 0)?;
+        let tree = reader.read(root, Above::ROOT)?;
         Some((tree, reader.leaves))
+    }
+}
+
+/// A leaf of a tree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeafNode {
+    pub node: Node,
+    /// The product of the positive factors between the root and the leaf, where it is met first.
+    pub factor: f64,
+}
+
+/// What stands above a node on the way from the root.
+#[derive(Clone, Copy)]
+struct Above {
+    negated: bool,
+    factor: f64,
+    depth: usize,
+}
+
+impl Above {
+    const ROOT: Self = Self { negated: false, factor: 1.0, depth: 0 };
+
+    fn below(self) -> Self {
+        Self { depth: self.depth + 1, ..self }
     }
 }
 
 struct Reader<'g> {
     graph: &'g Graph,
-    leaves: Vec<Node>,
+    leaves: Vec<LeafNode>,
     numbers: HashMap<Node, u32>,
     written: usize,
 }
 
 impl Reader<'_> {
-    fn read(&mut self, node: Node, negated: bool, depth: usize) -> Option<Logic> {
-        if depth > DEEPEST {
+    fn read(&mut self, node: Node, above: Above) -> Option<Logic> {
+        if above.depth > DEEPEST {
             return None;
         }
+        let (below, negated) = (above.below(), above.negated);
         match SignRule::of(self.graph, node) {
-            SignRule::Not(a) => self.read(a, !negated, depth + 1),
-            SignRule::Same(a) => self.read(a, negated, depth + 1),
+            SignRule::Not(a) => self.read(a, Above { negated: !negated, ..below }),
+            SignRule::Same(a) => self.read(a, Above { factor: above.factor * self.factor(node, a), ..below }),
             // min(a, a) = a: the value of a ∧ a differs from a, its sign does not
-            SignRule::All(a, b) | SignRule::Any(a, b) if a == b => self.read(a, negated, depth + 1),
+            SignRule::All(a, b) | SignRule::Any(a, b) if a == b => self.read(a, below),
             rule @ (SignRule::All(a, b) | SignRule::Any(a, b)) => {
-                let (a, b) = (self.read(a, negated, depth + 1)?, self.read(b, negated, depth + 1)?);
+                let (a, b) = (self.read(a, below)?, self.read(b, below)?);
                 Some(flat(a, b, matches!(rule, SignRule::All(..)) != negated))
             }
             SignRule::Leaf => {
@@ -58,22 +83,37 @@ impl Reader<'_> {
                 let next = self.leaves.len() as u32;
                 let leaf = *self.numbers.entry(node).or_insert(next);
                 if leaf == next {
-                    self.leaves.push(node);
+                    self.leaves.push(LeafNode { node, factor: above.factor });
                 }
                 Some(Logic::Leaf { leaf, negated })
             }
+        }
+    }
+
+    /// The positive constant with which a node multiplies one of its operands.
+    fn factor(&self, node: Node, of: Node) -> f64 {
+        let constant = |node: Node| self.graph.as_constant(node).unwrap_or(1.0);
+        match self.graph.expr(node) {
+            Expr::Binary(Binary::Mul, u, v) => constant(if of == v { u } else { v }),
+            Expr::Binary(Binary::Div, _, v) => 1.0 / constant(v),
+            Expr::Unary(..)
+            | Expr::Binary(..)
+            | Expr::Constant(_)
+            | Expr::Coordinate(_)
+            | Expr::Parameter(_)
+            | Expr::Uniform(_)
+            | Expr::Lookup(..) => 1.0,
         }
     }
 }
 
 /// Joins two trees. Parts that are joined by the same operation become members of one list.
 fn flat(a: Logic, b: Logic, all: bool) -> Logic {
-    let mut parts = Vec::new();
-    for part in [a, b] {
-        match (part, all) {
-            (Logic::All(inner), true) | (Logic::Any(inner), false) => parts.extend(inner),
-            (other, _) => parts.push(other),
-        }
-    }
+    let members = |tree: Logic| match (tree, all) {
+        (Logic::All(inner), true) | (Logic::Any(inner), false) => inner,
+        (other, _) => vec![other],
+    };
+    let mut parts = members(a);
+    parts.extend(members(b));
     if all { Logic::All(parts) } else { Logic::Any(parts) }
 }

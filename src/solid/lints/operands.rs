@@ -83,7 +83,7 @@ impl Operands {
     /// The operands of a formula; `None` if there are too many.
     pub fn of(graph: &Graph, root: Node) -> Option<Self> {
         let (_, nodes) = Logic::of(graph, root)?;
-        let leaves = nodes.iter().enumerate().map(|(i, &node)| (node, i as u32)).collect();
+        let leaves = nodes.iter().enumerate().map(|(i, leaf)| (leaf.node, i as u32)).collect();
         let mut reader = Reader { graph, leaves, all: Vec::new() };
         reader.read(root, None, 0)?;
         Some(Self { all: reader.all, leaves: nodes.len() })

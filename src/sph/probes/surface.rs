@@ -10,6 +10,7 @@ use glam::DVec3;
 use crate::{
     field::{Cut, Faces, Part, Walls, cut, is_inside},
     geom::Aabb,
+    interval::Interval,
 };
 
 /// Part of the particles' spacing that a piece has at most.
@@ -40,8 +41,9 @@ impl Pieces<'_> {
     pub fn find(&mut self, within: Aabb) {
         let halvings =
             (within.size().max_element() / (FINENESS * self.spacing)).log2().ceil().max(0.0) as u32;
-        let range = self.field.range(&within);
-        if range.lo.is_finite() || range.hi.is_finite() {
+        let knows = |over: &Aabb| self.field.range(over) != Interval::ALL;
+        // a box with both signs may have no other range, and a point has one
+        if knows(&within) || knows(&Aabb::new(within.centre(), within.centre())) {
             self.search(within, halvings, DEEPER);
         } else if self.may_hold_surface(&within) {
             // nothing is known of the field but its values

@@ -70,6 +70,7 @@ fn state_around(method: Method, particles: Particles, domain: Aabb, obstacles: V
         during: Vec::new(),
         slip: crate::sph::Slip::Free,
         time: 0.0,
+        step: 0.0,
         clearance: 1e-6,
         maps: Maps::default(),
     };

@@ -28,7 +28,9 @@ use crate::{
 use crate::sph::{VectorField, contacts::Contacts, particles::Vectors, scales::Slip};
 
 use super::{
-    contact::{Contact, Trouble, Undefined, bounce, first_contact, push_out, reflect, rubbed, turn_back},
+    contact::{
+        Contact, Trouble, Undefined, bounce, first_contact_during, push_out, reflect, rubbed, turn_back,
+    },
     coverage::Coverage,
     friction::Friction,
     kernel::Wall,
@@ -111,6 +113,8 @@ pub(in crate::sph) struct Boundary {
     pub during: Vec<Option<Box<dyn Walls>>>,
     /// The end of the present step, s.
     pub time: f64,
+    /// The length of the present step, s.
+    pub step: f64,
     /// Distance from an obstacle's surface, m, at which particles stop.
     pub clearance: f64,
     /// What the obstacles take of kernels.
@@ -128,6 +132,7 @@ impl Boundary {
     /// Sets the moving obstacles to a step between two times, s.
     pub fn move_to(&mut self, from: f64, to: f64) {
         self.time = to;
+        self.step = to - from;
         self.during.clear();
         self.during
             .extend(self.obstacles.iter().map(|o| o.moving.as_ref().map(|moving| moving.during(from, to))));
@@ -363,7 +368,7 @@ impl Boundary {
                     }
                 })
                 .map_err(Trouble::from)
-                .and_then(|(at, velocity)| self.leave_moving(from, at, velocity))
+                .and_then(|end| self.leave_moving(from, end.at, end.velocity, end.is_proven))
                 .map_err(|trouble| block.fault(k, trouble))?;
             // a point of a path may lie a rounding error beyond both of its ends
             block.put(k, at.clamp(self.domain.min, self.domain.max), velocity);
@@ -399,18 +404,21 @@ impl Boundary {
 
     /// Where the path of a particle ends, and the velocity there. `hit` is called for each contact with the
     /// obstacle's number, the change of velocity, and the place.
+    ///
+    /// A wall that moves takes the particle with it for the rest of the step: what is left of the path is passed relative to
+    /// the wall, and searched from the instant of the contact on.
     fn resolve(
         &self,
         from: DVec3,
         to: DVec3,
         velocity: DVec3,
         hit: impl Fn(usize, DVec3, DVec3),
-    ) -> Result<(DVec3, DVec3), Undefined> {
-        let (mut here, mut target, mut velocity) = (from, to, velocity);
+    ) -> Result<End, Undefined> {
+        let (mut here, mut since, mut target, mut velocity) = (from, 0.0, to, velocity);
         for _ in 0..MAX_CONTACTS {
             (target, velocity) = self.hold_in_box(target, velocity);
-            let Some((index, contact)) = self.nearest_contact(here, target)? else {
-                return Ok((target, velocity));
+            let Some((index, contact)) = self.nearest_contact(here, since, target)? else {
+                return Ok(End { at: target, velocity, is_proven: true });
             };
             let (obstacle, field) = (&self.obstacles[index], self.field(index));
             let before = velocity;
@@ -419,27 +427,78 @@ impl Boundary {
                 if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
             let arriving = velocity - wall;
             velocity = wall + bounce(arriving, &contact, obstacle.restitution, obstacle.friction);
-            let rest = target - contact.point;
+            let along = (1.0 - contact.fraction) * self.step * wall;
+            let rest = target - contact.point - along;
             let slide = turn_back(rest, &contact, 0.0);
-            here = contact.point;
-            target = here + slide;
+            (here, since) = (contact.point, contact.fraction);
+            target = here + along + slide;
             // A tangent enters a hollow surface, and by rounding also a flat one: lift its end out again.
             if field.omega(target) >= 0.0
-                && let Some(lifted) = push_out(field, target, slide.length(), self.clearance)?
+                && let Some((lifted, normal)) = self.lifted(index, target, &contact, along, slide)?
             {
-                target = lifted.point;
-                velocity = wall + reflect(velocity - wall, lifted.normal, obstacle.restitution);
+                target = lifted;
+                velocity = wall + reflect(velocity - wall, normal, obstacle.restitution);
             }
             hit(index, velocity - before, contact.point);
         }
-        Ok((here, velocity))
+        // a wall that moves on may pass what cannot go on
+        Ok(End { at: here, velocity, is_proven: self.all_at_rest() })
     }
 
-    fn nearest_contact(&self, from: DVec3, to: DVec3) -> Result<Option<(usize, Contact)>, Undefined> {
+    /// A place beside the end of a path that is inside an obstacle after a contact, and the normal there: on the side of the
+    /// contact, not behind a wall that moves.
+    fn lifted(
+        &self,
+        index: usize,
+        end: DVec3,
+        contact: &Contact,
+        along: DVec3,
+        slide: DVec3,
+    ) -> Result<Option<(DVec3, DVec3)>, Undefined> {
+        let field = self.field(index);
+        let reach = slide.length() + along.length();
+        let found = push_out(field, end, reach, self.clearance)?;
+        if self.obstacles[index].moving.is_none() {
+            return Ok(found.map(|lifted| (lifted.point, lifted.normal)));
+        }
+        if let Some(lifted) = found.filter(|lifted| lifted.normal.dot(contact.normal) > 0.0) {
+            return Ok(Some((lifted.point, lifted.normal)));
+        }
+        let mut distance = self.clearance;
+        while distance <= reach {
+            let place = end + distance * contact.normal;
+            if field.omega(place) < 0.0 {
+                return Ok(Some((place, contact.normal)));
+            }
+            distance *= 2.0;
+        }
+        Ok(None)
+    }
+
+    pub(super) fn all_at_rest(&self) -> bool {
+        self.obstacles.iter().all(|obstacle| obstacle.moving.is_none())
+    }
+
+    /// The first contact on the way to a target, from a place where a particle is after a part of the step.
+    fn nearest_contact(
+        &self,
+        here: DVec3,
+        since: f64,
+        target: DVec3,
+    ) -> Result<Option<(usize, Contact)>, Undefined> {
         let mut nearest: Option<(usize, Contact)> = None;
         for (k, obstacle) in self.obstacles.iter().enumerate() {
-            let path = Path::new(from, to, obstacle.resolution);
-            if let Some(contact) = first_contact(self.field(k), &path, self.clearance)?
+            let mut path = Path::new(here, target, obstacle.resolution);
+            let duration = if obstacle.moving.is_some() { self.step } else { 0.0 };
+            if since > 0.0 && !self.all_at_rest() {
+                if since >= 1.0 {
+                    return Ok(None); // nothing is left of the step
+                }
+                // where it would have begun
+                path.from = here - since / (1.0 - since) * (target - here);
+                path.start = since;
+            }
+            if let Some(contact) = first_contact_during(self.field(k), &path, self.clearance, duration)?
                 && nearest.is_none_or(|(_, other)| contact.fraction < other.fraction)
             {
                 nearest = Some((k, contact));
@@ -447,6 +506,14 @@ impl Boundary {
         }
         Ok(nearest)
     }
+}
+
+/// Where a particle's path ends.
+struct End {
+    at: DVec3,
+    velocity: DVec3,
+    /// Whether no wall can have passed it since.
+    is_proven: bool,
 }
 
 /// The smallest box that holds some points, given by columns.

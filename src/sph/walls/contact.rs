@@ -68,53 +68,76 @@ impl From<Undefined> for Trouble {
 /// # Errors
 /// [`Undefined`] where ω is NaN, or ∇ω at the contact is not finite.
 pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<Option<Contact>, Undefined> {
+    first_contact_during(field, path, clearance, 0.0)
+}
+
+/// The first contact of a path that a particle passes in a time, s, in which the obstacle may move.
+///
+/// # Errors
+/// [`Undefined`] where ω is NaN, or ∇ω at the contact is not finite.
+pub(super) fn first_contact_during(
+    field: &dyn Walls,
+    path: &Path,
+    clearance: f64,
+    duration: f64,
+) -> Result<Option<Contact>, Undefined> {
+    let stop = |entry: &Entry| stop(field, path, entry, clearance, duration).map(Some);
     let mut rest = *path;
     for _ in 0..MOST_DOUBTS {
         let Some(entry) = field.first_entry(&rest) else {
             // the value of the field at the end decides, because it also decides whether a particle is inside
             return match omega(field, path.to)? {
                 w if w < 0.0 => Ok(None),
-                _ => stop(field, path, &Entry::new(path, (1.0, 1.0), true, Normals::default()), clearance)
-                    .map(Some),
+                _ => stop(&Entry::new(path, (1.0, 1.0), true, Normals::default())),
             };
         };
         if entry.certain {
-            return stop(field, path, &entry, clearance).map(Some);
+            return stop(&entry);
         }
-        if let Some((t, w)) =
-            entry.first_sample_met(path, |t| field.on_path(path, t)).filter(|(t, w)| w.is_nan() || *t > 0.0)
+        if let Some((t, w)) = entry
+            .first_sample_met(path, |t| field.on_path(path, t))
+            .filter(|(t, w)| w.is_nan() || *t > path.start)
         {
             if w.is_nan() {
                 return Err(Undefined { at: path.at(t) });
             }
-            return stop(field, path, &entry, clearance).map(Some);
+            return stop(&entry);
         }
         if entry.until >= 1.0 {
             return Ok(None); // the last sample was the end of the path
         }
         rest.start = entry.until.next_up();
     }
-    let entry = Entry::new(path, (rest.start, 1.0), true, Normals::default());
-    stop(field, path, &entry, clearance).map(Some)
+    stop(&Entry::new(path, (rest.start, 1.0), true, Normals::default()))
 }
 
-/// The contact at which a path stops before an entry.
-fn stop(field: &dyn Walls, path: &Path, entry: &Entry, clearance: f64) -> Result<Contact, Undefined> {
-    let step = path.to - path.from;
+/// The contact at which a path, passed in a time, s, stops before an entry.
+fn stop(
+    field: &dyn Walls,
+    path: &Path,
+    entry: &Entry,
+    clearance: f64,
+    duration: f64,
+) -> Result<Contact, Undefined> {
+    let mut step = path.to - path.from;
     let normal = match entry.normals.mean() {
         Some(normal) => normal,
         None => normal(field, entry.point, -step)?,
     };
+    if duration > 0.0 {
+        // the way relative to the wall, which may come to a particle at rest
+        step -= duration * field.wall_velocity(entry.point);
+    }
     let approach = -step.dot(normal);
     // a path that hardly approaches goes back to its beginning and loses nothing: its rest goes on from there
     let back = clearance / if approach > 0.0 { approach } else { step.length() };
-    let mut fraction = if back.is_finite() { (entry.t - back).max(0.0) } else { 0.0 };
+    let mut fraction = if back.is_finite() { (entry.t - back).max(path.start) } else { path.start };
     let mut less = POINT * (1.0 + path.from.abs().max(path.to.abs()).max_element() / step.length());
-    while fraction > 0.0 && on_path(field, path, fraction)? >= 0.0 {
-        fraction = (fraction - less).max(0.0);
+    while fraction > path.start && on_path(field, path, fraction)? >= 0.0 {
+        fraction = (fraction - less).max(path.start);
         less *= 4.0;
     }
-    let fraction = if fraction.is_nan() { 0.0 } else { fraction };
+    let fraction = if fraction.is_nan() { path.start } else { fraction };
     let point = if fraction == 0.0 { path.from } else { path.at(fraction) };
     Ok(Contact { fraction, point, normal, faces: entry.normals })
 }

@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 
 use super::{boundary::Boundary, coverage::Coverage, kernel::Wall};
 use crate::geom::Aabb;
+use crate::sph::scales::Slip;
 
 /// Part of a force that walls share in directions in which none of them acts.
 const BESIDE: f64 = 1e-3;
@@ -28,13 +29,16 @@ struct Near {
     part: f64,
     /// ∇λ, 1/m.
     gradient: DVec3,
+    /// Whether the fluid sticks to it. The friction is that of such walls alone.
+    sticks: bool,
 }
 
 impl Boundary {
     /// Divides what walls do to a particle among the obstacles near it, and tells the acceleration by each, m/s².
     ///
-    /// What completes pressures at walls is divided by the walls' normals, and friction by the directions along the walls: in
-    /// a corner each wall has what it can give. All shares, that of the box included, add up to the whole.
+    /// What completes pressures at walls is divided by the walls' normals, and friction, among walls to which the fluid sticks,
+    /// by the directions along them: in a corner each wall has what it can give. All shares, that of the box included, add up
+    /// to the whole.
     pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, DVec3)) {
         let near = self.near(wall, p);
         if let [] | [_] = &near[..] {
@@ -45,22 +49,26 @@ impl Boundary {
         }
         let Pushed { by_pressure, factor, by_friction } = *pushed;
         let together: DVec3 = near.iter().map(|near| near.gradient).sum();
-        let [across, along] = [Near::across, Near::along]
-            .map(|weight| near.iter().fold(DMat3::ZERO, |all, near| all + weight(near)).inverse());
-        let (rest, friction) = (across * (by_pressure - factor * together), along * by_friction);
+        let sum = |weight: fn(&Near) -> DMat3, of: fn(&Near) -> bool| {
+            near.iter().filter(|near| of(near)).fold(DMat3::ZERO, |all, near| all + weight(near))
+        };
+        let rest = sum(Near::across, |_| true).inverse() * (by_pressure - factor * together);
+        let rubs = near.iter().any(|near| near.sticks);
+        let friction =
+            if rubs { sum(Near::along, |near| near.sticks).inverse() * by_friction } else { DVec3::ZERO };
         for near in &near {
-            if let Some(obstacle) = near.obstacle {
-                tell(obstacle, factor * near.gradient + near.across() * rest + near.along() * friction);
-            }
+            let Some(obstacle) = near.obstacle else { continue };
+            let rubbed = if near.sticks { near.along() * friction } else { DVec3::ZERO };
+            tell(obstacle, factor * near.gradient + near.across() * rest + rubbed);
         }
     }
 
     /// The walls within reach of a particle that at least one wall is near.
     fn near(&self, wall: &Wall, p: DVec3) -> SmallVec<[Near; 4]> {
-        let near = |obstacle: Option<usize>, coverage: &Coverage<()>| Near {
-            obstacle,
-            part: coverage.part,
-            gradient: coverage.gradient,
+        let near = |obstacle: Option<usize>, coverage: &Coverage<()>| {
+            let slip = obstacle.map_or(self.slip, |k| self.obstacles[k].slip);
+            let Coverage { part, gradient, .. } = *coverage;
+            Near { obstacle, part, gradient, sticks: slip == Slip::No }
         };
         let mut found: SmallVec<[Near; 4]> = SmallVec::new();
         let of_box = self.of_box::<()>(wall, p);
@@ -108,28 +116,29 @@ mod tests {
 
     use super::*;
     use crate::{
-        field::Closures,
+        field::{Closures, Walls},
         geom::Aabb,
-        sph::{
-            scales::Slip,
-            walls::{Obstacle, WallKernel, volume::Maps},
-        },
+        sph::walls::{Obstacle, WallKernel, volume::Maps},
     };
+
+    fn sticky(field: impl Walls + 'static) -> Obstacle {
+        Obstacle { slip: Slip::No, ..Obstacle::at_rest(Arc::new(field), 0.01) }
+    }
 
     /// A box with a floor at z = 0 and two blocks, that end at x = 0 and begin at x = `gap`.
     fn boundary(gap: f64) -> Boundary {
         let left = Closures { omega: |p: DVec3| -p.x, gradient: |_: DVec3| -DVec3::X };
         let right = Closures { omega: move |p: DVec3| p.x - gap, gradient: |_: DVec3| DVec3::X };
-        let obstacles: Vec<Obstacle> =
-            vec![Obstacle::at_rest(Arc::new(left), 0.01), Obstacle::at_rest(Arc::new(right), 0.01)];
+        let obstacles: Vec<Obstacle> = vec![sticky(left), sticky(right)];
         Boundary {
             domain: Aabb::new(DVec3::new(-5.0, -5.0, 0.0), DVec3::splat(5.0)),
             wall_restitution: 0.0,
             wall_friction: 0.0,
-            slip: Slip::Free,
+            slip: Slip::No,
             obstacles,
             during: Vec::new(),
             time: 0.0,
+            step: 0.0,
             clearance: 1e-6,
             maps: Maps::new(&[], &Aabb::new(DVec3::ZERO, DVec3::ONE), 1.0, 0.0),
         }
@@ -158,6 +167,17 @@ mod tests {
         // what acts along x is the floor's, which is that of the box
         let [left, _] = shares(&boundary(9.0), p, Pushed { by_friction: push, ..Pushed::default() });
         assert!(left.x.abs() < 0.02 && (left.z - 5.0).abs() < 0.02, "{left}");
+    }
+
+    #[test]
+    fn walls_along_which_the_fluid_slips_have_no_part_of_the_friction() {
+        let (p, push) = (DVec3::new(0.2, 0.0, 0.3), DVec3::new(0.0, 4.0, 1.0));
+        let friction = Pushed { by_friction: push, ..Pushed::default() };
+        let floor_slips = Boundary { slip: Slip::Free, ..boundary(9.0) };
+        assert!((shares(&floor_slips, p, friction)[0] - push).length() < 1e-12);
+        let mut floor_sticks = boundary(9.0);
+        floor_sticks.obstacles[0].slip = Slip::Free;
+        assert_eq!(shares(&floor_sticks, p, friction)[0], DVec3::ZERO);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A particle that a moving wall meets on its path is put before it. But a path ends at the latest after a few
 //! contacts, and then a wall that moves on may reach the place where the particle stopped, or press it into
 //! another wall. So at the end of a step all obstacles are looked at together: the particle goes to a place
-//! near it that is outside all of them, without passing an obstacle at rest. If there is none, fluid has
+//! near it that is outside all of them, without passing one on the way. If there is none, fluid has
 //! nowhere to go, and the run ends: a particle that stays inside would be wrong without a word.
 
 use glam::DVec3;
@@ -23,14 +23,16 @@ const DISTANCES: i32 = 13;
 
 impl Boundary {
     /// Moves a particle out of all obstacles at the end of a step in which it came from `from` to `at`, and
-    /// gives it the velocity that their walls leave it.
+    /// gives it the velocity that their walls leave it. If it is not proven that no wall has passed it, that is found out.
     pub(super) fn leave_moving(
         &self,
         from: DVec3,
         at: DVec3,
         mut velocity: DVec3,
+        is_proven: bool,
     ) -> Result<(DVec3, DVec3), Trouble> {
-        if self.obstacles.iter().all(|obstacle| obstacle.moving.is_none()) || self.first_around(at)?.is_none()
+        if self.all_at_rest()
+            || self.first_around(at)?.is_none() && (is_proven || self.is_within_reach(from, at)?)
         {
             return Ok((at, velocity));
         }
@@ -64,9 +66,9 @@ impl Boundary {
         Ok(None)
     }
 
-    /// Whether a point is in the box and no obstacle at rest lies on the straight way to it.
+    /// Whether a point is in the box, and the straight way to it during the step passes no obstacle.
     fn is_within_reach(&self, from: DVec3, to: DVec3) -> Result<bool, Undefined> {
-        for (k, obstacle) in self.obstacles.iter().enumerate().filter(|(_, o)| o.moving.is_none()) {
+        for (k, obstacle) in self.obstacles.iter().enumerate() {
             let path = Path::new(from, to, obstacle.resolution);
             if first_contact(self.field(k), &path, self.clearance)?.is_some() {
                 return Ok(false);

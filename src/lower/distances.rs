@@ -1,0 +1,147 @@
+//! Distances of single formulas, where they follow from the slope of the field.
+
+use super::lowering::Lowering;
+use crate::diagnostic::Span;
+use crate::geom::Aabb;
+use crate::ir::{self, Binary, Given, Graph, Interpreter, Node, Unary};
+
+/// How many places a part is looked at to find what its slope is like.
+const PLACES: u32 = 48;
+
+/// Fewer places with a slope tell nothing.
+const FEWEST_PLACES: usize = 16;
+
+/// What counts as rounding, relative to the terms of a sum.
+const ROUNDING: f64 = 1e-10;
+
+/// How a part's field becomes a distance, with g = |∇ω|.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Profile {
+    /// g is this number everywhere: ω/g.
+    Linear(f64),
+    /// ω is a square of distances, so that g² − 2ω·∂²ω/∂n² is the square of this number everywhere, which is g on the
+    /// surface: 2ω/(g + the number).
+    Quadratic(f64),
+    /// Something else.
+    Other,
+}
+
+impl Lowering<'_> {
+    /// The distance from the surface of a formula, with the sign of its field; `None` where it does not follow from the
+    /// slope. The formula is looked at in a cube around the box that it is known to be in, or around the origin with this
+    /// half side.
+    pub(super) fn exact_distance(
+        &mut self,
+        leaf: Node,
+        (within, half): (Option<Aabb>, f64),
+        span: Span,
+    ) -> Option<Node> {
+        let half = within.map_or(half, |within| within.size().max_element());
+        let middle = within.map_or([0.0; 3], |within| within.centre().to_array());
+        let is_one = |number: f64| (number - 1.0).abs() <= ROUNDING;
+        match self.profile(leaf, middle, half) {
+            Profile::Linear(slope) if is_one(slope) => Some(leaf),
+            Profile::Linear(slope) => {
+                let slope = self.constant(slope);
+                Some(self.binary(Binary::Div, leaf, slope, span))
+            }
+            Profile::Quadratic(at_surface) => {
+                let at_surface = self.constant(if is_one(at_surface) { 1.0 } else { at_surface });
+                let slope = self.slope_of_leaf(leaf, span);
+                let sum = self.binary(Binary::Add, slope, at_surface, span);
+                let twice = self.binary(Binary::Add, leaf, leaf, span);
+                Some(self.binary(Binary::Div, twice, sum, span))
+            }
+            Profile::Other => None,
+        }
+    }
+
+    /// |∇ω|, without the directions in which ω does not change.
+    pub(super) fn slope_of_leaf(&mut self, leaf: Node, span: Span) -> Node {
+        let gradient = ir::gradient(&mut self.module.graph, leaf);
+        let parts: Vec<Node> =
+            gradient.into_iter().filter(|part| self.module.graph.as_constant(*part) != Some(0.0)).collect();
+        match *parts.as_slice() {
+            [] => self.constant(0.0),
+            [part] => self.unary(Unary::Abs, part, span),
+            _ => {
+                let squares: Vec<Node> =
+                    parts.iter().map(|&part| self.binary(Binary::Mul, part, part, span)).collect();
+                let sum = self.chain(Binary::Add, &squares, span);
+                self.unary(Unary::Sqrt, sum, span)
+            }
+        }
+    }
+
+    /// What a part's slope is like at some places within a cube, with the params as they are and otherwise. Whatever is
+    /// found here, the distance has the right sign: only its value may be of first order.
+    fn profile(&self, leaf: Node, middle: [f64; 3], half: f64) -> Profile {
+        let (mut graph, leaf) = self.module.graph.extract_cone(leaf);
+        let slopes = Slopes::of(&mut graph, leaf);
+        let params: Vec<f64> = self.module.params.iter().map(|param| param.value).collect();
+        let others: Vec<f64> = params.iter().map(|value| 1.37 * value).collect();
+        let has_params = !graph.parameters(leaf).is_empty();
+        let mut found = Vec::new();
+        for i in 0..PLACES {
+            let parameters = if has_params && i % 2 == 1 { &others } else { &params };
+            let point = std::array::from_fn(|axis| middle[axis] + half * spread(i, axis));
+            found.extend(slopes.at(point, 7.0 * spread(i, 3), parameters));
+        }
+        if found.len() < FEWEST_PLACES {
+            return Profile::Other;
+        }
+        let first = found[0];
+        if found.iter().all(|at| (at.slope - first.slope).abs() <= ROUNDING * first.slope) {
+            return Profile::Linear(first.slope);
+        }
+        let is_same = |at: &Slope| (at.square - first.square).abs() <= ROUNDING * (at.terms + first.terms);
+        if first.square > 0.0 && found.iter().all(is_same) {
+            // the one with the least rounding
+            let best = found.iter().min_by(|a, b| a.terms.total_cmp(&b.terms)).unwrap_or(&first);
+            return Profile::Quadratic(best.square.sqrt());
+        }
+        Profile::Other
+    }
+}
+
+/// What a field is like at a place: g, g² − 2ω·∂²ω/∂n², and the sizes of both terms together.
+#[derive(Debug, Clone, Copy)]
+struct Slope {
+    slope: f64,
+    square: f64,
+    terms: f64,
+}
+
+/// The program for [`Slope`].
+struct Slopes(Interpreter);
+
+impl Slopes {
+    fn of(graph: &mut Graph, leaf: Node) -> Self {
+        let gradient = ir::gradient(graph, leaf);
+        let squares = gradient.map(|part| graph.binary(Binary::Mul, part, part));
+        let sum = graph.binary(Binary::Add, squares[0], squares[1]);
+        let sum = graph.binary(Binary::Add, sum, squares[2]);
+        let slope = graph.unary(Unary::Sqrt, sum);
+        let [a, b, c] = ir::gradient(graph, slope);
+        let [x, y, z] = gradient;
+        Self(Interpreter::new(graph, &[leaf, slope, x, y, z, a, b, c]))
+    }
+
+    /// `None` where the field has no value or no slope.
+    fn at(&self, point: [f64; 3], time: f64, parameters: &[f64]) -> Option<Slope> {
+        let mut out = [0.0; 8];
+        self.0.eval_given(Given { point, time, parameters, uniforms: &[] }, &mut out);
+        let [omega, slope, x, y, z, a, b, c] = out;
+        let along = (x * a + y * b + z * c) / slope;
+        let bent = 2.0 * omega * along;
+        let found = Slope { slope, square: slope * slope - bent, terms: slope * slope + bent.abs() };
+        (slope > 0.0 && found.terms.is_finite()).then_some(found)
+    }
+}
+
+/// Numbers from −1 to 1 that fill cubes evenly: multiples of the powers of a generalised golden ratio.
+fn spread(i: u32, axis: usize) -> f64 {
+    const STEPS: [f64; 4] =
+        [0.856_674_883_854_502_9, 0.733_891_856_627_126_1, 0.628_706_721_037_908_6, 0.538_597_257_132_362_5];
+    2.0 * (0.5 + f64::from(i) * STEPS[axis]).fract() - 1.0
+}
