@@ -105,7 +105,8 @@ impl Experiment {
                 return Err(refuse(&program, *refusal));
             }
         }
-        let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters)).collect();
+        let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters));
+        let warnings = warnings.chain(parameters::drag(&scene, &bodies)).collect();
         Ok(Self { program, scene, parameters, time_step, bodies, fluid, warnings })
     }
 

@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 
+use super::bodies::Body;
 use super::{vector_field, velocities};
 use crate::Program;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::ir::Node;
-use crate::lower::{Gravity, Scene};
-use crate::sph::Parameters;
+use crate::lower::{Gravity, Measured, Probe, Scene};
+use crate::sph::{Gradients, Method, Parameters};
 
 /// The length of a simulation's steps, and where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +81,29 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
         Diagnostic::warning(Code::TENSION_STIRS, at, message)
             .help("write `method: wcsph`, or `support_radius: 3*spacing`, which leaves a seventh of that")
     })
+}
+
+/// A warning for each probe of a force on a body that moves, with a method that makes its drag too large.
+pub(super) fn drag(scene: &Scene, bodies: &[Body]) -> Vec<Diagnostic> {
+    let in_pairs = match scene.method {
+        Method::Wcsph(numbers) => numbers.gradients == Gradients::Pairs,
+        Method::Dfsph(_) => true,
+        // its fluid is as thick as the paper's, and gives more drag than that anyway
+        Method::Paper(_) => false,
+    };
+    let told = |probe: &Probe| match probe.measured {
+        Measured::Force { body, .. }
+            if bodies.get(body).is_some_and(|body| body.obstacle.moving.is_some()) =>
+        {
+            let message = "with pressures in pairs the drag of a body that moves through the fluid is several times too large";
+            Some(
+                Diagnostic::warning(Code::DRAG, probe.span, message)
+                    .help("write `gradients: differences` with `method: wcsph`"),
+            )
+        }
+        _ => None,
+    };
+    if in_pairs { scene.probes.iter().filter_map(told).collect() } else { Vec::new() }
 }
 
 /// The length of steps, and a warning if the scene states a longer one than is stable.

@@ -55,6 +55,17 @@ const MOST_WORK: usize = 100_000;
 /// Rays get twice as long so many times.
 const DOUBLINGS: i32 = 60;
 
+/// Places behind a cell that are tried.
+const BEHIND: u32 = 6;
+
+/// Directions into which a ray is turned, and the tangents of the angles between which it is.
+const TURNS: u32 = 8;
+const WIDEST_TURN: f64 = 0.5;
+const LEAST_TURN: f64 = 1e-6;
+
+/// Rounds of turns, of which each tries all directions.
+const MOST_ROUNDS: usize = 100;
+
 /// Halvings of a ray around the surface.
 const HALVINGS: usize = 50;
 
@@ -104,6 +115,7 @@ impl Distances {
     fn search<S: Shrink>(&self, target: &S, sign: f64, p: DVec3) -> (f64, f64, DVec3) {
         let mut best = Best { solid: &self.solid, sign, p, distance: f64::INFINITY, point: DVec3::NAN };
         self.rays(&mut best);
+        best.turn();
         let reach = DVec3::splat(best.distance.min(2.0 * SEARCH_RADIUS));
         let mut around = Aabb::new(p - reach, p + reach);
         let Some(known) = target.shrink(&target.everything(), &mut around, Effort::Large) else {
@@ -119,7 +131,11 @@ impl Distances {
             }
             cells += 1;
             work = work.saturating_sub(target.work(&known));
+            let before = best.distance;
             best.try_cell(&space);
+            if best.distance < before {
+                best.turn();
+            }
             for mut half in space.halves() {
                 let Some((known, beyond)) = target.shrink_from(&known, &mut half, p) else { continue };
                 let distance = distance_to(&half, p).max(beyond);
@@ -167,15 +183,48 @@ impl Best<'_> {
         self.solid.sign(q) * self.sign < 0.0
     }
 
-    /// Tries the middle of a cell, and its corner that is nearest to the point.
+    /// Tries the middle of a cell, its corner that is nearest to the point, and what lies behind the cell.
     fn try_cell(&mut self, cell: &Aabb) {
         let nearest = self.p.clamp(cell.min, cell.max);
         if self.is_other(nearest) {
             self.take(nearest);
             return;
         }
-        self.try_ray(cell.centre());
-        self.try_ray(cell.centre() + (cell.centre() - nearest));
+        let centre = cell.centre();
+        self.try_ray(centre);
+        self.try_ray(centre + (centre - nearest));
+        // an edge may cut off less of the cell than its middle
+        let length = (centre - self.p).length();
+        let behind = self.distance - length;
+        if behind.is_finite() && behind > 0.0 && length > 0.0 {
+            let direction = (centre - self.p) / length;
+            let places = (1..BEHIND).map(|k| length + behind * (f64::from(k) / f64::from(BEHIND)).powi(3));
+            let found = places.map(|t| self.p + t * direction).find(|q| self.is_other(*q));
+            found.into_iter().for_each(|end| self.try_ray(end));
+        }
+    }
+
+    /// Turns the ray to the nearest point as long as that brings nearer ones: to the foot of a face, and along edges.
+    fn turn(&mut self) {
+        let mut angle = WIDEST_TURN;
+        for _ in 0..MOST_ROUNDS {
+            if !self.distance.is_finite() || angle <= LEAST_TURN {
+                return;
+            }
+            let (before, direction) = (self.distance, (self.point - self.p).normalize_or_zero());
+            if direction == DVec3::ZERO {
+                return;
+            }
+            let (u, v) = direction.any_orthonormal_pair();
+            for k in 0..TURNS {
+                let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / f64::from(TURNS)).sin_cos();
+                let other = (direction + angle * (cos * u + sin * v)).normalize();
+                self.try_ray(self.p + before * other);
+            }
+            if self.distance >= before * (1.0 - GAP * angle) {
+                angle *= 0.5;
+            }
+        }
     }
 
     /// Follows a ray to a point of the other sign back to the surface.

@@ -2,11 +2,12 @@
 //! time.
 //!
 //! Invariant: particles are written in the order of their ids, little-endian, as 32-bit floats, which are
-//! enough for a picture. The same state gives the same bytes.
+//! enough for a picture; places far from the origin as 64-bit floats. The same state gives the same bytes.
 
 use std::io::{self, Write};
 
 use super::particles::{Particles, Vectors};
+use crate::geom::Aabb;
 
 /// Writes one frame: the positions of the particles (m) and, for each, speed (m/s), velocity (m/s), density
 /// (kg/m³), pressure (Pa) and id.
@@ -31,7 +32,12 @@ pub fn write_vtp(out: &mut impl Write, particles: &Particles) -> io::Result<()> 
         appended.array("id", "UInt32", 1, ids),
     ]
     .concat();
-    let points = appended.array("position", "Float32", 3, vector(&particles.position));
+    let points = if are_enough(&particles.position) {
+        appended.array("position", "Float32", 3, vector(&particles.position))
+    } else {
+        let places = order.iter().flat_map(|&i| particles.position.get(i).to_array());
+        appended.array("position", "Float64", 3, places.flat_map(f64::to_le_bytes).collect())
+    };
     // one vertex cell per point, so that a viewer shows them without a filter
     let cells = [
         appended.array("connectivity", "Int64", 1, counting(0)),
@@ -58,6 +64,21 @@ _"#
     )?;
     out.write_all(&appended.bytes)?;
     out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+}
+
+/// The largest rounding of places that is not seen, as a part of the distance between particles that fill the box around them.
+const UNSEEN: f64 = 1e-3;
+
+/// Whether 32-bit floats are enough for places: they are not for particles that are much closer to one another than to the
+/// origin.
+fn are_enough(places: &Vectors) -> bool {
+    let within = places.iter().fold(Aabb::EMPTY, |within, p| within.union(&Aabb::new(p, p)));
+    if within.is_empty() || !within.is_finite() {
+        return true;
+    }
+    let farthest = within.min.abs().max(within.max.abs()).max_element();
+    let apart = within.size().max_element() / (places.len() as f64).cbrt();
+    0.5 * f64::from(f32::EPSILON) * farthest <= UNSEEN * apart
 }
 
 /// Writes the collection of frames: the time (s) and the file name of each.
@@ -156,5 +177,19 @@ mod tests {
         assert!(text.contains(r#"<DataSet timestep="0" part="0" file="a.vtp"/>"#));
         assert!(text.contains(r#"<DataSet timestep="0.04" part="0" file="b&amp;c.vtp"/>"#));
         assert_eq!(text.matches("<DataSet").count(), 2);
+    }
+
+    #[test]
+    fn places_far_from_the_origin_keep_their_digits() {
+        let mut fluid = Particles::default();
+        let places = [DVec3::new(1e7, 0.01, 0.0), DVec3::new(1e7 + 0.01, 0.0, 2.0)];
+        for (number, place) in places.into_iter().enumerate() {
+            fluid.push(place, DVec3::ZERO);
+            fluid.id[number] = number as u32;
+        }
+        (fluid.density, fluid.pressure) = (vec![1e3; 2], vec![0.0; 2]);
+        let mut frame = Vec::new();
+        write_vtp(&mut frame, &fluid).unwrap();
+        assert_eq!(crate::fluid_surface::read_points(&frame).unwrap(), places);
     }
 }

@@ -179,3 +179,124 @@ fn a_body_that_passes_over_the_fluid_in_one_step_leaves_nothing_inside() {
         }
     }
 }
+
+/// Walls much thinner than the way that they go in a step carry along what is before them.
+#[test]
+fn no_particle_is_left_behind_a_thin_wall_that_moves() {
+    let foil = |method: &str, speed: f64| {
+        let (until, numbers) = (0.5 / speed, if method == "wcsph" { ", sound_speed: 100" } else { "" });
+        let text = format!(
+            "rfm 1\n\
+             solid foil = box([-0.05 mm, -1, -1], [0.05 mm, 2, 2]).move([0.1 + {speed}*t, 0, 0])\n\
+             scene push {{\n\
+             box {{ max: [2, 0.2, 0.6] }}\n\
+             obstacle {{ solid: foil }}\n\
+             fluid water {{ shape: box([0.15, 0, 0], [0.5, 0.2, 0.2]), density: 1000, spacing: 0.05{numbers} }}\n\
+             method: {method}\n\
+             run {{ until: {until}, save_every: {until} }}\n\
+             }}\n"
+        );
+        let simulation = run(&text).unwrap_or_else(|e| panic!("{method}, {speed} m/s: {e}"));
+        let particles = simulation.particles();
+        let behind = particles.position.iter().filter(|p| p.x < 0.1 + speed * until).count();
+        assert_eq!(behind, 0, "{method}, {speed} m/s: {behind} of {}", particles.len());
+    };
+    for method in ["paper", "wcsph", "dfsph"] {
+        for speed in [1.0, 30.0] {
+            foil(method, speed);
+        }
+    }
+}
+
+#[test]
+fn no_particle_passes_a_thin_blade_that_turns() {
+    let text = "rfm 1
+solid blade = box([-0.3, -0.5 mm, -1], [0.3, 0.5 mm, 1]).rotate_z(20*t)
+solid pot = cylinder(0.3, 2).move([0, 0, -1])
+scene mix {
+  box { min: [-0.35, -0.35, 0], max: [0.35, 0.35, 0.16] }
+  container { solid: pot }
+  obstacle { solid: blade }
+  fluid water { shape: cylinder(0.3, 0.1), spacing: 0.04, density: 1000, sound_speed: 60 }
+  run { until: 0.1 s, save_every: 0.1 s }
+}";
+    let program = Program::from_source("mix.rfm", text).unwrap();
+    let mut simulation = Experiment::new(&program, "mix", Engine::Auto).unwrap().start().unwrap().simulation;
+    let side = |p: DVec3, angle: f64| p.y * angle.cos() > p.x * angle.sin();
+    let begin: Vec<bool> = by_number(&simulation).into_iter().map(|p| side(p, 0.0)).collect();
+    simulation.advance(0.1, |_| std::ops::ControlFlow::Continue(())).unwrap();
+    let end: Vec<bool> = by_number(&simulation).into_iter().map(|p| side(p, 2.0)).collect();
+    assert_eq!(begin, end);
+}
+
+/// The places of all particles, by their numbers.
+fn by_number(simulation: &rfm::sph::Simulation) -> Vec<DVec3> {
+    let particles = simulation.particles();
+    let mut all: Vec<_> = particles.id.iter().copied().zip(particles.position.iter()).collect();
+    all.sort_by_key(|(id, _)| *id);
+    all.into_iter().map(|(_, p)| p).collect()
+}
+
+/// A slab of oil that rubs on a floor between walls along which it slips: what it loses is what the floor feels.
+#[test]
+fn a_floor_feels_all_of_the_friction() {
+    for method in ["wcsph", "dfsph"] {
+        let text = format!(
+            "rfm 1
+solid slab = box([-5, -2, -1], [5, 2, 0])
+scene rub {{
+  box {{ min: [-1, -0.2, -0.3], max: [3, 0.2, 0.5] }}
+  obstacle {{ solid: slab, walls: no_slip }}
+  fluid oil {{ shape: box([-0.5, -0.2, 0], [0, 0.2, 0.2]), spacing: 0.04, density: 1000, viscosity: 20, velocity: [1, 0, 0] }}
+  method: {method}
+  probe f {{ force: slab, every: 1 ms }}
+  run {{ until: 50 ms, save_every: 50 ms }}
+}}"
+        );
+        let program = Program::from_source("rub.rfm", text).unwrap();
+        let mut simulation =
+            Experiment::new(&program, "rub", Engine::Auto).unwrap().start().unwrap().simulation;
+        let momentum = |simulation: &rfm::sph::Simulation| {
+            let mass = simulation.parameters().particle_mass;
+            mass * simulation.particles().velocity.iter().map(|v| v.x).sum::<f64>()
+        };
+        let begin = momentum(&simulation);
+        let (mut felt, mut time) = (0.0, 0.0);
+        let mut gauge = simulation.gauge(rfm::sph::Probe::Force { obstacle: 0, about: DVec3::ZERO }).unwrap();
+        while simulation.time() < 0.05 {
+            simulation.step().unwrap();
+            felt += simulation.sample(&mut gauge)[0] * (simulation.time() - time);
+            time = simulation.time();
+        }
+        let lost = begin - momentum(&simulation);
+        // friction with the floor brakes it by a tenth at least
+        assert!(lost > 0.1 * begin && (felt / lost - 1.0).abs() < 0.02, "{method}: {felt} of {lost}");
+    }
+}
+
+/// A wall that moves gives the speed of sound where it is faster than a fall through the box.
+#[test]
+fn fast_walls_are_expected() {
+    let speed = |motion: &str, gravity: f64| {
+        let text = format!(
+            "rfm 1
+solid piston = box([-1, -1, -1], [0.1, 2, 2]).{motion}
+scene push {{
+  box {{ max: [1, 1, 1] }}
+  obstacle {{ solid: piston }}
+  fluid water {{ shape: box([0.3, 0, 0], [1, 1, 0.5]), density: 1000, spacing: 0.1 }}
+  gravity: [0, 0, -{gravity}]
+  run {{ until: 0.1 s }}
+}}"
+        );
+        let program = Program::from_source("piston.rfm", text).unwrap();
+        Experiment::new(&program, "push", Engine::Auto).unwrap().typical_speed()
+    };
+    assert!((speed("move([20*t, 0, 0])", 9.81) - 20.0).abs() < 1e-6);
+    assert!((speed("move([20*t, 0, 0])", 0.0) - 20.0).abs() < 1e-6);
+    assert!((speed("move([t, 0, 0])", 9.81) - 19.62_f64.sqrt()).abs() < 1e-6);
+    // a swing of 0.2 m at 50/s, and slipping walls that move within themselves
+    let swing = speed("move([0.2*sin(50*t), 0, 0])", 0.0);
+    assert!((9.9..10.01).contains(&swing), "{swing}");
+    assert!(speed("move([0, 0, 0.001*t])", 9.81) < 4.5);
+}

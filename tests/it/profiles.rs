@@ -296,14 +296,14 @@ fn a_loft_between_circles_is_a_cone() {
     assert!(allowed.union(&bounds) == allowed, "{bounds:?}");
 }
 
-/// From a star to a disc that stands beside its middle: the sign is that of the weighed fields, and the gradient is that of
+/// From a star to a disc that stands beside its middle: the sign is that of the weighed distances, and the gradient is that of
 /// differences.
 #[test]
 fn a_loft_weighs_two_outlines() {
     let star =
         "polygon([[2, 0], [0.5, 0.5], [0, 2], [-0.5, 0.5], [-2, 0], [-0.5, -0.5], [0, -2], [0.5, -0.5]])";
     let disc = "polygon(arc([0.5, 0], 1, 0°, 360°))";
-    let (a, b) = (solid(star), solid(disc));
+    let [a, b] = [star, disc].map(|profile| solid(&format!("{profile}.distance()")));
     let loft = solid(&format!("{star}.loft({disc}, 0.5, 2)"));
     let Bounds::Within(bounds) = *loft.bounds() else { panic!("{:?}", loft.bounds()) };
     let mut random = Random(23);

@@ -95,6 +95,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
             Writer::Page => view::solid(&format!("{} · {}", solid.name(), title(options)), &mesh, out),
         })?;
         times.writing = milliseconds(started);
+        warn_of_rounding(path, &mesh, grid.as_ref());
     }
     let names = (solid.name(), options.method.name());
     let summary = MeshSummary::new(names, &report, thin.count, quality, simplified.as_ref(), times);
@@ -130,6 +131,25 @@ fn nothing_to_write(
 fn unit_hint(path: &Path, options: &Options) -> &'static str {
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(mesh::stl::FORMAT.ending));
     if is_stl && options.unit.is_none() { "; most programs read .stl as millimetres: --unit mm" } else { "" }
+}
+
+/// The rounding of vertices, as a part of a cell, that is said.
+const SEEN_ROUNDING: f64 = 1e-3;
+
+/// Says how far vertices are moved by a format that has few digits, if that is a part of a cell that can be seen.
+fn warn_of_rounding(path: &Path, mesh: &Mesh, grid: Option<&Grid>) {
+    let is_single = format::is_page(path) || format::of_path(path).is_ok_and(|format| format.single);
+    let Some(cell) = grid.map(|grid| grid.spacing().min_element()).filter(|_| is_single) else { return };
+    let farthest = mesh.positions.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let rounding = 0.5 * f64::from(f32::EPSILON) * farthest;
+    if rounding > SEEN_ROUNDING * cell {
+        complain(&format!(
+            "note: `{}` holds seven digits, which move vertices by up to {rounding:.1e} m, {:.1e} of a cell: move the solid to \
+             the origin, or write .ply",
+            path.shown(),
+            rounding / cell
+        ));
+    }
 }
 
 /// How a mesh is written.

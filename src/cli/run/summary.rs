@@ -156,9 +156,9 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         summary.non_finite
     );
     say!(
-        "energy: {:.2} J at the start, {:.2} J at the end; {}",
-        summary.energy_at_start,
-        summary.kinetic_energy + summary.potential_energy,
+        "energy: {} J at the start, {} J at the end; {}",
+        readable(summary.energy_at_start),
+        readable(summary.kinetic_energy + summary.potential_energy),
         match summary.energy_excess {
             Some(excess) => format!("never more than {:.2e} of it above what gravity gave", excess),
             None => "not judged".to_string(),
@@ -191,4 +191,12 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
 /// Names of the passes that a simulation runs.
 pub(super) fn pass_names(simulation: &Simulation) -> Vec<&'static str> {
     simulation.passes().into_iter().map(Pass::name).collect()
+}
+
+/// A figure with two decimals, or with three digits where these would say nothing.
+fn readable(figure: f64) -> String {
+    match figure.abs() {
+        0.0 | 0.1..1e6 => format!("{figure:.2}"),
+        _ => format!("{figure:.2e}"),
+    }
 }

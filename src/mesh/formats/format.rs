@@ -14,6 +14,8 @@ pub struct Format {
     pub purpose: &'static str,
     /// Whether its numbers are always metres.
     pub only_metres: bool,
+    /// Whether coordinates are rounded to single precision.
+    pub single: bool,
     /// Writes a mesh in this format.
     pub write: WriteMesh,
     /// Writes a mesh as text, if the format has a text form beside its binary one.

@@ -24,8 +24,14 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// The entry of the table of formats.
-pub const FORMAT: Format =
-    Format { ending: "glb", purpose: "For viewers and browsers", only_metres: true, write, write_text: None };
+pub const FORMAT: Format = Format {
+    ending: "glb",
+    purpose: "For viewers and browsers",
+    only_metres: true,
+    single: true,
+    write,
+    write_text: None,
+};
 
 /// Writes a mesh as GLB, in metres as glTF demands.
 ///

@@ -19,6 +19,7 @@ pub const FORMAT: Format = Format {
     ending: "obj",
     purpose: "Shared vertices with normals of corners, text; meshio and others with one normal for a vertex read .ply",
     only_metres: false,
+    single: false,
     write,
     write_text: None,
 };

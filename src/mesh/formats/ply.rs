@@ -17,6 +17,7 @@ pub const FORMAT: Format = Format {
     ending: "ply",
     purpose: "Shared vertices with normals, binary",
     only_metres: false,
+    single: false,
     write,
     write_text: None,
 };

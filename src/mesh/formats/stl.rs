@@ -16,6 +16,7 @@ pub const FORMAT: Format = Format {
     ending: "stl",
     purpose: "Triangles as records, for nearly every program",
     only_metres: false,
+    single: true,
     write,
     write_text: Some(write_ascii),
 };

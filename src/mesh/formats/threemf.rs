@@ -20,8 +20,14 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 "#;
 
 /// The entry of the table of formats.
-pub const FORMAT: Format =
-    Format { ending: "3mf", purpose: "For printers", only_metres: false, write, write_text: None };
+pub const FORMAT: Format = Format {
+    ending: "3mf",
+    purpose: "For printers",
+    only_metres: false,
+    single: false,
+    write,
+    write_text: None,
+};
 
 /// Writes a mesh as 3MF. A mesh without triangles becomes a model without objects.
 ///

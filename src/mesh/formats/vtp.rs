@@ -14,8 +14,14 @@ use super::format::{Format, in_metres};
 use super::unit::LengthUnit;
 
 /// The entry of the table of formats.
-pub const FORMAT: Format =
-    Format { ending: "vtp", purpose: "For ParaView", only_metres: true, write, write_text: None };
+pub const FORMAT: Format = Format {
+    ending: "vtp",
+    purpose: "For ParaView",
+    only_metres: true,
+    single: false,
+    write,
+    write_text: None,
+};
 
 /// Writes a mesh as VTP with one normal for each vertex, in metres as the frames of runs are.
 ///

@@ -160,7 +160,7 @@ fn energies_of_a_fall() {
     // diffusion would treat an even density as that of a fluid not at rest
     let method = Method::Wcsph(Wcsph {
         sound_speed: Some(30.0),
-        density_diffusion: 0.0,
+        density_diffusion: Some(0.0),
         artificial_viscosity: Some(0.0),
         ..Wcsph::default()
     });

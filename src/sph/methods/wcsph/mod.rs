@@ -18,6 +18,9 @@ use crate::sph::scales::Scales;
 /// The exponent of Tait's equation for water.
 const EXPONENT: i32 = 7;
 
+/// The part of the expected speed from which on the speed √(σ/ρa) of surface tension over a spacing a counts.
+const CAPILLARY: f64 = 0.05;
+
 /// The speed of sound over the greatest expected speed, unless it is stated. This keeps changes of the
 /// density within 1 %.
 const SOUND_OVER_SPEED: f64 = 10.0;
@@ -40,8 +43,9 @@ pub struct Wcsph {
     /// Speed of sound c, m/s. `None`: ten times the greatest expected speed, which keeps changes of the
     /// density within 1 %.
     pub sound_speed: Option<f64>,
-    /// δ of the density diffusion (Molteni & Colagrossi 2009). Default 0.1; zero: the term is not computed.
-    pub density_diffusion: f64,
+    /// δ of the density diffusion (Molteni & Colagrossi 2009). `None`: 0.1, and 0 where surface tension moves the fluid;
+    /// zero: the term is not computed.
+    pub density_diffusion: Option<f64>,
     /// α of the artificial viscosity (Monaghan 1992). With pairs of pressures it acts on rough motion alone; with
     /// differences on all, which without it would gain energy. `None`: 0.1 with pairs, 0.02 with differences; zero: the term
     /// is not computed.
@@ -62,7 +66,7 @@ impl Default for Wcsph {
     fn default() -> Self {
         Self {
             sound_speed: None,
-            density_diffusion: 0.1,
+            density_diffusion: None,
             artificial_viscosity: None,
             gradients: Gradients::Pairs,
             shifting: None,
@@ -73,6 +77,15 @@ impl Default for Wcsph {
 }
 
 impl Wcsph {
+    /// δ of the density diffusion, stated or derived. Surface tension acts on a layer of particles, in which the density
+    /// therefore grows with the depth. Diffusion levels that, out of step with the motion: a drop that oscillates, or one at
+    /// rest, gains energy. So there is none where waves of the particles' size are not much slower than the fluid.
+    fn density_diffusion(&self, scales: &Scales) -> f64 {
+        let capillary = (scales.surface_tension / (scales.rest_density * scales.spacing())).sqrt();
+        let moves = capillary > CAPILLARY * scales.expected_speed;
+        self.density_diffusion.unwrap_or(if moves { 0.0 } else { 0.1 })
+    }
+
     /// α of the artificial viscosity, stated or derived.
     fn artificial_viscosity(&self) -> f64 {
         self.artificial_viscosity.unwrap_or(match self.gradients {
@@ -129,9 +142,9 @@ impl Declaration for Wcsph {
             value: Value::Number {
                 dimension: Dimension::NONE,
                 bound: Bound::NotNegative,
-                get: |wcsph| Some(wcsph.density_diffusion),
-                set: |wcsph, delta| wcsph.density_diffusion = delta,
-                derived: "",
+                get: |wcsph| wcsph.density_diffusion,
+                set: |wcsph, delta| wcsph.density_diffusion = Some(delta),
+                derived: "0.1, and 0 where surface tension moves the fluid",
             },
         },
         Key {
@@ -189,8 +202,8 @@ impl Declaration for Wcsph {
     const PASSES: &'static [(Pass, Absence<Self>)] = &[
         (Pass::Coverage, |_, _| None),
         (Pass::Density, |_, _| None),
-        (Pass::DensityDiffusion, |wcsph, _| {
-            (wcsph.density_diffusion == 0.0).then_some("the density diffusion is zero")
+        (Pass::DensityDiffusion, |wcsph, scales| {
+            (wcsph.density_diffusion(scales) == 0.0).then_some("the density diffusion is zero")
         }),
         (Pass::Pressure, |_, _| None),
         (Pass::PressureSolver, |_, _| Some(Pass::STATE)),

@@ -22,7 +22,7 @@ impl Numbers {
     pub fn of(wcsph: &Wcsph, parameters: &Parameters) -> Self {
         Self {
             sound_speed: parameters.sound_speed(),
-            density_diffusion: wcsph.density_diffusion,
+            density_diffusion: wcsph.density_diffusion(&parameters.scales()),
             artificial_viscosity: wcsph.artificial_viscosity(),
             gradients: wcsph.gradients,
             shifting: wcsph.shifting(),
