@@ -281,7 +281,7 @@ COMPRESSED = "W0513":
 Look at `compression_p99` in the summary as well: large values mean that particles crowd in a few places, most often at
 walls that the flow hits.";
 DRAG = "W0514":
-"A probe measures the force on a body that moves, and the method takes pressures in pairs. Rows of particles under pressure
+"A probe takes the mean of the force on a body that moves, and the method takes pressures in pairs. Rows of particles under pressure
 resist being sheared, as a solid does a little, and what damps their noise acts as a viscosity: a ball of six spacings across
 that moves through water felt six times the drag that it should, and a fifth more than its buoyancy. Forces on bodies at rest in
 a fluid at rest are right, and so are impacts. With `method: wcsph` and `gradients: differences` the drag of that ball was right.";

@@ -50,10 +50,12 @@ pub(super) fn compile<'a>(
     container.chain(obstacles).map(part).collect()
 }
 
-/// The greatest speed, m/s, of walls that move.
-pub(super) fn greatest_speed(parts: &[Part<'_>], scene: &Scene) -> f64 {
-    let speed =
-        |part: &Part<'_>| wall_speed::greatest(&part.whole, part.skin.slip, &scene.domain, scene.run.until);
+/// The greatest speed, m/s, of walls and surfaces that move.
+pub(super) fn greatest_speed(program: &Program, scene: &Scene, parts: &[Part<'_>]) -> f64 {
+    let speed = |part: &Part<'_>| {
+        let belt = part.skin.velocity.map(|nodes| vector_field(program, &nodes));
+        wall_speed::greatest(&part.whole, (part.skin.slip, belt), &scene.domain, scene.run.until)
+    };
     parts.iter().map(speed).fold(0.0, f64::max)
 }
 

@@ -79,7 +79,7 @@ impl Experiment {
     fn of_scene(program: Program, scene: Scene, engine: Engine) -> Result<Self, Error> {
         let fluid = program.compile(&scene.fluid.name, scene.fluid.shape, engine)?;
         let parts = bodies::compile(&program, &scene, engine)?;
-        let by_walls = bodies::greatest_speed(&parts, &scene);
+        let by_walls = bodies::greatest_speed(&program, &scene, &parts);
         let typical_speed = parameters::typical_speed(&program, &scene).max(by_walls);
         let mass = filling::mass_by_number(&scene, &fluid).unwrap_or(scene.fluid.mass);
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
@@ -135,7 +135,8 @@ impl Experiment {
         self.time_step
     }
 
-    /// A speed that the fluid can reach, m/s: by its velocity at the start and a fall through the box, or by walls that move.
+    /// A speed that the fluid can reach, m/s: the greater one of what its velocity at the start and a fall through the box give,
+    /// and of the speed of walls that move.
     pub fn typical_speed(&self) -> f64 {
         self.parameters.expected_speed
     }

@@ -83,7 +83,7 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
     })
 }
 
-/// A warning for each probe of a force on a body that moves, with a method that makes its drag too large.
+/// A warning for each mean of the force on a body that moves, with a method that makes its drag too large.
 pub(super) fn drag(scene: &Scene, bodies: &[Body]) -> Vec<Diagnostic> {
     let in_pairs = match scene.method {
         Method::Wcsph(numbers) => numbers.gradients == Gradients::Pairs,
@@ -93,7 +93,8 @@ pub(super) fn drag(scene: &Scene, bodies: &[Body]) -> Vec<Diagnostic> {
     };
     let told = |probe: &Probe| match probe.measured {
         Measured::Force { body, .. }
-            if bodies.get(body).is_some_and(|body| body.obstacle.moving.is_some()) =>
+            if probe.mean.is_some()
+                && bodies.get(body).is_some_and(|body| body.obstacle.moving.is_some()) =>
         {
             let message = "with pressures in pairs the drag of a body that moves through the fluid is several times too large";
             Some(

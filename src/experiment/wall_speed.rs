@@ -1,10 +1,12 @@
 //! How fast the walls of a scene move at most.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::Solid;
 use crate::geom::Aabb;
-use crate::sph::Slip;
+use crate::sph::{Slip, VectorField};
 
 /// Times of a run at which a wall is looked at.
 const TIMES: usize = 96;
@@ -19,24 +21,34 @@ const STEPS: usize = 3;
 const NEAR: f64 = 1e-3;
 
 /// The greatest speed, m/s, with which a solid's surface drives the fluid in a box during a run: that along its normal, or
-/// the whole if the fluid sticks to it. Zero for a solid at rest.
+/// the whole if the fluid sticks to it; `belt` is its motion within the surface where that is stated. Zero for a solid at
+/// rest.
 ///
 /// It is found at some places and times, so a wall that moves during a hundredth of the run alone may be missed. Solids of
-/// many parts that move differently are not looked at: their velocities would be one large program, which nothing else needs.
-pub(super) fn greatest(solid: &Solid, slip: Slip, domain: &Aabb, until: f64) -> f64 {
-    if !solid.moves() || (solid.has_many_leaves() && !solid.moves_rigidly()) {
+/// many parts are not looked at: their gradients would be one large program, which nothing else needs.
+pub(super) fn greatest(
+    solid: &Solid,
+    (slip, belt): (Slip, Option<Arc<VectorField>>),
+    domain: &Aabb,
+    until: f64,
+) -> f64 {
+    let belt = belt.filter(|_| slip == Slip::No);
+    if !(solid.moves() || belt.is_some()) || solid.has_many_leaves() {
         return 0.0;
     }
     let mut greatest = 0.0;
     for k in 0..TIMES {
-        let now = solid.at(until * (k as f64 + 0.5) / TIMES as f64);
+        let time = until * (k as f64 + 0.5) / TIMES as f64;
+        let now = solid.at(time);
         for place in 0..SIDE.pow(3) {
             let Some((p, normal)) = on_surface(&now, domain, place) else { continue };
             let velocity = now.wall_velocity(p);
-            let speed = match slip {
-                Slip::Free => velocity.dot(normal).abs(),
-                Slip::No => velocity.length(),
+            let along = match (slip, &belt) {
+                (Slip::Free, _) => 0.0,
+                (Slip::No, Some(belt)) => belt(p, time).length(),
+                (Slip::No, None) => velocity.length(),
             };
+            let speed = velocity.dot(normal).abs().max(along);
             if speed.is_finite() {
                 greatest = f64::max(greatest, speed);
             }

@@ -16,7 +16,7 @@ pub(super) struct Side {
 pub(super) enum Joint {
     /// Another node holds the same points.
     Same(Side),
-    /// R₀ operations, which have edges to round.
+    /// R₀ operations.
     And([Side; 2]),
     Or([Side; 2]),
     /// The least and the greatest, which stay as they are.
@@ -51,7 +51,7 @@ impl Lowering<'_> {
         (order, joints)
     }
 
-    /// How a part is joined. Factors that are positive numbers change no distance; *not* turns *and* into *or*.
+    /// How a part is joined. A positive factor moves no surface, so it is left out; *not* turns *and* into *or*.
     fn joint(&self, Side { node, negated }: Side) -> Joint {
         let graph = &self.module.graph;
         let side = |node: Node, turned: bool| Side { node, negated: negated != turned };

@@ -71,7 +71,7 @@ impl Lowering<'_> {
 
     /// A formula whose surface is moved outwards: by its distance, or by g = |∇ω| to first order.
     fn offset_leaf(&mut self, side: Side, length: Node, within: Option<Aabb>, span: Span) -> Node {
-        let half = self.known_value(length).map_or(1.0, |length| 4.0 * length.abs());
+        let half = self.known_value(length).map_or(1.0, |length| (4.0 * length.abs()).max(1.0));
         let (field, by) = match self.exact_distance(side.node, (within, half), span) {
             Some(distance) => (distance, length),
             None => {

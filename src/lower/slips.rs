@@ -242,7 +242,8 @@ impl Lowering<'_> {
             ("at", _) => ".at([2*x, y, z])".into(),
             ("turned", _) => ".turned(0.5*z)".into(),
             ("repeat", _) => ".repeat([2, 0, 0], [6, 1, 1])".into(),
-            ("round", _) => ".round(0.1)".into(),
+            ("round" | "offset", _) => format!(".{method}(0.1)"),
+            ("distance", _) => ".distance()".into(),
             _ => format!(".{method}(45 deg)"),
         }
     }

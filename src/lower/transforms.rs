@@ -145,10 +145,13 @@ impl<'a> Lowering<'a> {
         }
         let shape = self.field(receiver);
         let known = METHODS.into_iter().find(|(name, _)| *name == method.text);
+        // a function of the file goes before the method of this name
+        if let Some((function, source)) = self.function_of_shapes(&method.text)
+            && (known.is_none() || source.is_users())
+        {
+            return self.call_method(function, source, receiver, arguments, span);
+        }
         let Some((_, transform)) = known else {
-            if let Some((function, source)) = self.function_of_shapes(&method.text) {
-                return self.call_method(function, source, receiver, arguments, span);
-            }
             if let Some(foreign) = self.foreign_method(receiver, method, arguments) {
                 return self.fail(foreign);
             }
@@ -224,7 +227,10 @@ impl<'a> Lowering<'a> {
         span: Span,
     ) -> Option<Node> {
         let p = Axis::SPACE.map(|axis| self.module.graph.coordinate(axis));
-        let Some((first, at)) = values.first() else { return self.distance_of_shape(shape, span) };
+        if transform == Transform::Distance {
+            return self.distance_of_shape(shape, span);
+        }
+        let (first, at) = values.first()?;
         match transform {
             Transform::Move => {
                 let by = self.as_vector(first, *at)?;

@@ -165,11 +165,6 @@ impl Solid {
         self.inner.motion.get_or_init(|| RigidMotion::of(&omega.graph, omega.root)).as_ref()
     }
 
-    /// Whether the solid is moved and turned as a whole, without deformation.
-    pub(crate) fn moves_rigidly(&self) -> bool {
-        self.rigid_motion().is_some()
-    }
-
     /// How many numbers of a program depend on time alone: they are found once for each time, the rest at
     /// each point. `None` for a solid at rest.
     pub fn time_dependent(&self, kind: ProgramKind) -> Option<usize> {

@@ -55,12 +55,19 @@ const MOST_WORK: usize = 100_000;
 /// Rays get twice as long so many times.
 const DOUBLINGS: i32 = 60;
 
+/// If what is known is so many times farther than the middle of a cell, the corners of the cell are tried as well.
+const WIDE_GAP: f64 = 1.02;
+
 /// Places behind a cell that are tried.
 const BEHIND: u32 = 6;
 
-/// Directions into which a ray is turned, and the tangents of the angles between which it is.
+/// Directions in which a ray is turned.
 const TURNS: u32 = 8;
+
+/// The tangent of the widest turn.
 const WIDEST_TURN: f64 = 0.5;
+
+/// Turns of a smaller tangent are not tried.
 const LEAST_TURN: f64 = 1e-6;
 
 /// Rounds of turns, of which each tries all directions.
@@ -133,7 +140,7 @@ impl Distances {
             work = work.saturating_sub(target.work(&known));
             let before = best.distance;
             best.try_cell(&space);
-            if best.distance < before {
+            if best.distance < before * (1.0 - GAP) {
                 best.turn();
             }
             for mut half in space.halves() {
@@ -183,7 +190,7 @@ impl Best<'_> {
         self.solid.sign(q) * self.sign < 0.0
     }
 
-    /// Tries the middle of a cell, its corner that is nearest to the point, and what lies behind the cell.
+    /// Tries the middle of a cell, its corner that is nearest to the point, other corners, and what lies behind the cell.
     fn try_cell(&mut self, cell: &Aabb) {
         let nearest = self.p.clamp(cell.min, cell.max);
         if self.is_other(nearest) {
@@ -195,6 +202,9 @@ impl Best<'_> {
         self.try_ray(centre + (centre - nearest));
         // an edge may cut off less of the cell than its middle
         let length = (centre - self.p).length();
+        if self.distance > WIDE_GAP * length {
+            cell.corners().into_iter().for_each(|corner| self.try_ray(corner));
+        }
         let behind = self.distance - length;
         if behind.is_finite() && behind > 0.0 && length > 0.0 {
             let direction = (centre - self.p) / length;

@@ -78,7 +78,8 @@ fn are_enough(places: &Vectors) -> bool {
     }
     let farthest = within.min.abs().max(within.max.abs()).max_element();
     let apart = within.size().max_element() / (places.len() as f64).cbrt();
-    0.5 * f64::from(f32::EPSILON) * farthest <= UNSEEN * apart
+    // all in one place
+    apart == 0.0 || 0.5 * f64::from(f32::EPSILON) * farthest <= UNSEEN * apart
 }
 
 /// Writes the collection of frames: the time (s) and the file name of each.

@@ -274,6 +274,27 @@ scene rub {{
     }
 }
 
+/// A cup of 1 mm that swings as it goes: its corners and its curved wall come from several sides at once.
+#[test]
+fn a_thin_cup_that_swings_keeps_what_is_in_it() {
+    let text = "rfm 1
+solid cup = (cylinder(0.3, 0.5) \\ cylinder(0.299, 0.499).move([0, 0, 0.001])).move([1.5*t, 0, 0]).rotate_y(0.5*sin(10*t))
+scene carry {
+  box { min: [-1, -1, -1], max: [2.5, 1, 1.5] }
+  obstacle { solid: cup }
+  fluid water { shape: cylinder(0.28, 0.2).move([0, 0, 0.01]), spacing: 0.05, density: 1000 }
+  run { until: 0.15 s, save_every: 0.15 s }
+}";
+    let simulation = run(text).unwrap_or_else(|e| panic!("{e}"));
+    let (sin, cos) = (0.5 * f64::sin(1.5)).sin_cos();
+    for p in simulation.particles().position.iter() {
+        // back into the cup's own frame
+        let own = DVec3::new(cos * p.x - sin * p.z - 0.225, p.y, sin * p.x + cos * p.z);
+        let is_in = own.z > 0.0009 && own.truncate().length() < 0.2991;
+        assert!(is_in || own.z > 0.4, "{p} is at {own} in the cup");
+    }
+}
+
 /// A wall that moves gives the speed of sound where it is faster than a fall through the box.
 #[test]
 fn fast_walls_are_expected() {
@@ -299,4 +320,18 @@ scene push {{
     let swing = speed("move([0.2*sin(50*t), 0, 0])", 0.0);
     assert!((9.9..10.01).contains(&swing), "{swing}");
     assert!(speed("move([0, 0, 0.001*t])", 9.81) < 4.5);
+}
+
+#[test]
+fn fast_belts_are_expected() {
+    let text = "rfm 1
+solid belt = box([-1, -1, -1], [2, 2, 0.1])
+scene drag {
+  box { max: [1, 1, 1] }
+  obstacle { solid: belt, walls: no_slip, surface_velocity: [0, 30, 0] }
+  fluid oil { shape: box([0.3, 0, 0.1], [1, 1, 0.5]), density: 1000, viscosity: 10, spacing: 0.1 }
+  run { until: 0.1 s }
+}";
+    let program = Program::from_source("belt.rfm", text).unwrap();
+    assert_eq!(Experiment::new(&program, "drag", Engine::Auto).unwrap().typical_speed(), 30.0);
 }

@@ -125,6 +125,8 @@ const METHODS: &[(&str, &str)] = &[
         "round",
         "arcs of a radius in place of the edges that `and`, `or` and `\\` make; another radius for those that point inwards, or 0",
     ),
+    ("offset", "the shape with its faces moved outwards by d; edges stay sharp"),
+    ("distance", "the shape by the distances of its parts, joined by min and max"),
 ];
 
 /// The functions of the language, standard solids among them.

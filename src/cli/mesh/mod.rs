@@ -143,8 +143,8 @@ fn warn_of_rounding(path: &Path, mesh: &Mesh, grid: Option<&Grid>) {
     let farthest = mesh.positions.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
     let rounding = 0.5 * f64::from(f32::EPSILON) * farthest;
     if rounding > SEEN_ROUNDING * cell {
-        complain(&format!(
-            "note: `{}` holds seven digits, which move vertices by up to {rounding:.1e} m, {:.1e} of a cell: move the solid to \
+        note(format!(
+            "`{}` holds seven digits, which move vertices by up to {rounding:.1e} m, {:.1e} of a cell: move the solid to \
              the origin, or write .ply",
             path.shown(),
             rounding / cell

@@ -1,7 +1,7 @@
 //! What decides in and near the cells of a box, found out where somebody asks.
 //!
-//! Gradients off the surface and values that are continuous are asked for in few places. So a cell is found from
-//! the one that holds it, down to those of the flat grid.
+//! Gradients off the surface are asked for in few places, and values that are continuous near the surface alone. So a
+//! cell is divided when a point in it is asked for, down to the cells of the flat grid.
 //!
 //! Invariant: what a cell keeps depends on the cell alone, and not on what was asked before.
 
@@ -43,6 +43,8 @@ pub(super) struct Demanded {
 struct Part {
     /// What is left of the solid, in prefix form; empty where nothing decides.
     words: Vec<u32>,
+    /// Whether it is not divided.
+    is_final: bool,
     octants: [OnceLock<Box<Self>>; 8],
 }
 
@@ -75,7 +77,7 @@ impl Demanded {
         let mut part = self.whole.get_or_init(|| self.kept(parts, (0, UVec3::ZERO), &parts.words));
         let mut place = UVec3::ZERO;
         for depth in 1..=DEPTH {
-            if self.is_enough(&part.words) {
+            if part.is_final {
                 break;
             }
             let k = (at >> (DEPTH - depth)) & UVec3::ONE;
@@ -84,14 +86,6 @@ impl Demanded {
             part = part.octants[k].get_or_init(|| Box::new(self.kept(parts, (depth, place), &part.words)));
         }
         part
-    }
-
-    /// Whether a cell with these words is not divided.
-    fn is_enough(&self, words: &[u32]) -> bool {
-        match self.keeps {
-            Keeps::Surface => words.is_empty(),
-            Keeps::Value => leaf_count(words) <= FEW_LEAVES,
-        }
     }
 
     /// What a cell keeps of the words of the one that holds it.
@@ -109,6 +103,10 @@ impl Demanded {
                 if range == Interval::ALL { range } else { range * factor }
             }),
         };
-        Part { words, octants: Default::default() }
+        let is_final = match self.keeps {
+            Keeps::Surface => words.is_empty(),
+            Keeps::Value => leaf_count(&words) <= FEW_LEAVES,
+        };
+        Part { words, is_final, octants: Default::default() }
     }
 }

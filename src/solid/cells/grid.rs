@@ -358,7 +358,8 @@ impl Cells {
         visit: &mut impl FnMut(Cell, u32) -> ControlFlow<B>,
     ) -> Option<ControlFlow<B>> {
         // points that rounding puts into the next cell are in it
-        let wider = over.grown(1e-9 * self.shortest_side(MAX_DEPTH));
+        let largest = over.min.abs().max(over.max.abs()).max_element();
+        let wider = over.grown(1e-9 * self.shortest_side(MAX_DEPTH) + 64.0 * f64::EPSILON * largest);
         for (at, cell) in self.touched(over, most)? {
             let found = match cell {
                 Cell::Divided(first) => self.visit_below((DEPTH, at, first), &wider, visit),

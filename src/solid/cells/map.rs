@@ -62,7 +62,7 @@ pub struct CellMap {
     /// What decides within [`AROUND`] of the cells, for gradients off the surface.
     around: Demanded,
     /// What decides the value in the cells.
-    pub(super) values: Demanded,
+    pub(super) deciding: Demanded,
     reach: f64,
     /// The length by which cells were grown, reach included: points that rounding puts into the next cell are
     /// still right.
@@ -132,9 +132,9 @@ impl CellMap {
         let (parts, margin) = (solid.parts()?, margin(&cells.domain, reach));
         let beside = AROUND * cells.domain.size().max_element() / f64::from(SIDE);
         let around = Demanded::new(cells.domain, Keeps::Surface, beside.max(margin));
-        let values = Demanded::new(cells.domain, Keeps::Value, margin);
+        let deciding = Demanded::new(cells.domain, Keeps::Value, margin);
         let (solid, twin) = (solid.clone(), solid.twin());
-        Some(Self { solid, twin, parts, cells, around, values, reach, margin })
+        Some(Self { solid, twin, parts, cells, around, deciding, reach, margin })
     }
 
     /// How the box was divided.
@@ -450,10 +450,9 @@ impl Field for CellMap {
     fn range(&self, over: &Aabb) -> Interval {
         self.range_by_cells(over).unwrap_or_else(|| {
             // leaf by leaf: a range program of thousands of leaves takes seconds to compile
-            let free = self.cells.shortest_side(SIDE.ilog2());
             match judged(&self.parts, over, &self.parts.words).0 {
-                Verdict::Inside => Interval::point(free),
-                Verdict::Outside => Interval::point(-free),
+                Verdict::Inside => Interval::new(f64::MIN_POSITIVE, f64::INFINITY),
+                Verdict::Outside => Interval::new(f64::NEG_INFINITY, -f64::MIN_POSITIVE),
                 Verdict::Near => Interval::ALL,
             }
         })
@@ -463,9 +462,12 @@ impl Field for CellMap {
         if !self.is_within(over) {
             return self.twin.sheets(over, visit);
         }
-        let mut known = Vec::new();
+        let (mut known, mut last) = (Vec::new(), None);
         let of_cell = &mut |cell: Cell, _: u32| -> ControlFlow<()> {
-            if let Cell::Near(program) = cell {
+            if let Cell::Near(program) = cell
+                && last != Some(program)
+            {
+                last = Some(program);
                 let tree = &self.cells.programs[program as usize..];
                 self.parts.leaves.sheets(tree, over, &mut known, visit);
             }

@@ -1,5 +1,5 @@
 //! The twin's value at many points, from the leaves that decide it near each. It differs from the value of the twin's own
-//! program by rounding.
+//! program by rounding, and where a leaf occurs with several factors; its sign is the same.
 
 use glam::DVec3;
 
@@ -24,7 +24,7 @@ impl CellMap {
             let count = RUN.min(points.len() - first);
             let mut keys = [(None, 0); RUN];
             for (k, key) in keys[..count].iter_mut().enumerate() {
-                *key = (self.values.find(&self.parts, points.get(first + k)), first + k);
+                *key = (self.deciding.find(&self.parts, points.get(first + k)), first + k);
             }
             let keys = &mut keys[..count];
             keys.sort_unstable();
@@ -34,7 +34,7 @@ impl CellMap {
                     continue;
                 };
                 gathered.fill(points, group.iter().map(|key| key.1));
-                let words = self.values.words(&self.parts, cell);
+                let words = self.deciding.words(&self.parts, cell);
                 let found = &mut found[..group.len()];
                 self.run_many(words, &mut 0, gathered.columns(), &|leaf| leaves.factor(leaf), found);
                 group.iter().zip(&*found).for_each(|(&(_, i), value)| omega[i] = *value);

@@ -46,6 +46,9 @@ pub(in crate::sph) const MARKED: usize = 32;
 /// Most contacts of one particle in one step. After them it stays where it is.
 const MAX_CONTACTS: usize = 4;
 
+/// The part of a step in which a wall that moves is no longer met: too little to tell where a path began.
+const LEAST_LEFT: f64 = 1e-6;
+
 /// A support radius, in clearances. A particle that a moving wall overtakes is moved at most this far, and no
 /// larger ball is tested for being free.
 const REACH: f64 = 1e6;
@@ -341,7 +344,7 @@ impl Boundary {
         }
         let swept = block.swept();
         // if an obstacle moves, a ball that is free now may not be free in the next step
-        let at_rest = self.obstacles.iter().all(|obstacle| obstacle.moving.is_none());
+        let at_rest = self.all_at_rest();
         let most = self.reach();
         if self.fields().all(|field| field.range(&swept).hi < 0.0) {
             if at_rest && self.fields().all(|field| field.is_far(&swept, most)) {
@@ -418,16 +421,25 @@ impl Boundary {
         for _ in 0..MAX_CONTACTS {
             (target, velocity) = self.hold_in_box(target, velocity);
             let Some((index, contact)) = self.nearest_contact(here, since, target)? else {
-                return Ok(End { at: target, velocity, is_proven: true });
+                let is_proven = 1.0 - since >= LEAST_LEFT || self.stays_outside(here, since)?;
+                return Ok(End { at: target, velocity, is_proven });
             };
             let (obstacle, field) = (&self.obstacles[index], self.field(index));
             let before = velocity;
             // the bounce depends on the velocity relative to the wall
             let wall =
                 if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
+            if !wall.is_finite() {
+                return Err(Undefined { at: contact.point });
+            }
             let arriving = velocity - wall;
             velocity = wall + bounce(arriving, &contact, obstacle.restitution, obstacle.friction);
-            let along = (1.0 - contact.fraction) * self.step * wall;
+            let left = (1.0 - contact.fraction) * self.step;
+            let along = match obstacle.moving {
+                // by the velocity in the middle of the way, as walls turn
+                Some(_) => left * field.wall_velocity(contact.point + 0.5 * left * wall),
+                None => DVec3::ZERO,
+            };
             let rest = target - contact.point - along;
             let slide = turn_back(rest, &contact, 0.0);
             (here, since) = (contact.point, contact.fraction);
@@ -442,7 +454,19 @@ impl Boundary {
             hit(index, velocity - before, contact.point);
         }
         // a wall that moves on may pass what cannot go on
-        Ok(End { at: here, velocity, is_proven: self.all_at_rest() })
+        let is_proven = self.stays_outside(here, since)?;
+        Ok(End { at: here, velocity, is_proven })
+    }
+
+    /// Whether no wall that moves passes a place between a part of the step and its end.
+    fn stays_outside(&self, here: DVec3, since: f64) -> Result<bool, Undefined> {
+        for (k, obstacle) in self.obstacles.iter().enumerate().filter(|(_, o)| o.moving.is_some()) {
+            let path = Path { start: since, ..Path::new(here, here, obstacle.resolution) };
+            if first_contact_during(self.field(k), &path, self.clearance, self.step)?.is_some() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// A place beside the end of a path that is inside an obstacle after a contact, and the normal there: on the side of the
@@ -456,7 +480,7 @@ impl Boundary {
         slide: DVec3,
     ) -> Result<Option<(DVec3, DVec3)>, Undefined> {
         let field = self.field(index);
-        let reach = slide.length() + along.length();
+        let reach = (slide.length() + along.length()).min(self.reach());
         let found = push_out(field, end, reach, self.clearance)?;
         if self.obstacles[index].moving.is_none() {
             return Ok(found.map(|lifted| (lifted.point, lifted.normal)));
@@ -475,6 +499,7 @@ impl Boundary {
         Ok(None)
     }
 
+    /// Whether no obstacle moves.
     pub(super) fn all_at_rest(&self) -> bool {
         self.obstacles.iter().all(|obstacle| obstacle.moving.is_none())
     }
@@ -487,20 +512,29 @@ impl Boundary {
         target: DVec3,
     ) -> Result<Option<(usize, Contact)>, Undefined> {
         let mut nearest: Option<(usize, Contact)> = None;
+        let left = 1.0 - since;
         for (k, obstacle) in self.obstacles.iter().enumerate() {
             let mut path = Path::new(here, target, obstacle.resolution);
-            let duration = if obstacle.moving.is_some() { self.step } else { 0.0 };
-            if since > 0.0 && !self.all_at_rest() {
-                if since >= 1.0 {
-                    return Ok(None); // nothing is left of the step
+            let is_late = obstacle.moving.is_some() && since > 0.0;
+            if is_late {
+                if left < LEAST_LEFT {
+                    continue; // `stays_outside` looks at what little is left
                 }
                 // where it would have begun
-                path.from = here - since / (1.0 - since) * (target - here);
+                path.from = here - since / left * (target - here);
                 path.start = since;
             }
-            if let Some(contact) = first_contact_during(self.field(k), &path, self.clearance, duration)?
-                && nearest.is_none_or(|(_, other)| contact.fraction < other.fraction)
-            {
+            let duration = if obstacle.moving.is_some() { self.step } else { 0.0 };
+            let Some(mut contact) = first_contact_during(self.field(k), &path, self.clearance, duration)?
+            else {
+                continue;
+            };
+            if !is_late {
+                contact.fraction = since + left * contact.fraction;
+            } else if contact.fraction <= since {
+                contact.point = here;
+            }
+            if nearest.is_none_or(|(_, other)| contact.fraction < other.fraction) {
                 nearest = Some((k, contact));
             }
         }

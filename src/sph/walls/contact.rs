@@ -71,7 +71,7 @@ pub fn first_contact(field: &dyn Walls, path: &Path, clearance: f64) -> Result<O
     first_contact_during(field, path, clearance, 0.0)
 }
 
-/// The first contact of a path that a particle passes in a time, s, in which the obstacle may move.
+/// The first contact of a path that a particle takes `duration`, s, to pass, while the obstacle may move.
 ///
 /// # Errors
 /// [`Undefined`] where ω is NaN, or ∇ω at the contact is not finite.
@@ -111,7 +111,7 @@ pub(super) fn first_contact_during(
     stop(&Entry::new(path, (rest.start, 1.0), true, Normals::default()))
 }
 
-/// The contact at which a path, passed in a time, s, stops before an entry.
+/// The contact at which a path stops before an entry. The particle takes `duration`, s, to pass the whole path.
 fn stop(
     field: &dyn Walls,
     path: &Path,

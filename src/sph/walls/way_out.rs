@@ -18,12 +18,15 @@ use super::{
 /// Most walls that push a particle on, one after the other.
 const ROUNDS: usize = 8;
 
+/// How often a way that begins on a surface is looked at from a little later on, up to half of it.
+const LATER: i32 = 16;
+
 /// Number of distances at which a place is looked for all around, the longest a support radius.
 const DISTANCES: i32 = 13;
 
 impl Boundary {
     /// Moves a particle out of all obstacles at the end of a step in which it came from `from` to `at`, and
-    /// gives it the velocity that their walls leave it. If it is not proven that no wall has passed it, that is found out.
+    /// gives it the velocity that their walls leave it. `is_proven` says that no wall can have passed it.
     pub(super) fn leave_moving(
         &self,
         from: DVec3,
@@ -31,9 +34,7 @@ impl Boundary {
         mut velocity: DVec3,
         is_proven: bool,
     ) -> Result<(DVec3, DVec3), Trouble> {
-        if self.all_at_rest()
-            || self.first_around(at)?.is_none() && (is_proven || self.is_within_reach(from, at)?)
-        {
+        if self.all_at_rest() || is_proven && self.first_around(at)?.is_none() {
             return Ok((at, velocity));
         }
         let out = match self.one_after_the_other(from, at)? {
@@ -68,13 +69,30 @@ impl Boundary {
 
     /// Whether a point is in the box, and the straight way to it during the step passes no obstacle.
     fn is_within_reach(&self, from: DVec3, to: DVec3) -> Result<bool, Undefined> {
-        for (k, obstacle) in self.obstacles.iter().enumerate() {
-            let path = Path::new(from, to, obstacle.resolution);
-            if first_contact(self.field(k), &path, self.clearance)?.is_some() {
+        for k in 0..self.obstacles.len() {
+            if !self.is_free(k, from, to)? {
                 return Ok(false);
             }
         }
         Ok(self.domain.contains(to))
+    }
+
+    /// Whether the straight way during the step passes no surface of an obstacle. It may begin on one, within rounding
+    /// errors, and leave it.
+    fn is_free(&self, k: usize, from: DVec3, to: DVec3) -> Result<bool, Undefined> {
+        let (obstacle, field) = (&self.obstacles[k], self.field(k));
+        let mut path = Path::new(from, to, obstacle.resolution);
+        for later in 0..LATER {
+            let Some(contact) = first_contact(field, &path, self.clearance)? else { return Ok(true) };
+            let wall =
+                if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
+            let leaves = (to - from - self.step * wall).dot(contact.normal) > 0.0;
+            if contact.fraction > path.start || !leaves {
+                return Ok(false);
+            }
+            path.start = 2.0f64.powi(later - LATER);
+        }
+        Ok(false)
     }
 
     /// Leaves one obstacle by the nearest way, then the next.
