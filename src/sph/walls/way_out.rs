@@ -21,6 +21,9 @@ const ROUNDS: usize = 8;
 /// How often a way that begins on a surface is looked at from a little later on, up to half of it.
 const LATER: i32 = 16;
 
+/// Clearances after which a way has left the surface that it begins on.
+const BEGINNING: f64 = 4.0;
+
 /// Number of distances at which a place is looked for all around, the longest a support radius.
 const DISTANCES: i32 = 13;
 
@@ -86,11 +89,22 @@ impl Boundary {
             let Some(contact) = first_contact(field, &path, self.clearance)? else { return Ok(true) };
             let wall =
                 if obstacle.moving.is_some() { field.wall_velocity(contact.point) } else { DVec3::ZERO };
-            let leaves = (to - from - self.step * wall).dot(contact.normal) > 0.0;
-            if contact.fraction > path.start || !leaves {
+            let way = to - from - self.step * wall;
+            if contact.fraction > path.start {
                 return Ok(false);
             }
-            path.start = 2.0f64.powi(later - LATER);
+            // a surface met within rounding errors may have no normal at the time of the contact: a way of some clearances
+            // shows whether it is left
+            let shortest = (BEGINNING * self.clearance / way.length()).min(0.5);
+            let leaves = match contact.faces.is_empty() {
+                true => path.start < shortest && field.on_path(&path, shortest) < 0.0,
+                false => way.dot(contact.normal) > 0.0,
+            };
+            if !leaves {
+                return Ok(false);
+            }
+            path.start =
+                2.0f64.powi(later - LATER).max(if contact.faces.is_empty() { shortest } else { 0.0 });
         }
         Ok(false)
     }
