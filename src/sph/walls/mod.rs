@@ -10,6 +10,7 @@
 mod boundary;
 mod contact;
 mod coverage;
+mod flight;
 mod friction;
 mod kernel;
 mod motion;
