@@ -74,7 +74,8 @@ impl Lowering<'_> {
     }
 
     /// What a part's slope is like at some places within a cube, with the params as they are and otherwise. Whatever is
-    /// found here, the distance has the right sign: only its value may be of first order.
+    /// found here, the distance has the right sign. Its value is wrong where a formula in pieces has another slope than at
+    /// all of these places, and an offset of it is then as wrong.
     fn profile(&self, leaf: Node, middle: [f64; 3], half: f64) -> Profile {
         let (mut graph, leaf) = self.module.graph.extract_cone(leaf);
         let slopes = Slopes::of(&mut graph, leaf);

@@ -17,7 +17,7 @@
 //! on the side of P: the loops that they meet there are the tunnel's ends.
 //!
 //! The values are those of [`crate::field::Field::continuous`] at the grid's nodes. For a solid they come
-//! from the min/max twin, whose sign is that of ω, with a cell map or without. Ties count as outside, as ω =
+//! from the min/max twin, whose sign is that of ω; with a cell map from its leaves, which give the same but for rounding. Ties count as outside, as ω =
 //! 0 does everywhere.
 //!
 //! Invariant: a decision about a face depends on its four values alone and not on their order, so both cells

@@ -39,6 +39,17 @@ impl SignRule {
         }
     }
 
+    /// The positive constant with which a node multiplies the operand that it has the sign of, see [`SignRule::Same`]; 1 for
+    /// all other nodes.
+    pub fn factor(graph: &Graph, node: Node) -> f64 {
+        let Self::Same(operand) = Self::of(graph, node) else { return 1.0 };
+        let expr = graph.expr(node);
+        let constant =
+            expr.operands().find(|other| *other != operand).and_then(|other| graph.as_constant(other));
+        let constant = constant.unwrap_or(1.0);
+        if matches!(expr, Expr::Binary(Binary::Div, ..)) { 1.0 / constant } else { constant }
+    }
+
     /// The operands that alone decide the sign.
     pub fn operands(self) -> impl Iterator<Item = Node> {
         let (a, b) = match self {

@@ -108,9 +108,7 @@ impl<F: FnMut(u32) -> Interval> Pruning<'_, F> {
             }
         }
     }
-}
 
-impl<F: FnMut(u32) -> Interval> Pruning<'_, F> {
     /// What may decide the value of the tree at `at`.
     fn value(&mut self, at: &mut usize) -> Left {
         let start = self.left.len();

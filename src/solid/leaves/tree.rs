@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use crate::ir::{Binary, Expr, Graph, Node, SignRule};
+use crate::ir::{Graph, Node, SignRule};
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Logic {
@@ -69,7 +69,9 @@ impl Reader<'_> {
         let (below, negated) = (above.below(), above.negated);
         match SignRule::of(self.graph, node) {
             SignRule::Not(a) => self.read(a, Above { negated: !negated, ..below }),
-            SignRule::Same(a) => self.read(a, Above { factor: above.factor * self.factor(node, a), ..below }),
+            SignRule::Same(a) => {
+                self.read(a, Above { factor: above.factor * SignRule::factor(self.graph, node), ..below })
+            }
             // min(a, a) = a: the value of a ∧ a differs from a, its sign does not
             SignRule::All(a, b) | SignRule::Any(a, b) if a == b => self.read(a, below),
             rule @ (SignRule::All(a, b) | SignRule::Any(a, b)) => {
@@ -88,22 +90,6 @@ impl Reader<'_> {
                 }
                 Some(Logic::Leaf { leaf, negated })
             }
-        }
-    }
-
-    /// The positive constant with which a node multiplies one of its operands.
-    fn factor(&self, node: Node, of: Node) -> f64 {
-        let constant = |node: Node| self.graph.as_constant(node).unwrap_or(1.0);
-        match self.graph.expr(node) {
-            Expr::Binary(Binary::Mul, u, v) => constant(if of == v { u } else { v }),
-            Expr::Binary(Binary::Div, _, v) => 1.0 / constant(v),
-            Expr::Unary(..)
-            | Expr::Binary(..)
-            | Expr::Constant(_)
-            | Expr::Coordinate(_)
-            | Expr::Parameter(_)
-            | Expr::Uniform(_)
-            | Expr::Lookup(..) => 1.0,
         }
     }
 }
