@@ -17,6 +17,9 @@ pub const MOST_NODES: usize = 1 << 26;
 /// Over more cells than this the slope is only known to be that of the whole map.
 const MOST_CELLS: usize = 64;
 
+/// Over more cells than this the heights are only known to be between those of the nodes around.
+const FEW_CELLS: usize = 9;
+
 /// What rounding may add to a height, relative to all that it is made of.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
@@ -101,30 +104,72 @@ impl HeightMap {
         (cell, place - cell as f64)
     }
 
+    /// What rounding may add to the part of a cell at which a place lies.
+    fn blur(&self, axis: usize) -> f64 {
+        ROUNDING * self.counts[axis] as f64
+    }
+
     /// Whether a place lies beyond the map along an axis.
     fn is_beyond(&self, axis: usize, coordinate: f64) -> bool {
         let place = (coordinate - self.corner[axis]) / self.spacing[axis];
         !(0.0..=(self.counts[axis] - 1) as f64).contains(&place)
     }
 
-    /// What the slope along an axis may be in some cells: in each it lies between those of two edges.
-    fn slopes_along(&self, axis: usize, first: [usize; 2], last: [usize; 2]) -> Interval {
+    /// The heights at the corners of a cell.
+    fn corners(&self, [i, j]: [usize; 2]) -> [f64; 4] {
+        let node = |i: usize, j: usize| self.heights[j * self.counts[0] + i];
+        [node(i, j), node(i + 1, j), node(i, j + 1), node(i + 1, j + 1)]
+    }
+
+    /// The cells between two places, if they are few, each with the parts of it along x and along y that lie between them.
+    fn few_cells(
+        &self,
+        low: DVec2,
+        high: DVec2,
+        most: usize,
+    ) -> Option<impl Iterator<Item = ([usize; 2], [[f64; 2]; 2])>> {
+        let [begin, end] = [low, high].map(|p| [0, 1].map(|axis: usize| self.cell(axis, p[axis])));
+        let across = [0, 1].map(|axis: usize| (end[axis].0 + 1).saturating_sub(begin[axis].0));
+        let is_few = (1..=most).contains(&across[0].saturating_mul(across[1]));
+        let part = move |axis: usize, cell: usize| {
+            let from = if cell == begin[axis].0 { begin[axis].1 } else { 0.0 };
+            [from, if cell == end[axis].0 { end[axis].1 } else { 1.0 }]
+        };
+        is_few.then(|| {
+            (begin[1].0..=end[1].0)
+                .flat_map(move |j| (begin[0].0..=end[0].0).map(move |i| ([i, j], [part(0, i), part(1, j)])))
+        })
+    }
+
+    /// What the slope along an axis may be between two places that few cells hold. In a cell it is linear across the axis.
+    fn slopes_along(&self, axis: usize, low: DVec2, high: DVec2) -> Option<Interval> {
         let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
-        let [beyond_x, beyond_y] = [last[0] + axis, last[1] + 1 - axis];
-        for j in first[1]..=beyond_y {
-            for i in first[0]..=beyond_x {
-                let next = if axis == 0 { [i + 1, j] } else { [i, j + 1] };
-                let [here, there] = [[i, j], next].map(|[i, j]| self.heights[j * self.counts[0] + i]);
-                let slope = (there - here) / self.spacing[axis];
+        for (cell, parts) in self.few_cells(low, high, MOST_CELLS)? {
+            let [a, b, c, d] = self.corners(cell);
+            let [first, second] = if axis == 0 { [b - a, d - c] } else { [c - a, d - b] };
+            for part in parts[1 - axis] {
+                let slope = (first * (1.0 - part) + second * part) / self.spacing[axis];
                 (least, greatest) = (least.min(slope), greatest.max(slope));
             }
         }
-        let slack = 1e-12 * self.steepest[axis];
-        Interval { lo: least - slack, hi: greatest + slack }
+        let slack = (1e-12 + self.blur(1 - axis)) * self.steepest[axis];
+        Some(Interval { lo: least - slack, hi: greatest + slack })
     }
 
-    /// The least and the greatest height between two places.
+    /// The least and the greatest height between two places, but for rounding.
     fn between(&self, low: DVec2, high: DVec2) -> (f64, f64) {
+        if let Some(cells) = self.few_cells(low, high, FEW_CELLS) {
+            // in a part of a cell heights are bilinear, so they are extreme at its corners
+            let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+            for (cell, [along_x, along_y]) in cells {
+                let corners = self.corners(cell);
+                for (u, v) in along_x.into_iter().flat_map(|u| along_y.map(|v| (u, v))) {
+                    let height = bilinear(corners, u, v);
+                    (least, greatest) = (least.min(height), greatest.max(height));
+                }
+            }
+            return (least, greatest);
+        }
         let first = [0, 1].map(|axis| self.cell(axis, low[axis]).0);
         let last = [0, 1].map(|axis| self.cell(axis, high[axis]).0 + 1);
         // so many nodes that at most three blocks lie side by side
@@ -140,6 +185,13 @@ impl HeightMap {
         }
         (least, greatest)
     }
+}
+
+/// The height in a cell, at parts of it along x and y, from those at its corners. The weights of one sum: it is never beyond
+/// those of the corners by more than rounding.
+fn bilinear([a, b, c, d]: [f64; 4], u: f64, v: f64) -> f64 {
+    let (low, high) = (a * (1.0 - u) + b * u, c * (1.0 - u) + d * u);
+    low * (1.0 - v) + high * v
 }
 
 impl Level {
@@ -168,11 +220,9 @@ impl Table for HeightMap {
             return Sample::NAN;
         }
         let ((i, u), (j, v)) = (self.cell(0, p.x), self.cell(1, p.y));
-        let node = |i: usize, j: usize| self.heights[j * self.counts[0] + i];
-        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i, j + 1), node(i + 1, j + 1)];
-        // weights of one sum: the height is never beyond those of the nodes by more than rounding
-        let (low, high) = (a * (1.0 - u) + b * u, c * (1.0 - u) + d * u);
-        let height = low * (1.0 - v) + high * v;
+        let corners = self.corners([i, j]);
+        let [a, b, c, d] = corners;
+        let height = bilinear(corners, u, v);
         let slope = |axis: usize, rise: f64| {
             if self.is_beyond(axis, p[axis]) { 0.0 } else { rise / self.spacing[axis] }
         };
@@ -183,19 +233,17 @@ impl Table for HeightMap {
 
     fn range(&self, over: &Aabb) -> Interval {
         let (least, greatest) = self.between(over.min.truncate(), over.max.truncate());
-        let slack = |z: f64| if z.is_finite() { ROUNDING * (self.largest + z.abs()) } else { 0.0 };
+        let by_place: f64 =
+            [0, 1].map(|axis| self.blur(axis) * self.steepest[axis] * self.spacing[axis]).iter().sum();
+        let slack = |z: f64| if z.is_finite() { ROUNDING * (self.largest + z.abs()) + by_place } else { 0.0 };
         Interval { lo: least - over.max.z - slack(over.max.z), hi: greatest - over.min.z + slack(over.min.z) }
     }
 
     fn slopes(&self, over: &Aabb) -> [Interval; 3] {
-        let first = [0, 1].map(|axis| self.cell(axis, over.min[axis]).0);
-        let last = [0, 1].map(|axis| self.cell(axis, over.max[axis]).0);
-        let across = [0, 1].map(|axis: usize| (last[axis] + 1).saturating_sub(first[axis]));
-        let is_small = (1..=MOST_CELLS).contains(&across[0].saturating_mul(across[1]));
         let along = |axis: usize| {
             let steepest = self.steepest[axis];
-            let any = Interval { lo: -steepest, hi: steepest };
-            let found = if is_small { self.slopes_along(axis, first, last) } else { any };
+            let found = self.slopes_along(axis, over.min.truncate(), over.max.truncate());
+            let found = found.unwrap_or(Interval { lo: -steepest, hi: steepest });
             let is_beyond = [over.min, over.max].into_iter().any(|p| self.is_beyond(axis, p[axis]));
             if is_beyond { found.hull(Interval::point(0.0)) } else { found }
         };
@@ -305,6 +353,13 @@ mod tests {
                 }
                 let slopes = map.slopes(&over);
                 assert!((0..3).all(|i| slopes[i].contains(middle.gradient[i])), "{middle:?} {slopes:?}");
+                // a small box has narrow ranges, however coarse the map is
+                let small = Aabb::new(a, a + 1e-6);
+                assert!(map.range(&small).width() < 1e-3 && map.range(&small).contains(map.at(a).value));
+                if small.min.x > -1.0 && small.max.x < 3.0 && small.min.y > 2.0 && small.max.y < 4.0 {
+                    let slopes = map.slopes(&small);
+                    assert!(slopes.iter().all(|slope| slope.width() < 1e-2), "{slopes:?}");
+                }
             }
             let all = map.range(&Aabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY));
             assert_eq!((all.lo, all.hi), (f64::NEG_INFINITY, f64::INFINITY));

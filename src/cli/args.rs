@@ -437,7 +437,8 @@ pub(super) struct Run {
                         One file for a colleague:     rfm view examples/pawn.out --save pawn.html\n\
                         From another machine:         ssh -L 8000:127.0.0.1:8000 HOST rfm view examples/pawn.rfm --no-open --port 8000\n\n\
                         The page is served on this machine alone, at an address with a token that nobody can guess; keep it to \
-                        yourself. A file is read again whenever it changes. Ctrl-C ends the viewer.")]
+                        yourself. A file is read again whenever it changes. A simulation waits while no page is open. Ctrl-C ends \
+                        the viewer.")]
 pub(super) struct View {
     /// A file, whose scene is simulated and whose solids are shown; or the folder of a run
     #[arg(value_name = "FILE|DIR")]

@@ -467,11 +467,16 @@ fn print_solid(solid: &Facts) {
     } else if !solid.empty {
         say!("    bounds      none found");
     }
+    // the error is found from two grids, which both miss what is not resolved
+    let measured = |value: f64, error: f64| match solid.resolved {
+        Some(false) => format!("{}, not resolved", significant(value, 3)),
+        Some(true) | None => format!("{} ± {error:.1e}", significant(value, 6)),
+    };
     if let (Some(volume), Some(error), false) = (solid.volume, solid.volume_error, solid.empty) {
-        say!("    volume      {} ± {error:.1e}", significant(volume, 6));
+        say!("    volume      {}", measured(volume, error));
     }
     if let (Some(area), Some(error), false) = (solid.area, solid.area_error, solid.empty) {
-        say!("    area        {} ± {error:.1e}", significant(area, 6));
+        say!("    area        {}", measured(area, error));
     }
     if let (Some(components), Some(coarser), false) =
         (solid.components, solid.components_coarser, solid.empty)

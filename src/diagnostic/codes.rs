@@ -284,7 +284,15 @@ DRAG = "W0514":
 "A probe takes the mean of the force on a body that moves, and the method takes pressures in pairs. Rows of particles under pressure
 resist being sheared, as a solid does a little, and what damps their noise acts as a viscosity: a ball of six spacings across
 that moves through water felt six times the drag that it should, and a fifth more than its buoyancy. Forces on bodies at rest in
-a fluid at rest are right, and so are impacts. With `method: wcsph` and `gradients: differences` the drag of that ball was right.";
+a fluid at rest are right, and so are impacts, and the drag of a fluid whose own viscosity is greater than that which damps
+noise. With `method: wcsph` and `gradients: differences` the drag of that ball was right.";
+MANY_STEPS = "W0515":
+"The run takes so many steps that it hardly ends: with a thousand particles a hundred million of them take half a day. Most
+often a number is in another unit than was meant. A `dt` may be left out; steps are as long as speeds of sound and of the fluid,
+viscosity, surface tension and gravity allow.";
+PROBE_IN_BODY = "W0516":
+"A probe of a pressure or a velocity lies in an obstacle at rest or outside the container, where there is never any fluid. What
+it tells is the mean of the particles that are near enough, beside the obstacle, or NaN if there are none.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

@@ -63,6 +63,9 @@ const STIRRED_AT: f64 = 2.2;
 /// How fast that falls with the kernels' reach, per spacing: measured are a part of 0.41 at 2.6 spacings and of 0.14 at 3.
 const CALMING: f64 = 2.4;
 
+/// Steps of a run from which on that is told: with a thousand particles they take half a day.
+const MANY_STEPS: f64 = 1e8;
+
 /// Part of the expected speed from which on that is told.
 const MUCH_STIRRED: f64 = 0.05;
 
@@ -84,7 +87,10 @@ pub(super) fn stirring(scene: &Scene, parameters: &Parameters) -> Option<Diagnos
 }
 
 /// A warning for each mean of the force on a body that moves, with a method that makes its drag too large.
-pub(super) fn drag(scene: &Scene, bodies: &[Body]) -> Vec<Diagnostic> {
+pub(super) fn drag(scene: &Scene, parameters: &Parameters, bodies: &[Body]) -> Vec<Diagnostic> {
+    if parameters.viscosity >= parameters.rest_density * parameters.numerical_viscosity() {
+        return Vec::new();
+    }
     let in_pairs = match scene.method {
         Method::Wcsph(numbers) => numbers.gradients == Gradients::Pairs,
         Method::Dfsph(_) => true,
@@ -135,6 +141,23 @@ pub(super) fn time_step(scene: &Scene, parameters: &Parameters) -> (TimeStep, Op
             (TimeStep { seconds: save_every / steps, reason }, None)
         }
     }
+}
+
+/// A warning if the run takes so many steps that it hardly ends.
+pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagnostic> {
+    let (shortest, cause) = parameters.shortest_step(parameters.expected_speed);
+    let (step, cause, at) = match scene.run.dt {
+        Some(dt) => (dt, "`dt`", scene.run.dt_span.unwrap_or(scene.span)),
+        None => (shortest, cause, scene.span),
+    };
+    let steps = scene.run.until / step;
+    (steps >= MANY_STEPS).then(|| {
+        let message =
+            format!("the run takes about {steps:.0e} steps of {step:.1e} s, which {cause} asks for");
+        Diagnostic::warning(Code::MANY_STEPS, at, message).help(
+            "`rfm run --dry-run` tells how long that is; look for a number in another unit than was meant",
+        )
+    })
 }
 
 /// A time with two digits, as a file writes it.

@@ -1,6 +1,8 @@
 //! The probes of a scene as the simulation takes them.
 
-use crate::lower::Measured;
+use super::bodies::Body;
+use crate::diagnostic::{Code, Diagnostic};
+use crate::lower::{Measured, Scene};
 use crate::sph::Probe;
 
 /// The probe for what a scene wants measured.
@@ -14,6 +16,20 @@ pub fn probe_of(measured: &Measured) -> Probe {
         Measured::Energy => Probe::Energy,
         Measured::Audit => Probe::Audit,
     }
+}
+
+/// A warning for each probe of a place that lies in a body at rest, where there is never any fluid.
+pub(super) fn in_bodies(scene: &Scene, bodies: &[Body]) -> Vec<Diagnostic> {
+    let told = |probe: &crate::lower::Probe| {
+        let (Measured::Pressure(at) | Measured::Velocity(at)) = probe.measured else { return None };
+        let holds = |body: &&Body| body.obstacle.moving.is_none() && body.solid.sign(at) > 0.0;
+        bodies.iter().find(holds)?;
+        let message = format!("the probe `{}` lies in an obstacle, or outside the container", probe.name);
+        Some(Diagnostic::warning(Code::PROBE_IN_BODY, probe.span, message).help(
+            "it tells what the fluid beside it has, or nothing; a place on the surface is in the fluid",
+        ))
+    };
+    scene.probes.iter().filter_map(told).collect()
 }
 
 /// The name under which a checkpoint keeps the [memory](crate::sph::Gauge::memory) of the probe with this

@@ -12,8 +12,9 @@
 //!
 //! What is promised: the mesh is closed; every edge lies in exactly two triangles, which run along it in
 //! opposite directions; triangles are counter-clockwise as seen from the fluid; the topology is that of
-//! the trilinear interpolant of ω at the nodes; the same field and grid give the same bits on any number
-//! of threads.
+//! the trilinear interpolant of ω at the nodes, but where ω along a diagonal of a face shows that its
+//! corners are joined in another way, as beside a sharp rim; the same field and grid give the same bits on any
+//! number of threads.
 //!
 //! What is not promised: marching cubes cut creases between nodes; features thinner than a cell may be
 //! missed, although they are counted; there is no surface where the field touches zero without a change
@@ -39,6 +40,7 @@ mod cases;
 mod check;
 mod collapse;
 mod crossings;
+mod diagonals;
 mod dual;
 mod extract;
 mod formats;

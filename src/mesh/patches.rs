@@ -5,7 +5,8 @@ use glam::DVec3;
 
 use super::{
     ambiguity,
-    cases::{CellTriangles, InnerVertex, Tunnel, edge, face_corners, loops},
+    cases::{Ambiguous, CellTriangles, FACES, InnerVertex, Tunnel, edge, face_corners, loops},
+    diagonals,
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, set_positions},
 };
@@ -32,8 +33,7 @@ pub(super) fn find(
     evaluations: &mut u64,
 ) -> Vec<CellPatch> {
     let mut found = Vec::new();
-    for ((z, bit), cell) in CellValues::of_brick(field, lattice, low, around) {
-        *evaluations += 8;
+    for ((z, bit), cell) in CellValues::of_brick(field, lattice, low, around, evaluations) {
         let CellTriangles { triangles, inner } = cell.patch();
         let inner =
             inner.iter().map(|inner| cell.on_surface(field, cell.place(inner), evaluations)).collect();
@@ -76,6 +76,10 @@ pub(super) struct CellValues {
     low: DVec3,
     high: DVec3,
     values: ambiguity::Corners,
+    /// How the corners of ambiguous faces are joined.
+    faces: [Ambiguous; FACES],
+    /// Whether ω joins them in another way than the values.
+    is_kinked: bool,
 }
 
 impl CellValues {
@@ -86,6 +90,7 @@ impl CellValues {
         lattice: &Lattice,
         low: [usize; 3],
         around: &Around,
+        evaluations: &mut u64,
     ) -> Vec<((usize, usize), Self)> {
         let cells: Vec<(usize, usize)> = undecided(around).collect();
         let corners = |cell: (usize, usize)| {
@@ -104,15 +109,52 @@ impl CellValues {
         }
         let of = |(i, cell): (usize, (usize, usize))| {
             let values = std::array::from_fn(|corner| values[8 * i + corner]);
-            (cell, Self { low: positions[8 * i], high: positions[8 * i + 7], values })
+            let (low, high, faces) = (positions[8 * i], positions[8 * i + 7], ambiguity::faces(&values));
+            (cell, Self { low, high, values, faces, is_kinked: false })
         };
-        cells.into_iter().enumerate().map(of).collect()
+        *evaluations += nodes.len() as u64;
+        let mut found: Vec<((usize, usize), Self)> = cells.into_iter().enumerate().map(of).collect();
+        Self::look_along_diagonals(field, &mut found, evaluations);
+        found
     }
 
-    /// The cell's loops of crossed edges, and the two of them that bound a tunnel, if any do.
+    /// Lets ω decide about ambiguous faces where it can.
+    fn look_along_diagonals(field: &dyn Field, cells: &mut [((usize, usize), Self)], evaluations: &mut u64) {
+        let mut places = Vec::new();
+        let mut faces = Vec::new();
+        for (number, (_, cell)) in cells.iter().enumerate() {
+            for face in 0..FACES {
+                let mut around = face_corners(face);
+                let value = |i: usize| cell.values[around[i]];
+                let inside = [0, 1, 2, 3].map(|i| value(i) > 0.0);
+                let leaves_grid = (0..4).any(|i| value(i) == f64::NEG_INFINITY);
+                if inside[0] != inside[2] || inside[1] != inside[3] || inside[0] == inside[1] || leaves_grid {
+                    continue;
+                }
+                if !inside[0] {
+                    around.rotate_left(1);
+                }
+                places.push((number, face));
+                faces.push(around.map(|corner| (cell.corner(corner), cell.values[corner])));
+            }
+        }
+        for ((number, face), joined) in places.into_iter().zip(diagonals::joined(field, &faces, evaluations))
+        {
+            let cell = &mut cells[number].1;
+            if let Some(joined) = joined
+                && joined != cell.faces[face]
+            {
+                cell.faces[face] = joined;
+                cell.is_kinked = true;
+            }
+        }
+    }
+
+    /// The cell's loops of crossed edges, and the two of them that bound a tunnel, if any do. Where ω is not as its values
+    /// say, there is none.
     pub(super) fn loops(&self) -> (Vec<Vec<usize>>, Option<Tunnel>) {
-        let polygons = loops(ambiguity::inside(&self.values), ambiguity::faces(&self.values));
-        let tunnel = ambiguity::tunnel(&self.values, &polygons);
+        let polygons = loops(ambiguity::inside(&self.values), self.faces);
+        let tunnel = if self.is_kinked { None } else { ambiguity::tunnel(&self.values, &polygons) };
         (polygons, tunnel)
     }
 

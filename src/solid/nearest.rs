@@ -61,6 +61,12 @@ const WIDE_GAP: f64 = 1.02;
 /// Places behind a cell that are tried.
 const BEHIND: u32 = 6;
 
+/// Places that are tried where no ray meets the surface.
+const SCATTERED: u32 = 1000;
+
+/// Most steps from a cell towards the other side.
+const MOST_STEPS: usize = 12;
+
 /// Directions in which a ray is turned.
 const TURNS: u32 = 8;
 
@@ -128,6 +134,10 @@ impl Distances {
         let Some(known) = target.shrink(&target.everything(), &mut around, Effort::Large) else {
             return (best.distance, best.distance, best.point);
         };
+        if !best.distance.is_finite() {
+            best.scatter(&around);
+            best.turn();
+        }
         // the nearest box comes first
         let mut queue = BinaryHeap::from([Queued { rank: -distance_to(&around, p), space: around, known }]);
         let (mut cells, mut work) = (0, MOST_WORK);
@@ -186,8 +196,11 @@ struct Best<'a> {
 }
 
 impl Best<'_> {
+    /// Whether a point is on the other side. The surface belongs to the solid; from inside, a point with ω = 0 may lie on
+    /// a face that two parts share.
     fn is_other(&self, q: DVec3) -> bool {
-        self.solid.sign(q) * self.sign < 0.0
+        let sign = self.solid.sign(q);
+        if self.sign < 0.0 { sign >= 0.0 } else { sign < 0.0 }
     }
 
     /// Tries the middle of a cell, its corner that is nearest to the point, other corners, and what lies behind the cell.
@@ -211,6 +224,39 @@ impl Best<'_> {
             let places = (1..BEHIND).map(|k| length + behind * (f64::from(k) / f64::from(BEHIND)).powi(3));
             let found = places.map(|t| self.p + t * direction).find(|q| self.is_other(*q));
             found.into_iter().for_each(|end| self.try_ray(end));
+        }
+        if self.distance > WIDE_GAP * length {
+            self.climb(centre, 0.5 * cell.size().length());
+        }
+    }
+
+    /// Tries places that are evenly spread over a box. (Beside a jump of ω the nearest cells are such that nobody can tell
+    /// what they hold, and no cell that holds something is ever looked at.)
+    fn scatter(&mut self, space: &Aabb) {
+        // the additive recurrence in three dimensions, by the root of g⁴ = g + 1
+        const G: f64 = 1.220_744_084_605_759_5;
+        let steps = DVec3::new(1.0 / G, 1.0 / (G * G), 1.0 / (G * G * G));
+        for k in 0..SCATTERED {
+            let share = (0.5 + steps * f64::from(k)).fract();
+            self.try_ray(space.min + share * space.size());
+        }
+    }
+
+    /// Follows ω towards the other side, with steps that get longer: from the tip of a sharp edge into the solid, where a
+    /// cell around the tip has neither middle nor corners.
+    fn climb(&mut self, from: DVec3, first: f64) {
+        let (mut q, mut step) = (from, first);
+        for _ in 0..MOST_STEPS {
+            let direction = self.solid.estimated_contact(q).normal * self.sign;
+            if !direction.is_finite() || direction == DVec3::ZERO {
+                return;
+            }
+            q += step * direction;
+            if self.is_other(q) {
+                self.try_ray(q);
+                return;
+            }
+            step *= 1.5;
         }
     }
 

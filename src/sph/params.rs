@@ -168,12 +168,25 @@ impl Parameters {
     /// Pressure forces have no bound before a run, see
     /// [`Simulation::stable_dt`](super::Simulation::stable_dt).
     pub fn stable_dt(&self, max_speed: f64) -> f64 {
+        self.shortest_step(max_speed).0
+    }
+
+    /// [`Parameters::stable_dt`], and what asks for it.
+    pub fn shortest_step(&self, max_speed: f64) -> (f64, &'static str) {
         let (numerics, scales) = (self.method.numerics(), self.scales());
-        numerics
-            .courant_dt(&scales, max_speed)
-            .min(numerics.viscous_dt(&scales))
-            .min(numerics.capillary_dt(&scales))
-            .min(self.force_dt(self.gravity.length()))
+        let limits = [
+            (numerics.courant_dt(&scales, max_speed), "the speeds of sound and of the fluid"),
+            (numerics.viscous_dt(&scales), "viscosity"),
+            (numerics.capillary_dt(&scales), "surface tension"),
+            (self.force_dt(self.gravity.length()), "gravity"),
+        ];
+        let none = (f64::INFINITY, "nothing");
+        limits.into_iter().fold(none, |shortest, limit| if limit.0 < shortest.0 { limit } else { shortest })
+    }
+
+    /// The kinematic viscosity, m²/s, with which a method damps the noise of particles.
+    pub fn numerical_viscosity(&self) -> f64 {
+        self.method.numerics().numerical_viscosity(&self.scales())
     }
 
     /// The longest step, s, for an acceleration a, m/s²: a multiple of √(h/a), with the support radius h.

@@ -141,6 +141,11 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::step`].
     pub fn step_at_most(&mut self, longest: f64) -> Result<(), StepError> {
+        // the whole step on threads of the pool: each of its many sums would have to be handed over to them else
+        rayon::scope(|_| self.take_step(longest))
+    }
+
+    fn take_step(&mut self, longest: f64) -> Result<(), StepError> {
         let before = self.core.steps;
         self.core.steps += 1;
         if let Some(gravity) = &self.core.turning_gravity {

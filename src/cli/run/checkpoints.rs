@@ -82,7 +82,7 @@ pub(super) fn latest(run_folder: &Path, fingerprint: &[u8; 32]) -> Result<Checkp
             Ok(checkpoint) if checkpoint.fingerprint != *fingerprint => {
                 return Err(Failure::usage(format!(
                     "cannot go on from `{}`: it belongs to another scene, or this one was changed since; only the \
-                     `run` block and probes may change (without --resume the run begins anew)",
+                     `run` block and probes may change (with --force instead of --resume the run begins anew)",
                     path.shown()
                 )));
             }

@@ -7,7 +7,7 @@ use super::frames::Frames;
 use super::means::Means;
 use super::probes::Probes;
 use super::watch::Watch;
-use crate::cli::output::Shown;
+use crate::cli::output::{Shown, significant};
 use rfm::Experiment;
 use rfm::experiment::Deviation;
 use rfm::sph::{Pass, Simulation};
@@ -165,11 +165,11 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         }
     );
     say!(
-        "compression by places: mean {:.2} %, one in a hundred above {:.1} %; volume {:+.2} %; at most {:.2} m/s",
+        "compression by places: mean {:.2} %, one in a hundred above {:.1} %; volume {:+.2} %; at most {} m/s",
         100.0 * summary.compression_mean,
         100.0 * summary.compression_p99,
         100.0 * summary.volume_change,
-        summary.max_speed
+        significant(summary.max_speed, 2)
     );
     let errors = [summary.pressure_error, summary.velocity_error, summary.front_error];
     for (what, error) in Deviation::NAMES.into_iter().zip(errors) {

@@ -1,5 +1,6 @@
 //! The newest of everything that pages are told. Whoever is slow misses what came between.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -59,12 +60,34 @@ struct News {
 pub(super) struct Board {
     news: Mutex<News>,
     changed: Condvar,
+    /// How many pages are open.
+    pages: AtomicUsize,
+}
+
+/// An open page.
+pub(super) struct OpenPage<'a>(&'a Board);
+
+impl Drop for OpenPage<'_> {
+    fn drop(&mut self) {
+        self.0.pages.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 /// What a page has been sent: for each topic the number of its newest message.
 pub(super) type Sent = [u64; 7];
 
 impl Board {
+    /// Counts a page as open until what is returned is dropped.
+    pub fn open_page(&self) -> OpenPage<'_> {
+        self.pages.fetch_add(1, Ordering::Relaxed);
+        OpenPage(self)
+    }
+
+    /// Whether anybody looks.
+    pub fn is_watched(&self) -> bool {
+        self.pages.load(Ordering::Relaxed) > 0
+    }
+
     /// What the page shows besides frames; `None` until the file has been read for the first time.
     pub fn setting(&self) -> Option<Setting> {
         self.lock().setting.clone()

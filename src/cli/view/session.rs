@@ -107,10 +107,16 @@ impl Session {
         self.status.playing = (1..=MOST_AT_ONCE).contains(&particles);
         self.tell();
         let mut looked = Instant::now();
+        let mut waited = false;
         loop {
-            let ahead = self.is_ahead();
-            let wait = match self.status.playing {
-                true if ahead => BREATH,
+            // a simulation that nobody looks at waits, and does not make up for that later
+            let is_watched = self.board.is_watched();
+            if is_watched && waited {
+                self.follow_clock();
+            }
+            waited = !is_watched;
+            let wait = match self.status.playing && is_watched {
+                true if self.is_ahead() => BREATH,
                 true => Duration::ZERO,
                 false => LOOK,
             };
@@ -127,7 +133,7 @@ impl Session {
                 looked = Instant::now();
                 self.reload_if_changed();
             }
-            if self.status.playing && !self.is_ahead() {
+            if self.status.playing && is_watched && !self.is_ahead() {
                 self.advance();
             }
         }

@@ -65,6 +65,7 @@ pub(super) fn follow(
     );
     let begun = stream.write_all(answer.as_bytes()).and_then(|()| stream.set_read_timeout(None));
     let (Ok(()), Ok(reader)) = (begun, stream.try_clone()) else { return };
+    let _open = board.open_page();
     let page = Arc::new(Page::default());
     let (of_reader, on_board) = (Arc::clone(&page), Arc::clone(board));
     let reading = thread::Builder::new().name("rfm-commands".into()).spawn(move || {

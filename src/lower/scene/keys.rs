@@ -7,6 +7,7 @@ use super::super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, Span};
 use crate::ir::Node;
 use crate::quantity::{Bound, Dimension, parse_unit};
+use crate::sph::{KeyBlock, Method};
 use crate::syntax::ast::{Entry, Expr, ExprKind, Name};
 use crate::syntax::foreign;
 
@@ -95,6 +96,10 @@ impl<'a> Lowering<'a> {
                 let inner_key = own.unwrap_or(key.text.as_str());
                 let inner =
                     INNER.iter().find(|(block, keys)| known.contains(block) && keys.contains(&inner_key));
+                let of_methods = [KeyBlock::Fluid, KeyBlock::Solver].into_iter().find(|block| {
+                    known.contains(&block.name()) && !Method::with_key(*block, inner_key).is_empty()
+                });
+                let inner = inner.map(|(block, _)| *block).or(of_methods.map(KeyBlock::name));
                 let absent = ABSENT
                     .iter()
                     .find(|(block, keys, _)| *block == what && keys.contains(&key.text.as_str()));
@@ -103,7 +108,7 @@ impl<'a> Lowering<'a> {
                     (Some(own), _) => diagnostic
                         .help(format!("`{}` is called `{own}` here", key.text))
                         .edit(key.span, &key.text, own, false),
-                    (None, Some((block, _))) => diagnostic
+                    (None, Some(block)) => diagnostic
                         .help(format!("it is a key of `{block}`: write `{block} {{ {inner_key}: … }}`")),
                     (None, None) if is_outer => diagnostic.help(format!(
                         "it is a key of the scene: write `{}: …` outside of this block",

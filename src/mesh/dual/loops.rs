@@ -61,7 +61,8 @@ impl Sheets {
     /// The sheets of the brick whose first node has the extended indices `low`.
     pub fn find(field: &dyn Field, lattice: &Lattice, low: [usize; 3], around: &Around) -> Self {
         let mut sheets = Self { undecided: Vec::new(), vertices: 0, evaluations: 0 };
-        for (cell, values) in CellValues::of_brick(field, lattice, low, around) {
+        let cells = CellValues::of_brick(field, lattice, low, around, &mut sheets.evaluations);
+        for (cell, values) in cells {
             let (polygons, tunnel) = values.loops();
             let found = CellLoops {
                 cell,
@@ -69,7 +70,6 @@ impl Sheets {
                 tunnel: tunnel.map(|tunnel| tunnel.loops),
             };
             sheets.vertices += (0..found.loops.len()).map(|number| found.vertices(number)).sum::<usize>();
-            sheets.evaluations += 8;
             sheets.undecided.push(found);
         }
         let loops = &*LOOPS;

@@ -86,6 +86,11 @@ pub(super) fn factor(alpha: f64, sound_speed: f64, support_radius: f64, dt: f64)
     (alpha * smoothing * sound_speed).min(10.0 * smoothing.powi(2) / (24.0 * dt))
 }
 
+/// The kinematic viscosity, m²/s, of an artificial viscosity without that limit.
+pub(super) fn viscosity(alpha: f64, sound_speed: f64, support_radius: f64) -> f64 {
+    alpha * 0.5 * support_radius * sound_speed / 10.0
+}
+
 /// The difference of rough velocities along a line, as far as it takes energy from the whole motion, `whole`.
 #[inline(always)]
 pub(super) fn damped<S: Simd, V: SimdFloat<S, Element: Real>>(rough: V, whole: V) -> V {

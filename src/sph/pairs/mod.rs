@@ -3,8 +3,7 @@
 //! A register holds several particles that lie close together: consecutive ones of one column. Each particle
 //! near any of them is added in turn to all of them; kernels of finite support give zero to those that are
 //! too far. No list of neighbours exists, so none is kept from step to step. A method that sums many times
-//! over the same places may find once what is near each register. The result, [`Near`], takes a third of a
-//! list of neighbours and is shared by 16 particles.
+//! over the same places may find once what is around each block and near each register: [`Near`].
 //!
 //! ```text
 //! Columns::sort ─▶ blocks ─▶ gather what is around a block ─▶ registers of particles ─▶ what is near each
@@ -35,7 +34,7 @@ use super::particles::Vectors;
 pub(super) use columns::Columns;
 use columns::{BLOCK, Block};
 pub(super) use near::Near;
-use near::{OfBlock, Reach};
+use near::{OfBlock, Range, Reach};
 pub(super) use real::Real;
 
 /// Compiles an expression for three widths of registers (512, 256 and 128 bits on x86-64) and runs the widest
@@ -61,13 +60,27 @@ macro_rules! at_level {
 
 /// A precision with working memory of its own.
 pub(super) trait Kept: Real {
+    /// What is around each block, found in this precision.
+    fn blocks(near: &Near) -> &[OfBlock<Self>];
+
+    /// Where that is to be stored.
+    fn blocks_mut(near: &mut Near) -> &mut Vec<OfBlock<Self>>;
+
     /// Lends this thread's working memory, which stays for the next use.
     fn with_surroundings<R>(use_it: impl FnOnce(&mut Surroundings<Self>) -> R) -> R;
 }
 
 macro_rules! kept {
-    ($real:ty) => {
+    ($real:ty, $blocks:ident) => {
         impl Kept for $real {
+            fn blocks(near: &Near) -> &[OfBlock<Self>] {
+                &near.$blocks
+            }
+
+            fn blocks_mut(near: &mut Near) -> &mut Vec<OfBlock<Self>> {
+                &mut near.$blocks
+            }
+
             fn with_surroundings<R>(use_it: impl FnOnce(&mut Surroundings<Self>) -> R) -> R {
                 thread_local!(static KEPT: RefCell<Surroundings<$real>> = RefCell::default());
                 KEPT.with_borrow_mut(use_it)
@@ -75,8 +88,8 @@ macro_rules! kept {
         }
     };
 }
-kept!(f32);
-kept!(f64);
+kept!(f32, single);
+kept!(f64, double);
 
 /// Quantity that is summed over neighbours. A pass reads `IN` numbers of each particle besides its position,
 /// forms `SUMS` sums and makes `OUT` results from them.
@@ -116,18 +129,13 @@ pub(super) struct Cloud<'a> {
     pub near: Option<&'a Near>,
 }
 
-/// Copies of what is around a block: positions relative to it, and the fields that a pass reads.
+/// Working memory for the sums of a block.
 #[derive(Default)]
 pub(super) struct Surroundings<T> {
-    values: Vec<Vec<T>>,
-    /// First particle and first copy of each range.
-    ranges: SmallVec<[(usize, usize); 9]>,
-    /// Number of copies; the vectors may be longer.
-    count: usize,
-    /// Index of the copy of the block's first particle.
-    own: usize,
-    /// Copies that are near each register.
-    near: OfBlock,
+    /// What is around the block, if it was not found before.
+    near: OfBlock<T>,
+    /// Copies of the fields that a pass reads, in the order of the copies of places.
+    fields: Vec<Vec<T>>,
     /// [`BLOCK`] places for each sum, one for each particle.
     sums: Vec<f64>,
 }
@@ -180,132 +188,127 @@ impl Cloud<'_> {
     {
         let all = Task { number: 0, blocks: self.columns.blocks(), first: 0, out: out.into_iter().collect() };
         all.run(&|mut task: Task<'_>| {
-            T::with_surroundings(|around| {
+            T::with_surroundings(|Surroundings { near, fields: copies, sums }| {
                 for (k, block) in task.blocks.iter().enumerate() {
-                    let found = self.near.map(|near| &near.of_blocks[task.number + k]);
-                    self.gather(&fields, block, around);
-                    let mut near = std::mem::take(&mut around.near);
-                    if found.is_none() {
-                        self.collect_near(block, around, &mut near);
-                    }
-                    add_up::<T, P, IN, SUMS, OUT>(self.level, pass, block, found.unwrap_or(&near), around);
-                    around.near = near;
-                    finish::<P, IN, SUMS, OUT>(pass, block, &around.sums, task.first, &mut task.out);
+                    let near = match self.near {
+                        Some(found) => &T::blocks(found)[task.number + k],
+                        None => {
+                            self.look_around(block, near);
+                            &*near
+                        }
+                    };
+                    self.gather(&fields, near, copies);
+                    add_up::<T, P, IN, SUMS, OUT>(self.level, pass, block, near, copies, sums);
+                    finish::<P, IN, SUMS, OUT>(pass, block, sums, task.first, &mut task.out);
                 }
             });
         });
     }
 
-    /// Finds what is near each register for later passes, which is worthwhile from three passes on.
+    /// Finds what is around each block for later passes, which is worthwhile from three passes on.
     pub fn find_near<T: Kept>(&self, near: &mut Near) {
         let blocks = self.columns.blocks();
-        near.of_blocks.resize_with(blocks.len(), OfBlock::default);
-        blocks.par_iter().zip(&mut near.of_blocks).with_min_len(TASK).for_each(|(block, of_block)| {
-            T::with_surroundings(|around| {
-                self.gather(&[], block, around);
-                self.collect_near(block, around, of_block);
-            });
-        });
+        let near = T::blocks_mut(near);
+        near.resize_with(blocks.len(), OfBlock::default);
+        blocks
+            .par_iter()
+            .zip(near)
+            .with_min_len(TASK)
+            .for_each(|(block, near)| self.look_around(block, near));
     }
 
-    /// Copies what is around a block.
-    fn gather<T: Kept>(&self, fields: &[&[f64]], block: &Block, around: &mut Surroundings<T>) {
+    /// Copies the places around a block, relative to it, and finds which of them are near its registers.
+    fn look_around<T: Kept>(&self, block: &Block, near: &mut OfBlock<T>) {
         let particles = block.particles();
         let centre = self.position.get(particles.start + particles.len() / 2);
-        let columns = 3 + fields.len();
-        around.values.resize_with(columns.max(around.values.len()), Vec::new);
-        around.ranges.clear();
-        let near =
+        let ranges =
             self.columns.ranges_around(block, extent(&self.position.z[particles.clone()]), self.radius);
-        let mut count = 0;
-        for &(start, end) in &near {
+        near.ranges.clear();
+        near.count = 0;
+        for (start, end) in ranges {
             let (start, end) = (start as usize, end as usize);
             if (start..end).contains(&particles.start) {
-                around.own = count + particles.start - start;
+                near.own = near.count + particles.start - start;
             }
-            around.ranges.push((start, count));
-            count += end - start;
-        }
-        around.count = count;
-        // The last register of the block may reach beyond the copies.
-        let room = count + MOST_LANES;
-        for values in &mut around.values[..columns] {
-            if values.len() < room {
-                values.resize(2 * room, T::default());
-            }
+            near.ranges.push(Range { start, end, copy: near.count });
+            near.count += end - start;
         }
         let Vectors { x, y, z } = self.position;
-        let places = [(&x[..], centre.x), (&y[..], centre.y), (&z[..], centre.z)];
-        let others = fields.iter().map(|&field| (field, 0.0));
-        for (values, (source, origin)) in around.values.iter_mut().zip(places.into_iter().chain(others)) {
-            at_level!(self.level, simd => copy_ranges(simd, source, origin, &near, &around.ranges, values));
+        let sources = [(x, centre.x), (y, centre.y), (z, centre.z)];
+        for (values, (source, origin)) in near.places.iter_mut().zip(sources) {
+            make_room(values, near.count);
+            at_level!(self.level, simd => copy_ranges(simd, source, origin, &near.ranges, values));
+        }
+        near.copies.clear();
+        near.ends.clear();
+        at_level!(self.level, simd => self.collect_near_registers(simd, block, near));
+    }
+
+    /// Copies the fields that a pass reads, of the particles around a block.
+    fn gather<T: Kept>(&self, fields: &[&[f64]], near: &OfBlock<T>, copies: &mut Vec<Vec<T>>) {
+        copies.resize_with(fields.len().max(copies.len()), Vec::new);
+        for (values, source) in copies.iter_mut().zip(fields) {
+            make_room(values, near.count);
+            at_level!(self.level, simd => copy_ranges(simd, source, 0.0, &near.ranges, values));
         }
     }
 
     /// Finds the copies that are near each register of a block.
-    fn collect_near<T: Kept>(&self, block: &Block, around: &Surroundings<T>, near: &mut OfBlock) {
-        near.clear();
-        at_level!(self.level, simd => self.collect_near_registers(simd, block, around, near));
-    }
-
     #[inline(always)]
-    fn collect_near_registers<T: Kept, S: Simd>(
-        &self,
-        simd: S,
-        block: &Block,
-        around: &Surroundings<T>,
-        near: &mut OfBlock,
-    ) {
+    fn collect_near_registers<T: Kept, S: Simd>(&self, simd: S, block: &Block, near: &mut OfBlock<T>) {
         let lanes = T::Native::<S>::LEN;
         let particles = block.particles();
-        let [x, y, z, ..] = &around.values[..] else { unreachable!("places come first") };
+        let OfBlock { places: [x, y, z], ranges, own, copies, ends, .. } = near;
         let mut first = particles.start;
         while first < particles.end {
             let last = (first + lanes).min(particles.end);
-            let here = places_of(simd, around, around.own + first - particles.start);
+            let here = places_of(simd, [x, y, z], *own + first - particles.start);
             let reach = Reach::around(simd, &here, last - first, self.radius);
-            let ranges =
+            let closer =
                 self.columns.ranges_around(block, extent(&self.position.z[first..last]), self.radius);
-            for (&(start, end), &(source, copy)) in ranges.iter().zip(&around.ranges) {
-                let (start, end) = (start as usize - source + copy, end as usize - source + copy);
-                reach.collect([x, y, z], (start, end), &mut near.copies);
+            for (&(start, end), range) in closer.iter().zip(&*ranges) {
+                let (start, end) =
+                    (start as usize - range.start + range.copy, end as usize - range.start + range.copy);
+                reach.collect([x, y, z], (start, end), copies);
             }
-            near.ends.push(near.copies.len() as u32);
+            ends.push(copies.len() as u32);
             first = last;
         }
     }
 }
 
+/// Makes room for so many copies. The last register of a block may reach beyond them.
+fn make_room<T: Copy + Default>(values: &mut Vec<T>, count: usize) {
+    let room = count + MOST_LANES;
+    if values.len() < room {
+        values.resize(room + room / 4, T::default());
+    }
+}
+
 /// Copies ranges of numbers, less an origin.
 #[inline(always)]
-fn copy_ranges<T: Kept, S: Simd>(
-    _: S,
-    source: &[f64],
-    origin: f64,
-    near: &[(u32, u32)],
-    ranges: &[(usize, usize)],
-    values: &mut [T],
-) {
-    for (&(start, end), &(_, copy)) in near.iter().zip(ranges) {
-        for (to, from) in values[copy..].iter_mut().zip(&source[start as usize..end as usize]) {
+fn copy_ranges<T: Kept, S: Simd>(_: S, source: &[f64], origin: f64, ranges: &[Range], values: &mut [T]) {
+    for range in ranges {
+        for (to, from) in values[range.copy..].iter_mut().zip(&source[range.start..range.end]) {
             *to = T::of(from - origin);
         }
     }
 }
 
-/// Sums over the neighbours of a block's particles into `around.sums`. Only this function is compiled for
-/// each pass, precision and width.
+/// Sums over the neighbours of a block's particles. Only this function is compiled for each pass, precision and
+/// width.
 fn add_up<T, P, const IN: usize, const SUMS: usize, const OUT: usize>(
     level: Level,
     pass: &P,
     block: &Block,
-    near: &OfBlock,
-    around: &mut Surroundings<T>,
+    near: &OfBlock<T>,
+    fields: &[Vec<T>],
+    sums: &mut Vec<f64>,
 ) where
     T: Kept,
     P: PairPass<IN, SUMS, OUT>,
 {
-    at_level!(level, simd => add_up_registers(simd, pass, block.len as usize, near, around));
+    at_level!(level, simd => add_up_registers(simd, pass, block.len as usize, near, fields, sums));
 }
 
 #[inline(always)]
@@ -313,8 +316,9 @@ fn add_up_registers<T, S, P, const IN: usize, const SUMS: usize, const OUT: usiz
     simd: S,
     pass: &P,
     len: usize,
-    near: &OfBlock,
-    around: &mut Surroundings<T>,
+    near: &OfBlock<T>,
+    fields: &[Vec<T>],
+    of_block: &mut Vec<f64>,
 ) where
     T: Kept,
     S: Simd,
@@ -327,25 +331,24 @@ fn add_up_registers<T, S, P, const IN: usize, const SUMS: usize, const OUT: usiz
     // not in it.
     let pass = *pass;
     let zero = T::Native::<S>::splat(simd, T::default());
-    if around.sums.len() < SUMS * BLOCK {
-        around.sums.resize(SUMS * BLOCK, 0.0);
+    if of_block.len() < SUMS * BLOCK {
+        of_block.resize(SUMS * BLOCK, 0.0);
     }
+    let [x, y, z] = &near.places;
     let mut first = 0;
     while first < len {
-        let at = around.own + first;
-        let here = places_of(simd, around, at);
+        let at = near.own + first;
+        let here = places_of(simd, [x, y, z], at);
         let mut own = [zero; IN];
         for k in 0..IN {
-            own[k] = T::Native::<S>::from_slice(simd, &around.values[3 + k][at..at + lanes]);
+            own[k] = T::Native::<S>::from_slice(simd, &fields[k][at..at + lanes]);
         }
         let mut sums = [zero; SUMS];
-        let count = around.count;
-        let x = &around.values[0][..count];
-        let y = &around.values[1][..count];
-        let z = &around.values[2][..count];
+        let count = near.count;
+        let (x, y, z) = (&x[..count], &y[..count], &z[..count]);
         let mut values: [&[T]; IN] = [&[]; IN];
         for k in 0..IN {
-            values[k] = &around.values[3 + k][..count];
+            values[k] = &fields[k][..count];
         }
         for &j in near.register(first / lanes) {
             let j = j as usize;
@@ -363,7 +366,7 @@ fn add_up_registers<T, S, P, const IN: usize, const SUMS: usize, const OUT: usiz
         }
         for k in 0..SUMS {
             let place = k * BLOCK + first;
-            for (to, from) in around.sums[place..place + lanes].iter_mut().zip(sums[k].as_slice()) {
+            for (to, from) in of_block[place..place + lanes].iter_mut().zip(sums[k].as_slice()) {
                 *to = from.wide();
             }
         }
@@ -391,10 +394,10 @@ fn finish<P, const IN: usize, const SUMS: usize, const OUT: usize>(
 
 /// Places of a register's particles; `copy` is the index of the first.
 #[inline(always)]
-fn places_of<T: Kept, S: Simd>(simd: S, around: &Surroundings<T>, copy: usize) -> [T::Native<S>; 3] {
+fn places_of<T: Kept, S: Simd>(simd: S, places: [&[T]; 3], copy: usize) -> [T::Native<S>; 3] {
     let mut here = [T::Native::<S>::splat(simd, T::default()); 3];
     for k in 0..3 {
-        here[k] = T::Native::<S>::from_slice(simd, &around.values[k][copy..copy + T::Native::<S>::LEN]);
+        here[k] = T::Native::<S>::from_slice(simd, &places[k][copy..copy + T::Native::<S>::LEN]);
     }
     here
 }

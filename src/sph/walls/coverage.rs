@@ -254,7 +254,7 @@ fn common(a: f64, b: f64, cosine: f64) -> (f64, f64, f64) {
 }
 
 /// Whether all eigenvalues of a symmetric matrix are positive (Sylvester's criterion).
-fn is_positive_definite(m: &DMat3) -> bool {
+pub(super) fn is_positive_definite(m: &DMat3) -> bool {
     let [x, y] = [m.x_axis, m.y_axis];
     x.x > 0.0 && x.x * y.y > x.y * y.x && m.determinant() > 0.0
 }

@@ -11,11 +11,16 @@ pub(super) use start::spread;
 
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::numerics::Numerics;
+use super::roughness;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
 use crate::sph::pass::Pass;
 use crate::sph::scales::Scales;
 use crate::sph::walls::{Wall, WallKernel};
+
+/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
+/// a weakly compressible fluid, so that the same α damps alike.
+const NOMINAL_SOUND: f64 = 10.0;
 
 /// Part of the spacing that a particle may cross in one step of a method without sound: the customary 0.4.
 const ADVECTION: f64 = 0.4;
@@ -141,6 +146,11 @@ impl Declaration for Dfsph {
 }
 
 impl Numerics for Dfsph {
+    fn numerical_viscosity(&self, scales: &Scales) -> f64 {
+        let sound = NOMINAL_SOUND * scales.expected_speed;
+        roughness::viscosity(self.artificial_viscosity, sound, scales.support_radius)
+    }
+
     fn sound_speed(&self, _scales: &Scales) -> f64 {
         0.0
     }

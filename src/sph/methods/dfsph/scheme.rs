@@ -52,9 +52,9 @@ use super::super::{
     tension::Tension,
 };
 use super::passes::{Constants, Continuation, Densities, Drag, Field};
-use super::solver::{Errors, Goal, Solver};
+use super::solver::{Begin, Errors, Goal, Solver};
 use super::walls::Walls;
-use super::{ADVECTION, Dfsph};
+use super::{ADVECTION, Dfsph, NOMINAL_SOUND};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
     core::{Core, add_scaled},
@@ -84,10 +84,6 @@ const OWED: f64 = 0.6;
 /// The part of 2/ω that a step may be long, for the fastest motion that pressure causes and that the solver
 /// does not see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
 const STABLE: f64 = 0.75;
-
-/// The speed of sound by which the artificial viscosity is measured, over the greatest expected speed: that of
-/// a weakly compressible fluid, so that the same α damps alike.
-const NOMINAL_SOUND: f64 = 10.0;
 
 /// The scheme. It keeps the pressures, and what is owed, between steps; the rest is working memory.
 pub struct DivergenceFree {
@@ -317,11 +313,13 @@ impl DivergenceFree {
                 .zip(&self.debt)
                 .map(|((rate, rho), debt)| rate + wanted(*rho, *debt)),
         );
+        // What a step leaves becomes a debt and is paid back. So it may be what the density gains in a step of a fast flow
+        // while it is off by the tolerance.
         let goal = Goal {
-            tolerance: self.numbers.tolerance * rest / relaxation,
+            tolerance: RELAXATION_STEPS * self.numbers.tolerance * rest / relaxation,
             most_iterations: self.numbers.most_iterations,
         };
-        self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal);
+        self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal, Begin::Last);
         if let Some(reaction) = Reaction::of(core, dt) {
             self.forces.note_walls(reaction, &self.walls, rest);
         }
@@ -378,8 +376,7 @@ impl DivergenceFree {
             self.displacement.resize(self.free.len());
             self.displacement.components_mut().into_iter().for_each(|column| column.fill(0.0));
         } else {
-            self.places.s.fill(0.0);
-            self.iterations += self.places.solve(core, &self.walls, &self.free, 1.0, goal);
+            self.iterations += self.places.solve(core, &self.walls, &self.free, 1.0, goal, Begin::Nothing);
             self.displacement.clone_from(&self.places.push);
             for ((debt, excess), rate) in self.debt.iter_mut().zip(&self.free).zip(&self.places.rate) {
                 let left = (excess + rate).max(0.0);

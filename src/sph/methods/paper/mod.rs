@@ -106,6 +106,11 @@ impl Declaration for Paper {
 }
 
 impl Numerics for Paper {
+    /// None: the viscosity of this method is the fluid's own.
+    fn numerical_viscosity(&self, _scales: &Scales) -> f64 {
+        0.0
+    }
+
     /// The speed of sound √(dp/dρ) = √k.
     fn sound_speed(&self, _scales: &Scales) -> f64 {
         self.stiffness.sqrt()

@@ -9,6 +9,7 @@ pub(super) use scheme::Weakly;
 use super::declaration::{Absence, Declaration, FluidDefaults, Key, KeyBlock, Support, Value};
 use super::negative_pressure::NegativePressure;
 use super::numerics::Numerics;
+use super::roughness;
 use crate::precision::Precision;
 use crate::quantity::{Bound, Dimension};
 use crate::sph::error::ParameterError;
@@ -237,6 +238,10 @@ impl Declaration for Wcsph {
 }
 
 impl Numerics for Wcsph {
+    fn numerical_viscosity(&self, scales: &Scales) -> f64 {
+        roughness::viscosity(self.artificial_viscosity(), self.sound_speed(scales), scales.support_radius)
+    }
+
     fn validate(&self, scales: &Scales) -> Result<(), ParameterError> {
         let found = self.sound_speed(scales);
         if Bound::Positive.admits(found) {

@@ -237,7 +237,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
             push = push.lerp(wall.completion() * push, balanced);
             if let Some(reaction) = &rates.reaction {
                 let by_pressure = (push - by_pairs) / density;
-                reaction.add(i, Pushed { by_pressure, factor: -2.0 * pressure / density, by_friction });
+                let factor = -2.0 * pressure / density;
+                reaction.add(i, Pushed { by_pressure, factor, gradient: wall.gradient, by_friction });
             }
         }
         let acceleration = mean * (push / density + drag) + parameters.gravity;

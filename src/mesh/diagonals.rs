@@ -1,0 +1,113 @@
+//! Decisions about ambiguous faces by ω itself.
+//!
+//! On a face of a cell whose corners lie inside and outside in turn, the values at the corners say which of them are joined
+//! if ω is bilinear. At the rim of a wedge it is not: a node just inside the rim has a small value, and would be parted from
+//! the solid behind it, as a crumb beside the edge. But a solid that holds all of the straight line from one corner to the
+//! other joins them whatever the values are, and likewise for the fluid. So ω is asked along the diagonal that has the sign
+//! of the face's middle. Where ω is bilinear the values decide.
+//!
+//! Invariant: a decision depends on the face's corners and not on their order, so both cells at the face decide alike.
+
+use glam::DVec3;
+
+use super::cases::Ambiguous;
+use crate::field::{Field, Points};
+
+/// Places from the middle of a diagonal to one of its ends. Each is nearer to the end by √2: a bilinear ω with a small value
+/// there dips below zero right beside it.
+const STEPS: i32 = 18;
+
+/// Places on a diagonal besides its middle, as parts of it; each with its mirror image.
+fn places() -> impl Iterator<Item = f64> + Clone {
+    (1..=STEPS).map(|k| 0.5 * 0.5_f64.powf(0.5 * f64::from(k))).flat_map(|part| [part, 1.0 - part])
+}
+
+/// Departures of ω in the middle of a face, as parts of its largest value, that are rounding.
+const BILINEAR: f64 = 1e-9;
+
+/// How the corners of ambiguous faces are joined. Each face is given by its corners and their values, around it, of which the
+/// first and the third are inside. `None` where ω is bilinear, or where ω along the diagonals leaves the choice. Adds to the number of evaluations.
+pub(super) fn joined(
+    field: &dyn Field,
+    faces: &[[(DVec3, f64); 4]],
+    evaluations: &mut u64,
+) -> Vec<Option<Ambiguous>> {
+    let mut values_at = |places: &[DVec3]| -> Vec<f64> {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| places.iter().map(|p| p[axis]).collect::<Vec<f64>>());
+        let mut omega = vec![0.0; places.len()];
+        field.continuous_many(Points { x: &x, y: &y, z: &z }, &mut omega);
+        *evaluations += places.len() as u64;
+        omega
+    };
+    // sums of two products are the same bits in either order
+    let on = |p: DVec3, q: DVec3, part: f64| (1.0 - part) * p + part * q;
+    let middles: Vec<DVec3> = faces.iter().map(|[a, _, c, _]| on(a.0, c.0, 0.5)).collect();
+    let middles = values_at(&middles);
+    let diagonal = |([a, b, c, d], middle): (&[(DVec3, f64); 4], &f64)| {
+        let (p, q) = if *middle > 0.0 { (a.0, c.0) } else { (b.0, d.0) };
+        places().map(move |part| on(p, q, part))
+    };
+    let along: Vec<DVec3> = faces.iter().zip(&middles).flat_map(diagonal).collect();
+    let along = values_at(&along);
+    let decide = |((face, middle), along): ((&[(DVec3, f64); 4], &f64), &[f64])| {
+        let inside = *middle > 0.0;
+        let is_whole = along.iter().all(|value| (*value > 0.0) == inside);
+        let decision = if inside { Ambiguous::JoinSolid } else { Ambiguous::PartSolid };
+        (is_whole && !is_bilinear(face, *middle)).then_some(decision)
+    };
+    faces.iter().zip(&middles).zip(along.chunks_exact(2 * STEPS as usize)).map(decide).collect()
+}
+
+/// Whether ω in the middle of a face is what its corners say, so that they are to be believed.
+fn is_bilinear([a, b, c, d]: &[(DVec3, f64); 4], middle: f64) -> bool {
+    let largest = [a, b, c, d].iter().fold(0.0, |largest: f64, corner| largest.max(corner.1.abs()));
+    (0.25 * ((a.1 + c.1) + (b.1 + d.1)) - middle).abs() <= BILINEAR * largest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Closures;
+
+    const SQUARE: [DVec3; 4] = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+
+    fn decide(omega: impl Fn(DVec3) -> f64 + Send + Sync) -> Option<Ambiguous> {
+        let square = SQUARE.map(|corner| (corner, omega(corner)));
+        let field = Closures { omega, gradient: |_: DVec3| DVec3::ZERO };
+        let mut evaluations = 0;
+        let found = joined(&field, &[square], &mut evaluations);
+        assert_eq!(evaluations, 37);
+        let [a, b, c, d] = square;
+        assert_eq!(joined(&field, &[[c, d, a, b]], &mut 0), found, "the other way round");
+        found[0]
+    }
+
+    #[test]
+    fn what_holds_the_whole_diagonal_joins_its_ends() {
+        // a bar along the diagonal, which is thin at one end: by its values, 0.01·0.2 < 0.2·0.3, it would be parted
+        let bar = |p: DVec3| 0.01 + 0.1 * (p.x + p.y) - 2.0 * (p.x - p.y).abs();
+        assert_eq!(decide(bar), Some(Ambiguous::JoinSolid));
+        assert_eq!(
+            decide(|p| 0.01 + 0.05 * (p.x + p.y - 1.0).abs() - 2.0 * (p.x - p.y).abs()),
+            Some(Ambiguous::JoinSolid)
+        );
+    }
+
+    #[test]
+    fn a_gap_across_the_diagonal_parts_its_ends() {
+        assert_eq!(decide(|p| (p.x + p.y - 1.0).abs() - 0.3), Some(Ambiguous::PartSolid));
+    }
+
+    #[test]
+    fn where_neither_diagonal_is_whole_the_values_decide() {
+        // solid in the middle and at the ends, with gaps between
+        let omega = |p: DVec3| ((p.x + p.y - 1.0).abs() - 0.5).abs() - 0.2;
+        assert_eq!(decide(omega), None);
+        // bilinear, with corners 0.001, 1 inside and −0.04 outside: parted, by a gap of a twenty-fifth beside the first corner
+        let bilinear = |p: DVec3| {
+            let (u, v) = (p.x, p.y);
+            0.001 * (1.0 - u) * (1.0 - v) + u * v - 0.04 * (u * (1.0 - v) + v * (1.0 - u))
+        };
+        assert_eq!(decide(bilinear), None);
+    }
+}
