@@ -108,7 +108,7 @@ impl Experiment {
         let warnings = too_long.into_iter().chain(parameters::stirring(&scene, &parameters));
         let warnings = warnings.chain(parameters::many_steps(&scene, &parameters));
         let warnings = warnings.chain(parameters::drag(&scene, &parameters, &bodies));
-        let warnings = warnings.chain(probes::in_bodies(&scene, &bodies)).collect();
+        let warnings = warnings.chain(probes::in_bodies(&scene, &bodies, parameters.spacing())).collect();
         Ok(Self { program, scene, parameters, time_step, bodies, fluid, warnings })
     }
 

@@ -150,6 +150,9 @@ pub(super) fn many_steps(scene: &Scene, parameters: &Parameters) -> Option<Diagn
         Some(dt) => (dt, "`dt`", scene.run.dt_span.unwrap_or(scene.span)),
         None => (shortest, cause, scene.span),
     };
+    // steps end at frames
+    let (step, cause) =
+        if scene.run.save_every < step { (scene.run.save_every, "`save_every`") } else { (step, cause) };
     let steps = scene.run.until / step;
     (steps >= MANY_STEPS).then(|| {
         let message =

@@ -18,12 +18,20 @@ pub fn probe_of(measured: &Measured) -> Probe {
     }
 }
 
+/// A place nearer to a surface than this part of the spacing lies on it.
+const ON_SURFACE: f64 = 1e-3;
+
 /// A warning for each probe of a place that lies in a body at rest, where there is never any fluid.
-pub(super) fn in_bodies(scene: &Scene, bodies: &[Body]) -> Vec<Diagnostic> {
+pub(super) fn in_bodies(scene: &Scene, bodies: &[Body], spacing: f64) -> Vec<Diagnostic> {
     let told = |probe: &crate::lower::Probe| {
         let (Measured::Pressure(at) | Measured::Velocity(at)) = probe.measured else { return None };
-        let holds = |body: &&Body| body.obstacle.moving.is_none() && body.solid.sign(at) > 0.0;
-        bodies.iter().find(holds)?;
+        // a place on the surface may be a rounding inside
+        let is_deep = |body: &Body| body.solid.contact(at).distance < -ON_SURFACE * spacing;
+        let holds =
+            |body: &Body| body.obstacle.moving.is_none() && body.solid.sign(at) > 0.0 && is_deep(body);
+        if !bodies.iter().any(holds) {
+            return None;
+        }
         let message = format!("the probe `{}` lies in an obstacle, or outside the container", probe.name);
         Some(Diagnostic::warning(Code::PROBE_IN_BODY, probe.span, message).help(
             "it tells what the fluid beside it has, or nothing; a place on the surface is in the fluid",

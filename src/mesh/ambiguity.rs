@@ -16,6 +16,8 @@
 //! cell where its waist does. The lines go on beyond the hexagon's corners, those next to P towards the faces
 //! on the side of P: the loops that they meet there are the tunnel's ends.
 //!
+//! Where ω itself is not as its values say, see `diagonals`, it decides about a face, and no tunnel is sought.
+//!
 //! The values are those of [`crate::field::Field::continuous`] at the grid's nodes. For a solid they come
 //! from the min/max twin, whose sign is that of ω; with a cell map from its leaves, which give the same but for rounding. Ties count as outside, as ω =
 //! 0 does everywhere.

@@ -13,14 +13,29 @@ use glam::DVec3;
 use super::cases::Ambiguous;
 use crate::field::{Field, Points};
 
-/// Places from the middle of a diagonal to one of its ends. Each is nearer to the end by √2: a bilinear ω with a small value
-/// there dips below zero right beside it.
-const STEPS: i32 = 18;
-
-/// Places on a diagonal besides its middle, as parts of it; each with its mirror image.
-fn places() -> impl Iterator<Item = f64> + Clone {
-    (1..=STEPS).map(|k| 0.5 * 0.5_f64.powf(0.5 * f64::from(k))).flat_map(|part| [part, 1.0 - part])
-}
+/// Places from the middle of a diagonal to one of its ends, as parts of it: even ones, and then ever nearer to the end, beside
+/// which a small value may dip below zero. All have few binary digits, so that a part and what is left of the whole are exact,
+/// and with them the places are the same bits from either end.
+const PLACES: [f64; 18] = [
+    7.0 / 16.0,
+    3.0 / 8.0,
+    5.0 / 16.0,
+    1.0 / 4.0,
+    3.0 / 16.0,
+    1.0 / 8.0,
+    3.0 / 32.0,
+    1.0 / 16.0,
+    3.0 / 64.0,
+    1.0 / 32.0,
+    3.0 / 128.0,
+    1.0 / 64.0,
+    3.0 / 256.0,
+    1.0 / 128.0,
+    3.0 / 512.0,
+    1.0 / 256.0,
+    3.0 / 1024.0,
+    1.0 / 512.0,
+];
 
 /// Departures of ω in the middle of a face, as parts of its largest value, that are rounding.
 const BILINEAR: f64 = 1e-9;
@@ -39,13 +54,11 @@ pub(super) fn joined(
         *evaluations += places.len() as u64;
         omega
     };
-    // sums of two products are the same bits in either order
-    let on = |p: DVec3, q: DVec3, part: f64| (1.0 - part) * p + part * q;
     let middles: Vec<DVec3> = faces.iter().map(|[a, _, c, _]| on(a.0, c.0, 0.5)).collect();
     let middles = values_at(&middles);
     let diagonal = |([a, b, c, d], middle): (&[(DVec3, f64); 4], &f64)| {
         let (p, q) = if *middle > 0.0 { (a.0, c.0) } else { (b.0, d.0) };
-        places().map(move |part| on(p, q, part))
+        PLACES.into_iter().flat_map(move |part| [on(p, q, part), on(q, p, part)])
     };
     let along: Vec<DVec3> = faces.iter().zip(&middles).flat_map(diagonal).collect();
     let along = values_at(&along);
@@ -55,7 +68,12 @@ pub(super) fn joined(
         let decision = if inside { Ambiguous::JoinSolid } else { Ambiguous::PartSolid };
         (is_whole && !is_bilinear(face, *middle)).then_some(decision)
     };
-    faces.iter().zip(&middles).zip(along.chunks_exact(2 * STEPS as usize)).map(decide).collect()
+    faces.iter().zip(&middles).zip(along.chunks_exact(2 * PLACES.len())).map(decide).collect()
+}
+
+/// The place at a part of the way from p to q. A sum of two products is the same bits in either order.
+fn on(p: DVec3, q: DVec3, part: f64) -> DVec3 {
+    (1.0 - part) * p + part * q
 }
 
 /// Whether ω in the middle of a face is what its corners say, so that they are to be believed.
@@ -80,6 +98,18 @@ mod tests {
         let [a, b, c, d] = square;
         assert_eq!(joined(&field, &[[c, d, a, b]], &mut 0), found, "the other way round");
         found[0]
+    }
+
+    #[test]
+    fn places_are_the_same_bits_from_either_end() {
+        for k in 0..1000 {
+            let number = |i: u32| (f64::from(k * 7 + i) * 0.754_877_666).fract() * 3.0 - 1.0;
+            let (p, q) =
+                (DVec3::new(number(1), number(2), number(3)), DVec3::new(number(4), number(5), number(6)));
+            for part in PLACES {
+                assert_eq!(on(p, q, part), on(q, p, 1.0 - part), "{p} {q} {part}");
+            }
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@
 //!
 //! What is promised: the mesh is closed; every edge lies in exactly two triangles, which run along it in
 //! opposite directions; triangles are counter-clockwise as seen from the fluid; the topology is that of
-//! the trilinear interpolant of ω at the nodes, but where ω along a diagonal of a face shows that its
+//! the trilinear interpolant of ω at the nodes, but where ω at many places of a diagonal of a face says that its
 //! corners are joined in another way, as beside a sharp rim; the same field and grid give the same bits on any
 //! number of threads.
 //!

@@ -61,6 +61,9 @@ const WIDE_GAP: f64 = 1.02;
 /// Places behind a cell that are tried.
 const BEHIND: u32 = 6;
 
+/// How far beyond a point with ω = 0 the other side is looked for, over its distance.
+const BEYOND: f64 = 1e-9;
+
 /// Places that are tried where no ray meets the surface.
 const SCATTERED: u32 = 1000;
 
@@ -196,11 +199,16 @@ struct Best<'a> {
 }
 
 impl Best<'_> {
-    /// Whether a point is on the other side. The surface belongs to the solid; from inside, a point with ω = 0 may lie on
-    /// a face that two parts share.
+    /// Whether a point is on the other side, or on the surface.
     fn is_other(&self, q: DVec3) -> bool {
-        let sign = self.solid.sign(q);
-        if self.sign < 0.0 { sign >= 0.0 } else { sign < 0.0 }
+        let product = self.solid.sign(q) * self.sign;
+        product < 0.0 || product == 0.0 && self.is_on_surface(q)
+    }
+
+    /// Whether the other side begins at a point with ω = 0. On a face that two parts share nothing begins.
+    fn is_on_surface(&self, q: DVec3) -> bool {
+        let way = BEYOND * self.p.distance(q) * self.solid.estimated_contact(q).normal * self.sign;
+        way.is_finite() && self.solid.sign(q + way) * self.sign < 0.0
     }
 
     /// Tries the middle of a cell, its corner that is nearest to the point, other corners, and what lies behind the cell.

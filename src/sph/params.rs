@@ -184,7 +184,7 @@ impl Parameters {
         limits.into_iter().fold(none, |shortest, limit| if limit.0 < shortest.0 { limit } else { shortest })
     }
 
-    /// The kinematic viscosity, m²/s, with which a method damps the noise of particles.
+    /// The kinematic viscosity, m²/s, with which a method damps the noise of particles, at least that of its defaults.
     pub fn numerical_viscosity(&self) -> f64 {
         self.method.numerics().numerical_viscosity(&self.scales())
     }

@@ -141,7 +141,8 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::step`].
     pub fn step_at_most(&mut self, longest: f64) -> Result<(), StepError> {
-        // the whole step on threads of the pool: each of its many sums would have to be handed over to them else
+        // the whole step on threads of the pool: each of its many sums would have to be handed over to them else. A thread
+        // that waits may take a step of another simulation meanwhile
         rayon::scope(|_| self.take_step(longest))
     }
 

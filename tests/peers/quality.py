@@ -30,7 +30,7 @@ def mirrored(places, box, reach):
 
 
 def excess(places, spacing, box):
-    """How far the density of each particle is above that at rest, as a part of it; 0 where it is below."""
+    """How far the density of each particle is above that at rest, as a part of it; below zero at surfaces."""
     reach = SUPPORT * spacing
     n = np.arange(-3, 4)
     lattice = np.stack(np.meshgrid(n, n, n), -1).reshape(-1, 3)
@@ -43,7 +43,7 @@ def excess(places, spacing, box):
         near = cKDTree(chunk).sparse_distance_matrix(tree, reach, output_type="coo_matrix")
         weights = kernel(near.data / reach)
         found[first : first + 20_000] = np.bincount(near.row, weights, len(chunk))
-    return np.maximum(found / full - 1, 0)
+    return found / full - 1
 
 
 def front(places, spacing, column):
@@ -61,13 +61,15 @@ def energy(places, velocities, gravity):
 
 
 def of(instants, spacing, box, column, gravity):
-    """The worst of all instants, of (time, places, velocities) each, and their fronts and energies."""
+    """The figures of all instants, of (time, places, velocities) each. The median is that of the depth of the fluid."""
     rows = []
     for time, places, velocities in instants:
-        above = excess(places, spacing, box)
+        excesses = excess(places, spacing, box)
+        above = np.maximum(excesses, 0)
         rows.append(
             {
                 "time": time,
+                "median": float(np.median(excesses)),
                 "mean": float(above.mean()),
                 "p99": float(np.quantile(above, 0.99)),
                 "most": float(above.max()),

@@ -324,12 +324,12 @@ def main():
         return child(options.child)
     head = ["solver", "particles", "on walls", "steps", "iterations", "ms per step", "neighbours"]
     head += ["ns per particle·neighbour", "CPU s per simulated s"]
-    worth = ["solver", "particles", "mean", "99th percentile", "most", "by its own kernel: mean", "99th percentile"]
+    worth = ["solver", "particles", "mean", "99th percentile", "most", "median at the end", "by its own kernel: mean", "99th percentile"]
     worth += ["front at 0.4 s, m", "energy at the end", "outside"]
     rows, seen = [], []
     for particles in [int(n) for n in options.particles.split(",")]:
         for name, (solver, arguments) in RUNS.items():
-            if options.only not in name:
+            if options.only.lower() not in name.lower():
                 continue
             print(f"{name}, {particles} particles", file=sys.stderr, flush=True)
             found, why = measure(solver, particles, options.seconds, arguments)
@@ -370,6 +370,7 @@ def value(name, found):
         name,
         str(found["particles"]),
         *(percent(worst[key]) for key in ("mean", "p99", "most")),
+        percent(instants[-1]["median"]),
         *(percent(part) for part in found["own"]),
         f"{at['front']:.2f}",
         f"{100 * instants[-1]['energy'] / instants[0]['energy']:.1f} %",

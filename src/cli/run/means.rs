@@ -97,11 +97,12 @@ const PLAIN: std::ops::Range<f64> = 1e-3..1e7;
 /// A value with as many digits as its error leaves it.
 fn rounded(value: f64, error: f64) -> String {
     let last = if error > 0.0 { error.log10().floor() - 1.0 } else { -6.0 };
-    if value == 0.0 || PLAIN.contains(&value.abs()) {
+    let size = value.abs().max(error);
+    if size == 0.0 || PLAIN.contains(&size) {
         return format!("{value:.0$}", (-last).clamp(0.0, 12.0) as usize);
     }
     let digits = if error > 0.0 { value.abs().log10().floor() - last } else { 6.0 };
-    format!("{value:.0$e}", digits.clamp(1.0, 12.0) as usize)
+    format!("{value:.0$e}", digits.clamp(0.0, 12.0) as usize)
 }
 
 #[cfg(test)]
@@ -112,7 +113,8 @@ mod tests {
     fn values_have_the_digits_that_their_errors_leave() {
         assert_eq!(rounded(236.0712, 0.11), "236.07");
         assert_eq!(rounded(0.0, 0.11), "0.00");
-        assert_eq!(rounded(-3e-7, 6.5e-6), "-3.0e-7");
+        assert_eq!(rounded(5e-4, 0.11), "0.00");
+        assert_eq!(rounded(-3e-7, 6.5e-6), "-3e-7");
         assert_eq!(rounded(3.414567e-10, 2.1e-12), "3.415e-10");
         assert_eq!(rounded(3.413119e14, 2e11), "3.4131e14");
     }

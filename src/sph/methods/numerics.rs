@@ -18,7 +18,8 @@ const FORCE_FACTOR: f64 = 0.25;
 
 /// What the solver needs to know of a method's numbers.
 pub(in crate::sph) trait Numerics: Sync {
-    /// The kinematic viscosity, m²/s, with which the noise of particles is damped: αhc/20 of an artificial viscosity.
+    /// The kinematic viscosity, m²/s, with which the noise of particles is damped, or would be by default: αhc/20 of an
+    /// artificial viscosity. Rows of particles resist a shear about as much without it.
     fn numerical_viscosity(&self, scales: &Scales) -> f64;
 
     /// Checks what the bounds of single keys do not cover.

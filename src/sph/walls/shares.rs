@@ -1,21 +1,25 @@
 //! Which obstacle does what of all that walls do to a particle.
 
 use glam::{DMat3, DVec3};
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 
 use super::{
     boundary::Boundary,
     coverage::{Coverage, is_positive_definite},
     kernel::Wall,
 };
+use crate::field::{Face, Faces, Part};
 use crate::geom::Aabb;
 use crate::sph::scales::Slip;
 
 /// Part of a force that walls share in directions in which none of them acts.
 const BESIDE: f64 = 1e-3;
 
-/// Ways from a particle to a plane that lead into it, as parts of the distance.
-const BEYOND: f64 = 1.1;
+/// How far behind a face a place is in its wall, over the support radius: less than any wall is thick.
+const BEHIND: f64 = 0.02;
+
+/// The square of the sine of the angle, some ten degrees, from which on two faces meet in a corner.
+const LEAST_SQUARED_SINE: f64 = 0.03;
 
 /// What all walls together do to a particle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -89,24 +93,34 @@ impl Boundary {
             None => !self.domain.contains(q),
         };
         near.iter().enumerate().any(|(i, one)| {
+            let to_one = self.faces_of(wall, p, one);
             near[i + 1..].iter().any(|other| {
-                let ways = self.ways_into(wall, p, other);
-                self.ways_into(wall, p, one).iter().any(|way| {
-                    ways.iter().map(|other_way| p + way + other_way).any(|q| holds(one, q) && holds(other, q))
-                })
+                let to_other = self.faces_of(wall, p, other);
+                let pairs = to_one.iter().flat_map(|face| to_other.iter().map(move |other| (face, other)));
+                let corners = pairs.filter_map(|(face, other)| behind_both(face, other, wall.h));
+                corners.map(|way| p + way).any(|q| holds(one, q) && holds(other, q))
             })
         })
     }
 
-    /// Ways from a particle to just behind the faces of a wall.
-    fn ways_into(&self, wall: &Wall, p: DVec3, near: &Near) -> SmallVec<[DVec3; 6]> {
-        if near.obstacle.is_some() {
-            let distance = wall.h * wall.distance_of(near.part);
-            return smallvec![BEYOND * distance * near.gradient.normalize_or_zero()];
-        }
-        let [to_low, to_high] = [self.domain.min - p, self.domain.max - p];
-        let ways = DVec3::AXES.into_iter().flat_map(|axis| [axis * to_low, axis * to_high]);
-        ways.filter(|way| way.length() < wall.h).map(|way| BEYOND * way).collect()
+    /// The faces of a wall near a particle.
+    fn faces_of(&self, wall: &Wall, p: DVec3, near: &Near) -> SmallVec<[Face; 6]> {
+        let Some(k) = near.obstacle else {
+            let [to_low, to_high] = [p - self.domain.min, self.domain.max - p];
+            let axes = DVec3::AXES.into_iter();
+            let faces = axes.flat_map(|n| [(n, to_low.dot(n)), (-n, to_high.dot(n))]);
+            let reached = faces.filter(|(_, distance)| *distance < wall.h);
+            return reached
+                .map(|(normal, distance)| Face { distance, normal, mean_curvature: 0.0 })
+                .collect();
+        };
+        let mut parts = Faces::new();
+        self.field(k).faces(p, wall.h, &mut parts);
+        let faces = parts.iter().filter_map(|part| match part {
+            Part::Face(face) => Some(*face),
+            Part::All(_) | Part::Any(_) => None,
+        });
+        faces.collect()
     }
 
     /// The walls within reach of a particle that at least one wall is near.
@@ -140,6 +154,20 @@ impl Boundary {
         }
         found
     }
+}
+
+/// The way from a particle to just behind two faces; `None` if they are nearly parallel or meet far away.
+fn behind_both(one: &Face, other: &Face, h: f64) -> Option<DVec3> {
+    let cosine = one.normal.dot(other.normal);
+    let squared_sine = 1.0 - cosine * cosine;
+    if squared_sine < LEAST_SQUARED_SINE {
+        return None;
+    }
+    let [to_one, to_other] = [one, other].map(|face| face.distance + BEHIND * h);
+    let along_one = (to_one - cosine * to_other) / squared_sine;
+    let along_other = (to_other - cosine * to_one) / squared_sine;
+    let way = -along_one * one.normal - along_other * other.normal;
+    (way.length() < 2.0 * h).then_some(way)
 }
 
 impl Near {
@@ -221,6 +249,24 @@ mod tests {
         // the image of the fluid in the block is pressed down less than the fluid itself
         assert!(left.z < -0.1 * left.x.abs(), "{left}");
         assert_eq!(right, DVec3::ZERO);
+    }
+
+    #[test]
+    fn corners_are_found_at_any_angle() {
+        let face = |degrees: f64, distance: f64| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            Face { distance, normal: DVec3::new(-sin, 0.0, cos), mean_curvature: 0.0 }
+        };
+        for degrees in [30.0, 60.0, 90.0, 120.0, 150.0, -60.0] {
+            let (one, other) = (face(0.0, 0.3), face(degrees, 0.2));
+            let way = behind_both(&one, &other, 1.0).unwrap();
+            for face in [one, other] {
+                let behind = -way.dot(face.normal) - face.distance;
+                assert!((behind - BEHIND).abs() < 1e-12, "{degrees}: {way}");
+            }
+        }
+        assert_eq!(behind_both(&face(0.0, 0.3), &face(180.0, 0.3), 1.0), None);
+        assert_eq!(behind_both(&face(0.0, 0.3), &face(5.0, 0.3), 1.0), None);
     }
 
     #[test]

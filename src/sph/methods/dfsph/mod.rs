@@ -42,7 +42,7 @@ pub struct Dfsph {
     /// Most iterations of each of the two solves in one step. Default 100.
     pub most_iterations: u32,
     /// α of the artificial viscosity (Monaghan 1992), for a speed of sound of ten times the greatest expected
-    /// speed. Default 0.04; zero: the term is not computed.
+    /// speed. Default 0.06; zero: the term is not computed.
     pub artificial_viscosity: f64,
     /// How strongly particles drift to where there are fewer of them. Default 0: no drift. 1 halves the
     /// deviation of a fluid at rest, and makes that of a shear flow two to three times as large.
@@ -148,7 +148,8 @@ impl Declaration for Dfsph {
 impl Numerics for Dfsph {
     fn numerical_viscosity(&self, scales: &Scales) -> f64 {
         let sound = NOMINAL_SOUND * scales.expected_speed;
-        roughness::viscosity(self.artificial_viscosity, sound, scales.support_radius)
+        let alpha = self.artificial_viscosity.max(Self::default().artificial_viscosity);
+        roughness::viscosity(alpha, sound, scales.support_radius)
     }
 
     fn sound_speed(&self, _scales: &Scales) -> f64 {

@@ -313,8 +313,8 @@ impl DivergenceFree {
                 .zip(&self.debt)
                 .map(|((rate, rho), debt)| rate + wanted(*rho, *debt)),
         );
-        // What a step leaves becomes a debt and is paid back. So it may be what the density gains in a step of a fast flow
-        // while it is off by the tolerance.
+        // What a step leaves becomes a debt, which the next ones pay back: of eight tolerances at most where this goes on and on.
+        // What is promised of densities is a matter of the places alone.
         let goal = Goal {
             tolerance: RELAXATION_STEPS * self.numbers.tolerance * rest / relaxation,
             most_iterations: self.numbers.most_iterations,

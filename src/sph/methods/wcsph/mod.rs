@@ -22,6 +22,9 @@ const EXPONENT: i32 = 7;
 /// The part of the expected speed from which on the speed √(σ/ρa) of surface tension over a spacing a counts.
 const CAPILLARY: f64 = 0.05;
 
+/// α of the artificial viscosity with pairs of pressures, unless it is stated.
+const PAIRS_ALPHA: f64 = 0.1;
+
 /// The speed of sound over the greatest expected speed, unless it is stated. This keeps changes of the
 /// density within 1 %.
 const SOUND_OVER_SPEED: f64 = 10.0;
@@ -90,7 +93,7 @@ impl Wcsph {
     /// α of the artificial viscosity, stated or derived.
     fn artificial_viscosity(&self) -> f64 {
         self.artificial_viscosity.unwrap_or(match self.gradients {
-            Gradients::Pairs => 0.1,
+            Gradients::Pairs => PAIRS_ALPHA,
             Gradients::Differences => 0.02,
         })
     }
@@ -239,7 +242,8 @@ impl Declaration for Wcsph {
 
 impl Numerics for Wcsph {
     fn numerical_viscosity(&self, scales: &Scales) -> f64 {
-        roughness::viscosity(self.artificial_viscosity(), self.sound_speed(scales), scales.support_radius)
+        let alpha = self.artificial_viscosity().max(PAIRS_ALPHA);
+        roughness::viscosity(alpha, self.sound_speed(scales), scales.support_radius)
     }
 
     fn validate(&self, scales: &Scales) -> Result<(), ParameterError> {
