@@ -40,11 +40,14 @@ const PLACES: [f64; 18] = [
 /// Departures of ω in the middle of a face, as parts of its largest value, that are rounding.
 const BILINEAR: f64 = 1e-9;
 
+/// The corners around a face, with their values.
+pub(super) type FaceCorners = [(DVec3, f64); 4];
+
 /// How the corners of ambiguous faces are joined. Each face is given by its corners and their values, around it, of which the
 /// first and the third are inside. `None` where ω is bilinear, or where ω along the diagonals leaves the choice. Adds to the number of evaluations.
 pub(super) fn joined(
     field: &dyn Field,
-    faces: &[[(DVec3, f64); 4]],
+    faces: &[FaceCorners],
     evaluations: &mut u64,
 ) -> Vec<Option<Ambiguous>> {
     let mut values_at = |places: &[DVec3]| -> Vec<f64> {
@@ -56,13 +59,13 @@ pub(super) fn joined(
     };
     let middles: Vec<DVec3> = faces.iter().map(|[a, _, c, _]| on(a.0, c.0, 0.5)).collect();
     let middles = values_at(&middles);
-    let diagonal = |([a, b, c, d], middle): (&[(DVec3, f64); 4], &f64)| {
+    let diagonal = |([a, b, c, d], middle): (&FaceCorners, &f64)| {
         let (p, q) = if *middle > 0.0 { (a.0, c.0) } else { (b.0, d.0) };
         PLACES.into_iter().flat_map(move |part| [on(p, q, part), on(q, p, part)])
     };
     let along: Vec<DVec3> = faces.iter().zip(&middles).flat_map(diagonal).collect();
     let along = values_at(&along);
-    let decide = |((face, middle), along): ((&[(DVec3, f64); 4], &f64), &[f64])| {
+    let decide = |((face, middle), along): ((&FaceCorners, &f64), &[f64])| {
         let inside = *middle > 0.0;
         let is_whole = along.iter().all(|value| (*value > 0.0) == inside);
         let decision = if inside { Ambiguous::JoinSolid } else { Ambiguous::PartSolid };
@@ -77,7 +80,7 @@ fn on(p: DVec3, q: DVec3, part: f64) -> DVec3 {
 }
 
 /// Whether ω in the middle of a face is what its corners say, so that they are to be believed.
-fn is_bilinear([a, b, c, d]: &[(DVec3, f64); 4], middle: f64) -> bool {
+fn is_bilinear([a, b, c, d]: &FaceCorners, middle: f64) -> bool {
     let largest = [a, b, c, d].iter().fold(0.0, |largest: f64, corner| largest.max(corner.1.abs()));
     (0.25 * ((a.1 + c.1) + (b.1 + d.1)) - middle).abs() <= BILINEAR * largest
 }
