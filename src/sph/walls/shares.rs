@@ -53,12 +53,15 @@ impl Boundary {
     ///
     /// Each wall presses as if it were alone, p·∇λ of its own. What the walls together press less, because they overlap in a
     /// corner, acts along them: it is what the mirror image in one wall lacks behind the other. Where none overlap, as at a
-    /// ball above a floor, the rest is what the closed forms of bent faces are off, and acts along the normals. What completes pressures is
-    /// divided by the walls' K. A mirror image holds up the fluid beside its wall, and is pressed down as much at its end
-    /// in the corner, so that along a wall all adds up to nothing. (Divided by the normals, the floor of a vessel had to hold
-    /// up the images too, and bore 10 % less than the water on it with ten spacings from wall to wall.) Friction is divided
-    /// among the walls to which the fluid sticks, by the directions along them. All shares, that of the box included, add up
-    /// to the whole.
+    /// ball above a floor, the rest is what the closed forms of bent faces are off, and acts along the normals.
+    ///
+    /// What completes pressures is divided by the walls' K. A mirror image holds up the fluid beside its wall, and is pressed
+    /// down as much at its end in the corner, so that along a wall all adds up to nothing. (Divided by the normals, the floor
+    /// of a vessel had to hold up the images too, and bore 10 % less than the water on it with ten spacings from wall to wall.)
+    /// In corners of other angles than a right one there are no such images, and loads are some 5 % off.
+    ///
+    /// Friction is divided among the walls to which the fluid sticks, by the directions along them. All shares, that of the
+    /// box included, add up to the whole.
     pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, DVec3)) {
         let near = self.near(wall, p);
         if let [] | [_] = &near[..] {
