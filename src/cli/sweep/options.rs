@@ -26,7 +26,7 @@ pub(in crate::cli) struct Again {
     /// Go on with the sweep that the folder holds: values without figures, or with new ones
     #[arg(long, requires = "sweep")]
     pub resume: bool,
-    /// Replace the sweep that the folder holds
-    #[arg(long, requires = "sweep", conflicts_with = "resume")]
+    /// Replace the sweep that the folder holds; without a sweep the file is replaced anyway
+    #[arg(long, conflicts_with = "resume")]
     pub force: bool,
 }

@@ -227,7 +227,10 @@ fn groups(tokens: &[Token], lines: &[Line]) -> Vec<Option<usize>> {
         let leads =
             matches!(tokens[line.first].kind, Kind::Operator | Kind::Product | Kind::Not | Kind::NotSign);
         for i in line.first + 1 + usize::from(leads)..line.end {
-            if let Some(class) = class(&tokens[i]).filter(|_| between(&tokens[i - 1], &tokens[i]) > 0) {
+            // what is written without a blank, as after a comma, stands in its column by chance
+            let is_apart = tokens[i].column > tokens[i - 1].end_column;
+            let blank = is_apart && between(&tokens[i - 1], &tokens[i]) > 0;
+            if let Some(class) = class(&tokens[i]).filter(|_| blank) {
                 members.entry((line.paragraph, tokens[i].column, class)).or_default().push(i);
             }
         }

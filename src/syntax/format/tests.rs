@@ -73,6 +73,9 @@ fn hand_made_columns_stay() {
     );
     // nothing is in the same column
     check("let a    = 1       # one\n", "let a = 1  # one\n");
+    // what follows a comma or a sign without a blank stands below something else by chance
+    check("param   a=1\nfn f(x1,y1=2)=x1\n", "param a = 1\nfn f(x1, y1 = 2) = x1\n");
+    check("let    a=1\nsolid s=x\n", "let a = 1\nsolid s = x\n");
     // all move together
     check("let a  =1\nlet bc =2 + 3\nlet d  =x\n", "let a  = 1\nlet bc = 2 + 3\nlet d  = x\n");
 }
