@@ -289,7 +289,7 @@ noise. With `method: wcsph` and `gradients: differences` the drag of that ball w
 MANY_STEPS = "W0515":
 "The run takes so many steps that it hardly ends: with a thousand particles a hundred million of them take half a day. Most
 often a number is in another unit than was meant. A `dt` may be left out; steps are as long as speeds of sound and of the fluid,
-viscosity, surface tension and gravity allow.";
+viscosity, surface tension and gravity allow, and end at each frame (`save_every`).";
 PROBE_IN_BODY = "W0516":
 "A probe of a pressure or a velocity lies in an obstacle at rest or outside the container, where there is never any fluid. What
 it tells is the mean of the particles that are near enough, beside the obstacle, or NaN if there are none.";

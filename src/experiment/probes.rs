@@ -33,9 +33,10 @@ pub(super) fn in_bodies(scene: &Scene, bodies: &[Body], spacing: f64) -> Vec<Dia
             return None;
         }
         let message = format!("the probe `{}` lies in an obstacle, or outside the container", probe.name);
-        Some(Diagnostic::warning(Code::PROBE_IN_BODY, probe.span, message).help(
-            "it tells what the fluid beside it has, or nothing; a place on the surface is in the fluid",
-        ))
+        Some(
+            Diagnostic::warning(Code::PROBE_IN_BODY, probe.span, message)
+                .help("move it into the fluid; for the pressure on a wall, to a place on its surface"),
+        )
     };
     scene.probes.iter().filter_map(told).collect()
 }

@@ -70,12 +70,14 @@ impl Cases {
 /// which a tunnel may join.
 pub(super) fn needs_values(inside: u8) -> bool {
     let is_inside = |corner: usize| inside >> corner & 1 == 1;
-    let ambiguous = |face: usize| {
-        let [a, b, c, d] = face_corners(face).map(is_inside);
-        a == c && b == d && a != b
-    };
+    let ambiguous = |face: usize| is_ambiguous(face_corners(face).map(is_inside));
     let opposite = |mask: u8| mask.count_ones() == 2 && mask == mask.reverse_bits();
     (0..FACES).any(ambiguous) || opposite(inside) || opposite(!inside)
+}
+
+/// Whether the corners around a face lie inside and outside in turn.
+pub(super) fn is_ambiguous([a, b, c, d]: [bool; 4]) -> bool {
+    a == c && b == d && a != b
 }
 
 /// Two loops that bound a tunnel, and the closed line around its waist.

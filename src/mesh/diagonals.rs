@@ -44,7 +44,8 @@ const BILINEAR: f64 = 1e-9;
 pub(super) type FaceCorners = [(DVec3, f64); 4];
 
 /// How the corners of ambiguous faces are joined. Each face is given by its corners and their values, around it, of which the
-/// first and the third are inside. `None` where ω is bilinear, or where ω along the diagonals leaves the choice. Adds to the number of evaluations.
+/// first and the third are inside. `None` where ω is bilinear, or where ω along the diagonals leaves the choice. Adds to the
+/// number of evaluations.
 pub(super) fn joined(
     field: &dyn Field,
     faces: &[FaceCorners],
@@ -117,7 +118,7 @@ mod tests {
 
     #[test]
     fn what_holds_the_whole_diagonal_joins_its_ends() {
-        // a bar along the diagonal, which is thin at one end: by its values, 0.01·0.2 < 0.2·0.3, it would be parted
+        // a bar along the diagonal, which is thin at one end: by its values, 0.01·0.21 < 1.89², it would be parted
         let bar = |p: DVec3| 0.01 + 0.1 * (p.x + p.y) - 2.0 * (p.x - p.y).abs();
         assert_eq!(decide(bar), Some(Ambiguous::JoinSolid));
         assert_eq!(
@@ -136,7 +137,7 @@ mod tests {
         // solid in the middle and at the ends, with gaps between
         let omega = |p: DVec3| ((p.x + p.y - 1.0).abs() - 0.5).abs() - 0.2;
         assert_eq!(decide(omega), None);
-        // bilinear, with corners 0.001, 1 inside and −0.04 outside: parted, by a gap of a twenty-fifth beside the first corner
+        // bilinear, with corners 0.001, 1 inside and −0.04 outside: parted, by a narrow gap beside the first corner
         let bilinear = |p: DVec3| {
             let (u, v) = (p.x, p.y);
             0.001 * (1.0 - u) * (1.0 - v) + u * v - 0.04 * (u * (1.0 - v) + v * (1.0 - u))

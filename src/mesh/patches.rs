@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::{
     ambiguity,
-    cases::{Ambiguous, CellTriangles, FACES, InnerVertex, Tunnel, edge, face_corners, loops},
+    cases::{Ambiguous, CellTriangles, FACES, InnerVertex, Tunnel, edge, face_corners, is_ambiguous, loops},
     diagonals,
     prune::{BRICK, Lattice},
     signs::{Around, crossed_cells, set_positions},
@@ -128,7 +128,7 @@ impl CellValues {
                 let value = |i: usize| cell.values[around[i]];
                 let inside = [0, 1, 2, 3].map(|i| value(i) > 0.0);
                 let leaves_grid = (0..4).any(|i| value(i) == f64::NEG_INFINITY);
-                if inside[0] != inside[2] || inside[1] != inside[3] || inside[0] == inside[1] || leaves_grid {
+                if !is_ambiguous(inside) || leaves_grid {
                     continue;
                 }
                 if !inside[0] {

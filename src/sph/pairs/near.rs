@@ -115,7 +115,7 @@ pub(in crate::sph) struct Range {
 pub(in crate::sph) struct OfBlock<T> {
     /// Copies of the places around it, relative to it. There is room for one register more.
     pub places: [Vec<T>; 3],
-    /// Of which particles these are copies.
+    /// The particles that these are copies of.
     pub ranges: SmallVec<[Range; 9]>,
     /// Number of copies; the vectors may be longer.
     pub count: usize,

@@ -131,10 +131,9 @@ impl Solver {
         let (mut iteration, mut momentum, mut best) = (0, 0.0, f64::INFINITY);
         if begin == Begin::Nothing {
             // no pressure changes nothing, so the first guess needs no sums
-            for column in [&mut self.s, &mut self.rate, &mut self.last] {
-                column.fill(0.0);
-            }
-            self.last.resize(n, 0.0);
+            self.s.fill(0.0);
+            self.rate.fill(0.0);
+            self.last.clone_from(&self.s);
             self.guess_again(free, dt, least, 0.0);
             (iteration, momentum) = (1, 1.0);
         }
