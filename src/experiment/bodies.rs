@@ -8,7 +8,7 @@ use crate::field::{Moving, Walls};
 use crate::ir::Node;
 use crate::lower::{Scene, Skin};
 use crate::solid::MovingMap;
-use crate::sph::{Obstacle, Parameters};
+use crate::sph::{ChangingShape, Obstacle, Parameters};
 use crate::{Engine, Program, Solid};
 
 /// Distance of samples, over the support radius, along paths at obstacles without a known range. Compiled
@@ -17,6 +17,13 @@ const PATH_RESOLUTION: f64 = 0.05;
 
 /// Length of the window of time for which the map of a moving solid holds, in steps.
 const WINDOW: f64 = 16.0;
+
+/// How far the surface of a solid that changes its shape moves between two looks at it, over the support radius. What it
+/// takes of kernels is a cubic in time, whose error is below a thousandth then.
+const CHANGE: f64 = 1.0 / 6.0;
+
+/// The least number of intervals between such looks in a run: a cubic needs three.
+const LEAST_CHANGES: f64 = 3.0;
 
 /// A solid in the way of the fluid: an obstacle, or the outside of the container.
 pub struct Body {
@@ -82,8 +89,12 @@ fn body(
     let has_maps = whole.moves() && parameters.walls_have_density();
     let parts =
         if has_maps { rigid_parts::of(program, (name, shape), scene.run.until, engine)? } else { Vec::new() };
+    let changing = (has_maps && parts.is_empty())
+        .then(|| changing_shape(program, shape, &whole, scene, parameters))
+        .flatten();
     let obstacle = Obstacle {
         parts,
+        changing,
         field: at_rest(&solid, scene, parameters),
         moving: whole.moves().then(|| in_motion(&whole, scene, parameters)),
         restitution: skin.bounce.restitution,
@@ -93,6 +104,27 @@ fn body(
         resolution: PATH_RESOLUTION * parameters.support_radius,
     };
     Ok(Body { solid, skin, obstacle })
+}
+
+/// How often a solid that changes its shape during a run is looked at; `None` if it does not change it, or has so many parts
+/// that its volume would cost too much.
+fn changing_shape(
+    program: &Program,
+    shape: Node,
+    whole: &Solid,
+    scene: &Scene,
+    parameters: &Parameters,
+) -> Option<ChangingShape> {
+    let until = scene.run.until;
+    if whole.has_many_leaves() || rigid_parts::keeps_its_shape(program, shape, until) {
+        return None;
+    }
+    let way = CHANGE * parameters.support_radius;
+    let wanted = wall_speed::time_for(whole, way, &scene.domain, until)
+        .max(parameters.stable_dt(parameters.expected_speed).min(parameters.time_step));
+    // a whole number of them, so that none is beyond the end
+    let count = (until / wanted).ceil().max(LEAST_CHANGES);
+    Some(ChangingShape { body: Arc::new(whole.clone()), interval: until / count, until })
 }
 
 /// The cheapest field that represents a solid in the box of a scene.

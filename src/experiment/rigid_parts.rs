@@ -15,6 +15,14 @@ const MOST_PARTS: usize = 16;
 /// Instants of a run at which is seen whether a shape is deformed.
 const INSTANTS: usize = 61;
 
+/// Whether a shape moves as a whole during a run that ends at a time, s.
+pub(super) fn keeps_its_shape(program: &Program, shape: Node, until: f64) -> bool {
+    let motion = RigidMotion::of(&program.module().graph, shape);
+    // instants that no period of a motion divides
+    let mut instants = (0..INSTANTS).map(|i| until * (i as f64 + 0.618) / INSTANTS as f64);
+    motion.is_some_and(|motion| instants.all(|time| motion.placement(time).is_some()))
+}
+
 /// The parts of a shape during a run that ends at a time, s; none if it moves as a whole, or if parts of it are deformed.
 ///
 /// A union is divided until each of its parts moves as one.
@@ -25,18 +33,12 @@ pub(super) fn of(
     engine: Engine,
 ) -> Result<Vec<RigidPart>, Error> {
     let graph = &program.module().graph;
-    let is_rigid = |node: Node| {
-        let motion = RigidMotion::of(graph, node);
-        // instants that no period of a motion divides
-        let mut instants = (0..INSTANTS).map(|i| until * (i as f64 + 0.618) / INSTANTS as f64);
-        motion.is_some_and(|motion| instants.all(|time| motion.placement(time).is_some()))
-    };
     let (mut left, mut rigid) = (vec![shape], Vec::new());
     while let Some(node) = left.pop() {
         if left.len() + rigid.len() >= MOST_PARTS {
             return Ok(Vec::new());
         }
-        if is_rigid(node) {
+        if keeps_its_shape(program, node, until) {
             rigid.push(node);
             continue;
         }

@@ -406,10 +406,22 @@ impl Core {
         (id[fastest], speed(&fastest))
     }
 
+    /// The place of a particle at which a gravity that depends on the place has no finite value.
+    fn without_gravity(&self) -> Option<DVec3> {
+        let field = self.gravity_field.as_ref()?;
+        let position = &self.particles.position;
+        let places = (0..position.len()).map(|i| position.get(i));
+        places.filter(|p| p.is_finite()).find(|p| !field(*p, self.boundary.time).is_finite())
+    }
+
     fn non_finite(&self, index: usize, quantity: Quantity, dt: f64) -> StepError {
         // the state may hold NaN already; max and min pass it over
         let stable = self.stable_dt();
-        let cause = if dt > stable { Cause::StepTooLong { dt, stable } } else { Cause::Overflow };
+        let cause = match self.without_gravity() {
+            Some(at) => Cause::GravityUndefined { at },
+            None if dt > stable => Cause::StepTooLong { dt, stable },
+            None => Cause::Overflow,
+        };
         StepError::NonFinite { step: self.steps, id: self.particles.id[index], quantity, cause }
     }
 }

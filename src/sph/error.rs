@@ -109,6 +109,11 @@ pub enum Cause {
         /// The point, m.
         at: DVec3,
     },
+    /// The formula of a gravity that depends on the place has no value at a point.
+    GravityUndefined {
+        /// The point, m.
+        at: DVec3,
+    },
     /// The step was short enough: values grew until they left the range of a double.
     Overflow,
 }
@@ -126,6 +131,13 @@ pub enum StepError {
         quantity: Quantity,
         /// The most likely reason.
         cause: Cause,
+    },
+    /// The formula of a gravity that depends on the time has no value.
+    Gravity {
+        /// Number of the step.
+        step: u64,
+        /// The time, s.
+        time: f64,
     },
     /// Walls that move leave no room for a particle: they close on it, or pass over it in one step.
     NoRoom {
@@ -165,6 +177,9 @@ impl fmt::Display for StepError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (step, id, quantity, cause) = match self {
             Self::NonFinite { step, id, quantity, cause } => (step, id, quantity, cause),
+            Self::Gravity { step, time } => {
+                return write!(f, "step {step}: the formula of gravity has no finite value at t = {time} s");
+            }
             Self::NoRoom { step, id, at } => {
                 return write!(
                     f,
@@ -204,6 +219,7 @@ impl fmt::Display for StepError {
                 write!(f, "the time step of {dt} s is too long, at most {stable:.2e} s is stable")
             }
             Cause::FieldUndefined { at } => write!(f, "the obstacle's formula has no value at {at}"),
+            Cause::GravityUndefined { at } => write!(f, "the formula of gravity has no finite value at {at}"),
             Cause::Overflow => write!(f, "values have grown beyond the range of numbers"),
         }
     }

@@ -93,4 +93,6 @@ pub use stats::Stats;
 #[doc(hidden)]
 pub use vtp::short_time;
 pub use vtp::{write_pvd, write_vtp};
-pub use walls::{Contact, Obstacle, RigidPart, Undefined, WallKernel, bounce, first_contact, push_out};
+pub use walls::{
+    ChangingShape, Contact, Obstacle, RigidPart, Undefined, WallKernel, bounce, first_contact, push_out,
+};

@@ -151,6 +151,9 @@ impl Simulation {
         self.core.steps += 1;
         if let Some(gravity) = &self.core.turning_gravity {
             self.core.parameters.gravity = gravity(self.core.time);
+            if !self.core.parameters.gravity.is_finite() {
+                return Err(StepError::Gravity { step: self.core.steps, time: self.core.time });
+            }
         }
         let dt = self.scheme.step(&mut self.core, longest)?;
         // equal steps are counted, so that their rounding errors do not add up

@@ -162,17 +162,18 @@ struct MeshHead {
     triangles: usize,
     min: [f64; 3],
     max: [f64; 3],
+    time: f64,
     run: u64,
 }
 
-/// The block of a mesh: positions and normals with 16 bits for each coordinate, then the corners of triangles. `run`
-/// is the number of the run that the mesh belongs to.
-pub fn pack_mesh(mesh: &Mesh, run: u64) -> Vec<u8> {
+/// The block of a mesh: positions and normals with 16 bits for each coordinate, then the corners of triangles. `time` is
+/// the instant at which what moves stands so, s, and `run` the number of the run that the mesh belongs to.
+pub fn pack_mesh(mesh: &Mesh, time: f64, run: u64) -> Vec<u8> {
     let bounds = mesh.positions.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
     let bounds = if mesh.positions.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ONE) } else { bounds };
     let lattice = Lattice::new(&bounds);
     let (min, max) = (lattice.bounds().min.to_array(), lattice.bounds().max.to_array());
-    let rest = MeshHead { triangles: mesh.triangles.len(), min, max, run };
+    let rest = MeshHead { triangles: mesh.triangles.len(), min, max, time, run };
     let head = Head { kind: "mesh", count: mesh.positions.len(), follows: false, rest: &rest };
     let mut out = begin(&head);
     let unit = Lattice::new(&Aabb::new(DVec3::NEG_ONE, DVec3::ONE));

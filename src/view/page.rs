@@ -133,7 +133,7 @@ pub fn solid(title: &str, mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         plots: None,
     };
     let mut page = Page::begin(out, &setting)?;
-    page.block(&pack_mesh(&split_creases(mesh), 0))?;
+    page.block(&pack_mesh(&split_creases(mesh), 0.0, 0))?;
     page.end()
 }
 

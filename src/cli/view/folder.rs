@@ -79,7 +79,7 @@ impl SavedRun {
             while mesh.is_some_and(|mesh| written <= mesh) {
                 let file = std::fs::read(&self.meshes[written])?;
                 let mesh = read_mesh(&file).map_err(io::Error::other)?;
-                page.block(&pack_mesh(&split_creases(&mesh), 0))?;
+                page.block(&pack_mesh(&split_creases(&mesh), entry.time, 0))?;
                 written += 1;
             }
             let frame = self.frame(entry)?;

@@ -163,7 +163,7 @@ impl Subject {
         };
         let bodies = Bodies::of(solids, domain, cells);
         let meshes = bodies.meshes_at(0.0).map_err(message)?;
-        let mesh = pack_mesh(&split_creases(&Mesh::joined(&meshes)), run);
+        let mesh = pack_mesh(&split_creases(&Mesh::joined(&meshes)), 0.0, run);
         Ok(Standing { mesh, solids: bodies.solids().to_vec(), domain })
     }
 
@@ -296,8 +296,9 @@ impl Running {
 
     /// The block of the obstacles' mesh as they stand now.
     pub fn mesh(&self, run: u64) -> Result<Vec<u8>, String> {
-        let meshes = self.bodies.meshes_at(self.simulation.time()).map_err(message)?;
-        Ok(pack_mesh(&split_creases(&Mesh::joined(&meshes)), run))
+        let time = self.simulation.time();
+        let meshes = self.bodies.meshes_at(time).map_err(message)?;
+        Ok(pack_mesh(&split_creases(&Mesh::joined(&meshes)), time, run))
     }
 
     /// The block of the present instant.

@@ -62,10 +62,18 @@ struct Pace {
     /// An instant of the clock and the simulated time then, s.
     from: (Instant, f64),
     seconds_per_step: f64,
-    /// When the last mesh of a moving obstacle was made, and how long that took.
-    mesh: (Instant, Duration),
+    mesh: MeshShown,
     /// When the plots were told.
     plots: Instant,
+}
+
+/// The last mesh of a moving obstacle.
+struct MeshShown {
+    /// When it was made, and how long that took.
+    at: Instant,
+    took: Duration,
+    /// The simulated time that it belongs to, s. Not a number before the first one of a run.
+    time: f64,
 }
 
 impl Session {
@@ -83,7 +91,12 @@ impl Session {
             standing: None,
             plane: None,
             gravity: None,
-            pace: Pace { from: (now, 0.0), seconds_per_step: 0.0, mesh: (now, Duration::ZERO), plots: now },
+            pace: Pace {
+                from: (now, 0.0),
+                seconds_per_step: 0.0,
+                mesh: MeshShown { at: now, took: Duration::ZERO, time: f64::NAN },
+                plots: now,
+            },
             run: 0,
         };
         // a page that is asked for before the first run needs something to show
@@ -147,6 +160,7 @@ impl Session {
             }
             Command::Pause => {
                 self.status.playing = false;
+                self.show_obstacles();
                 self.show_plots();
             }
             Command::Step => {
@@ -242,6 +256,8 @@ impl Session {
     /// Reads the file and begins a run; if that is not possible, the last one remains.
     fn load(&mut self) {
         self.status.text = "starting".into();
+        // what was wrong may have been mended, and looking takes a while
+        self.status.error = None;
         self.tell();
         let values = self.values.clone();
         let Some((checked, bounds)) = self.show_mesh(&values, Detail::Lasting) else {
@@ -285,11 +301,18 @@ impl Session {
     /// Shows the first instant of a run.
     fn begin(&mut self, bounds: &Aabb) {
         self.run += 1;
+        if self.running.is_none() {
+            // of a fluid that the file no longer has
+            self.board.clear(Topic::Frame);
+            self.board.clear(Topic::Plots);
+            self.status.text.clear();
+        }
         self.board.set_setting(self.subject.setting(self.checked.as_ref(), bounds, self.running.as_ref()));
         if let (Some(running), Some(gravity)) = (&mut self.running, self.gravity) {
             running.set_gravity(gravity);
         }
         self.pace.seconds_per_step = 0.0;
+        self.pace.mesh.time = f64::NAN;
         self.follow_clock();
         self.show_frame();
         self.show_plots();
@@ -371,19 +394,27 @@ impl Session {
         }
     }
 
-    fn show_frame(&mut self) {
+    /// Shows what moves where it stands now, unless it is shown so already.
+    fn show_obstacles(&mut self) {
         let Some(running) = &self.running else { return };
-        // meshes of what moves may take as much time as frames do
-        let (at, took) = self.pace.mesh;
-        if running.moves() && at.elapsed() > 2 * took {
-            let began = Instant::now();
-            match running.mesh(self.run) {
-                Ok(mesh) => self.board.set_block(Topic::Mesh, mesh),
-                Err(error) => self.status.error = Some(error),
-            }
-            let time = running.simulation.time();
-            self.show_slice(time);
-            self.pace.mesh = (Instant::now(), began.elapsed());
+        let time = running.simulation.time();
+        if !running.moves() || self.pace.mesh.time == time {
+            return;
+        }
+        let began = Instant::now();
+        match running.mesh(self.run) {
+            Ok(mesh) => self.board.set_block(Topic::Mesh, mesh),
+            Err(error) => self.status.error = Some(error),
+        }
+        self.show_slice(time);
+        self.pace.mesh = MeshShown { at: Instant::now(), took: began.elapsed(), time };
+    }
+
+    fn show_frame(&mut self) {
+        // while it plays, meshes of what moves may take as much time as frames do
+        let MeshShown { at, took, .. } = self.pace.mesh;
+        if !self.status.playing || at.elapsed() > 2 * took {
+            self.show_obstacles();
         }
         let Some(running) = &self.running else { return };
         self.board.set_block(Topic::Frame, running.frame(self.run));

@@ -32,7 +32,7 @@ use super::{
     coverage::Coverage,
     friction::Friction,
     kernel::Wall,
-    volume::{Known, Maps, RigidPart},
+    volume::{ChangingShape, Known, Mapped, Maps, RigidPart},
 };
 
 /// Number of particles whose paths are first tested together.
@@ -61,6 +61,9 @@ pub struct Obstacle {
     /// The parts of a body that moves, if they move differently and each without deformation; empty if it moves as a whole,
     /// or if that is not known. What it takes of the kernels of particles then follows from its volume.
     pub parts: Vec<RigidPart>,
+    /// How often a body that changes its shape is looked at for what it takes of the kernels of particles. Without it that
+    /// follows from its faces, in closed forms that hold where they are hardly bent within a support radius.
+    pub changing: Option<ChangingShape>,
     /// Restitution c_R, 0 (stick) to 1 (mirror).
     pub restitution: f64,
     /// Coefficient of friction μ: when a particle hits the body, its speed along the face falls by μ times
@@ -87,6 +90,7 @@ impl Obstacle {
             field,
             moving: None,
             parts: Vec::new(),
+            changing: None,
             restitution: 0.5,
             friction: 0.0,
             resolution,
@@ -233,7 +237,12 @@ impl Boundary {
     /// Prepares the maps of what obstacles take of kernels with the support radius h, m.
     pub fn map_obstacles(&mut self, h: f64) {
         let obstacles: Vec<_> = (self.obstacles.iter())
-            .map(|obstacle| (&obstacle.field, obstacle.moving.as_ref(), &obstacle.parts[..]))
+            .map(|obstacle| Mapped {
+                field: &obstacle.field,
+                motion: obstacle.moving.as_ref(),
+                parts: &obstacle.parts,
+                changing: obstacle.changing.as_ref(),
+            })
             .collect();
         self.maps = Maps::new(&obstacles, &self.domain, h, self.time);
     }
@@ -248,21 +257,18 @@ impl Boundary {
             let continuous = if wall.layer.is_some() { self.of_box::<()>(&plain, p) } else { whole };
             whole = whole.with_bodies(wall, &continuous, &taken);
         }
+        let none = Coverage::<()>::default();
         for k in 0..self.obstacles.len() {
             match self.maps.of(k, p) {
                 Known::AtRest | Known::Nothing => {}
                 Known::Taken(taken) => {
-                    let none = Coverage::<()>::default();
-                    let mut coverage = none.with_bodies(wall, &none, &taken);
-                    coverage.set_in_motion(self.field(k).wall_velocity(p));
-                    whole = whole.or(&coverage);
+                    let taken = taken.moving(self.field(k).wall_velocity(p));
+                    whole = whole.or(&none.with_bodies(wall, &none, &taken));
                 }
+                Known::Changing(taken) => whole = whole.or(&none.with_bodies(wall, &none, &taken)),
                 Known::Parts(parts) => {
-                    let none = Coverage::<()>::default();
                     for (taken, velocity) in &parts {
-                        let mut coverage = none.with_bodies(wall, &none, taken);
-                        coverage.set_in_motion(*velocity);
-                        whole = whole.or(&coverage);
+                        whole = whole.or(&none.with_bodies(wall, &none, &taken.moving(*velocity)));
                     }
                 }
                 Known::ByFaces => whole = self.with_faces(wall, p, whole, k),

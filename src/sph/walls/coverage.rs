@@ -201,6 +201,7 @@ impl Coverage {
             return *self;
         }
         let gradient = (taken.gradient + part * continuous.gradient) / left;
+        let sweep = taken.sweep / left;
         let delta = wall.distance_of(part);
         let plane = wall.of_face(delta, 0.0);
         // how much faster than λ of a continuous wall the others grow
@@ -216,8 +217,12 @@ impl Coverage {
             gradient: of_part * gradient,
             spread: of_part * (taken.moment - taken.part * Symmetric::IDENTITY)
                 + of_layers * Symmetric::square(normal),
-            sweep: 0.0,
-            barrier: Barrier { part: plane.barrier, gradient: of_barrier * gradient, sweep: 0.0 },
+            sweep: of_part * sweep,
+            barrier: Barrier {
+                part: plane.barrier,
+                gradient: of_barrier * gradient,
+                sweep: of_barrier * sweep,
+            },
             friction: (),
         };
         let (da, db) = (1.0 - bodies.part, 1.0 - self.part);

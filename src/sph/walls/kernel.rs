@@ -221,6 +221,12 @@ impl Wall {
         if part > 0.5 { -delta } else { delta }
     }
 
+    /// How many times ∇λ of a face at the distance δ = d/h is that of a continuous wall.
+    pub fn strength(&self, delta: f64) -> f64 {
+        let slope = self.kernel.slope(delta);
+        if self.layer.is_none() || slope <= 0.0 { 1.0 } else { self.of_face(delta, 0.0).area / slope }
+    }
+
     /// The part of a face at the distance δ = d/h with the mean curvature H·h.
     #[inline]
     pub fn of_face(&self, delta: f64, curvature: f64) -> OfFace {

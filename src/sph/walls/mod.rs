@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! Field::omega ─▶ Maps: λ, ∇λ, K of obstacles by their volume ─▶ Coverage ─▶ density, pressure
-//! Field::faces ─▶ Coverage: λ, ∇λ, K of faces in closed form ─▶ viscosity, and obstacles that change their shape
+//! Field::faces ─▶ Coverage: λ, ∇λ, K of faces in closed form ─▶ viscosity, and obstacles too large for maps
 //! Moving::placement ─▶ StepLimits: how long a step may be
 //! Field::first_entry ─▶ Contact ─▶ Boundary::collide: position and velocity
 //! ```
 
 mod boundary;
 mod contact;
+mod corner;
 mod coverage;
 mod flight;
 mod friction;
@@ -30,4 +31,4 @@ pub use kernel::WallKernel;
 pub(super) use motion::StepLimits;
 pub(super) use shares::Pushed;
 pub(super) use volume::Maps;
-pub use volume::RigidPart;
+pub use volume::{ChangingShape, RigidPart};

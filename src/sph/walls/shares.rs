@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 
 use super::{
     boundary::Boundary,
+    corner::{Corner, Seen},
     coverage::{Coverage, is_positive_definite},
     kernel::Wall,
 };
@@ -15,11 +16,11 @@ use crate::sph::scales::Slip;
 /// Part of a force that walls share in directions in which none of them acts.
 const BESIDE: f64 = 1e-3;
 
-/// How far behind a face a place is in its wall, over the support radius: less than any wall is thick.
+/// How far behind a face, over the support radius, a place is looked at for being in its wall: less than any wall is thick.
 const BEHIND: f64 = 0.02;
 
-/// The square of the sine of the angle, some ten degrees, from which on two faces meet in a corner.
-const LEAST_SQUARED_SINE: f64 = 0.03;
+/// How much less than 1 the cosine of the angle between two faces is that count as parallel: some ten degrees.
+const PARALLEL: f64 = 0.015;
 
 /// What all walls together do to a particle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -51,59 +52,124 @@ struct Near {
 impl Boundary {
     /// Divides what walls do to a particle among the obstacles near it, and tells the acceleration by each, m/s².
     ///
-    /// Each wall presses as if it were alone, p·∇λ of its own. What the walls together press less, because they overlap in a
-    /// corner, acts along them: it is what the mirror image in one wall lacks behind the other. Where none overlap, as at a
-    /// ball above a floor, the rest is what the closed forms of bent faces are off, and acts along the normals.
+    /// Each wall presses as if it were alone, with p·∇λ of its own; in a corner as [`Corner`] says. What the walls together
+    /// press less, because they overlap in a corner, acts along them: it is what the mirror image in one wall lacks behind the
+    /// other. Where none overlap, as at a ball above a floor, the rest is what the closed forms of bent faces are off, and acts
+    /// along the normals.
     ///
     /// What completes pressures is divided by the walls' K. A mirror image holds up the fluid beside its wall, and is pressed
     /// down as much at its end in the corner, so that along a wall all adds up to nothing. (Divided by the normals, the floor
     /// of a vessel had to hold up the images too, and bore 10 % less than the water on it with ten spacings from wall to wall.)
-    /// In corners of other angles than a right one there are no such images, and loads are some 5 % off.
     ///
     /// Friction is divided among the walls to which the fluid sticks, by the directions along them. All shares, that of the
     /// box included, add up to the whole.
     pub fn divide(&self, wall: &Wall, p: DVec3, pushed: &Pushed, mut tell: impl FnMut(usize, DVec3)) {
-        let near = self.near(wall, p);
+        let mut near = self.near(wall, p);
         if let [] | [_] = &near[..] {
             if let Some(obstacle) = near.first().and_then(|only| only.obstacle) {
                 tell(obstacle, pushed.by_pressure + pushed.by_friction);
             }
             return;
         }
+        let in_corner = self.press_in_corners(wall, p, &mut near);
         let Pushed { by_pressure, factor, gradient, by_friction } = *pushed;
         let together: DVec3 = near.iter().map(|near| near.gradient).sum();
         let sum = |weight: fn(&Near) -> DMat3, of: fn(&Near) -> bool| {
             near.iter().filter(|near| of(near)).fold(DMat3::ZERO, |all, near| all + weight(near))
         };
         let completed = sum(|near| near.moment, |_| true).inverse() * (by_pressure - factor * gradient);
-        let share = if self.overlap(wall, p, &near) { Near::along } else { Near::across };
-        let overlapped = sum(share, |_| true).inverse() * (factor * (gradient - together));
+        let share = if in_corner { Near::along } else { Near::across };
+        let left = sum(share, |_| true).inverse() * (factor * (gradient - together));
         let rubs = near.iter().any(|near| near.sticks);
         let friction =
             if rubs { sum(Near::along, |near| near.sticks).inverse() * by_friction } else { DVec3::ZERO };
         for near in &near {
             let Some(obstacle) = near.obstacle else { continue };
             let rubbed = if near.sticks { near.along() * friction } else { DVec3::ZERO };
-            let pressed = factor * near.gradient + share(near) * overlapped + near.moment * completed;
+            let pressed = factor * near.gradient + share(near) * left + near.moment * completed;
             tell(obstacle, pressed + rubbed);
         }
     }
 
-    /// Whether a place near a particle lies in two of the walls near it: in the corner where they meet.
-    fn overlap(&self, wall: &Wall, p: DVec3, near: &[Near]) -> bool {
-        let holds = |near: &Near, q: DVec3| match near.obstacle {
+    /// The faces near a particle, with the numbers of their walls, but for those behind another wall, which has what they
+    /// would do: a floor of the box below a slab that lies on it, or one of the faces of two walls that overlap.
+    fn seen(&self, wall: &Wall, p: DVec3, near: &mut [Near]) -> Vec<(usize, Face)> {
+        let of = |k: usize| self.faces_of(wall, p, &near[k]).into_iter().map(move |face| (k, face));
+        let faces: Vec<(usize, Face)> = (0..near.len()).flat_map(of).collect();
+        let deep = BEHIND * wall.h;
+        let behind = |&(k, face): &(usize, Face)| {
+            let at = |depth: f64| p - (face.distance + depth) * face.normal;
+            let hides = |&&(other, before): &&(usize, Face)| {
+                let nearer = face.distance - before.distance;
+                // where both lie in one plane it is that of an obstacle, or that of the first one
+                let is_first = (near[other].obstacle.is_some(), k) > (near[k].obstacle.is_some(), other);
+                let is_before = nearer > deep || (nearer > -deep && is_first);
+                let is_parallel = || face.normal.dot(before.normal) > 1.0 - PARALLEL;
+                let touches = || nearer < deep || self.is_in(&near[other], at(-deep));
+                let begins = || self.is_in(&near[other], p - (before.distance + deep) * before.normal);
+                other != k
+                    && is_before
+                    && is_parallel()
+                    && self.is_in(&near[k], at(deep))
+                    && begins()
+                    && touches()
+            };
+            // what goes on behind the face is part of it already
+            faces.iter().find(hides).map(|&(other, _)| (other, self.is_in(&near[other], at(deep))))
+        };
+        let hidden: Vec<Option<(usize, bool)>> = faces.iter().map(behind).collect();
+        for ((k, face), hidden) in faces.iter().zip(&hidden) {
+            let &Some((other, goes_on)) = hidden else { continue };
+            let (delta, seen) = (face.distance / wall.h, Seen::of_face(wall, face.distance, face.normal));
+            let (strength, part) = (wall.strength(delta), wall.kernel.covered(delta));
+            near[*k].add(&seen, -strength);
+            near[*k].part = (near[*k].part - part).max(0.0);
+            if !goes_on {
+                near[other].add(&seen, strength);
+                near[other].part += part;
+            }
+        }
+        faces.into_iter().zip(hidden).filter(|(_, hidden)| hidden.is_none()).map(|(face, _)| face).collect()
+    }
+
+    /// Lets each wall press as it does in the corners that it has with others. Whether there are any.
+    fn press_in_corners(&self, wall: &Wall, p: DVec3, near: &mut [Near]) -> bool {
+        let faces = self.seen(wall, p, near);
+        let deep = BEHIND * wall.h;
+        let mut any = false;
+        for (n, (i, one)) in faces.iter().enumerate() {
+            for (j, other) in faces[n + 1..].iter().filter(|(j, _)| j != i) {
+                let Some(corner) = Corner::of(one, other, wall.h) else { continue };
+                let lies_in = |wall: usize, depth: [f64; 2]| self.is_in(&near[wall], p + corner.edge(depth));
+                // both faces begin at the edge, and there is no gap between the walls
+                let begin = lies_in(*i, [deep, -deep]) && lies_in(*j, [-deep, deep]);
+                let go_on = [*i, *j].map(|wall| lies_in(wall, [deep, deep]));
+                if !begin || go_on == [false; 2] {
+                    continue;
+                }
+                any = true;
+                for (on, (k, face)) in [(*i, one), (*j, other)].into_iter().enumerate() {
+                    let strength = wall.strength(face.distance / wall.h);
+                    if !go_on[on] {
+                        near[k].add(&corner.behind_both(wall.h), strength);
+                    }
+                    let own = Seen::of_face(wall, face.distance, face.normal);
+                    near[k].add(&own, -strength);
+                    for distance in corner.pressing(on).into_iter().flatten() {
+                        near[k].add(&Seen::of_face(wall, distance, face.normal), strength);
+                    }
+                }
+            }
+        }
+        any
+    }
+
+    /// Whether a place lies in a wall.
+    fn is_in(&self, near: &Near, q: DVec3) -> bool {
+        match near.obstacle {
             Some(k) => self.field(k).omega(q) > 0.0,
             None => !self.domain.contains(q),
-        };
-        near.iter().enumerate().any(|(i, one)| {
-            let to_one = self.faces_of(wall, p, one);
-            near[i + 1..].iter().any(|other| {
-                let to_other = self.faces_of(wall, p, other);
-                let pairs = to_one.iter().flat_map(|face| to_other.iter().map(move |other| (face, other)));
-                let corners = pairs.filter_map(|(face, other)| behind_both(face, other, wall.h));
-                corners.map(|way| p + way).any(|q| holds(one, q) && holds(other, q))
-            })
-        })
+        }
     }
 
     /// The faces of a wall near a particle.
@@ -159,21 +225,13 @@ impl Boundary {
     }
 }
 
-/// The way from a particle to just behind two faces; `None` if they are nearly parallel or meet far away.
-fn behind_both(one: &Face, other: &Face, h: f64) -> Option<DVec3> {
-    let cosine = one.normal.dot(other.normal);
-    let squared_sine = 1.0 - cosine * cosine;
-    if squared_sine < LEAST_SQUARED_SINE {
-        return None;
-    }
-    let [to_one, to_other] = [one, other].map(|face| face.distance + BEHIND * h);
-    let along_one = (to_one - cosine * to_other) / squared_sine;
-    let along_other = (to_other - cosine * to_one) / squared_sine;
-    let way = -along_one * one.normal - along_other * other.normal;
-    (way.length() < 2.0 * h).then_some(way)
-}
-
 impl Near {
+    /// Adds a part of a wall whose ∇λ is so many times that of a continuous one.
+    fn add(&mut self, seen: &Seen, strength: f64) {
+        self.gradient += strength * seen.gradient;
+        self.moment += strength.signum() * seen.moment;
+    }
+
     /// λ·(n⊗n), and a little in all directions.
     fn across(&self) -> DMat3 {
         self.part * (self.square_of_normal() + BESIDE * DMat3::IDENTITY)
@@ -254,22 +312,31 @@ mod tests {
         assert_eq!(right, DVec3::ZERO);
     }
 
+    /// A slab on the floor of the box, and the same once more: of walls behind one another the first has all.
     #[test]
-    fn corners_are_found_at_any_angle() {
-        let face = |degrees: f64, distance: f64| {
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            Face { distance, normal: DVec3::new(-sin, 0.0, cos), mean_curvature: 0.0 }
+    fn what_is_behind_another_wall_has_nothing() {
+        let slab = || Closures { omega: |p: DVec3| 0.1 - p.z, gradient: |_: DVec3| -DVec3::Z };
+        let p = DVec3::new(0.4, 0.0, 0.3);
+        let pushed = Pushed {
+            by_pressure: DVec3::new(0.3, 0.1, 5.0),
+            factor: -4.0,
+            gradient: DVec3::new(0.0, 0.0, -1.1),
+            by_friction: DVec3::new(1.0, 2.0, 0.0),
         };
-        for degrees in [30.0, 60.0, 90.0, 120.0, 150.0, -60.0] {
-            let (one, other) = (face(0.0, 0.3), face(degrees, 0.2));
-            let way = behind_both(&one, &other, 1.0).unwrap();
-            for face in [one, other] {
-                let behind = -way.dot(face.normal) - face.distance;
-                assert!((behind - BEHIND).abs() < 1e-12, "{degrees}: {way}");
-            }
-        }
-        assert_eq!(behind_both(&face(0.0, 0.3), &face(180.0, 0.3), 1.0), None);
-        assert_eq!(behind_both(&face(0.0, 0.3), &face(5.0, 0.3), 1.0), None);
+        let twice = Boundary { obstacles: vec![sticky(slab()), sticky(slab())], ..boundary(9.0) };
+        let [first, second] = shares(&twice, p, pushed);
+        let whole = pushed.by_pressure + pushed.by_friction;
+        assert!((first - whole).length() < 1e-9 && second.length() < 1e-9, "{first} {second}");
+        // below a gap the floor has its part
+        let high = Closures {
+            omega: |p: DVec3| (0.2 - p.z).min(p.z - 0.1),
+            gradient: |p: DVec3| if p.z > 0.15 { -DVec3::Z } else { DVec3::Z },
+        };
+        let above = Boundary { obstacles: vec![sticky(high)], ..boundary(9.0) };
+        let mut shares = DVec3::ZERO;
+        let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
+        above.divide(&wall, p, &pushed, |_, share| shares += share);
+        assert!(shares.z > 0.1 && shares.z < 4.9, "{shares}");
     }
 
     #[test]

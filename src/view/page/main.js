@@ -27,8 +27,6 @@ class Viewer {
     this.listen();
     this.showPanel(innerWidth > 720);
     this.showPlots(innerWidth >= 1000);
-    byId("transport").hidden = setting.arrays.length === 0;
-    byId("record").hidden = !window.MediaRecorder || setting.arrays.length === 0;
     if (setting.live) this.live = new Live((kind, content) => this.told(kind, content));
   }
 
@@ -45,6 +43,16 @@ class Viewer {
     byId("facts").textContent = setting.facts;
     this.scene.setBox(setting.box);
     if (setting.plots) this.tellPlots(setting.plots);
+    const hasFluid = setting.arrays.length > 0;
+    byId("transport").hidden = !hasFluid;
+    byId("record").hidden = !window.MediaRecorder || !hasFluid;
+    // a file that has lost its fluid
+    if (!hasFluid && this.timeline.frames.length) {
+      this.timeline.clear();
+      this.timelineChanged();
+      this.tellPlots([]);
+      this.camera.frame(look.boxBounds);
+    }
     // controls in use stay as they are: only another set of them is built anew
     const kind = JSON.stringify([setting.params.map(({ name, range, unit }) => [name, range, unit]), setting.arrays.map((array) => array.name)]);
     if (kind !== this.kind) buildPanel(byId("panel"), this);

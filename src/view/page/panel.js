@@ -182,8 +182,8 @@ function boxGroup(viewer) {
   const { look, camera } = viewer;
   return group("Box", true,
     row("drag", choice("drag", ["turns the view", "turns the box"], look.turns ? "turns the box" : "turns the view", (value) => { look.turns = value === "turns the box"; })),
-    row("gravity", choice("gravity", ["stays in the room", "turns with the box"], look.gravityInRoom ? "stays in the room" : "turns with the box", (value) => {
-      look.gravityInRoom = value === "stays in the room";
+    row("gravity", choice("gravity", ["with the room", "with the box"], look.gravityInRoom ? "with the room" : "with the box", (value) => {
+      look.gravityInRoom = value === "with the room";
       viewer.changed();
     })),
     element("div", { className: "buttons" }, element("button", { id: "upright", onclick: () => { camera.turn = NO_TURN; viewer.changed(); } }, "Upright")));

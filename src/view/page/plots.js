@@ -3,8 +3,8 @@
 const LINE_COLOURS = ["#3b7dd8", "#d9822b", "#4c9a52", "#b04a8f", "#7a6bd0", "#8a8f98"];
 
 /** Sizes in pixels of the page: the width of a plot, the least and the usual height of its lines, the height of its title, its
- *  numbers and a row of its legend, the width of a value, what lies between plots. */
-const PLOT = { width: 268, low: 36, lines: 74, title: 22, numbers: 18, row: 14, value: 50, gap: 8 };
+ *  numbers and a row of its legend, what lies below the legend, the width of a value, what lies between plots. */
+const PLOT = { width: 268, low: 36, lines: 74, title: 22, numbers: 18, row: 14, below: 6, value: 62, gap: 8 };
 
 class Plots {
   /** `sought` is called with a time that was clicked. */
@@ -45,7 +45,7 @@ class Plots {
   lines() {
     const context = this.measure ??= element("canvas").getContext("2d");
     context.font = PLOT_FONT;
-    const rest = ({ columns }) => PLOT.title + PLOT.numbers + PLOT.gap + PLOT.row * legendOf(context, columns).rows;
+    const rest = ({ columns }) => PLOT.title + PLOT.below + PLOT.numbers + PLOT.gap + PLOT.row * legendOf(context, columns).rows;
     const room = innerHeight - this.place.getBoundingClientRect().top - 70;
     const height = (room - this.plots.reduce((sum, plot) => sum + rest(plot), 0)) / Math.max(this.plots.length, 1);
     return Math.floor(clamp(height, PLOT.low, PLOT.lines));
@@ -63,7 +63,7 @@ class Plots {
     begin();
     const legend = legendOf(context, plot.columns);
     const { width } = PLOT;
-    const top = PLOT.title + PLOT.row * legend.rows;
+    const top = PLOT.title + PLOT.row * legend.rows + PLOT.below;
     const bottom = top + lines;
     const height = bottom + PLOT.numbers;
     for (const canvas of [still, plot.canvas]) [canvas.width, canvas.height] = [width * ratio, height * ratio];

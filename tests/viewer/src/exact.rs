@@ -111,9 +111,12 @@ pub fn beside_the_mesh(room: &mut Room) {
 pub fn in_motion(room: &mut Room) {
     let _viewer = open(room, &["paddle.rfm", "-D", "particles=500", "--mesh-cells", "192"]);
     room.browser.wait_for("!viewer.run.playing");
-    // the mesh is that of the last frame, once it has been told
+    // while it plays its mesh may be older than its frame; at rest, and after a step, it belongs to the same instant
+    let same_instant = "viewer.meshes[0].time === viewer.timeline.frames.at(-1).time";
+    room.browser.wait_for(same_instant);
+    let time = room.browser.number("viewer.timeline.frames.at(-1).time");
     room.browser.click("#forward");
-    room.browser.eval("new Promise((done) => setTimeout(() => done(0), 700))");
+    room.browser.wait_for(&format!("viewer.timeline.frames.at(-1).time > {time} && {same_instant}"));
     agree(room, "a paddle");
     room.shot("exact-moving");
 }

@@ -74,7 +74,7 @@ pub fn turned(room: &mut Room) {
     // the fluid goes where gravity points in the box
     room.browser.wait_for("viewer.timeline.frames.at(-1).time > 0.3");
     room.shot("turned");
-    room.browser.choose("#gravity", "turns with the box");
+    room.browser.choose("#gravity", "with the box");
     room.browser.wait_for("Math.abs(viewer.look.gravity[2] + 9.81) < 1e-6");
     room.browser.click("#upright");
     room.browser.wait_for("viewer.camera.turn[3] === 1");
@@ -99,6 +99,20 @@ pub fn mended(room: &mut Room) {
     std::fs::write(&file, good.replace("0.05)\n", "0.08)\n")).unwrap();
     let waited = room.browser.wait_for("document.getElementById('notice').hidden");
     println!("  mended after {:.0} ms", waited.as_secs_f64() * 1e3);
+
+    // without its scene a file has no fluid, in this page and in one that is opened then
+    std::fs::write(&file, "rfm 1\nsolid only = sphere(1)\n").unwrap();
+    let shown = "viewer.timeline.frames.length === 0 && viewer.meshes.length === 1 && viewer.setting.box.max[2] < 1.2";
+    for _ in 0..2 {
+        room.browser.wait_for(&format!("window.viewer && {shown}"));
+        assert_eq!(room.browser.eval("document.getElementById('transport').hidden"), true);
+        let plots = room.browser.number("document.querySelectorAll('#plots canvas').length");
+        assert_eq!(plots, 0.0, "plots of a fluid that is gone");
+        room.browser.open(&viewer.address);
+    }
+    std::fs::write(&file, &good).unwrap();
+    room.browser.wait_for("window.viewer && viewer.timeline.frames.length > 2");
+    assert_eq!(room.browser.eval("document.getElementById('transport').hidden"), false);
 }
 
 pub fn solid(room: &mut Room) {

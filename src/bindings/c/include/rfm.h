@@ -175,7 +175,8 @@ typedef struct RfmParam {
     double value;
 } RfmParam;
 
-// The surface as seen from a point: accurate near it, an estimate far away.
+// The surface as seen from a point: accurate near a face, an estimate far away. Before an edge or a corner that stands
+// out the distance is that of the nearest face's plane, up to 29 and 42 % too small.
 typedef struct RfmContact {
     // Distance, m, positive outside.
     double distance;
@@ -219,7 +220,7 @@ enum RfmStatus rfm_gradient_many(const struct RfmSolid *solid,
                                  struct RfmVectors gradient,
                                  struct RfmError **error);
 
-// Whether many points are inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no
+// Whether many points are inside (1), on the surface (0) or outside (-1), as rfm_sign; NaN where the formula has no
 // value.
 enum RfmStatus rfm_sign_many(const struct RfmSolid *solid,
                              size_t count,
@@ -267,8 +268,8 @@ enum RfmStatus rfm_contact_many_f32(const struct RfmSolid *solid,
                                     struct RfmValuesF32 curvature,
                                     struct RfmError **error);
 
-// Puts particles that are inside a solid, or on its surface, back to the nearest place outside, at most `reach`
-// metres away, and reflects their velocities relative to that of the surface: the part `restitution` of the normal
+// Puts particles that are inside a solid, or on its surface, back outside, at most `reach` metres away: to the nearest
+// place if they are not deep in it, else to where the formula's slope leads, which may be farther; and reflects their velocities relative to that of the surface: the part `restitution` of the normal
 // speed returns, and the tangential speed loses at most `friction` times the change of the normal speed. Particles
 // that stay outside keep their bits. `collisions` may be null. The first call for a solid of many parts takes longer,
 // because it finds out which of them matter where; see rfm_solid_within.
@@ -467,7 +468,8 @@ double rfm_gradient(const struct RfmSolid *solid, double x, double y, double z, 
 // `rfm_gradient` in single precision throughout.
 float rfm_gradient_f32(const struct RfmSolid *solid, float x, float y, float z, float *gradient);
 
-// Whether a point is inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no value.
+// Whether a point is inside (1), on the surface (0) or outside (-1): exactly the logic of the parts, each by the sign of
+// its rounded formula. NaN where the formula has no value.
 double rfm_sign(const struct RfmSolid *solid,
                 double x,
                 double y,
@@ -486,7 +488,7 @@ void rfm_wall_velocity(const struct RfmSolid *solid,
 
 // Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
 // is proven that nothing of the path is in the solid, however thin the solid and long the path. `entry` may be null.
-// After an error, or for null, the answer is false as well.
+// After an error, for null, or for numbers that are not finite, the answer is false as well.
 bool rfm_first_entry(const struct RfmSolid *solid,
                      const double *from,
                      const double *to,
@@ -590,7 +592,8 @@ double rfm_gradient(const struct RfmSolid *solid, double x, double y, double z, 
 // `rfm_gradient` in single precision throughout.
 float rfm_gradient_f32(const struct RfmSolid *solid, float x, float y, float z, float *gradient);
 
-// Whether a point is inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no value.
+// Whether a point is inside (1), on the surface (0) or outside (-1): exactly the logic of the parts, each by the sign of
+// its rounded formula. NaN where the formula has no value.
 double rfm_sign(const struct RfmSolid *solid,
                 double x,
                 double y,
@@ -609,7 +612,7 @@ void rfm_wall_velocity(const struct RfmSolid *solid,
 
 // Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
 // is proven that nothing of the path is in the solid, however thin the solid and long the path. `entry` may be null.
-// After an error, or for null, the answer is false as well.
+// After an error, for null, or for numbers that are not finite, the answer is false as well.
 bool rfm_first_entry(const struct RfmSolid *solid,
                      const double *from,
                      const double *to,
@@ -633,7 +636,7 @@ enum RfmStatus rfm_gradient_many(const struct RfmSolid *solid,
                                  struct RfmVectors gradient,
                                  struct RfmError **error);
 
-// Whether many points are inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no
+// Whether many points are inside (1), on the surface (0) or outside (-1), as rfm_sign; NaN where the formula has no
 // value.
 enum RfmStatus rfm_sign_many(const struct RfmSolid *solid,
                              size_t count,
@@ -681,8 +684,8 @@ enum RfmStatus rfm_contact_many_f32(const struct RfmSolid *solid,
                                     struct RfmValuesF32 curvature,
                                     struct RfmError **error);
 
-// Puts particles that are inside a solid, or on its surface, back to the nearest place outside, at most `reach`
-// metres away, and reflects their velocities relative to that of the surface: the part `restitution` of the normal
+// Puts particles that are inside a solid, or on its surface, back outside, at most `reach` metres away: to the nearest
+// place if they are not deep in it, else to where the formula's slope leads, which may be farther; and reflects their velocities relative to that of the surface: the part `restitution` of the normal
 // speed returns, and the tangential speed loses at most `friction` times the change of the normal speed. Particles
 // that stay outside keep their bits. `collisions` may be null. The first call for a solid of many parts takes longer,
 // because it finds out which of them matter where; see rfm_solid_within.

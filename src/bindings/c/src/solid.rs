@@ -35,7 +35,8 @@ pub enum RfmBounds {
     RFM_UNBOUNDED = 2,
 }
 
-/// The surface as seen from a point: accurate near it, an estimate far away.
+/// The surface as seen from a point: accurate near a face, an estimate far away. Before an edge or a corner that stands
+/// out the distance is that of the nearest face's plane, up to 29 and 42 % too small.
 #[repr(C)]
 pub struct RfmContact {
     /// Distance, m, positive outside.
@@ -289,7 +290,8 @@ pub unsafe extern "C" fn rfm_gradient_f32(
     omega
 }
 
-/// Whether a point is inside (1), on the surface (0) or outside (-1), exactly; NaN where the formula has no value.
+/// Whether a point is inside (1), on the surface (0) or outside (-1): exactly the logic of the parts, each by the sign of
+/// its rounded formula. NaN where the formula has no value.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_sign(solid: *const RfmSolid, x: f64, y: f64, z: f64) -> f64 {
     // SAFETY: null, or a solid
@@ -332,7 +334,7 @@ pub unsafe extern "C" fn rfm_wall_velocity(
 
 /// Where the straight path between two points, three numbers each, first meets the solid. False if it does not: it
 /// is proven that nothing of the path is in the solid, however thin the solid and long the path. `entry` may be null.
-/// After an error, or for null, the answer is false as well.
+/// After an error, for null, or for numbers that are not finite, the answer is false as well.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_first_entry(
     solid: *const RfmSolid,
@@ -347,7 +349,12 @@ pub unsafe extern "C" fn rfm_first_entry(
     }
     // SAFETY: the caller promises three numbers each
     let (from, to) = unsafe { (*from.cast::<[f64; 3]>(), *to.cast::<[f64; 3]>()) };
-    let found = answer(None, || this.solid.first_entry(DVec3::from_array(from), DVec3::from_array(to)));
+    let (from, to) = (DVec3::from_array(from), DVec3::from_array(to));
+    // nothing is known of a path from or to nowhere
+    if !(from.is_finite() && to.is_finite()) {
+        return false;
+    }
+    let found = answer(None, || this.solid.first_entry(from, to));
     let Some(found) = found else { return false };
     let normal = found.normals.mean().unwrap_or(DVec3::ZERO).to_array();
     let met = RfmEntry { part: found.t, point: found.point.to_array(), normal, certain: found.certain };

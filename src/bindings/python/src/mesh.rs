@@ -2,13 +2,13 @@
 
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use rfm::Solid;
-use rfm::field::Field;
 use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::mesh::{
@@ -53,6 +53,9 @@ fn unbounded(solid: &Solid) -> String {
 pub struct PyMesh {
     mesh: Mesh,
     report: Report,
+    /// What it was made of, and in which cells; `None` for an empty solid.
+    made_of: Option<(Solid, Grid)>,
+    thin_cells: OnceLock<usize>,
     vertices: PyOnceLock<Py<PyAny>>,
     normals: PyOnceLock<Py<PyAny>>,
     triangles: PyOnceLock<Py<PyAny>>,
@@ -77,20 +80,26 @@ impl PyMesh {
             (None, Bounds::Unbounded) => return Err(refused(unbounded(solid))),
         };
         let grid = grid.map_err(refused)?;
-        Self::new(&*solid.surface(*grid.bounds()), &grid, mesher, no_slivers)
-    }
-
-    /// The mesh of a field, checked.
-    ///
-    /// # Errors
-    /// `RfmError` if the field cannot be meshed.
-    fn new(field: &dyn Field, grid: &Grid, mesher: Mesher, no_slivers: bool) -> PyResult<Self> {
-        let mut found = mesher(field, grid).map_err(refused)?;
+        let field = solid.surface(*grid.bounds());
+        let mut found = mesher(&*field, &grid).map_err(refused)?;
         if no_slivers {
             mesh::remove_slivers(&mut found);
         }
-        let report = mesh::check(&found, field);
-        Ok(Self::checked(found, report))
+        let report = mesh::check(&found, &*field);
+        Ok(Self::checked(found, report, Some((solid.clone(), grid))))
+    }
+
+    /// The number of cells in which parts of the solid hide, found when it is first asked for.
+    ///
+    /// # Errors
+    /// `RfmError` if there are too many cells.
+    fn count_thin_cells(&self) -> PyResult<usize> {
+        if let Some(count) = self.thin_cells.get() {
+            return Ok(*count);
+        }
+        let Some((solid, grid)) = &self.made_of else { return Ok(0) };
+        let found = mesh::thin_cells(&*solid.surface(*grid.bounds()), grid).map_err(refused)?;
+        Ok(*self.thin_cells.get_or_init(|| found.count))
     }
 
     /// The mesh of an empty solid.
@@ -98,12 +107,12 @@ impl PyMesh {
         let nowhere = rfm::field::Closures { omega: |_| -1.0, gradient: |_| DVec3::ZERO };
         let empty = Mesh::default();
         let report = mesh::check(&empty, &nowhere);
-        Self::checked(empty, report)
+        Self::checked(empty, report, None)
     }
 
-    fn checked(mesh: Mesh, report: Report) -> Self {
+    fn checked(mesh: Mesh, report: Report, made_of: Option<(Solid, Grid)>) -> Self {
         let [vertices, normals, triangles] = [PyOnceLock::new(), PyOnceLock::new(), PyOnceLock::new()];
-        Self { mesh, report, vertices, normals, triangles }
+        Self { mesh, report, made_of, thin_cells: OnceLock::new(), vertices, normals, triangles }
     }
 }
 
@@ -181,13 +190,20 @@ impl PyMesh {
         self.report.area
     }
 
-    /// Whether every edge lies in exactly two triangles.
+    /// Whether every edge lies in exactly two triangles. An empty mesh is not closed.
     #[getter]
     fn closed(&self) -> bool {
-        self.report.closed
+        self.report.closed && self.report.triangles > 0
     }
 
-    /// Largest distance of the mesh's triangles from the surface, m, as far as the formula can tell.
+    /// Number of cells in which parts of the solid hide that are too thin for the mesh.
+    #[getter]
+    fn thin_cells(&self, py: Python<'_>) -> PyResult<usize> {
+        py.detach(|| self.count_thin_cells())
+    }
+
+    /// Largest distance of the mesh's vertices from the surface, m. Between them triangles leave a curved surface by up
+    /// to an eighth of the squared cell times its curvature.
     #[getter]
     fn max_distance(&self) -> f64 {
         self.report.max_distance
@@ -226,6 +242,13 @@ impl PyMesh {
         if format.only_metres && unit != LengthUnit::METRE {
             return Err(PyValueError::new_err(format!(".{ending} files are always in metres")));
         }
+        if self.mesh.triangles.is_empty() {
+            let reason = match py.detach(|| self.count_thin_cells())? {
+                0 => "the solid is empty, or smaller than a cell".to_owned(),
+                n => format!("parts of the solid hide in {n} cells; mesh it with more"),
+            };
+            return Err(refused(format!("the mesh is empty: {reason}")));
+        }
         py.detach(|| write_file(&path, |out| write(&self.mesh, unit, out)))
     }
 
@@ -246,8 +269,8 @@ impl PyMesh {
     }
 
     fn __repr__(&self) -> String {
-        let Report { vertices, triangles, closed, .. } = self.report;
-        let closed = if closed { "closed" } else { "open" };
+        let Report { vertices, triangles, .. } = self.report;
+        let closed = if self.closed() { "closed" } else { "open" };
         format!("<rfm.Mesh {vertices} vertices, {triangles} triangles, {closed}>")
     }
 }

@@ -37,7 +37,10 @@ pub fn first_entry<'py>(
     }
     let (from, to) = (rows(&both.get_item(0)?)?, rows(&both.get_item(1)?)?);
     let few = threads == Threads::Auto && from.len() < WORTH_THREADS;
-    let met = |(from, to): (&DVec3, &DVec3)| solid.first_entry(*from, *to);
+    // nothing is known of a path from or to nowhere
+    let met = |(from, to): (&DVec3, &DVec3)| {
+        if from.is_finite() && to.is_finite() { solid.first_entry(*from, *to) } else { None }
+    };
     let entries: Vec<Option<Entry>> = if few || threads.is_one() {
         py.detach(|| from.iter().zip(&to).map(met).collect())
     } else {
@@ -47,7 +50,10 @@ pub fn first_entry<'py>(
     let part = PyArray1::from_iter(py, entries.iter().map(|e| e.map_or(f64::NAN, |e| e.t)));
     let point = vectors(py, &entries, |entry| entry.point)?.call_method1("reshape", (&shape,))?;
     let normal = vectors(py, &entries, normal)?.call_method1("reshape", (&shape,))?;
-    let certain = PyArray1::from_iter(py, entries.iter().map(|e| e.is_some_and(|e| e.certain)));
+    let is_path = from.iter().zip(&to).map(|(from, to)| from.is_finite() && to.is_finite());
+    // that there is no entry is proven, too
+    let certain = entries.iter().zip(is_path).map(|(e, is_path)| is_path && e.is_none_or(|e| e.certain));
+    let certain = PyArray1::from_iter(py, certain);
     shape.pop();
     let part = part.call_method1("reshape", (&shape,))?;
     let certain = certain.call_method1("reshape", (&shape,))?;

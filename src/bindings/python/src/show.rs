@@ -128,7 +128,7 @@ fn page_of_simulation(experiment: &Experiment, simulation: &Simulation, facts: &
     let mut page = Page::begin(&mut out, &setting).ok()?;
     let has_mesh = !obstacles.triangles.is_empty();
     if has_mesh {
-        page.block(&pack_mesh(&split_creases(&obstacles), 0)).ok()?;
+        page.block(&pack_mesh(&split_creases(&obstacles), simulation.time(), 0)).ok()?;
     }
     let (time, step) = (simulation.time(), Some(simulation.steps()));
     let head = FrameHead { time, step, ranges, mesh: has_mesh.then_some(0), run: 0, motion: None };

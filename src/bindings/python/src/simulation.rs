@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
 use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
@@ -30,7 +30,8 @@ const CHECKPOINTS: &str = "checkpoints";
 ///
 /// ``program.scene("drop")`` makes one at its start. Arrays of particles are copies in the order in which the
 /// particles were made, so that a row is always the same particle. Quantities are in SI units. While one thread
-/// takes steps, others get a ``RuntimeError``.
+/// takes steps, others get a ``RuntimeError`` for all but ``time``, ``steps``, ``len`` and what stays the same: these
+/// tell how far it was a moment ago.
 #[pyclass(frozen, module = "rfm", name = "Simulation")]
 pub struct PySimulation {
     program: Py<PyProgram>,
@@ -38,6 +39,32 @@ pub struct PySimulation {
     threads: Threads,
     warnings: Py<PyTuple>,
     state: Mutex<State>,
+    now: Mutex<Now>,
+}
+
+/// How far a simulation is: what is told while it takes steps, too.
+#[derive(Clone, Copy)]
+struct Now {
+    time: f64,
+    steps: u64,
+    particles: usize,
+    /// Mass of a particle, kg.
+    mass: f64,
+    /// m.
+    spacing: f64,
+}
+
+impl Now {
+    fn of(simulation: &Simulation) -> Self {
+        let parameters = simulation.parameters();
+        Self {
+            time: simulation.time(),
+            steps: simulation.steps(),
+            particles: simulation.particles().len(),
+            mass: parameters.particle_mass,
+            spacing: parameters.spacing(),
+        }
+    }
 }
 
 /// What changes with each step.
@@ -148,6 +175,7 @@ impl PySimulation {
         let mut found = experiment.warnings();
         found.list.extend(warnings.list);
         let recorders = run(py, threads, || recorders(&experiment, &mut simulation, None))??;
+        let now = Mutex::new(Now::of(&simulation));
         let state = State { simulation, recorders, failed: None, lent: Lent::default() };
         Ok(Self {
             program: program.clone().unbind(),
@@ -155,6 +183,7 @@ impl PySimulation {
             threads,
             warnings: diagnostics(py, &found)?.unbind(),
             state: Mutex::new(state),
+            now,
         })
     }
 
@@ -169,6 +198,16 @@ impl PySimulation {
                 "a step of the simulation was interrupted by an error of the program",
             )),
         }
+    }
+
+    /// How far it is; a moment ago, if another thread takes steps.
+    fn now(&self) -> Now {
+        // it is copied as a whole, so a thread that panicked left nothing half done
+        *self.now.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn set_now(&self, simulation: &Simulation) {
+        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = Now::of(simulation);
     }
 
     /// The state, to be changed.
@@ -195,9 +234,11 @@ impl PySimulation {
         let mut state = self.state_to_change()?;
         let state = &mut *state;
         while run(py, self.threads, || state.go_on(goal))?.is_continue() {
+            self.set_now(&state.simulation);
             report(&state.simulation)?;
             py.check_signals()?;
         }
+        self.set_now(&state.simulation);
         report(&state.simulation)?;
         match &state.failed {
             Some(error) => Err(refused(error)),
@@ -247,14 +288,14 @@ impl PySimulation {
 
     /// Simulated time, s.
     #[getter]
-    fn time(&self) -> PyResult<f64> {
-        Ok(self.state()?.simulation.time())
+    fn time(&self) -> f64 {
+        self.now().time
     }
 
     /// Number of steps taken.
     #[getter]
-    fn steps(&self) -> PyResult<u64> {
-        Ok(self.state()?.simulation.steps())
+    fn steps(&self) -> u64 {
+        self.now().steps
     }
 
     /// Time at which a run of the scene ends, s, as the file states it.
@@ -263,16 +304,16 @@ impl PySimulation {
         self.experiment.scene().run.until
     }
 
-    /// Mass of a particle, kg.
+    /// Mass of a particle, kg: ``len(simulation)`` of them have that of the fluid.
     #[getter]
     fn particle_mass(&self) -> f64 {
-        self.experiment.parameters().particle_mass
+        self.now().mass
     }
 
-    /// Distance of particles at the start, m.
+    /// Distance of particles, m: the side of a cube of the fluid with the mass of one.
     #[getter]
     fn spacing(&self) -> f64 {
-        self.experiment.parameters().spacing()
+        self.now().spacing
     }
 
     /// The box of the scene: array of shape (2, 3), m.
@@ -284,8 +325,8 @@ impl PySimulation {
     }
 
     /// Number of particles.
-    fn __len__(&self) -> PyResult<usize> {
-        Ok(self.state()?.simulation.particles().len())
+    fn __len__(&self) -> usize {
+        self.now().particles
     }
 
     /// Places of the particles: a copy, array of shape (n, 3), m.
@@ -333,7 +374,7 @@ impl PySimulation {
     ///
     /// Parameters
     /// ----------
-    /// count : int
+    /// count : int, not negative
     ///
     /// Raises
     /// ------
@@ -342,7 +383,10 @@ impl PySimulation {
     /// KeyboardInterrupt
     ///     After Ctrl-C. The simulation may go on from the last whole step.
     #[pyo3(signature = (count=1))]
-    fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
+    fn step(&self, py: Python<'_>, count: i64) -> PyResult<()> {
+        let Ok(count) = u64::try_from(count) else {
+            return Err(PyValueError::new_err(format!("count is {count}, expected 0 or more steps")));
+        };
         let last = self.state()?.simulation.steps().saturating_add(count);
         self.go_on(py, Goal::Steps(last), |_| Ok(()))
     }
@@ -363,6 +407,11 @@ impl PySimulation {
     fn advance(&self, py: Python<'_>, until: f64, progress: bool) -> PyResult<()> {
         if !until.is_finite() {
             return Err(PyValueError::new_err(format!("until is {until} s, expected a finite time")));
+        }
+        let time = self.state()?.simulation.time();
+        if until < time {
+            let message = format!("until is {until} s, but the simulation is at {time} s and cannot go back");
+            return Err(PyValueError::new_err(message));
         }
         let result = self.go_on(py, Goal::Time(until), |simulation| match progress {
             true => show_progress(py, simulation, until, ""),
@@ -506,6 +555,7 @@ impl PySimulation {
             Ok::<_, PyErr>((simulation, recorders))
         })?;
         let (simulation, recorders) = resumed?;
+        self.set_now(&simulation);
         *state = State { simulation, recorders, failed: None, lent: Lent::default() };
         Ok(())
     }
@@ -516,10 +566,9 @@ impl PySimulation {
         show::simulation(py, &self.experiment, &state.simulation, self.threads)
     }
 
-    fn __repr__(&self) -> PyResult<String> {
-        let state = self.state()?;
-        let (count, time) = (state.simulation.particles().len(), state.simulation.time());
-        Ok(format!("<rfm.Simulation {}: {count} particles, t = {time} s>", self.name()))
+    fn __repr__(&self) -> String {
+        let Now { particles, time, .. } = self.now();
+        format!("<rfm.Simulation {}: {particles} particles, t = {time} s>", self.name())
     }
 }
 

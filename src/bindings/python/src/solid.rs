@@ -237,7 +237,8 @@ impl PySolid {
         )
     }
 
-    /// Whether points are inside (1), on the surface (0) or outside (-1), exactly.
+    /// Whether points are inside (1), on the surface (0) or outside (-1): exactly the logic of the parts, each
+    /// by the sign of its rounded formula.
     ///
     /// Parameters
     /// ----------
@@ -270,7 +271,8 @@ impl PySolid {
         )
     }
 
-    /// The surface as seen from points: accurate near it, an estimate far away.
+    /// The surface as seen from points: accurate near a face, an estimate far away. Before an edge or a corner that
+    /// stands out the distance is that of the nearest face's plane, up to 29 and 42 % too small.
     ///
     /// Parameters
     /// ----------
@@ -328,8 +330,9 @@ impl PySolid {
     /// -------
     /// `Entry`, always in double precision: ``part`` of shape (...), the part of the path before the entry, 0 to 1,
     /// or NaN if there is none; ``point`` of shape (..., 3), m; ``normal`` of shape (..., 3), the outward unit
-    /// normal there, the mean of those that meet; ``certain`` of shape (...), False where the path only grazes the
-    /// surface within rounding errors.
+    /// normal there, the mean of those that meet; ``certain`` of shape (...), False where the path may only graze the
+    /// surface within rounding errors, and for ends that are not finite. An entry comes early, never late, by up to
+    /// some 1e-8 of the path where the surface is met far from the origin or steeply.
     #[pyo3(signature = (start, end, *, threads=Threads::Auto))]
     #[pyo3(text_signature = "($self, start, end, *, threads=None)")]
     fn first_entry<'py>(
@@ -341,9 +344,10 @@ impl PySolid {
         first_entry(&self.solid, start, end, threads)
     }
 
-    /// Puts particles that are inside the solid, or on its surface, back to the nearest place outside, and reflects
-    /// their velocities relative to that of the surface. Both arrays are changed in place; particles that stay
-    /// outside keep their bits.
+    /// Puts particles that are inside the solid, or on its surface, back outside, and reflects their velocities
+    /// relative to that of the surface. Both arrays are changed in place; particles that stay outside keep their bits.
+    /// A particle goes to the nearest place outside if it is not deep in the solid, as after a step. Deeper than the
+    /// solid is thick, or bent, it goes where the formula's slope leads, which may be farther: ``reach`` limits that.
     ///
     /// Parameters
     /// ----------

@@ -37,13 +37,20 @@ pub(in crate::sph) struct Taken {
     pub gradient: DVec3,
     /// K = ∫ y ⊗ ∇W, y from the particle.
     pub moment: Symmetric,
+    /// −∂λ/∂t, 1/s: ∇λ·v for bodies that move with the velocity v.
+    pub sweep: f64,
 }
 
 impl Taken {
     /// What turned bodies take.
     pub fn turned(&self, rotation: &DMat3) -> Self {
-        let Self { part, gradient, moment } = *self;
-        Self { part, gradient: *rotation * gradient, moment: moment.turned(rotation) }
+        let Self { part, gradient, moment, sweep } = *self;
+        Self { part, gradient: *rotation * gradient, moment: moment.turned(rotation), sweep }
+    }
+
+    /// What bodies take that move with one velocity, m/s.
+    pub fn moving(&self, velocity: DVec3) -> Self {
+        Self { sweep: self.gradient.dot(velocity), ..*self }
     }
 }
 
@@ -52,9 +59,27 @@ const NODES: usize = BRICK * BRICK * BRICK;
 
 /// Coefficients of the spline.
 #[repr(align(64))]
-struct Brick {
+pub(super) struct Brick {
     /// x runs first.
     nodes: [Node; NODES],
+}
+
+impl Brick {
+    /// The sum of bricks with weights, and with other weights the rate at which its λ changes. `None` if there are none.
+    pub fn sum<'a>(terms: impl Iterator<Item = (Option<&'a Brick>, f64, f64)>) -> Option<Box<Self>> {
+        let mut sum = None;
+        for (brick, weight, rate) in terms {
+            let Some(brick) = brick else { continue };
+            let sum = sum.get_or_insert_with(|| Box::new(NOTHING));
+            let (weight, rate) = (weight as f32, rate as f32);
+            for (node, added) in sum.nodes.iter_mut().zip(&brick.nodes) {
+                node.diagonal += weight * added.diagonal;
+                node.others += weight * added.others;
+                node.others.w += rate * added.diagonal.w;
+            }
+        }
+        sum
+    }
 }
 
 /// Coefficients at a node.
@@ -62,51 +87,31 @@ struct Brick {
 struct Node {
     /// xx, yy and zz of K, and λ.
     diagonal: Vec4,
-    /// yz, zx and xy of K.
+    /// yz, zx and xy of K, and ∂λ/∂t, 1/s, of what changes its shape.
     others: Vec4,
 }
 
 /// A brick without bodies near.
-static NOTHING: Brick = Brick { nodes: [Node { diagonal: Vec4::ZERO, others: Vec4::ZERO }; NODES] };
+const NOTHING: Brick = Brick { nodes: [Node { diagonal: Vec4::ZERO, others: Vec4::ZERO }; NODES] };
 
-/// A map of λ and K.
-pub(super) struct VolumeMap {
-    lattice: Lattice,
-    stencil: Stencil,
-    fractions: Fractions,
+/// The nodes of a lattice, of which bricks are made when they are asked for.
+pub(super) struct Spline {
+    lattice: Arc<Lattice>,
     /// `None` where no body is near.
     bricks: Sparse<Option<Box<Brick>>>,
-    /// Memory of the bricks, bytes.
-    bytes: AtomicUsize,
 }
 
-impl VolumeMap {
-    /// The map of bodies in a box, for a support radius, m. `None` if there are no bodies, or more than 10⁶ cells along
-    /// the sides of the box.
-    pub fn new(bodies: Vec<Arc<dyn Walls>>, domain: &Aabb, h: f64) -> Option<Self> {
-        if bodies.is_empty() {
-            return None;
-        }
-        let lattice = Lattice::new(domain, h);
-        let fractions = Fractions::new(bodies, &lattice)?;
+impl Spline {
+    /// No bricks yet. `None` if there are more than 10⁶ cells along the sides of the box.
+    pub fn new(lattice: &Arc<Lattice>) -> Option<Self> {
         let bricks = Sparse::new(lattice.cells.map(|n| (n + 3) / BRICK + 1))?;
-        let stencil = Stencil::new(&lattice, h);
-        Some(Self { stencil, lattice, fractions, bricks, bytes: AtomicUsize::new(0) })
+        Some(Self { lattice: lattice.clone(), bricks })
     }
 
-    /// Memory of what has been made so far, bytes.
-    pub fn bytes(&self) -> usize {
-        self.bytes.load(Ordering::Relaxed)
-    }
-
-    /// Whether the map holds a place.
-    pub fn reaches(&self, p: DVec3) -> bool {
-        self.lattice.domain.contains(p)
-    }
-
-    /// What the bodies take of the kernel at a place in the box; `None` if none is near.
-    pub fn at(&self, p: DVec3) -> Option<Taken> {
-        let Lattice { domain, step, cells } = &self.lattice;
+    /// What bodies take of the kernel at a place in the box; `None` if none is near. Bricks are made by their indices.
+    #[inline]
+    pub fn at(&self, p: DVec3, make: impl Fn([usize; 3]) -> Option<Box<Brick>>) -> Option<Taken> {
+        let Lattice { domain, step, cells } = &*self.lattice;
         let u = (p - domain.min) / step;
         let cell: [usize; 3] = std::array::from_fn(|axis| (u[axis].max(0.0) as usize).min(cells[axis] - 1));
         // the nodes cell − 1 to cell + 2 along each axis have the indices cell to cell + 3, in one or two bricks
@@ -116,12 +121,13 @@ impl VolumeMap {
             let is_second: [usize; 3] = std::array::from_fn(|axis| corner >> axis & 1);
             let is_touched = (0..3).all(|axis| is_second[axis] == 0 || !cell[axis].is_multiple_of(BRICK));
             let brick = if is_touched {
-                self.brick(std::array::from_fn(|axis| first[axis] + is_second[axis]))
+                let at = std::array::from_fn(|axis| first[axis] + is_second[axis]);
+                self.bricks.get(at, || make(at)).as_deref()
             } else {
                 None
             };
             is_near |= brick.is_some();
-            brick.unwrap_or(&NOTHING)
+            brick.unwrap_or(const { &NOTHING })
         });
         if !is_near {
             return None;
@@ -134,11 +140,57 @@ impl VolumeMap {
             part: f64::from(diagonal.w),
             gradient: slopes.as_dvec3() / *step,
             moment: Symmetric::new(diagonal.truncate().as_dvec3(), others.truncate().as_dvec3()),
+            sweep: -f64::from(others.w),
         })
     }
+}
 
-    fn brick(&self, at: [usize; 3]) -> Option<&Brick> {
-        self.bricks.get(at, || self.make(at)).as_deref()
+/// A map of λ and K.
+pub(super) struct VolumeMap {
+    spline: Spline,
+    stencil: Arc<Stencil>,
+    fractions: Fractions,
+    /// Memory of the bricks, bytes.
+    bytes: AtomicUsize,
+}
+
+impl VolumeMap {
+    /// The map of bodies in a box, for a support radius, m. `None` if there are no bodies, or more than 10⁶ cells along
+    /// the sides of the box.
+    pub fn new(bodies: Vec<Arc<dyn Walls>>, domain: &Aabb, h: f64) -> Option<Self> {
+        if bodies.is_empty() {
+            return None;
+        }
+        let lattice = Arc::new(Lattice::new(domain, h));
+        let stencil = Arc::new(Stencil::new(&lattice, h));
+        Self::on(&lattice, &stencil, bodies)
+    }
+
+    /// The map of bodies on a lattice, with its weights.
+    pub fn on(lattice: &Arc<Lattice>, stencil: &Arc<Stencil>, bodies: Vec<Arc<dyn Walls>>) -> Option<Self> {
+        let fractions = Fractions::new(bodies, lattice)?;
+        let spline = Spline::new(lattice)?;
+        Some(Self { spline, stencil: stencil.clone(), fractions, bytes: AtomicUsize::new(0) })
+    }
+
+    /// Memory of what has been made so far, bytes.
+    pub fn bytes(&self) -> usize {
+        self.bytes.load(Ordering::Relaxed)
+    }
+
+    /// Whether the map holds a place.
+    pub fn reaches(&self, p: DVec3) -> bool {
+        self.spline.lattice.domain.contains(p)
+    }
+
+    /// What the bodies take of the kernel at a place in the box; `None` if none is near.
+    pub fn at(&self, p: DVec3) -> Option<Taken> {
+        self.spline.at(p, |at| self.make(at))
+    }
+
+    /// A brick, by its indices; `None` where no body is near.
+    pub fn brick(&self, at: [usize; 3]) -> Option<&Brick> {
+        self.spline.bricks.get(at, || self.make(at)).as_deref()
     }
 
     /// Makes a brick from the cells around it.
@@ -170,7 +222,8 @@ impl VolumeMap {
     fn block(&self, first: [isize; 3]) -> Option<Vec<Row>> {
         let spans: [_; 3] = std::array::from_fn(|axis| {
             let low = first[axis].max(0) as usize;
-            let high = (first[axis] + BLOCK as isize).clamp(0, self.lattice.cells[axis] as isize) as usize;
+            let high =
+                (first[axis] + BLOCK as isize).clamp(0, self.spline.lattice.cells[axis] as isize) as usize;
             low..high
         });
         let [is, js, ks] = spans;
@@ -180,7 +233,7 @@ impl VolumeMap {
         let mut rows = Vec::new();
         // tiles that follow one another along x do so in the order in which rows are filled
         for [ti, tj, tk] in places(tiles(&is), tiles(&js), tiles(&ks)) {
-            let tile = self.fractions.tile(&self.lattice, [ti, tj, tk]);
+            let tile = self.fractions.tile(&self.spline.lattice, [ti, tj, tk]);
             if matches!(tile, Tile::Empty) {
                 continue;
             }

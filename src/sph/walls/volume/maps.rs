@@ -1,11 +1,14 @@
-//! The maps of all obstacles of a scene: one of those at rest, and one of each, or of each part of one, that moves without
-//! deformation.
+//! The maps of all obstacles of a scene: one of those at rest, one of each, or of each part of one, that moves without
+//! deformation, and those of each that changes its shape.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::map::{Taken, VolumeMap};
+use super::{
+    changing::{Changing, ChangingShape},
+    map::{Taken, VolumeMap},
+};
 use crate::{
     field::{Moving, Walls},
     geom::{Aabb, Placement},
@@ -23,8 +26,17 @@ pub struct RigidPart {
     pub moving: Option<Arc<dyn Moving>>,
 }
 
-/// An obstacle: its field at the time 0, its motion, and the parts that move differently, if there are any.
-pub(in crate::sph) type Mapped<'a> = (&'a Arc<dyn Walls>, Option<&'a Arc<dyn Moving>>, &'a [RigidPart]);
+/// An obstacle.
+pub(in crate::sph) struct Mapped<'a> {
+    /// Its field at the time 0.
+    pub field: &'a Arc<dyn Walls>,
+    /// `None` if it is at rest.
+    pub motion: Option<&'a Arc<dyn Moving>>,
+    /// The parts that move differently, if there are any.
+    pub parts: &'a [RigidPart],
+    /// How it changes its shape, if it does and that is known.
+    pub changing: Option<&'a ChangingShape>,
+}
 
 /// What obstacles take of kernels.
 #[derive(Default)]
@@ -41,6 +53,8 @@ enum Body {
     Whole(Box<Rigid>),
     /// In a map for each part.
     Parts(Vec<Rigid>),
+    /// In maps for instants.
+    Changing(Box<Changing>),
     /// Nowhere.
     Unknown,
 }
@@ -88,7 +102,10 @@ impl Rigid {
 pub(in crate::sph) enum Known {
     /// It is one of those at rest, see [`Maps::at_rest`].
     AtRest,
+    /// It moves as a whole.
     Taken(Taken),
+    /// It changes its shape, and how that moves its surface is known too.
+    Changing(Taken),
     /// What each of its parts takes, and the velocity at which this moves, m/s.
     Parts(Vec<(Taken, DVec3)>),
     /// It is not near.
@@ -100,14 +117,18 @@ pub(in crate::sph) enum Known {
 impl Maps {
     /// The maps of obstacles in a box, for a support radius, m, as they are at a time, s.
     pub fn new(obstacles: &[Mapped<'_>], domain: &Aabb, h: f64, time: f64) -> Self {
-        let at_rest = obstacles.iter().filter(|(_, motion, _)| motion.is_none());
-        let at_rest = VolumeMap::new(at_rest.map(|&(field, ..)| field.clone()).collect(), domain, h);
+        let at_rest = obstacles.iter().filter(|obstacle| obstacle.motion.is_none());
+        let at_rest = VolumeMap::new(at_rest.map(|obstacle| obstacle.field.clone()).collect(), domain, h);
         let around = domain.grown(BEYOND * domain.size().length());
-        let body = |&(field, motion, parts): &Mapped<'_>| match motion {
+        let body = |&Mapped { field, motion, parts, changing }: &Mapped<'_>| match motion {
             None if at_rest.is_some() => Body::AtRest,
             Some(_) if !parts.is_empty() => {
                 let maps = parts.iter().map(|part| Rigid::new(&part.field, part.moving.as_ref(), &around, h));
                 maps.collect::<Option<Vec<_>>>().map_or(Body::Unknown, Body::Parts)
+            }
+            Some(_) if changing.is_some() => {
+                let changing = changing.and_then(|shape| Changing::new(shape, domain, h, time));
+                changing.map_or(Body::Unknown, |changing| Body::Changing(Box::new(changing)))
             }
             Some(motion) if motion.placement(0.0).is_some() => {
                 let whole = Rigid::new(field, Some(motion), &around, h);
@@ -126,6 +147,7 @@ impl Maps {
             match body {
                 Body::AtRest | Body::Unknown => {}
                 Body::Whole(whole) => whole.move_to(to),
+                Body::Changing(changing) => changing.move_to(to),
                 Body::Parts(parts) => {
                     for part in parts {
                         part.move_to(to);
@@ -141,6 +163,7 @@ impl Maps {
         let of_body = |body: &Body| match body {
             Body::AtRest | Body::Unknown => 0,
             Body::Whole(whole) => whole.map.bytes(),
+            Body::Changing(changing) => changing.bytes(),
             Body::Parts(parts) => parts.iter().map(|part| part.map.bytes()).sum(),
         };
         self.at_rest.as_ref().map_or(0, VolumeMap::bytes) + self.bodies.iter().map(of_body).sum::<usize>()
@@ -156,13 +179,16 @@ impl Maps {
         match self.bodies.get(k) {
             Some(Body::AtRest) => Known::AtRest,
             Some(Body::Whole(whole)) => whole.at(p),
+            Some(Body::Changing(changing)) => changing.at(p).map_or(Known::Nothing, Known::Changing),
             Some(Body::Parts(parts)) => {
                 let mut taken = Vec::new();
                 for part in parts {
                     match part.at(p) {
                         Known::Taken(by_part) => taken.push((by_part, part.velocity(p))),
                         Known::Nothing => {}
-                        Known::AtRest | Known::Parts(_) | Known::ByFaces => return Known::ByFaces,
+                        Known::AtRest | Known::Parts(_) | Known::Changing(_) | Known::ByFaces => {
+                            return Known::ByFaces;
+                        }
                     }
                 }
                 if taken.is_empty() { Known::Nothing } else { Known::Parts(taken) }

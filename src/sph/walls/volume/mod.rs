@@ -1,5 +1,5 @@
 //! What bodies take of the kernels near them, by their volume: λ = ∫ W, ∇λ and K = ∫ y ⊗ ∇W over all bodies at rest in the
-//! box, and over each body, or part of one, that moves without changing its shape.
+//! box, over each body, or part of one, that moves without changing its shape, and over each that changes it, at instants.
 //!
 //! The box has a lattice with [`CELLS`](lattice::CELLS) cells along a support radius. How far bodies fill its cells is found from their
 //! fields ([`fractions`]), and what the filled cells add to a node from a table ([`stencil`]). Between the nodes λ is a
@@ -13,6 +13,7 @@
 //!
 //! Nodes lie in bricks that are made when a particle first comes near. Nothing that is not asked for costs time or memory.
 
+mod changing;
 mod fractions;
 mod lattice;
 mod map;
@@ -22,6 +23,7 @@ mod stencil;
 #[cfg(test)]
 mod tests;
 
+pub use self::changing::ChangingShape;
 pub(in crate::sph) use self::map::Taken;
 pub use self::maps::RigidPart;
-pub(in crate::sph) use self::maps::{Known, Maps};
+pub(in crate::sph) use self::maps::{Known, Mapped, Maps};

@@ -5,14 +5,18 @@ use std::{f64::consts::PI, sync::Arc};
 use glam::DVec3;
 
 use super::{
+    changing::{Changing, ChangingShape},
     map::{Taken, VolumeMap},
-    maps::{Known, Maps, RigidPart},
+    maps::{Known, Mapped, Maps, RigidPart},
 };
 use crate::sph::{
     scenes::{half_space, pawn, random_cloud, sphere},
     walls::{Wall, WallKernel, symmetric::Symmetric},
 };
-use crate::{field::Walls, geom::Aabb};
+use crate::{
+    field::{Moving, Walls},
+    geom::Aabb,
+};
 
 const H: f64 = 0.26;
 
@@ -20,6 +24,11 @@ const KERNEL: WallKernel = WallKernel::WendlandC2;
 
 fn map(body: Arc<dyn Walls>, domain: Aabb) -> VolumeMap {
     VolumeMap::new(vec![body], &domain, H).unwrap()
+}
+
+/// A body that moves, and its parts.
+fn mapped<'a>(field: &'a Arc<dyn Walls>, motion: &'a Arc<dyn Moving>, parts: &'a [RigidPart]) -> Mapped<'a> {
+    Mapped { field, motion: Some(motion), parts, changing: None }
 }
 
 fn cube(side: f64) -> Aabb {
@@ -38,7 +47,8 @@ fn planes_have_their_closed_forms() {
             if !(0.0..1.0).contains(&delta) {
                 continue;
             }
-            let nothing = Taken { part: 0.0, gradient: DVec3::ZERO, moment: Symmetric::default() };
+            let nothing =
+                Taken { part: 0.0, gradient: DVec3::ZERO, moment: Symmetric::default(), sweep: 0.0 };
             let taken = map.at(place).unwrap_or(nothing);
             let (part, slope) = (KERNEL.covered(delta), KERNEL.slope(delta));
             let moment = part * Symmetric::IDENTITY + delta * slope * Symmetric::square(normal);
@@ -155,8 +165,8 @@ fn moving_bodies_take_their_map_along() {
     );
     let solid = program.unwrap().solid("s").unwrap();
     let field: Arc<dyn Walls> = Arc::new(solid.at(0.0));
-    let motion: Arc<dyn crate::field::Moving> = Arc::new(solid.clone());
-    let mut maps = Maps::new(&[(&field, Some(&motion), &[])], &cube(2.0), H, 0.0);
+    let motion: Arc<dyn Moving> = Arc::new(solid.clone());
+    let mut maps = Maps::new(&[mapped(&field, &motion, &[])], &cube(2.0), H, 0.0);
     maps.move_to(0.0, 0.7);
     let there = map(Arc::new(solid.at(0.7)), cube(2.0));
     let mut seen = 0;
@@ -184,8 +194,8 @@ fn parts_of_a_body_take_their_maps_along() {
     let parts = [&slow, &fast]
         .map(|solid| RigidPart { field: Arc::new(solid.at(0.0)), moving: Some(Arc::new(solid.clone())) });
     let field: Arc<dyn Walls> = Arc::new(both.at(0.0));
-    let motion: Arc<dyn crate::field::Moving> = Arc::new(both.clone());
-    let mut maps = Maps::new(&[(&field, Some(&motion), &parts)], &cube(2.0), H, 0.0);
+    let motion: Arc<dyn Moving> = Arc::new(both.clone());
+    let mut maps = Maps::new(&[mapped(&field, &motion, &parts)], &cube(2.0), H, 0.0);
     maps.move_to(0.4, 0.5);
     let there = [&slow, &fast].map(|solid| map(Arc::new(solid.at(0.5)), cube(2.0)));
     let mut before: Option<f64> = None;
@@ -194,7 +204,7 @@ fn parts_of_a_body_take_their_maps_along() {
         let found = match maps.of(0, place) {
             Known::Parts(found) => found,
             Known::Nothing => Vec::new(),
-            Known::AtRest | Known::Taken(_) | Known::ByFaces => panic!("{place}"),
+            Known::AtRest | Known::Taken(_) | Known::Changing(_) | Known::ByFaces => panic!("{place}"),
         };
         let [by_slow, by_fast] = there.each_ref().map(|map| map.at(place).map_or(0.0, |taken| taken.part));
         let part_with = |rise: f64| {
@@ -210,5 +220,44 @@ fn parts_of_a_body_take_their_maps_along() {
         // a step of a fortieth of the kernel
         assert!(before.is_none_or(|before| (part - before).abs() < 0.1), "{place}: {before:?} {part}");
         before = Some(part);
+    }
+}
+
+/// A ball that grows takes what it would at each instant, and its sweep is how fast that grows: at the first and the last
+/// instant of a run too, and beyond.
+#[test]
+fn bodies_that_change_their_shape_take_what_they_would_at_each_instant() {
+    let program =
+        crate::Program::from_source("grows.rfm", "rfm 1\nsolid s = sphere(0.2 + 0.3*sqrt(t*(2 - t)))");
+    let solid = program.unwrap().solid("s").unwrap();
+    let shape = ChangingShape { body: Arc::new(solid.clone()), interval: 0.05, until: 1.5 };
+    let domain = cube(2.0);
+    for time in [0.2, 0.61, 1.37, 1.5, 1.52] {
+        let changing = Changing::new(&shape, &domain, H, time).unwrap();
+        let [before, there, after] = [-1e-3, 0.0, 1e-3].map(|d| map(Arc::new(solid.at(time + d)), domain));
+        let mut worst = [0.0_f64; 3];
+        for place in random_cloud(300, 0.9).iter() {
+            let (Some(found), Some(exact)) = (changing.at(place), there.at(place)) else { continue };
+            let part_at = |map: &VolumeMap| map.at(place).map_or(0.0, |taken| taken.part);
+            let rate = (part_at(&after) - part_at(&before)) / 2e-3;
+            let off = [
+                (found.part - exact.part).abs(),
+                (found.gradient - exact.gradient).length() * H,
+                (found.sweep + rate).abs() * H,
+            ];
+            worst = std::array::from_fn(|k| worst[k].max(off[k]));
+        }
+        println!("{time}: λ {:.5}, ∇λ {:.4}, sweep {:.4}", worst[0], worst[1], worst[2]);
+        assert!(worst[0] < 0.001 && worst[1] < 0.01 && worst[2] < 0.01, "{time}: {worst:?}");
+    }
+    // one after the other, the same as at once
+    let mut along = Changing::new(&shape, &domain, H, 0.2).unwrap();
+    for time in [0.21, 0.26, 0.43, 1.0, 0.3] {
+        along.move_to(time);
+        let at_once = Changing::new(&shape, &domain, H, time).unwrap();
+        for place in random_cloud(50, 0.9).iter() {
+            let part = |changing: &Changing| changing.at(place).map(|taken| taken.part);
+            assert_eq!(part(&along), part(&at_once), "{time}");
+        }
     }
 }

@@ -29,7 +29,7 @@ Entry.__module__ = "rfm"
 Entry.__doc__ = """Where paths first meet a solid.
 
 ``part`` (...) is the part of the path before the entry, 0 to 1, or NaN if there is none; ``point`` (..., 3), m;
-``normal`` (..., 3) is the outward unit normal; ``certain`` (...) is False where a path only grazes the surface.
+``normal`` (..., 3) is the outward unit normal; ``certain`` (...) is False where a path may only graze the surface.
 """
 
 Collisions = namedtuple("Collisions", ["hits", "stuck", "undefined"])
