@@ -280,7 +280,8 @@ impl PySimulation {
         &self.experiment.scene().name
     }
 
-    /// Messages about the scene and its start: a tuple of `Diagnostic`.
+    /// Messages about the scene and its start: a tuple of `Diagnostic`. ``rfm check`` also looks for parts of obstacles
+    /// that are too thin for the particles (W0508), and for formulas that jump.
     #[getter]
     fn warnings(&self, py: Python<'_>) -> Py<PyTuple> {
         self.warnings.clone_ref(py)
@@ -391,7 +392,7 @@ impl PySimulation {
         self.go_on(py, Goal::Steps(last), |_| Ok(()))
     }
 
-    /// Takes steps until a time, at which the last step ends.
+    /// Takes steps until a time, at which the last step ends; none if that time has passed.
     ///
     /// Parameters
     /// ----------
@@ -407,11 +408,6 @@ impl PySimulation {
     fn advance(&self, py: Python<'_>, until: f64, progress: bool) -> PyResult<()> {
         if !until.is_finite() {
             return Err(PyValueError::new_err(format!("until is {until} s, expected a finite time")));
-        }
-        let time = self.state()?.simulation.time();
-        if until < time {
-            let message = format!("until is {until} s, but the simulation is at {time} s and cannot go back");
-            return Err(PyValueError::new_err(message));
         }
         let result = self.go_on(py, Goal::Time(until), |simulation| match progress {
             true => show_progress(py, simulation, until, ""),

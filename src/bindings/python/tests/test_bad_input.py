@@ -190,3 +190,20 @@ def test_classes_are_not_made_by_hand():
     for made in (rfm.Program, rfm.Solid, rfm.Mesh, rfm.Slice, rfm.Simulation):
         with pytest.raises(TypeError):
             made()
+
+
+def test_meshes_of_thin_solids_say_what_they_lack(tmp_path):
+    plate = rfm.load("rfm 1\nsolid plate = box([0, 0, 0], [1, 1, 0.001])\n")["plate"]
+    mesh = plate.mesh(cells=64)
+    assert len(mesh.triangles) == 0 and not mesh.closed and mesh.thin_cells > 0
+    with pytest.raises(rfm.RfmError, match="empty"):
+        mesh.save(tmp_path / "plate.stl")
+    assert not (tmp_path / "plate.stl").exists()
+    fine = rfm.load("rfm 1\nsolid ball = sphere(1)\n")["ball"].mesh(cells=16)
+    assert fine.closed and fine.thin_cells == 0
+
+
+def test_paths_from_nowhere_are_not_certain():
+    ball = rfm.load("rfm 1\nsolid ball = sphere(1)\n")["ball"]
+    part, point, normal, certain = ball.first_entry([[np.nan, 0, 0], [-2, 0, 0]], [[2, 0, 0], [np.inf, 0, 0]])
+    assert np.isnan(part).all() and np.isnan(point).all() and np.isnan(normal).all() and not certain.any()

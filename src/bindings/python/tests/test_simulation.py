@@ -153,12 +153,34 @@ def test_states_that_do_not_fit_are_refused(drop, tmp_path):
     drop.step()
 
 
+def test_a_particle_has_the_mass_of_its_part_of_the_fluid():
+    text = """rfm 1
+    scene s {
+      box { max: [0.63, 0.41, 0.5] }
+      fluid water { shape: box([0, 0, 0], [0.63, 0.41, 0.29]), density: 1000, spacing: 5.3 cm }
+      run { until: 1 s }
+    }"""
+    pool = rfm.load(text).scene()
+    assert len(pool) * pool.particle_mass == pytest.approx(1000 * 0.63 * 0.41 * 0.29, rel=1e-3)
+    assert pool.spacing == pytest.approx((pool.particle_mass / 1000) ** (1 / 3))
+
+
+def test_another_thread_sees_how_far_a_simulation_is(drop):
+    seen, steps = [], threading.Thread(target=drop.step, args=(200,))
+    steps.start()
+    while steps.is_alive():
+        seen.append((drop.time, drop.steps, len(drop), repr(drop)))
+    steps.join()
+    assert drop.steps == 200 and [s for _, s, _, _ in seen] == sorted(s for _, s, _, _ in seen)
+    assert all(0 <= time <= drop.time and count == len(drop) for time, _, count, _ in seen)
+
+
 def test_bad_goals(drop):
     for until in (np.nan, np.inf):
         with pytest.raises(ValueError, match="until"):
             drop.advance(until)
     for count in (-1, 1.5, "ten"):
-        with pytest.raises((TypeError, OverflowError)):
+        with pytest.raises((TypeError, ValueError)):
             drop.step(count)
     drop.step(0)
     drop.advance(-1.0)
