@@ -427,3 +427,26 @@ scene drag {
     let program = Program::from_source("belt.rfm", text).unwrap();
     assert_eq!(Experiment::new(&program, "drag", Engine::Auto).unwrap().typical_speed(), 30.0);
 }
+
+/// A gravity that ceases to have a value is named, whether it depends on the time or on the place.
+#[test]
+fn a_gravity_without_a_value_is_named() {
+    for (gravity, told) in [
+        ("-9.81*sqrt(0.02 - t)", "the formula of gravity has no finite value at t = 0.02"),
+        ("-9.81 - 1/max(0, t - 0.02)*0.01", "the formula of gravity has no finite value at t = 0"),
+        ("-9.81*sqrt(z - 0.1)", "the formula of gravity has no finite value at ["),
+    ] {
+        let text = format!(
+            "rfm 1
+scene s {{
+  box {{ max: [0.4, 0.4, 0.6] }}
+  fluid water {{ shape: box([0, 0, 0], [0.4, 0.4, 0.4]), density: 1000, spacing: 0.05 }}
+  gravity: [0, 0, {gravity}]
+  method: wcsph
+  run {{ until: 1 s }}
+}}"
+        );
+        let error = run(&text).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains(told), "{gravity}: {error}");
+    }
+}

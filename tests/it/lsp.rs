@@ -530,3 +530,18 @@ fn what_takes_longer_is_told_when_the_text_rests() {
     assert_eq!(editor.messages[0]["range"]["start"]["line"], 2);
     editor.end();
 }
+
+/// A message that makes no sense is refused, and those that follow are answered.
+#[test]
+fn a_senseless_message_is_refused_and_survived() {
+    let mut editor = Editor::with("rfm 1\nsolid s = sphere(1)\n");
+    for text in ["{", "nonsense", r#"{"jsonrpc": "2.0", "id": 7}"#] {
+        let to = editor.to.as_mut().unwrap();
+        write!(to, "Content-Length: {}\r\n\r\n{text}", text.len()).unwrap();
+        to.flush().unwrap();
+        assert_eq!(editor.read()["error"]["code"], -32700, "{text}");
+    }
+    let at = json!({ "textDocument": { "uri": URI }, "position": { "line": 1, "character": 10 } });
+    let hover = editor.ask("textDocument/hover", at);
+    assert!(hover["contents"].to_string().contains("sphere"), "{hover}");
+}

@@ -11,6 +11,7 @@ mod edits;
 mod hover;
 mod messages;
 mod names;
+mod pipes;
 mod preview;
 mod symbols;
 mod words;
@@ -42,6 +43,7 @@ use super::failure::Failure;
 use background::Background;
 use document::{Document, Encoding};
 use names::Meaning;
+use pipes::Pipes;
 
 #[derive(Debug, Args)]
 #[command(
@@ -59,12 +61,12 @@ pub(super) struct Lsp {}
 
 /// Serves one editor until it says good-bye.
 pub(super) fn run(_: &Lsp) -> Result<(), Failure> {
-    let (connection, threads) = Connection::stdio();
+    let (connection, pipes) = Pipes::open()?;
     let outcome = serve(&connection);
     // the threads end when the last sender is gone
     drop(connection);
     outcome?;
-    threads.join()?;
+    pipes.close()?;
     Ok(())
 }
 
