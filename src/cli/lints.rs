@@ -308,7 +308,7 @@ fn thin(
     let number = scene.fluid.particles.map_or_else(String::new, |n| {
         format!(", that of {:.1e} particles,", n as f64 * (spacing / needed).powi(3))
     });
-    let help = format!("a spacing of {needed:.1e} m{number} shows it; or make the {what} wider");
+    let help = format!("a spacing of {needed:.1e} m{number} is small enough; or make the {what} wider");
     Diagnostic::warning(Code::THIN_FOR_PARTICLES, obstacle.span, message).help(help)
 }
 

@@ -251,10 +251,10 @@ pack its particles at the start, and make them lighter as far as those at curved
 and momentum are smaller by as much. More particles leave smaller gaps; `method: wcsph` keeps all of the mass.";
 THIN_FOR_PARTICLES = "W0508":
 "A gap of an obstacle is thinner than the spacing of the particles, or a wall thinner than half of it. No particle finds room in
-such a gap. Through such a wall the fluid on one side feels that on the other more than its own second neighbours. A wall whose
-load a probe measures is told of from one and a half spacings on: kernels before it reach beyond it, and where nothing is
-behind it the fluid is pressed against it harder than it should be. The message says how thin it is, where, and what spacing
-shows it. Parts that extend over less than two spacings, and the tips of wedges, do
+such a gap. Through such a wall the fluid on one side feels that on the other more than its own second neighbours. Of a wall whose
+load a probe measures it is told if it is thinner than one and a half spacings: kernels before it reach beyond it, and where
+nothing is behind it the fluid is pressed against it harder than it should be. The message says how thin it is, where, and what
+spacing is small enough. Parts that extend over less than two spacings, and the tips of wedges, do
 not count.";
 TENSION_STIRS = "W0509":
 "The surface tension of a divergence-free fluid (dfsph) is a force by normals and curvature. It is not the gradient of an

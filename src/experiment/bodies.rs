@@ -19,11 +19,11 @@ const PATH_RESOLUTION: f64 = 0.05;
 const WINDOW: f64 = 16.0;
 
 /// How far the surface of a solid that changes its shape moves between two looks at it, over the support radius. What it
-/// takes of kernels is a cubic in time, whose error is below a thousandth then.
-const CHANGE: f64 = 1.0 / 6.0;
+/// takes of kernels is a cubic in time, whose error is about a thousandth then.
+const CHANGE: f64 = 1.0 / 8.0;
 
-/// The least number of intervals between such looks in a run: a cubic needs three.
-const LEAST_CHANGES: f64 = 3.0;
+/// The least number of intervals between such looks in a run.
+const LEAST_CHANGES: f64 = 16.0;
 
 /// A solid in the way of the fluid: an obstacle, or the outside of the container.
 pub struct Body {
@@ -106,8 +106,8 @@ fn body(
     Ok(Body { solid, skin, obstacle })
 }
 
-/// How often a solid that changes its shape during a run is looked at; `None` if it does not change it, or has so many parts
-/// that its volume would cost too much.
+/// How often a solid that changes its shape during a run is looked at; `None` if it does not change it, if it has so many
+/// parts that its volume would cost too much, or if its surface is not found.
 fn changing_shape(
     program: &Program,
     shape: Node,
@@ -120,11 +120,11 @@ fn changing_shape(
         return None;
     }
     let way = CHANGE * parameters.support_radius;
-    let wanted = wall_speed::time_for(whole, way, &scene.domain, until)
+    let wanted = wall_speed::time_for(whole, way, &scene.domain, until)?
         .max(parameters.stable_dt(parameters.expected_speed).min(parameters.time_step));
     // a whole number of them, so that none is beyond the end
-    let count = (until / wanted).ceil().max(LEAST_CHANGES);
-    Some(ChangingShape { body: Arc::new(whole.clone()), interval: until / count, until })
+    let intervals = (until / wanted).ceil().max(LEAST_CHANGES) as u64;
+    Some(ChangingShape { body: Arc::new(whole.clone()), until, intervals })
 }
 
 /// The cheapest field that represents a solid in the box of a scene.

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::Solid;
 use crate::geom::Aabb;
+use crate::solid::Bounds;
 use crate::sph::{Slip, VectorField};
 
 /// Times of a run at which a wall is looked at.
@@ -27,10 +28,17 @@ const STEPS: usize = 3;
 /// The part of the box's longest side within which a place counts as one of the surface.
 const NEAR: f64 = 1e-3;
 
+/// How far a body's pressure reaches into a fluid, over its greatest size: that of a ball has fallen to a fortieth there.
+const REACH: f64 = 4.0;
+
+/// How often a stretch of time is halved in search of a motion that is short.
+const HALVINGS: usize = 12;
+
 /// The greatest speed, m/s, with which a solid's surface drives the fluid in a box during a run: that along its normal, or
 /// the whole if the fluid sticks to it; `belt` is its motion within the surface where that is stated. A surface with the
-/// acceleration a raises pressures up to ρ·a·L in a box of the length L, as a speed of √(a·L) does: what swings fast without
-/// getting far would else drive a fluid with a sound so slow that it resounds. Zero for a solid at rest.
+/// acceleration a raises pressures up to ρ·a·L over a length L, that of the box or of some bodies, as a speed of √(a·L) does:
+/// what swings fast without getting far would else drive a fluid with a sound so slow that it resounds. Zero for a solid
+/// at rest.
 ///
 /// It is found at some places and times, so a wall that moves during a hundredth of the run alone may be missed. Solids of
 /// many parts are not looked at: their gradients would be one large program, which nothing else needs.
@@ -44,9 +52,13 @@ pub(super) fn greatest(
     if !(solid.moves() || belt.is_some()) || solid.has_many_leaves() {
         return 0.0;
     }
-    let (soon, reach) = (SOON * until, domain.size().max_element());
+    let size = match solid.at(0.0).bounds() {
+        Bounds::Within(bounds) => REACH * bounds.size().max_element(),
+        Bounds::Empty | Bounds::Unbounded => f64::INFINITY,
+    };
+    let reach = size.min(domain.size().max_element());
     let mut greatest = 0.0;
-    at_places(solid, domain, until, |now, (p, normal)| {
+    at_places(solid, domain, until, |[now, later], (p, normal)| {
         let velocity = now.wall_velocity(p);
         let along = match (slip, &belt) {
             (Slip::Free, _) => 0.0,
@@ -54,8 +66,8 @@ pub(super) fn greatest(
             (Slip::No, None) => velocity.length(),
         };
         let across = velocity.dot(normal);
-        let later = solid.at(now.time() + soon).wall_velocity(p).dot(normal);
-        let by_pressure = ((later - across).abs() / soon * reach).sqrt();
+        let change = later.wall_velocity(p).dot(normal) - across;
+        let by_pressure = (change.abs() / (SOON * until) * reach).sqrt();
         let speeds = [across.abs(), along, by_pressure];
         greatest = speeds.into_iter().filter(|speed| speed.is_finite()).fold(greatest, f64::max);
     });
@@ -63,26 +75,58 @@ pub(super) fn greatest(
 }
 
 /// A time, s, in which a solid's surface in a box moves by no more than `way`, m, along its normal, and in which its speed
-/// changes by no more than a small part of that: at most the whole run. Found at some places and times, as [`greatest`] is.
-pub(super) fn time_for(solid: &Solid, way: f64, domain: &Aabb, until: f64) -> f64 {
-    let soon = SOON * until;
-    let mut time = until;
-    at_places(solid, domain, until, |now, (p, normal)| {
+/// changes by no more than a small part of that: at most the whole run. `None` if no place of its surface is found.
+///
+/// Its speed is looked at in some instants, and between each two of them how far it has moved from one to the next. Where that
+/// is too far, the half in which it moves farther is looked at in the same way.
+pub(super) fn time_for(solid: &Solid, way: f64, domain: &Aabb, until: f64) -> Option<f64> {
+    let mut time: Option<f64> = None;
+    at_places(solid, domain, until, |[now, later], (p, normal)| {
         let speed = now.wall_velocity(p).dot(normal);
-        let later = solid.at(now.time() + soon).wall_velocity(p).dot(normal);
+        let change = later.wall_velocity(p).dot(normal) - speed;
         let by_speed = way / speed.abs();
-        let by_change = (CHANGE * way * soon / (later - speed).abs()).sqrt();
-        time = time.min(by_speed).min(by_change);
+        let by_change = (CHANGE * way * SOON * until / change.abs()).sqrt();
+        time = Some(time.unwrap_or(until).min(by_speed).min(by_change));
     });
-    time
+    let instant = |k: usize| until * k as f64 / TIMES as f64;
+    let stretches = (0..TIMES).filter_map(|k| quiet_time(solid, way, domain, [instant(k), instant(k + 1)]));
+    Some(stretches.fold(time?, f64::min))
 }
 
-/// Calls `see` with a solid at some times of a run, and places of its surface in a box with their normals.
-fn at_places(solid: &Solid, domain: &Aabb, until: f64, mut see: impl FnMut(&Solid, (DVec3, DVec3))) {
+/// The length, s, of a part of a stretch of time in which the surface moves by no more than `way`, m: where it moves fastest.
+fn quiet_time(solid: &Solid, way: f64, domain: &Aabb, [mut from, mut to]: [f64; 2]) -> Option<f64> {
+    let mut moved = farthest(solid, domain, [from, to])?;
+    for _ in 0..HALVINGS {
+        if moved <= way {
+            break;
+        }
+        let middle = 0.5 * (from + to);
+        let halves = [[from, middle], [middle, to]];
+        let [first, second] = halves.map(|half| farthest(solid, domain, half).unwrap_or(0.0));
+        ([from, to], moved) = if first > second { (halves[0], first) } else { (halves[1], second) };
+    }
+    Some(to - from)
+}
+
+/// How far places of the surface at a time, s, are from the surface at another one, m, at most.
+fn farthest(solid: &Solid, domain: &Aabb, [from, to]: [f64; 2]) -> Option<f64> {
+    let (now, then) = (solid.at(from), solid.at(to));
+    let ways = (0..SIDE.pow(3)).filter_map(|start| on_surface(&now, domain, start)).map(|(p, _)| {
+        let (omega, gradient) = then.omega_grad(p);
+        (omega / gradient.length()).abs()
+    });
+    ways.filter(|way| way.is_finite()).reduce(f64::max)
+}
+
+/// Calls `see` with a solid at some times of a run and a little later, and with places of its surface in a box and their
+/// normals.
+fn at_places(solid: &Solid, domain: &Aabb, until: f64, mut see: impl FnMut([&Solid; 2], (DVec3, DVec3))) {
     for k in 0..TIMES {
-        let now = solid.at(until * (k as f64 + 0.5) / TIMES as f64);
+        // instants that no period of a motion divides, and at which none begins
+        let time = until * (k as f64 + 0.618) / TIMES as f64;
+        let (now, later) = (solid.at(time), solid.at(time + SOON * until));
         for place in (0..SIDE.pow(3)).filter_map(|start| on_surface(&now, domain, start)) {
-            see(&now, place);
+            see([&now, &later], place);
         }
     }
 }

@@ -295,7 +295,6 @@ scene carry {
     }
 }
 
-/// A wall that moves gives the speed of sound where it is faster than a fall through the box.
 /// A body that changes its shape by nothing to speak of leaves water at rest as one does that stands still: without maps of its
 /// volume the closed forms of its bent faces threw particles of three spacings away at 7 m/s.
 #[test]
@@ -382,10 +381,11 @@ scene s {
     let volume = 4.0 / 3.0 * std::f64::consts::PI * 0.1_f64.powi(3);
     let added = sum / square / (1000.0 * volume);
     println!("added mass {added} of the displaced, typical speed {} m/s", experiment.typical_speed());
-    // in a box six radii wide potential flow gives some 0.53
-    assert!((0.35..0.8).contains(&added), "{added}");
+    // in a box six radii wide potential flow gives some 0.53; the ball is three spacings in radius, and acts larger
+    assert!((0.5..0.85).contains(&added), "{added}");
 }
 
+/// A wall that moves, or is accelerated, gives the speed of sound where that is faster than a fall through the box.
 #[test]
 fn fast_walls_are_expected() {
     let speed = |motion: &str, gravity: f64| {
@@ -433,14 +433,13 @@ scene drag {
 fn a_gravity_without_a_value_is_named() {
     for (gravity, told) in [
         ("-9.81*sqrt(0.02 - t)", "the formula of gravity has no finite value at t = 0.02"),
-        ("-9.81 - 1/max(0, t - 0.02)*0.01", "the formula of gravity has no finite value at t = 0"),
-        ("-9.81*sqrt(z - 0.1)", "the formula of gravity has no finite value at ["),
+        ("-9.81*sqrt(z + 0.02 - t)", "the formula of gravity has no finite value at ["),
     ] {
         let text = format!(
             "rfm 1
 scene s {{
   box {{ max: [0.4, 0.4, 0.6] }}
-  fluid water {{ shape: box([0, 0, 0], [0.4, 0.4, 0.4]), density: 1000, spacing: 0.05 }}
+  fluid water {{ shape: box([0, 0, 0], [0.4, 0.4, 0.4]), density: 1000, spacing: 0.05, sound_speed: 30 }}
   gravity: [0, 0, {gravity}]
   method: wcsph
   run {{ until: 1 s }}

@@ -239,6 +239,7 @@ impl Session {
         match made {
             Ok((checked, Standing { mesh, solids, domain })) => {
                 self.board.set_block(Topic::Mesh, mesh);
+                self.pace.mesh.time = f64::NAN;
                 self.status.error = None;
                 self.standing = Some((solids, domain));
                 self.show_slice(0.0);
@@ -276,6 +277,8 @@ impl Session {
             }
             Err(error) => {
                 self.status.error = Some(error);
+                // the last run remains, and its obstacles with it
+                self.show_obstacles();
                 // its params must be within reach, so that they can be set otherwise
                 if self.checked.is_none() {
                     self.board.set_setting(self.subject.setting(Some(&checked), &bounds, None));

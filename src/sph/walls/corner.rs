@@ -4,7 +4,8 @@
 //! above it takes ½ of a kernel, and the pressure counts twice. In a corner columns above a wall end at the other one, if the
 //! corner is acute, and if it is obtuse there is fluid without wall below it. So a particle presses on a wall if its foot is on
 //! it, and so does its mirror image behind the other wall. In a corner of a right angle that is what it does if the wall is alone.
-//! (Without this a wall of the corner θ is off by 0.21·cot θ·p·h for each part of the edge.)
+//! (Without this a wall of the corner θ is off by 0.21·cot θ·p·h for each part of the edge. Below 45° there are images of
+//! images, which are left out: there it is off by 0.21·cot 2θ·p·h.)
 //!
 //! The places behind both faces lie in a wedge along the edge. Integrals along the edge and away from the particle come from
 //! a table, the one over the angle around the particle from a sum.

@@ -206,8 +206,10 @@ impl Coverage {
         let plane = wall.of_face(delta, 0.0);
         // how much faster than λ of a continuous wall the others grow
         let slope = wall.kernel.slope(delta);
-        let of_part = if wall.layer.is_some() { plane.area / slope } else { 1.0 };
-        let of_barrier = if wall.layer.is_some() { plane.barrier_area / slope } else { 0.0 };
+        // deep in a wall nothing grows any more
+        let in_layers = wall.layer.is_some() && slope > 0.0;
+        let of_part = if in_layers { plane.area / slope } else { 1.0 };
+        let of_barrier = if in_layers { plane.barrier_area / slope } else { 0.0 };
         // K of layers differs from that of a continuous wall along the normal; for a plane this is exact
         let of_layers = plane.spread - of_part * delta * slope;
         let normal = gradient.normalize_or_zero();

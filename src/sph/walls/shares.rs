@@ -72,22 +72,25 @@ impl Boundary {
             return;
         }
         let in_corner = self.press_in_corners(wall, p, &mut near);
+        // that of strongly bent faces, and of thin walls, may have no share to give along their normals
+        for near in near.iter_mut().filter(|near| !is_positive_definite(&near.moment)) {
+            near.moment = near.part * DMat3::IDENTITY;
+        }
         let Pushed { by_pressure, factor, gradient, by_friction } = *pushed;
-        let together: DVec3 = near.iter().map(|near| near.gradient).sum();
         let sum = |weight: fn(&Near) -> DMat3, of: fn(&Near) -> bool| {
             near.iter().filter(|near| of(near)).fold(DMat3::ZERO, |all, near| all + weight(near))
         };
-        let completed = sum(|near| near.moment, |_| true).inverse() * (by_pressure - factor * gradient);
+        let completed = solved(sum(|near| near.moment, |_| true), by_pressure - factor * gradient);
         let share = if in_corner { Near::along } else { Near::across };
-        let left = sum(share, |_| true).inverse() * (factor * (gradient - together));
-        let rubs = near.iter().any(|near| near.sticks);
+        let pressed = |near: &Near| factor * near.gradient + near.moment * completed;
+        let left = solved(sum(share, |_| true), by_pressure - near.iter().map(pressed).sum::<DVec3>());
+        let rubs = near.iter().any(|near| near.sticks && near.part > 0.0);
         let friction =
-            if rubs { sum(Near::along, |near| near.sticks).inverse() * by_friction } else { DVec3::ZERO };
+            if rubs { solved(sum(Near::along, |near| near.sticks), by_friction) } else { DVec3::ZERO };
         for near in &near {
             let Some(obstacle) = near.obstacle else { continue };
             let rubbed = if near.sticks { near.along() * friction } else { DVec3::ZERO };
-            let pressed = factor * near.gradient + share(near) * left + near.moment * completed;
-            tell(obstacle, pressed + rubbed);
+            tell(obstacle, pressed(near) + share(near) * left + rubbed);
         }
     }
 
@@ -114,19 +117,23 @@ impl Boundary {
                     && begins()
                     && touches()
             };
-            // what goes on behind the face is part of it already
-            faces.iter().find(hides).map(|&(other, _)| (other, self.is_in(&near[other], at(deep))))
+            faces.iter().find(hides).map(|&(other, _)| other)
         };
-        let hidden: Vec<Option<(usize, bool)>> = faces.iter().map(behind).collect();
+        let hidden: Vec<Option<usize>> = faces.iter().map(behind).collect();
+        let is_seen = |k: usize| {
+            let mut own = faces.iter().zip(&hidden).filter(|((other, _), _)| *other == k);
+            own.any(|((_, face), hidden)| hidden.is_none() && face.distance > -deep)
+        };
         for ((k, face), hidden) in faces.iter().zip(&hidden) {
-            let &Some((other, goes_on)) = hidden else { continue };
-            let (delta, seen) = (face.distance / wall.h, Seen::of_face(wall, face.distance, face.normal));
-            let (strength, part) = (wall.strength(delta), wall.kernel.covered(delta));
-            near[*k].add(&seen, -strength);
-            near[*k].part = (near[*k].part - part).max(0.0);
-            if !goes_on {
-                near[other].add(&seen, strength);
-                near[other].part += part;
+            let &Some(other) = hidden else { continue };
+            // the fluid feels the friction of what it cannot reach, too
+            near[other].sticks |= near[*k].sticks;
+            if is_seen(*k) {
+                let (delta, seen) = (face.distance / wall.h, Seen::of_face(wall, face.distance, face.normal));
+                near[*k].add(&seen, -wall.strength(delta));
+                near[*k].part = (near[*k].part - wall.kernel.covered(delta)).max(0.0);
+            } else {
+                (near[*k].gradient, near[*k].moment, near[*k].part) = (DVec3::ZERO, DMat3::ZERO, 0.0);
             }
         }
         faces.into_iter().zip(hidden).filter(|(_, hidden)| hidden.is_none()).map(|(face, _)| face).collect()
@@ -136,9 +143,10 @@ impl Boundary {
     fn press_in_corners(&self, wall: &Wall, p: DVec3, near: &mut [Near]) -> bool {
         let faces = self.seen(wall, p, near);
         let deep = BEHIND * wall.h;
-        let mut any = false;
+        // whether the particle presses on a face itself, and the distances of its images that do; `None` if it is in no corner
+        let mut presses: Vec<Option<(bool, SmallVec<[f64; 4]>)>> = vec![None; faces.len()];
         for (n, (i, one)) in faces.iter().enumerate() {
-            for (j, other) in faces[n + 1..].iter().filter(|(j, _)| j != i) {
+            for (m, (j, other)) in faces.iter().enumerate().skip(n + 1).filter(|(_, (j, _))| j != i) {
                 let Some(corner) = Corner::of(one, other, wall.h) else { continue };
                 let lies_in = |wall: usize, depth: [f64; 2]| self.is_in(&near[wall], p + corner.edge(depth));
                 // both faces begin at the edge, and there is no gap between the walls
@@ -147,21 +155,33 @@ impl Boundary {
                 if !begin || go_on == [false; 2] {
                     continue;
                 }
-                any = true;
-                for (on, (k, face)) in [(*i, one), (*j, other)].into_iter().enumerate() {
-                    let strength = wall.strength(face.distance / wall.h);
+                for (on, at) in [n, m].into_iter().enumerate() {
+                    let (k, face) = &faces[at];
                     if !go_on[on] {
-                        near[k].add(&corner.behind_both(wall.h), strength);
+                        near[*k].add(&corner.behind_both(wall.h), wall.strength(face.distance / wall.h));
                     }
-                    let own = Seen::of_face(wall, face.distance, face.normal);
-                    near[k].add(&own, -strength);
-                    for distance in corner.pressing(on).into_iter().flatten() {
-                        near[k].add(&Seen::of_face(wall, distance, face.normal), strength);
-                    }
+                    let [own, image] = corner.pressing(on);
+                    let (itself, images) = presses[at].get_or_insert_with(|| (true, SmallVec::new()));
+                    *itself &= own.is_some();
+                    images.extend(image);
                 }
             }
         }
-        any
+        for ((k, face), presses) in faces.iter().zip(&presses) {
+            let Some((itself, images)) = presses else { continue };
+            let taken = |distance: f64| {
+                let seen = Seen::of_face(wall, distance, face.normal);
+                (seen, wall.strength(distance / wall.h))
+            };
+            if !itself {
+                let (seen, strength) = taken(face.distance);
+                near[*k].add(&seen, -strength);
+            }
+            for (seen, strength) in images.iter().map(|distance| taken(*distance)) {
+                near[*k].add(&seen, strength);
+            }
+        }
+        presses.iter().any(Option::is_some)
     }
 
     /// Whether a place lies in a wall.
@@ -198,8 +218,6 @@ impl Boundary {
             let slip = obstacle.map_or(self.slip, |k| self.obstacles[k].slip);
             let Coverage { part, gradient, spread, .. } = *coverage;
             let moment = part * DMat3::IDENTITY + spread.to_matrix();
-            // that of strongly bent faces may have no share to give along their normals
-            let moment = if is_positive_definite(&moment) { moment } else { part * DMat3::IDENTITY };
             Near { obstacle, part, gradient, moment, sticks: slip == Slip::No }
         };
         let mut found: SmallVec<[Near; 4]> = SmallVec::new();
@@ -223,6 +241,12 @@ impl Boundary {
         }
         found
     }
+}
+
+/// The solution x of A·x = b; zero if A has no inverse, as where nothing is left of any wall.
+fn solved(a: DMat3, b: DVec3) -> DVec3 {
+    let x = a.inverse() * b;
+    if x.is_finite() { x } else { DVec3::ZERO }
 }
 
 impl Near {
@@ -327,12 +351,20 @@ mod tests {
         let [first, second] = shares(&twice, p, pushed);
         let whole = pushed.by_pressure + pushed.by_friction;
         assert!((first - whole).length() < 1e-9 && second.length() < 1e-9, "{first} {second}");
-        // below a gap the floor has its part
-        let high = Closures {
-            omega: |p: DVec3| (0.2 - p.z).min(p.z - 0.1),
-            gradient: |p: DVec3| if p.z > 0.15 { -DVec3::Z } else { DVec3::Z },
+        // two slabs on a floor, thinner than the kernel: the upper one has all, also what the lower ones rub
+        let plate = |low: f64, high: f64| Closures {
+            omega: move |p: DVec3| (high - p.z).min(p.z - low),
+            gradient: move |p: DVec3| if p.z > 0.5 * (low + high) { -DVec3::Z } else { DVec3::Z },
         };
-        let above = Boundary { obstacles: vec![sticky(high)], ..boundary(9.0) };
+        let text = "rfm 1\nsolid lower = box([-9, -9, 0], [9, 9, 0.1])\nsolid upper = box([-9, -9, 0.1], [9, 9, 0.2])";
+        let program = crate::Program::from_source("slabs.rfm", text).unwrap();
+        let slabs = ["lower", "upper"].map(|name| sticky(program.solid(name).unwrap()));
+        let mut stack = Boundary { obstacles: slabs.into(), ..boundary(9.0) };
+        stack.obstacles[1].slip = Slip::Free;
+        let [lower, upper] = shares(&stack, p + 0.1 * DVec3::Z, pushed);
+        assert!((upper - whole).length() < 0.02 && lower.length() < 0.02, "{lower} {upper}");
+        // below a gap the floor has its part
+        let above = Boundary { obstacles: vec![sticky(plate(0.1, 0.2))], ..boundary(9.0) };
         let mut shares = DVec3::ZERO;
         let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
         above.divide(&wall, p, &pushed, |_, share| shares += share);

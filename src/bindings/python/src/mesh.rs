@@ -244,7 +244,7 @@ impl PyMesh {
             return Err(PyValueError::new_err(format!(".{ending} files are always in metres")));
         }
         if self.mesh.triangles.is_empty() {
-            let reason = match py.detach(|| self.count_thin_cells())? {
+            let reason = match py.detach(|| self.count_thin_cells()).unwrap_or(0) {
                 0 => "the solid is empty, or smaller than a cell".to_owned(),
                 n => format!("parts of the solid hide in {n} cells; mesh it with more"),
             };
@@ -271,7 +271,11 @@ impl PyMesh {
 
     fn __repr__(&self) -> String {
         let Report { vertices, triangles, .. } = self.report;
-        let closed = if self.closed() { "closed" } else { "open" };
+        let closed = match (triangles, self.closed()) {
+            (0, _) => "empty",
+            (_, true) => "closed",
+            (_, false) => "open",
+        };
         format!("<rfm.Mesh {vertices} vertices, {triangles} triangles, {closed}>")
     }
 }

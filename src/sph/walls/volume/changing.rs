@@ -19,10 +19,24 @@ const KEYS: usize = 4;
 pub struct ChangingShape {
     /// The body.
     pub body: Arc<dyn Moving>,
-    /// Time between two looks, s. Its surface should move by no more than a sixth of the support radius in it.
-    pub interval: f64,
     /// The end of the run, s. What follows on it is looked at only if a simulation goes on beyond it.
     pub until: f64,
+    /// Equal intervals of the run, at least three, between which the body is looked at. Its surface should move by no more than a
+    /// eighth of the support radius in any of them.
+    pub intervals: u64,
+}
+
+impl ChangingShape {
+    /// The length of an interval, s.
+    fn interval(&self) -> f64 {
+        self.until / self.intervals as f64
+    }
+
+    /// The instant, s, after so many intervals.
+    fn instant(&self, number: u64) -> f64 {
+        // a formula need not hold a rounding error behind the end
+        if number == self.intervals { self.until } else { number as f64 * self.interval() }
+    }
 }
 
 /// The maps around the present time.
@@ -30,6 +44,8 @@ pub(super) struct Changing {
     shape: ChangingShape,
     lattice: Arc<Lattice>,
     stencil: Arc<Stencil>,
+    /// The present time, s. Not a number before the first maps are made.
+    time: f64,
     /// The number of the first map: how many intervals after the time 0 it is.
     first: u64,
     maps: Vec<VolumeMap>,
@@ -50,6 +66,7 @@ impl Changing {
             stencil: Arc::new(Stencil::new(&lattice, h)),
             present: Spline::new(&lattice)?,
             lattice,
+            time: f64::NAN,
             first: 0,
             maps: Vec::new(),
             weights: [0.0; KEYS],
@@ -59,24 +76,25 @@ impl Changing {
         (changing.maps.len() == KEYS).then_some(changing)
     }
 
-    /// Makes the maps around a time, s. Which these are depends on the time alone, so that a run which is resumed goes on
-    /// with the same ones.
+    /// Makes the maps around a time, s. Which these are depends on the time alone, so that a run which is resumed, with the same
+    /// end, goes on with the same ones.
     pub fn move_to(&mut self, time: f64) {
-        let ChangingShape { interval, until, .. } = self.shape;
-        let spare = KEYS as u64 - 2;
+        if time == self.time {
+            return;
+        }
+        self.time = time;
+        let interval = self.shape.interval();
         // of times before the start, and after the end, a formula need not hold
         let mut first = ((time / interval) as u64).saturating_sub(1);
-        if time <= until {
-            let last = (until / interval).ceil() as u64;
-            first = first.min(last.saturating_sub(spare + 1));
+        if time <= self.shape.until {
+            first = first.min((self.shape.intervals + 1).saturating_sub(KEYS as u64));
         }
         let kept =
             if first >= self.first { (first - self.first).min(self.maps.len() as u64) } else { u64::MAX };
         self.maps.drain(..self.maps.len().min(kept as usize));
         self.first = first;
         while self.maps.len() < KEYS {
-            let at = (first + self.maps.len() as u64) as f64 * interval;
-            let at = if time <= until { at.min(until) } else { at };
+            let at = self.shape.instant(first + self.maps.len() as u64);
             let body = self.shape.body.during(at, at);
             let Some(map) = VolumeMap::on(&self.lattice, &self.stencil, vec![body.into()]) else { return };
             self.maps.push(map);
@@ -91,7 +109,8 @@ impl Changing {
 
     /// What the body takes of the kernel at a place in the box; `None` if it is not near.
     pub fn at(&self, p: DVec3) -> Option<Taken> {
-        self.present.at(p, |at| self.blended(at))
+        // between maps of which two have a wall and two do not, a cubic goes beyond what the wall can take
+        self.present.at(p, |at| self.blended(at)).map(|taken| Taken { part: taken.part.min(1.0), ..taken })
     }
 
     fn blended(&self, at: [usize; 3]) -> Option<Box<Brick>> {

@@ -227,12 +227,11 @@ fn parts_of_a_body_take_their_maps_along() {
 /// instant of a run too, and beyond.
 #[test]
 fn bodies_that_change_their_shape_take_what_they_would_at_each_instant() {
-    let program =
-        crate::Program::from_source("grows.rfm", "rfm 1\nsolid s = sphere(0.2 + 0.3*sqrt(t*(2 - t)))");
+    let program = crate::Program::from_source("grows.rfm", "rfm 1\nsolid s = sphere(0.3 + 0.2*sin(t))");
     let solid = program.unwrap().solid("s").unwrap();
-    let shape = ChangingShape { body: Arc::new(solid.clone()), interval: 0.05, until: 1.5 };
+    let shape = ChangingShape { body: Arc::new(solid.clone()), until: 1.4, intervals: 9 };
     let domain = cube(2.0);
-    for time in [0.2, 0.61, 1.37, 1.5, 1.52] {
+    for time in [0.0, 0.07, 0.61, 1.23, 1.4, 1.52] {
         let changing = Changing::new(&shape, &domain, H, time).unwrap();
         let [before, there, after] = [-1e-3, 0.0, 1e-3].map(|d| map(Arc::new(solid.at(time + d)), domain));
         let mut worst = [0.0_f64; 3];
@@ -248,16 +247,17 @@ fn bodies_that_change_their_shape_take_what_they_would_at_each_instant() {
             worst = std::array::from_fn(|k| worst[k].max(off[k]));
         }
         println!("{time}: λ {:.5}, ∇λ {:.4}, sweep {:.4}", worst[0], worst[1], worst[2]);
-        assert!(worst[0] < 0.001 && worst[1] < 0.01 && worst[2] < 0.01, "{time}: {worst:?}");
+        // the surface moves by an eighth of h in an interval; in the first and the last one the cubic is one-sided
+        assert!(worst[0] < 0.002 && worst[1] < 0.015 && worst[2] < 0.02, "{time}: {worst:?}");
     }
-    // one after the other, the same as at once
+    // one after the other, also back and beyond the end, the same as at once
     let mut along = Changing::new(&shape, &domain, H, 0.2).unwrap();
-    for time in [0.21, 0.26, 0.43, 1.0, 0.3] {
+    for time in [0.21, 0.26, 0.43, 1.0, 0.3, 1.39, 1.4, 1.45, 1.9, 1.3] {
         along.move_to(time);
         let at_once = Changing::new(&shape, &domain, H, time).unwrap();
         for place in random_cloud(50, 0.9).iter() {
-            let part = |changing: &Changing| changing.at(place).map(|taken| taken.part);
-            assert_eq!(part(&along), part(&at_once), "{time}");
+            let figures = |changing: &Changing| changing.at(place).map(|taken| (taken.part, taken.sweep));
+            assert_eq!(figures(&along), figures(&at_once), "{time}");
         }
     }
 }
