@@ -259,8 +259,8 @@ pub(super) fn of_experiment(experiment: &Experiment, searches: &mut Searches) ->
 /// through such a wall it is nearer to those on the other side than to its own second neighbours.
 const THIN_WALL: f64 = 0.5;
 
-/// The same for walls whose load is asked for: behind a thinner one the kernels of particles before it reach beyond it, and what
-/// is not there does not press back. Measured with still water on one side of a wall are loads 5 % too large at 1.4 spacings.
+/// Walls whose load a probe measures are told of below this part of the spacing. The kernels of particles before a thinner wall
+/// reach beyond it, where nothing presses back: with still water on one side loads are 5 % too large at 1.4 spacings.
 const LOADED_WALL: f64 = 1.5;
 
 /// Scenes with more obstacles are not looked at.
