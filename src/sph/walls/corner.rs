@@ -15,7 +15,7 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3};
 
-use super::kernel::Wall;
+use super::symmetric::Symmetric;
 use crate::field::Face;
 
 /// The square of the sine of the angle, some ten degrees, from which on two faces meet in a corner.
@@ -50,16 +50,6 @@ pub(super) struct Seen {
     pub gradient: DVec3,
     /// K = ∫ y ⊗ ∇W.
     pub moment: DMat3,
-}
-
-impl Seen {
-    /// What is behind a plane at a distance, m, that is continuous.
-    pub fn of_face(wall: &Wall, distance: f64, normal: DVec3) -> Self {
-        let delta = distance / wall.h;
-        let slope = wall.kernel.slope(delta);
-        let moment = wall.kernel.covered(delta) * DMat3::IDENTITY + delta * slope * square(normal);
-        Self { gradient: -slope / wall.h * normal, moment }
-    }
 }
 
 impl Corner {
@@ -128,6 +118,7 @@ impl Corner {
                 continue;
             }
             let (middle, half) = (0.5 * (to_edge + end), 0.5 * (end - to_edge));
+            let square = |n: DVec3| Symmetric::square(n).to_matrix();
             for [place, weight] in GAUSS {
                 for place in [-place, place] {
                     let angle = middle + half * place;
@@ -144,10 +135,6 @@ impl Corner {
 
 /// How far before a face, over the support radius, a particle is at least.
 const ON_FACE: f64 = 1e-6;
-
-fn square(n: DVec3) -> DMat3 {
-    DMat3::from_cols(n.x * n, n.y * n, n.z * n)
-}
 
 /// Integrals over all places on a ray's half-plane, spanned by the ray and the edge's direction, that are farther than q from
 /// the line through the particle along the edge, for each angle: of |∇W| across that line, in 1/h, and of the components of

@@ -8,6 +8,7 @@ use super::{
     corner::{Corner, Seen},
     coverage::{Coverage, is_positive_definite},
     kernel::Wall,
+    symmetric::Symmetric,
 };
 use crate::field::{Face, Faces, Part};
 use crate::geom::Aabb;
@@ -129,9 +130,9 @@ impl Boundary {
             // the fluid feels the friction of what it cannot reach, too
             near[other].sticks |= near[*k].sticks;
             if is_seen(*k) {
-                let (delta, seen) = (face.distance / wall.h, Seen::of_face(wall, face.distance, face.normal));
-                near[*k].add(&seen, -wall.strength(delta));
-                near[*k].part = (near[*k].part - wall.kernel.covered(delta)).max(0.0);
+                let taken = Coverage::of_face(wall, face);
+                near[*k].add(&Seen::of(&taken), -1.0);
+                near[*k].part = (near[*k].part - taken.part).max(0.0);
             } else {
                 (near[*k].gradient, near[*k].moment, near[*k].part) = (DVec3::ZERO, DMat3::ZERO, 0.0);
             }
@@ -169,16 +170,12 @@ impl Boundary {
         }
         for ((k, face), presses) in faces.iter().zip(&presses) {
             let Some((itself, images)) = presses else { continue };
-            let taken = |distance: f64| {
-                let seen = Seen::of_face(wall, distance, face.normal);
-                (seen, wall.strength(distance / wall.h))
-            };
             if !itself {
-                let (seen, strength) = taken(face.distance);
-                near[*k].add(&seen, -strength);
+                near[*k].add(&Seen::of(&Coverage::of_face(wall, face)), -1.0);
             }
-            for (seen, strength) in images.iter().map(|distance| taken(*distance)) {
-                near[*k].add(&seen, strength);
+            for &distance in images {
+                let image = Face { distance, ..*face };
+                near[*k].add(&Seen::of(&Coverage::of_face(wall, &image)), 1.0);
             }
         }
         presses.iter().any(Option::is_some)
@@ -216,8 +213,7 @@ impl Boundary {
     fn near(&self, wall: &Wall, p: DVec3) -> SmallVec<[Near; 4]> {
         let near = |obstacle: Option<usize>, coverage: &Coverage<()>| {
             let slip = obstacle.map_or(self.slip, |k| self.obstacles[k].slip);
-            let Coverage { part, gradient, spread, .. } = *coverage;
-            let moment = part * DMat3::IDENTITY + spread.to_matrix();
+            let (part, Seen { gradient, moment }) = (coverage.part, Seen::of(coverage));
             Near { obstacle, part, gradient, moment, sticks: slip == Slip::No }
         };
         let mut found: SmallVec<[Near; 4]> = SmallVec::new();
@@ -243,6 +239,13 @@ impl Boundary {
     }
 }
 
+impl Seen {
+    fn of(coverage: &Coverage) -> Self {
+        let moment = coverage.part * DMat3::IDENTITY + coverage.spread.to_matrix();
+        Self { gradient: coverage.gradient, moment }
+    }
+}
+
 /// The solution x of A·x = b; zero if A has no inverse, as where nothing is left of any wall.
 fn solved(a: DMat3, b: DVec3) -> DVec3 {
     let x = a.inverse() * b;
@@ -250,10 +253,10 @@ fn solved(a: DMat3, b: DVec3) -> DVec3 {
 }
 
 impl Near {
-    /// Adds a part of a wall whose ∇λ is so many times that of a continuous one.
-    fn add(&mut self, seen: &Seen, strength: f64) {
-        self.gradient += strength * seen.gradient;
-        self.moment += strength.signum() * seen.moment;
+    /// Adds a part of a wall so many times.
+    fn add(&mut self, seen: &Seen, times: f64) {
+        self.gradient += times * seen.gradient;
+        self.moment += times * seen.moment;
     }
 
     /// λ·(n⊗n), and a little in all directions.
@@ -267,8 +270,7 @@ impl Near {
     }
 
     fn square_of_normal(&self) -> DMat3 {
-        let n = self.gradient.normalize_or_zero();
-        DMat3::from_cols(n.x * n, n.y * n, n.z * n)
+        Symmetric::square(self.gradient.normalize_or_zero()).to_matrix()
     }
 }
 
