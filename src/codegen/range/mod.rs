@@ -72,9 +72,12 @@ pub(super) fn emit(
     let hosts = Hosts::default(); // no instruction calls a function for one number
     let emitter = Emitter::new(builder, Precision::F64, (request.graph, request.forms), &hosts);
     let (numbers, values) = (HashMap::new(), HashMap::new());
-    let (rounding, smooth) = match request.shape {
-        Shape::Slopes(rounding) => (rounding, request.graph.cone(request.outputs[0]).into_iter().collect()),
-        Shape::Range(rounding) => (rounding, HashSet::new()),
+    let (rounding, function) = match request.shape {
+        Shape::Slopes(rounding) => {
+            let cone: HashSet<Node> = request.graph.cone(request.outputs[0]).into_iter().collect();
+            (rounding, Some(cone))
+        }
+        Shape::Range(rounding) => (rounding, None),
         Shape::Point | Shape::Batch => unreachable!("only ranges come here"),
     };
     let mut ranges = Ranges { emitter, rounding, host, numbers, values, pole: None, bounds: None };
@@ -102,8 +105,10 @@ pub(super) fn emit(
                 ranges.call(function, operands.map(|node| ranges.values[&node]))
             }
         };
-        if smooth.contains(&node) {
-            ranges.forbid_jumps(instruction, value);
+        match &function {
+            Some(cone) if cone.contains(&node) => ranges.forbid_jumps(instruction, value),
+            Some(_) => ranges.forbid_open_choices(instruction, value),
+            None => {}
         }
         ranges.values.insert(node, value);
     }

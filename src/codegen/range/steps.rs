@@ -59,24 +59,35 @@ impl Ranges<'_, '_> {
         (self.emitter.select(is_known, within, limit), self.emitter.builder.ins().bnot(is_known))
     }
 
+    /// A mask: ones where a range holds more than one number.
+    fn varies(&mut self, range: Value) -> Value {
+        let turned = self.swap(range);
+        let width = self.fadd(range, turned);
+        let zero = self.emitter.constant(0.0);
+        self.emitter.compare(FloatCC::NotEqual, width, zero)
+    }
+
+    /// Sees to it that there is no answer where a derivative may be that of either operand of a minimum. Where both have
+    /// nearly the same, their weights, each from 0 to 1, would give anything from nothing to their sum.
+    pub(super) fn forbid_open_choices(&mut self, instruction: Instruction, value: Value) {
+        if let Instruction::Share(..) = instruction {
+            let is_open = self.varies(value);
+            self.fail_where(is_open);
+        }
+    }
+
     /// Sees to it that there is no answer where a node may jump.
     pub(super) fn forbid_jumps(&mut self, instruction: Instruction, value: Value) {
-        let varies = |ranges: &mut Self, range: Value| {
-            let turned = ranges.swap(range);
-            let width = ranges.fadd(range, turned);
-            let zero = ranges.emitter.constant(0.0);
-            ranges.emitter.compare(FloatCC::NotEqual, width, zero)
-        };
         match instruction {
             Instruction::Unary(RangeUnary::Sign | RangeUnary::Floor | RangeUnary::Round, _)
             | Instruction::Share(..) => {
-                let steps = varies(self, value);
+                let steps = self.varies(value);
                 self.fail_where(steps);
             }
             // a choice that is made neither way
             Instruction::Binary(RangeBinary::MulOrZero, _, b) => {
                 let b = self.values[&b];
-                let (is_open, turned) = (varies(self, b), self.swap(b));
+                let (is_open, turned) = (self.varies(b), self.swap(b));
                 let nearest = self.min(b, turned);
                 let nearest = self.min_of_lanes(nearest);
                 let zero = self.emitter.constant(0.0);

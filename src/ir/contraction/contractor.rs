@@ -2,6 +2,8 @@
 
 use std::cell::RefCell;
 
+use smallvec::SmallVec;
+
 use super::backward;
 use super::forward::{POSITIVE, numbers};
 use super::rule::{Degree, Rule};
@@ -21,12 +23,19 @@ pub struct Contractor {
     root: Node,
     /// Whether the root is a number only if the node is.
     needed: Vec<bool>,
-    /// The operands of each node that it needs.
-    needs: Vec<[bool; 3]>,
+    operands: Vec<SmallVec<[Operand; 3]>>,
     /// Linear forms that something else is computed from, or the root.
     pub(super) forms: Vec<Node>,
     coordinates: [Option<Node>; 3],
     pub(super) tables: Tables,
+}
+
+/// What a node is computed from.
+#[derive(Debug, Clone, Copy)]
+struct Operand {
+    node: Node,
+    /// Whether the node that reads it is a number only if this one is.
+    needed: bool,
 }
 
 /// What is asked of a formula.
@@ -64,23 +73,19 @@ impl Contractor {
         for rule in &rules {
             degrees.push(rule.degree(|node| degrees[node.index()]));
         }
-        let needs = rules.iter().map(|rule| {
+        let operands = rules.iter().map(|rule| {
             let needed: Vec<Node> = rule.needed(graph).collect();
-            let mut flags = [false; 3];
-            for (flag, operand) in flags.iter_mut().zip(rule.operands()) {
-                *flag = needed.contains(&operand);
-            }
-            flags
+            rule.operands().map(|node| Operand { node, needed: needed.contains(&node) }).collect()
         });
-        let needs: Vec<[bool; 3]> = needs.collect();
+        let operands: Vec<SmallVec<[Operand; 3]>> = operands.collect();
         let mut needed = vec![false; rules.len()];
         needed[root.index()] = true;
         let mut read_by_other = vec![false; rules.len()];
         read_by_other[root.index()] = true;
         for i in (0..=root.index()).rev() {
-            for (operand, is_needed) in rules[i].operands().zip(needs[i]) {
-                needed[operand.index()] |= needed[i] && is_needed;
-                read_by_other[operand.index()] |= needed[i] && degrees[i] == Degree::Other;
+            for operand in &operands[i] {
+                needed[operand.node.index()] |= needed[i] && operand.needed;
+                read_by_other[operand.node.index()] |= needed[i] && degrees[i] == Degree::Other;
             }
         }
         let is_form = |&(node, expr): &(Node, Expr)| {
@@ -92,7 +97,7 @@ impl Contractor {
         let forms = graph.nodes().filter(is_form).map(|(node, _)| node).collect();
         let coordinates = Axis::SPACE.map(|axis| graph.find(Expr::Coordinate(axis)));
         let tables = graph.tables().clone();
-        Self { rules, degrees, root, needed, needs, forms, coordinates, tables }
+        Self { rules, degrees, root, needed, operands, forms, coordinates, tables }
     }
 
     /// How many nodes a call visits.
@@ -130,20 +135,23 @@ impl Contractor {
         may_fail.clear();
         may_be_infinite.clear();
         for (i, rule) in self.rules[..=self.root.index()].iter().enumerate() {
-            // an operand that is undefined where the node is not says nothing of the node
-            let unknown = |node: Node| may_fail[node.index()];
-            let is_open = rule.operands().zip(self.needs[i]).any(|(node, needed)| !needed && unknown(node));
             let of = |node: Node| values[node.index()];
             let infinite = |node: Node| may_be_infinite[node.index()];
+            let (mut is_open, mut fails, mut reads_infinity) = (false, false, false);
+            for &Operand { node, needed } in &self.operands[i] {
+                let is_unknown = may_fail[node.index()];
+                fails |= is_unknown;
+                // an operand that is undefined where the node is not says nothing of the node
+                is_open |= is_unknown && !needed;
+                reads_infinity |= infinite(node);
+            }
             let found = numbers(rule, of, region, &self.tables);
-            let fails = found.may_fail
-                || rule.operands().any(unknown)
-                || rule.operands().any(infinite) && rule.fails_at_infinity(of, infinite);
+            fails |= found.may_fail || reads_infinity && rule.fails_at_infinity(of, infinite);
             let is_infinite =
                 found.range.is_some_and(|range| !range.is_bounded()) && rule.may_be_infinite(of, infinite);
             // a choice that is made leaves out what may be undefined
             let is_left_out = matches!(*rule, Rule::Plain(Expr::Binary(Binary::MulOrZero, _, b))
-                if is_zero(values[b.index()]) && !unknown(b));
+                if is_zero(of(b)) && !may_fail[b.index()]);
             let (is_open, fails) = (is_open && !is_left_out, fails && !is_left_out);
             let value = match (found.range, is_open) {
                 (Some(range), false) => range,
@@ -179,7 +187,8 @@ impl Contractor {
             }
             Rule::Plain(Expr::Binary(op, a, b)) => {
                 let [left, right] = backward::binary(op, value, values[a.index()], values[b.index()])?;
-                let [needs_a, needs_b, _] = self.needs[i];
+                let [needs_a, needs_b] =
+                    [0, 1].map(|side| self.operands[i].get(side).is_some_and(|o| o.needed));
                 if a == b {
                     if needs_a && needs_b {
                         values[a.index()] = meet(left, right)?;
