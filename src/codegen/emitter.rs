@@ -20,6 +20,8 @@ use crate::table::Table;
 pub(super) struct Emitter<'a, 'f> {
     pub builder: &'a mut FunctionBuilder<'f>,
     pub precision: Precision,
+    /// Lanes that hold a point. Functions are called for no others: a single point would pay for the origin as well.
+    lanes: u8,
     pub forms: &'a Forms,
     /// The functions that the program calls.
     hosts: &'a Hosts,
@@ -67,7 +69,7 @@ pub(super) struct R0Parts {
 impl<'a, 'f> Emitter<'a, 'f> {
     pub fn new(
         builder: &'a mut FunctionBuilder<'f>,
-        precision: Precision,
+        (precision, lanes): (Precision, u8),
         (graph, forms): (&Graph, &'a Forms),
         hosts: &'a Hosts,
     ) -> Self {
@@ -77,7 +79,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
             _ => None,
         });
         let weighted = weights.flat_map(|(u, v, junction)| [(u, v, junction), (v, u, junction)]).collect();
-        Self { builder, precision, forms, hosts, parts: HashMap::new(), weighted }
+        Self { builder, precision, lanes, forms, hosts, parts: HashMap::new(), weighted }
     }
 
     pub fn lane_type(&self) -> Type {
@@ -163,13 +165,13 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.call_behind(HostFunction::Table(lookup.part), &[address], &at)
     }
 
-    /// A host function, lane by lane, with arguments that all lanes share before the others.
+    /// A host function, lane by lane, with arguments that all lanes share before the others. Lanes without a point are zero.
     fn call_behind(&mut self, function: HostFunction, shared: &[Value], operands: &[Value]) -> Value {
         let function = self.hosts[&function];
         let vector = self.vector_type();
         let first = self.call_in_lane(function, shared, operands, 0);
         let mut result = self.builder.ins().scalar_to_vector(vector, first);
-        for lane in 1..self.precision.lanes() as u8 {
+        for lane in 1..self.lanes {
             let value = self.call_in_lane(function, shared, operands, lane);
             result = self.builder.ins().insertlane(result, value, lane);
         }

@@ -191,7 +191,7 @@ fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node
     builder.switch_to_block(block);
     builder.seal_block(block);
     let parameters = builder.block_params(block).to_vec();
-    let mut emitter = Emitter::new(builder, request.precision, (request.graph, request.forms), hosts);
+    let mut emitter = Emitter::new(builder, (request.precision, 1), (request.graph, request.forms), hosts);
     let vector = emitter.vector_type();
     let coordinates: [Value; 3] =
         std::array::from_fn(|i| emitter.builder.ins().scalar_to_vector(vector, parameters[i]));
@@ -234,7 +234,12 @@ fn batch(
 
     let offset = builder.append_block_param(body, pointer);
     builder.switch_to_block(body);
-    let mut emitter = Emitter::new(builder, request.precision, (request.graph, request.forms), hosts);
+    let mut emitter = Emitter::new(
+        builder,
+        (request.precision, request.precision.lanes() as u8),
+        (request.graph, request.forms),
+        hosts,
+    );
     let vector = emitter.vector_type();
     // columns may start anywhere, so no alignment is promised
     let mut load = |base: Value| {

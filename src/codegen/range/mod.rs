@@ -3,8 +3,9 @@
 //! With the lower bound negated both bounds are rounded in the same direction, upwards. A caller that sets
 //! the processor to round upwards ([`Rounding::Upward`]) needs nothing more: every bound is then at or above
 //! the exact one after a single instruction. Elsewhere ([`Rounding::Nearest`]) |v|·2⁻⁵² + 2⁻¹⁰⁰⁰ is added
-//! after each operation. The rules are those of `ir::bounds::range`. Bounds may be wider by a few ulp, those
-//! of R₀ by a few ulp of its larger operand.
+//! after each operation. The rules are those of `ir::bounds::range`, but for choices (`ir::bounds::choice`): here they
+//! are sums of products, and reach to zero where they are open. Bounds may be wider by a few ulp, those of R₀ by a few
+//! ulp of its larger operand.
 //!
 //! Only graphs and boxes are taken for which `instructions` has shown that neither infinity nor NaN can arise: min
 //! and max need not look for them. For others the interpreter answers. Whether a divisor may vanish, a root may be
@@ -69,8 +70,8 @@ pub(super) fn emit(
     let arguments = builder.block_params(block).to_vec();
     let (input, output) = (arguments[0], arguments[1]);
     let [parameters, uniforms] = pointers(request, &arguments[2..]);
-    let hosts = Hosts::default(); // no instruction calls a function for one number
-    let emitter = Emitter::new(builder, Precision::F64, (request.graph, request.forms), &hosts);
+    let hosts = Hosts::default(); // no instruction calls a function for one number, so no lane needs one
+    let emitter = Emitter::new(builder, (Precision::F64, 0), (request.graph, request.forms), &hosts);
     let (numbers, values) = (HashMap::new(), HashMap::new());
     let (rounding, function) = match request.shape {
         Shape::Slopes(rounding) => {

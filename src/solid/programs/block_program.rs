@@ -12,7 +12,7 @@
 
 use super::block_plan::{BlockPlan, BlockStep, Operation, Piece};
 use super::columns::{ColumnPlace, Frame, Scratch};
-use super::compiled::SegmentProgram;
+use super::compiled::{SegmentProgram, padded};
 use super::kernels::{Kernel, WeightedKernel};
 use super::number::Number;
 use crate::codegen::{CodegenError, Forms};
@@ -111,11 +111,8 @@ impl<T: Number> BlockProgram<T> {
                 self.block(points, uniforms, &mut outputs, scratch);
             }
             if whole < count {
-                let mut inputs = [[T::default(); PADDING]; 3];
+                let inputs: [[T; PADDING]; 3] = points.map(|column| padded(&column[whole..]));
                 let mut results = [[T::default(); PADDING]; N];
-                for (padded, column) in inputs.iter_mut().zip(points) {
-                    padded[..count - whole].copy_from_slice(&column[whole..]);
-                }
                 let mut outputs = results.each_mut().map(<[T; PADDING]>::as_mut_slice);
                 let inputs = inputs.each_ref().map(<[T; PADDING]>::as_slice);
                 self.block(inputs, uniforms, &mut outputs, scratch);

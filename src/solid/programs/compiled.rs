@@ -81,6 +81,14 @@ impl<T: Number> PointProgram<T> {
     }
 }
 
+/// A block that begins with the given numbers, of which there is at least one. The last of them fills the rest: a point
+/// that was asked for costs no more where a table is looked up, and the origin may cost a walk through all of it.
+pub(super) fn padded<T: Copy, const LENGTH: usize>(given: &[T]) -> [T; LENGTH] {
+    let mut block = [given[given.len() - 1]; LENGTH];
+    block[..given.len()].copy_from_slice(given);
+    block
+}
+
 /// A compiled program for many points given by columns, in the numbers `T`.
 #[derive(Debug)]
 pub struct BatchProgram<T> {
@@ -120,11 +128,8 @@ impl<T: Number> BatchProgram<T> {
             self.blocks(columns, uniforms, out.each_mut().map(|c| c.as_mut_ptr()), whole / lanes);
         }
         if whole < count {
-            let mut inputs = [[T::default(); MAX_LANES]; 3];
+            let inputs: [[T; MAX_LANES]; 3] = points.map(|column| padded(&column[whole..]));
             let mut outputs = [[T::default(); MAX_LANES]; N];
-            for (padded, column) in inputs.iter_mut().zip(points) {
-                padded[..count - whole].copy_from_slice(&column[whole..]);
-            }
             let inputs = inputs.each_ref().map(|c| c.as_ptr());
             self.blocks(inputs, uniforms, outputs.each_mut().map(|c| c.as_mut_ptr()), 1);
             for (column, padded) in out.iter_mut().zip(outputs) {
@@ -517,11 +522,8 @@ impl LeafProgram {
             self.blocks(points.map(<[f64]>::as_ptr), columns, whole / LANES, numbers);
         }
         if whole < count {
-            let mut inputs = [[0.0; LANES]; 3];
+            let inputs: [[f64; LANES]; 3] = points.map(|column| padded(&column[whole..]));
             let mut outputs = [[0.0; LANES]; N];
-            for (padded, column) in inputs.iter_mut().zip(points) {
-                padded[..count - whole].copy_from_slice(&column[whole..]);
-            }
             let inputs = inputs.each_ref().map(|c| c.as_ptr());
             self.blocks(inputs, outputs.each_mut().map(|c| c.as_mut_ptr()), 1, numbers);
             for (column, padded) in out.iter_mut().zip(outputs) {
