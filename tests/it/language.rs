@@ -157,6 +157,8 @@ fn bounds_of_mapped_shapes_are_found() {
         ("smooth_or(sphere(1), sphere(1).move([1, 0, 0]), 0.3)", [-1.1, -1.1, -1.1], [2.1, 1.1, 1.1]),
         ("blend(sphere(1), box([0, 0, 0], [2, 1, 1]), 0.3)", [-1.1, -1.1, -1.1], [2.1, 1.1, 1.1]),
         ("box().shell(0.1)", [0.0; 3], [1.0; 3]),
+        ("where(x <= 0, sphere(1), sphere(0.5))", [-1.0, -1.0, -1.0], [0.5, 1.0, 1.0]),
+        ("where(z >= 0, hypot(x, y, z) <= 1, hypot(x, y) <= 1) and z >= -2", [-1.0, -1.0, -2.0], [1.0; 3]),
     ] {
         let found = solid(definition);
         let Bounds::Within(bounds) = *found.bounds() else { panic!("{definition}: {:?}", found.bounds()) };

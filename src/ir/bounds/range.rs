@@ -13,6 +13,7 @@
 
 use std::cell::RefCell;
 
+use super::choice::Choice;
 use crate::geom::Aabb;
 use crate::interval::Interval;
 use crate::ir::graph::{Axis, Expr, Graph, Node};
@@ -107,6 +108,8 @@ pub(crate) struct Limits {
 #[derive(Debug, Clone)]
 pub struct RangeEvaluator {
     rules: Vec<RangeRule>,
+    /// In the order of the nodes.
+    choices: Vec<Choice>,
     root: Node,
     tables: Tables,
 }
@@ -119,7 +122,7 @@ impl RangeEvaluator {
     /// Prepares a root of a graph.
     pub fn new(graph: &Graph, root: Node) -> Self {
         let rules = graph.nodes().map(|(_, expr)| RangeRule::of(graph, expr)).collect();
-        Self { rules, root, tables: graph.tables().clone() }
+        Self { rules, choices: Choice::all(graph), root, tables: graph.tables().clone() }
     }
 
     /// The range of ω over a box at any time; bounds of the box may be infinite.
@@ -157,6 +160,7 @@ impl RangeEvaluator {
     fn fill(&self, region: &Region<'_>, values: &mut Vec<Interval>, limits: Option<Limits>) {
         let up_to = |most: f64| Interval::new(-most, most);
         let steepest = limits.map(|limits| up_to(1.0 / limits.least_divisor));
+        let mut choices = self.choices.iter().peekable();
         values.clear();
         for &rule in &self.rules {
             // a coordinate is always a number, even if nothing else is known of it
@@ -200,7 +204,9 @@ impl RangeEvaluator {
                 }
                 RangeRule::Plain(expr) => plain(expr, values, region),
             };
-            values.push(value);
+            let chosen = choices.next_if(|choice| choice.node().index() == values.len());
+            let chosen = chosen.and_then(|choice| choice.range(|node| values[node.index()]));
+            values.push(chosen.filter(|_| value != Interval::ALL).unwrap_or(value));
         }
     }
 }

@@ -10,6 +10,7 @@ use super::rule::{Degree, Rule};
 use super::sets::meet;
 use crate::geom::Aabb;
 use crate::interval::Interval;
+use crate::ir::bounds::choice::Choice;
 use crate::ir::bounds::range::{Affine, Region, is_zero};
 use crate::ir::graph::{Axis, Expr, Graph, Node};
 use crate::ir::lookup::Tables;
@@ -24,6 +25,8 @@ pub struct Contractor {
     /// Whether the root is a number only if the node is.
     needed: Vec<bool>,
     operands: Vec<SmallVec<[Operand; 3]>>,
+    /// In the order of the nodes.
+    choices: Vec<Choice>,
     /// Linear forms that something else is computed from, or the root.
     pub(super) forms: Vec<Node>,
     coordinates: [Option<Node>; 3],
@@ -97,7 +100,17 @@ impl Contractor {
         let forms = graph.nodes().filter(is_form).map(|(node, _)| node).collect();
         let coordinates = Axis::SPACE.map(|axis| graph.find(Expr::Coordinate(axis)));
         let tables = graph.tables().clone();
-        Self { rules, degrees, root, needed, operands, forms, coordinates, tables }
+        Self {
+            rules,
+            degrees,
+            root,
+            needed,
+            operands,
+            choices: Choice::all(graph),
+            forms,
+            coordinates,
+            tables,
+        }
     }
 
     /// How many nodes a call visits.
@@ -131,6 +144,7 @@ impl Contractor {
     pub(super) fn forward(&self, region: &Region<'_>, scratch: &mut Scratch) -> Option<()> {
         let Scratch { values, may_fail, may_be_infinite, known, .. } = scratch;
         let mut known = known.iter().peekable();
+        let mut choices = self.choices.iter().peekable();
         values.clear();
         may_fail.clear();
         may_be_infinite.clear();
@@ -158,6 +172,11 @@ impl Contractor {
                 (None, false) if self.needed[i] => return None,
                 // undefined where nobody asks for it, or made of what is undefined: nothing is known
                 (None, false) | (Some(_) | None, true) => Interval::ALL,
+            };
+            let value = match choices.next_if(|choice| choice.node().index() == i) {
+                // where an operand is undefined, the value is as well, or that operand is not chosen
+                Some(choice) => choice.range(of).and_then(|range| meet(value, range)).unwrap_or(value),
+                None => value,
             };
             let value = match known.next_if(|(node, _)| node.index() == i) {
                 Some((_, range)) => meet(value, *range)?,

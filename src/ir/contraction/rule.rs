@@ -85,7 +85,7 @@ impl Rule {
             },
             Self::Plain(_) | Self::Power { .. } | Self::Slab { .. } => (true, true),
         };
-        let is_needed = [needs_first, needs_second];
+        let is_needed = [needs_first, needs_second, true];
         self.operands().zip(is_needed).filter_map(|(node, needed)| needed.then_some(node))
     }
 
