@@ -355,3 +355,34 @@ fn a_hundred_thousand_triangles_are_quick() {
     );
     assert!(setup.as_secs_f64() <= 1.0 && spent <= 2e-6);
 }
+
+/// A file that names polygons with notches, corners within sides among them, is the solid that it shows.
+#[test]
+fn notches_of_polygons_stay_empty() {
+    let outline = [[0, 0], [1, 0], [3, 0], [3, 2], [2, 2], [2, 1], [1, 1], [1, 2], [0, 2]];
+    let n = outline.len();
+    let mut text = String::new();
+    for z in [0, 1] {
+        outline.iter().for_each(|[x, y]| text += &format!("v {x} {y} {z}\n"));
+    }
+    let line = |corners: &mut dyn Iterator<Item = usize>| {
+        "f".to_string() + &corners.map(|corner| format!(" {corner}")).collect::<String>() + "\n"
+    };
+    text += &line(&mut (1..=n).rev());
+    text += &line(&mut (n + 1..=2 * n));
+    for i in 1..=n {
+        let next = i % n + 1;
+        text += &line(&mut [i, next, next + n, i + n].into_iter());
+    }
+    let solid = program("solid s = mesh(\"u.obj\")", text.into_bytes()).solid("s").unwrap();
+    let inside = |p: DVec3| {
+        let within = p.x > 0.0 && p.x < 3.0 && p.y > 0.0 && p.y < 2.0 && p.z > 0.0 && p.z < 1.0;
+        within && !(p.x > 1.0 && p.x < 2.0 && p.y > 1.0)
+    };
+    for i in 0..20_000 {
+        let part = |k: f64| (0.413_7 + f64::from(i) * k).fract();
+        let p =
+            DVec3::new(4.0 * part(0.754_877_666), 3.0 * part(0.569_840_29), 2.0 * part(0.430_159_7)) - 0.5;
+        assert_eq!(solid.omega(p) > 0.0, inside(p), "{p}");
+    }
+}

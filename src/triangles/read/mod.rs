@@ -2,6 +2,7 @@
 
 mod obj;
 mod ply;
+mod polygon;
 mod stl;
 
 use glam::DVec3;
@@ -9,7 +10,7 @@ use glam::DVec3;
 /// The endings of files that are read.
 pub const FORMATS: [&str; 3] = ["stl", "obj", "ply"];
 
-/// The corners of a file's triangles, in the order of the file; polygons are cut into fans. The format is that of the
+/// The corners of a file's triangles, in the order of the file; polygons are cut into triangles. The format is that of the
 /// name's ending.
 ///
 /// # Errors
@@ -40,15 +41,12 @@ fn point<'t>(words: &mut impl Iterator<Item = &'t str>, line: usize) -> Result<D
     Ok(DVec3::new(number(words.next(), line)?, number(words.next(), line)?, number(words.next(), line)?))
 }
 
-/// A polygon as triangles that share its first corner.
-fn fan(places: &[DVec3], polygon: &[usize], out: &mut Vec<[DVec3; 3]>) -> Result<(), String> {
-    let at = |i: usize| {
+/// The triangles of a polygon that names its corners.
+fn cut(places: &[DVec3], polygon: &[usize], out: &mut Vec<[DVec3; 3]>) -> Result<(), String> {
+    let at = |&i: &usize| {
         let missing = || format!("a face names corner {i}, and there are {}", places.len());
         places.get(i).copied().ok_or_else(missing)
     };
-    let [first, rest @ ..] = polygon else { return Ok(()) };
-    for pair in rest.windows(2) {
-        out.push([at(*first)?, at(pair[0])?, at(pair[1])?]);
-    }
-    Ok(())
+    let corners: Vec<DVec3> = polygon.iter().map(at).collect::<Result<_, _>>()?;
+    polygon::cut(&corners, out)
 }

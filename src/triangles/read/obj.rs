@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{fan, point};
+use super::{cut, point};
 
 pub fn read(text: &str) -> Result<Vec<[DVec3; 3]>, String> {
     let mut places: Vec<DVec3> = Vec::new();
@@ -17,7 +17,7 @@ pub fn read(text: &str) -> Result<Vec<[DVec3; 3]>, String> {
                 if polygon.len() < 3 {
                     return Err(format!("the face on line {} has fewer than three corners", i + 1));
                 }
-                fan(&places, &polygon, &mut triangles)?;
+                cut(&places, &polygon, &mut triangles)?;
             }
             _ => {}
         }

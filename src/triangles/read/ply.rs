@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::fan;
+use super::cut;
 
 /// How numbers are written.
 #[derive(Clone, Copy, PartialEq)]
@@ -50,7 +50,7 @@ pub fn read(bytes: &[u8]) -> Result<Vec<[DVec3; 3]>, String> {
             let (point, polygon) = record(element, &mut numbers)?;
             match element.name.as_str() {
                 "vertex" => places.push(point),
-                "face" => fan(&places, &polygon, &mut triangles)?,
+                "face" => cut(&places, &polygon, &mut triangles)?,
                 _ => {}
             }
         }
