@@ -314,12 +314,16 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
     }
     let grid = solid.bounds().aabb().and_then(|bounds| Grid::around(&bounds, RESOLUTION).ok());
     if let Some(grid) = grid.filter(|_| thin.count > 0) {
+        let (what, help) = match thin.is_wedge {
+            true => ("edges so sharp that", "more --cells show more of them, and none shows all"),
+            false => ("parts or gaps that", "mesh it with more --cells, until `thin_cells` is 0"),
+        };
+        let does = if thin.is_wedge { "show them blunt" } else { "do not show" };
         let message = format!(
-            "solid `{}` has parts or gaps that {VOLUME_CELLS} cells along its longest side do not show, {}",
+            "solid `{}` has {what} {VOLUME_CELLS} cells along its longest side {does}, {}",
             named.name,
             hidden(thin, &grid)
         );
-        let help = "mesh it with more --cells, until `thin_cells` is 0";
         found.push(warning(Code::THIN_PARTS, message).help(help));
     }
     found
@@ -396,7 +400,8 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
             facts.area_error = Some(found.area_error);
             facts.components = Some(found.solids);
             facts.components_coarser = Some(found.solids_coarser);
-            let no_thin_parts = thin.as_ref().is_some_and(|thin| thin.count == 0);
+            // what is left out at the edge of a wedge is within the errors
+            let no_thin_parts = thin.as_ref().is_some_and(|thin| thin.count == 0 || thin.is_wedge);
             facts.resolved = Some(found.solids == found.solids_coarser && no_thin_parts);
         }
         Err(VolumeError::TooThin) => {}

@@ -83,13 +83,13 @@ TOO_LARGE = "E0210":
 "The file unrolls to more operations than the limit (1 million, or what --max-nodes says). A range such as
 `0..1000000` may have too many members.";
 OVERRIDE = "E0211":
-"-D name=value sets a param of the file. The file must declare it with `param name = …`, and the value must lie in
+"A param is set, by -D name=value, by -P or by a program. The file must declare it with `param name = …`, and the value must lie in
 the range that the declaration states.";
 UNIT_MISMATCH = "E0212":
 "The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
 only lengths and angles are meaningful.";
 BARE_OVERRIDE = "W0214":
-"The file writes the value of this param in a unit such as mm, and -D gives a number without one. Numbers without a unit
+"The file writes the value of this param in a unit such as mm, and a number without one is given, as by -D. Numbers without a unit
 are in SI units everywhere, so `-D d=8` is 8 m. Write the unit: `-D d=8mm`, or `-D d=8m` if metres are meant.";
 ATTRIBUTE = "E0213":
 "An attribute stands before a solid and says what is wanted of it beside its shape. There is one: `@tolerance(1e-6)`,
@@ -187,7 +187,8 @@ THIN_PARTS = "W0408":
 "Parts of the solid, or gaps in it, are thinner than the cells of the grid that it was measured on, and pass between
 its nodes or beside its triangles: they are missing from its volume, and from a mesh with as many cells. The message says
 where the thinnest is and how many cells would show it. Each cell that is counted holds a point of a surface which the
-grid does not know, so surfaces that only touch, as in `a and not a`, do not count.";
+grid does not know, so surfaces that only touch, as in `a and not a`, do not count. Edges of wedges count as well: every grid
+shows them a little blunt. If there is nothing else the message says so, and the volume is measured all the same.";
 LARGE_ANGLE = "W0409":
 "Angles are radians unless a unit says otherwise, and this one is more than a whole turn. Write `45 deg` for degrees, or
 `45 rad` if radians are meant.";

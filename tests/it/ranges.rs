@@ -351,3 +351,26 @@ fn slopes_hold_between_any_two_points_whatever_jumps_between_them() {
         assert!(looked_at > 1000, "{leaf}: {looked_at}");
     }
 }
+
+/// Where the operands of a minimum are equal, as the faces of a rounded shape are beside its edges, its slopes are theirs.
+#[test]
+fn slopes_of_a_rounded_box_are_those_of_its_plane_faces() {
+    let text = "rfm 1\nsolid s = box([-0.5, -0.4, -0.3], [0.5, 0.4, 0.3]).rotate([1, 2, 3], 0.6).round(5 cm)";
+    let solid = Program::from_source("f.rfm", text).unwrap().solid("s").unwrap();
+    let (twin, mut faces) = (solid.twin(), 0);
+    let axis = DVec3::new(1.0, 2.0, 3.0).normalize();
+    let turned = |p: DVec3| rfm::glam::DQuat::from_axis_angle(axis, 0.6) * p;
+    for normal in [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z] {
+        let middle = turned(normal * DVec3::new(0.5, 0.4, 0.3));
+        let outward = turned(normal);
+        let all = twin.sheets(&Aabb::new(middle - 1e-3, middle + 1e-3), &mut |sheet| {
+            faces += 1;
+            for (slope, out) in sheet.slopes.iter().zip(outward.to_array()) {
+                assert!(slope.lo < -out + 1e-9 && slope.hi > -out - 1e-9, "{normal}: {slope:?}, {out}");
+                assert!(slope.width() < 0.3, "{normal}: {slope:?}, {out}");
+            }
+        });
+        assert!(all);
+    }
+    assert!(faces >= 6, "{faces}");
+}

@@ -179,3 +179,26 @@ fn faces_that_coincide_and_smooth_surfaces_hide_nothing() {
         }
     }
 }
+
+/// No grid shows all of a wedge: it is counted, and told from a wall. Its volume is measured all the same.
+#[test]
+fn wedges_are_told_from_walls() {
+    let (_, wedge) = looked_at(&solid("polygon([[0, 0], [1, 0], [1, 0.577]]).extrude(0, 1)"), 96);
+    assert!(wedge.count > 0 && wedge.is_wedge, "{wedge:?}");
+    let (_, wall) =
+        looked_at(&solid("box([0, 0, 0], [1, 0.003, 1]).rotate_z(0.2) or sphere(0.4).move([2, 0, 0])"), 48);
+    assert!(wall.count > 0 && !wall.is_wedge && (wall.thickness - 0.003).abs() < 1e-6, "{wall:?}");
+    // a ridge of 22° on a plate, all of it thinner than a cell, is no edge of what the grid shows
+    let ridge = "box([0, 0, 0], [1, 1, 0.1]) or polygon([[0.3, 0.1], [0.304, 0.1], [0.302, 0.11]]).extrude(-0.9, -0.1).rotate_x(90 deg)";
+    let (_, ridge) = looked_at(&solid(ridge), 96);
+    assert!(ridge.count > 0 && !ridge.is_wedge, "{ridge:?}");
+    // nor is a wire along a plate
+    let wire =
+        "box([0, 0, 0], [1, 1, 0.1]) or cylinder(0.002, 0.8).rotate_y(90 deg).move([0.1, 0.437, 0.107])";
+    let (_, wire) = looked_at(&solid(wire), 96);
+    assert!(wire.count > 0 && !wire.is_wedge, "{wire:?}");
+    // where there are both, the wall is told
+    let both = "polygon([[0, 0], [1, 0], [1, 0.577]]).extrude(0, 1) or box([0, 1, 0], [1, 1.003, 1])";
+    let (_, both) = looked_at(&solid(both), 48);
+    assert!(!both.is_wedge && (both.thickness - 0.003).abs() < 1e-6, "{both:?}");
+}

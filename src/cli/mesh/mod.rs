@@ -280,6 +280,7 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
     let (what, at) = (if thin.is_gap { "a gap" } else { "a part" }, thin.at);
     let how = match thin.cells_needed(grid) {
         Some(needed) => format!("{what} {:.2e} thick: about {needed} cells would show it", thin.thickness),
+        None if thin.is_wedge => format!("{what} that ends in a sharp edge"),
         None if thin.thickness.is_finite() => {
             format!("{what} {:.0e} thick, as at a sharp edge", thin.thickness)
         }
@@ -294,7 +295,12 @@ pub(super) fn hidden(thin: &ThinCells, grid: &Grid) -> String {
 /// Says on standard error what the grid could not see, and why a mesh is empty.
 fn remark(solid: &Solid, mesh: &Mesh, (thin, grid): (&ThinCells, Option<&Grid>), options: &Options) {
     if let Some(grid) = grid.filter(|_| thin.count > 0) {
-        note(format!("the mesh misses what is thinner than a cell {}", hidden(thin, grid)));
+        let what = if thin.is_wedge {
+            "the mesh shows sharp edges blunt"
+        } else {
+            "the mesh misses what is thinner than a cell"
+        };
+        note(format!("{what} {}", hidden(thin, grid)));
     }
     if mesh.triangles.is_empty() {
         note(format!("`{}` has no surface here: {}", solid.name(), why_empty(solid, options)));

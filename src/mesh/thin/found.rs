@@ -15,33 +15,41 @@ pub struct ThinCells {
     pub count: usize,
     /// The smallest box around all of them, in metres; empty if there are none.
     pub bounds: Aabb,
-    /// The least thickness that was found in them, in metres; infinite if there are none.
+    /// The least thickness that was found in them, in metres, of those that are no wedges if there are any; infinite if it
+    /// is not known or nothing hides.
     pub thickness: f64,
     /// A point of the surface where it is that thin, in metres; the origin if there is none.
     pub at: DVec3,
     /// Whether a gap is that thin, rather than a part of the solid.
     pub is_gap: bool,
+    /// Whether all of them are edges of wedges whose faces the grid shows nearby. No grid shows all of such an edge.
+    pub is_wedge: bool,
 }
 
 impl ThinCells {
     /// The result for a grid that sees everything.
-    pub const NONE: Self =
-        Self { count: 0, bounds: Aabb::EMPTY, thickness: f64::INFINITY, at: DVec3::ZERO, is_gap: false };
+    pub const NONE: Self = Self {
+        count: 0,
+        bounds: Aabb::EMPTY,
+        thickness: f64::INFINITY,
+        at: DVec3::ZERO,
+        is_gap: false,
+        is_wedge: false,
+    };
 
     /// The number of cells along the longest side of a grid with which what hides would be two cells thick.
-    /// `None` if nothing hides, its thickness is not known, or no grid is so fine.
+    /// `None` if nothing hides but wedges, its thickness is not known, or no grid is so fine.
     pub fn cells_needed(&self, grid: &Grid) -> Option<usize> {
         let needed = (2.0 * grid.bounds().size().max_element() / self.thickness).ceil();
-        (self.count > 0 && needed > 0.0 && needed <= FINEST).then_some(needed as usize)
+        (self.count > 0 && !self.is_wedge && needed > 0.0 && needed <= FINEST).then_some(needed as usize)
     }
 
     /// The cells of two parts of a grid.
     pub(super) fn and(self, other: Self) -> Self {
-        let thinner = if other.count > 0 && (self.count == 0 || other.thickness < self.thickness) {
-            other
-        } else {
-            self
-        };
+        // a wall tells more than the edge of a wedge
+        let before = |a: &Self, b: &Self| (a.is_wedge, a.thickness) < (b.is_wedge, b.thickness);
+        let is_other = other.count > 0 && (self.count == 0 || before(&other, &self));
+        let thinner = if is_other { other } else { self };
         let (count, bounds) = (self.count + other.count, self.bounds.union(&other.bounds));
         Self { count, bounds, ..thinner }
     }

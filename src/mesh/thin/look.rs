@@ -36,6 +36,10 @@ const STEPS: usize = 8;
 /// A point nearer to a face than this, in cells, is on it.
 const ON_FACE: f64 = 1e-8;
 
+/// Faces that agree more than this (cosine) with each other's backs are those of a wall or a gap, and others those of a wedge
+/// of ten degrees or more.
+const WALL: f64 = 0.985;
+
 /// A face that agrees more than this (cosine) with the way to it ends a thickness.
 const BACK: f64 = 0.5;
 
@@ -123,6 +127,19 @@ struct Foot {
     at: DVec3,
     /// The outward unit normal.
     normal: DVec3,
+}
+
+/// What lies across a part or a gap.
+#[derive(Clone, Copy)]
+struct Across {
+    /// m; infinite if there is nothing near.
+    thickness: f64,
+    /// The outward unit normal of the face there.
+    normal: DVec3,
+}
+
+impl Across {
+    const FAR: Self = Self { thickness: f64::INFINITY, normal: DVec3::ZERO };
 }
 
 impl Look<'_> {
@@ -298,23 +315,29 @@ impl Look<'_> {
         let ways = || std::iter::once(foot.normal).chain(beside.clone());
         let least = |inside: bool| {
             let sign = if inside { -1.0 } else { 1.0 };
-            ways().map(|way| self.across(foot.at, sign * way, inside)).fold(f64::INFINITY, f64::min)
+            let thinner = |a: Across, b: Across| if b.thickness < a.thickness { b } else { a };
+            ways().map(|way| self.across(foot.at, sign * way, inside)).fold(Across::FAR, thinner)
         };
         let (wall, gap) = (least(true), least(false));
-        let thickness = wall.min(gap);
+        let is_gap = gap.thickness < wall.thickness;
+        let Across { thickness, normal } = if is_gap { gap } else { wall };
         if thickness == f64::INFINITY && !seen.around.is_empty() {
             return ThinCells::NONE; // a step or an edge of something thick
         }
-        ThinCells { count: 1, bounds: self.bounds, thickness, at: foot.at, is_gap: gap < wall }
+        // the edge of something that the grid knows: both faces are seen nearby, and meet at an angle
+        let straight = self.across(foot.at, if is_gap { 1.0 } else { -1.0 } * foot.normal, !is_gap);
+        let is_known = is_known(foot.normal, &seen.around) && is_known(normal, &seen.around);
+        let is_wedge = thickness == straight.thickness && is_known && normal.dot(foot.normal).abs() < WALL;
+        ThinCells { count: 1, bounds: self.bounds, thickness, at: foot.at, is_gap, is_wedge }
     }
 
-    /// The distance from a point of the surface to where it is met again from inside, or from outside, if the
-    /// face there turns its back. Infinite beyond two cells.
-    fn across(&self, from: DVec3, way: DVec3, inside: bool) -> f64 {
+    /// The way from a point of the surface to where it is met again from inside, or from outside, if the face there turns its
+    /// back. Infinite beyond two cells.
+    fn across(&self, from: DVec3, way: DVec3, inside: bool) -> Across {
         let step = THICKEST * self.bounds.size().min_element() / STEPS_ACROSS as f64;
         let is_beyond = |t: f64| (self.omega(from + t * way) > 0.0) != inside;
         let ends = (0..STEPS_ACROSS).map(|i| step * (i as f64 + 0.5));
-        let Some(mut far) = ends.into_iter().find(|t| is_beyond(*t)) else { return f64::INFINITY };
+        let Some(mut far) = ends.into_iter().find(|t| is_beyond(*t)) else { return Across::FAR };
         let mut near = f64::max(far - step, 0.0);
         for _ in 0..HALVED {
             let middle = 0.5 * (near + far);
@@ -322,7 +345,10 @@ impl Look<'_> {
         }
         let towards = if inside { way } else { -way };
         let end = unit(-self.field.omega_grad(from + far * way).1);
-        if end.is_some_and(|normal| normal.dot(towards) > BACK) { far } else { f64::INFINITY }
+        match end.filter(|normal| normal.dot(towards) > BACK) {
+            Some(normal) => Across { thickness: far, normal },
+            None => Across::FAR,
+        }
     }
 
     /// The normals where the surface crosses the edges of this cell and of those around it.
