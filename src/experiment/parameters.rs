@@ -21,10 +21,16 @@ pub struct TimeStep {
 
 /// A speed that the fluid can reach by its velocity at the start and a fall through the box, m/s.
 pub(super) fn typical_speed(program: &Program, scene: &Scene) -> f64 {
-    let gravity = at_start(program, &scene.gravity);
-    let height = gravity.normalize_or_zero().abs().dot(scene.domain.size());
+    let size = scene.domain.size();
+    let fall = match &scene.gravity {
+        Gravity::Still(_) | Gravity::Turning(_) => {
+            let gravity = at_start(program, &scene.gravity);
+            gravity.length() * gravity.normalize_or_zero().abs().dot(size)
+        }
+        Gravity::Field(nodes) => most_in_fluid(program, scene, nodes, |gravity| gravity.abs().dot(size)),
+    };
     let start = fastest(program, scene);
-    (start * start + 2.0 * gravity.length() * height).sqrt()
+    (start * start + 2.0 * fall).sqrt()
 }
 
 /// All parameters except the time step, which is 1 s here. `mass` is that of a particle, kg.
@@ -198,18 +204,19 @@ fn most(scene: &Scene, value: impl Fn(DVec3) -> f64) -> f64 {
     (0..SIDE.pow(3)).map(|k| value(at(k))).filter(|v| v.is_finite()).fold(0.0, f64::max)
 }
 
+/// The greatest size of a vector where the fluid is at the start, at four instants of the run; at least 0. Formulas may have
+/// poles elsewhere.
+fn most_in_fluid(program: &Program, scene: &Scene, nodes: &[Node; 3], size: impl Fn(DVec3) -> f64) -> f64 {
+    let (fluid, vector) = (vector_field(program, &[scene.fluid.shape; 3]), vector_field(program, nodes));
+    let inside = |p: DVec3, time: f64| if fluid(p, 0.0).x > 0.0 { size(vector(p, time)) } else { 0.0 };
+    let at = |time: f64| most(scene, |p| inside(p, time));
+    [0.0, 0.25, 0.5, 1.0].map(|part| at(part * scene.run.until)).into_iter().fold(0.0, f64::max)
+}
+
 /// A speed that the fluid reaches where it neither falls nor moves at the start: that of its known solution, of surfaces that
 /// take it along, or of a fall through the box under a force that depends on the place. 1 m/s if nothing is known.
 pub(super) fn driven_speed(program: &Program, scene: &Scene) -> f64 {
-    let until = scene.run.until;
-    // formulas may have poles where there is no fluid
-    let fluid = vector_field(program, &[scene.fluid.shape; 3]);
-    let fastest = |nodes: &[Node; 3]| {
-        let vector = vector_field(program, nodes);
-        let inside = |p: DVec3, time: f64| if fluid(p, 0.0).x > 0.0 { vector(p, time).length() } else { 0.0 };
-        let at = |time: f64| most(scene, |p| inside(p, time));
-        [0.0, 0.25, 0.5, 1.0].map(|part| at(part * until)).into_iter().fold(0.0, f64::max)
-    };
+    let fastest = |nodes: &[Node; 3]| most_in_fluid(program, scene, nodes, DVec3::length);
     let container = scene.container.iter().map(|c| c.skin);
     let skins = container.chain(scene.obstacles.iter().map(|o| o.skin));
     let stated = scene.truth.iter().filter_map(|truth| truth.velocity);

@@ -384,7 +384,8 @@ fn forces_on_bodies_are_those_of_momentum_and_of_archimedes() {
         ("buoyancy", 0, ("layers", 10.0), 0.04),
         ("gate_load", 0, ("layers", 8.0), 0.015),
         ("gate_load", 1, ("layers", 8.0), 0.06),
-        ("gate_load", 2, ("layers", 8.0), 0.015),
+        ("gate_load", 2, ("layers", 8.0), 0.06),
+        ("gate_load", 3, ("layers", 8.0), 0.015),
     ] {
         let program = program(name, &[params]);
         let scene = &program.module().scenes[scene];

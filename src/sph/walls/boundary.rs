@@ -21,7 +21,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{
-    field::{Face, Faces, Moving, Walls},
+    field::{Face, Faces, Moving, Part, Walls},
     geom::Aabb,
 };
 
@@ -47,6 +47,15 @@ const REACH: f64 = 1e6;
 
 /// Distance of a particle from all obstacles that is not known. Any negative number means the same.
 pub(in crate::sph) const UNKNOWN: f64 = -1.0;
+
+/// How far from a wall of the box, over the support radius, a face of an obstacle may lie that ends there.
+pub(super) const FLUSH: f64 = 1e-3;
+
+/// How much less than 1 the cosine of the angle between both may be.
+const LEVEL: f64 = 1e-6;
+
+/// The distance, over the support radius, of a face behind which all of a kernel lies.
+const BEYOND_REACH: f64 = 2.0;
 
 /// Part of a proven radius that is used. The rest allows for the rounding of many subtractions.
 const SURELY: f64 = 1.0 - 1e-9;
@@ -307,6 +316,18 @@ impl Boundary {
         whole
     }
 
+    /// Whether a face of an obstacle before a particle lies in a wall of the box and looks out of it. The obstacle is then taken
+    /// to go on behind that wall, as one that stands out of the box does: nothing can be seen of either end, and what is
+    /// behind the wall would otherwise count as a notch in both.
+    pub(super) fn ends_at_box(&self, p: DVec3, face: &Face, h: f64) -> bool {
+        let axis = face.normal.abs().max_position();
+        let outwards = face.normal[axis];
+        let wall = if outwards > 0.0 { self.domain.max[axis] } else { self.domain.min[axis] };
+        let foot = p[axis] - face.distance * outwards;
+        let is_level = outwards.abs() > 1.0 - LEVEL && (face.mean_curvature * h).abs() < FLUSH;
+        is_level && (foot - wall) * outwards.signum() > -FLUSH * h
+    }
+
     /// Adds what an obstacle takes of the kernel of a particle by its faces.
     pub(super) fn with_faces<F: Friction>(
         &self,
@@ -320,6 +341,13 @@ impl Boundary {
         field.faces(p, wall.h, &mut faces);
         if faces.is_empty() {
             return whole;
+        }
+        for part in &mut faces {
+            if let Part::Face(face) = part
+                && self.ends_at_box(p, face, wall.h)
+            {
+                face.distance = -BEYOND_REACH * wall.h;
+            }
         }
         let mut coverage = Coverage::<F>::of_faces(wall, &faces);
         if obstacle.slip == Slip::Free {

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use smallvec::SmallVec;
 
 use super::{
-    boundary::Boundary,
+    boundary::{Boundary, FLUSH},
     corner::{Corner, Seen},
     coverage::{Coverage, is_positive_definite},
     kernel::Wall,
@@ -149,10 +149,16 @@ impl Boundary {
         for (n, (i, one)) in faces.iter().enumerate() {
             for (m, (j, other)) in faces.iter().enumerate().skip(n + 1).filter(|(_, (j, _))| j != i) {
                 let Some(corner) = Corner::of(one, other, wall.h) else { continue };
-                let lies_in = |wall: usize, depth: [f64; 2]| self.is_in(&near[wall], p + corner.edge(depth));
+                let lies_in = |k: usize, depth: [f64; 2]| self.is_in(&near[k], p + corner.edge(depth));
                 // both faces begin at the edge, and there is no gap between the walls
                 let begin = lies_in(*i, [deep, -deep]) && lies_in(*j, [-deep, deep]);
-                let go_on = [*i, *j].map(|wall| lies_in(wall, [deep, deep]));
+                // an obstacle that ends in a wall of the box is taken to go on behind it
+                let beside = 2.0 * FLUSH * wall.h;
+                let is_box = |k: usize| near[k].obstacle.is_none();
+                let go_on = [
+                    lies_in(*i, [deep, if is_box(*j) { -beside } else { deep }]),
+                    lies_in(*j, [if is_box(*i) { -beside } else { deep }, deep]),
+                ];
                 if !begin || go_on == [false; 2] {
                     continue;
                 }
@@ -206,7 +212,7 @@ impl Boundary {
             Part::Face(face) => Some(*face),
             Part::All(_) | Part::Any(_) => None,
         });
-        faces.collect()
+        faces.filter(|face| !self.ends_at_box(p, face, wall.h)).collect()
     }
 
     /// The walls within reach of a particle that at least one wall is near.

@@ -14,6 +14,9 @@ use crate::{
 /// Cells along the side of a tile.
 pub(super) const TILE: usize = 8;
 
+/// How far from the walls of the box, in cells, places are looked at that lie on them.
+const BESIDE_WALL: f64 = 1e-3;
+
 /// How far a cell is filled, and with what.
 #[derive(Clone, Copy, Default, PartialEq)]
 pub(super) struct Filled {
@@ -102,14 +105,21 @@ impl Fractions {
             }
             return;
         }
-        let filled = if range.lo > 0.0 { Filled::WHOLE } else { self.part(&within, range).within(&within) };
+        let filled =
+            if range.lo > 0.0 { Filled::WHOLE } else { self.part(lattice, &within, range).within(&within) };
         cells[at[0] + TILE * (at[1] + TILE * at[2])] = filled;
     }
 
     /// What is filled of a cell whose range is not of one sign: of its eight parts one by one, for curved surfaces and
     /// thin parts.
-    fn part(&self, within: &Aabb, range: Interval) -> Part {
-        let omega = |p: DVec3| self.bodies.iter().map(|body| body.omega(p)).fold(f64::NEG_INFINITY, f64::max);
+    fn part(&self, lattice: &Lattice, within: &Aabb, range: Interval) -> Part {
+        // a body that ends in a wall of the box has no surface there
+        let margin = BESIDE_WALL * lattice.step;
+        let (low, high) = (lattice.domain.min + margin, lattice.domain.max - margin);
+        let omega = |p: DVec3| {
+            let p = p.clamp(low, high);
+            self.bodies.iter().map(|body| body.omega(p)).fold(f64::NEG_INFINITY, f64::max)
+        };
         if range == Interval::ALL {
             let inside = within.corners().map(|corner| is_inside(omega(corner)));
             if inside.iter().all(|is| *is == inside[0]) {
