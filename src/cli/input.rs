@@ -63,7 +63,7 @@ pub(super) fn program(shared: &Shared, path: &Path) -> Result<Program, Failure> 
 pub(super) fn failure(diagnostics: &Diagnostics) -> Failure {
     let errors = || diagnostics.list.iter().filter(|d| d.severity == rfm::diagnostic::Severity::Error);
     if errors().all(|d| d.code == Code::OVERRIDE) {
-        return Failure::usage("the params given with -D do not fit the file");
+        return Failure::usage("the params that are given do not fit the file");
     }
     Failure::Findings
 }

@@ -54,7 +54,8 @@ fn a_sweep_of_check_has_the_volumes_of_balls() {
     assert!(lines[1].contains("0.5236") && lines[1].ends_with('1'), "{}", lines[1]);
     let table = std::fs::read_to_string(folder.path().join("a.sweep/table.csv")).unwrap();
     let table: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
-    assert_eq!(table[0], ["r", "volume", "area", "components", "failure"]);
+    let head = ["r", "volume", "volume error", "area", "area error", "components", "resolved", "failure"];
+    assert_eq!(table[0], head);
     assert_eq!(table[2][1].parse::<f64>().unwrap(), figure(&rows(&found)[1], "volume"));
     // a panel for volume and one for area: the number of components does not change
     let plot = std::fs::read_to_string(folder.path().join("a.sweep/plot.svg")).unwrap();
@@ -345,4 +346,18 @@ fn an_interrupted_sweep_goes_on_within_its_row() {
         let content = |out: &Path| std::fs::read(out.join("v=-1m_s").join(file)).unwrap();
         assert!(content(&broken) == content(&straight), "{file} differs");
     }
+}
+
+/// What a single `check` says of a volume that its cells do not show, the table of a sweep says too.
+#[test]
+fn volumes_that_are_not_resolved_are_told_in_the_table() {
+    let folder = in_folder(
+        "rfm 1\nparam r = 0.2 in 0.05 .. 0.9\nsolid pin = box([0, 0, 0], [1, 1, 0.5]) \\ cylinder(r, 2).move([0.5, 0.5, -0.5])\n",
+    );
+    let outcome = rfm(folder.path(), &["check", "a.rfm", "--sweep", "r=0.3..0.7:2"]).expect(0);
+    let lines: Vec<&str> = outcome.stdout.lines().collect();
+    assert!(lines[1].contains(" ± ") && !lines[1].contains("not resolved"), "{}", lines[1]);
+    assert!(lines[2].contains("not resolved"), "{}", lines[2]);
+    let found = index(&folder.path().join("a.sweep"));
+    assert_eq!([0, 1].map(|row| figure(&rows(&found)[row], "resolved")), [1.0, 0.0]);
 }

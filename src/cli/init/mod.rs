@@ -33,6 +33,12 @@ pub(super) enum Template {
 }
 
 impl Template {
+    /// As it is called on the command line.
+    fn word(self) -> &'static str {
+        let name = self.name();
+        name.strip_suffix(".rfm").unwrap_or(name)
+    }
+
     fn name(self) -> &'static str {
         match self {
             Self::Obstacle => "obstacle.rfm",
@@ -61,6 +67,14 @@ impl Template {
 
 pub(super) fn run(options: &Init) -> Result<(), Failure> {
     let path = options.file.clone().unwrap_or_else(|| PathBuf::from(options.template.name()));
+    if let Some(template) =
+        Template::value_variants().iter().find(|template| path.as_os_str() == template.word())
+    {
+        let (word, name) = (template.word(), template.name());
+        return Err(Failure::usage(format!(
+            "`{word}` is a template: rfm init {name} --template {word}; for a file of this name: rfm init ./{word}"
+        )));
+    }
     if path.as_os_str() == "-" {
         say!("{}", options.template.text().trim_end());
         return Ok(());

@@ -107,13 +107,17 @@ impl EvenAxis {
     /// The values to mark, each with its text.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
         let count = ((self.high - self.low) / self.tick).round() as usize;
-        let digits = (-self.tick.log10().floor()).clamp(0.0, 12.0) as usize;
-        let large = self.low.abs().max(self.high.abs()) >= 1e6 || self.tick < 1e-6;
+        let power = |value: f64| value.log10().floor();
+        let digits = (-power(self.tick)).clamp(0.0, 12.0) as usize;
+        let largest = self.low.abs().max(self.high.abs());
+        let large = largest >= 1e6 || self.tick < 1e-6;
+        // as many as tell one tick from the next
+        let of_power = (power(largest) - power(self.tick)).clamp(1.0, 12.0) as usize;
         (0..=count).map(move |k| {
             let value = self.low + k as f64 * self.tick;
             // the last bits of a sum must not give −0
             let value = if value.abs() < 1e-9 * self.tick { 0.0 } else { value };
-            (value, if large { format!("{value:.1e}") } else { format!("{value:.digits$}") })
+            (value, if large { format!("{value:.of_power$e}") } else { format!("{value:.digits$}") })
         })
     }
 }
@@ -210,7 +214,17 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_hold_all_values() {
-        for (low, high) in [(0.0, 1.0), (-3.2, 17.0), (0.0, 1e-4), (1e5, 1e5 + 3.0), (2.0, 2.0), (0.0, 0.0)] {
+        for (low, high) in [
+            (0.0, 1.0),
+            (-3.2, 17.0),
+            (0.0, 1e-4),
+            (1e5, 1e5 + 3.0),
+            (1e6, 1e6 + 3.0),
+            (-3.0626e-4, -3.0589e-4),
+            (9.1878e-8, 9.3381e-8),
+            (2.0, 2.0),
+            (0.0, 0.0),
+        ] {
             let axis = EvenAxis::over([low, high].into_iter(), 0.0, 100.0);
             let count = axis.ticks().count();
             assert!((6..=15).contains(&count), "{low} {high}: {count}");

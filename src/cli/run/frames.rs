@@ -136,6 +136,12 @@ impl Frames {
         parts.join(", ")
     }
 
+    /// The speed at the end of the pictures' colours, m/s, if a fluid with this greatest speed has little more than one of
+    /// them.
+    pub fn pale(&self, max_speed: f64) -> Option<f64> {
+        self.pictures.as_ref().and_then(|pictures| pictures.pale(max_speed))
+    }
+
     /// Saves the present state as a frame and a picture.
     pub fn save(&mut self, simulation: &Simulation) -> Result<(), Failure> {
         self.last_time = simulation.time();

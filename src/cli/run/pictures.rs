@@ -34,6 +34,9 @@ const SMALL: (u32, u32) = (320, 240);
 /// long before.
 const FASTEST: f64 = 0.6;
 
+/// The part of the colours that a fluid should use: they are chosen before anything is known of its motion.
+const PALE: f64 = 0.25;
+
 /// What is asked of pictures, besides what the scene states.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::cli) struct Look<'a> {
@@ -66,6 +69,8 @@ pub(in crate::cli) struct Pictures {
     bodies: Vec<Body>,
     /// How the surface of the fluid is drawn in place of the particles, and the plane that cuts it open.
     surface: Option<(Surface, Option<Cut>)>,
+    /// The speed at the end of the colours, m/s; `None` where they do not tell speeds.
+    colours_end: Option<f64>,
     pub(in crate::cli) count: usize,
 }
 
@@ -105,8 +110,14 @@ impl Pictures {
             radius: 0.5 * experiment.parameters().spacing(),
             bodies,
             surface: look.surface.map(|surface| (surface, plane(look, experiment, &camera))),
+            colours_end: look.surface.is_none().then_some(fastest),
             count: 0,
         })
+    }
+
+    /// The end of the colours, m/s, if a fluid with this greatest speed has little more than one of them.
+    pub fn pale(&self, max_speed: f64) -> Option<f64> {
+        self.colours_end.filter(|&end| self.count > 0 && max_speed < PALE * end)
     }
 
     /// Puts the obstacles where they are now.

@@ -185,7 +185,14 @@ pub(super) fn print(summary: &Summary, frames: &Frames, probes: &Probes) {
         1 => ", 1 probe".to_string(),
         count => format!(", {count} probes"),
     };
-    say!("written to {}: {}{probes}", frames.folder().shown(), frames.describe());
+    let folder = frames.folder().shown();
+    say!("written to {folder}: {}{probes}", frames.describe());
+    if let Some(end) = frames.pale(summary.max_speed) {
+        let end = significant(end, 2);
+        say!(
+            "the pictures' colours end at {end} m/s, and the fluid stayed far below that: rfm render {folder} fits them"
+        );
+    }
 }
 
 /// Names of the passes that a simulation runs.

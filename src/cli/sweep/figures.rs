@@ -5,21 +5,33 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// A figure, which is a number, or a mean with its standard error.
+/// A figure, which is a number, or a mean over time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Figure {
     /// Its name, with the solid or the probe that it belongs to.
     pub name: String,
     pub value: f64,
-    /// Standard error, of means over time only.
+    /// Of a mean its standard error, of a volume or an area how far it may be off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
+    /// Empty for a plain number.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub unit: String,
+    /// Whether it is that of what the cells show, which is not all of the solid.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub unresolved: bool,
 }
 
 impl Figure {
     fn new(name: impl Into<String>, value: &Value) -> Option<Self> {
         let value = value.as_f64().or(value.as_bool().map(f64::from))?;
-        value.is_finite().then(|| Self { name: name.into(), value, error: None })
+        value.is_finite().then(|| Self {
+            name: name.into(),
+            value,
+            error: None,
+            unit: String::new(),
+            unresolved: false,
+        })
     }
 }
 
@@ -50,8 +62,9 @@ impl Command {
                 keys(document, "", &["triangles", "volume", "area", "max_distance", "thin_cells", "closed"])
             }
             Self::Run => {
-                let mut figures = keys(document, "", &RUN);
-                figures.extend(of_probes(&folder.join("probes")));
+                // a study is about what it measures
+                let mut figures = of_probes(&folder.join("probes"));
+                figures.extend(keys(document, "", &RUN));
                 figures
             }
             Self::Report => of_report(document),
@@ -71,9 +84,30 @@ const RUN: [&str; 8] = [
     "front_error",
 ];
 
+/// The figure that says whether a solid is resolved.
+pub(super) const RESOLVED: &str = "resolved";
+
 /// Those of some keys of an object that are numbers.
 fn keys(object: &Value, prefix: &str, names: &[&str]) -> Vec<Figure> {
-    names.iter().filter_map(|name| Figure::new(format!("{prefix}{name}"), &object[*name])).collect()
+    let figure = |name: &&str| {
+        let figure = Figure::new(format!("{prefix}{name}"), &object[*name])?;
+        Some(Figure { unit: unit(name).into(), ..figure })
+    };
+    names.iter().filter_map(figure).collect()
+}
+
+/// The unit of a key; empty for a plain number.
+fn unit(key: &str) -> &'static str {
+    match key {
+        "volume" => "m³",
+        "area" => "m²",
+        "max_distance" => "m",
+        "max_speed" => "m/s",
+        "cpu_seconds" => "s",
+        "milliseconds" => "ms",
+        "ns_per_point" => "ns",
+        _ => "",
+    }
 }
 
 fn of_solids(document: &Value) -> Vec<Figure> {
@@ -83,7 +117,15 @@ fn of_solids(document: &Value) -> Vec<Figure> {
             (2.., Some(name)) => format!("{name}."),
             _ => String::new(),
         };
-        keys(solid, &prefix, &["volume", "area", "components"])
+        let mut figures = keys(solid, &prefix, &["volume", "area", "components", RESOLVED]);
+        let resolved = solid[RESOLVED] != Value::Bool(false);
+        for (key, error) in [("volume", "volume_error"), ("area", "area_error")] {
+            if let Some(figure) = figures.iter_mut().find(|figure| figure.name == format!("{prefix}{key}")) {
+                figure.unresolved = !resolved;
+                figure.error = solid[error].as_f64().filter(|_| resolved);
+            }
+        }
+        figures
     };
     solids.iter().flat_map(figures).collect()
 }
@@ -142,9 +184,10 @@ fn means(probe: &str, table: &str) -> Vec<Figure> {
     };
     let figure = |(i, name): (usize, &&str)| {
         let (value, error) = mean(&column(i))?;
-        // without the unit: `height [m]`
-        let quantity = name.split(" [").next().unwrap_or(name);
-        Some(Figure { name: format!("{probe}.{quantity}"), value, error })
+        // `height [m]`
+        let (quantity, unit) = name.split_once(" [").unwrap_or((name, ""));
+        let unit = unit.trim_end_matches(']').into();
+        Some(Figure { name: format!("{probe}.{quantity}"), value, error, unit, unresolved: false })
     };
     names.iter().enumerate().skip(1).filter_map(figure).collect()
 }

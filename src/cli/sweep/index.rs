@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::Failure;
 use super::super::output::{self, Shown};
-use super::figures::Figure;
+use super::figures::{Figure, RESOLVED};
 
 pub(super) const INDEX: &str = "index.json";
 
@@ -47,9 +47,9 @@ pub(super) struct Row {
 /// Who reads a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Reader {
-    /// Five digits, and errors of means behind them.
+    /// Five digits, and errors behind them.
     Person,
-    /// All digits, and columns for errors of means.
+    /// All digits, and columns for errors.
     Program,
 }
 
@@ -118,14 +118,18 @@ impl Index {
 
     /// The table: the names of the columns, then a line for each combination.
     fn cells(&self, reader: Reader) -> Vec<Vec<String>> {
-        let names = self.names();
+        let mut names = self.names();
         let is_file = reader == Reader::Program;
+        if !is_file {
+            // volumes and areas say it
+            names.retain(|name| name.rsplit('.').next() != Some(RESOLVED));
+        }
         let has_error = |name: &str| self.figures(name).any(|figure| figure.error.is_some());
         let mut head: Vec<String> = self.sweeps.iter().map(Axis::column).collect();
         for name in &names {
             head.push((*name).to_string());
             if is_file && has_error(name) {
-                head.push(format!("{name} standard error"));
+                head.push(format!("{name} {}", self.kind_of_error()));
             }
         }
         head.push("failure".into());
@@ -150,6 +154,14 @@ impl Index {
             cells
         };
         std::iter::once(head).chain(self.rows.iter().map(line)).collect()
+    }
+
+    /// What the errors of figures are.
+    pub fn kind_of_error(&self) -> &'static str {
+        match self.command.as_str() {
+            "run" => "standard error",
+            _ => "error",
+        }
     }
 
     pub fn figures<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Figure> {
@@ -183,6 +195,7 @@ fn short(figure: &Figure) -> String {
         _ => format!("{value:.4e}"),
     };
     match figure.error.filter(|error| *error > 0.0) {
+        _ if figure.unresolved => format!("{}, not resolved", number(figure.value)),
         Some(error) => format!("{} ± {error:.1e}", number(figure.value)),
         None => number(figure.value),
     }

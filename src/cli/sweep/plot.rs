@@ -4,6 +4,7 @@
 use std::fmt::Write;
 
 use super::super::plot::{self, EvenAxis, Legend};
+use super::figures::RESOLVED;
 use super::index::{Index, Row};
 use rfm::slice;
 
@@ -32,7 +33,8 @@ pub(super) fn draw(index: &Index) -> String {
         let first = values.next();
         values.any(|value| Some(value) != first)
     };
-    let mut names: Vec<&str> = index.names().into_iter().filter(changes).collect();
+    let is_shown = |name: &&str| name.rsplit('.').next() != Some(RESOLVED) && changes(name);
+    let mut names: Vec<&str> = index.names().into_iter().filter(is_shown).collect();
     names.truncate(MOST_PANELS);
     let panels: Vec<String> = match names.is_empty() {
         true => vec![empty(index)],
@@ -42,7 +44,7 @@ pub(super) fn draw(index: &Index) -> String {
     let width = plot::WIDTH * columns as f64;
     let height = plot::HEIGHT * panels.len().div_ceil(columns) as f64;
     let mut out = format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}">"##
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}"><rect width="100%" height="100%" fill="#ffffff"/>"##
     );
     for (i, panel) in panels.iter().enumerate() {
         let (x, y) = (plot::WIDTH * (i % columns) as f64, plot::HEIGHT * (i / columns) as f64);
@@ -66,7 +68,8 @@ fn panel(index: &Index, name: &str) -> String {
     let x = EvenAxis::over(points().map(|point| point[0]), plot::LEFT, right);
     let ends = points().flat_map(|[_, value, error]| [value - error, value + error]);
     let y = EvenAxis::over(ends, plot::HEIGHT - plot::BOTTOM, plot::TOP);
-    let mut out = plot::begin(name);
+    let unit = index.figures(name).map(|figure| figure.unit.as_str()).find(|unit| !unit.is_empty());
+    let mut out = plot::begin(&unit.map_or_else(|| name.into(), |unit| format!("{name}, {unit}")));
     let along = index.sweeps.first().map_or_else(String::new, |axis| slice::escaped(&axis.column()));
     // the title names what goes up
     plot::even_grid(&mut out, &x, &y, [&along, ""], right);
@@ -103,7 +106,7 @@ fn panel(index: &Index, name: &str) -> String {
     }
     if points().any(|[.., error]| *error > 0.0) {
         legend.gap();
-        legend.remark(&mut out, "bars: standard error");
+        legend.remark(&mut out, &format!("bars: {}", index.kind_of_error()));
     }
     out
 }
