@@ -25,6 +25,7 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics, Label, Severity, Source, 
 use crate::geom::Aabb;
 use crate::ir::Node;
 use crate::lower::{self, Imported, Module, OpenParams, Options, Scene, Tolerance};
+use crate::quantity::Dimension;
 use crate::solid::{Bounds, Chosen, Engine, Solid};
 use crate::sph::Method;
 use crate::syntax::{self, Ast};
@@ -176,13 +177,29 @@ impl Program {
     /// # Errors
     /// [`Error::Diagnostics`] if the file declares no such param, or if the value makes it wrong.
     pub fn with(&self, param: &str, value: f64) -> Result<Self, Error> {
-        let mut options = self.options.clone();
-        options.overrides.insert(param.to_string(), value);
         // a program gives numbers in SI units, whatever the file writes
         let declared = self.module.params.iter().find(|declared| declared.name == param);
-        if let Some((unit, _)) = declared.and_then(|declared| declared.unit.as_ref()) {
-            options.dimensions.insert(param.to_string(), unit.dimension);
-        }
+        let dimension = declared.and_then(|declared| declared.unit.as_ref()).map(|(unit, _)| unit.dimension);
+        self.with_quantity(param, value, dimension)
+    }
+
+    /// [`with`](Self::with), where the value in SI units was given with a unit of this dimension, which is to fit that of the
+    /// file, or without one.
+    ///
+    /// # Errors
+    /// [`Error::Diagnostics`] also if it does not.
+    pub fn with_quantity(
+        &self,
+        param: &str,
+        value: f64,
+        dimension: Option<Dimension>,
+    ) -> Result<Self, Error> {
+        let mut options = self.options.clone();
+        options.overrides.insert(param.to_string(), value);
+        match dimension {
+            Some(dimension) => options.dimensions.insert(param.to_string(), dimension),
+            None => options.dimensions.remove(param),
+        };
         self.lowered_again(options)
     }
 

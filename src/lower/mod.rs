@@ -275,10 +275,8 @@ impl<'a> Lowering<'a> {
             // a range tells which unit is meant
             if unit.factor != 1.0 && param.value != 0.0 && param.range.is_none() {
                 let si = unit.dimension.unit().unwrap_or("in SI units");
-                let message = format!(
-                    "-D {name}={0} means {0} {si}, and the file writes `{name}` in {text}",
-                    param.value
-                );
+                let message =
+                    format!("`{name}` = {0} means {0} {si}, and the file writes it in {text}", param.value);
                 self.report(
                     Diagnostic::warning(Code::BARE_OVERRIDE, param.span, message).at("declared here").help(
                         format!(
@@ -294,7 +292,8 @@ impl<'a> Lowering<'a> {
         if *dimension == unit.dimension {
             return true;
         }
-        let message = format!("the unit that -D gives `{name}` does not fit: the file writes it in {text}");
+        let message =
+            format!("the unit that `{name}` is given in does not fit: the file writes it in {text}");
         self.report(
             Diagnostic::error(Code::OVERRIDE, param.span, message)
                 .at("declared here")
@@ -352,7 +351,7 @@ impl<'a> Lowering<'a> {
             let [first, last] = [low, high].map(|end| given.shown(end));
             let diagnostic = if overridden {
                 let message =
-                    format!("-D sets `{}` to {shown}, outside its range {first} .. {last}", given.name);
+                    format!("`{}` is set to {shown}, outside its range {first} .. {last}", given.name);
                 let diagnostic =
                     Diagnostic::error(Code::OVERRIDE, param.name.span, message).at("declared here");
                 match given
@@ -518,7 +517,7 @@ impl<'a> Lowering<'a> {
         let declared: Vec<String> = params.collect();
         for name in options.overrides.keys().filter(|name| !declared.contains(name)) {
             let span = Span::new(SourceId::File, 0, 0);
-            let message = format!("-D sets `{name}`, but the file declares no such param");
+            let message = format!("`{name}` is set, but the file declares no such param");
             let mut diagnostic = Diagnostic::error(Code::OVERRIDE, span, message);
             diagnostic = match crate::diagnostic::nearest(name, declared.iter().map(String::as_str)) {
                 Some(near) => diagnostic.help(format!("did you mean `{near}`?")),

@@ -53,6 +53,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "diagnostic",
             "files",
             "geom",
+            "quantity",
             "syntax",
             "ir",
             "lower",

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use pyo3::exceptions::{PyKeyError, PyTypeError};
+use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyString, PyTuple, PyType};
@@ -12,6 +12,7 @@ use rfm::compile::{files_beside, text_of};
 use rfm::diagnostic::{Source, SourceId};
 use rfm::files::Files;
 use rfm::lower::Options;
+use rfm::quantity::{Dimension, parse_quantity};
 use rfm::{Error, Program, Solid};
 
 use crate::error::{diagnostics, not_read, of_diagnostics, raised};
@@ -29,8 +30,8 @@ const TEXT: &str = "<text>";
 /// ----------
 /// path_or_text : str or path
 ///     A text, if it is a str that has several lines or begins with ``rfm ``; otherwise the path of a file.
-/// **params : float
-///     Values for params of the file.
+/// **params : float or str
+///     Values for params of the file: numbers in SI units, or texts with a unit such as ``"8 mm"``.
 ///
 /// Returns
 /// -------
@@ -53,7 +54,7 @@ pub fn load(
         Ok(text) if is_text(&text.to_cow()?) => Source::file(TEXT, text.to_cow()?.into_owned()),
         _ => read(&path_or_text.extract::<PathBuf>()?)?,
     };
-    PyProgram::check(py, source, numbers(params)?)
+    PyProgram::check(py, source, given(params)?)
 }
 
 fn is_text(given: &str) -> bool {
@@ -66,16 +67,30 @@ fn read(path: &Path) -> PyResult<Source> {
     Ok(Source::file(name, text))
 }
 
-/// Params as names with numbers.
-fn numbers(params: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
-    let number = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+/// A param as it is given: a number, or a text with a unit.
+struct Given {
+    name: String,
+    /// In SI units.
+    value: f64,
+    /// `None` without a unit.
+    dimension: Option<Dimension>,
+}
+
+/// Params as names with numbers, or with texts such as `"8 mm"`.
+fn given(params: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<Given>> {
+    let one = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let name: String = name.extract()?;
-        let value = value
-            .extract::<f64>()
-            .map_err(|_| PyTypeError::new_err(format!("param `{name}` is {value}, expected a number")))?;
-        Ok((name, value))
+        if let Ok(value) = value.extract::<f64>() {
+            return Ok(Given { name, value, dimension: None });
+        }
+        let Ok(text) = value.cast::<PyString>() else {
+            return Err(PyTypeError::new_err(format!("param `{name}` is {value}, expected a number")));
+        };
+        let (value, dimension) = parse_quantity(&text.to_cow()?)
+            .map_err(|error| PyValueError::new_err(format!("param `{name}`: {error}")))?;
+        Ok(Given { name, value, dimension })
     };
-    params.into_iter().flat_map(|params| params.iter()).map(number).collect()
+    params.into_iter().flat_map(|params| params.iter()).map(one).collect()
 }
 
 /// A checked file: its solids and its scenes. `load` makes one.
@@ -89,10 +104,13 @@ pub struct PyProgram {
 }
 
 impl PyProgram {
-    fn check(py: Python<'_>, source: Source, params: Vec<(String, f64)>) -> PyResult<Self> {
+    fn check(py: Python<'_>, source: Source, params: Vec<Given>) -> PyResult<Self> {
         // a text has no folder, and names no other files
         let files = if &*source.name == TEXT { Files::default() } else { files_beside(&*source.name, false) };
-        let options = Options { overrides: params.into_iter().collect(), files, ..Options::default() };
+        let dimensions =
+            params.iter().filter_map(|param| Some((param.name.clone(), param.dimension?))).collect();
+        let overrides = params.into_iter().map(|param| (param.name, param.value)).collect();
+        let options = Options { overrides, dimensions, files, ..Options::default() };
         let program = py.detach(|| Program::check(source, options));
         program.map(Self::new).map_err(|found| of_diagnostics(py, &found))
     }
@@ -233,13 +251,15 @@ impl PyProgram {
         PySimulation::new(slf, name, threads)
     }
 
-    /// The same file with other values for params; those that are not named keep theirs.
+    /// The same file with other values for params, as `load` takes them; those that are not named keep theirs.
     #[pyo3(signature = (**params))]
     fn with_params(&self, py: Python<'_>, params: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let params = numbers(params)?;
-        let changed = py.detach(|| {
-            params.iter().try_fold(self.program.clone(), |program, (name, value)| program.with(name, *value))
-        });
+        let params = given(params)?;
+        let set = |program: Program, param: &Given| match param.dimension {
+            None => program.with(&param.name, param.value),
+            dimension => program.with_quantity(&param.name, param.value, dimension),
+        };
+        let changed = py.detach(|| params.iter().try_fold(self.program.clone(), set));
         changed.map(Self::new).map_err(|error| raised(py, error))
     }
 
@@ -267,7 +287,8 @@ pub fn program_from_pickle(
     text: String,
     params: Vec<(String, f64)>,
 ) -> PyResult<PyProgram> {
-    PyProgram::check(py, Source::file(name, text), params)
+    let params = params.into_iter().map(|(name, value)| Given { name, value, dimension: None });
+    PyProgram::check(py, Source::file(name, text), params.collect())
 }
 
 /// A solid of a program by its name, at a stretch of time and for particles in a box; for pickles.

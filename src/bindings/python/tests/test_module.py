@@ -32,6 +32,7 @@ def test_a_program_says_what_it_has():
     assert program.params["cx"] == (1.25, 0.5, 2.5, "axis of the pawn, x")
     assert program.params["cy"].value == 1.5 and list(program.params) == ["cx", "cy", "particles"]
     assert program.path == str(EXAMPLES / "pawn.rfm") and program.text.startswith("rfm 1\n")
+    assert rfm.load("rfm 1\nparam a = 1 mm\nsolid s = sphere(a)", a="5 cm")["s"](0, 0, 0) == pytest.approx(0.025)
     moved = program.with_params(cy=2.0)
     assert (moved.params["cx"].value, moved.params["cy"].value) == (1.25, 2.0)
     assert moved["pawn"](1.25, 2.0, 0.5) == program["pawn"](1.25, 1.5, 0.5)
