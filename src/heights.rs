@@ -260,6 +260,10 @@ impl Table for HeightMap {
         Aabb { max: everywhere.max.with_z(top), ..everywhere }
     }
 
+    fn what(&self) -> &'static str {
+        "a height map"
+    }
+
     fn fingerprint(&self) -> String {
         self.hash.to_hex()[..16].to_string()
     }

@@ -24,6 +24,9 @@ pub trait Table: Debug + Send + Sync {
     /// A box around the points whose value is at least `least`.
     fn reach(&self, least: f64) -> Aabb;
 
+    /// What it is, with its article, in messages.
+    fn what(&self) -> &'static str;
+
     /// What tells this table from one with other values.
     fn fingerprint(&self) -> String;
 }

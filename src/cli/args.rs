@@ -127,9 +127,9 @@ pub(super) struct Check {
     /// Plot ω over a plane: x=…, y=… or z=…; several planes make a sheet: z=0.2,z=0.8,y=1.5
     #[arg(long, value_name = "AXIS=VALUE", value_parser = plane, value_delimiter = ',')]
     pub slice: Vec<Plane>,
-    /// The solid to plot; of several their sections are drawn together, hatched [default: the only one, or the first
-    /// obstacle of the scene]
-    #[arg(short, long, value_name = "NAME", requires = "slice", value_delimiter = ',')]
+    /// The solid to measure and to plot; of several the sections are drawn together, hatched [default: all are measured,
+    /// and the only one or the first obstacle of the scene is plotted]
+    #[arg(short, long, value_name = "NAME", value_delimiter = ',')]
     pub solid: Vec<String>,
     /// Where the plot goes: .svg or .png [default: SOLID.AXIS=VALUE.svg; a sheet: slices.svg]
     #[arg(short, long, value_name = "FILE", requires = "slice")]
@@ -544,7 +544,7 @@ fn flow_method() -> impl TypedValueParser<Value = Method> {
 
 #[derive(Debug, Args)]
 pub(super) struct Explain {
-    /// The code of a message (E0201), or a file, FILE:SOLID or FILE:SCENE
+    /// The code of a message (E0201), `codes` for a list of them, or a file, FILE:SOLID or FILE:SCENE
     #[arg(value_name = "CODE|FILE[:NAME]", required_unless_present = "methods")]
     pub subject: Option<String>,
     /// List the methods of the fluid solver, with the keys, units, defaults and passes of each, as Markdown

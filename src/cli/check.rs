@@ -238,8 +238,16 @@ fn solids(
 ) -> Result<Vec<Facts>, Failure> {
     let (time, budget) = (options.time, options.budget);
     let (mut facts, mut searches) = (Vec::new(), lints::Searches::new());
-    let (start, named_solids) = (Instant::now(), &program.module().solids);
-    for named in named_solids {
+    let (start, all) = (Instant::now(), &program.module().solids);
+    let chosen = |name: &String| {
+        let found = all.iter().find(|named| named.name == *name);
+        found.ok_or_else(|| choose::no_such(Path::new(file), program, name))
+    };
+    let named_solids: Vec<&NamedSolid> = match &options.solid[..] {
+        [] => all.iter().collect(),
+        names => names.iter().map(chosen).collect::<Result<_, _>>()?,
+    };
+    for &named in &named_solids {
         let elapsed = start.elapsed().as_secs_f64();
         if is_over(facts.len(), named_solids.len(), elapsed, budget) {
             note(format!(

@@ -8,7 +8,7 @@ use super::args::{Explain, Shared, Stage};
 use super::run::{experiment, start};
 use super::{Failure, choose, input};
 use rfm::codegen::{CodegenError, Listing, Request, Shape, target_description};
-use rfm::diagnostic::{Span, explain};
+use rfm::diagnostic::{Span, explain, explanations};
 use rfm::geom::Aabb;
 use rfm::interval::Interval;
 use rfm::ir::{Node, dump};
@@ -27,13 +27,19 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
         say!("{}", methods_reference().trim_end());
         return Ok(());
     };
+    if subject == "codes" && !Path::new(subject).exists() {
+        for (code, text) in explanations() {
+            say!("{code}  {}", first_sentence(text));
+        }
+        return Ok(());
+    }
     if let Some(text) = explain(subject) {
         say!("{}\n\n{text}", subject.to_uppercase());
         return Ok(());
     }
     let is_code = subject.len() == 5 && subject.starts_with(['E', 'W']) && !Path::new(subject).exists();
     if is_code && subject[1..].bytes().all(|b| b.is_ascii_digit()) {
-        return Err(Failure::usage(format!("there is no message {subject}")));
+        return Err(Failure::usage(format!("there is no message {subject}: `rfm explain codes` lists all")));
     }
     let (path, name) = choose::subject(subject);
     let program = input::program(shared, path)?;
@@ -58,6 +64,19 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
             Ok(())
         }
     }
+}
+
+/// The first sentence of an explanation, on one line.
+fn first_sentence(text: &str) -> String {
+    let words = text.split_whitespace();
+    let mut sentence: Vec<&str> = Vec::new();
+    for word in words {
+        sentence.push(word);
+        if word.ends_with('.') && word.chars().filter(|c| *c == '.').count() == 1 {
+            break;
+        }
+    }
+    sentence.join(" ")
 }
 
 /// Prints what the stages of the compiler make of one solid.

@@ -21,6 +21,11 @@ pub fn explain(code: &str) -> Option<&'static str> {
     TABLE.iter().find(|(name, _)| name.eq_ignore_ascii_case(code)).map(|&(_, text)| text)
 }
 
+/// All codes with their explanations, in the order of what they are about.
+pub fn explanations() -> impl Iterator<Item = (&'static str, &'static str)> {
+    TABLE.iter().copied()
+}
+
 codes! {
 VERSION_UNKNOWN = "E0001":
 "The first line of a file names the edition of the language it is written in: `rfm 1`. This file names an
@@ -83,8 +88,8 @@ TOO_LARGE = "E0210":
 "The file unrolls to more operations than the limit (1 million, or what --max-nodes says). A range such as
 `0..1000000` may have too many members.";
 OVERRIDE = "E0211":
-"A param is set, by -D name=value, by -P or by a program. The file must declare it with `param name = …`, and the value must lie in
-the range that the declaration states.";
+"A param is set that the file does not declare with `param name = …`, or to a value outside the range that the declaration
+states, or with another unit. Params are set by `-D name=value`, by files that `-P` names, or by a program.";
 UNIT_MISMATCH = "E0212":
 "The unit does not fit what is measured here: a density needs kg/m^3, a time s, an angle deg or rad. Inside shapes
 only lengths and angles are meaningful.";

@@ -11,7 +11,7 @@ mod source;
 use std::fmt;
 use std::sync::Arc;
 
-pub use codes::{Code, explain};
+pub use codes::{Code, explain, explanations};
 pub use printable::{is_hidden, printable, printable_line};
 pub use render::{Style, render};
 pub use source::{Position, Source, SourceId, Span};

@@ -207,6 +207,10 @@ impl Table for TriangleSolid {
         bounds.grown(slack - least)
     }
 
+    fn what(&self) -> &'static str {
+        "a mesh"
+    }
+
     fn fingerprint(&self) -> String {
         self.hash.to_hex()[..16].to_string()
     }

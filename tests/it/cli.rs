@@ -144,6 +144,13 @@ fn check_prints_facts() {
     let outcome = rfm_reading(root(), &["check", "-", "-D", "r=0.2"], SMALL.as_bytes()).expect(0);
     snapshot("cli", "check stdin", &outcome.transcript());
     snapshot("cli", "explain a code", &rfm(root(), &["explain", "e0106"]).expect(0).transcript());
+    let list = rfm(root(), &["explain", "codes"]).expect(0).stdout;
+    let codes: Vec<&str> = list.lines().map(|line| &line[..5]).collect();
+    assert!(codes.len() > 50 && codes.contains(&"E0106") && codes.contains(&"W0408"), "{list}");
+    assert!(
+        list.lines().all(|line| line.len() > 20 && rfm::diagnostic::explain(&line[..5]).is_some()),
+        "{list}"
+    );
     snapshot(
         "cli",
         "explain a scene",

@@ -354,10 +354,31 @@ fn volumes_that_are_not_resolved_are_told_in_the_table() {
     let folder = in_folder(
         "rfm 1\nparam r = 0.2 in 0.05 .. 0.9\nsolid pin = box([0, 0, 0], [1, 1, 0.5]) \\ cylinder(r, 2).move([0.5, 0.5, -0.5])\n",
     );
-    let outcome = rfm(folder.path(), &["check", "a.rfm", "--sweep", "r=0.3..0.7:2"]).expect(0);
+    // what is given for a swept param is not used, and that is told
+    let outcome = rfm(folder.path(), &["check", "a.rfm", "--sweep", "r=0.3..0.7:2", "-D", "r=0.4"]).expect(0);
+    assert!(outcome.stderr.contains("the value that is given for `r` is not used"), "{}", outcome.stderr);
     let lines: Vec<&str> = outcome.stdout.lines().collect();
     assert!(lines[1].contains(" ± ") && !lines[1].contains("not resolved"), "{}", lines[1]);
     assert!(lines[2].contains("not resolved"), "{}", lines[2]);
     let found = index(&folder.path().join("a.sweep"));
     assert_eq!([0, 1].map(|row| figure(&rows(&found)[row], "resolved")), [1.0, 0.0]);
+}
+
+/// `-s` names what is measured: other solids cost nothing and have no column.
+#[test]
+fn a_study_of_one_solid_measures_no_other() {
+    let folder = in_folder(
+        "rfm 1\nparam r = 0.2 in 0.05 .. 0.9\nsolid ball = sphere(r)\nsolid other = sphere(1)\nsolid third = sphere(2)\n",
+    );
+    let outcome = rfm(folder.path(), &["check", "a.rfm", "-s", "ball", "--sweep", "r=0.1..0.3:2"]).expect(0);
+    let head: Vec<&str> = outcome.stdout.lines().next().unwrap().split_whitespace().collect();
+    assert_eq!(head, ["r", "volume", "area", "components"]);
+    let outcome = rfm(folder.path(), &["check", "a.rfm", "-s", "ball,third"]).expect(0);
+    assert!(
+        outcome.stdout.contains("solid third") && !outcome.stdout.contains("solid other"),
+        "{}",
+        outcome.stdout
+    );
+    let outcome = rfm(folder.path(), &["check", "a.rfm", "-s", "bell"]).expect(2);
+    assert!(outcome.stderr.contains("did you mean `ball`?"), "{}", outcome.stderr);
 }

@@ -84,6 +84,16 @@ fn every_frame_becomes_a_picture_with_the_same_bytes_on_any_number_of_threads() 
         delays.push(frame.delay);
     }
     assert_eq!(delays, [4; 6]);
+    // frames of every 20 ms
+    let speed = |flags: &[&str], told: &str| {
+        let mut arguments = vec!["render", "drop.out", "-o", "a.gif", "--size", "64x48"];
+        arguments.extend(flags);
+        let stdout = rfm(here, &arguments).expect(0).stdout;
+        assert!(stdout.contains(told), "{flags:?}: {stdout}");
+    };
+    speed(&[], "it shows the fluid slowed down 2.0 times");
+    speed(&["--fps", "50"], "it shows the fluid as fast as it was");
+    speed(&["--fps", "50", "--every", "2"], "it shows the fluid 2.0 times as fast as it was");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::options::{Render, Surface};
 use super::solid::camera;
 use crate::cli::args::Shared;
 use crate::cli::failure::{Failure, note};
-use crate::cli::output::{self, Shown};
+use crate::cli::output::{self, Shown, significant};
 use crate::cli::saved::{self, RunFigures};
 use crate::cli::scenery::{self, Drawn, half_towards_eye};
 use crate::cli::survey::Survey;
@@ -223,7 +223,28 @@ impl RunScene {
         let pictures = if count == 1 { "picture" } else { "pictures" };
         say!("{count} {pictures} of {width} × {height} in {seconds:.1} s, {each:.1} ms each to draw");
         say!("written to {}", target.path.shown());
+        if let Some(speed) = target.kind.is_film().then(|| self.speed(target.rate)).flatten() {
+            say!("it shows {speed}");
+        }
         Ok(())
+    }
+
+    /// How fast a film with so many pictures in a second is, in words; `None` if its pictures are not of instants that
+    /// follow each other.
+    fn speed(&self, rate: u32) -> Option<String> {
+        let (first, last) = (self.entries.first()?.1.time, self.entries.last()?.1.time);
+        let between = (last - first) / (self.entries.len() - 1) as f64;
+        let speed = between * f64::from(rate);
+        match speed {
+            0.98..1.02 => Some("the fluid as fast as it was".into()),
+            1.0.. if speed.is_finite() => {
+                Some(format!("the fluid {} times as fast as it was", significant(speed, 1)))
+            }
+            0.0..1.0 if speed > 0.0 => {
+                Some(format!("the fluid slowed down {} times", significant(1.0 / speed, 1)))
+            }
+            _ => None,
+        }
     }
 }
 

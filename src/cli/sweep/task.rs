@@ -173,6 +173,12 @@ impl Task<'_> {
             if self.sweeps[..i].iter().any(|other| other.name == sweep.name) {
                 return Err(Failure::usage(format!("--sweep {}: the param is swept twice", sweep.name)));
             }
+            if self.shared.define.iter().any(|given| given.name == sweep.name) {
+                note(format!(
+                    "the value that is given for `{0}` is not used: --sweep {0} goes before it",
+                    sweep.name
+                ));
+            }
         }
         let count =
             self.sweeps.iter().fold(1, |count: usize, sweep| count.saturating_mul(sweep.values.len()));

@@ -233,9 +233,12 @@ impl Look<'_> {
             for (varies, slope) in varies.iter_mut().zip(sheet.slopes) {
                 *varies |= slope.lo < -NO_SLOPE || slope.hi > NO_SLOPE;
             }
-            let way = seen.around.iter().find(|normal| agrees(&sheet.slopes, **normal, KNOWN));
-            known &= way.is_some();
             let middle = middle(&sheet);
+            // the middle is among what the slopes allow, so most normals are soon ruled out
+            known &= middle.is_some_and(|way| {
+                let mut may = seen.around.iter().filter(|normal| normal.dot(way) > KNOWN - 1e-9);
+                may.any(|normal| agrees(&sheet.slopes, *normal, KNOWN))
+            });
             flat &= middle.is_some_and(|way| agrees(&sheet.slopes, way, PARALLEL));
             normals.extend(middle);
         });

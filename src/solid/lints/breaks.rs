@@ -319,7 +319,7 @@ impl<'a> Formula<'a> {
             Expr::Unary(op, _) => format!("`{}`", op.name()),
             Expr::Binary(Binary::Div, ..) => "a division".into(),
             Expr::Binary(op, ..) => format!("`{}`", op.name()),
-            Expr::Lookup(..) => "a table".into(),
+            Expr::Lookup(lookup, _) => graph.tables()[lookup.table as usize].what().into(),
             Expr::Constant(_) | Expr::Coordinate(_) | Expr::Parameter(_) | Expr::Uniform(_) => {
                 "a number".into()
             }
