@@ -412,7 +412,7 @@ fn one_document_or_none() {
     contract(&dry.stdout, &dry.json(), &["schema", "particles", "steps", "time_step", "passes", "seconds"]);
     run(&["check", "-", "--json", "--slice", "z=0.1", "--term"]).expect(2);
     run(&["explain", "E0201", "--json"]).expect(2);
-    run(&["check", "-", "-s", "post"]).expect(2);
+    run(&["check", "-", "-s", "pots"]).expect(2);
     run(&["check", "-", "--threads", "1025"]).expect(2);
     let thin = b"rfm 1\nsolid s = sphere(1) and -1e-4 <= x + y + 0.7*z - 0.0123 <= 1e-4";
     let thin = rfm_reading(root(), &["check", "-", "--json"], thin).expect(0).json();
