@@ -322,11 +322,16 @@ fn remarks(named: &NamedSolid, solid: &Solid, thin: &ThinCells) -> Vec<Diagnosti
     }
     let grid = solid.bounds().aabb().and_then(|bounds| Grid::around(&bounds, RESOLUTION).ok());
     if let Some(grid) = grid.filter(|_| thin.count > 0) {
-        let (what, help) = match thin.is_wedge {
-            true => ("edges so sharp that", "more --cells show more of them, and none shows all"),
-            false => ("parts or gaps that", "mesh it with more --cells, until `thin_cells` is 0"),
+        let (what, does, help) = match thin.is_wedge {
+            true => (
+                "edges so sharp that",
+                "show them blunt",
+                "more --cells show more of them, and none shows all",
+            ),
+            false => {
+                ("parts or gaps that", "do not show", "mesh it with more --cells, until `thin_cells` is 0")
+            }
         };
-        let does = if thin.is_wedge { "show them blunt" } else { "do not show" };
         let message = format!(
             "solid `{}` has {what} {VOLUME_CELLS} cells along its longest side {does}, {}",
             named.name,

@@ -11,7 +11,7 @@ pub(super) struct Figure {
     /// Its name, with the solid or the probe that it belongs to.
     pub name: String,
     pub value: f64,
-    /// Of a mean its standard error, of a volume or an area how far it may be off.
+    /// The standard error of a mean; how far a volume or an area may be off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
     /// Empty for a plain number.
@@ -85,7 +85,12 @@ const RUN: [&str; 8] = [
 ];
 
 /// The figure that says whether a solid is resolved.
-pub(super) const RESOLVED: &str = "resolved";
+const RESOLVED: &str = "resolved";
+
+/// Whether a figure's name is that of what is said beside volumes and areas already, for people.
+pub(super) fn is_said_elsewhere(name: &str) -> bool {
+    name.rsplit('.').next() == Some(RESOLVED)
+}
 
 /// Those of some keys of an object that are numbers.
 fn keys(object: &Value, prefix: &str, names: &[&str]) -> Vec<Figure> {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::Failure;
 use super::super::output::{self, Shown};
-use super::figures::{Figure, RESOLVED};
+use super::figures::{Figure, is_said_elsewhere};
 
 pub(super) const INDEX: &str = "index.json";
 
@@ -121,8 +121,7 @@ impl Index {
         let mut names = self.names();
         let is_file = reader == Reader::Program;
         if !is_file {
-            // volumes and areas say it
-            names.retain(|name| name.rsplit('.').next() != Some(RESOLVED));
+            names.retain(|name| !is_said_elsewhere(name));
         }
         let has_error = |name: &str| self.figures(name).any(|figure| figure.error.is_some());
         let mut head: Vec<String> = self.sweeps.iter().map(Axis::column).collect();

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use super::super::plot::{self, EvenAxis, Legend};
-use super::figures::RESOLVED;
+use super::figures::is_said_elsewhere;
 use super::index::{Index, Row};
 use rfm::slice;
 
@@ -33,7 +33,7 @@ pub(super) fn draw(index: &Index) -> String {
         let first = values.next();
         values.any(|value| Some(value) != first)
     };
-    let is_shown = |name: &&str| name.rsplit('.').next() != Some(RESOLVED) && changes(name);
+    let is_shown = |name: &&str| !is_said_elsewhere(name) && changes(name);
     let mut names: Vec<&str> = index.names().into_iter().filter(is_shown).collect();
     names.truncate(MOST_PANELS);
     let panels: Vec<String> = match names.is_empty() {
