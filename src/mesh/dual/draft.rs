@@ -46,6 +46,7 @@ const BATCH: usize = 4096;
 const TOO_CLOSE: f64 = 0.1;
 
 /// A mesh that is still worked on.
+#[derive(Clone)]
 pub(super) struct Draft<'a> {
     field: &'a dyn Field,
     /// The grid.
@@ -56,6 +57,10 @@ pub(super) struct Draft<'a> {
     triangles: Vec<[u32; 3]>,
     work: Work,
     care: Care,
+    /// The vertices from here on cut edges.
+    first_cut: usize,
+    /// The ends of these edges.
+    cut_ends: Vec<[u32; 2]>,
 }
 
 impl<'a> Draft<'a> {
@@ -64,32 +69,32 @@ impl<'a> Draft<'a> {
         field: &'a dyn Field,
         grid: &'a Grid,
         (vertices, triangles): (Vertices, Vec<[u32; 3]>),
-        (work, care): (Work, Care),
+        work: Work,
     ) -> Self {
         let (bounds, size) = (grid.bounds(), grid.spacing().min_element());
-        Self { field, bounds, size, vertices, triangles, work, care }
-    }
-
-    /// Cuts edges, merges vertices and mends what is still not right.
-    ///
-    /// # Errors
-    /// [`MeshError::TooManyVertices`] if that made too many.
-    pub fn refine_and_mend(&mut self) -> Result<(), MeshError> {
-        let left = self.refine();
-        self.mend(left)
+        let (first_cut, cut_ends) = (vertices.len(), Vec::new());
+        Self { field, bounds, size, vertices, triangles, work, care: Care::Sharp, first_cut, cut_ends }
     }
 
     /// Cuts edges until the mesh is near the surface. Returns the edges that are not near and could not be
     /// cut, ascending.
-    fn refine(&mut self) -> Vec<[u32; 2]> {
-        let first = self.vertices.len();
+    pub fn cut(&mut self) -> Vec<[u32; 2]> {
+        self.first_cut = self.vertices.len();
         let Refined { left, ends, evaluations } =
             refine::refine(self.field, &mut self.vertices, &mut self.triangles, self.size);
         self.work.gradients += evaluations;
-        if self.care == Care::Apart && !ends.is_empty() {
-            self.uncross(first, &ends);
-        }
+        self.cut_ends = ends;
         left
+    }
+
+    /// Moves cuts back where triangles cross, if none crossed without them, and takes care from now on that none do.
+    /// For a mesh that was cut and not mended.
+    pub fn part(&mut self) {
+        self.care = Care::Apart;
+        let ends = std::mem::take(&mut self.cut_ends);
+        if !ends.is_empty() {
+            self.uncross(self.first_cut, &ends);
+        }
     }
 
     /// Moves vertices that cut edges back to the middles of their edges where triangles cross, and then as many of
@@ -149,8 +154,10 @@ impl<'a> Draft<'a> {
     fn restore(&mut self, cuts: &BTreeMap<u32, Vertex>) {
         let mut beside: FxHashMap<u32, SmallVec<[u32; 8]>> = FxHashMap::default();
         let mut touched = Vec::new();
+        let mut is_cut = vec![false; self.vertices.len()];
+        cuts.keys().for_each(|&v| is_cut[v as usize] = true);
         for (t, triangle) in (0..).zip(&self.triangles) {
-            let moved = triangle.iter().filter(|v| cuts.contains_key(v));
+            let moved = triangle.iter().filter(|&&v| is_cut[v as usize]);
             moved.clone().for_each(|v| beside.entry(*v).or_default().push(t));
             touched.extend(moved.map(|_| t).next());
         }
@@ -207,9 +214,9 @@ impl<'a> Draft<'a> {
         parts.concat()
     }
 
-    /// Whether triangles cross, of which one is not surely clear of others.
-    pub fn crosses_itself(&self) -> bool {
-        !crossing_pairs(&self.vertices.positions, &self.triangles, &self.doubtful(), self.size).is_empty()
+    /// The number of pairs of triangles that cross, of which one is not surely clear of others.
+    pub fn crossings(&self) -> usize {
+        crossing_pairs(&self.vertices.positions, &self.triangles, &self.doubtful(), self.size).len()
     }
 
     /// The work done so far.
@@ -217,16 +224,28 @@ impl<'a> Draft<'a> {
         self.work
     }
 
-    /// Mends the mesh around the given edges, merges vertices that are too close, and mends folded triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Whether edges were cut.
+    pub fn is_cut(&self) -> bool {
+        !self.cut_ends.is_empty()
+    }
+
+    /// Mends the mesh around the given edges, merges vertices that are too close, and mends folded triangles. Returns
+    /// whether that changed anything.
     ///
     /// # Errors
     /// [`MeshError::TooManyVertices`] if refining and mending made too many.
-    fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<(), MeshError> {
+    pub fn mend(&mut self, far: Vec<[u32; 2]>) -> Result<bool, MeshError> {
         let mut budget = match self.care {
             Care::Sharp => u64::MAX,
             Care::Apart => ((MENDING * self.work.evaluations as f64) as u64).max(LEAST_MENDING),
         };
-        if mend::is_worth(&far, &self.triangles) {
+        let merged = self.work.merged;
+        let mut changes = mend::is_worth(&far, &self.triangles);
+        if changes {
             self.mend_around(far, Aim::Distance, &mut budget);
         }
         MeshError::check_vertices(self.vertices.len())?;
@@ -237,10 +256,11 @@ impl<'a> Draft<'a> {
             if !mend::is_worth(&folded, &self.triangles) || budget == 0 {
                 break;
             }
+            changes = true;
             self.mend_around(folded, Aim::Folds, &mut budget);
             self.merge(0.0);
         }
-        Ok(())
+        Ok(changes || self.work.merged != merged)
     }
 
     fn mend_around(&mut self, edges: Vec<[u32; 2]>, aim: Aim, budget: &mut u64) {

@@ -9,7 +9,7 @@
 //! 4. `refine`: edges that are still too far from the surface are cut.
 //! 5. `mend`: what stays far off or lies upside down is looked at one by one.
 //!
-//! If many triangles cross after stage 3, or any in the end, what follows stage 3 is done with care: `secure` makes
+//! If many triangles cross after stage 3 or 4, or any in the end, what follows stage 3 is done with care: `secure` makes
 //! fans of quads that cross, in stage 4 cuts move back to the middles of their edges where triangles would cross, and
 //! stage 5 changes nothing that would make them cross, as far as a budget allows.
 //!
@@ -21,6 +21,7 @@
 //! Invariant: bricks are numbered in order and each task writes to its own part of the mesh, so the mesh is
 //! the same for any number of threads.
 
+mod bends;
 mod crease;
 mod draft;
 mod loops;
@@ -83,30 +84,85 @@ pub fn dual_contouring(
     };
     let mut joined = placed_and_joined(&mut work);
     let crossings = joined.crossings();
-    if crossings.len() <= MENDABLE {
-        // a mesh that does not cross itself now hardly ever does so later: no copy is kept
-        let (triangles, kept) = match crossings.is_empty() {
-            true => (joined.into_triangles(), None),
-            false => (joined.triangles(), Some(joined)),
+    let is_clear = crossings.is_empty();
+    let mut kept = None;
+    if crossings.len() > MENDABLE {
+        kept = Some(joined);
+    } else {
+        let triangles = if is_clear {
+            joined.into_triangles()
+        } else {
+            let triangles = joined.triangles();
+            kept = Some(joined);
+            triangles
         };
-        let mut sharp = Draft::new(field, grid, triangles, (work, Care::Sharp));
-        sharp.refine_and_mend()?;
-        if !sharp.crosses_itself() {
-            return Ok(sharp.finish());
+        match Attempt::make(Draft::new(field, grid, triangles, work), is_clear)? {
+            Attempt::Clear(mesh) => return Ok(mesh),
+            // without the cuts nothing crosses
+            Attempt::Crossing { cut: Some((draft, far)), .. } if is_clear => return apart(draft, far),
+            Attempt::Crossing { work: spent, .. } => work = spent,
         }
-        work = sharp.work();
-        joined = kept.unwrap_or_else(|| placed_and_joined(&mut work));
     }
+    let joined = kept.unwrap_or_else(|| placed_and_joined(&mut work));
     let triangles = joined.triangles_apart(crossings, &mut work);
-    let mut draft = Draft::new(field, grid, triangles, (work, Care::Apart));
-    draft.refine_and_mend()?;
+    let mut draft = Draft::new(field, grid, triangles, work);
+    let far = draft.cut();
+    apart(draft, far)
+}
+
+/// A mesh made sharp without care for triangles that cross.
+enum Attempt<'a> {
+    /// It does not cross itself.
+    Clear(Mesh),
+    /// It does.
+    Crossing {
+        /// The mesh before it was mended, and its edges that are far from the surface, if triangles crossed then.
+        cut: Option<(Draft<'a>, Vec<[u32; 2]>)>,
+        work: Work,
+    },
+}
+
+impl<'a> Attempt<'a> {
+    /// Cuts edges, and mends what can be mended. A mesh is clear if nothing crosses before.
+    ///
+    /// # Errors
+    /// Those of [`Draft::mend`].
+    fn make(mut draft: Draft<'a>, is_clear: bool) -> Result<Self, MeshError> {
+        let far = draft.cut();
+        let is_long = far.len() > draft.triangle_count() / CHECKED;
+        let crossing = if is_long && !(is_clear && !draft.is_cut()) { draft.crossings() } else { 0 };
+        if crossing > MENDABLE {
+            let work = draft.work();
+            return Ok(Self::Crossing { cut: Some((draft, far)), work });
+        }
+        let cut = (crossing > 0).then(|| (draft.clone(), far.clone()));
+        let changes = draft.mend(far)?;
+        let is_known = is_clear && !changes && !draft.is_cut();
+        let crossing = if is_known { 0 } else { draft.crossings() };
+        Ok(match crossing {
+            0 => Self::Clear(draft.finish()),
+            _ => Self::Crossing { cut, work: draft.work() },
+        })
+    }
+}
+
+/// The mesh without triangles that cross.
+///
+/// # Errors
+/// Those of [`Draft::mend`].
+fn apart(mut draft: Draft<'_>, far: Vec<[u32; 2]>) -> Result<Mesh, MeshError> {
+    draft.part();
+    draft.mend(far)?;
     Ok(draft.finish())
 }
 
-/// So many pairs of triangles may cross before edges are cut, and mending is tried. In the examples at 32 and 96 cells it
-/// parted all of at most 4; the bottle's 319 and the 156 to 957 of a thousand joined parts it never parted. Between these
-/// numbers the choice costs time, and no quality.
+/// So many pairs of triangles may cross before edges are cut or after it, and mending is tried. In the examples at 32 and
+/// 96 cells it parted all of at most 4 before and at most 44 after it, and never more than 48 after it; the 156 to 957 of
+/// a thousand joined parts before it were never parted. Between these numbers the choice costs time, and no quality.
 const MENDABLE: usize = 100;
+
+/// With fewer edges to mend than one for so many triangles, mending takes less time than to look for crossings before it.
+const CHECKED: usize = 5000;
 
 /// What a mesh is made for. Few meshes cross themselves, and care against that costs sharpness and time, so it is
 /// taken only where a mesh without it does.

@@ -8,11 +8,12 @@
 //! its cell is in the ring.
 
 use glam::DVec3;
+use smallvec::SmallVec;
 
 use super::super::{
     cases::{EDGES, tube},
     crossings::{Crossed, Task},
-    normals::GradientColumns,
+    normals::{GradientColumns, unit},
     patches::cell_low,
     prune::{BRICK, Lattice},
     signs::{
@@ -20,6 +21,7 @@ use super::super::{
         vertex_table,
     },
 };
+use super::bends::{self, Bent};
 use super::loops::{CellLoops, LOOPS, Loop, Sheets};
 use super::project;
 use super::sharp::{self, SLIDE};
@@ -38,7 +40,7 @@ const STEPS: usize = 4;
 const LAST_STEP: f64 = 3e-6;
 
 /// A vertex of a smooth surface that lies farther than this from its cell, in cells, is astray.
-const ASTRAY: f64 = 0.05;
+pub(super) const ASTRAY: f64 = 0.05;
 
 /// The ends of a tunnel lie this far from a face into the cell, as a share of the way to the middle.
 const INTO_CELL: f64 = 0.25;
@@ -84,6 +86,7 @@ pub(super) struct PlacementScratch {
     table: Box<VertexTable>,
     gradients: GradientColumns,
     hits: Vec<Hit>,
+    unsmooth: Vec<Unsmooth>,
     /// The extended indices of the low corner of each vertex's cell; [`NONE`] for those of tunnels.
     cells: Vec<[u32; 3]>,
 }
@@ -94,9 +97,22 @@ impl Default for PlacementScratch {
             table: vertex_table(),
             gradients: GradientColumns::default(),
             hits: Vec::new(),
+            unsmooth: Vec::new(),
             cells: Vec::new(),
         }
     }
+}
+
+/// A loop whose hits do not face the same way.
+struct Unsmooth {
+    /// The extended indices of the cell's low corner.
+    low: [usize; 3],
+    /// The numbers of the loop's hits.
+    numbers: SmallVec<[usize; EDGES]>,
+    /// The mean of the hits.
+    mean: DVec3,
+    /// The place of the vertex.
+    place: usize,
 }
 
 /// What a task writes.
@@ -166,8 +182,10 @@ impl Placement<'_> {
                 self.add_tube(cell, first, &mut output);
             }
         }
-        let Output { mut slots, scratch, mut placed } = output;
-        self.settle_smooth(&mut slots, &mut scratch.gradients, &mut placed);
+        self.settle_smooth(&mut output);
+        self.place_unsmooth(&mut output);
+        let Output { slots, scratch, mut placed } = output;
+        placed.fallbacks.sort_unstable_by_key(|&(v, _)| v);
         self.find_astray(&slots, &scratch.cells, &mut placed);
         placed
     }
@@ -233,18 +251,50 @@ impl Placement<'_> {
         slots.positions[place] = mean + (0.5 * height / count as f64) * normal;
         slots.normals[place] = normal;
         if !is_smooth {
-            self.move_to_crease(low, numbers, mean, place, output);
+            let numbers = SmallVec::from_slice(numbers);
+            scratch.unsmooth.push(Unsmooth { low, numbers, mean, place });
+            slots.kinds[place] = VertexKind::Sharp;
         }
     }
 
-    /// Moves the vertex of a loop that is not smooth to a crease or a corner, or onto the border. `low` are
-    /// the extended indices of the cell's low corner, and `mean` is the mean of the loop's hits.
+    /// Moves the vertices of loops that are not smooth onto the surface: together where it only bends, and to
+    /// its creases and corners, or onto the border, elsewhere.
+    fn place_unsmooth(&self, output: &mut Output<'_, '_>) {
+        let unsmooth = std::mem::take(&mut output.scratch.unsmooth);
+        let Output { slots, scratch, placed } = output;
+        let bends: Vec<Option<Bent>> =
+            unsmooth.iter().map(|of| self.bent(of, slots.positions[of.place])).collect();
+        let known: Vec<Bent> = bends.iter().flatten().cloned().collect();
+        let size = self.spacing.min_element();
+        let settled = bends::settle(self.field, &known, size, &mut scratch.gradients, &mut placed.gradients);
+        let mut settled = settled.into_iter();
+        for (of, bend) in unsmooth.iter().zip(bends) {
+            match bend.and_then(|_| settled.next()).flatten() {
+                Some(bends::Settled { position, normal }) => {
+                    let Output { slots, placed, .. } = output;
+                    slots.set(of.place, Vertex { position, normal, kind: VertexKind::Smooth });
+                    placed.fallbacks.push((slots.first + of.place as u32, of.mean));
+                }
+                None => self.move_to_crease(of, output),
+            }
+        }
+        output.scratch.unsmooth = unsmooth;
+        output.scratch.unsmooth.clear();
+    }
+
+    /// The cell of a loop that is not smooth, if the surface may only bend there.
+    fn bent(&self, Unsmooth { low, numbers, .. }: &Unsmooth, start: DVec3) -> Option<Bent> {
+        if self.is_border(*low) {
+            return None;
+        }
+        let cell = Aabb::new(self.lattice.position(*low), self.lattice.position(low.map(|n| n + 1)));
+        Bent::new(cell, start, numbers.iter().map(|&number| self.hits.get(number as u32)))
+    }
+
+    /// Moves the vertex of a loop that is not smooth to a crease or a corner, or onto the border.
     fn move_to_crease(
         &self,
-        low: [usize; 3],
-        numbers: &[usize],
-        mean: DVec3,
-        place: usize,
+        &Unsmooth { low, ref numbers, mean, place }: &Unsmooth,
         Output { slots, scratch, placed }: &mut Output<'_, '_>,
     ) {
         scratch.hits.clear();
@@ -300,8 +350,15 @@ impl Placement<'_> {
         let (a, b) = (ring(ends[0]).len(), ring(ends[1]).len());
         // the tube's vertices count as inner ones, because none of its cross edges lies in a face
         let numbers: Vec<usize> = (EDGES..EDGES + a + b).collect();
-        let low = slots.positions[places[0]];
-        let place = |v: usize| ((slots.positions[places[v - EDGES]] - low) / self.spacing).to_array();
+        // where the vertices began they surely lie in the cell, and they go back there if the tube crosses anything
+        let start = |place: &usize| {
+            let vertex = slots.first + *place as u32;
+            let found = placed.fallbacks.iter().rev().find(|(v, _)| *v == vertex);
+            found.map_or(slots.positions[*place], |(_, start)| *start)
+        };
+        let starts: Vec<DVec3> = places.iter().map(start).collect();
+        let around = around_axis(starts.split_at(a));
+        let place = |v: usize| around[v - EDGES].to_array();
         let Some((_, triangles)) = tube(&numbers[..a], &numbers[a..], &place) else { return };
         let number = |v: u8| slots.first + places[usize::from(v) - EDGES] as u32;
         placed.tubes.extend(triangles.into_iter().map(|t| t.map(number)));
@@ -313,7 +370,8 @@ impl Placement<'_> {
     }
 
     /// Moves the vertices of smooth cells onto the surface, together.
-    fn settle_smooth(&self, slots: &mut Slots<'_>, gradients: &mut GradientColumns, placed: &mut Placed) {
+    fn settle_smooth(&self, Output { slots, scratch, placed }: &mut Output<'_, '_>) {
+        let gradients = &mut scratch.gradients;
         let size = self.spacing.min_element();
         let mut moving: Vec<usize> =
             (0..slots.kinds.len()).filter(|&v| slots.kinds[v] == VertexKind::Smooth).collect();
@@ -346,8 +404,21 @@ impl Placement<'_> {
                 placed.fallbacks.push((slots.first + v as u32, start));
             }
         }
-        placed.fallbacks.sort_unstable_by_key(|&(v, _)| v);
     }
+}
+
+/// The corners of both rings of a tube as they are seen along its axis, both as wide as a unit circle around its
+/// middle. Rings that are slanted, or of different widths, then still join corner to corner without a twist.
+fn around_axis((a, b): (&[DVec3], &[DVec3])) -> Vec<DVec3> {
+    let middle = |ring: &[DVec3]| ring.iter().sum::<DVec3>() / ring.len() as f64;
+    let axis = unit(middle(b) - middle(a)).unwrap_or(DVec3::ZERO);
+    let flat = |ring: &[DVec3]| {
+        let across = |p: &DVec3| (p - middle(ring)).reject_from_normalized(axis);
+        let seen: Vec<DVec3> = ring.iter().map(across).collect();
+        let width = (seen.iter().map(|p| p.length_squared()).sum::<f64>() / seen.len() as f64).sqrt();
+        seen.into_iter().map(move |p| if width > 0.0 { p / width } else { p })
+    };
+    flat(a).chain(flat(b)).collect()
 }
 
 impl Slots<'_> {
@@ -355,5 +426,33 @@ impl Slots<'_> {
         self.positions[place] = vertex.position;
         self.normals[place] = vertex.normal;
         self.kinds[place] = vertex.kind;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rings of a tunnel through a cell of a gyroid, one of them far to one side of the other. With the shortest
+    /// cross edges two of its triangles would cross.
+    #[test]
+    fn a_tube_between_unlike_rings_is_not_twisted() {
+        let ring = |corners: [[f64; 3]; 3]| corners.map(DVec3::from_array);
+        let a = ring([[10.20, 17.41, 2.40], [17.80, 12.55, 2.40], [10.20, 12.55, -5.16]]);
+        let b = ring([[2.54, 6.63, 14.13], [-0.88, 6.63, 13.41], [2.54, -0.95, 13.41]]);
+        let around = around_axis((&a, &b));
+        let numbers: Vec<usize> = (EDGES..EDGES + 6).collect();
+        let (_, triangles) = tube(&numbers[..3], &numbers[3..], &|v| around[v - EDGES].to_array()).unwrap();
+        let mut cross_edges: Vec<[usize; 2]> = triangles
+            .iter()
+            .flat_map(|t| {
+                let t = t.map(|v| usize::from(v) - EDGES);
+                let (near, far): (Vec<usize>, Vec<usize>) = t.into_iter().partition(|v| *v < 3);
+                near.into_iter().flat_map(move |v| far.clone().into_iter().map(move |w| [v, w]))
+            })
+            .collect();
+        cross_edges.sort_unstable();
+        cross_edges.dedup();
+        assert_eq!(cross_edges, [[0, 3], [0, 4], [1, 3], [1, 5], [2, 4], [2, 5]]);
     }
 }
