@@ -125,10 +125,14 @@ impl Compression {
             above -= f64::from(count);
             above < 0.0
         });
-        // the upper end of the class, but no more than there is
-        let p99 = class.map_or(0.0, |class| (CLASS * (class + 1) as f64).min(largest));
-        // all of the first class counts as uncompressed
-        let p99 = if class == Some(0) { 0.0 } else { p99 };
+        let p99 = match class {
+            // all of the first class counts as uncompressed
+            None | Some(0) => 0.0,
+            // the last class has no end
+            Some(class) if class == CLASSES - 1 => exceeded(densities, rest_density),
+            // the upper end of the class, but no more than there is
+            Some(class) => (CLASS * (class + 1) as f64).min(largest),
+        };
         (Self { mean: sum / n, p99, largest }, volume / n)
     }
 
@@ -140,6 +144,13 @@ impl Compression {
             largest: self.largest.max(other.largest),
         }
     }
+}
+
+/// The excess of the density that one particle in a hundred exceeds, as a part of that at rest.
+fn exceeded(densities: &[f64], rest_density: f64) -> f64 {
+    let mut excess: Vec<f64> = densities.iter().map(|rho| rho / rest_density - 1.0).collect();
+    let rank = (0.01 * excess.len() as f64) as usize;
+    *excess.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1
 }
 
 /// Something about a run that its user must know.

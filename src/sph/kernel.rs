@@ -102,6 +102,15 @@ impl Kernels {
     }
 }
 
+/// What a particle of a lattice sees of the surface above it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// |Σ V ∇W|·h.
+    pub normal: f64,
+    /// The part of Σ V W that is missing.
+    pub missing: f64,
+}
+
 /// The kernel Wendland C2: W = w·(1 − q)⁴(1 + 4q), ∇W = −c·(1 − q)³·**r**, with q = r/h.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wendland {
@@ -141,6 +150,25 @@ impl Wendland {
         let sum: f64 =
             cube().flat_map(|x| cube().flat_map(move |y| cube().map(move |z| weight(x, y, z)))).sum();
         sum * Self::new(ratio).weight
+    }
+
+    /// A layer under the flat surface of a cubic lattice with `ratio` spacings per support radius. Layer 0 is the
+    /// outermost; the surface lies half a spacing above it.
+    pub fn lattice_surface(ratio: f64, layer: u32) -> Surface {
+        let ratio = ratio.min(MOST_COUNTED);
+        let kernel = Self::new(ratio);
+        let reach = ratio.ceil() as i32;
+        let side = || -reach..=reach;
+        let (mut normal, mut missing) = (0.0, 0.0);
+        for z in layer as i32 + 1..=reach {
+            for (x, y) in side().flat_map(|x| side().map(move |y| (x, y))) {
+                let q = f64::from(x * x + y * y + z * z).sqrt() / ratio;
+                let nearness = (1.0 - q).max(0.0);
+                normal += kernel.steepness * nearness.powi(3) * f64::from(z) * ratio;
+                missing += kernel.weight * nearness.powi(4) * (1.0 + 4.0 * q);
+            }
+        }
+        Surface { normal, missing: missing / Self::lattice_sum(ratio) }
     }
 
     /// C = s²·Σ V·2(1 − cos πn_x)·∂²W/∂x² over a cubic lattice of the spacing s, with `ratio` spacings per

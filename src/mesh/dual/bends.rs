@@ -10,10 +10,12 @@
 use glam::DVec3;
 
 use super::super::normals::{GradientColumns, unit};
-use super::place::ASTRAY;
 use super::vertices::Hit;
 use crate::field::Field;
 use crate::geom::Aabb;
+
+/// A vertex of a smooth surface that lies farther than this from its cell, in cells, is astray.
+pub(super) const ASTRAY: f64 = 0.05;
 
 /// Steps of Newton's method, at most.
 const STEPS: usize = 6;

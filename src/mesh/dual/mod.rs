@@ -130,7 +130,8 @@ impl<'a> Attempt<'a> {
     fn make(mut draft: Draft<'a>, is_clear: bool) -> Result<Self, MeshError> {
         let far = draft.cut();
         let is_long = far.len() > draft.triangle_count() / CHECKED;
-        let crossing = if is_long && !(is_clear && !draft.is_cut()) { draft.crossings() } else { 0 };
+        let may_cross = draft.is_cut() || !is_clear;
+        let crossing = if is_long && may_cross { draft.crossings() } else { 0 };
         if crossing > MENDABLE {
             let work = draft.work();
             return Ok(Self::Crossing { cut: Some((draft, far)), work });

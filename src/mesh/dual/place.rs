@@ -21,7 +21,7 @@ use super::super::{
         vertex_table,
     },
 };
-use super::bends::{self, Bent};
+use super::bends::{self, ASTRAY, Bent};
 use super::loops::{CellLoops, LOOPS, Loop, Sheets};
 use super::project;
 use super::sharp::{self, SLIDE};
@@ -38,9 +38,6 @@ const STEPS: usize = 4;
 /// The step of Newton's method onto a smooth surface that needs no other after it, in cells. It leaves its
 /// square times the curvature per cell, which is below 1/3 in a cell with normals within [`NEARLY_FLAT`].
 const LAST_STEP: f64 = 3e-6;
-
-/// A vertex of a smooth surface that lies farther than this from its cell, in cells, is astray.
-pub(super) const ASTRAY: f64 = 0.05;
 
 /// The ends of a tunnel lie this far from a face into the cell, as a share of the way to the middle.
 const INTO_CELL: f64 = 0.25;

@@ -51,6 +51,15 @@ fn classes_give_mean_and_percentile() {
 }
 
 #[test]
+fn a_fluid_that_collapses_has_its_percentile_too() {
+    // a thousand densities from 2 to 5 times that at rest, beyond the last class
+    let densities: Vec<f64> = (0..1000).map(|k| 2000.0 + 3.0 * f64::from(k)).collect();
+    let (Compression { mean, p99, largest }, _) = Compression::of(&densities, 1000.0);
+    assert!((p99 - 3.967).abs() < 1e-9, "{p99}"); // ten lie above it
+    assert!(mean < p99 && p99 < largest);
+}
+
+#[test]
 fn a_splash_in_a_closed_tank_makes_no_energy() {
     for method in [Method::from(Wcsph::default()), Paper::default().into()] {
         let mut simulation = column(method, 0.05);

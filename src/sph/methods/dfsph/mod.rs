@@ -1,5 +1,6 @@
 //! The divergence-free method: its numbers, keys and limits. The scheme is in [`scheme`].
 
+mod free_surface;
 mod passes;
 mod scheme;
 mod solver;
@@ -32,6 +33,9 @@ const IMPLICIT_FORCE_FACTOR: f64 = 0.1;
 /// Factor of √(h/a) once the pressure is known and its acceleration is part of a. With 0.25 a column of forty
 /// layers bursts at its start.
 const SOLVED_FORCE_FACTOR: f64 = 0.15;
+
+/// The support radius of a fluid with surface tension.
+const WITH_TENSION: Support = Support::Spacings(3.0);
 
 /// Numbers of the divergence-free method.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,6 +135,13 @@ impl Declaration for Dfsph {
         (Pass::NoSlip, |_, scales| Pass::without_friction(scales)),
         (Pass::SurfaceTension, |_, scales| Pass::without_tension(scales)),
     ];
+    const OTHER_SUPPORT: Option<(Support, &'static str)> = Some((WITH_TENSION, "with surface tension"));
+
+    /// Normals and curvature need a smooth surface: with 2.2 spacings a drop stirs itself without end.
+    fn support(&self, has_tension: bool) -> Support {
+        if has_tension { WITH_TENSION } else { Self::FLUID.support }
+    }
+
     const SAVES: &'static [&'static str] = &[
         "specific pressure",
         "debt",

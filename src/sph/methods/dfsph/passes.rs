@@ -13,6 +13,7 @@ use crate::sph::{
     walls::{Friction, Pushed},
 };
 
+use super::free_surface::FreeSurface;
 use super::walls::{Walls, WallsNear};
 
 /// Constants that the passes share.
@@ -61,11 +62,12 @@ pub(super) enum Continuation {
     Barrier,
 }
 
-/// Finds the density ρ with the barriers of the walls, the diagonals of both systems, the direction in which
+/// Finds the density ρ with the barriers of the walls and what is missing before a free surface, the diagonals of both systems, the direction in which
 /// particles crowd, G, and the density that the places say.
 #[derive(Clone, Copy)]
 pub(super) struct Densities<'a> {
     pub constants: Constants,
+    pub surface: &'a FreeSurface,
     pub walls: &'a Walls,
 }
 
@@ -110,6 +112,12 @@ impl PairPass<0, 6, 8> for Densities<'_> {
             let barrier = slope + rest_density * wall.barrier.gradient;
             factors = [own.length_squared() + others, barrier.length_squared() + squares];
         }
+        let missing = rest_density * self.surface.missing(crowding.length() * self.constants.kernel.h);
+        density += match self.walls.near(i) {
+            // a gap beside a wall is no surface
+            Some(_) => missing.min((rest_density - filled).max(0.0)),
+            None => missing,
+        };
         let crowding = depth(spread) * crowding;
         let [linear, barrier] = factors;
         [density, linear, barrier, crowding.x, crowding.y, crowding.z, spread, filled]

@@ -18,6 +18,9 @@
 //! (Baumgarte 1972). The tolerance of this solve is that of the density over τ. A part of what displacements take
 //! away is added to the debt, see [`OWED`].
 //!
+//! Before a free surface both systems take the missing half of the kernel for fluid ([`free_surface`](super::free_surface)),
+//! so that the outermost particles keep their distance as those in the depth do.
+//!
 //! The two systems treat walls differently.
 //!
 //! Forces: a(s)_i = −M_i[Σ m (s_i + s_j) ∇W + 2ρ₀ s_i ∇λ] and dρ_i/dt = Σ m (M_i v_i − M_j v_j)·∇W +
@@ -51,6 +54,7 @@ use super::super::{
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
+use super::free_surface::FreeSurface;
 use super::passes::{Constants, Continuation, Densities, Drag, Field};
 use super::solver::{Begin, Errors, Goal, Solver};
 use super::walls::Walls;
@@ -113,9 +117,12 @@ pub struct DivergenceFree {
     pub(super) displacement: Vectors,
     /// Velocities with what displaces besides, m/s.
     drift: Vectors,
-    /// Densities with the barriers of the walls, kg/m³: what must not exceed that at rest.
+    /// Densities with the barriers of the walls and what is missing before a free surface, kg/m³: what must not exceed
+    /// that at rest.
     pub(super) loaded: Vec<f64>,
     pub(super) walls: Walls,
+    /// What kernels miss before a free surface.
+    surface: FreeSurface,
     /// Iterations of the last step's solvers.
     pub(super) iterations: u32,
 }
@@ -212,6 +219,7 @@ impl DivergenceFree {
             drift: Vectors::default(),
             loaded: vec![0.0; n],
             walls: Walls::default(),
+            surface: FreeSurface::of_lattice(core.parameters.support_radius / core.parameters.spacing()),
             iterations: 0,
         };
         scheme.settle(core, &mut []);
@@ -238,7 +246,8 @@ impl DivergenceFree {
         core.find_near();
         self.walls.find(core);
         let mut density = std::mem::take(&mut core.particles.density);
-        let pass = Densities { constants: Constants::of(&core.parameters), walls: &self.walls };
+        let (constants, walls, surface) = (Constants::of(&core.parameters), &self.walls, &self.surface);
+        let pass = Densities { constants, surface, walls };
         self.spread.resize(density.len(), 0.0);
         self.crowding.resize(density.len());
         let Vectors { x, y, z } = &mut self.crowding;

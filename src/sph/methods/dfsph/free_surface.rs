@@ -1,0 +1,75 @@
+//! What a kernel misses before a free surface.
+//!
+//! A sum over neighbours takes the empty half before a surface for room: the outermost particles have four fifths of
+//! the density at rest, and may come nearer to each other until they have all of it. Gravity alone presses them hardly,
+//! but the surface tension acts just there: it pulled the outermost layers together until a drop was a seventh too small, its
+//! tension nearly twice too strong, and its surface too ragged for normals, so that it stirred itself without end. With what is
+//! missing added, a flat surface of a lattice is as dense as its depth.
+//!
+//! What is missing follows from the normal: n = Σ V ∇W + ∇λ is zero in the depth, and before a flat surface both n and
+//! the missing part depend on the distance from it alone. Between the layers of a lattice the relation is
+//! taken as linear.
+
+use crate::sph::kernel::{Surface, Wendland};
+
+/// Normals of this length times h, and shorter ones, are disorder in the depth.
+const DISORDER: f64 = 0.1;
+
+/// Half of the kernel is missing where a particle lies in a flat surface, and no more is ever counted.
+const MOST: f64 = 0.5;
+
+/// Layers that are looked at, at most.
+const LAYERS: usize = 4;
+
+/// The missing part of a kernel by the length of the normal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FreeSurface {
+    /// |n|·h and the missing part, from the depth to the surface. Points that repeat the first one are unused.
+    points: [[f64; 2]; LAYERS + 1],
+}
+
+impl FreeSurface {
+    /// That of a lattice with `ratio` spacings per support radius.
+    pub fn of_lattice(ratio: f64) -> Self {
+        let mut points = [[DISORDER, 0.0]; LAYERS + 1];
+        for layer in 0..LAYERS {
+            let Surface { normal, missing } = Wendland::lattice_surface(ratio, layer as u32);
+            if normal > DISORDER {
+                points[LAYERS - layer] = [normal, missing];
+            }
+        }
+        Self { points }
+    }
+
+    /// The part of the kernel that is missing where |n|·h is `normal`.
+    pub fn missing(&self, normal: f64) -> f64 {
+        let mut found = 0.0;
+        for [from, to] in self.points.array_windows::<2>().copied() {
+            // beyond the last point the last line goes on
+            if normal > from[0] && to[0] > from[0] {
+                found = from[1] + (normal - from[0]) * (to[1] - from[1]) / (to[0] - from[0]);
+            }
+        }
+        found.min(MOST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_of_a_lattice_miss_what_lies_beyond_the_surface() {
+        for ratio in [2.2, 3.0] {
+            let surface = FreeSurface::of_lattice(ratio);
+            for layer in 0..2 {
+                let Surface { normal, missing } = Wendland::lattice_surface(ratio, layer);
+                let found = surface.missing(normal);
+                let expected = if normal > DISORDER { missing } else { 0.0 };
+                assert!((found - expected).abs() < 1e-12, "{ratio}, {layer}: {found} for {expected}");
+            }
+            assert_eq!(surface.missing(0.05), 0.0);
+            assert_eq!(surface.missing(7.0), MOST);
+        }
+    }
+}
