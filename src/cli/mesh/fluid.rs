@@ -12,12 +12,12 @@ use serde::Serialize;
 use super::super::args::{Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
 use super::super::saved::{self, RunFigures};
+use super::super::surfaces::{self, Origins};
 use super::super::{output, progress};
 use super::format;
 use crate::cli::output::Shown;
 use rfm::fluid_surface::{FrameEntry, Reconstruction, read_points};
 use rfm::mesh::{LengthUnit, WriteMesh, is_closed_manifold, shells, vtp};
-use rfm::sph;
 
 /// The JSON document. Lengths are in metres, volumes in cubic metres.
 #[derive(Debug, Serialize)]
@@ -71,7 +71,7 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
     let entries = saved::chosen(collection(folder)?, options.frames)?;
     let scale = ParticleScale::new(folder, options)?;
     saved::check_frames(folder, &entries)?;
-    let target = options.output.clone().unwrap_or_else(|| folder.join("surface"));
+    let target = options.output.clone().unwrap_or_else(|| folder.join(surfaces::FOLDER));
     let job = Job { folder, target, ending: format.ending, write, unit, scale };
     let started = Instant::now();
     let surfaces = job.surfaces(&entries)?;
@@ -164,15 +164,14 @@ impl Job<'_> {
     fn surfaces(&self, entries: &[(usize, FrameEntry)]) -> Result<Vec<FrameSurface>, Failure> {
         let bar = progress::bar(entries.len() as u64, "surfaces");
         let mut surfaces: Vec<FrameSurface> = Vec::new();
+        let mut origins = Origins::default();
         for (frame, entry) in entries {
-            let made = self.surface(*frame, entry);
+            let made = self.surface(*frame, entry, &mut origins);
             let made = made.map_err(|failure| with_kept(failure, surfaces.len(), &self.target))?;
             bar.set_message(format!("t = {:.3} s, {} triangles", made.time, made.triangles));
             surfaces.push(made);
             if self.ending == vtp::FORMAT.ending {
-                output::write(&self.target.join("surface.pvd"), |mut out| {
-                    sph::write_pvd(&mut out, surfaces.iter().map(|s| (s.time, s.file.as_str())))
-                })?;
+                origins.write(&self.target, surfaces.iter().map(|s| (s.time, s.file.as_str())))?;
             }
             bar.inc(1);
         }
@@ -181,7 +180,12 @@ impl Job<'_> {
     }
 
     /// Reads one frame, meshes it and writes the mesh.
-    fn surface(&self, frame: usize, entry: &FrameEntry) -> Result<FrameSurface, Failure> {
+    fn surface(
+        &self,
+        frame: usize,
+        entry: &FrameEntry,
+        origins: &mut Origins,
+    ) -> Result<FrameSurface, Failure> {
         let started = Instant::now();
         let path = self.folder.join(&entry.file);
         let failed = |error: String| {
@@ -193,8 +197,9 @@ impl Job<'_> {
         let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
         let mesh = self.scale.surface.mesh(&finite).map_err(|error| failed(error.to_string()))?;
         create(&self.target)?;
-        let file = format!("surface_{frame:06}.{}", self.ending);
+        let file = surfaces::file_name(frame, self.ending);
         output::write(&self.target.join(&file), |out| (self.write)(&mesh, self.unit, out))?;
+        origins.add(&file, &bytes);
         let parts = shells(&mesh);
         let volume = parts.iter().fold(0.0, |sum, shell| sum + shell.volume);
         let particle_volume = finite.len() as f64 * self.scale.particle_volume;

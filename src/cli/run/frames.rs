@@ -12,6 +12,7 @@ use super::bodies::Bodies;
 use super::pictures::{Look, Pictures};
 use super::{checkpoints, folder, probes};
 use crate::cli::output::Shown;
+use crate::cli::surfaces;
 use rfm::Experiment;
 use rfm::mesh::{self, Mesh};
 use rfm::sph::{self, Checkpoint, Simulation};
@@ -287,6 +288,7 @@ fn remove_old(folder: &Path) -> Result<(), Failure> {
     }
     checkpoints::remove_all(folder).map_err(|e| not_cleared(folder, &e))?;
     probes::remove_old(folder).map_err(|e| not_cleared(folder, &e))?;
+    surfaces::remove_old(folder).map_err(|e| not_cleared(folder, &e))?;
     remove_numbered(&folder.join("frames"), PARTICLES, ".vtp", 0)?;
     remove_numbered(&folder.join("frames"), OBSTACLE, ".vtp", 0)?;
     remove_numbered(&folder.join("pictures"), "frame_", ".png", 0)
