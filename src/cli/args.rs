@@ -388,7 +388,8 @@ pub(super) struct Run {
     /// Stop at this simulated time, in seconds or with a unit: 500ms
     #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true)]
     pub until: Option<f64>,
-    /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed
+    /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed. The result is that of
+    /// a run without a stop, bit for bit, unless it had ended between two frames (--until): the last step was cut short there
     #[arg(long)]
     pub resume: bool,
     /// Replace the run that the folder holds

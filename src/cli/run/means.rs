@@ -15,6 +15,9 @@ pub(super) struct Means {
     /// The time of the first sample that counts, s.
     from: f64,
     samples: usize,
+    /// Samples of the probe that were lost while the run was not going on; they may be among those that count.
+    #[serde(rename = "samples_lost", skip_serializing_if = "is_zero")]
+    lost: usize,
     /// Names of the figures, with their units.
     columns: Vec<String>,
     mean: Vec<Option<f64>>,
@@ -28,6 +31,12 @@ pub(super) struct Means {
     /// How far the first figures are from what is known, as a part of it, or in their unit if it is zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     deviation: Option<f64>,
+}
+
+// serde asks for a reference
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Columns that text shows where no torque is asked for.
@@ -52,8 +61,9 @@ impl Means {
         let size = if size > 0.0 { size } else { 1.0 };
         Self {
             probe: name.to_string(),
-            from: asked.from,
+            from: asked.from.max(rows.first().map_or(0.0, |row| time(row))),
             samples: means.iter().map(|mean| mean.map_or(0, |mean| mean.samples)).max().unwrap_or_default(),
+            lost: 0,
             columns: probe.columns().iter().map(|(name, unit)| format!("{name} [{unit}]")).collect(),
             mean: means.iter().map(|mean| mean.map(|mean| mean.value)).collect(),
             error: means.iter().map(|mean| mean.and_then(|mean| mean.error)).collect(),
@@ -61,6 +71,11 @@ impl Means {
             known,
             shown: if asked.torque { usize::MAX } else { WITHOUT_TORQUE },
         }
+    }
+
+    /// The same means, of a table that lacks samples.
+    pub fn lacking(self, lost: usize) -> Self {
+        Self { lost, ..self }
     }
 
     /// The means as a line of text.
@@ -86,6 +101,9 @@ impl Means {
                 true => format!("; {deviation:.2e} from what is known"),
                 false => format!("; {:.2} % from what is known", 100.0 * deviation),
             };
+        }
+        if self.lost > 0 {
+            line += &format!("; {} samples of its table are lost (W0517), so this may be wrong", self.lost);
         }
         line
     }

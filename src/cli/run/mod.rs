@@ -65,6 +65,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         }
     };
     let goal = Goal::of(options, &experiment)?;
+    goal.lies_ahead(options, &folder, &simulation)?;
     frames_fit(options, goal, &experiment)?;
     let _held = held.map_or_else(|| Hold::take(&folder), Ok)?;
     // another run may have ended in the meantime
