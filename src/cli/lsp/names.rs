@@ -16,8 +16,14 @@ const OF_FLUIDS: [&str; 2] = ["energy", "audit"];
 pub(super) enum Meaning {
     /// Something that the file defines, with the place of its name.
     Defined(Range<usize>),
+    /// Something that an imported file defines, with the path of the file as it is written.
+    Imported(String),
+    /// The path of an imported file.
+    File(String),
     /// A standard solid, a function or a method of the language.
     Standard,
+    /// A word that is the value of the key with this name.
+    Word(String),
     /// A key of a scene, in the block with this name; `None` for the scene itself.
     Key(Option<String>),
 }
@@ -72,7 +78,10 @@ impl<'a> Reader<'a> {
     fn item(&mut self, item: &'a Item) {
         self.define(item.name());
         match item {
-            Item::Import(_) => {}
+            Item::Import(import) => {
+                let (place, path) = (import.span.range(), import.path.clone());
+                self.found.push(Mention { place, text: path.clone(), meaning: Meaning::File(path) });
+            }
             Item::Param(param) => {
                 self.expr(&param.value);
                 param.range.iter().for_each(|(low, high)| {
@@ -135,7 +144,10 @@ impl<'a> Reader<'a> {
     fn setting(&mut self, key: &Name, value: &'a Expr) {
         let ExprKind::Name(word) = &value.kind else { return self.expr(value) };
         if vocabulary::words(&key.text).contains(word) {
-            return; // a word of the key, whatever the file defines
+            // a word of the key, whatever the file defines
+            let place = self.place(value.span, word);
+            self.found.push(Mention { place, text: word.clone(), meaning: Meaning::Word(key.text.clone()) });
+            return;
         }
         match self.fluids.get(word.as_str()).copied().filter(|_| OF_FLUIDS.contains(&key.text.as_str())) {
             Some(fluid) => {
@@ -156,6 +168,16 @@ impl<'a> Reader<'a> {
             return Some(Meaning::Defined(item.name().span.range()));
         }
         is_standard(name).then_some(Meaning::Standard)
+    }
+
+    /// The path of the file that an expression names, if it is the name of an import.
+    fn import(&self, expr: &Expr) -> Option<&'a str> {
+        let ExprKind::Name(name) = &expr.kind else { return None };
+        let is_local = self.locals.iter().any(|local| local.text == *name);
+        match self.items.get(name.as_str()) {
+            Some(Item::Import(import)) if !is_local => Some(&import.path),
+            _ => None,
+        }
     }
 
     fn function(&self, name: &str) -> Option<&'a Function> {
@@ -184,8 +206,18 @@ impl<'a> Reader<'a> {
                 let called = self.function(&function.text);
                 self.arguments(arguments, called);
             }
+            ExprKind::Member { of, name } => {
+                self.expr(of);
+                if let Some(path) = self.import(of) {
+                    self.mention(name, Meaning::Imported(path.to_string()));
+                }
+            }
             ExprKind::Method { receiver, method, arguments } => {
                 self.expr(receiver);
+                if let Some(path) = self.import(receiver) {
+                    self.mention(method, Meaning::Imported(path.to_string()));
+                    return self.arguments(arguments, None);
+                }
                 let own = self.function(&method.text).filter(|function| function.takes_a_shape());
                 match own {
                     Some(function) => self.mention(method, Meaning::Defined(function.name.span.range())),
@@ -235,7 +267,7 @@ impl<'a> Reader<'a> {
 }
 
 /// Whether the language itself has this name for a value or a function.
-fn is_standard(name: &str) -> bool {
+pub(super) fn is_standard(name: &str) -> bool {
     vocabulary::reserved().contains(&name)
         || vocabulary::builtins().any(|builtin| builtin == name)
         || vocabulary::prelude().items.iter().any(|item| item.name().text == name)
