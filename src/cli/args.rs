@@ -195,7 +195,7 @@ pub(super) struct Eval {
     /// Time at which moving solids are evaluated, in seconds or with a unit
     #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
-    /// Columns to print
+    /// Columns to print, in this order
     #[arg(long, value_enum, value_delimiter = ',', default_value = "value,gradient")]
     pub what: Vec<What>,
     /// Width of all arithmetic [default: f64, or what the solid's tolerance allows for ω]
@@ -203,8 +203,8 @@ pub(super) struct Eval {
     pub precision: Option<Precision>,
 }
 
-/// A column of the output of `rfm eval`. The variants stand in the order of the columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+/// A column of the output of `rfm eval`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum What {
     /// ω, positive inside
     Value,

@@ -198,6 +198,25 @@ fn surfaces_go_with_the_run_that_they_were_made_of() {
     rfm(here, &["render", "drop.out", "--surface", "--frames", "1..", "-o", "pictures"]).expect(0);
 }
 
+#[test]
+fn a_file_for_the_surface_holds_one_frame() {
+    let folder = run();
+    let here = folder.path();
+    let refused = |flags: &[&str], part: &str| {
+        let told = mesh(here, flags).expect(2).stderr;
+        assert!(told.contains(part), "{told}");
+        assert!(!here.join("x.stl").exists(), "{flags:?}");
+    };
+    refused(&["-o", "x.stl"], "there are 3 frames: write a file for each into a folder, -o x --format stl");
+    refused(&["-o", "x.stl", "--frames", "0", "--format", "ply"], "names a .stl file, and --format ply");
+    refused(&["-o", "x.html"], "rfm view drop.out --save x.html");
+    let told = mesh(here, &["-o", "x.stl", "--frames", "1"]).expect(0).stdout;
+    assert!(told.starts_with("1 frame, ") && told.contains("written to x.stl"), "{told}");
+    let file = std::fs::read(here.join("x.stl")).unwrap();
+    mesh(here, &["-o", "all", "--format", "stl"]).expect(0);
+    assert!(file == std::fs::read(here.join("all/surface_000001.stl")).unwrap());
+}
+
 /// The crate that makes surfaces relies on sane particles; these are not.
 #[test]
 fn strange_particles_end_in_a_mesh_or_a_message() {

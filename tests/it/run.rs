@@ -160,6 +160,31 @@ fn damaged_and_foreign_checkpoints() {
 }
 
 #[test]
+fn files_of_others_are_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), scene("paper", "dt: 1 ms, until: 2 ms, save_every: 2 ms")).unwrap();
+    for (k, name) in
+        ["summary.json", "particles.pvd", "probes/level.csv", "history/audit.csv"].iter().enumerate()
+    {
+        let out = format!("out{k}");
+        let path = here.join(&out).join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, "of another program").unwrap();
+        let told = run(here, &[&out]).expect(2).stderr;
+        assert!(told.contains("holds no run") && told.contains(&format!("`{name}` in it")), "{told}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"of another program");
+        if k < 2 {
+            run(here, &[&out, "--force"]).expect(0);
+        }
+    }
+    // what a run does not write is in nobody's way
+    std::fs::create_dir_all(here.join("mine/probes")).unwrap();
+    std::fs::write(here.join("mine/probes/other.csv"), "a,b\n").unwrap();
+    run(here, &["mine"]).expect(0);
+}
+
+#[test]
 fn what_a_resumed_run_lacks_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

@@ -12,7 +12,7 @@ use super::super::{Failure, output};
 use super::bodies::Bodies;
 use super::pictures::{Look, Pictures};
 use super::{checkpoints, folder, probes};
-use crate::cli::output::Shown;
+use crate::cli::output::{Shown, counted};
 use crate::cli::surfaces;
 use rfm::Experiment;
 use rfm::diagnostic::Code;
@@ -161,8 +161,7 @@ impl Frames {
     pub fn describe(&self) -> String {
         let mut parts = vec!["summary.json".to_string()];
         if self.write_frames {
-            let frames = self.listed().count();
-            let frames = format!("{frames} frame{}", if frames == 1 { "" } else { "s" });
+            let frames = counted(self.listed().count(), "frame");
             parts.push(format!("particles.pvd and {frames} for ParaView"));
         }
         if self.write_frames && !self.bodies.is_empty() {
@@ -170,7 +169,7 @@ impl Frames {
             parts.push(format!("{moving}obstacle.stl, obstacle.vtp"));
         }
         if let Some(pictures) = &self.pictures {
-            parts.push(format!("{} picture{}", pictures.count, if pictures.count == 1 { "" } else { "s" }));
+            parts.push(counted(pictures.count, "picture"));
         }
         parts.join(", ")
     }
@@ -316,7 +315,7 @@ fn create(folder: &Path) -> Result<(), Failure> {
 
 /// Removes the files of an earlier run, which would mix with those of this one, and no other files.
 fn remove_old(folder: &Path) -> Result<(), Failure> {
-    for name in ["summary.json", "particles.pvd", "obstacle.pvd", "obstacle.stl", "obstacle.vtp"] {
+    for name in folder::RESULTS {
         let path = folder.join(name);
         if path.is_file() {
             std::fs::remove_file(&path).map_err(|e| not_cleared(folder, &e))?;

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use super::super::failure::warn;
 use super::super::plot;
 use super::super::{Failure, note, output};
+use super::folder::PROBES;
 use super::means::Means;
 use super::probe_plot::{drawn, rows};
 use crate::cli::output::Shown;
@@ -20,8 +21,6 @@ use rfm::diagnostic::Code;
 use rfm::experiment::{Every, probe_column, probe_of};
 use rfm::lower::{AskedMean, Scene};
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
-
-const FOLDER: &str = "probes";
 
 /// A resumed run takes over samples up to this relative tolerance after the checkpoint's time. Times are
 /// written with twelve digits, so these are the samples before the checkpoint.
@@ -60,7 +59,7 @@ impl Probes {
         simulation: &mut Simulation,
         resumed: Option<&Checkpoint>,
     ) -> Result<Self, Failure> {
-        let folder = run_folder.join(FOLDER);
+        let folder = run_folder.join(PROBES);
         if !scene.probes.is_empty() {
             create(&folder)?;
         }
@@ -234,7 +233,7 @@ pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
             remove(&path)?;
         }
     }
-    let probes = run_folder.join(FOLDER);
+    let probes = run_folder.join(PROBES);
     if !probes.is_dir() {
         return Ok(());
     }
