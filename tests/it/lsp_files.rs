@@ -119,9 +119,14 @@ fn names_of_imported_files_are_explained_and_found() {
     let mut places: Vec<String> = uses.as_array().unwrap().iter().map(|found| desk.place(found)).collect();
     places.sort();
     assert_eq!(places, ["imp/lib.rfm:4:10", "imp/other.rfm:2:16", "main.rfm:2:14"]);
-    // a parameter belongs to its file alone
+    // a parameter is named in calls
+    let found = desk.at("definition", "main.rfm", of(MAIN, 2, "h ="), json!({}));
+    assert_eq!(desk.place(&found), "imp/lib.rfm:3:11");
+    let uses = desk.at("references", "imp/lib.rfm", (3, 11), declared.clone());
+    let places: Vec<String> = uses.as_array().unwrap().iter().map(|found| desk.place(found)).collect();
+    assert_eq!(places, ["imp/lib.rfm:3:11", "imp/lib.rfm:3:32", "main.rfm:2:24"]);
     let uses = desk.at("references", "imp/lib.rfm", (3, 8), declared);
-    assert_eq!(uses.as_array().unwrap().len(), 2);
+    assert_eq!(uses.as_array().unwrap().len(), 2, "one that no call names");
     desk.editor.end();
 }
 

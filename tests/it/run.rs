@@ -184,6 +184,17 @@ fn files_of_others_are_not_replaced() {
     run(here, &["mine"]).expect(0);
 }
 
+/// Makes a hole in one table of a run, and removes another one and a frame. Returns how many samples the first one had.
+fn damaged(out: &Path) -> usize {
+    let table = out.join("probes/level.csv");
+    let text = std::fs::read_to_string(&table).unwrap();
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    std::fs::write(&table, [&lines[..4], &lines[6..]].concat().concat()).unwrap();
+    std::fs::remove_file(out.join("probes/head.csv")).unwrap();
+    std::fs::remove_file(out.join("frames/particles_000002.vtp")).unwrap();
+    lines.len() - 1
+}
+
 #[test]
 fn what_a_resumed_run_lacks_is_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -201,18 +212,10 @@ fn what_a_resumed_run_lacks_is_told() {
         assert!(told.contains("0.04 s, already") && told.contains("--force"), "{told}");
     }
 
-    // a hole in one table, another one gone, and a frame too
-    let table = here.join("out/probes/level.csv");
-    let lines = std::fs::read_to_string(&table).unwrap();
-    let cut: String =
-        lines.split_inclusive('\n').enumerate().filter(|(i, _)| *i != 4 && *i != 5).map(|(_, l)| l).collect();
-    std::fs::write(&table, cut).unwrap();
-    std::fs::remove_file(here.join("out/probes/head.csv")).unwrap();
-    std::fs::remove_file(here.join("out/frames/particles_000002.vtp")).unwrap();
+    let samples = damaged(&here.join("out"));
     for until in ["60ms", "80ms"] {
         let goes_on = run(here, &["out", "--resume", "--until", until]).expect(0);
         let told = &goes_on.stderr;
-        let samples = lines.lines().count() - 1;
         let lacks = format!("`out/probes/level.csv` lacks 2 of the {samples} samples up to 0.04 s");
         assert!(until == "80ms" || told.contains(&lacks), "{told}");
         assert!(told.contains("warning[W0517]: `out/probes/level.csv` lacks 2 of the"), "{told}");

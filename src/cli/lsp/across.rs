@@ -15,7 +15,7 @@ use rfm::syntax::{self, KEYWORDS, ast::Item};
 
 use super::buffers::Buffers;
 use super::document::Document;
-use super::names::{Meaning, Mention, is_standard};
+use super::names::{Imported, Meaning, Mention, is_standard};
 use super::reading::{Encoding, Reading, uri_of};
 
 /// The most files that are looked through for uses of a name, and entries of folders on the way to them.
@@ -99,9 +99,9 @@ impl Workspace {
                 let (uri, file) = self.imported(document, path)?;
                 Some(Place { uri, file: File::Open(file), bytes: 0..0 })
             }
-            Meaning::Imported(path) => {
+            Meaning::Imported(Imported { path, parameter_of }) => {
                 let (uri, file) = self.imported(document, path)?;
-                let bytes = offered(&file.reading, &mention.text)?;
+                let bytes = offered(&file.reading, &mention.text, parameter_of.as_deref())?;
                 Some(Place { uri, file: File::Open(file), bytes })
             }
             Meaning::Standard | Meaning::Key(_) | Meaning::Word(_) => None,
@@ -121,10 +121,10 @@ impl Workspace {
         let at_home = home.names.uses(&of).map(|found| found.place.clone()).filter(|place| *place != of);
         let mut places =
             found_in(&defined.uri, &defined.file, std::iter::once(of.clone()).chain(at_home).collect());
-        if offered(home, &mention.text).is_some_and(|place| place == of) {
+        if let Some(parameter_of) = known_outside(home, &of) {
             let path = home.path();
             for (uri, file) in self.files_that_may_name(&path, &mention.text, document) {
-                let uses = imported_uses(file.reading(), &path, &mention.text);
+                let uses = imported_uses(file.reading(), &path, &mention.text, parameter_of);
                 places.extend(found_in(&uri, &file, uses));
             }
         }
@@ -195,20 +195,39 @@ impl Workspace {
     }
 }
 
-/// Where a text defines a name that others may use.
-fn offered(reading: &Reading, name: &str) -> Option<Range<usize>> {
-    let found = reading.ast.items.iter().find(|item| item.name().text == name)?;
-    match found {
-        Item::Param(_) | Item::Let(_) | Item::Solid(_) | Item::Function(_) => Some(found.name().span.range()),
-        Item::Import(_) | Item::Scene(_) => None,
+/// Where a text defines a name that others may use: an item, or the parameter of a function.
+pub(super) fn offered(reading: &Reading, name: &str, parameter_of: Option<&str>) -> Option<Range<usize>> {
+    let item = |name: &str| reading.ast.items.iter().find(|item| item.name().text == name);
+    match (item(parameter_of.unwrap_or(name))?, parameter_of) {
+        (Item::Function(function), Some(_)) => {
+            let found = function.parameters.iter().find(|parameter| parameter.name.text == name)?;
+            Some(found.name.span.range())
+        }
+        (Item::Import(_) | Item::Scene(_), _) | (_, Some(_)) => None,
+        (found, None) => Some(found.name().span.range()),
     }
 }
 
-/// The places at which a text uses a name of the file with this path.
-fn imported_uses(reading: &Reading, path: &str, name: &str) -> Vec<Range<usize>> {
+/// Whether others may use what a text defines at a place. The inner value is the function, if it is a parameter of one.
+fn known_outside<'r>(reading: &'r Reading, place: &Range<usize>) -> Option<Option<&'r str>> {
+    reading.ast.items.iter().find_map(|item| match item {
+        Item::Import(_) | Item::Scene(_) => None,
+        item if item.name().span.range() == *place => Some(None),
+        Item::Function(function) => {
+            let is_own = function.parameters.iter().any(|parameter| parameter.name.span.range() == *place);
+            is_own.then_some(Some(function.name.text.as_str()))
+        }
+        Item::Param(_) | Item::Let(_) | Item::Solid(_) => None,
+    })
+}
+
+/// The places at which a text uses a name of the file with this path: that of an item, or of a function's parameter.
+fn imported_uses(reading: &Reading, path: &str, name: &str, parameter_of: Option<&str>) -> Vec<Range<usize>> {
     let is_of_file = |written: &str| Files::name(written, &reading.source.name) == path;
     let uses = reading.names.mentions.iter().filter(|mention| match &mention.meaning {
-        Meaning::Imported(written) => mention.text == name && is_of_file(written),
+        Meaning::Imported(of) => {
+            mention.text == name && of.parameter_of.as_deref() == parameter_of && is_of_file(&of.path)
+        }
         Meaning::Defined(_) | Meaning::File(_) | Meaning::Standard | Meaning::Key(_) | Meaning::Word(_) => {
             false
         }

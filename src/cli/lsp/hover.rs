@@ -7,11 +7,11 @@ use rfm::glam::DVec3;
 use rfm::syntax::ast::{Definition, Item};
 use rfm::{Engine, Program};
 
-use super::across::Workspace;
+use super::across::{Workspace, offered};
 use super::complete::{method_around, signature};
 use super::document::Document;
 use super::keys;
-use super::names::{Meaning, Mention};
+use super::names::{Imported, Meaning, Mention};
 use super::words::comment_above;
 
 /// Lines of a definition that are shown.
@@ -25,7 +25,7 @@ pub(super) fn at(workspace: &Workspace, document: &Document, byte: usize) -> Opt
     let mention = document.reading.names.at(byte)?;
     let words = match &mention.meaning {
         Meaning::Defined(place) => defined(document, mention, place),
-        Meaning::Imported(path) => imported(workspace, document, mention, path)?,
+        Meaning::Imported(of) => imported(workspace, document, mention, of)?,
         Meaning::File(path) => format!("the file `{path}`"),
         Meaning::Word(key) => keys::about_word(key, &mention.text)?,
         Meaning::Standard => standard(document, mention)?,
@@ -39,10 +39,10 @@ pub(super) fn at(workspace: &Workspace, document: &Document, byte: usize) -> Opt
 }
 
 /// What is known of a name in the file that defines it.
-fn imported(workspace: &Workspace, document: &Document, mention: &Mention, path: &str) -> Option<String> {
-    let (_, file) = workspace.imported(document, path)?;
-    let item = file.reading.ast.items.iter().find(|item| item.name().text == mention.text)?;
-    Some(format!("{}\n\nin `{path}`", defined(&file, mention, &item.name().span.range())))
+fn imported(workspace: &Workspace, document: &Document, mention: &Mention, of: &Imported) -> Option<String> {
+    let (_, file) = workspace.imported(document, &of.path)?;
+    let place = offered(&file.reading, &mention.text, of.parameter_of.as_deref())?;
+    Some(format!("{}\n\nin `{}`", defined(&file, mention, &place), of.path))
 }
 
 fn standard(document: &Document, mention: &Mention) -> Option<String> {

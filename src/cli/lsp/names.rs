@@ -16,8 +16,8 @@ const OF_FLUIDS: [&str; 2] = ["energy", "audit"];
 pub(super) enum Meaning {
     /// Something that the file defines, with the place of its name.
     Defined(Range<usize>),
-    /// Something that an imported file defines, with the path of the file as it is written.
-    Imported(String),
+    /// Something that an imported file defines.
+    Imported(Imported),
     /// The path of an imported file.
     File(String),
     /// A standard solid, a function or a method of the language.
@@ -26,6 +26,15 @@ pub(super) enum Meaning {
     Word(String),
     /// A key of a scene, in the block with this name; `None` for the scene itself.
     Key(Option<String>),
+}
+
+/// Something that an imported file defines.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Imported {
+    /// The path of the file, as it is written.
+    pub path: String,
+    /// The function, if it is a parameter of one.
+    pub parameter_of: Option<String>,
 }
 
 /// A name in the text.
@@ -209,14 +218,17 @@ impl<'a> Reader<'a> {
             ExprKind::Member { of, name } => {
                 self.expr(of);
                 if let Some(path) = self.import(of) {
-                    self.mention(name, Meaning::Imported(path.to_string()));
+                    self.mention(name, Meaning::Imported(Imported { path: path.into(), parameter_of: None }));
                 }
             }
             ExprKind::Method { receiver, method, arguments } => {
                 self.expr(receiver);
                 if let Some(path) = self.import(receiver) {
-                    self.mention(method, Meaning::Imported(path.to_string()));
-                    return self.arguments(arguments, None);
+                    self.mention(
+                        method,
+                        Meaning::Imported(Imported { path: path.into(), parameter_of: None }),
+                    );
+                    return self.imported_arguments(arguments, path, &method.text);
                 }
                 let own = self.function(&method.text).filter(|function| function.takes_a_shape());
                 match own {
@@ -246,6 +258,15 @@ impl<'a> Reader<'a> {
             }
             self.expr(&argument.value);
         }
+    }
+
+    /// The arguments of a function that the file of a path defines.
+    fn imported_arguments(&mut self, arguments: &'a [Argument], path: &str, function: &str) {
+        for name in arguments.iter().filter_map(|argument| argument.name.as_ref()) {
+            let parameter_of = Some(function.to_string());
+            self.mention(name, Meaning::Imported(Imported { path: path.to_string(), parameter_of }));
+        }
+        self.exprs(arguments.iter().map(|argument| &argument.value));
     }
 
     /// The place of a name whose span may hold brackets and comments around it.
