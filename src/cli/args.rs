@@ -195,7 +195,7 @@ pub(super) struct Eval {
     /// Time at which moving solids are evaluated, in seconds or with a unit
     #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = seconds, allow_negative_numbers = true)]
     pub time: f64,
-    /// Columns to print
+    /// Columns to print, in this order
     #[arg(long, value_enum, value_delimiter = ',', default_value = "value,gradient")]
     pub what: Vec<What>,
     /// Width of all arithmetic [default: f64, or what the solid's tolerance allows for ω]
@@ -203,8 +203,8 @@ pub(super) struct Eval {
     pub precision: Option<Precision>,
 }
 
-/// A column of the output of `rfm eval`. The variants stand in the order of the columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+/// A column of the output of `rfm eval`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum What {
     /// ω, positive inside
     Value,
@@ -388,7 +388,8 @@ pub(super) struct Run {
     /// Stop at this simulated time, in seconds or with a unit: 500ms
     #[arg(long, value_name = "TIME", value_parser = seconds, allow_negative_numbers = true)]
     pub until: Option<f64>,
-    /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed
+    /// Go on from the folder's last checkpoint; the scene's `run` block and probes may have changed. The result is that of
+    /// a run without a stop, bit for bit, unless it had ended between two frames (--until): the last step was cut short there
     #[arg(long)]
     pub resume: bool,
     /// Replace the run that the folder holds

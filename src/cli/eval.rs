@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::args::{Eval, Shared, What};
 use super::failure::Failure;
+use super::progress::{self, Progress};
 use super::{choose, input, output};
 use crate::cli::output::Shown;
 use rfm::field::Points;
@@ -23,6 +24,9 @@ const CHUNK: usize = 1 << 15;
 
 /// Points that one thread evaluates together.
 const BLOCK: usize = 1 << 11;
+
+/// Points that one thread evaluates together where each of them needs a search for the nearest point.
+const SEARCHES: usize = 8;
 
 /// So many points at a time make it worthwhile to divide space into cells before their signs are asked for.
 const MANY_POINTS: usize = 1 << 12;
@@ -130,6 +134,8 @@ struct Rows {
     distances: OnceLock<Distances>,
     /// Made when many signs are first asked for; `None` where the twin answers as fast.
     cells: OnceLock<Option<CellMap>>,
+    /// The progress through the points that are evaluated now, if that takes long.
+    progress: Option<Progress>,
 }
 
 /// What is computed for all points of a block together; empty columns where nothing is asked for.
@@ -155,7 +161,10 @@ impl Table {
         if points.len() >= MANY_POINTS && rows.needs_only_signs() {
             rows.cells(); // not in a thread of the pool: others would wait for it
         }
-        let blocks = points.par_chunks(BLOCK);
+        let is_slow = rows.asks_for_searches();
+        rows.progress = is_slow.then(|| progress::bar(points.len() as u64, "distances"));
+        let rows = &*rows;
+        let blocks = points.par_chunks(if is_slow { SEARCHES } else { BLOCK });
         match json {
             None => {
                 let texts: Vec<String> = blocks.map(|points| rows.as_csv(points)).collect();
@@ -166,6 +175,7 @@ impl Table {
                 all.extend(found.into_iter().flatten());
             }
         }
+        rows.progress.iter().for_each(Progress::finish_and_clear);
         Ok(())
     }
 
@@ -180,9 +190,13 @@ impl Table {
 
 impl Rows {
     fn new(solid: Solid, chosen: Option<Chosen>, options: &Eval) -> Self {
-        let mut what = options.what.clone();
-        what.sort_unstable();
-        what.dedup();
+        let mut what: Vec<What> = Vec::new();
+        // each column once, in the order in which they are asked for
+        for &asked in &options.what {
+            if !what.contains(&asked) {
+                what.push(asked);
+            }
+        }
         let mut names = vec!["x", "y", "z"];
         for what in &what {
             names.extend(match what {
@@ -196,7 +210,7 @@ impl Rows {
         }
         let precision = options.precision.unwrap_or(Precision::F64);
         let (distances, cells) = (OnceLock::new(), OnceLock::new());
-        Self { solid, chosen, what, precision, names, distances, cells }
+        Self { solid, chosen, what, precision, names, distances, cells, progress: None }
     }
 
     fn as_csv(&self, points: &[DVec3]) -> String {
@@ -233,6 +247,7 @@ impl Rows {
             row.extend(p.to_array());
             self.push_row(p, &columns, i, &mut row);
             visit(&row);
+            self.progress.iter().for_each(|progress| progress.inc(1));
         }
     }
 
@@ -257,6 +272,12 @@ impl Rows {
 
     fn asks_for(&self, any: &[What]) -> bool {
         self.what.iter().any(|what| any.contains(what))
+    }
+
+    /// Whether the nearest point of the surface is searched for, which takes some milliseconds for each point.
+    fn asks_for_searches(&self) -> bool {
+        self.asks_for(&[What::Clearance])
+            || self.asks_for(&[What::Distance]) && self.precision == Precision::F64
     }
 
     /// Whether signs are asked for, and nothing from which they follow.
@@ -463,6 +484,38 @@ fn digits(magnitude: f64) -> (u64, i32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The table of a ball with these columns.
+    fn table(what: Vec<What>) -> Table {
+        let program = rfm::Program::from_source("ball", "rfm 1\nsolid s = sphere(1)\n").unwrap();
+        let options = Eval {
+            file: "ball".into(),
+            solid: None,
+            at: Vec::new(),
+            points: None,
+            time: 0.0,
+            what,
+            precision: None,
+        };
+        Table::new(program.solid("s").unwrap(), None, &options, true).unwrap()
+    }
+
+    #[test]
+    fn columns_stand_in_the_order_in_which_they_are_asked_for() {
+        let table = table(vec![What::Sign, What::Distance, What::Value, What::Sign]);
+        assert_eq!(table.rows.names, ["x", "y", "z", "sign", "distance", "omega"]);
+    }
+
+    #[test]
+    fn searches_for_distances_tell_how_far_they_are() {
+        let points: Vec<DVec3> = (0..20).map(|i| DVec3::new(0.1 * f64::from(i), 0.2, 0.0)).collect();
+        let mut slow = table(vec![What::Clearance]);
+        slow.rows(&points).unwrap();
+        assert_eq!(slow.rows.progress.unwrap().position(), 20);
+        let mut quick = table(vec![What::Value]);
+        quick.rows(&points).unwrap();
+        assert!(quick.rows.progress.is_none());
+    }
 
     fn number(value: f64) -> String {
         let mut text = String::new();

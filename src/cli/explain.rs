@@ -15,7 +15,7 @@ use rfm::ir::{Node, dump};
 use rfm::lower::{NamedSolid, Scene};
 use rfm::simplify::{Exactness, MOST_PLACES, simplify};
 use rfm::solid::{Bounds, ProgramKind, Remainder};
-use rfm::sph::methods_reference;
+use rfm::sph::{Method, method_reference, methods_reference};
 use rfm::syntax;
 use rfm::{Precision, Program, Solid};
 
@@ -31,6 +31,10 @@ pub(super) fn run(shared: &Shared, options: &Explain) -> Result<(), Failure> {
         for (code, text) in explanations() {
             say!("{code}  {}", first_sentence(text));
         }
+        return Ok(());
+    }
+    if let Some(method) = Method::named(subject).filter(|_| !Path::new(subject).exists()) {
+        say!("{}", method_reference(method).trim_end());
         return Ok(());
     }
     if let Some(text) = explain(subject) {

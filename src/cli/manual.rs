@@ -3,14 +3,21 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use clap::{Args, Command, CommandFactory};
+use clap::{Arg, ArgAction, Args, Command, CommandFactory};
 use clap_complete::Shell;
 
 use super::args::Arguments;
 use super::failure::Failure;
 use super::output::{self, Shown};
 
+/// Commands that read no file of the language: options of all commands mean nothing to them.
+const WITHOUT_FILES: [&str; 4] = ["completions", "man", "lsp", "init"];
+
+/// Help without the options of all commands.
+const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\nArguments:\n{positionals}{after-help}";
+
 #[derive(Debug, Args)]
+#[command(help_template = HELP, override_usage = "rfm completions <SHELL>")]
 #[command(after_help = "bash:  rfm completions bash > ~/.local/share/bash-completion/completions/rfm\n\
                         fish:  rfm completions fish > ~/.config/fish/completions/rfm.fish\n\
                         zsh:   rfm completions zsh > a file _rfm in a folder of $fpath")]
@@ -21,6 +28,7 @@ pub(super) struct Completions {
 }
 
 #[derive(Debug, Args)]
+#[command(help_template = HELP, override_usage = "rfm man [DIR]")]
 pub(super) struct Man {
     /// Folder for a page of each command [default: rfm's own page, on standard output]
     #[arg(value_name = "DIR")]
@@ -52,11 +60,45 @@ pub(super) fn man(options: &Man) -> Result<(), Failure> {
 }
 
 fn page(command: Command) -> Result<Vec<u8>, Failure> {
+    let takes_no_file = WITHOUT_FILES.contains(&command.get_name());
+    let command = command.mut_args(|arg| {
+        let means_nothing = takes_no_file && arg.is_global_set();
+        let is_hidden = means_nothing || arg.is_hide_set();
+        arg.hide(is_hidden).hide_short_help(false)
+    });
+    let usage = synopsis(&command);
+    let command = command.override_usage(usage);
     let mut text = Vec::new();
     clap_mangen::Man::new(command)
         .render(&mut text)
         .map_err(|e| Failure::usage(format!("cannot make the page: {e}")))?;
     Ok(text)
+}
+
+/// What may be written behind the name of a command, with the names of values.
+fn synopsis(command: &Command) -> String {
+    let name = command.get_bin_name().unwrap_or_else(|| command.get_name());
+    let options = command.get_arguments().filter(|arg| !arg.is_hide_set() && !arg.is_positional());
+    let mut words = vec![name.to_string()];
+    words.extend(options.chain(command.get_positionals()).map(written));
+    if command.has_subcommands() {
+        words.push("COMMAND".to_string());
+    }
+    words.join(" ")
+}
+
+/// An argument as it is written: `[-s|--solid NAME]`.
+fn written(arg: &Arg) -> String {
+    let flags = [arg.get_short().map(|c| format!("-{c}")), arg.get_long().map(|long| format!("--{long}"))];
+    let flag = flags.into_iter().flatten().collect::<Vec<_>>().join("|");
+    let value = match arg.get_value_names() {
+        Some([name, ..]) if arg.get_action().takes_values() => name.as_str(),
+        _ => "",
+    };
+    let words = format!("{flag} {value}");
+    let words = words.trim();
+    let words = if arg.is_required_set() { words.to_string() } else { format!("[{words}]") };
+    if matches!(arg.get_action(), ArgAction::Append) { format!("{words} …") } else { words }
 }
 
 /// Prints text that ends in a line of its own.

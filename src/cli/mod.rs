@@ -34,6 +34,7 @@ mod saved;
 mod scenery;
 mod section;
 mod stopwatch;
+mod surfaces;
 mod survey;
 mod sweep;
 mod values;

@@ -218,6 +218,11 @@ pub(super) fn significant(figure: f64, digits: usize) -> String {
     }
 }
 
+/// A number of things: `1 frame`, `3 frames`.
+pub(super) fn counted(count: usize, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

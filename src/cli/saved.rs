@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::failure::Failure;
-use super::output::Shown;
+use super::output::{Shown, counted};
 use super::values::Frames;
 use rfm::fluid_surface::{FrameEntry, read_collection};
 use rfm::sph::Probe;
@@ -129,7 +129,9 @@ pub(super) fn chosen(
     let end = end.unwrap_or(count);
     if first >= end || end > count {
         return Err(Failure::usage(format!(
-            "--frames {first}..{end}: there are {count} frames, from 0 to {}; B is the first that is left out",
+            "--frames {first}..{end}: there {} {}, from 0 to {}; B is the first that is left out",
+            if count == 1 { "is" } else { "are" },
+            counted(count, "frame"),
             count - 1
         )));
     }

@@ -158,7 +158,8 @@ SCENE_KEY = "E0301":
 `known` states what it is to be, and the run says how far off it is. Each method has keys of its own: `rfm explain --methods` lists them.";
 SCENE_MISSING = "E0302":
 "The scene lacks something without which it cannot be run: a box with its far corner `max`, a fluid with a `shape`, or
-the `solid` of an obstacle. All other keys have defaults.";
+the `solid` of an obstacle. All other keys have defaults. Only the `sound_speed` of `method: wcsph` has none where the fluid rests
+at the start and no gravity, velocity or moving obstacle says how fast it will be.";
 SCENE_REPEATED = "E0303":
 "A key or block stands twice where it may stand once.";
 SCENE_NO_ROOM = "E0304":
@@ -301,6 +302,11 @@ viscosity, surface tension and gravity allow, and end at each frame (`save_every
 PROBE_IN_BODY = "W0516":
 "A probe of a pressure or a velocity lies in an obstacle at rest or outside the container, where there is never any fluid. What
 it tells is the mean of the particles that are near enough, beside the obstacle, or NaN if there are none.";
+RUN_HAS_HOLES = "W0517":
+"A run goes on with --resume in a folder where files of its past are missing or were cut: frames, or samples in the table of a
+probe. The state itself is whole, because it comes from a checkpoint, so all that follows is right. What was lost stays lost:
+`particles.pvd` goes without those frames, and a mean over a table with a hole is not the mean of the run. The message says
+what is missing. `--force` in place of --resume computes the run anew.";
 OBSTACLE_FILLS_BOX = "E0502":
 "The obstacle covers every place where fluid was to be put: nothing is left to simulate.";
 }

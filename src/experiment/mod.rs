@@ -33,7 +33,9 @@ use crate::diagnostic::{Code, Diagnostic, Diagnostics};
 use crate::geom::Aabb;
 use crate::ir::{Given, Interpreter, Node};
 use crate::lower::{Fluid, Gravity, Scene};
-use crate::sph::{Checkpoint, Obstacle, Parameters, Particles, SetupError, Simulation, VectorField};
+use crate::sph::{
+    Checkpoint, Obstacle, ParameterError, Parameters, Particles, SetupError, Simulation, VectorField,
+};
 use crate::{Engine, Program, Solid};
 
 pub use bodies::Body;
@@ -85,20 +87,7 @@ impl Experiment {
         let mut parameters = parameters::of_scene(&program, &scene, mass, typical_speed);
         let (time_step, too_long) = parameters::time_step(&scene, &parameters);
         parameters.time_step = time_step.seconds;
-        parameters.validate().map_err(|error| {
-            let message = format!("the fluid's figures do not fit together: {error}");
-            let refusal = Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message);
-            refuse(
-                &program,
-                if error.name == "sound_speed" && typical_speed == 0.0 {
-                    refusal.help(
-                        "no fluid falls or moves at the start: state `sound_speed`, ten times the greatest speed to come",
-                    )
-                } else {
-                    refusal
-                },
-            )
-        })?;
+        parameters.validate().map_err(|error| refuse(&program, unfit(&scene, typical_speed, &error)))?;
         let bodies = bodies::of_parts(&program, &scene, &parameters, engine, parts)?;
         for body in &bodies {
             if let Some(Err(refusal)) = program.within_tolerance(&body.solid) {
@@ -262,6 +251,18 @@ fn vector_field(program: &Program, nodes: &[Node; 3]) -> Arc<VectorField> {
         formulas.eval_given(Given { time, ..Given::point(p.to_array()) }, &mut vector);
         DVec3::from_array(vector)
     })
+}
+
+/// Says why the figures of a fluid do not fit together, or which one is missing.
+fn unfit(scene: &Scene, typical_speed: f64, error: &ParameterError) -> Diagnostic {
+    if error.name == "sound_speed" && typical_speed == 0.0 {
+        // it has no default where nothing moves; one that is stated was checked when the scene was read
+        let message = "`sound_speed` is missing: it follows from how fast the fluid falls or is moved, and here nothing moves";
+        let help = "state `sound_speed` in this block, ten times the greatest speed to come";
+        return Diagnostic::error(Code::SCENE_MISSING, scene.fluid.span, message).help(help);
+    }
+    let message = format!("the fluid's figures do not fit together: {error}");
+    Diagnostic::error(Code::OUT_OF_RANGE, scene.fluid.shape_span, message)
 }
 
 fn refuse(program: &Program, diagnostic: Diagnostic) -> Error {

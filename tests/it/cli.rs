@@ -132,8 +132,20 @@ fn shells_and_man_know_every_command() {
         let text = rfm(folder.path(), &["completions", shell]).expect(0).stdout;
         assert!(text.contains("mesh-cells") && text.contains("init"), "{shell}");
     }
-    assert!(rfm(folder.path(), &["man"]).expect(0).stdout.starts_with(".ie"));
+    let page = rfm(folder.path(), &["man"]).expect(0).stdout;
+    assert!(page.starts_with(".ie"), "{page}");
+    for part in
+        ["[-D NAME=VALUE] … [-P|--params FILE] …", "[--max-nodes N]", "Operations that a file may unroll to"]
+    {
+        assert!(page.replace("\\-", "-").contains(part), "{part}: {page}");
+    }
     rfm(folder.path(), &["man", "pages"]).expect(0);
+    let of_man = std::fs::read_to_string(folder.path().join("pages/rfm-man.1")).unwrap();
+    assert!(of_man.contains("[DIR]") && !of_man.contains("engine"), "{of_man}");
+    for command in ["man", "completions"] {
+        let help = rfm(folder.path(), &[command, "--help"]).expect(0).stdout;
+        assert!(!help.contains("-D") && !help.contains("--engine"), "{help}");
+    }
     let page = std::fs::read_to_string(folder.path().join("pages/rfm-run.1")).unwrap();
     assert!(page.contains("Simulate"), "{page}");
 }
@@ -257,6 +269,25 @@ fn slices_are_pictures() {
     }
     let term = rfm(folder.path(), &["check", pawn, "--slice", "y=1.5", "--term"]).expect(0);
     assert!(term.stdout.lines().count() > 10 && !term.stdout.contains('\x1b'));
+}
+
+#[test]
+fn methods_are_explained_by_their_names() {
+    let all = rfm(root(), &["explain", "--methods"]).expect(0).stdout;
+    for method in ["wcsph", "dfsph", "paper"] {
+        let one = rfm(root(), &["explain", method]).expect(0).stdout;
+        assert!(one.starts_with(&format!("## `{method}`: ")) && all.contains(one.trim_end()), "{one}");
+    }
+}
+
+#[test]
+fn eval_prints_columns_in_the_order_asked_for() {
+    let text = b"rfm 1\nsolid s = sphere(1)\n";
+    let asked = ["eval", "-", "--at", "2,0,0", "--what", "distance,value,sign,distance"];
+    let table = rfm_reading(root(), &asked, text).expect(0).stdout;
+    assert!(table.starts_with("x,y,z,distance,omega,sign\n"), "{table}");
+    let row: Vec<f64> = table.lines().nth(1).unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert!((row[3] - 1.0).abs() < 1e-9 && row[5] == -1.0, "{table}");
 }
 
 #[test]

@@ -8,9 +8,9 @@ const FOLDERS: [&str; 6] =
     ["parse_error", "name_error", "type_error", "range_error", "scene_error", "file_error"];
 
 /// Codes that no file can raise by itself: for files of more than 256 MiB, for flags of the command line, for a
-/// machine without room, and for what the audit of a run finds.
-const NOT_OF_A_FILE: [&str; 9] =
-    ["E0103", "E0211", "W0214", "W0413", "W0414", "W0506", "W0511", "W0512", "W0513"];
+/// machine without room, for what the audit of a run finds, and for what --resume misses.
+const NOT_OF_A_FILE: [&str; 10] =
+    ["E0103", "E0211", "W0214", "W0413", "W0414", "W0506", "W0511", "W0512", "W0513", "W0517"];
 
 /// What a person who runs the file sees: `check`, and for a scene that passes it, the start of a run.
 fn messages(path: &str) -> String {

@@ -65,7 +65,7 @@ fn frames_become_closed_surfaces_about_as_large_as_the_fluid() {
     let out = folder.path().join("drop.out/surface");
     assert_eq!(
         names(&out),
-        ["surface.pvd", "surface_000000.vtp", "surface_000001.vtp", "surface_000002.vtp"]
+        ["frames.json", "surface.pvd", "surface_000000.vtp", "surface_000001.vtp", "surface_000002.vtp"]
     );
     let mut triangles = 0;
     for (i, surface) in surfaces.iter().enumerate() {
@@ -150,7 +150,7 @@ fn what_is_no_run_is_refused_with_advice() {
     std::fs::write(&frame, &whole[..whole.len() / 2]).unwrap();
     refused(&["mesh", "drop.out", "--fluid"], "particles_000001.vtp");
     let out = here.join("drop.out/surface");
-    assert_eq!(names(&out), ["surface.pvd", "surface_000000.vtp"]);
+    assert_eq!(names(&out), ["frames.json", "surface.pvd", "surface_000000.vtp"]);
     refused(&["mesh", "drop.out", "--fluid"], "it was cut off");
     std::fs::remove_file(&frame).unwrap();
     refused(&["mesh", "drop.out", "--fluid"], "is missing");
@@ -161,6 +161,60 @@ fn what_is_no_run_is_refused_with_advice() {
     refused(&["mesh", "drop.out", "--fluid", "--frames", "0"], "--radius");
     let document = mesh(here, &["--frames", "0", "--radius", "18.4mm", "--json"]).expect(0).json();
     assert!((0.9..1.1).contains(&number(&document["surfaces"][0]["volume_ratio"])), "{document}");
+}
+
+#[test]
+fn surfaces_go_with_the_run_that_they_were_made_of() {
+    let folder = run();
+    let here = folder.path();
+    let render = |code: i32| rfm(here, &["render", "drop.out", "--surface", "-o", "pictures"]).expect(code);
+    let surface = here.join("drop.out/surface");
+    mesh(here, &[]).expect(0);
+    mesh(here, &["--format", "stl", "--frames", "0"]).expect(0);
+    std::fs::write(surface.join("notes.txt"), "of the user").unwrap();
+    render(0);
+
+    // a new run in the folder removes what the old one left, and nothing else
+    let kept: Vec<_> =
+        names(&surface).into_iter().map(|name| (std::fs::read(surface.join(&name)).unwrap(), name)).collect();
+    let other = SCENE.replace("z <= 0.6", "z <= 0.5").replace("particles: 1000", "particles: 900");
+    std::fs::write(here.join("drop.rfm"), other).unwrap();
+    rfm(here, &["run", "drop.rfm", "--no-pictures", "--force"]).expect(0);
+    assert_eq!(names(&surface), ["notes.txt"]);
+    assert!(render(2).stderr.contains("`rfm mesh drop.out --fluid` makes them"));
+
+    // surfaces of the old run beside frames of the new one, at the same times
+    for (bytes, name) in kept {
+        std::fs::write(surface.join(name), bytes).unwrap();
+    }
+    let told = render(2).stderr;
+    assert!(told.contains("surface_000000.vtp` was made of another run than frame 0"), "{told}");
+    mesh(here, &["--frames", "1.."]).expect(0);
+    assert!(render(2).stderr.contains("frame 0, at 0 s, has no surface"));
+    rfm(here, &["render", "drop.out", "--surface", "--frames", "1..", "-o", "pictures"]).expect(0);
+
+    // older versions did not tell what surfaces were made of
+    std::fs::remove_file(surface.join("frames.json")).unwrap();
+    rfm(here, &["render", "drop.out", "--surface", "--frames", "1..", "-o", "pictures"]).expect(0);
+}
+
+#[test]
+fn a_file_for_the_surface_holds_one_frame() {
+    let folder = run();
+    let here = folder.path();
+    let refused = |flags: &[&str], part: &str| {
+        let told = mesh(here, flags).expect(2).stderr;
+        assert!(told.contains(part), "{told}");
+        assert!(!here.join("x.stl").exists(), "{flags:?}");
+    };
+    refused(&["-o", "x.stl"], "there are 3 frames: write a file for each into a folder, -o x --format stl");
+    refused(&["-o", "x.stl", "--frames", "0", "--format", "ply"], "names a .stl file, and --format ply");
+    refused(&["-o", "x.html"], "rfm view drop.out --save x.html");
+    let told = mesh(here, &["-o", "x.stl", "--frames", "1"]).expect(0).stdout;
+    assert!(told.starts_with("1 frame, ") && told.contains("written to x.stl"), "{told}");
+    let file = std::fs::read(here.join("x.stl")).unwrap();
+    mesh(here, &["-o", "all", "--format", "stl"]).expect(0);
+    assert!(file == std::fs::read(here.join("all/surface_000001.stl")).unwrap());
 }
 
 /// The crate that makes surfaces relies on sane particles; these are not.

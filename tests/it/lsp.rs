@@ -41,7 +41,7 @@ impl Editor {
     }
 
     /// An editor that counts in UTF-16, with a file open.
-    fn with(text: &str) -> Self {
+    pub fn with(text: &str) -> Self {
         let mut editor = Self::new(&[]);
         editor.open(text);
         editor
@@ -52,14 +52,14 @@ impl Editor {
         self.server.id()
     }
 
-    fn write(&mut self, message: &Value) {
+    pub fn write(&mut self, message: &Value) {
         let text = message.to_string();
         let to = self.to.as_mut().unwrap();
         write!(to, "Content-Length: {}\r\n\r\n{text}", text.len()).unwrap();
         to.flush().unwrap();
     }
 
-    fn read(&mut self) -> Value {
+    pub fn read(&mut self) -> Value {
         let mut length = 0;
         loop {
             let mut line = String::new();
@@ -76,12 +76,12 @@ impl Editor {
         serde_json::from_slice(&bytes).unwrap()
     }
 
-    fn tell(&mut self, method: &str, params: Value) {
+    pub fn tell(&mut self, method: &str, params: Value) {
         self.write(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
     }
 
     /// The answer to a request: its result, or an object with the key `code` if it was refused.
-    fn ask(&mut self, method: &str, params: Value) -> Value {
+    pub fn ask(&mut self, method: &str, params: Value) -> Value {
         self.last += 1;
         self.write(&json!({ "jsonrpc": "2.0", "id": self.last, "method": method, "params": params }));
         loop {
@@ -150,7 +150,7 @@ impl Editor {
         items.as_array().unwrap().iter().map(|item| item["label"].as_str().unwrap().to_string()).collect()
     }
 
-    fn hover(&mut self, line: u32, character: u32) -> String {
+    pub fn hover(&mut self, line: u32, character: u32) -> String {
         self.at("hover", line, character)["contents"]["value"].as_str().unwrap_or("").to_string()
     }
 
@@ -163,7 +163,7 @@ impl Editor {
 }
 
 /// The text after edits, which must not overlap. Positions are those of UTF-16.
-fn edited(text: &str, edits: &Value) -> String {
+pub fn edited(text: &str, edits: &Value) -> String {
     let byte = |position: &Value| {
         let line = position["line"].as_u64().unwrap() as usize;
         let start: usize = text.split_inclusive('\n').take(line).map(str::len).sum();

@@ -159,6 +159,98 @@ fn damaged_and_foreign_checkpoints() {
     snapshot("cli", "resume refused", &text);
 }
 
+#[test]
+fn files_of_others_are_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::write(here.join("drop.rfm"), scene("paper", "dt: 1 ms, until: 2 ms, save_every: 2 ms")).unwrap();
+    for (k, name) in
+        ["summary.json", "particles.pvd", "probes/level.csv", "history/audit.csv"].iter().enumerate()
+    {
+        let out = format!("out{k}");
+        let path = here.join(&out).join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, "of another program").unwrap();
+        let told = run(here, &[&out]).expect(2).stderr;
+        assert!(told.contains("holds no run") && told.contains(&format!("`{name}` in it")), "{told}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"of another program");
+        if k < 2 {
+            run(here, &[&out, "--force"]).expect(0);
+        }
+    }
+    // what a run does not write is in nobody's way
+    std::fs::create_dir_all(here.join("mine/probes")).unwrap();
+    std::fs::write(here.join("mine/probes/other.csv"), "a,b\n").unwrap();
+    run(here, &["mine"]).expect(0);
+}
+
+/// Makes a hole in one table of a run, and removes another one and a frame. Returns how many samples the first one had.
+fn damaged(out: &Path) -> usize {
+    let table = out.join("probes/level.csv");
+    let text = std::fs::read_to_string(&table).unwrap();
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    std::fs::write(&table, [&lines[..4], &lines[6..]].concat().concat()).unwrap();
+    std::fs::remove_file(out.join("probes/head.csv")).unwrap();
+    std::fs::remove_file(out.join("frames/particles_000002.vtp")).unwrap();
+    lines.len() - 1
+}
+
+#[test]
+fn what_a_resumed_run_lacks_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let probes = "probe level { height: [0.5, 0.52], every: 3 ms }";
+    let text = scene("wcsph", "until: 40 ms, save_every: 10 ms");
+    let text = text.replace(probes, "probe level { height: [0.5, 0.52], every: 3 ms, from: 5 ms }");
+    std::fs::write(here.join("drop.rfm"), &text).unwrap();
+    let whole = run(here, &["out"]).expect(0);
+    assert!(!whole.stdout.contains("lost") && !whole.stderr.contains("W0517"), "{}", whole.stderr);
+
+    // an end that lies behind
+    for flags in [["--until", "0.02"], ["--steps", "3"]] {
+        let told = run(here, &[&["out", "--resume"][..], &flags].concat()).expect(2).stderr;
+        assert!(told.contains("0.04 s, already") && told.contains("--force"), "{told}");
+    }
+
+    let samples = damaged(&here.join("out"));
+    for until in ["60ms", "80ms"] {
+        let goes_on = run(here, &["out", "--resume", "--until", until]).expect(0);
+        let told = &goes_on.stderr;
+        let lacks = format!("`out/probes/level.csv` lacks 2 of the {samples} samples up to 0.04 s");
+        assert!(until == "80ms" || told.contains(&lacks), "{told}");
+        assert!(told.contains("warning[W0517]: `out/probes/level.csv` lacks 2 of the"), "{told}");
+        assert!(told.contains("`out/probes/head.csv` lacks 5 of the"), "{told}");
+        assert!(
+            told.contains("frames is missing, the first at 0.02 s (`out/frames/particles_000002.vtp`)"),
+            "{told}"
+        );
+        let means = goes_on.stdout.lines().find(|line| line.starts_with("probe level, mean")).unwrap();
+        assert!(means.contains("2 samples of its table are lost (W0517)"), "{means}");
+        let summary = std::fs::read_to_string(here.join("out/summary.json")).unwrap();
+        assert!(summary.contains("\"samples_lost\": 2"), "{summary}");
+    }
+    // the frames that are left keep their times
+    let pvd = std::fs::read_to_string(here.join("out/particles.pvd")).unwrap();
+    for (time, number) in [("0.01", 1), ("0.03", 3), ("0.05", 5), ("0.08", 8)] {
+        let entry = format!("timestep=\"{time}\" part=\"0\" file=\"frames/particles_{number:06}.vtp\"");
+        assert!(pvd.contains(&entry), "{entry}: {pvd}");
+    }
+    assert!(!pvd.contains("particles_000002"), "{pvd}");
+
+    // probes that are new or measure something else begin where the run goes on
+    let more = text.replace("probe level", "probe late { height: [0.5, 0.5], from: 10 ms }\n  probe level");
+    let more = more.replace("probe head { pressure: ", "probe head { velocity: ");
+    std::fs::write(here.join("drop.rfm"), more).unwrap();
+    let goes_on = run(here, &["out", "--resume", "--until", "0.1"]).expect(0);
+    for told in [
+        "`out/probes/late.csv` has no samples of the time before 0.08 s",
+        "`out/probes/head.csv` measures something else",
+    ] {
+        assert!(goes_on.stderr.contains(told), "{}", goes_on.stderr);
+    }
+    assert!(goes_on.stdout.contains("probe late, mean from 0.08 s on"), "{}", goes_on.stdout);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_has_a_checkpoint_and_goes_on() {

@@ -15,8 +15,10 @@ use rfm::Engine;
 use rfm::diagnostic::Diagnostic;
 
 use super::super::lints;
-use super::document::{Document, Encoding};
+use super::buffers::Buffers;
+use super::document::Document;
 use super::messages;
+use super::reading::Encoding;
 
 /// A text that is not changed for so long rests.
 const REST: Duration = Duration::from_millis(400);
@@ -94,13 +96,17 @@ impl Shared {
 
 impl Background {
     /// Starts the thread. It sends all messages of a text again, with those that it has found.
-    pub fn start(encoding: Encoding, send: impl Fn(PublishDiagnosticsParams) + Send + 'static) -> Self {
+    pub fn start(
+        encoding: Encoding,
+        buffers: Buffers,
+        send: impl Fn(PublishDiagnosticsParams) + Send + 'static,
+    ) -> Self {
         let background = Self::default();
         let shared = Arc::clone(&background.shared);
         std::thread::spawn(move || {
             while let Some(text) = shared.wait() {
                 // a mistake in a search must not end the others
-                let found = catch_unwind(AssertUnwindSafe(|| look(&shared, &text, encoding)));
+                let found = catch_unwind(AssertUnwindSafe(|| look(&shared, &text, encoding, &buffers)));
                 let Ok(Some(messages)) = found else { continue };
                 let state = shared.state();
                 if !state.is_over && state.newest.get(text.uri.as_str()) == Some(&text.number) {
@@ -140,9 +146,14 @@ impl Drop for Background {
 
 /// All messages of a text with those that are found in its solids; `None` if there are none of these, or the text is not
 /// the newest any more.
-fn look(shared: &Shared, text: &Text, encoding: Encoding) -> Option<PublishDiagnosticsParams> {
+fn look(
+    shared: &Shared,
+    text: &Text,
+    encoding: Encoding,
+    buffers: &Buffers,
+) -> Option<PublishDiagnosticsParams> {
     let started = Instant::now();
-    let mut document = Document::new(&text.uri, text.text.clone(), encoding);
+    let mut document = Document::new(&text.uri, &text.text, text.version, encoding, buffers);
     let program = document.program.as_ref()?;
     let mut searches = lints::Searches::short();
     let mut found: Vec<Diagnostic> = Vec::new();
@@ -167,5 +178,5 @@ fn look(shared: &Shared, text: &Text, encoding: Encoding) -> Option<PublishDiagn
         return None;
     }
     document.messages.list.extend(found);
-    Some(messages::published(&text.uri, &document, text.version))
+    Some(messages::published(&text.uri, &document))
 }

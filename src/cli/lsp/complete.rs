@@ -15,6 +15,7 @@ use rfm::syntax::{
 
 use super::context::{Context, Open};
 use super::document::Document;
+use super::keys;
 use super::words::{self, Signature};
 
 const OPERATORS: [&str; 9] = ["and", "or", "not", "any", "all", "sum", "product", "min", "max"];
@@ -49,7 +50,8 @@ pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
     {
         let method = method_around(document, byte).unwrap_or_default();
         let keys = vocabulary::keys(block, method).into_iter();
-        return keys.map(|key| item(key, CompletionItemKind::PROPERTY, &about_key(key))).collect();
+        let about = |key: &str| keys::about(block, key, Some(method));
+        return keys.map(|key| item(key, CompletionItemKind::PROPERTY, &about(key))).collect();
     }
     if let Some(key) = &context.key {
         let words = vocabulary::words(key);
@@ -82,7 +84,7 @@ pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
 
 /// What the file defines above a byte.
 fn names(document: &Document, byte: usize) -> Vec<CompletionItem> {
-    let above = document.ast.items.iter().filter(|item| item.name().span.range().end < byte);
+    let above = document.reading.ast.items.iter().filter(|item| item.name().span.range().end < byte);
     above.filter_map(|item| defined(item, document.text())).collect()
 }
 
@@ -98,7 +100,7 @@ fn members(document: &Document, context: &Context) -> Option<Vec<CompletionItem>
 /// The text of an import, from the name that stands alone in front of a dot; `None` if that names something else.
 fn imported(document: &Document, context: &Context, owner: Option<&str>) -> Option<Source> {
     let owner = owner.filter(|owner| !context.locals.iter().any(|local| local == owner))?;
-    let import = document.ast.items.iter().find_map(|item| match item {
+    let import = document.reading.ast.items.iter().find_map(|item| match item {
         Item::Import(import) => (import.name.text == *owner).then_some(import),
         Item::Param(_) | Item::Let(_) | Item::Function(_) | Item::Solid(_) | Item::Scene(_) => None,
     })?;
@@ -123,7 +125,7 @@ fn defined(defined: &Item, text: &str) -> Option<CompletionItem> {
 }
 
 fn methods(document: &Document) -> Vec<Signature> {
-    let own = document.ast.items.iter().filter_map(|item| match item {
+    let own = document.reading.ast.items.iter().filter_map(|item| match item {
         Item::Function(function) => {
             function.takes_a_shape().then(|| words::behind_a_shape(words::of(function, document.text())))
         }
@@ -132,19 +134,9 @@ fn methods(document: &Document) -> Vec<Signature> {
     own.chain(words::methods()).collect()
 }
 
-/// What a key means, for those that methods of the solver declare.
-pub(super) fn about_key(key: &str) -> String {
-    let declared = Method::all().into_iter().flat_map(|method| method.info().keys);
-    let known = declared.into_iter().find(|own| own.name == key);
-    known.map_or_else(String::new, |own| {
-        let unit = own.unit.map_or(String::new(), |unit| format!(", in {unit}"));
-        format!("{}{unit}; accepts {}; by default {}", own.about, own.accepts, own.default)
-    })
-}
-
 /// The method of the scene around a byte, if it states one.
-fn method_around(document: &Document, byte: usize) -> Option<Method> {
-    let in_tree = document.ast.items.iter().find_map(|item| match item {
+pub(super) fn method_around(document: &Document, byte: usize) -> Option<Method> {
+    let in_tree = document.reading.ast.items.iter().find_map(|item| match item {
         Item::Scene(scene) => scene.span.range().contains(&byte).then(|| scene.entries.iter()),
         Item::Import(_) | Item::Param(_) | Item::Let(_) | Item::Function(_) | Item::Solid(_) => None,
     });
@@ -173,7 +165,7 @@ pub(super) fn signature(document: &Document, name: &str, is_method: bool) -> Opt
     if is_method {
         return methods(document).into_iter().find(|method| method.name == name);
     }
-    let own = function(&document.ast, document.text(), name);
+    let own = function(&document.reading.ast, document.text(), name);
     own.or_else(|| words::functions().into_iter().find(|function| function.name == name))
 }
 

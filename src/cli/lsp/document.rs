@@ -1,69 +1,41 @@
-//! An open file: its text, and the positions that an editor counts in it.
+//! An open file: its text, and all that follows from it.
 
 use std::sync::Arc;
 
-use lsp_types::{Position, PositionEncodingKind, Range, Uri};
+use lsp_types::{Position, Range, Uri};
 
 use rfm::Program;
-use rfm::compile::{files_beside, text_of};
+use rfm::compile::text_of;
 use rfm::diagnostic::{Diagnostics, Source, Span};
 use rfm::files::Files;
 use rfm::lower::Options;
-use rfm::syntax::{self, Ast};
+use rfm::syntax;
 
-use super::names::Names;
-
-/// In what the editor counts along a line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Encoding {
-    Utf8,
-    /// What every editor understands.
-    Utf16,
-}
-
-impl Encoding {
-    /// UTF-8 if the editor offers it.
-    pub fn chosen(offered: Option<&[PositionEncodingKind]>) -> Self {
-        let utf8 = offered.is_some_and(|kinds| kinds.contains(&PositionEncodingKind::UTF8));
-        if utf8 { Self::Utf8 } else { Self::Utf16 }
-    }
-
-    pub fn kind(self) -> PositionEncodingKind {
-        match self {
-            Self::Utf8 => PositionEncodingKind::UTF8,
-            Self::Utf16 => PositionEncodingKind::UTF16,
-        }
-    }
-
-    fn width(self, text: &str) -> u32 {
-        match self {
-            Self::Utf8 => text.len() as u32,
-            Self::Utf16 => text.encode_utf16().count() as u32,
-        }
-    }
-}
+use super::buffers::Buffers;
+use super::reading::{Encoding, Reading, path_of};
 
 /// An open file with all that follows from its text.
 pub(super) struct Document {
-    pub source: Source,
-    pub ast: Ast,
+    pub reading: Reading,
     /// What there is to say, errors and warnings.
     pub messages: Diagnostics,
     /// The compiled file; `None` if it has errors.
     pub program: Option<Program>,
-    pub names: Names,
-    encoding: Encoding,
-    /// The first byte of each line.
-    lines: Vec<usize>,
+    /// The number that the editor gave to this text.
+    pub version: Option<i32>,
+    buffers: Buffers,
+    /// The files that it names, as they were read.
+    files: Files,
 }
 
 impl Document {
-    /// Reads a text as the compiler does.
-    pub fn new(uri: &Uri, text: String, encoding: Encoding) -> Self {
+    /// Reads a text as the compiler does. Files that it names are read from the open ones, and from the disk.
+    pub fn new(uri: &Uri, text: &str, version: Option<i32>, encoding: Encoding, buffers: &Buffers) -> Self {
         let text: Arc<str> = text.into();
-        let path = uri.path().as_estr().decode().into_string_lossy();
-        let source = Source::file(&*path, text.clone());
-        let (program, ast, messages) = match Program::check(source.clone(), options(&source)) {
+        let source = Source::file(path_of(uri), text);
+        let files = buffers.beside(&source.name);
+        let options = Options { files: files.clone(), ..Options::default() };
+        let (program, ast, messages) = match Program::check(source.clone(), options) {
             Ok(program) => {
                 let (ast, warnings) = (program.ast().clone(), program.warnings());
                 (Some(program), ast, warnings)
@@ -71,69 +43,43 @@ impl Document {
             // the items without a mistake are known all the same
             Err(messages) => (None, syntax::parse(&source).0, messages),
         };
-        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        let names = Names::of(&ast);
-        Self { source, ast, messages, program, names, encoding, lines }
+        let reading = Reading::new(source, ast, encoding);
+        Self { reading, messages, program, version, buffers: buffers.clone(), files }
     }
 
     pub fn text(&self) -> &str {
-        &self.source.text
+        self.reading.text()
     }
 
-    /// The byte at a position; one beyond its line counts as the end of the line.
     pub fn byte(&self, position: Position) -> usize {
-        let text = self.text();
-        let Some(&start) = self.lines.get(position.line as usize) else { return text.len() };
-        let line = text[start..].split('\n').next().unwrap_or("");
-        let line = line.strip_suffix('\r').unwrap_or(line);
-        let mut before = 0;
-        for (at, c) in line.char_indices() {
-            if before >= position.character {
-                return start + at;
-            }
-            before += self.encoding.width(c.encode_utf8(&mut [0; 4]));
-        }
-        start + line.len()
-    }
-
-    /// The position of a byte; one within a character counts as its beginning.
-    pub fn position(&self, byte: usize) -> Position {
-        let text = self.text();
-        let mut byte = byte.min(text.len());
-        while !text.is_char_boundary(byte) {
-            byte -= 1;
-        }
-        let line = self.lines.partition_point(|&start| start <= byte) - 1;
-        Position::new(line as u32, self.encoding.width(&text[self.lines[line]..byte]))
+        self.reading.byte(position)
     }
 
     pub fn range(&self, bytes: std::ops::Range<usize>) -> Range {
-        Range::new(self.position(bytes.start), self.position(bytes.end))
+        self.reading.range(bytes)
     }
 
     pub fn span(&self, span: Span) -> Range {
-        self.range(span.range())
+        self.reading.span(span)
     }
 
-    pub fn whole(&self) -> Range {
-        self.range(0..self.text().len())
+    /// Whether it names the file of this path, or one that it imports does.
+    pub fn names_file(&self, path: &str) -> bool {
+        self.files.asked().iter().any(|asked| asked == path)
     }
 
     /// A file that this one imports, by the path that is written; `None` if it cannot be read.
     pub fn imported(&self, path: &str) -> Option<Source> {
-        let name = Files::name(path, &self.source.name);
-        let bytes = options(&self.source).files.read(&name).ok()?;
+        let name = Files::name(path, &self.reading.source.name);
+        let bytes = self.buffers.beside(&self.reading.source.name).read(&name).ok()?;
         Some(Source::file(name, text_of(bytes.to_vec()).ok()?))
     }
 
     /// The file with more text at its end, if that compiles.
     pub fn with(&self, more: &str) -> Option<Program> {
         let text = format!("{}\n{more}\n", self.text());
-        Program::check(Source::file(self.source.name.clone(), text), options(&self.source)).ok()
+        let name = self.reading.source.name.clone();
+        let options = Options { files: self.files.clone(), ..Options::default() };
+        Program::check(Source::file(name, text), options).ok()
     }
-}
-
-/// A file may name those in its folder, as for the other commands.
-fn options(source: &Source) -> Options {
-    Options { files: files_beside(&*source.name, false), ..Options::default() }
 }

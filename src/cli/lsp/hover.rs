@@ -7,9 +7,11 @@ use rfm::glam::DVec3;
 use rfm::syntax::ast::{Definition, Item};
 use rfm::{Engine, Program};
 
-use super::complete::{about_key, signature};
+use super::across::{Workspace, offered};
+use super::complete::{method_around, signature};
 use super::document::Document;
-use super::names::{Meaning, Mention};
+use super::keys;
+use super::names::{Imported, Meaning, Mention};
 use super::words::comment_above;
 
 /// Lines of a definition that are shown.
@@ -19,17 +21,28 @@ const MOST_LINES: usize = 12;
 const MOST_OPERATIONS: usize = 20_000;
 
 /// The words about the name at a byte, in Markdown, and its place.
-pub(super) fn at(document: &Document, byte: usize) -> Option<(String, Range<usize>)> {
-    let mention = document.names.at(byte)?;
+pub(super) fn at(workspace: &Workspace, document: &Document, byte: usize) -> Option<(String, Range<usize>)> {
+    let mention = document.reading.names.at(byte)?;
     let words = match &mention.meaning {
         Meaning::Defined(place) => defined(document, mention, place),
+        Meaning::Imported(of) => imported(workspace, document, mention, of)?,
+        Meaning::File(path) => format!("the file `{path}`"),
+        Meaning::Word(key) => keys::about_word(key, &mention.text)?,
         Meaning::Standard => standard(document, mention)?,
-        Meaning::Key(_) => {
-            let about = about_key(&mention.text);
+        Meaning::Key(block) => {
+            let method = method_around(document, byte).unwrap_or_default();
+            let about = keys::about(block.as_deref(), &mention.text, Some(method));
             format!("key `{}`{}", mention.text, if about.is_empty() { about } else { format!(": {about}") })
         }
     };
     Some((words, mention.place.clone()))
+}
+
+/// What is known of a name in the file that defines it.
+fn imported(workspace: &Workspace, document: &Document, mention: &Mention, of: &Imported) -> Option<String> {
+    let (_, file) = workspace.imported(document, &of.path)?;
+    let place = offered(&file.reading, &mention.text, of.parameter_of.as_deref())?;
+    Some(format!("{}\n\nin `{}`", defined(&file, mention, &place), of.path))
 }
 
 fn standard(document: &Document, mention: &Mention) -> Option<String> {
@@ -46,7 +59,7 @@ fn standard(document: &Document, mention: &Mention) -> Option<String> {
 
 fn defined(document: &Document, mention: &Mention, place: &Range<usize>) -> String {
     let text = document.text();
-    let item = document.ast.items.iter().find(|item| item.name().span.range() == *place);
+    let item = document.reading.ast.items.iter().find(|item| item.name().span.range() == *place);
     let Some(item) = item else {
         return format!("`{}`: a parameter, the variable of a fold, or the label of a block", mention.text);
     };

@@ -13,14 +13,18 @@ use super::document::Document;
 const MOST: usize = 200;
 
 /// All messages of a file.
-pub(super) fn published(uri: &Uri, document: &Document, version: Option<i32>) -> PublishDiagnosticsParams {
+pub(super) fn published(uri: &Uri, document: &Document) -> PublishDiagnosticsParams {
     let messages = document.messages.list.iter().filter_map(|message| of(uri, document, message));
-    PublishDiagnosticsParams { uri: uri.clone(), diagnostics: messages.take(MOST).collect(), version }
+    PublishDiagnosticsParams {
+        uri: uri.clone(),
+        diagnostics: messages.take(MOST).collect(),
+        version: document.version,
+    }
 }
 
 /// A message; `None` if it is about another text.
 pub(super) fn of(uri: &Uri, document: &Document, message: &diagnostic::Diagnostic) -> Option<Diagnostic> {
-    let in_file = |span: diagnostic::Span| span.source == document.source.id;
+    let in_file = |span: diagnostic::Span| span.source == document.reading.source.id;
     // a mistake in a standard solid is shown where the file calls it
     let labels = std::iter::once(&message.primary).chain(&message.secondary);
     let primary = labels.clone().find(|label| in_file(label.span))?;

@@ -1,49 +1,62 @@
 //! `rfm lsp`: what editors ask about files, over the Language Server Protocol on standard input and output.
 //!
 //! One thread answers one request after the other: a file is compiled again in milliseconds when it changes, so nothing is
-//! kept from one version of a text to the next. Another thread looks for warnings that take longer.
+//! kept from one version of a text to the next. Texts are read when a request needs them, or when no message waits: of many
+//! changes that come together only the last one is read. Another thread looks for warnings that take longer.
 
+mod across;
 mod background;
+mod buffers;
 mod complete;
 mod context;
 mod document;
 mod edits;
 mod hover;
+mod keys;
 mod messages;
 mod names;
 mod pipes;
 mod preview;
+mod reading;
 mod symbols;
 mod words;
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use lsp_server::{Connection, ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types::notification::{
-    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, Notification as _, PublishDiagnostics,
+    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, Exit, Notification as _,
+    PublishDiagnostics,
 };
 use lsp_types::request::{
     CodeActionRequest, Completion, DocumentSymbolRequest, ExecuteCommand, Formatting, GotoDefinition,
-    HoverRequest, PrepareRenameRequest, References, Rename, Request as _, SignatureHelpRequest,
+    HoverRequest, Initialize, PrepareRenameRequest, References, Rename, Request as _, Shutdown,
+    SignatureHelpRequest,
 };
 use lsp_types::{
     CodeActionKind, CodeActionOptions, CodeActionProviderCapability, CompletionOptions,
     ExecuteCommandOptions, GotoDefinitionParams, Hover, HoverContents, HoverParams, HoverProviderCapability,
-    InitializeParams, Location, MarkupContent, MarkupKind, OneOf, Position, PrepareRenameResponse,
-    ReferenceParams, RenameOptions, ServerCapabilities, SignatureHelpOptions, TextDocumentPositionParams,
+    InitializeParams, Location, MarkupContent, MarkupKind, OneOf, PrepareRenameResponse, ReferenceParams,
+    RenameOptions, ServerCapabilities, SignatureHelpOptions, TextDocumentPositionParams,
     TextDocumentSyncCapability, TextDocumentSyncKind, Uri,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use rfm::files::Files;
+
 use super::failure::Failure;
+use across::Workspace;
 use background::Background;
-use document::{Document, Encoding};
-use names::Meaning;
+use buffers::Buffers;
+use document::Document;
 use pipes::Pipes;
+use reading::{Encoding, path_of};
 
 #[derive(Debug, Args)]
 #[command(
@@ -62,42 +75,106 @@ pub(super) struct Lsp {}
 /// Serves one editor until it says good-bye.
 pub(super) fn run(_: &Lsp) -> Result<(), Failure> {
     let (connection, pipes) = Pipes::open()?;
-    let outcome = serve(&connection);
+    let end = serve(&connection)?;
     // the threads end when the last sender is gone
     drop(connection);
-    outcome?;
     pipes.close()?;
-    Ok(())
+    match end {
+        End::InOrder => Ok(()),
+        // the protocol asks for the exit code 1
+        End::WithoutShutdown => Err(Failure::Findings),
+    }
 }
 
-fn serve(connection: &Connection) -> Result<(), Failure> {
-    let (id, parameters) = connection.initialize_start().map_err(Failure::usage)?;
-    let parameters: InitializeParams = serde_json::from_value(parameters).map_err(Failure::usage)?;
-    let general = parameters.capabilities.general.as_ref();
-    let encoding = Encoding::chosen(general.and_then(|general| general.position_encodings.as_deref()));
-    let answer = serde_json::json!({
-        "capabilities": capabilities(encoding),
-        "serverInfo": { "name": "rfm", "version": env!("CARGO_PKG_VERSION") },
-    });
-    connection.initialize_finish(id, answer).map_err(Failure::usage)?;
+/// How an editor ended the server.
+enum End {
+    /// It asked for a shutdown first, or closed its pipe.
+    InOrder,
+    WithoutShutdown,
+}
+
+fn serve(connection: &Connection) -> Result<End, Failure> {
+    let workspace = match greet(connection)? {
+        Ok(workspace) => workspace,
+        Err(end) => return Ok(end),
+    };
     let sender = connection.sender.clone();
     // an editor that is gone is noticed by the other thread
-    let background = Background::start(encoding, move |messages| _ = sender.send(publication(messages)));
-    let mut server = Server { connection, encoding, documents: HashMap::new(), background };
-    for message in &connection.receiver {
+    let send = move |messages| _ = sender.send(publication(messages));
+    let background = Background::start(workspace.encoding, workspace.buffers.clone(), send);
+    let mut server = Server { connection, workspace, waiting: Vec::new(), background };
+    let mut is_shut = false;
+    while let Some(message) = server.next()? {
         match message {
+            Message::Request(Request { id, .. }) if is_shut => {
+                let refusal = "the server was shut down and waits for `exit`".to_string();
+                let answer = Response::new_err(id, ErrorCode::InvalidRequest as i32, refusal);
+                server.send(Message::Response(answer))?;
+            }
+            Message::Request(Request { id, method, .. }) if method == Shutdown::METHOD => {
+                is_shut = true;
+                server.send(Message::Response(Response::new_ok(id, ())))?;
+            }
             Message::Request(request) => {
-                if connection.handle_shutdown(&request).map_err(Failure::usage)? {
-                    return Ok(());
-                }
+                while server.read_next()? {}
                 let answer = server.answer(request);
                 server.send(Message::Response(answer))?;
             }
-            Message::Notification(notification) => server.notice(notification)?,
-            Message::Response(_) => {}
+            Message::Notification(notification) if notification.method == Exit::METHOD => {
+                return Ok(if is_shut { End::InOrder } else { End::WithoutShutdown });
+            }
+            Message::Notification(notification) if !is_shut => server.notice(notification)?,
+            Message::Notification(_) | Message::Response(_) => {}
         }
     }
-    Ok(())
+    Ok(End::InOrder)
+}
+
+/// Answers the first request of an editor. The inner error is how it ended the server before that.
+fn greet(connection: &Connection) -> Result<Result<Workspace, End>, Failure> {
+    let send = |answer| connection.sender.send(Message::Response(answer)).map_err(|_| Failure::ClosedPipe);
+    for message in &connection.receiver {
+        match message {
+            Message::Request(Request { id, method, params }) if method == Initialize::METHOD => {
+                let parameters: InitializeParams = match from_json(params) {
+                    Ok(parameters) => parameters,
+                    Err(Refusal { code, message }) => {
+                        send(Response::new_err(id, code as i32, message))?;
+                        continue;
+                    }
+                };
+                let general = parameters.capabilities.general.as_ref();
+                let encoding =
+                    Encoding::chosen(general.and_then(|general| general.position_encodings.as_deref()));
+                let answer = serde_json::json!({
+                    "capabilities": capabilities(encoding),
+                    "serverInfo": { "name": "rfm", "version": env!("CARGO_PKG_VERSION") },
+                });
+                send(Response::new_ok(id, answer))?;
+                return Ok(Ok(Workspace {
+                    encoding,
+                    buffers: Buffers::default(),
+                    documents: HashMap::new(),
+                    roots: roots(&parameters),
+                }));
+            }
+            Message::Request(Request { id, .. }) => {
+                let refusal = "`initialize` comes first".to_string();
+                send(Response::new_err(id, ErrorCode::ServerNotInitialized as i32, refusal))?;
+            }
+            Message::Notification(notification) if notification.method == Exit::METHOD => {
+                return Ok(Err(End::WithoutShutdown));
+            }
+            Message::Notification(_) | Message::Response(_) => {}
+        }
+    }
+    Ok(Err(End::InOrder))
+}
+
+/// The folders that an editor works in.
+fn roots(parameters: &InitializeParams) -> Vec<PathBuf> {
+    let folders = parameters.workspace_folders.iter().flatten().map(|folder| &folder.uri);
+    folders.map(|uri| PathBuf::from(path_of(uri))).collect()
 }
 
 fn capabilities(encoding: Encoding) -> ServerCapabilities {
@@ -147,15 +224,35 @@ impl Refusal {
 
 struct Server<'c> {
     connection: &'c Connection,
-    encoding: Encoding,
-    documents: HashMap<String, Document>,
+    workspace: Workspace,
+    /// Texts that have not been read, one for each file at most.
+    waiting: Vec<Waiting>,
     background: Background,
+}
+
+/// A text that is to be read.
+struct Waiting {
+    uri: Uri,
+    text: Arc<str>,
+    version: Option<i32>,
 }
 
 impl Server<'_> {
     fn send(&self, message: Message) -> Result<(), Failure> {
         // the editor is gone: there is nobody left to serve
         self.connection.sender.send(message).map_err(|_| Failure::ClosedPipe)
+    }
+
+    /// The next message of the editor, which may be long in coming; `None` if it is gone. Meanwhile texts are read.
+    fn next(&mut self) -> Result<Option<Message>, Failure> {
+        loop {
+            if let Ok(message) = self.connection.receiver.try_recv() {
+                return Ok(Some(message));
+            }
+            if !self.read_next()? {
+                return Ok(self.connection.receiver.recv().ok());
+            }
+        }
     }
 
     fn answer(&self, request: Request) -> Response {
@@ -176,7 +273,7 @@ impl Server<'_> {
         match request.method.as_str() {
             Formatting::METHOD => {
                 let asked = asked::<Formatting>(parameters)?;
-                given(edits::layout(self.document(&asked.text_document.uri)?))
+                given(edits::layout(&*self.document(&asked.text_document.uri)?))
             }
             HoverRequest::METHOD => given(self.hover(&asked::<HoverRequest>(parameters)?)?),
             GotoDefinition::METHOD => given(self.definition(&asked::<GotoDefinition>(parameters)?)?),
@@ -184,21 +281,21 @@ impl Server<'_> {
             Completion::METHOD => {
                 let asked = asked::<Completion>(parameters)?;
                 let (document, byte) = self.place(&asked.text_document_position)?;
-                given(complete::at(document, byte))
+                given(complete::at(&document, byte))
             }
             SignatureHelpRequest::METHOD => {
                 let asked = asked::<SignatureHelpRequest>(parameters)?;
                 let (document, byte) = self.place(&asked.text_document_position_params)?;
-                given(complete::signature_help(document, byte))
+                given(complete::signature_help(&document, byte))
             }
             DocumentSymbolRequest::METHOD => {
                 let asked = asked::<DocumentSymbolRequest>(parameters)?;
-                given(symbols::of(self.document(&asked.text_document.uri)?))
+                given(symbols::of(&*self.document(&asked.text_document.uri)?))
             }
             CodeActionRequest::METHOD => {
                 let asked = asked::<CodeActionRequest>(parameters)?;
                 let uri = &asked.text_document.uri;
-                given(edits::fixes(uri, self.document(uri)?, asked.range))
+                given(edits::fixes(uri, &*self.document(uri)?, asked.range))
             }
             PrepareRenameRequest::METHOD => {
                 given(self.renamable(&asked::<PrepareRenameRequest>(parameters)?)?)
@@ -207,7 +304,8 @@ impl Server<'_> {
                 let asked = asked::<Rename>(parameters)?;
                 let position = &asked.text_document_position;
                 let (document, byte) = self.place(position)?;
-                let edits = edits::rename(&position.text_document.uri, document, byte, &asked.new_name);
+                let uri = &position.text_document.uri;
+                let edits = self.workspace.rename(uri, &document, byte, &asked.new_name);
                 given(edits.map_err(|why| Refusal::new(ErrorCode::InvalidParams, why))?)
             }
             ExecuteCommand::METHOD => {
@@ -220,7 +318,7 @@ impl Server<'_> {
 
     fn hover(&self, asked: &HoverParams) -> Result<Option<Hover>, Refusal> {
         let (document, byte) = self.place(&asked.text_document_position_params)?;
-        Ok(hover::at(document, byte).map(|(value, place)| Hover {
+        Ok(hover::at(&self.workspace, &document, byte).map(|(value, place)| Hover {
             contents: HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value }),
             range: Some(document.range(place)),
         }))
@@ -229,22 +327,17 @@ impl Server<'_> {
     fn definition(&self, asked: &GotoDefinitionParams) -> Result<Option<Location>, Refusal> {
         let position = &asked.text_document_position_params;
         let (document, byte) = self.place(position)?;
-        let found = document.names.at(byte).and_then(|mention| match &mention.meaning {
-            Meaning::Defined(place) => Some(place.clone()),
-            Meaning::Standard | Meaning::Key(_) => None,
-        });
-        Ok(found.map(|place| Location::new(position.text_document.uri.clone(), document.range(place))))
+        let found = self.workspace.definition(&position.text_document.uri, &document, byte);
+        Ok(found.map(|place| place.location()))
     }
 
     fn references(&self, asked: &ReferenceParams) -> Result<Option<Vec<Location>>, Refusal> {
         let position = &asked.text_document_position;
         let (document, byte) = self.place(position)?;
-        let uri = &position.text_document.uri;
-        Ok(edits::renamable(document, byte).map(|(_, place)| {
-            let wanted = |found: &&names::Mention| asked.context.include_declaration || found.place != *place;
-            let uses = document.names.uses(place).filter(wanted);
-            uses.map(|found| Location::new(uri.clone(), document.range(found.place.clone()))).collect()
-        }))
+        let uses = self.workspace.uses(&position.text_document.uri, &document, byte);
+        // the definition comes first
+        let from = usize::from(!asked.context.include_declaration);
+        Ok(uses.map(|uses| uses.iter().skip(from).map(across::Place::location).collect()))
     }
 
     fn renamable(
@@ -252,31 +345,36 @@ impl Server<'_> {
         asked: &TextDocumentPositionParams,
     ) -> Result<Option<PrepareRenameResponse>, Refusal> {
         let (document, byte) = self.place(asked)?;
-        Ok(edits::renamable(document, byte)
-            .map(|(mention, _)| PrepareRenameResponse::Range(document.range(mention.place.clone()))))
+        Ok(across::own_name(&document, byte)
+            .map(|mention| PrepareRenameResponse::Range(document.range(mention.place.clone()))))
     }
 
     fn command(&self, command: &str, mut arguments: Vec<Value>) -> Result<Value, Refusal> {
-        if command != preview::COMMAND || arguments.len() != 1 {
+        if command != preview::COMMAND {
             return Err(Refusal::new(
                 ErrorCode::InvalidParams,
                 format!("there is no such command: {command}"),
             ));
         }
-        let wanted: preview::Wanted = from_json(arguments.remove(0))?;
+        if arguments.len() != 1 {
+            return Err(Refusal::new(ErrorCode::InvalidParams, preview::EXPECTED));
+        }
+        let wanted: preview::Wanted = serde_json::from_value(arguments.remove(0)).map_err(|error| {
+            Refusal::new(ErrorCode::InvalidParams, format!("{error}: {}", preview::EXPECTED))
+        })?;
         let document = self.document(&wanted.uri)?;
-        given(preview::slice(document, &wanted).map_err(|why| Refusal::new(ErrorCode::RequestFailed, why))?)
+        given(preview::slice(&document, &wanted).map_err(|why| Refusal::new(ErrorCode::RequestFailed, why))?)
     }
 
-    fn document(&self, uri: &Uri) -> Result<&Document, Refusal> {
-        let found = self.documents.get(uri.as_str());
+    fn document(&self, uri: &Uri) -> Result<Arc<Document>, Refusal> {
+        let found = self.workspace.documents.get(uri.as_str()).cloned();
         found.ok_or_else(|| Refusal::new(ErrorCode::InvalidParams, "the file is not open"))
     }
 
-    fn place(&self, at: &TextDocumentPositionParams) -> Result<(&Document, usize), Refusal> {
+    fn place(&self, at: &TextDocumentPositionParams) -> Result<(Arc<Document>, usize), Refusal> {
         let document = self.document(&at.text_document.uri)?;
-        let position: Position = at.position;
-        Ok((document, document.byte(position)))
+        let byte = document.byte(at.position);
+        Ok((document, byte))
     }
 
     fn notice(&mut self, notification: Notification) -> Result<(), Failure> {
@@ -287,24 +385,29 @@ impl Server<'_> {
                 type Opened = <DidOpenTextDocument as lsp_types::notification::Notification>::Params;
                 let Ok(opened) = serde_json::from_value::<Opened>(parameters) else { return Ok(()) };
                 let file = opened.text_document;
-                self.read(&file.uri, file.text, Some(file.version))
+                self.give(file.uri, file.text.into(), Some(file.version));
+                Ok(())
             }
             DidChangeTextDocument::METHOD => {
                 type Changed = <DidChangeTextDocument as lsp_types::notification::Notification>::Params;
                 let Ok(changed) = serde_json::from_value::<Changed>(parameters) else { return Ok(()) };
                 let file = changed.text_document;
                 // the whole text is sent, so the last change is all there is
-                match changed.content_changes.into_iter().next_back() {
-                    Some(change) => self.read(&file.uri, change.text, Some(file.version)),
-                    None => Ok(()),
+                if let Some(change) = changed.content_changes.into_iter().next_back() {
+                    self.give(file.uri, change.text.into(), Some(file.version));
                 }
+                Ok(())
             }
             DidCloseTextDocument::METHOD => {
                 type Closed = <DidCloseTextDocument as lsp_types::notification::Notification>::Params;
                 let Ok(closed) = serde_json::from_value::<Closed>(parameters) else { return Ok(()) };
                 let uri = closed.text_document.uri;
-                self.documents.remove(uri.as_str());
+                let path = Files::plain(&path_of(&uri));
+                self.workspace.documents.remove(uri.as_str());
+                self.workspace.buffers.close(&path);
+                self.waiting.retain(|waiting| waiting.uri != uri);
                 self.background.forget(&uri);
+                self.read_again(&path);
                 let nothing =
                     lsp_types::PublishDiagnosticsParams { uri, diagnostics: Vec::new(), version: None };
                 self.publish(nothing)
@@ -313,21 +416,48 @@ impl Server<'_> {
         }
     }
 
-    /// Compiles a new version of a text and sends its messages.
-    fn read(&mut self, uri: &Uri, text: String, version: Option<i32>) -> Result<(), Failure> {
-        let encoding = self.encoding;
-        self.background.forget(uri);
+    /// Takes a new version of a text, which is read later together with those that import it.
+    fn give(&mut self, uri: Uri, text: Arc<str>, version: Option<i32>) {
+        let path = Files::plain(&path_of(&uri));
+        self.workspace.buffers.put(&path, &text);
+        self.background.forget(&uri);
+        self.waiting.retain(|waiting| waiting.uri != uri);
+        self.waiting.push(Waiting { uri, text, version });
+        self.read_again(&path);
+    }
+
+    /// Has all open files read again that import the file of a path.
+    fn read_again(&mut self, path: &str) {
+        for (uri, document) in &self.workspace.documents {
+            let is_waiting = self.waiting.iter().any(|waiting| waiting.uri.as_str() == uri);
+            if document.names_file(path)
+                && !is_waiting
+                && let Ok(uri) = uri.parse::<Uri>()
+            {
+                self.background.forget(&uri);
+                self.waiting.push(Waiting { uri, text: document.text().into(), version: document.version });
+            }
+        }
+    }
+
+    /// Compiles a text that waits and sends its messages. Returns whether there was one.
+    fn read_next(&mut self) -> Result<bool, Failure> {
+        if self.waiting.is_empty() {
+            return Ok(false);
+        }
+        let Waiting { uri, text, version } = self.waiting.remove(0);
+        let Workspace { encoding, buffers, .. } = &self.workspace;
         // a text on which the compiler fails is answered as a file that is not open
-        let Ok(document) = catch_unwind(AssertUnwindSafe(|| Document::new(uri, text, encoding))) else {
-            self.documents.remove(uri.as_str());
-            return Ok(());
+        let read = catch_unwind(AssertUnwindSafe(|| Document::new(&uri, &text, version, *encoding, buffers)));
+        let Ok(document) = read else {
+            self.workspace.documents.remove(uri.as_str());
+            return Ok(true);
         };
-        let messages = messages::published(uri, &document, version);
-        let text = document.text().to_string();
-        self.documents.insert(uri.as_str().to_string(), document);
+        let messages = messages::published(&uri, &document);
+        self.workspace.documents.insert(uri.as_str().to_string(), Arc::new(document));
         self.publish(messages)?;
-        self.background.give(uri, text, version);
-        Ok(())
+        self.background.give(&uri, text.to_string(), version);
+        Ok(true)
     }
 
     fn publish(&self, messages: lsp_types::PublishDiagnosticsParams) -> Result<(), Failure> {

@@ -16,10 +16,25 @@ const OF_FLUIDS: [&str; 2] = ["energy", "audit"];
 pub(super) enum Meaning {
     /// Something that the file defines, with the place of its name.
     Defined(Range<usize>),
+    /// Something that an imported file defines.
+    Imported(Imported),
+    /// The path of an imported file.
+    File(String),
     /// A standard solid, a function or a method of the language.
     Standard,
+    /// A word that is the value of the key with this name.
+    Word(String),
     /// A key of a scene, in the block with this name; `None` for the scene itself.
     Key(Option<String>),
+}
+
+/// Something that an imported file defines.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Imported {
+    /// The path of the file, as it is written.
+    pub path: String,
+    /// The function, if it is a parameter of one.
+    pub parameter_of: Option<String>,
 }
 
 /// A name in the text.
@@ -72,7 +87,10 @@ impl<'a> Reader<'a> {
     fn item(&mut self, item: &'a Item) {
         self.define(item.name());
         match item {
-            Item::Import(_) => {}
+            Item::Import(import) => {
+                let (place, path) = (import.span.range(), import.path.clone());
+                self.found.push(Mention { place, text: path.clone(), meaning: Meaning::File(path) });
+            }
             Item::Param(param) => {
                 self.expr(&param.value);
                 param.range.iter().for_each(|(low, high)| {
@@ -135,7 +153,10 @@ impl<'a> Reader<'a> {
     fn setting(&mut self, key: &Name, value: &'a Expr) {
         let ExprKind::Name(word) = &value.kind else { return self.expr(value) };
         if vocabulary::words(&key.text).contains(word) {
-            return; // a word of the key, whatever the file defines
+            // a word of the key, whatever the file defines
+            let place = self.place(value.span, word);
+            self.found.push(Mention { place, text: word.clone(), meaning: Meaning::Word(key.text.clone()) });
+            return;
         }
         match self.fluids.get(word.as_str()).copied().filter(|_| OF_FLUIDS.contains(&key.text.as_str())) {
             Some(fluid) => {
@@ -156,6 +177,16 @@ impl<'a> Reader<'a> {
             return Some(Meaning::Defined(item.name().span.range()));
         }
         is_standard(name).then_some(Meaning::Standard)
+    }
+
+    /// The path of the file that an expression names, if it is the name of an import.
+    fn import(&self, expr: &Expr) -> Option<&'a str> {
+        let ExprKind::Name(name) = &expr.kind else { return None };
+        let is_local = self.locals.iter().any(|local| local.text == *name);
+        match self.items.get(name.as_str()) {
+            Some(Item::Import(import)) if !is_local => Some(&import.path),
+            _ => None,
+        }
     }
 
     fn function(&self, name: &str) -> Option<&'a Function> {
@@ -184,8 +215,21 @@ impl<'a> Reader<'a> {
                 let called = self.function(&function.text);
                 self.arguments(arguments, called);
             }
+            ExprKind::Member { of, name } => {
+                self.expr(of);
+                if let Some(path) = self.import(of) {
+                    self.mention(name, Meaning::Imported(Imported { path: path.into(), parameter_of: None }));
+                }
+            }
             ExprKind::Method { receiver, method, arguments } => {
                 self.expr(receiver);
+                if let Some(path) = self.import(receiver) {
+                    self.mention(
+                        method,
+                        Meaning::Imported(Imported { path: path.into(), parameter_of: None }),
+                    );
+                    return self.imported_arguments(arguments, path, &method.text);
+                }
                 let own = self.function(&method.text).filter(|function| function.takes_a_shape());
                 match own {
                     Some(function) => self.mention(method, Meaning::Defined(function.name.span.range())),
@@ -216,6 +260,15 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// The arguments of a function that the file of a path defines.
+    fn imported_arguments(&mut self, arguments: &'a [Argument], path: &str, function: &str) {
+        for name in arguments.iter().filter_map(|argument| argument.name.as_ref()) {
+            let parameter_of = Some(function.to_string());
+            self.mention(name, Meaning::Imported(Imported { path: path.to_string(), parameter_of }));
+        }
+        self.exprs(arguments.iter().map(|argument| &argument.value));
+    }
+
     /// The place of a name whose span may hold brackets and comments around it.
     fn place(&self, span: Span, name: &str) -> Range<usize> {
         let Range { start, end } = span.range();
@@ -235,7 +288,7 @@ impl<'a> Reader<'a> {
 }
 
 /// Whether the language itself has this name for a value or a function.
-fn is_standard(name: &str) -> bool {
+pub(super) fn is_standard(name: &str) -> bool {
     vocabulary::reserved().contains(&name)
         || vocabulary::builtins().any(|builtin| builtin == name)
         || vocabulary::prelude().items.iter().any(|item| item.name().text == name)

@@ -12,6 +12,10 @@ use super::document::Document;
 
 pub(super) const COMMAND: &str = "rfm.slice";
 
+/// What its arguments are, for a caller that gave others.
+pub(super) const EXPECTED: &str = "rfm.slice takes one object: { \"uri\": address of an open file, \"solid\": its name, \"axis\": \
+     \"x\", \"y\" or \"z\", \"at\": metres along the axis }, of which only `uri` must be there";
+
 /// Samples along the longer side: enough for a panel beside the text, and quick.
 const SAMPLES: usize = 128;
 

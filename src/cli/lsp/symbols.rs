@@ -8,7 +8,7 @@ use rfm::syntax::ast::{Entry, Item, Name};
 use super::document::Document;
 
 pub(super) fn of(document: &Document) -> Vec<DocumentSymbol> {
-    let items = document.ast.items.iter();
+    let items = document.reading.ast.items.iter();
     items
         .map(|item| match item {
             Item::Import(import) => {

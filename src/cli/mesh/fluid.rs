@@ -12,12 +12,12 @@ use serde::Serialize;
 use super::super::args::{Mesh as Options, Shared};
 use super::super::failure::{Failure, note};
 use super::super::saved::{self, RunFigures};
+use super::super::surfaces::{self, Origins};
 use super::super::{output, progress};
 use super::format;
-use crate::cli::output::Shown;
+use crate::cli::output::{Shown, counted};
 use rfm::fluid_surface::{FrameEntry, Reconstruction, read_points};
-use rfm::mesh::{LengthUnit, WriteMesh, is_closed_manifold, shells, vtp};
-use rfm::sph;
+use rfm::mesh::{Format, LengthUnit, WriteMesh, is_closed_manifold, shells, vtp};
 
 /// The JSON document. Lengths are in metres, volumes in cubic metres.
 #[derive(Debug, Serialize)]
@@ -64,14 +64,16 @@ struct ParticleScale {
 }
 
 pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
-    let format = options.format.unwrap_or(vtp::FORMAT);
+    let named =
+        options.output.as_deref().filter(|path| !path.is_dir()).and_then(|path| format::of_path(path).ok());
+    let format = options.format.or(named).unwrap_or(vtp::FORMAT);
     let unit = format::unit_fits(format, options.unit)?;
     let write = format::writer(format, options.ascii)?;
     let folder = options.file.as_path();
     let entries = saved::chosen(collection(folder)?, options.frames)?;
     let scale = ParticleScale::new(folder, options)?;
     saved::check_frames(folder, &entries)?;
-    let target = options.output.clone().unwrap_or_else(|| folder.join("surface"));
+    let target = target(folder, options, named, &entries)?;
     let job = Job { folder, target, ending: format.ending, write, unit, scale };
     let started = Instant::now();
     let surfaces = job.surfaces(&entries)?;
@@ -94,8 +96,58 @@ pub(super) fn run(shared: &Shared, options: &Options) -> Result<(), Failure> {
         return output::json(&summary);
     }
     print(&summary);
-    say!("written to {}", job.target.shown());
+    say!("written to {}", job.target.path().shown());
     Ok(())
+}
+
+/// Where surfaces go.
+enum Target {
+    /// A file for each frame.
+    Folder(PathBuf),
+    /// The surface of the only frame.
+    File(PathBuf),
+}
+
+impl Target {
+    fn path(&self) -> &Path {
+        match self {
+            Self::Folder(path) | Self::File(path) => path,
+        }
+    }
+}
+
+/// Where the surfaces of these frames go. An ending of the format `named` is that of a file, which holds one frame.
+fn target(
+    folder: &Path,
+    options: &Options,
+    named: Option<Format>,
+    entries: &[(usize, FrameEntry)],
+) -> Result<Target, Failure> {
+    if let Some(page) = options.output.as_deref().filter(|path| format::is_page(path)) {
+        let (page, run) = (page.shown(), folder.shown());
+        return Err(Failure::usage(format!(
+            "-o {page}: `rfm view {run} --save {page}` makes a page of a run"
+        )));
+    }
+    let (Some(path), Some(named)) = (&options.output, named) else {
+        return Ok(Target::Folder(options.output.clone().unwrap_or_else(|| folder.join(surfaces::FOLDER))));
+    };
+    let (shown, ending) = (path.shown(), named.ending);
+    if let Some(other) = options.format.filter(|other| other.ending != ending) {
+        return Err(Failure::usage(format!(
+            "-o {shown} names a .{ending} file, and --format {}",
+            other.ending
+        )));
+    }
+    if let [_] = entries {
+        return Ok(Target::File(path.clone()));
+    }
+    let whole = path.with_extension("").shown();
+    Err(Failure::usage(format!(
+        "-o {shown} names one file, and there are {}: write a file for each into a folder, -o {whole} --format {ending}, or \
+         choose one with --frames N",
+        counted(entries.len(), "frame")
+    )))
 }
 
 /// The frames of a run.
@@ -150,8 +202,7 @@ impl ParticleScale {
 struct Job<'a> {
     /// The folder of the run.
     folder: &'a Path,
-    /// The folder for the surfaces.
-    target: PathBuf,
+    target: Target,
     /// The ending of their files.
     ending: &'static str,
     write: WriteMesh,
@@ -164,15 +215,16 @@ impl Job<'_> {
     fn surfaces(&self, entries: &[(usize, FrameEntry)]) -> Result<Vec<FrameSurface>, Failure> {
         let bar = progress::bar(entries.len() as u64, "surfaces");
         let mut surfaces: Vec<FrameSurface> = Vec::new();
+        let mut origins = Origins::default();
         for (frame, entry) in entries {
-            let made = self.surface(*frame, entry);
-            let made = made.map_err(|failure| with_kept(failure, surfaces.len(), &self.target))?;
+            let made = self.surface(*frame, entry, &mut origins);
+            let made = made.map_err(|failure| with_kept(failure, surfaces.len(), self.target.path()))?;
             bar.set_message(format!("t = {:.3} s, {} triangles", made.time, made.triangles));
             surfaces.push(made);
-            if self.ending == vtp::FORMAT.ending {
-                output::write(&self.target.join("surface.pvd"), |mut out| {
-                    sph::write_pvd(&mut out, surfaces.iter().map(|s| (s.time, s.file.as_str())))
-                })?;
+            if let Target::Folder(target) = &self.target
+                && self.ending == vtp::FORMAT.ending
+            {
+                origins.write(target, surfaces.iter().map(|s| (s.time, s.file.as_str())))?;
             }
             bar.inc(1);
         }
@@ -181,7 +233,12 @@ impl Job<'_> {
     }
 
     /// Reads one frame, meshes it and writes the mesh.
-    fn surface(&self, frame: usize, entry: &FrameEntry) -> Result<FrameSurface, Failure> {
+    fn surface(
+        &self,
+        frame: usize,
+        entry: &FrameEntry,
+        origins: &mut Origins,
+    ) -> Result<FrameSurface, Failure> {
         let started = Instant::now();
         let path = self.folder.join(&entry.file);
         let failed = |error: String| {
@@ -192,9 +249,16 @@ impl Job<'_> {
         let points = read_points(&bytes).map_err(|error| failed(error.to_string()))?;
         let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
         let mesh = self.scale.surface.mesh(&finite).map_err(|error| failed(error.to_string()))?;
-        create(&self.target)?;
-        let file = format!("surface_{frame:06}.{}", self.ending);
-        output::write(&self.target.join(&file), |out| (self.write)(&mesh, self.unit, out))?;
+        let (path, file) = match &self.target {
+            Target::Folder(folder) => {
+                create(folder)?;
+                let file = surfaces::file_name(frame, self.ending);
+                (folder.join(&file), file)
+            }
+            Target::File(path) => (path.clone(), saved::title(path)),
+        };
+        output::write(&path, |out| (self.write)(&mesh, self.unit, out))?;
+        origins.add(&file, &bytes);
         let parts = shells(&mesh);
         let volume = parts.iter().fold(0.0, |sum, shell| sum + shell.volume);
         let particle_volume = finite.len() as f64 * self.scale.particle_volume;
@@ -236,8 +300,8 @@ fn print(summary: &FluidSummary) {
     let (least, most) =
         ratios.fold((f64::INFINITY, 0.0), |(least, most), ratio| (ratio.min(least), ratio.max(most)));
     say!(
-        "{} frames, {} triangles in {:.1} ms; particles of radius {:.3e} m, cells of {:.3e} m",
-        summary.frames,
+        "{}, {} triangles in {:.1} ms; particles of radius {:.3e} m, cells of {:.3e} m",
+        counted(summary.frames, "frame"),
         summary.triangles,
         summary.milliseconds,
         summary.particle_radius,

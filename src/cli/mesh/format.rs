@@ -88,7 +88,7 @@ pub(super) fn no_output() -> Failure {
 pub(in crate::cli) fn output_help() -> String {
     format!(
         "Where the mesh goes; the ending chooses the format: {}, or .html for a page that shows it. With --fluid a folder [default: surface/ in that of \
-         the run]",
+         the run], or a file for one frame",
         endings(FORMATS).join(" ")
     )
 }

@@ -15,6 +15,7 @@ use crate::cli::failure::{Failure, note};
 use crate::cli::output::{self, Shown, significant};
 use crate::cli::saved::{self, RunFigures};
 use crate::cli::scenery::{self, Drawn, half_towards_eye};
+use crate::cli::surfaces;
 use crate::cli::survey::Survey;
 use crate::cli::values::CutFlag;
 use rfm::diagnostic::nearest;
@@ -109,7 +110,7 @@ impl RunScene {
             words.chain(scenery::described(&names, &drawn)).collect::<Vec<_>>().join(" · ")
         });
         let surfaces = match options.surface {
-            Some(_) => surfaces(folder, &entries)?,
+            Some(_) => surfaces::of_frames(folder, &entries)?,
             None => Vec::new(),
         };
         let balls = options.surface.is_none() || options.particles;
@@ -246,33 +247,6 @@ impl RunScene {
             _ => None,
         }
     }
-}
-
-/// The surfaces of the fluid that `rfm mesh DIR --fluid` made of these frames.
-fn surfaces(folder: &Path, entries: &[(usize, FrameEntry)]) -> Result<Vec<PathBuf>, Failure> {
-    let list = folder.join("surface").join("surface.pvd");
-    let shown = folder.shown();
-    let made_by = format!("`rfm mesh {shown} --fluid` makes them");
-    if !list.is_file() {
-        return Err(Failure::usage(format!(
-            "--surface: there are no surfaces of the fluid in `{}`: {made_by}",
-            folder.join("surface").shown()
-        )));
-    }
-    let known = saved::by_time(saved::listed(&list)?);
-    let of_frame = |(number, entry): &(usize, FrameEntry)| {
-        let found = known.get(&entry.time.to_bits());
-        let file =
-            found.map(|surface| folder.join("surface").join(&surface.file)).filter(|file| file.is_file());
-        file.ok_or_else(|| {
-            Failure::usage(format!(
-                "--surface: frame {number}, at {} s, has no surface in `{}`: {made_by}, and --frames chooses others",
-                entry.time,
-                list.shown()
-            ))
-        })
-    };
-    entries.iter().map(of_frame).collect()
 }
 
 /// The mesh of a surface of the fluid.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use rfm::Precision;
 use rfm::experiment::Deviation;
 use rfm::sph::Simulation;
 
@@ -43,14 +44,22 @@ impl FlowRun {
         [self.pressure_order, self.velocity_order, self.front_order]
     }
 
+    /// Relative deviations that rounding alone may leave.
+    fn rounding(&self) -> f64 {
+        if self.precision == Precision::F64.name() { 1e-12 } else { 1e-6 }
+    }
+
     /// Sets the orders of convergence from the coarser run before this one.
     pub fn compare(&mut self, coarser: &Self) {
         let halvings = (coarser.spacing / self.spacing).ln();
         if coarser.method != self.method || halvings <= 0.0 {
             return;
         }
+        let rounding = self.rounding();
         let order = |coarse: Option<f64>, fine: Option<f64>| {
-            Some((coarse? / fine?).ln() / halvings).filter(|order| order.is_finite())
+            // what is left of errors at the level of rounding says nothing of the method
+            let (coarse, fine) = (coarse?, fine.filter(|fine| *fine > rounding)?);
+            Some((coarse / fine).ln() / halvings).filter(|order| order.is_finite())
         };
         self.pressure_order = order(coarser.pressure_error, self.pressure_error);
         self.velocity_order = order(coarser.velocity_error, self.velocity_error);
@@ -84,5 +93,45 @@ impl FlowRun {
             seconds,
             failure,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(spacing: f64, error: f64, precision: &'static str) -> FlowRun {
+        FlowRun {
+            method: "wcsph",
+            precision,
+            particles: 1,
+            spacing,
+            steps: 1,
+            simulated_seconds: 1.0,
+            pressure_error: Some(error),
+            velocity_error: None,
+            front_error: None,
+            pressure_order: None,
+            velocity_order: None,
+            front_order: None,
+            cpu_seconds: 1.0,
+            cpu_seconds_per_simulated_second: 1.0,
+            seconds: 1.0,
+            failure: None,
+        }
+    }
+
+    #[test]
+    fn orders_come_from_errors_above_rounding() {
+        let order = |coarse: f64, fine: f64, precision| {
+            let mut finer = run(0.1, fine, precision);
+            finer.compare(&run(0.2, coarse, precision));
+            finer.pressure_order
+        };
+        assert!((order(0.04, 0.01, "f64").unwrap() - 2.0).abs() < 1e-12);
+        assert_eq!(order(2e-16, 3e-16, "f64"), None);
+        assert_eq!(order(1e-2, 3e-16, "f64"), None);
+        assert_eq!(order(2e-8, 3e-7, "f32"), None);
+        assert!(order(2e-8, 3e-7, "f64").is_some());
     }
 }

@@ -99,6 +99,8 @@ pub(super) fn latest(run_folder: &Path, fingerprint: &[u8; 32]) -> Result<Checkp
         let folder = folder.shown();
         return Err(Failure::usage(format!("there is no checkpoint in `{folder}` to go on from")));
     }
+    faults
+        .push("there is nothing else to go on from: --force in place of --resume begins the run anew".into());
     Err(Failure::usage(faults.join("\n")))
 }
 

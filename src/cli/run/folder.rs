@@ -6,16 +6,24 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use super::super::args::Run;
-use super::super::output::{Shown, TEMPORARY};
+use super::super::output::{Shown, TEMPORARY, counted};
 use super::super::{Failure, note};
 use super::checkpoints;
-use crate::cli::saved::HISTORY;
+use crate::cli::saved::{HISTORY, OWN_TABLES};
+use rfm::lower::Scene;
 
 /// Name of the file that a run locks in its folder. The system unlocks it when the process ends, however it ends.
 const LOCK: &str = ".rfm.lock";
 
 /// Folders within that of a run.
-const PARTS: [&str; 5] = ["frames", "pictures", "checkpoints", "probes", HISTORY];
+const PARTS: [&str; 5] = ["frames", "pictures", "checkpoints", PROBES, HISTORY];
+
+/// The folder, within that of a run, of the tables of probes.
+pub(super) const PROBES: &str = "probes";
+
+/// Files that a run writes beside these folders.
+pub(super) const RESULTS: [&str; 5] =
+    ["summary.json", "particles.pvd", "obstacle.pvd", "obstacle.stl", "obstacle.vtp"];
 
 /// Beginnings of the names of files that a run writes beside these folders.
 const FILES: [&str; 3] = ["summary", "particles", "obstacle"];
@@ -36,8 +44,9 @@ pub(super) fn of(options: &Run) -> PathBuf {
     }
 }
 
-/// Refuses a folder that holds a sweep, or a run which is neither to be replaced nor to be continued.
-pub(super) fn may_be_written(folder: &Path, options: &Run) -> Result<(), Failure> {
+/// Refuses a folder that holds a sweep, a run which is neither to be replaced nor to be continued, or files of others that
+/// the run of a scene would replace.
+pub(super) fn may_be_written(folder: &Path, options: &Run, scene: &Scene) -> Result<(), Failure> {
     if holds_a_sweep(folder) {
         return Err(Failure::usage(format!(
             "`{}` holds a sweep: write the run elsewhere with -o DIR",
@@ -47,11 +56,23 @@ pub(super) fn may_be_written(folder: &Path, options: &Run) -> Result<(), Failure
     if options.resume || options.force {
         return Ok(());
     }
-    let Some(content) = run_in(folder) else { return Ok(()) };
+    let Some(content) = run_in(folder) else { return nothing_is_replaced(folder, scene) };
     let shown = folder.shown();
     let go_on = if checkpoints::exist(folder) { "go on from it with --resume, " } else { "" };
     Err(Failure::usage(format!(
         "`{shown}` holds a run already ({content}): {go_on}replace it with --force, or write elsewhere with -o DIR"
+    )))
+}
+
+/// Refuses a folder that is not one of a run and has files which the run of a scene would replace.
+fn nothing_is_replaced(folder: &Path, scene: &Scene) -> Result<(), Failure> {
+    let tables = scene.probes.iter().map(|probe| format!("{PROBES}/{}.csv", probe.name));
+    let own = OWN_TABLES.iter().map(|(name, _)| format!("{HISTORY}/{name}.csv"));
+    let mut written = RESULTS.iter().map(ToString::to_string).chain(tables).chain(own);
+    let Some(found) = written.find(|name| folder.join(name).exists()) else { return Ok(()) };
+    Err(Failure::usage(format!(
+        "`{}` holds no run, and `{found}` in it would be replaced: write elsewhere with -o DIR, or replace it with --force",
+        folder.shown()
     )))
 }
 
@@ -73,7 +94,7 @@ pub(super) fn run_in(folder: &Path) -> Option<String> {
     if !is_summary && frames == 0 && !checkpoints::exist(folder) {
         return None;
     }
-    let frames = format!("{frames} frame{}", if frames == 1 { "" } else { "s" });
+    let frames = counted(frames, "frame");
     Some(match (summary["scene"].as_str(), summary["simulated_seconds"].as_f64()) {
         (Some(scene), Some(time)) => format!("scene {scene}, {time:.3} s, {frames}"),
         _ => format!("not finished, {frames}"),

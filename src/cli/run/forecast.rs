@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::super::args::{Run, Shared};
 use super::super::failure::warn;
+use super::super::output::counted;
 use super::super::progress::duration;
 use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, input, output};
@@ -203,9 +204,9 @@ fn print(forecast: &Forecast) {
     say!("passes        {}", forecast.passes.join(", "));
     say!("memory        about {}{}", size(forecast.bytes), free(forecast.bytes_free));
     say!(
-        "disk          about {} for {} frames{}",
+        "disk          about {} for {}{}",
         size(forecast.disk_bytes),
-        forecast.frames,
+        counted(forecast.frames as usize, "frame"),
         free(forecast.disk_bytes_free)
     );
     say!(

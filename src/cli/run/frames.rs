@@ -6,15 +6,18 @@
 use std::path::{Path, PathBuf};
 
 use super::super::args::Run;
+use super::super::failure::warn;
 use super::super::stopwatch::Stopwatch;
 use super::super::{Failure, output};
 use super::bodies::Bodies;
 use super::pictures::{Look, Pictures};
 use super::{checkpoints, folder, probes};
-use crate::cli::output::Shown;
+use crate::cli::output::{Shown, counted};
+use crate::cli::surfaces;
 use rfm::Experiment;
+use rfm::diagnostic::Code;
 use rfm::mesh::{self, Mesh};
-use rfm::sph::{self, Checkpoint, Simulation};
+use rfm::sph::{self, Checkpoint, Simulation, short_time};
 
 /// Meshes of a run are in the unit of its frames.
 const METRE: mesh::LengthUnit = mesh::LengthUnit::METRE;
@@ -25,13 +28,22 @@ const TIMES: &str = "frames";
 /// The frames and pictures of a run.
 pub(super) struct Frames {
     folder: PathBuf,
-    /// Time and file of each frame, relative to the folder.
-    saved: Vec<(f64, String)>,
+    saved: Vec<Saved>,
     write_frames: bool,
     bodies: Bodies,
     pictures: Option<Pictures>,
     count: usize,
     last_time: f64,
+}
+
+/// A frame that was saved.
+struct Saved {
+    /// Its time, s.
+    time: f64,
+    /// Its file, relative to the folder of the run.
+    file: String,
+    /// Whether the file is missing, although the run saved it before it was resumed.
+    is_lost: bool,
 }
 
 impl Frames {
@@ -86,8 +98,12 @@ impl Frames {
             return Ok(());
         }
         self.count = times.len();
-        let named = times.iter().enumerate().map(|(number, time)| (*time, frame_name(number)));
-        self.saved = named.filter(|(_, name)| self.folder.join(name).is_file()).collect();
+        let saved = times.iter().enumerate().map(|(number, &time)| {
+            let file = frame_name(number);
+            Saved { time, is_lost: !self.folder.join(&file).is_file(), file }
+        });
+        self.saved = saved.collect();
+        self.tell_of_lost();
         if let Some(pictures) = &mut self.pictures {
             pictures.count = self.count;
         }
@@ -97,10 +113,31 @@ impl Frames {
         remove_numbered(&self.folder.join("pictures"), "frame_", ".png", self.count)
     }
 
+    /// Warns of frames that the run had saved and that are missing now.
+    fn tell_of_lost(&self) {
+        let mut lost = self.saved.iter().filter(|saved| saved.is_lost);
+        let Some(first) = lost.next() else { return };
+        let (count, all) = (1 + lost.count(), self.saved.len());
+        let are = if count == 1 { "is" } else { "are" };
+        warn(
+            Code::RUN_HAS_HOLES,
+            format!(
+                "{count} of {all} frames {are} missing, the first at {} s (`{}`): particles.pvd goes without",
+                short_time(first.time),
+                self.folder.join(&first.file).shown()
+            ),
+        );
+    }
+
+    /// The time and the file of each frame that is there.
+    fn listed(&self) -> impl Iterator<Item = (f64, &str)> {
+        self.saved.iter().filter(|saved| !saved.is_lost).map(|saved| (saved.time, saved.file.as_str()))
+    }
+
     /// Puts into a checkpoint which frames there are. A frame that was saved out of turn, because the run
     /// ended, is left out: a resumed run has the frames of one that never stopped.
     pub fn remember(&self, checkpoint: &mut Checkpoint, in_turn: bool) {
-        let mut times: Vec<f64> = self.saved.iter().map(|(time, _)| *time).collect();
+        let mut times: Vec<f64> = self.saved.iter().map(|saved| saved.time).collect();
         if !in_turn && self.last_time == checkpoint.time {
             times.pop();
         }
@@ -124,14 +161,15 @@ impl Frames {
     pub fn describe(&self) -> String {
         let mut parts = vec!["summary.json".to_string()];
         if self.write_frames {
-            parts.push(format!("particles.pvd and {} frames for ParaView", self.saved.len()));
+            let frames = counted(self.listed().count(), "frame");
+            parts.push(format!("particles.pvd and {frames} for ParaView"));
         }
         if self.write_frames && !self.bodies.is_empty() {
             let moving = if self.bodies.move_about() { "obstacle.pvd, " } else { "" };
             parts.push(format!("{moving}obstacle.stl, obstacle.vtp"));
         }
         if let Some(pictures) = &self.pictures {
-            parts.push(format!("{} pictures", pictures.count));
+            parts.push(counted(pictures.count, "picture"));
         }
         parts.join(", ")
     }
@@ -156,7 +194,7 @@ impl Frames {
             let path = self.folder.join(obstacle_name(self.count));
             output::write(&path, |mut out| mesh::vtp::write_bodies(meshes, METRE, &mut out))?;
         }
-        self.saved.push((simulation.time(), name));
+        self.saved.push(Saved { time: simulation.time(), file: name, is_lost: false });
         self.write_collections()?;
         if let Some(pictures) = &mut self.pictures {
             if let Some(meshes) = &moved {
@@ -169,14 +207,12 @@ impl Frames {
     }
 
     fn write_collections(&self) -> Result<(), Failure> {
-        output::write(&self.folder.join("particles.pvd"), |mut out| {
-            sph::write_pvd(&mut out, self.saved.iter().map(|(time, file)| (*time, file.as_str())))
-        })?;
+        output::write(&self.folder.join("particles.pvd"), |mut out| sph::write_pvd(&mut out, self.listed()))?;
         if !self.bodies.move_about() {
             return Ok(());
         }
         let obstacle = |file: &str| file.replace(PARTICLES, OBSTACLE);
-        let saved: Vec<_> = self.saved.iter().map(|(time, file)| (*time, obstacle(file))).collect();
+        let saved: Vec<_> = self.saved.iter().map(|saved| (saved.time, obstacle(&saved.file))).collect();
         let is_there = |file: &str| self.folder.join(file).is_file();
         output::write(&self.folder.join("obstacle.pvd"), |mut out| {
             let frames = saved.iter().filter(|(_, file)| is_there(file));
@@ -279,7 +315,7 @@ fn create(folder: &Path) -> Result<(), Failure> {
 
 /// Removes the files of an earlier run, which would mix with those of this one, and no other files.
 fn remove_old(folder: &Path) -> Result<(), Failure> {
-    for name in ["summary.json", "particles.pvd", "obstacle.pvd", "obstacle.stl", "obstacle.vtp"] {
+    for name in folder::RESULTS {
         let path = folder.join(name);
         if path.is_file() {
             std::fs::remove_file(&path).map_err(|e| not_cleared(folder, &e))?;
@@ -287,6 +323,7 @@ fn remove_old(folder: &Path) -> Result<(), Failure> {
     }
     checkpoints::remove_all(folder).map_err(|e| not_cleared(folder, &e))?;
     probes::remove_old(folder).map_err(|e| not_cleared(folder, &e))?;
+    surfaces::remove_old(folder).map_err(|e| not_cleared(folder, &e))?;
     remove_numbered(&folder.join("frames"), PARTICLES, ".vtp", 0)?;
     remove_numbered(&folder.join("frames"), OBSTACLE, ".vtp", 0)?;
     remove_numbered(&folder.join("pictures"), "frame_", ".png", 0)

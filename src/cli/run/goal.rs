@@ -1,9 +1,12 @@
 //! Where a run ends, and when its frames are saved.
 
+use std::path::Path;
+
 use super::super::Failure;
 use super::super::args::Run;
+use crate::cli::output::Shown;
 use rfm::Experiment;
-use rfm::sph::Simulation;
+use rfm::sph::{Simulation, short_time};
 
 /// The end of a run.
 #[derive(Clone, Copy)]
@@ -30,6 +33,21 @@ impl Goal {
                 })
             }
         }
+    }
+
+    /// Refuses an end that a flag asks for and that lies behind a run which goes on: it does not go back.
+    pub fn lies_ahead(self, options: &Run, folder: &Path, simulation: &Simulation) -> Result<(), Failure> {
+        let (time, steps) = (short_time(simulation.time()), simulation.steps());
+        let asked = match (options.steps, options.until) {
+            (Some(asked), _) if asked < steps => format!("--steps {asked}"),
+            (None, Some(asked)) if asked < simulation.time() * (1.0 - 1e-12) => format!("--until {asked}"),
+            _ => return Ok(()),
+        };
+        Err(Failure::usage(format!(
+            "{asked}: the run in `{}` is at step {steps}, {time} s, already, and --resume does not go back: ask for a later \
+             end, or begin anew with --force",
+            folder.shown()
+        )))
     }
 
     pub fn is_reached(self, simulation: &Simulation) -> bool {

@@ -15,6 +15,9 @@ pub(super) struct Means {
     /// The time of the first sample that counts, s.
     from: f64,
     samples: usize,
+    /// Samples of the probe that were lost while the run was not going on; they may be among those that count.
+    #[serde(rename = "samples_lost", skip_serializing_if = "is_zero")]
+    lost: usize,
     /// Names of the figures, with their units.
     columns: Vec<String>,
     mean: Vec<Option<f64>>,
@@ -28,6 +31,12 @@ pub(super) struct Means {
     /// How far the first figures are from what is known, as a part of it, or in their unit if it is zero.
     #[serde(skip_serializing_if = "Option::is_none")]
     deviation: Option<f64>,
+}
+
+// serde asks for a reference
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Columns that text shows where no torque is asked for.
@@ -52,8 +61,9 @@ impl Means {
         let size = if size > 0.0 { size } else { 1.0 };
         Self {
             probe: name.to_string(),
-            from: asked.from,
+            from: asked.from.max(rows.first().map_or(0.0, |row| time(row))),
             samples: means.iter().map(|mean| mean.map_or(0, |mean| mean.samples)).max().unwrap_or_default(),
+            lost: 0,
             columns: probe.columns().iter().map(|(name, unit)| format!("{name} [{unit}]")).collect(),
             mean: means.iter().map(|mean| mean.map(|mean| mean.value)).collect(),
             error: means.iter().map(|mean| mean.and_then(|mean| mean.error)).collect(),
@@ -61,6 +71,11 @@ impl Means {
             known,
             shown: if asked.torque { usize::MAX } else { WITHOUT_TORQUE },
         }
+    }
+
+    /// The same means, of a table that lacks samples.
+    pub fn lacking(self, lost: usize) -> Self {
+        Self { lost, ..self }
     }
 
     /// The means as a line of text.
@@ -77,8 +92,11 @@ impl Means {
             let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
             let separator = if k == 0 { "" } else { "," };
             line += &match error {
-                Some(error) => format!("{separator} {name} {} ± {error:.1e}{unit}", rounded(mean, *error)),
-                None => format!("{separator} {name} {mean:.4e}{unit}"),
+                Some(error) => {
+                    let (mean, error) = rounded(mean, *error);
+                    format!("{separator} {name} {mean} ± {error}{unit}")
+                }
+                None => format!("{separator} {name} {}{unit} (too few samples for its error)", alone(mean)),
             };
         }
         if let Some(deviation) = self.deviation {
@@ -87,6 +105,9 @@ impl Means {
                 false => format!("; {:.2} % from what is known", 100.0 * deviation),
             };
         }
+        if self.lost > 0 {
+            line += &format!("; {} samples of its table are lost (W0517), so this may be wrong", self.lost);
+        }
         line
     }
 }
@@ -94,15 +115,30 @@ impl Means {
 /// Sizes of values that are written without an exponent.
 const PLAIN: std::ops::Range<f64> = 1e-3..1e7;
 
-/// A value with as many digits as its error leaves it.
-fn rounded(value: f64, error: f64) -> String {
+/// A value of which no error is known, with five digits.
+fn alone(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let decimals = 4.0 - value.abs().log10().floor();
+    match PLAIN.contains(&value.abs()) {
+        true => format!("{value:.0$}", decimals.clamp(0.0, 12.0) as usize),
+        false => format!("{value:.4e}"),
+    }
+}
+
+/// A value with as many digits as its error leaves it, and the error with two, in one notation.
+fn rounded(value: f64, error: f64) -> (String, String) {
     let last = if error > 0.0 { error.log10().floor() - 1.0 } else { -6.0 };
     let size = value.abs().max(error);
     if size == 0.0 || PLAIN.contains(&size) {
-        return format!("{value:.0$}", (-last).clamp(0.0, 12.0) as usize);
+        let decimals = (-last).clamp(0.0, 12.0) as usize;
+        // two digits of an error above a hundred
+        let error = if last > 0.0 { (error / 10_f64.powf(last)).round() * 10_f64.powf(last) } else { error };
+        return (format!("{value:.decimals$}"), format!("{error:.decimals$}"));
     }
     let digits = if error > 0.0 { value.abs().log10().floor() - last } else { 6.0 };
-    format!("{value:.0$e}", digits.clamp(0.0, 12.0) as usize)
+    (format!("{value:.0$e}", digits.clamp(0.0, 12.0) as usize), format!("{error:.1e}"))
 }
 
 #[cfg(test)]
@@ -111,12 +147,20 @@ mod tests {
 
     #[test]
     fn values_have_the_digits_that_their_errors_leave() {
-        assert_eq!(rounded(236.0712, 0.11), "236.07");
-        assert_eq!(rounded(0.0, 0.11), "0.00");
-        assert_eq!(rounded(5e-4, 0.11), "0.00");
-        assert_eq!(rounded(-3e-7, 6.5e-6), "-3e-7");
-        assert_eq!(rounded(3.414567e-10, 2.1e-12), "3.415e-10");
-        assert_eq!(rounded(3.413119e14, 2e11), "3.4131e14");
+        let check = |value, error, expected: [&str; 2]| {
+            assert_eq!(rounded(value, error), (expected[0].to_string(), expected[1].to_string()));
+        };
+        check(236.0712, 0.11, ["236.07", "0.11"]);
+        check(136.4, 31.2, ["136", "31"]);
+        check(1362.7, 143.0, ["1363", "140"]);
+        check(8.7234, 0.748, ["8.72", "0.75"]);
+        check(0.0, 0.11, ["0.00", "0.11"]);
+        check(5e-4, 0.11, ["0.00", "0.11"]);
+        check(-3e-7, 6.5e-6, ["-3e-7", "6.5e-6"]);
+        check(3.414567e-10, 2.1e-12, ["3.415e-10", "2.1e-12"]);
+        check(3.413119e14, 2e11, ["3.4131e14", "2.0e11"]);
+        let shown = [662.234_56, 0.012_345_67, -1.5e-9, 0.0].map(alone);
+        assert_eq!(shown, ["662.23", "0.012346", "-1.5000e-9", "0"]);
     }
 
     #[test]

@@ -53,7 +53,7 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         frames_fit(options, goal, &experiment)?;
         return forecast::dry_run(shared, options, &experiment, goal);
     }
-    folder::may_be_written(&folder, options)?;
+    folder::may_be_written(&folder, options, experiment.scene())?;
     // a folder that is not there yet is made only after all that can fail
     let held = folder.exists().then(|| Hold::take(&folder)).transpose()?;
     let resumed = options.resume.then(|| checkpoints::latest(&folder, &fingerprint)).transpose()?;
@@ -65,10 +65,11 @@ pub(super) fn run(shared: &Shared, options: &Run) -> Result<(), Failure> {
         }
     };
     let goal = Goal::of(options, &experiment)?;
+    goal.lies_ahead(options, &folder, &simulation)?;
     frames_fit(options, goal, &experiment)?;
     let _held = held.map_or_else(|| Hold::take(&folder), Ok)?;
     // another run may have ended in the meantime
-    folder::may_be_written(&folder, options)?;
+    folder::may_be_written(&folder, options, experiment.scene())?;
     let mut recording = Recording {
         frames: Frames::new(options, &experiment, resumed.as_ref())?,
         probes: Probes::start(&folder, experiment.scene(), &mut simulation, resumed.as_ref())?,

@@ -9,17 +9,18 @@ use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::super::failure::warn;
 use super::super::plot;
-use super::super::{Failure, output};
+use super::super::{Failure, note, output};
+use super::folder::PROBES;
 use super::means::Means;
 use super::probe_plot::{drawn, rows};
 use crate::cli::output::Shown;
 use crate::cli::saved::{HISTORY, OWN_TABLES};
+use rfm::diagnostic::Code;
 use rfm::experiment::{Every, probe_column, probe_of};
 use rfm::lower::{AskedMean, Scene};
 use rfm::sph::{Checkpoint, Gauge, Probe, Simulation, short_time};
-
-const FOLDER: &str = "probes";
 
 /// A resumed run takes over samples up to this relative tolerance after the checkpoint's time. Times are
 /// written with twelve digits, so these are the samples before the checkpoint.
@@ -44,6 +45,9 @@ struct Recorder {
     mean: Option<AskedMean>,
     clock: Every,
     path: PathBuf,
+    /// Samples in the file, and samples that the run took before it was resumed and that the file lacks.
+    samples: usize,
+    lost: usize,
     file: File,
 }
 
@@ -55,7 +59,7 @@ impl Probes {
         simulation: &mut Simulation,
         resumed: Option<&Checkpoint>,
     ) -> Result<Self, Failure> {
-        let folder = run_folder.join(FOLDER);
+        let folder = run_folder.join(PROBES);
         if !scene.probes.is_empty() {
             create(&folder)?;
         }
@@ -96,6 +100,7 @@ impl Probes {
             line.push('\n');
             // the line is written in one piece and not buffered
             recorder.file.write_all(line.as_bytes()).map_err(|e| not_written(&recorder.path, &e))?;
+            recorder.samples += 1;
         }
         Ok(())
     }
@@ -104,6 +109,9 @@ impl Probes {
     pub fn save(&self, checkpoint: &mut Checkpoint) {
         for recorder in &self.stated {
             checkpoint.set(&probe_column(&recorder.name), recorder.gauge.memory().to_vec());
+        }
+        for recorder in self.stated.iter().chain(&self.own) {
+            checkpoint.set(&samples_column(&recorder.path), vec![(recorder.samples + recorder.lost) as f64]);
         }
     }
 
@@ -125,7 +133,8 @@ impl Probes {
         let mut means = Vec::new();
         for recorder in &self.stated {
             let Some(asked) = &recorder.mean else { continue };
-            means.push(Means::of(&recorder.name, &recorder.gauge.probe, asked, &rows(&recorder.text()?)));
+            let rows = rows(&recorder.text()?);
+            means.push(Means::of(&recorder.name, &recorder.gauge.probe, asked, &rows).lacking(recorder.lost));
         }
         Ok(means)
     }
@@ -147,15 +156,13 @@ impl Recorder {
     ) -> Result<Self, Failure> {
         let path = folder.join(format!("{name}.csv"));
         let header = header(&gauge.probe);
-        let kept = match resumed {
-            Some(checkpoint) => lines_until(&path, &header, checkpoint.time * (1.0 + ROUNDING)),
-            None => String::new(),
-        };
-        output::write(&path, |out| write!(out, "{header}\n{kept}"))?;
+        let past = resumed.map(|checkpoint| Past::of(&path, &header, checkpoint)).unwrap_or_default();
+        output::write(&path, |out| write!(out, "{header}\n{}", past.kept))?;
         let file = OpenOptions::new().append(true).open(&path).map_err(|e| not_written(&path, &e))?;
         // a new probe begins with the present instant
-        let clock = Every::after(every, if kept.is_empty() { -every } else { simulation.time() });
-        Ok(Self { name: name.to_string(), gauge, mean: None, clock, path, file })
+        let clock = Every::after(every, if past.is_new() { -every } else { simulation.time() });
+        let (samples, lost) = (past.kept.lines().count(), past.lost);
+        Ok(Self { name: name.to_string(), gauge, mean: None, clock, path, samples, lost, file })
     }
 
     /// The table so far.
@@ -163,6 +170,56 @@ impl Recorder {
         std::fs::read_to_string(&self.path)
             .map_err(|e| Failure::usage(format!("cannot read `{}`: {e}", self.path.shown())))
     }
+}
+
+/// What a resumed run has of the table of a probe.
+#[derive(Default)]
+struct Past {
+    /// The lines up to the checkpoint.
+    kept: String,
+    /// Samples before the checkpoint that the table lacks.
+    lost: usize,
+}
+
+impl Past {
+    /// Reads a table as far as a checkpoint. Says what it lacks, and where a table begins that is not as old as the run.
+    fn of(path: &Path, header: &str, checkpoint: &Checkpoint) -> Self {
+        let kept = lines_until(path, header, checkpoint.time * (1.0 + ROUNDING));
+        let taken = checkpoint.get(&samples_column(path)).ok().and_then(|numbers| numbers.first().copied());
+        let (table, time) = (path.shown(), short_time(checkpoint.time));
+        let Some(taken) = taken.map(|taken| taken as usize) else {
+            if kept.is_empty() && checkpoint.steps > 0 {
+                note(format!("`{table}` has no samples of the time before {time} s: it begins there"));
+            }
+            return Self { kept, lost: 0 };
+        };
+        if measures_something_else(path, header) {
+            note(format!("`{table}` measures something else than before: it begins anew at {time} s"));
+            return Self::default();
+        }
+        let lost = taken.saturating_sub(kept.lines().count());
+        if lost > 0 {
+            let message = format!("`{table}` lacks {lost} of the {taken} samples up to {time} s");
+            warn(Code::RUN_HAS_HOLES, format!("{message}: means over them would be wrong"));
+        }
+        Self { kept, lost }
+    }
+
+    fn is_new(&self) -> bool {
+        self.kept.is_empty() && self.lost == 0
+    }
+}
+
+/// The name under which a checkpoint keeps the number of samples of a table.
+fn samples_column(table: &Path) -> String {
+    let part = |path: Option<&std::ffi::OsStr>| path.unwrap_or_default().to_string_lossy().into_owned();
+    format!("samples {}/{}", part(table.parent().and_then(Path::file_name)), part(table.file_stem()))
+}
+
+/// Whether a table has other columns than these.
+fn measures_something_else(path: &Path, header: &str) -> bool {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    text.lines().next().is_some_and(|first| first.starts_with(TIME) && first.trim_end() != header)
 }
 
 /// Removes the tables and plots that an earlier run has left, and nothing else.
@@ -176,7 +233,7 @@ pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
             remove(&path)?;
         }
     }
-    let probes = run_folder.join(FOLDER);
+    let probes = run_folder.join(PROBES);
     if !probes.is_dir() {
         return Ok(());
     }

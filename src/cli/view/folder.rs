@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::args::View;
 use super::super::failure::Failure;
+use super::super::output::counted;
 use super::super::saved::{self, RunFigures};
 use super::super::survey::{Survey, is_velocity};
 use super::plots;
@@ -132,7 +133,7 @@ fn facts(entries: &[(usize, FrameEntry)], survey: &Survey, figures: Option<&RunF
     parts.extend(figures.map(|figures| format!("scene {}", figures.scene)));
     parts.push(format!("{} particles", survey.particles / entries.len().max(1)));
     if let (Some((_, first)), Some((_, last))) = (entries.first(), entries.last()) {
-        parts.push(format!("{} frames, {} to {} s", entries.len(), first.time, last.time));
+        parts.push(format!("{}, {} to {} s", counted(entries.len(), "frame"), first.time, last.time));
     }
     parts.join(" · ")
 }

@@ -80,7 +80,8 @@ fn save(shared: &Shared, run: &SavedRun, target: &Path) -> Result<(), Failure> {
         }));
     }
     say!(
-        "{frames} frames, {:.2} MB, {:.1} bytes per particle and frame",
+        "{}, {:.2} MB, {:.1} bytes per particle and frame",
+        output::counted(frames, "frame"),
         bytes as f64 / 1e6,
         bytes as f64 / particles.max(1) as f64
     );

@@ -159,6 +159,7 @@ impl<'a> Lowering<'a> {
         let particles = particles?.or(defaults.particles.filter(|_| size_span.is_none()));
         Some(Fluid {
             name: block.label.map_or_else(|| "fluid".into(), |label| label.text.clone()),
+            span: block.span,
             shape,
             shape_span,
             fill: fill?,

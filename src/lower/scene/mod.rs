@@ -145,6 +145,8 @@ pub struct Solver {
 pub struct Fluid {
     /// Name of the fluid; `fluid` if it has none.
     pub name: String,
+    /// Place of its block in the text.
+    pub span: Span,
     /// Positive where particles are put at the start.
     pub shape: Node,
     /// Place of the shape in the text.

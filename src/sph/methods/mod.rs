@@ -23,7 +23,7 @@ pub use declaration::{FluidDefaults, KeyBlock, KeyInfo, KeyReader, MethodInfo, S
 pub use dfsph::Dfsph;
 pub use negative_pressure::NegativePressure;
 pub use paper::Paper;
-pub use reference::{methods_overview, methods_reference};
+pub use reference::{method_reference, methods_overview, methods_reference};
 pub use wcsph::{Gradients, Wcsph};
 
 use declaration::{Declaration, check, read};

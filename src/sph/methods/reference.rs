@@ -31,6 +31,14 @@ pub fn methods_reference() -> String {
     text
 }
 
+/// The section of the [`methods_reference`] about one method.
+pub fn method_reference(method: Method) -> String {
+    let mut text = String::new();
+    // writing to a String cannot fail
+    let _ = section(&mut text, &method.info());
+    text.trim_start().to_string()
+}
+
 fn section(text: &mut String, method: &MethodInfo) -> std::fmt::Result {
     let fluid = &method.fluid;
     writeln!(text, "\n## `{}`: {}\n", method.name, method.title)?;
