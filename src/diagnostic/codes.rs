@@ -265,9 +265,9 @@ spacing is small enough. Parts that extend over less than two spacings, and the 
 not count.";
 TENSION_STIRS = "W0509":
 "The surface tension of a divergence-free fluid (dfsph) is a force by normals and curvature. It is not the gradient of an
-energy, and gives particles at the surface a motion that does not end: a drop at rest simmers, spray may gain energy. The
-message says how fast that is, and it is told where that is not small against the speeds of the scene. `method: wcsph` damps
-it; with a `support_radius` of three spacings a seventh of the speed is left.";
+energy, and gives particles at the surface a motion that only viscosity ends. The message says how fast that is at most in a
+drop at rest, and it is told where that is not small against the speeds of the scene. More viscosity calms it, `method: wcsph`
+damps it, and with smaller particles it is slower.";
 FRAMES = "W0505":
 "Frames are saved so rarely that none lies between the start and the end of the run, or so often that they fill a disk.
 `save_every` is the simulated time between two of them, `until` that of the whole run.";

@@ -16,6 +16,7 @@ mod error;
 mod frame;
 mod storage;
 mod values;
+mod vessel;
 
 use std::fmt;
 
@@ -45,6 +46,9 @@ pub struct Reconstruction {
     /// The part of the rest density at which the surface lies. splashsurf advises 0.6, with which a
     /// half-space full of particles keeps about its volume.
     pub threshold: f64,
+    /// A box whose walls hold the fluid. The fluid goes up to a wall that it touches, and never beyond it. `None`: the
+    /// surface is round everywhere, also where the fluid lies on a wall.
+    pub vessel: Option<Aabb>,
 }
 
 impl Reconstruction {
@@ -67,6 +71,7 @@ impl Reconstruction {
             support_radius: Self::SUPPORT * particle_radius,
             cell: Self::CELL * particle_radius,
             threshold: Self::THRESHOLD,
+            vessel: None,
         }
     }
 
@@ -97,8 +102,11 @@ impl Reconstruction {
         }
         // near the origin f32 has its digits where they are needed
         let middle = bounds.centre();
+        // with one layer of images only, edges between walls show holes
+        let images = self.vessel.map(|vessel| vessel::images(particles, &vessel, self.support_radius));
         let positions: Vec<Vector3<f32>> = particles
             .iter()
+            .chain(images.iter().flatten())
             .map(|p| {
                 let p = (*p - middle).as_vec3();
                 Vector3::new(p.x, p.y, p.z)
@@ -107,7 +115,11 @@ impl Reconstruction {
         let found = reconstruct_surface::<i64, f32>(&positions, &self.parameters());
         let surface = found.map_err(|error| SurfaceError::Crate(error.to_string()))?.mesh;
         let positions = surface.vertices.iter().map(|v| [v.x, v.y, v.z]).collect();
-        in_order(positions, surface.triangles, middle)
+        let mut mesh = in_order(positions, surface.triangles, middle)?;
+        if let Some(vessel) = &self.vessel {
+            vessel::hold(&mut mesh, vessel);
+        }
+        Ok(mesh)
     }
 
     fn parameters(&self) -> Parameters<f32> {

@@ -178,3 +178,22 @@ fn bodies_of_a_mesh_are_numbered_at_their_vertices() {
     assert_eq!((points.len(), &body.values[..]), (6, &[0.0, 0.0, 0.0, 2.0, 2.0, 2.0][..]));
     assert_eq!(read_mesh(&bytes).unwrap().triangles, [[0, 1, 2], [3, 4, 5]]);
 }
+
+/// A pool that fills the floor of a box up to its walls, and a drop that touches none.
+#[test]
+fn walls_hold_the_fluid() {
+    let pool: Vec<DVec3> = lattice(16, DVec3::ZERO).into_iter().filter(|p| p.z < 0.4).collect();
+    let vessel = Aabb::new(DVec3::ZERO, DVec3::splat(0.8));
+    let held = Reconstruction { vessel: Some(vessel), ..advised() };
+    let mesh = held.mesh(&pool).unwrap();
+    assert!(is_closed_manifold(&mesh));
+    assert!(mesh.positions.iter().all(|p| p.clamp(vessel.min, vessel.max) == *p));
+    let part = volume(&mesh) / (0.8 * 0.8 * 0.4);
+    println!("volume over that of the particles: {part}");
+    assert!((part - 1.0).abs() < 0.01, "{part}");
+    let level = mesh.positions.iter().map(|p| p.z).fold(0.0, f64::max);
+    assert!((level - 0.4).abs() < 0.1 * SPACING, "{level}");
+
+    let drop = lattice(6, DVec3::splat(0.25));
+    assert_eq!(held.mesh(&drop), advised().mesh(&drop));
+}

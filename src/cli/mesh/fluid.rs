@@ -17,6 +17,7 @@ use super::super::{output, progress};
 use super::format;
 use crate::cli::output::{Shown, counted};
 use rfm::fluid_surface::{FrameEntry, Reconstruction, read_points};
+use rfm::geom::Aabb;
 use rfm::mesh::{Format, LengthUnit, WriteMesh, is_closed_manifold, shells, vtp};
 
 /// The JSON document. Lengths are in metres, volumes in cubic metres.
@@ -172,7 +173,10 @@ impl ParticleScale {
     /// The scale that the flags give, and otherwise the one in the run's summary.
     fn new(folder: &Path, options: &Options) -> Result<Self, Failure> {
         let path = folder.join("summary.json");
-        let figures = RunFigures::read(&path).map(|figures| figures.particle_volume());
+        let figures = RunFigures::read(&path);
+        let corners = figures.as_ref().ok().and_then(|figures| figures.domain);
+        let vessel = corners.map(|[min, max]| Aabb::new(DVec3::from(min), DVec3::from(max)));
+        let figures = figures.map(|figures| figures.particle_volume());
         let usable = |length: f64| length.is_finite() && length > 0.0;
         let particle_volume = match (options.radius, figures) {
             (_, Ok(volume)) if usable(volume) => volume,
@@ -194,7 +198,7 @@ impl ParticleScale {
                 return Err(Failure::usage(format!("{flag} {length}: expected a length above 0")));
             }
         }
-        Ok(Self { surface: Reconstruction { cell, ..advised }, particle_volume })
+        Ok(Self { surface: Reconstruction { cell, vessel, ..advised }, particle_volume })
     }
 }
 

@@ -18,8 +18,8 @@
 //! (Baumgarte 1972). The tolerance of this solve is that of the density over τ. A part of what displacements take
 //! away is added to the debt, see [`OWED`].
 //!
-//! Before a free surface both systems take the missing half of the kernel for fluid ([`free_surface`](super::free_surface)),
-//! so that the outermost particles keep their distance as those in the depth do.
+//! Where surface tension pulls at single particles, both systems take the half of the kernel that is missing before a free
+//! surface for fluid ([`free_surface`](super::free_surface)), so that the outermost particles keep their distance as those in the depth do.
 //!
 //! The two systems treat walls differently.
 //!
@@ -121,8 +121,8 @@ pub struct DivergenceFree {
     /// that at rest.
     pub(super) loaded: Vec<f64>,
     pub(super) walls: Walls,
-    /// What kernels miss before a free surface.
-    surface: FreeSurface,
+    /// What kernels miss before a free surface, where that counts as filled.
+    surface: Option<FreeSurface>,
     /// Iterations of the last step's solvers.
     pub(super) iterations: u32,
 }
@@ -219,7 +219,7 @@ impl DivergenceFree {
             drift: Vectors::default(),
             loaded: vec![0.0; n],
             walls: Walls::default(),
-            surface: FreeSurface::of_lattice(core.parameters.support_radius / core.parameters.spacing()),
+            surface: FreeSurface::of(&core.parameters),
             iterations: 0,
         };
         scheme.settle(core, &mut []);
@@ -246,7 +246,8 @@ impl DivergenceFree {
         core.find_near();
         self.walls.find(core);
         let mut density = std::mem::take(&mut core.particles.density);
-        let (constants, walls, surface) = (Constants::of(&core.parameters), &self.walls, &self.surface);
+        let (constants, walls) = (Constants::of(&core.parameters), &self.walls);
+        let surface = self.surface.as_ref();
         let pass = Densities { constants, surface, walls };
         self.spread.resize(density.len(), 0.0);
         self.crowding.resize(density.len());
