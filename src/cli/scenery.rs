@@ -1,6 +1,6 @@
 //! The obstacles of pictures: which of them are whole, cut open or left out, so that they do not hide the fluid.
 
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 use super::failure::{Failure, note};
 use rfm::geom::Aabb;
@@ -49,14 +49,40 @@ pub(super) fn backdrop<'a>(
     legend: &Legend<'_>,
     bodies: impl Iterator<Item = (Drawn, &'a Mesh)>,
 ) -> Result<Backdrop, Failure> {
-    let sharp = sharp(bodies);
+    let sharp = sharp(domain, bodies);
     Backdrop::new(camera.clone(), domain, &views(&sharp), legend).map_err(Failure::usage)
 }
 
-/// The meshes of the bodies that are drawn, with sharp edges.
-pub(super) fn sharp<'a>(bodies: impl Iterator<Item = (Drawn, &'a Mesh)>) -> Vec<(Drawn, Mesh)> {
+/// The meshes of the bodies that are drawn in a box, with sharp edges.
+pub(super) fn sharp<'a>(
+    domain: &Aabb,
+    bodies: impl Iterator<Item = (Drawn, &'a Mesh)>,
+) -> Vec<(Drawn, Mesh)> {
     let shown = bodies.filter(|(drawn, _)| *drawn != Drawn::Hidden);
-    shown.map(|(drawn, mesh)| (drawn, split_creases(mesh))).collect()
+    let sharpened = |(drawn, mesh): (Drawn, &Mesh)| match drawn {
+        Drawn::Glass => (drawn, split_creases(&open_at_walls(mesh, domain))),
+        Drawn::Whole | Drawn::Open(_) | Drawn::Hidden => (drawn, split_creases(mesh)),
+    };
+    shown.map(sharpened).collect()
+}
+
+/// Triangles nearer to a wall of the box than this, in its longest sides, lie on it.
+const ON_WALL: f64 = 1e-6;
+
+/// A mesh without its triangles on the walls of a box. A body that goes on behind a wall is cut off there; through glass only
+/// these cuts would be seen, and not the vessel within them.
+fn open_at_walls(mesh: &Mesh, domain: &Aabb) -> Mesh {
+    let margin = ON_WALL * domain.size().max_element();
+    let (low, high) = (domain.min + margin, domain.max - margin);
+    let is_inner = |t: &&[u32; 3]| {
+        let corners = t.map(|v| mesh.positions[v as usize]);
+        let (below, above) = corners.iter().fold((BVec3::TRUE, BVec3::TRUE), |(below, above), p| {
+            (below & p.cmple(low), above & p.cmpge(high))
+        });
+        !(below | above).any()
+    };
+    let triangles = mesh.triangles.iter().filter(is_inner).copied().collect();
+    Mesh { positions: mesh.positions.clone(), normals: mesh.normals.clone(), triangles, ..Mesh::default() }
 }
 
 /// What of these meshes is seen.
@@ -144,4 +170,21 @@ pub(super) fn described(names: &[&str], drawn: &[Drawn]) -> Vec<String> {
         format!("{who} {what}")
     });
     words.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wall across a box goes on behind its floor: the triangle on the floor is left out, and what only touches it stays.
+    #[test]
+    fn cuts_at_the_walls_of_a_box_are_not_of_glass() {
+        let corners =
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(DVec3::from_array);
+        let mesh = Mesh::from_triangles(corners.to_vec(), vec![[0, 2, 1], [0, 1, 3], [1, 2, 3]]);
+        let box_below = Aabb::new(DVec3::new(-1.0, -1.0, 0.0), DVec3::splat(2.0));
+        let open = open_at_walls(&mesh, &box_below);
+        assert_eq!(open.triangles, [[0, 1, 3], [1, 2, 3]]);
+        assert_eq!(open_at_walls(&mesh, &box_below.grown(0.5)).triangles, mesh.triangles);
+    }
 }

@@ -171,7 +171,7 @@ impl RunScene {
         let particles =
             ParticlesView { positions: Points::new(&x, &y, &z), values: &values, radius: self.radius };
         let started = Instant::now();
-        let bodies = scenery::sharp(self.drawn.iter().copied().zip(&bodies));
+        let bodies = scenery::sharp(&self.domain, self.drawn.iter().copied().zip(&bodies));
         let mut meshes = scenery::views(&bodies);
         meshes.extend(self.surface.zip(water.as_ref()).map(|(surface, mesh)| MeshView {
             values: &tints,

@@ -105,7 +105,7 @@ impl Pictures {
             scenery::backdrop(&camera, &domain, &legend, still.map(|(body, mesh)| (body.drawn, mesh)))?;
         Ok(Self {
             scene,
-            moving: moving(&bodies, meshes),
+            moving: moving(&domain, &bodies, meshes),
             domain,
             radius: 0.5 * experiment.parameters().spacing(),
             bodies,
@@ -122,7 +122,7 @@ impl Pictures {
 
     /// Puts the obstacles where they are now.
     pub fn show(&mut self, meshes: &[Mesh]) {
-        self.moving = moving(&self.bodies, meshes);
+        self.moving = moving(&self.domain, &self.bodies, meshes);
     }
 
     pub fn save(&mut self, path: &Path, simulation: &Simulation) -> Result<(), Failure> {
@@ -158,7 +158,8 @@ impl Pictures {
             return Ok(None);
         }
         let places = simulation.particles().position.iter().filter(|p| p.is_finite());
-        let made = Reconstruction::of_radius(self.radius).mesh(&places.collect::<Vec<_>>());
+        let within = Reconstruction { vessel: Some(self.domain), ..Reconstruction::of_radius(self.radius) };
+        let made = within.mesh(&places.collect::<Vec<_>>());
         made.map(Some).map_err(|error| Failure::usage(format!("--surface: {error}")))
     }
 
@@ -194,9 +195,9 @@ fn columns(places: &[DVec3]) -> [Vec<f64>; 3] {
 }
 
 /// The obstacles that move, where their meshes are.
-fn moving(bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)> {
+fn moving(domain: &Aabb, bodies: &[Body], meshes: &[Mesh]) -> Vec<(Drawn, Mesh)> {
     let moving = bodies.iter().zip(meshes).filter(|(body, _)| body.solid.moves());
-    scenery::sharp(moving.map(|(body, mesh)| (body.drawn, mesh)))
+    scenery::sharp(domain, moving.map(|(body, mesh)| (body.drawn, mesh)))
 }
 
 /// The camera that the flags or the scene ask for.
