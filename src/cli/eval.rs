@@ -157,6 +157,9 @@ impl Table {
     }
 
     fn rows(&mut self, points: &[DVec3]) -> Result<(), Failure> {
+        if points.is_empty() {
+            return Ok(());
+        }
         let Self { rows, json, out } = self;
         if points.len() >= MANY_POINTS && rows.needs_only_signs() {
             rows.cells(); // not in a thread of the pool: others would wait for it

@@ -3,12 +3,14 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use serde::Deserialize;
 
 use super::failure::Failure;
 use super::output::{Shown, counted};
 use super::values::Frames;
 use rfm::fluid_surface::{FrameEntry, read_collection};
+use rfm::geom::Aabb;
 use rfm::sph::Probe;
 
 /// The folder, within that of a run, of the tables that every run writes.
@@ -37,6 +39,12 @@ impl RunFigures {
     pub fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
         serde_json::from_str(&text).map_err(|error| error.to_string())
+    }
+
+    /// The box of the scene, if the summary states one.
+    pub fn vessel(&self) -> Option<Aabb> {
+        let vessel = self.domain.map(|[min, max]| Aabb::new(DVec3::from_array(min), DVec3::from_array(max)));
+        vessel.filter(|vessel| vessel.is_finite() && !vessel.is_empty())
     }
 
     /// The volume of the fluid that a particle stands for, m³.

@@ -19,7 +19,7 @@ pub(super) const FOLDER: &str = "surface";
 const LIST: &str = "surface.pvd";
 
 /// The file that tells of which frames the surfaces were made.
-const ORIGINS: &str = "frames.json";
+const ORIGINS: &str = "surface.json";
 
 /// Beginning of the names of surfaces.
 const SURFACE: &str = "surface_";
@@ -123,6 +123,13 @@ pub(super) fn remove_old(run: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
+/// A file in the folder of a run that [`remove_old`] would remove.
+pub(super) fn first_old(run: &Path) -> Option<String> {
+    let names = std::fs::read_dir(run.join(FOLDER)).into_iter().flatten().flatten();
+    let mut names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.find(|name| is_ours(name)).map(|name| format!("{FOLDER}/{name}"))
+}
+
 /// Whether `rfm mesh DIR --fluid` writes files of this name.
 fn is_ours(name: &str) -> bool {
     if name == LIST || name == ORIGINS {
@@ -145,7 +152,7 @@ mod tests {
         for format in FORMATS {
             assert!(is_ours(&file_name(3, format.ending)) && is_ours(&file_name(12_345_678, format.ending)));
         }
-        assert!(is_ours("surface.pvd") && is_ours("frames.json"));
+        assert!(is_ours("surface.pvd") && is_ours("surface.json"));
         for name in ["surface_1.vtp", "surface_000001.png", "surface_00000a.vtp", "surface.txt", "notes.md"] {
             assert!(!is_ours(name), "{name}");
         }

@@ -90,10 +90,7 @@ impl Survey {
 
     /// The box of the scene if a summary states it, and otherwise that around all particles.
     pub fn domain(&self, figures: Option<&RunFigures>) -> Aabb {
-        let domain = figures
-            .and_then(|figures| figures.domain)
-            .map(|[min, max]| Aabb::new(DVec3::from_array(min), DVec3::from_array(max)));
-        domain.filter(|domain| domain.is_finite() && !domain.is_empty()).unwrap_or(self.bounds)
+        figures.and_then(RunFigures::vessel).unwrap_or(self.bounds)
     }
 
     /// Half the spacing of the particles, m.

@@ -47,6 +47,10 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
         viscosity: fluid.viscosity,
         surface_tension: fluid.surface_tension,
         gravity: at_start(program, &scene.gravity),
+        most_gravity: scene
+            .gravity
+            .formulas()
+            .map_or(0.0, |nodes| most_in_fluid(program, scene, nodes, DVec3::length)),
         wall_restitution: scene.walls.restitution,
         wall_friction: scene.walls.friction,
         time_step: 1.0,
@@ -61,8 +65,8 @@ pub(super) fn of_scene(program: &Program, scene: &Scene, mass: f64, typical_spee
 }
 
 /// Speed, rms, that a drop at rest keeps in a method that keeps its density, over √(σ/ρa) with the spacing a, at an Ohnesorge
-/// number µ/√(ρσa) of [`STIRRED_AT`] and with kernels of three spacings: the most that was measured, with 500 particles. It is
-/// 0.0023 and 0.0008 with 2000 and 8000.
+/// number µ/√(ρσa) of [`STIRRED_AT`] and with kernels of three spacings: the most that was measured, with 500 particles. With
+/// 2000 and 8000 it is 0.0023 and 0.0008 at numbers of 0.14 and 0.18 (0.05 by the radius, as with 500).
 const STIRRED: f64 = 0.0075;
 const STIRRED_AT: f64 = 0.1;
 

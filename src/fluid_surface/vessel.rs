@@ -32,13 +32,59 @@ pub(super) fn images(particles: &[DVec3], vessel: &Aabb, reach: f64) -> Vec<DVec
     images
 }
 
-/// Moves what lies beyond the walls onto them.
+/// Moves what lies beyond the walls onto them, and leaves out what lies there alone: the images of fluid that does not
+/// touch the wall.
 pub(super) fn hold(mesh: &mut Mesh, vessel: &Aabb) {
+    keep_parts_within(mesh, vessel);
     for (p, normal) in mesh.positions.iter_mut().zip(&mut mesh.normals) {
         let held = p.clamp(vessel.min, vessel.max);
         if held != *p {
             let outwards = (*p - held).try_normalize();
             (*p, *normal) = (held, outwards.unwrap_or(*normal));
         }
+    }
+}
+
+/// Leaves out the parts of a mesh that have no vertex within the box. The others keep their order.
+fn keep_parts_within(mesh: &mut Mesh, vessel: &Aabb) {
+    // each vertex points to one of its part, the first of all in the end
+    let mut of: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    fn first(of: &mut [u32], mut v: u32) -> u32 {
+        while of[v as usize] != v {
+            of[v as usize] = of[of[v as usize] as usize];
+            v = of[v as usize];
+        }
+        v
+    }
+    for t in &mesh.triangles {
+        for pair in [[t[0], t[1]], [t[1], t[2]]] {
+            let [a, b] = pair.map(|v| first(&mut of, v));
+            of[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut is_kept = vec![false; of.len()];
+    for v in 0..of.len() as u32 {
+        let p = mesh.positions[v as usize];
+        if (p.cmpgt(vessel.min) & p.cmplt(vessel.max)).all() {
+            is_kept[first(&mut of, v) as usize] = true;
+        }
+    }
+    let stays: Vec<bool> = (0..of.len() as u32).map(|v| is_kept[first(&mut of, v) as usize]).collect();
+    if stays.iter().all(|stays| *stays) {
+        return;
+    }
+    let mut count = 0;
+    let numbers: Vec<u32> = stays
+        .iter()
+        .map(|&stays| {
+            count += u32::from(stays);
+            count - u32::from(stays)
+        })
+        .collect();
+    mesh.triangles.retain(|t| stays[t[0] as usize]);
+    mesh.triangles.iter_mut().flatten().for_each(|v| *v = numbers[*v as usize]);
+    for column in [&mut mesh.positions, &mut mesh.normals] {
+        let mut stays = stays.iter();
+        column.retain(|_| stays.next() == Some(&true));
     }
 }

@@ -27,6 +27,8 @@ pub struct Parameters {
     pub surface_tension: f64,
     /// Gravity, m/s². (0, 0, −9.81). Zero: the pass does not run.
     pub gravity: DVec3,
+    /// The greatest acceleration by gravity where a formula of place or time gives it, m/s². 0 where none does.
+    pub most_gravity: f64,
     /// Restitution c_R of the container's walls, 0 (stick) to 1 (mirror). 0.5: half of the normal speed
     /// returns.
     pub wall_restitution: f64,
@@ -65,6 +67,7 @@ impl Default for Parameters {
             viscosity: 3.5,
             surface_tension: 0.0728,
             gravity: DVec3::new(0.0, 0.0, -9.81),
+            most_gravity: 0.0,
             wall_restitution: 0.5,
             time_step: 0.002,
             adaptive: false,
@@ -93,6 +96,7 @@ impl Parameters {
             ("support_radius", self.support_radius, Bound::Positive),
             ("viscosity", self.viscosity, Bound::NotNegative),
             ("surface_tension", self.surface_tension, Bound::NotNegative),
+            ("most_gravity", self.most_gravity, Bound::NotNegative),
             ("wall_restitution", self.wall_restitution, Bound::Fraction),
             ("time_step", self.time_step, Bound::Positive),
             ("wall_friction", self.wall_friction, Bound::NotNegative),

@@ -65,7 +65,7 @@ fn frames_become_closed_surfaces_about_as_large_as_the_fluid() {
     let out = folder.path().join("drop.out/surface");
     assert_eq!(
         names(&out),
-        ["frames.json", "surface.pvd", "surface_000000.vtp", "surface_000001.vtp", "surface_000002.vtp"]
+        ["surface.json", "surface.pvd", "surface_000000.vtp", "surface_000001.vtp", "surface_000002.vtp"]
     );
     let mut triangles = 0;
     for (i, surface) in surfaces.iter().enumerate() {
@@ -150,7 +150,7 @@ fn what_is_no_run_is_refused_with_advice() {
     std::fs::write(&frame, &whole[..whole.len() / 2]).unwrap();
     refused(&["mesh", "drop.out", "--fluid"], "particles_000001.vtp");
     let out = here.join("drop.out/surface");
-    assert_eq!(names(&out), ["frames.json", "surface.pvd", "surface_000000.vtp"]);
+    assert_eq!(names(&out), ["surface.json", "surface.pvd", "surface_000000.vtp"]);
     refused(&["mesh", "drop.out", "--fluid"], "it was cut off");
     std::fs::remove_file(&frame).unwrap();
     refused(&["mesh", "drop.out", "--fluid"], "is missing");
@@ -194,7 +194,7 @@ fn surfaces_go_with_the_run_that_they_were_made_of() {
     rfm(here, &["render", "drop.out", "--surface", "--frames", "1..", "-o", "pictures"]).expect(0);
 
     // older versions did not tell what surfaces were made of
-    std::fs::remove_file(surface.join("frames.json")).unwrap();
+    std::fs::remove_file(surface.join("surface.json")).unwrap();
     rfm(here, &["render", "drop.out", "--surface", "--frames", "1..", "-o", "pictures"]).expect(0);
 }
 

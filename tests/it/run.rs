@@ -164,9 +164,15 @@ fn files_of_others_are_not_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     std::fs::write(here.join("drop.rfm"), scene("paper", "dt: 1 ms, until: 2 ms, save_every: 2 ms")).unwrap();
-    for (k, name) in
-        ["summary.json", "particles.pvd", "probes/level.csv", "history/audit.csv"].iter().enumerate()
-    {
+    let names = [
+        "summary.json",
+        "particles.pvd",
+        "probes/level.csv",
+        "history/audit.csv",
+        "surface/surface_000001.stl",
+        "pictures/frame_000000.png",
+    ];
+    for (k, name) in names.iter().enumerate() {
         let out = format!("out{k}");
         let path = here.join(&out).join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -178,6 +184,10 @@ fn files_of_others_are_not_replaced() {
             run(here, &[&out, "--force"]).expect(0);
         }
     }
+    // a run that was stopped before its first frame may begin anew
+    std::fs::create_dir_all(here.join("begun/history")).unwrap();
+    std::fs::write(here.join("begun/history/audit.csv"), "time [s]\n").unwrap();
+    run(here, &["begun"]).expect(0);
     // what a run does not write is in nobody's way
     std::fs::create_dir_all(here.join("mine/probes")).unwrap();
     std::fs::write(here.join("mine/probes/other.csv"), "a,b\n").unwrap();

@@ -253,8 +253,8 @@ fn edits(places: &[Place], name: &str) -> WorkspaceEdit {
     WorkspaceEdit { changes: Some(changes), ..WorkspaceEdit::default() }
 }
 
-/// The files of the language in some folders and below, in the order of their paths. Hidden folders and what Cargo builds are
-/// left out.
+/// The files of the language in some folders and below, in the order of their paths. Hidden folders, those of runs and
+/// what Cargo builds are left out, and so is what lies beyond the limits.
 fn files_below(roots: &[PathBuf]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = roots.to_vec();
@@ -270,9 +270,13 @@ fn files_below(roots: &[PathBuf]) -> Vec<PathBuf> {
             // a link to a folder may lead in a circle
             match entry.file_type() {
                 Ok(kind) if kind.is_dir() && !name.starts_with('.') && name != "target" => {
-                    folders.push(entry.path())
+                    // the folder of a run holds thousands of frames
+                    if !entry.path().join("particles.pvd").exists() {
+                        folders.push(entry.path());
+                    }
                 }
-                Ok(kind) if !kind.is_dir() && name.ends_with(".rfm") => found.push(entry.path()),
+                // no pipe, which would be read for ever
+                Ok(_) if name.ends_with(".rfm") && entry.path().is_file() => found.push(entry.path()),
                 Ok(_) | Err(_) => {}
             }
         }

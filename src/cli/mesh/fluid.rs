@@ -17,7 +17,6 @@ use super::super::{output, progress};
 use super::format;
 use crate::cli::output::{Shown, counted};
 use rfm::fluid_surface::{FrameEntry, Reconstruction, read_points};
-use rfm::geom::Aabb;
 use rfm::mesh::{Format, LengthUnit, WriteMesh, is_closed_manifold, shells, vtp};
 
 /// The JSON document. Lengths are in metres, volumes in cubic metres.
@@ -174,8 +173,7 @@ impl ParticleScale {
     fn new(folder: &Path, options: &Options) -> Result<Self, Failure> {
         let path = folder.join("summary.json");
         let figures = RunFigures::read(&path);
-        let corners = figures.as_ref().ok().and_then(|figures| figures.domain);
-        let vessel = corners.map(|[min, max]| Aabb::new(DVec3::from(min), DVec3::from(max)));
+        let vessel = figures.as_ref().ok().and_then(RunFigures::vessel);
         let figures = figures.map(|figures| figures.particle_volume());
         let usable = |length: f64| length.is_finite() && length > 0.0;
         let particle_volume = match (options.radius, figures) {

@@ -9,7 +9,9 @@ use super::super::args::Run;
 use super::super::output::{Shown, TEMPORARY, counted};
 use super::super::{Failure, note};
 use super::checkpoints;
+use super::probes::is_table;
 use crate::cli::saved::{HISTORY, OWN_TABLES};
+use crate::cli::surfaces;
 use rfm::lower::Scene;
 
 /// Name of the file that a run locks in its folder. The system unlocks it when the process ends, however it ends.
@@ -68,12 +70,31 @@ pub(super) fn may_be_written(folder: &Path, options: &Run, scene: &Scene) -> Res
 fn nothing_is_replaced(folder: &Path, scene: &Scene) -> Result<(), Failure> {
     let tables = scene.probes.iter().map(|probe| format!("{PROBES}/{}.csv", probe.name));
     let own = OWN_TABLES.iter().map(|(name, _)| format!("{HISTORY}/{name}.csv"));
+    if OWN_TABLES.iter().any(|(name, _)| is_table(&folder.join(HISTORY).join(format!("{name}.csv")))) {
+        return Ok(()); // of a run that was stopped before its first frame
+    }
     let mut written = RESULTS.iter().map(ToString::to_string).chain(tables).chain(own);
-    let Some(found) = written.find(|name| folder.join(name).exists()) else { return Ok(()) };
+    let found = written.find(|name| folder.join(name).exists());
+    let numbered = || {
+        let pictures = [("pictures", "frame_", ".png"), ("frames", "obstacle_", ".vtp")];
+        pictures.into_iter().find_map(|(part, prefix, suffix)| first_numbered(folder, part, prefix, suffix))
+    };
+    let Some(found) = found.or_else(numbered).or_else(|| surfaces::first_old(folder)) else { return Ok(()) };
     Err(Failure::usage(format!(
         "`{}` holds no run, and `{found}` in it would be replaced: write elsewhere with -o DIR, or replace it with --force",
         folder.shown()
     )))
+}
+
+/// The first file of a part of a folder whose name is a number between these ends, in any order.
+fn first_numbered(folder: &Path, part: &str, prefix: &str, suffix: &str) -> Option<String> {
+    let names = std::fs::read_dir(folder.join(part)).into_iter().flatten().flatten();
+    let mut names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let is_numbered = |name: &String| {
+        let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(suffix));
+        number.is_some_and(|number| number.parse::<usize>().is_ok())
+    };
+    names.find(is_numbered).map(|name| format!("{part}/{name}"))
 }
 
 /// Whether a folder has the index of a sweep.

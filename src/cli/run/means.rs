@@ -15,7 +15,7 @@ pub(super) struct Means {
     /// The time of the first sample that counts, s.
     from: f64,
     samples: usize,
-    /// Samples of the probe that were lost while the run was not going on; they may be among those that count.
+    /// Samples that the run took and that the table lacked when it went on; they may be among those that count.
     #[serde(rename = "samples_lost", skip_serializing_if = "is_zero")]
     lost: usize,
     /// Names of the figures, with their units.

@@ -224,7 +224,6 @@ fn measures_something_else(path: &Path, header: &str) -> bool {
 
 /// Removes the tables and plots that an earlier run has left, and nothing else.
 pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
-    let is_table = |path: &Path| std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()));
     let remove = |path: &Path| if path.is_file() { std::fs::remove_file(path) } else { Ok(()) };
     // tables of their own names, without drawings
     for (name, _) in OWN_TABLES {
@@ -247,6 +246,11 @@ pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
 }
 
 const TIME: &str = "time [s]";
+
+/// Whether a file is a table that a run has written.
+pub(super) fn is_table(path: &Path) -> bool {
+    std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()))
+}
 
 fn header(probe: &Probe) -> String {
     let columns = probe.columns().iter().map(|(name, unit)| format!(",{name} [{unit}]"));

@@ -233,6 +233,11 @@ impl<'a> Draft<'a> {
         !self.cut_ends.is_empty()
     }
 
+    /// Counts the work that was spent on the mesh in all.
+    pub fn count(&mut self, work: Work) {
+        self.work = work;
+    }
+
     /// Mends the mesh around the given edges, merges vertices that are too close, and mends folded triangles. Returns
     /// whether that changed anything.
     ///

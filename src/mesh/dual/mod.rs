@@ -99,7 +99,10 @@ pub fn dual_contouring(
         match Attempt::make(Draft::new(field, grid, triangles, work), is_clear)? {
             Attempt::Clear(mesh) => return Ok(mesh),
             // without the cuts nothing crosses
-            Attempt::Crossing { cut: Some((draft, far)), .. } if is_clear => return apart(draft, far),
+            Attempt::Crossing { cut: Some((mut draft, far)), work: spent } if is_clear => {
+                draft.count(spent);
+                return apart(draft, far);
+            }
             Attempt::Crossing { work: spent, .. } => work = spent,
         }
     }

@@ -54,7 +54,7 @@ pub(super) struct Slots<'a> {
 /// The results of a task besides its vertices.
 #[derive(Default)]
 pub(super) struct Placed {
-    /// For each vertex that is not smooth, ascending, the point to which it moves if the triangles around it
+    /// For each vertex that is not surely smooth, ascending, the point to which it moves if the triangles around it
     /// lie upside down.
     pub fallbacks: Vec<(u32, DVec3)>,
     pub twice: Vec<Twice>,

@@ -1,14 +1,15 @@
 //! What a kernel misses before a free surface.
 //!
-//! A sum over neighbours takes the empty half before a surface for room: the outermost particles have four fifths of
-//! the density at rest, and may come nearer to each other until they have all of it. Surface tension pulls just there: it drew the
-//! outermost layers together until a drop was a seventh too small, its tension nearly twice too strong, and its surface too ragged
-//! for normals, so that it stirred itself without end. With what is missing added, a flat surface of a lattice is as dense as its
-//! depth.
+//! A sum over neighbours takes the empty half before a surface for room: the outermost particles have four fifths
+//! of the density at rest, and may come nearer to each other until they have all of it. Surface tension pulls just
+//! there: it drew the outermost layers together until a drop was a seventh too small, its tension nearly twice too
+//! strong, and its surface too ragged for normals, so that it stirred itself without end. With what is missing
+//! added, a flat surface of a lattice is as dense as its depth.
 //!
-//! It counts where tension moves single particles: where their spacing is below the capillary length √(σ/ρg). Without tension it
-//! would calm still water too (a pool of eight layers starts with 16 mm/s instead of 43), but columns of sixty layers on a lattice
-//! burst in their first steps: nothing in them is too dense then, and their pressure comes too late.
+//! The missing part is counted where tension moves single particles: where their spacing is below the capillary
+//! length √(σ/ρg). Without tension it would calm still water too (a pool of eight layers starts with 16 mm/s instead
+//! of 43), but columns of sixty layers on a lattice burst in their first steps: nothing in them is too dense then, and
+//! their pressure comes too late.
 //!
 //! What is missing follows from the normal: n = Σ V ∇W + ∇λ is zero in the depth, and before a flat surface both n and
 //! the missing part depend on the distance from it alone. Between the layers of a lattice the relation is
@@ -38,10 +39,12 @@ pub(super) struct FreeSurface {
 impl FreeSurface {
     /// That of a fluid, if its tension moves single particles.
     pub fn of(parameters: &Parameters) -> Option<Self> {
-        let Parameters { surface_tension, rest_density, gravity, support_radius, .. } = *parameters;
+        let Parameters { surface_tension, rest_density, gravity, most_gravity, support_radius, .. } =
+            *parameters;
         let spacing = parameters.spacing();
-        // the tension's acceleration of a particle over that of gravity
-        let pulls = surface_tension > rest_density * gravity.length() * spacing.powi(2);
+        // the tension's acceleration of a particle against that by gravity
+        let gravity = gravity.length().max(most_gravity);
+        let pulls = surface_tension > rest_density * gravity * spacing.powi(2);
         pulls.then(|| Self::of_lattice(support_radius / spacing))
     }
 
@@ -72,7 +75,50 @@ impl FreeSurface {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
+
+    /// Sums over the half of a lattice, with what is missing added, are those over the whole.
+    #[test]
+    fn a_flat_surface_is_as_dense_as_its_depth() {
+        for ratio in [2.2, 3.0] {
+            let (surface, kernel) = (FreeSurface::of_lattice(ratio), Wendland::new(ratio));
+            for depth in 0..4 {
+                let at = DVec3::new(0.0, 0.0, -0.5 - f64::from(depth));
+                let (mut sum, mut normal) = (0.0, DVec3::ZERO);
+                for k in 0..9 * 9 * 9 {
+                    let [x, y, z] = [k % 9, k / 9 % 9, k / 81].map(f64::from);
+                    let away = at - DVec3::new(x - 4.0, y - 4.0, -0.5 - z);
+                    let nearness = (1.0 - away.length() / ratio).max(0.0);
+                    sum += kernel.at(away.length_squared());
+                    normal -= kernel.steepness * nearness.powi(3) * away;
+                }
+                let density = sum / Wendland::lattice_sum(ratio) + surface.missing(normal.length() * ratio);
+                // below the second layer a missing part of up to 0.3 % counts as disorder
+                assert!((density - 1.0).abs() < 3e-3, "{ratio}, layer {depth}: {density}");
+            }
+        }
+    }
+
+    #[test]
+    fn gravity_by_a_formula_counts_too() {
+        let of = |surface_tension: f64, spacing: f64, gravity: f64, most_gravity: f64| {
+            FreeSurface::of(&Parameters {
+                rest_density: 1000.0,
+                particle_mass: 1000.0 * spacing.powi(3),
+                surface_tension,
+                gravity: DVec3::new(0.0, 0.0, -gravity),
+                most_gravity,
+                ..Parameters::default()
+            })
+            .is_some()
+        };
+        // the capillary length of water is 2.7 mm
+        assert!(of(0.072, 2e-3, 9.81, 0.0) && !of(0.072, 4e-3, 9.81, 0.0));
+        assert!(of(0.072, 4e-3, 0.0, 0.0) && !of(0.072, 4e-3, 0.0, 9.81));
+        assert!(!of(0.0, 2e-3, 0.0, 0.0));
+    }
 
     #[test]
     fn layers_of_a_lattice_miss_what_lies_beyond_the_surface() {

@@ -62,8 +62,8 @@ pub(super) enum Continuation {
     Barrier,
 }
 
-/// Finds the density ρ with the barriers of the walls and what is missing before a free surface, the diagonals of both systems, the direction in which
-/// particles crowd, G, and the density that the places say.
+/// Finds the density ρ with the barriers of the walls and what is missing before a free surface, the diagonals of both
+/// systems, the direction in which particles crowd, G, and the density that the places say.
 #[derive(Clone, Copy)]
 pub(super) struct Densities<'a> {
     pub constants: Constants,

@@ -18,8 +18,9 @@
 //! (Baumgarte 1972). The tolerance of this solve is that of the density over τ. A part of what displacements take
 //! away is added to the debt, see [`OWED`].
 //!
-//! Where surface tension pulls at single particles, both systems take the half of the kernel that is missing before a free
-//! surface for fluid ([`free_surface`](super::free_surface)), so that the outermost particles keep their distance as those in the depth do.
+//! Where surface tension pulls at single particles, both systems take the half of the kernel that is missing before
+//! a free surface for fluid ([`free_surface`](super::free_surface)), so that the outermost particles keep their
+//! distance as those in the depth do.
 //!
 //! The two systems treat walls differently.
 //!
