@@ -9,7 +9,6 @@ use super::super::args::Run;
 use super::super::output::{Shown, TEMPORARY, counted};
 use super::super::{Failure, note};
 use super::checkpoints;
-use super::probes::is_table;
 use crate::cli::saved::{HISTORY, OWN_TABLES};
 use crate::cli::surfaces;
 use rfm::lower::Scene;
@@ -84,6 +83,14 @@ fn nothing_is_replaced(folder: &Path, scene: &Scene) -> Result<(), Failure> {
         "`{}` holds no run, and `{found}` in it would be replaced: write elsewhere with -o DIR, or replace it with --force",
         folder.shown()
     )))
+}
+
+/// The head of the first column of every table.
+pub(super) const TIME: &str = "time [s]";
+
+/// Whether a file is a table that a run has written.
+pub(super) fn is_table(path: &Path) -> bool {
+    std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()))
 }
 
 /// The first file of a part of a folder whose name is a number between these ends, in any order.

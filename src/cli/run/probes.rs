@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::super::failure::warn;
 use super::super::plot;
 use super::super::{Failure, note, output};
-use super::folder::PROBES;
+use super::folder::{PROBES, TIME, is_table};
 use super::means::Means;
 use super::probe_plot::{drawn, rows};
 use crate::cli::output::Shown;
@@ -243,13 +243,6 @@ pub(super) fn remove_old(run_folder: &Path) -> std::io::Result<()> {
         }
     }
     Ok(())
-}
-
-const TIME: &str = "time [s]";
-
-/// Whether a file is a table that a run has written.
-pub(super) fn is_table(path: &Path) -> bool {
-    std::fs::read(path).is_ok_and(|bytes| bytes.starts_with(TIME.as_bytes()))
 }
 
 fn header(probe: &Probe) -> String {
