@@ -54,7 +54,7 @@ pub(super) struct Slots<'a> {
 /// The results of a task besides its vertices.
 #[derive(Default)]
 pub(super) struct Placed {
-    /// For each vertex that is not surely smooth, ascending, the point to which it moves if the triangles around it
+    /// For each vertex that is not smooth, ascending, the point to which it moves if the triangles around it
     /// lie upside down.
     pub fallbacks: Vec<(u32, DVec3)>,
     pub twice: Vec<Twice>,
@@ -268,9 +268,8 @@ impl Placement<'_> {
         for (of, bend) in unsmooth.iter().zip(bends) {
             match bend.and_then(|_| settled.next()).flatten() {
                 Some(bends::Settled { position, normal }) => {
-                    let Output { slots, placed, .. } = output;
-                    slots.set(of.place, Vertex { position, normal, kind: VertexKind::Smooth });
-                    placed.fallbacks.push((slots.first + of.place as u32, of.mean));
+                    // no way back: with it, meshes of gyroids crossed themselves more often
+                    output.slots.set(of.place, Vertex { position, normal, kind: VertexKind::Smooth });
                 }
                 None => self.move_to_crease(of, output),
             }

@@ -316,7 +316,7 @@ impl<'a> Quads<'a> {
             let (first, second) = (agreement[0].min(agreement[1]), agreement[2].min(agreement[3]));
             write(hit, halves(quad, first >= second));
             if first.max(second) < 0.0 {
-                cut.spoilt.extend(quad.iter().filter(|&&v| vertices.kinds[v as usize] != VertexKind::Cap));
+                cut.spoilt.extend(quad.iter().filter(|&&v| vertices.kinds[v as usize] == VertexKind::Sharp));
             }
         }
     }
