@@ -97,11 +97,12 @@ pub(super) fn is_table(path: &Path) -> bool {
 fn first_numbered(folder: &Path, part: &str, prefix: &str, suffix: &str) -> Option<String> {
     let names = std::fs::read_dir(folder.join(part)).into_iter().flatten().flatten();
     let mut names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let is_numbered = |name: &String| {
-        let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(suffix));
-        number.is_some_and(|number| number.parse::<usize>().is_ok())
-    };
-    names.find(is_numbered).map(|name| format!("{part}/{name}"))
+    names.find(|name| number_in(name, prefix, suffix).is_some()).map(|name| format!("{part}/{name}"))
+}
+
+/// The number between these ends of a name.
+pub(super) fn number_in(name: &str, prefix: &str, suffix: &str) -> Option<usize> {
+    name.strip_prefix(prefix)?.strip_suffix(suffix)?.parse().ok()
 }
 
 /// Whether a folder has the index of a sweep.

@@ -337,10 +337,8 @@ fn remove_numbered(folder: &Path, prefix: &str, suffix: &str, first: usize) -> R
     let failed = |e| not_cleared(folder, &e);
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(suffix));
-        if number.and_then(|n| n.parse::<usize>().ok()).is_some_and(|n| n >= first) {
+        let number = folder::number_in(&entry.file_name().to_string_lossy(), prefix, suffix);
+        if number.is_some_and(|number| number >= first) {
             std::fs::remove_file(entry.path()).map_err(failed)?;
         }
     }

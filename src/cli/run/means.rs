@@ -73,7 +73,7 @@ impl Means {
         }
     }
 
-    /// The same means, of a table that lacks samples.
+    /// These means, taken from a table that lacks so many samples.
     pub fn lacking(self, lost: usize) -> Self {
         Self { lost, ..self }
     }

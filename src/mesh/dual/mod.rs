@@ -99,11 +99,11 @@ pub fn dual_contouring(
         match Attempt::make(Draft::new(field, grid, triangles, work), is_clear)? {
             Attempt::Clear(mesh) => return Ok(mesh),
             // without the cuts nothing crosses
-            Attempt::Crossing { cut: Some((mut draft, far)), work: spent } if is_clear => {
+            Attempt::Crossing { cut: Some((mut draft, far)), work: spent } => {
                 draft.count(spent);
                 return apart(draft, far);
             }
-            Attempt::Crossing { work: spent, .. } => work = spent,
+            Attempt::Crossing { cut: None, work: spent } => work = spent,
         }
     }
     let joined = kept.unwrap_or_else(|| placed_and_joined(&mut work));
@@ -119,7 +119,8 @@ enum Attempt<'a> {
     Clear(Mesh),
     /// It does.
     Crossing {
-        /// The mesh before it was mended, and its edges that are far from the surface, if triangles crossed then.
+        /// The mesh before it was mended, and its edges that are far from the surface, if it was clear before edges were
+        /// cut, and triangles crossed then.
         cut: Option<(Draft<'a>, Vec<[u32; 2]>)>,
         work: Work,
     },
@@ -137,16 +138,15 @@ impl<'a> Attempt<'a> {
         let crossing = if is_long && may_cross { draft.crossings() } else { 0 };
         if crossing > MENDABLE {
             let work = draft.work();
-            return Ok(Self::Crossing { cut: Some((draft, far)), work });
+            return Ok(Self::Crossing { cut: is_clear.then_some((draft, far)), work });
         }
-        let cut = (crossing > 0).then(|| (draft.clone(), far.clone()));
+        let cut = (crossing > 0 && is_clear).then(|| (draft.clone(), far.clone()));
         let changes = draft.mend(far)?;
         let is_known = is_clear && !changes && !draft.is_cut();
-        let crossing = if is_known { 0 } else { draft.crossings() };
-        Ok(match crossing {
-            0 => Self::Clear(draft.finish()),
-            _ => Self::Crossing { cut, work: draft.work() },
-        })
+        if is_known || draft.crossings() == 0 {
+            return Ok(Self::Clear(draft.finish()));
+        }
+        Ok(Self::Crossing { cut, work: draft.work() })
     }
 }
 
