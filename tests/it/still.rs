@@ -27,20 +27,21 @@ scene deep {{
     )
 }
 
-/// Eighty layers on a lattice, whose first steps are the hardest that `dfsph` meets. (If densities came back
-/// within ten steps, however short, speeds and pressures would grow without bound.)
+/// Eighty layers on a lattice, whose first steps are the hardest that `dfsph` meets: nothing is too dense in them, all of the
+/// pressure is to be found at once, and a column that falls for some steps does not stop in time. (It fell with 1 m/s.)
 #[test]
-fn a_deep_column_does_not_burst() {
+fn a_deep_column_stands_from_the_first_step() {
     let mut simulation = simulation(&column(80));
+    let mut speed = 0.0_f64;
     while simulation.time() < 0.1 {
         simulation.step().unwrap_or_else(|e| panic!("{e}"));
+        speed = speed.max(simulation.stats().max_speed);
     }
-    let speed = simulation.stats().max_speed;
     let height = |p: DVec3| p.z;
     let top = simulation.particles().position.iter().map(height).fold(0.0, f64::max);
     println!("{} steps, at most {speed:.2} m/s, top at {top:.3} m", simulation.steps());
-    // a fall through the whole column would reach 4.4 m/s
-    assert!(speed < 2.0 && top < 1.1, "{speed} m/s, {top} m");
+    // a fall of 0.1 s would reach 1 m/s; the highest particles lie half a spacing below the surface
+    assert!(speed < 0.3 && (0.98..1.0).contains(&top), "{speed} m/s, {top} m");
 }
 
 /// Planes of particles under the pressure p swing with ω² = 6.82·p/(ρs²), the greatest eigenvalue of the forces

@@ -281,8 +281,14 @@ mod tests {
     type Coverage = super::Coverage<WallDrag>;
 
     const H: f64 = 0.3;
-    const WALL: Wall =
-        Wall { kernel: WallKernel::WendlandC2, h: H, layer: None, spacing: 1.0 / 2.6, at_rest: 0.0 };
+    const WALL: Wall = Wall {
+        kernel: WallKernel::WendlandC2,
+        h: H,
+        layer: None,
+        spacing: 1.0 / 2.6,
+        at_rest: 0.0,
+        lattice: 1.0,
+    };
 
     fn face(distance: f64, normal: DVec3) -> Part {
         Part::Face(Face { distance, normal: normal.normalize(), mean_curvature: 0.0 })

@@ -86,6 +86,24 @@ impl WallKernel {
             }
     }
 
+    /// The part of a kernel's sum over a cubic lattice that lies behind a face half a spacing before a particle, with
+    /// `ratio` spacings per support radius.
+    fn lattice_behind(self, ratio: f64) -> f64 {
+        let reach = ratio.ceil() as i32;
+        let side = || -reach..=reach;
+        let [mut behind, mut all] = [0.0; 2];
+        for z in side() {
+            for (x, y) in side().flat_map(|x| side().map(move |y| (x, y))) {
+                // the kernel is −dA/dδ over 2πδ; at the particle itself, its limit
+                let q = (f64::from(x * x + y * y + z * z).sqrt() / ratio).max(AT_PARTICLE);
+                let weight = self.steepness(q) / q;
+                all += weight;
+                behind += if z > 0 { weight } else { 0.0 };
+            }
+        }
+        behind / all
+    }
+
     /// A and −dA/dδ, computed together.
     #[inline]
     fn slope_and_steepness(self, delta: f64) -> (f64, f64) {
@@ -133,6 +151,12 @@ impl WallKernel {
     }
 }
 
+/// From so many spacings per support radius on sums over lattices are integrals.
+const LONGEST_SUM: f64 = 8.0;
+
+/// A distance, over the support radius, at which a kernel is what it is at its particle.
+const AT_PARTICLE: f64 = 1e-9;
+
 /// How walls enter the sums of a method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::sph) struct Wall {
@@ -145,6 +169,9 @@ pub(in crate::sph) struct Wall {
     pub spacing: f64,
     /// λ at half a spacing from a wall in layers, where a fluid rests.
     pub at_rest: f64,
+    /// How many times λ of layers a lattice behind the face has of the kernel's sum, half a spacing before it: layers
+    /// are planes and a lattice is points. With 2.2 spacings per support radius it is 0.975, with 3 it is 0.997.
+    pub lattice: f64,
 }
 
 /// What one face takes of a kernel.
@@ -156,14 +183,15 @@ pub(in crate::sph) struct OfFace {
     pub area: f64,
     /// ∫ y·∂W/∂y along the normal, minus λ: δ·A for a plane.
     pub spread: f64,
-    /// λ by layers a spacing apart: what a wall adds to the sum over a lattice of particles, of which the
-    /// first layer is half a spacing away.
+    /// What a wall adds to the sum over a lattice of particles, of which the first layer is half a spacing away: λ by
+    /// layers a spacing apart, as a lattice has it.
     pub filled: f64,
-    /// B, what a wall in layers adds to the density of a fluid that must not be compressed. It
-    /// is λ, and nearer than half a spacing, where a fluid at rest touches the wall, λ counts twice: the wall
-    /// mirrors the fluid. Between, over a width of [`BEND`], it bends. (With λ alone the fluid creeps into the
-    /// walls, and a level of ten layers sinks by 3 %. With a kink instead of the bend water at rest never
-    /// comes to rest.)
+    /// B, what a wall in layers adds to the density of a fluid that must not be compressed. It is what a lattice adds, and
+    /// nearer than half a spacing, where a fluid at rest touches the wall, λ counts twice: the wall mirrors the fluid. Over
+    /// a width of two [`BEND`] it bends from the one to the other. (Without the mirror the fluid creeps into the walls,
+    /// and a level of ten layers sinks by 3 %. With a kink instead of the bend water at rest never comes to rest. With λ
+    /// of layers instead of a lattice's part the first layer is 0.9 % too dense, and a deep column that rises by that
+    /// much bursts.)
     pub barrier: f64,
     /// −h·dB/dd.
     pub barrier_area: f64,
@@ -179,18 +207,24 @@ const NEWTON_STEP: f64 = 1e-8;
 const ON_FACE: f64 = 0.5;
 
 /// Half the width, in λ, of the bend of a barrier.
-const BEND: f64 = 0.02;
+const BEND: f64 = 0.01;
 
 impl Wall {
     /// A continuous wall, for a fluid with this spacing, m.
     pub fn new(kernel: WallKernel, h: f64, spacing: f64) -> Self {
-        Self { kernel, h, layer: None, spacing: spacing / h, at_rest: 0.0 }
+        let spacing = spacing / h;
+        let mut wall = Self { kernel, h, layer: None, spacing, at_rest: 0.0, lattice: 1.0 };
+        // wide kernels know no difference between planes and points
+        if spacing * LONGEST_SUM > 1.0 {
+            wall.lattice = kernel.lattice_behind(1.0 / spacing) / wall.by_layers(0.5 * spacing);
+        }
+        wall
     }
 
     /// A wall in layers that are a spacing, m, thick.
     pub fn in_layers(kernel: WallKernel, h: f64, spacing: f64) -> Self {
         let mut wall = Self { layer: Some(spacing / h), ..Self::new(kernel, h, spacing) };
-        wall.at_rest = wall.filled_by(0.5 * wall.spacing, 0.0);
+        wall.at_rest = wall.by_layers(0.5 * wall.spacing);
         wall
     }
 
@@ -243,7 +277,8 @@ impl Wall {
         let whole = || self.continuous(delta, curvature);
         let Some(layer) = self.layer else {
             let whole = whole();
-            return OfFace { filled: self.filled_by(delta, whole.part), ..whole };
+            let layers = if delta < 0.0 { whole.part } else { self.by_layers(delta) };
+            return OfFace { filled: self.as_lattice(delta, layers), ..whole };
         };
         let layered = self.of_layers(layer, delta, curvature);
         if delta >= 0.0 {
@@ -255,7 +290,7 @@ impl Wall {
         let mix = |layered: f64, whole: f64| layered + delta * (layered - whole);
         let part = mix(layered.part, whole.part);
         let (area, spread) = (mix(layered.area, whole.area), mix(layered.spread, whole.spread));
-        self.with_barrier(OfFace { part, area, spread, filled: part, ..layered })
+        self.with_barrier(OfFace { part, area, spread, filled: self.as_lattice(delta, part), ..layered })
     }
 
     /// The part of a continuous face.
@@ -266,19 +301,22 @@ impl Wall {
         OfFace { part, area, spread: delta * area, filled: part, barrier: 0.0, barrier_area: 0.0 }
     }
 
-    /// λ of a plane by layers a spacing apart, or `part` behind the face.
+    /// What a lattice adds where layers take this part of a kernel. Deep behind the face it is all.
     #[inline]
-    fn filled_by(&self, delta: f64, part: f64) -> f64 {
-        if delta < 0.0 {
-            return part;
-        }
+    fn as_lattice(&self, delta: f64, layers: f64) -> f64 {
+        (layers * (1.0 - (1.0 - self.lattice) * (1.0 + delta.min(0.0)))).min(1.0)
+    }
+
+    /// λ of a plane by layers a spacing apart, before the face.
+    #[inline]
+    fn by_layers(&self, delta: f64) -> f64 {
         let mut slopes = 0.0;
         let mut at = delta + 0.5 * self.spacing;
         while at < 1.0 {
             slopes += self.kernel.slope(at);
             at += self.spacing;
         }
-        (self.spacing * slopes).min(1.0)
+        self.spacing * slopes
     }
 
     /// The part of a face by the midpoint rule over the wall's layers, for δ > −1.
@@ -300,7 +338,7 @@ impl Wall {
         let area = layer * (steeps + curvature * (slopes - spreads));
         let spread = layer * (spreads - slopes) * (1.0 - curvature * delta);
         let part = part.clamp(0.0, 1.0);
-        OfFace { part, area, spread, filled: part, barrier: 0.0, barrier_area: 0.0 }
+        OfFace { part, area, spread, filled: self.as_lattice(delta, part), barrier: 0.0, barrier_area: 0.0 }
     }
 
     /// The part of a face with its barrier.
@@ -308,16 +346,21 @@ impl Wall {
     fn with_barrier(&self, of_face: OfFace) -> OfFace {
         let beyond = of_face.part - self.at_rest;
         // behind the face the wall is no mirror any more: deep in it B is one, as λ is
-        let most = ON_FACE - self.at_rest;
+        let (on_face, deep) = (ON_FACE - self.at_rest - BEND, 1.0 - self.lattice);
         let (more, slope) = match () {
             () if of_face.part > ON_FACE => {
-                (most * (1.0 - of_face.part) / (1.0 - ON_FACE), -most / (1.0 - ON_FACE))
+                let slope = (deep - on_face) / (1.0 - ON_FACE);
+                (on_face + slope * (of_face.part - ON_FACE), slope)
             }
-            () if beyond > BEND => (beyond, 1.0),
-            () if beyond < -BEND => (0.0, 0.0),
-            () => ((beyond + BEND).powi(2) / (4.0 * BEND), (beyond + BEND) / (2.0 * BEND)),
+            () if beyond < 0.0 => (0.0, 0.0),
+            () if beyond < 2.0 * BEND => (beyond.powi(2) / (4.0 * BEND), beyond / (2.0 * BEND)),
+            () => (beyond - BEND, 1.0),
         };
-        OfFace { barrier: of_face.part + more, barrier_area: (1.0 + slope) * of_face.area, ..of_face }
+        OfFace {
+            barrier: self.lattice * of_face.part + more,
+            barrier_area: (self.lattice + slope) * of_face.area,
+            ..of_face
+        }
     }
 }
 
@@ -329,6 +372,7 @@ fn horner(coefficients: &[f64], x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sph::kernel::Wendland;
     use std::f64::consts::PI;
 
     /// w(q) of the kernel.
@@ -540,19 +584,28 @@ mod tests {
             let [before, now, after] = [-step, 0.0, step].map(|d| wall.of_face(delta + d, 0.0));
             let slope = (before.barrier - after.barrier) / (2.0 * step);
             assert!((slope - now.barrier_area).abs() < 1e-5, "{delta}: {slope} {}", now.barrier_area);
-            assert!(now.barrier >= now.part);
+            // a fluid that B keeps is not denser than what its places say
+            assert!(now.barrier >= now.filled);
         }
         for k in 1..=100 {
             let deep = wall.of_face(-0.01 * f64::from(k), 0.0);
             assert!(deep.barrier <= 1.0 + 1e-12 && deep.barrier >= deep.part - 1e-12, "{k}: {deep:?}");
+            assert!(deep.filled <= 1.0 && deep.filled >= wall.lattice * deep.part, "{k}: {deep:?}");
             // the sum over layers is one up to half a hundredth, so its slope is not quite monotone
             assert!(deep.barrier_area >= -0.01, "{k}: {deep:?}");
         }
-        // where a fluid rests it is λ, up to the bend; on the wall a mirrored layer is added
-        let at_rest = wall.of_face(0.5 / 2.2, 0.0);
-        assert!((at_rest.barrier - at_rest.part - 0.25 * BEND).abs() < 1e-12);
-        let on_wall = wall.of_face(0.0, 0.0);
-        assert!((on_wall.barrier - 2.0 * on_wall.part + at_rest.part).abs() < 1e-12);
+        // a lattice at rest is as dense before a wall as in its depth
+        for ratio in [2.0, 2.2, 3.0] {
+            let wall = Wall::in_layers(WallKernel::WendlandC2, 1.0, 1.0 / ratio);
+            let at_rest = wall.of_face(0.5 / ratio, 0.0);
+            let lattice = Wendland::lattice_surface(ratio, 0).missing;
+            assert!((at_rest.barrier - lattice).abs() < 1e-12, "{ratio}: {at_rest:?} {lattice}");
+            assert!((at_rest.filled - lattice).abs() < 1e-12, "{ratio}: {at_rest:?} {lattice}");
+            // on the wall a mirrored layer is added
+            let on_wall = wall.of_face(0.0, 0.0);
+            let mirrored = on_wall.part - at_rest.part - BEND;
+            assert!((on_wall.barrier - on_wall.filled - mirrored).abs() < 1e-12, "{ratio}: {on_wall:?}");
+        }
         assert_eq!(Wall::new(WallKernel::WendlandC2, 1.0, 0.4).of_face(0.1, 0.0).barrier, 0.0);
     }
 }

@@ -3,22 +3,14 @@
 //! A sum over neighbours takes the empty half before a surface for room: the outermost particles have four fifths
 //! of the density at rest, and may come nearer to each other until they have all of it. Surface tension pulls just
 //! there: it drew the outermost layers together until a drop was a seventh too small, its tension nearly twice too
-//! strong, and its surface too ragged for normals, so that it stirred itself without end. With what is missing
-//! added, a flat surface of a lattice is as dense as its depth.
-//!
-//! The missing part is counted where tension moves single particles: where their spacing is below the capillary
-//! length √(σ/ρg). Without tension it would calm still water too (a pool of eight layers starts with 16 mm/s instead
-//! of 43), but columns of sixty layers on a lattice burst in their first steps: nothing in them is too dense then, and
-//! their pressure comes too late.
+//! strong, and its surface too ragged for normals, so that it stirred itself without end. And water at rest sank by a
+//! twentieth while it did so. With what is missing added, a flat surface of a lattice is as dense as its depth.
 //!
 //! What is missing follows from the normal: n = Σ V ∇W + ∇λ is zero in the depth, and before a flat surface both n and
 //! the missing part depend on the distance from it alone. Between the layers of a lattice the relation is
 //! taken as linear.
 
-use crate::sph::{
-    kernel::{Surface, Wendland},
-    params::Parameters,
-};
+use crate::sph::kernel::{Surface, Wendland};
 
 /// Normals of this length times h, and shorter ones, are disorder in the depth.
 const DISORDER: f64 = 0.1;
@@ -37,17 +29,6 @@ pub(super) struct FreeSurface {
 }
 
 impl FreeSurface {
-    /// That of a fluid, if its tension moves single particles.
-    pub fn of(parameters: &Parameters) -> Option<Self> {
-        let Parameters { surface_tension, rest_density, gravity, most_gravity, support_radius, .. } =
-            *parameters;
-        let spacing = parameters.spacing();
-        // the tension's acceleration of a particle against that by gravity
-        let gravity = gravity.length().max(most_gravity);
-        let pulls = surface_tension > rest_density * gravity * spacing.powi(2);
-        pulls.then(|| Self::of_lattice(support_radius / spacing))
-    }
-
     /// That of a lattice with `ratio` spacings per support radius.
     pub fn of_lattice(ratio: f64) -> Self {
         let mut points = [[DISORDER, 0.0]; LAYERS + 1];
@@ -99,25 +80,6 @@ mod tests {
                 assert!((density - 1.0).abs() < 3e-3, "{ratio}, layer {depth}: {density}");
             }
         }
-    }
-
-    #[test]
-    fn gravity_by_a_formula_counts_too() {
-        let of = |surface_tension: f64, spacing: f64, gravity: f64, most_gravity: f64| {
-            FreeSurface::of(&Parameters {
-                rest_density: 1000.0,
-                particle_mass: 1000.0 * spacing.powi(3),
-                surface_tension,
-                gravity: DVec3::new(0.0, 0.0, -gravity),
-                most_gravity,
-                ..Parameters::default()
-            })
-            .is_some()
-        };
-        // the capillary length of water is 2.7 mm
-        assert!(of(0.072, 2e-3, 9.81, 0.0) && !of(0.072, 4e-3, 9.81, 0.0));
-        assert!(of(0.072, 4e-3, 0.0, 0.0) && !of(0.072, 4e-3, 0.0, 9.81));
-        assert!(!of(0.0, 2e-3, 0.0, 0.0));
     }
 
     #[test]

@@ -43,7 +43,8 @@ pub struct Dfsph {
     /// Mean excess of the density that is accepted, as a part of the rest density. One particle in two hundred may
     /// exceed it by more than ten times as much. Default 1e-4.
     pub tolerance: f64,
-    /// Most iterations of each of the two solves in one step. Default 100.
+    /// Most iterations of each of the two solves in one step; thirty times as many where no pressure is known to begin with,
+    /// as in the first step. Default 100.
     pub most_iterations: u32,
     /// α of the artificial viscosity (Monaghan 1992), for a speed of sound of ten times the greatest expected
     /// speed. Default 0.06; zero: the term is not computed.

@@ -67,7 +67,7 @@ pub(super) enum Continuation {
 #[derive(Clone, Copy)]
 pub(super) struct Densities<'a> {
     pub constants: Constants,
-    pub surface: Option<&'a FreeSurface>,
+    pub surface: &'a FreeSurface,
     pub walls: &'a Walls,
 }
 
@@ -112,14 +112,12 @@ impl PairPass<0, 6, 8> for Densities<'_> {
             let barrier = slope + rest_density * wall.barrier.gradient;
             factors = [own.length_squared() + others, barrier.length_squared() + squares];
         }
-        if let Some(surface) = self.surface {
-            let missing = rest_density * surface.missing(crowding.length() * self.constants.kernel.h);
-            density += match self.walls.near(i) {
-                // a gap beside a wall is no surface
-                Some(_) => missing.min((rest_density - filled).max(0.0)),
-                None => missing,
-            };
-        }
+        let missing = rest_density * self.surface.missing(crowding.length() * self.constants.kernel.h);
+        density += match self.walls.near(i) {
+            // a gap beside a wall is no surface
+            Some(_) => missing.min((rest_density - filled).max(0.0)),
+            None => missing,
+        };
         let crowding = depth(spread) * crowding;
         let [linear, barrier] = factors;
         [density, linear, barrier, crowding.x, crowding.y, crowding.z, spread, filled]

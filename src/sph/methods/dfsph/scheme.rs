@@ -18,9 +18,8 @@
 //! (Baumgarte 1972). The tolerance of this solve is that of the density over τ. A part of what displacements take
 //! away is added to the debt, see [`OWED`].
 //!
-//! Where surface tension pulls at single particles, both systems take the half of the kernel that is missing before
-//! a free surface for fluid ([`free_surface`](super::free_surface)), so that the outermost particles keep their
-//! distance as those in the depth do.
+//! Both systems take the part of the kernel that is missing before a free surface for fluid
+//! ([`free_surface`](super::free_surface)), so that the outermost particles keep their distance as those in the depth do.
 //!
 //! The two systems treat walls differently.
 //!
@@ -30,7 +29,7 @@
 //! solution adds no energy. (Measured on a still column: with λ and ∇λ alone the pressure of the first layer
 //! comes out 2.2 times too high, and in a narrow vessel all of it by 20 %.)
 //!
-//! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is λ where a
+//! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is a lattice's part where a
 //! fluid at rest touches the wall, and b(s′) by its derivative, exact for each face. The solve therefore meets the
 //! density that is found next, up to the square of the displacement. (With the system of forces a breaking dam
 //! keeps three times the tolerance.)
@@ -77,9 +76,15 @@ const RELAXATION_STEPS: f64 = 8.0;
 /// at once, and with eight steps a column of eighty layers bursts at its start.
 const RELAXATION_FALLS: f64 = 2.0;
 
-/// The most steps of a relaxation time, for a gravity close to zero. Where a column would burst, steps are so
-/// short that a relaxation time has some sixty of them.
+/// The most steps of a relaxation time, for a gravity close to zero: of those that the motion allows. Pressure makes steps
+/// shorter, and a relaxation time that followed would make the pressure grow without end.
 const MOST_RELAXATION_STEPS: f64 = 100.0;
+
+/// How many times as many iterations, and how much smaller an error, a solve of pressures has that begins with none: a
+/// column that is new, or that strikes the ground, has all of its weight to find. With those of other steps a column of
+/// sixty layers, whose pressure comes too late, falls and bursts.
+const FIRST_ITERATIONS: u32 = 30;
+const FIRST_TOLERANCE: f64 = 0.1;
 
 /// Part of a density that displacements take away which becomes a debt. Without it a column of forty layers, ten
 /// wide, sinks at 0.3 m/s with a velocity in which the system of forces sees no divergence, and displacements
@@ -122,8 +127,8 @@ pub struct DivergenceFree {
     /// that at rest.
     pub(super) loaded: Vec<f64>,
     pub(super) walls: Walls,
-    /// What kernels miss before a free surface, where that counts as filled.
-    surface: Option<FreeSurface>,
+    /// What kernels miss before a free surface.
+    surface: FreeSurface,
     /// Iterations of the last step's solvers.
     pub(super) iterations: u32,
 }
@@ -220,7 +225,7 @@ impl DivergenceFree {
             drift: Vectors::default(),
             loaded: vec![0.0; n],
             walls: Walls::default(),
-            surface: FreeSurface::of(&core.parameters),
+            surface: FreeSurface::of_lattice(core.parameters.support_radius / core.parameters.spacing()),
             iterations: 0,
         };
         scheme.settle(core, &mut []);
@@ -248,8 +253,7 @@ impl DivergenceFree {
         self.walls.find(core);
         let mut density = std::mem::take(&mut core.particles.density);
         let (constants, walls) = (Constants::of(&core.parameters), &self.walls);
-        let surface = self.surface.as_ref();
-        let pass = Densities { constants, surface, walls };
+        let pass = Densities { constants, surface: &self.surface, walls };
         self.spread.resize(density.len(), 0.0);
         self.crowding.resize(density.len());
         let Vectors { x, y, z } = &mut self.crowding;
@@ -326,10 +330,14 @@ impl DivergenceFree {
         );
         // What a step leaves becomes a debt, which the next ones pay back: of eight tolerances at most where this goes on and on.
         // What is promised of densities is a matter of the places alone.
-        let goal = Goal {
+        let mut goal = Goal {
             tolerance: RELAXATION_STEPS * self.numbers.tolerance * rest / relaxation,
             most_iterations: self.numbers.most_iterations,
         };
+        if self.forces.s.iter().all(|s| *s == 0.0) {
+            goal.tolerance *= FIRST_TOLERANCE;
+            goal.most_iterations = goal.most_iterations.saturating_mul(FIRST_ITERATIONS);
+        }
         self.iterations = self.forces.solve(core, &self.walls, &self.free, dt, goal, Begin::Last);
         if let Some(reaction) = Reaction::of(core, dt) {
             self.forces.note_walls(reaction, &self.walls, rest);
@@ -407,15 +415,16 @@ impl DivergenceFree {
 /// an acceleration large. A debt that were paid back within eight such steps would become a speed without bound (a still
 /// fluid with frames 0.1 ms apart reached 11 m/s), so it has the time that eight steps of the expected motion take.
 fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
-    let fall = (parameters.support_radius / parameters.gravity.length()).sqrt();
-    let falls =
-        if fall.is_finite() { (RELAXATION_FALLS * fall).min(MOST_RELAXATION_STEPS * dt) } else { 0.0 };
+    // where nothing is expected to move, steps have no length of their own but that between frames
+    let allowed = parameters.time_step.min(parameters.stable_dt(speed));
+    let most = MOST_RELAXATION_STEPS * allowed;
+    let gravity = parameters.gravity.length().max(parameters.most_gravity);
+    let fall = (parameters.support_radius / gravity).sqrt();
+    let falls = if fall.is_finite() { (RELAXATION_FALLS * fall).min(most) } else { 0.0 };
     let moving = RELAXATION_STEPS * dt;
     let slow = falls.max(moving);
     let courant = (dt * speed / (ADVECTION * parameters.spacing())).min(1.0);
     let in_steps = slow + (moving - slow) * courant;
-    // where nothing is expected to move, steps have no length of their own but that between frames
-    let allowed = parameters.time_step.min(parameters.stable_dt(speed));
     let expected = RELAXATION_STEPS * ADVECTION * parameters.spacing() / speed.max(parameters.expected_speed);
-    in_steps.max(expected.min(MOST_RELAXATION_STEPS * allowed))
+    in_steps.max(expected.min(most))
 }

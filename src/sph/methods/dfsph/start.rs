@@ -34,8 +34,8 @@ const PACKING_ROUNDS: usize = 100;
 const PACKING_FACTOR: f64 = 0.05;
 
 /// Mean excess of the density from which on what moving apart takes away is no debt of the first steps. (The particles in a bent
-/// tube, 3 % too dense, would get speeds of 6 m/s from it. A column of eighty layers, whose edges only are too dense, needs
-/// it: without that push its pressure comes too late, and it bursts.)
+/// tube, 3 % too dense, would get speeds of 6 m/s from it. A column of forty layers whose places have a jitter of a twentieth
+/// of the spacing needs it: without that push its pressure comes too late, and it bursts.)
 const CROWDED: f64 = 0.01;
 
 /// Packing ends when no particle moves farther than this part of the spacing in a round.
