@@ -2,7 +2,9 @@
 
 use std::sync::OnceLock;
 
-use cranelift_codegen::ir::{Function, InstBuilder, UserFuncName, Value};
+use cranelift_codegen::ir::{
+    Function, InstBuilder, StackSlotData, StackSlotKind, Type, UserFuncName, Value, types,
+};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Linkage, Module, default_libcall_names};
@@ -65,7 +67,7 @@ pub fn define(
     }
     let mut shared = FunctionBuilderContext::new();
     let mut builder = FunctionBuilder::new(&mut context.func, &mut shared);
-    emit(&mut builder, (precision, wanted), &hosts);
+    emit(&mut builder, (precision, wanted), (&hosts, pointer));
     builder.finalize(module.target_config());
     let id = module
         .declare_function(&wanted.symbol(precision), Linkage::Local, &signature)
@@ -75,7 +77,11 @@ pub fn define(
 }
 
 /// The whole function.
-fn emit(builder: &mut FunctionBuilder<'_>, (precision, wanted): (Precision, Wanted), hosts: &Hosts) {
+fn emit(
+    builder: &mut FunctionBuilder<'_>,
+    (precision, wanted): (Precision, Wanted),
+    (hosts, pointer): (&Hosts, Type),
+) {
     let [entry, rare, common] = std::array::from_fn(|_| builder.create_block());
     builder.set_cold_block(rare);
     builder.append_block_params_for_function_params(entry);
@@ -104,11 +110,37 @@ fn emit(builder: &mut FunctionBuilder<'_>, (precision, wanted): (Precision, Want
     emitter.builder.switch_to_block(common);
     emitter.builder.ins().return_(&results);
 
-    emitter.builder.switch_to_block(rare);
-    let lanes = precision.lanes() as u8;
-    let mut emitter = Emitter::new(builder, (precision, lanes), (&graph, &forms), hosts);
-    let results: Vec<Value> =
-        wanted.functions().map(|function| emitter.call(HostFunction::Unary(function), &[x])).collect();
-    emitter.builder.ins().return_(&results);
-    emitter.builder.seal_all_blocks();
+    builder.switch_to_block(rare);
+    let results = call_by_lanes(builder, (precision, wanted), (hosts, pointer), x);
+    builder.ins().return_(&results);
+    builder.seal_all_blocks();
+}
+
+/// The functions of the mathematical library, in each lane. The lanes wait in memory: the vector would be saved before it
+/// is known whether there is anything to call.
+fn call_by_lanes(
+    builder: &mut FunctionBuilder<'_>,
+    (precision, wanted): (Precision, Wanted),
+    (hosts, pointer): (&Hosts, Type),
+    x: Value,
+) -> Vec<Value> {
+    let (lane, vector) = match precision {
+        Precision::F32 => (types::F32, types::F32X4),
+        Precision::F64 => (types::F64, types::F64X2),
+    };
+    let slot = StackSlotData::new(StackSlotKind::ExplicitSlot, vector.bytes(), 4);
+    let arguments = builder.create_sized_stack_slot(slot.clone());
+    builder.ins().stack_store(pointer, x, arguments, 0);
+    let mut found = Vec::new();
+    for function in wanted.functions().map(HostFunction::Unary) {
+        let results = builder.create_sized_stack_slot(slot.clone());
+        for offset in (0..vector.bytes() as i32).step_by(lane.bytes() as usize) {
+            let argument = builder.ins().stack_load(pointer, lane, arguments, offset);
+            let call = builder.ins().call(hosts.functions[&function], &[argument]);
+            let result = builder.inst_results(call)[0];
+            builder.ins().stack_store(pointer, result, results, offset);
+        }
+        found.push(results);
+    }
+    found.into_iter().map(|results| builder.ins().stack_load(pointer, vector, results, 0)).collect()
 }

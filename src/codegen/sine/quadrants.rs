@@ -9,7 +9,7 @@ use crate::codegen::emitter::{ENDIANNESS, Emitter};
 /// 1.5 · 2⁵²: a number below 2⁵¹ that is added to it is rounded to a whole one, which its last bits then hold.
 pub(super) const TO_WHOLE: f64 = 1.5 / f64::EPSILON;
 /// 2/π
-pub(super) const QUARTERS: f64 = 6.36619772367581382433e-01;
+pub(super) const QUARTERS: f64 = std::f64::consts::FRAC_2_PI;
 
 /// Lanes of `f64` as far as they are known without their quadrants.
 pub(super) struct Quadrants {
