@@ -12,7 +12,8 @@ use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, typ
 use cranelift_frontend::FunctionBuilder;
 
 use super::host_functions::HostFunction;
-use crate::ir::{Binary, Expr, Forms, Graph, Lookup, Node, Tables};
+use super::sine::{Wanted, Waves};
+use crate::ir::{Binary, Expr, Forms, Graph, Lookup, Node, Tables, UnaryFunction};
 use crate::precision::Precision;
 use crate::table::Table;
 
@@ -23,16 +24,23 @@ pub(super) struct Emitter<'a, 'f> {
     /// Lanes that hold a point. Functions are called for no others: a single point would pay for the origin as well.
     lanes: u8,
     pub forms: &'a Forms,
-    /// The functions that the program calls.
-    hosts: &'a Hosts,
+    pub hosts: &'a Hosts,
     /// Intermediate results of R₀ for a pair of operands: value and weights share them.
     pub parts: HashMap<(Node, Node, Junction), R0Parts>,
     /// Pairs whose weights will be asked for: their value uses the same quotient.
     pub weighted: HashSet<(Node, Node, Junction)>,
+    /// Sines and cosines of arguments that had one: the other is found with it.
+    pub waves: HashMap<Node, Waves>,
 }
 
-/// The functions of the mathematical library that were declared in a program.
-pub(super) type Hosts = HashMap<HostFunction, FuncRef>;
+/// What a program calls.
+#[derive(Default)]
+pub(super) struct Hosts {
+    /// The functions of the mathematical library.
+    pub functions: HashMap<HostFunction, FuncRef>,
+    /// Those of `sine`: which results of a node are asked for, and what finds them.
+    pub waves: HashMap<Node, (Wanted, FuncRef)>,
+}
 
 /// A node, and the value that holds it.
 pub(super) type Operand = (Node, Value);
@@ -79,7 +87,8 @@ impl<'a, 'f> Emitter<'a, 'f> {
             _ => None,
         });
         let weighted = weights.flat_map(|(u, v, junction)| [(u, v, junction), (v, u, junction)]).collect();
-        Self { builder, precision, lanes, forms, hosts, parts: HashMap::new(), weighted }
+        let (parts, waves) = (HashMap::new(), HashMap::new());
+        Self { builder, precision, lanes, forms, hosts, parts, weighted, waves }
     }
 
     pub fn lane_type(&self) -> Type {
@@ -147,6 +156,25 @@ impl<'a, 'f> Emitter<'a, 'f> {
         self.builder.ins().band_not(a, sign)
     }
 
+    /// The sine or the cosine of a node in every lane.
+    ///
+    /// # Panics
+    /// If it was not declared that this is asked for: a bug of the caller.
+    pub fn wave(&mut self, function: UnaryFunction, (node, x): (Node, Value)) -> Value {
+        let waves = match self.waves.get(&node) {
+            Some(&waves) => waves,
+            None => {
+                let (wanted, function) = self.hosts.waves[&node];
+                let call = self.builder.ins().call(function, &[x]);
+                let waves = wanted.of(self.builder.inst_results(call));
+                self.waves.insert(node, waves);
+                waves
+            }
+        };
+        let found = if function == UnaryFunction::Sin { waves.sine } else { waves.cosine };
+        found.expect("every use is declared")
+    }
+
     /// A host function, lane by lane.
     ///
     /// # Panics
@@ -167,7 +195,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
 
     /// A host function, lane by lane, with arguments that all lanes share before the others. Lanes without a point are zero.
     fn call_behind(&mut self, function: HostFunction, shared: &[Value], operands: &[Value]) -> Value {
-        let function = self.hosts[&function];
+        let function = self.hosts.functions[&function];
         let vector = self.vector_type();
         let first = self.call_in_lane(function, shared, operands, 0);
         let mut result = self.builder.ins().scalar_to_vector(vector, first);
@@ -187,4 +215,4 @@ impl<'a, 'f> Emitter<'a, 'f> {
 }
 
 /// Only the byte order of a bitcast between lanes of one width, where it does not matter.
-const ENDIANNESS: cranelift_codegen::ir::Endianness = cranelift_codegen::ir::Endianness::Little;
+pub(super) const ENDIANNESS: cranelift_codegen::ir::Endianness = cranelift_codegen::ir::Endianness::Little;

@@ -17,6 +17,7 @@ mod operations;
 mod r0;
 mod range;
 mod request;
+mod sine;
 mod translate;
 
 pub use host_functions::Library;

@@ -3,11 +3,13 @@
 use cranelift_codegen::isa::{self, OwnedTargetIsa};
 use cranelift_module::{Linkage, default_libcall_names};
 use cranelift_object::{ObjectBuilder, ObjectModule};
+use rustc_hash::FxHashSet;
 
 use super::host_functions::Library;
 use super::machine::{CodegenError, object_target, object_target_of};
 use super::request::Request;
-use super::translate::{Named, define, needed};
+use super::sine;
+use super::translate::{Named, define, needed, waves};
 
 /// A program of an object file, under the name that a linker knows it by.
 pub struct ObjectProgram<'a> {
@@ -43,6 +45,14 @@ pub fn object(
     let bug = |what: &dyn std::fmt::Display| CodegenError::Bug(what.to_string());
     let builder = ObjectBuilder::new(isa, "rfm", default_libcall_names()).map_err(|error| bug(&error))?;
     let mut module = ObjectModule::new(builder);
+    if library == Library::Rfm {
+        let of = |&ObjectProgram { request, .. }: &ObjectProgram<'_>| {
+            waves(request, &needed(request)).into_values().map(move |wanted| (request.precision, wanted))
+        };
+        for (precision, wanted) in programs.iter().flat_map(of).collect::<FxHashSet<_>>() {
+            sine::define(&mut module, precision, wanted)?;
+        }
+    }
     for ObjectProgram { symbol, request } in programs {
         let named = Named { name: symbol, linkage: Linkage::Export, library };
         define(&mut module, *request, named, false)?;

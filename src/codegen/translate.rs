@@ -15,7 +15,8 @@ use super::machine::{CodegenError, target};
 use super::memory::Code;
 use super::range::{self, Instructions};
 use super::request::{Request, Shape, pointers};
-use crate::ir::{Axis, Expr, Node};
+use super::sine::{self, Wanted};
+use crate::ir::{Axis, Expr, Node, Unary, UnaryFunction};
 use crate::precision::Precision;
 
 /// The code generator's own texts of a program.
@@ -48,13 +49,17 @@ impl Listing {
 }
 
 fn build(request: Request<'_>, listing: bool) -> Result<(Code, Listing), CodegenError> {
-    let isa = target(needed(request).len())?;
+    let needed = needed(request);
+    let isa = target(needed.len())?;
     let mut linker = JITBuilder::with_isa(isa, default_libcall_names());
     for function in HostFunction::all() {
         let symbol = function.symbol(request.precision, Library::Rfm);
         linker.symbol(symbol, function.address(request.precision));
     }
     range::register(&mut linker);
+    for wanted in waves(request, &needed).into_values() {
+        linker.symbol(wanted.symbol(request.precision), sine::address(request.precision, wanted)?);
+    }
     let mut module = JITModule::new(linker);
     let named = Named { name: "program", linkage: Linkage::Local, library: Library::Rfm };
     let Defined { id, size, listing } = define(&mut module, request, named, listing)?;
@@ -110,9 +115,7 @@ pub(super) fn define(
     declare_parameters(&mut context.func, module, request);
 
     let hosts = match request.shape {
-        Shape::Point | Shape::Batch => {
-            declare_hosts(module, &mut context.func, (request, named.library), &needed)
-        }
+        Shape::Point | Shape::Batch => declare_hosts(module, &mut context.func, (request, named), &needed),
         Shape::Range(_) | Shape::Slopes(_) => Ok(Hosts::default()),
     };
     let hosts = hosts.map_err(|e| bug(&e))?;
@@ -166,23 +169,60 @@ fn declare_parameters(function: &mut Function, module: &impl Module, request: Re
 fn declare_hosts(
     module: &mut impl Module,
     function: &mut Function,
-    (request, library): (Request<'_>, Library),
+    (request, named): (Request<'_>, Named<'_>),
     needed: &[Node],
 ) -> Result<Hosts, cranelift_module::ModuleError> {
     let mut hosts = Hosts::default();
+    let pointer = module.target_config().pointer_type();
+    let waves = match named.library {
+        Library::Rfm => waves(request, needed),
+        Library::System => FxHashMap::default(),
+    };
     for &node in needed {
-        let Some(host) = HostFunction::of(request.graph.expr(node)) else { continue };
-        if hosts.contains_key(&host) {
+        let expr = request.graph.expr(node);
+        let Some(host) = HostFunction::of(expr) else { continue };
+        if wave(request, node).is_some_and(|(_, argument)| waves.contains_key(&argument)) {
             continue;
         }
-        let convention = module.target_config().default_call_conv;
-        let pointer = module.target_config().pointer_type();
-        let signature = host.signature(convention, request.precision, pointer);
-        let id =
-            module.declare_function(&host.symbol(request.precision, library), Linkage::Import, &signature)?;
-        hosts.insert(host, module.declare_func_in_func(id, function));
+        if hosts.functions.contains_key(&host) {
+            continue;
+        }
+        let signature = host.signature(module.target_config().default_call_conv, request.precision, pointer);
+        let symbol = host.symbol(request.precision, named.library);
+        let id = module.declare_function(&symbol, Linkage::Import, &signature)?;
+        hosts.functions.insert(host, module.declare_func_in_func(id, function));
+    }
+    let mut declared = FxHashMap::default();
+    for (argument, wanted) in waves {
+        let function = match declared.get(&wanted) {
+            Some(&function) => function,
+            None => {
+                let (symbol, signature) =
+                    (wanted.symbol(request.precision), wanted.signature(request.precision));
+                let id = module.declare_function(&symbol, Linkage::Import, &signature)?;
+                *declared.entry(wanted).or_insert(module.declare_func_in_func(id, function))
+            }
+        };
+        hosts.waves.insert(argument, (wanted, function));
     }
     Ok(hosts)
+}
+
+/// The arguments of sines and cosines that functions of `sine` find.
+pub(super) fn waves(request: Request<'_>, needed: &[Node]) -> FxHashMap<Node, Wanted> {
+    let mut waves: FxHashMap<Node, Wanted> = FxHashMap::default();
+    for (function, argument) in needed.iter().filter_map(|&node| wave(request, node)) {
+        waves.entry(argument).or_default().add(function);
+    }
+    waves
+}
+
+/// The function and the argument of a node that may be computed by functions of `sine`.
+fn wave(request: Request<'_>, node: Node) -> Option<(UnaryFunction, Node)> {
+    match request.graph.expr(node) {
+        Expr::Unary(Unary::Call(function), argument) if sine::is_wave(function) => Some((function, argument)),
+        _ => None,
+    }
 }
 
 fn point(builder: &mut FunctionBuilder<'_>, request: Request<'_>, needed: &[Node], hosts: &Hosts) {
@@ -290,7 +330,12 @@ fn nodes(
             Expr::Coordinate(Axis::T) => unreachable!("`build` refuses time"),
             Expr::Parameter(i) => emitter.parameter(parameters, i),
             Expr::Uniform(i) => emitter.parameter(uniforms, i),
-            Expr::Unary(op, a) => emitter.unary(op, values[&a]),
+            Expr::Unary(op, a) => match wave(request, node) {
+                Some((function, _)) if emitter.hosts.waves.contains_key(&a) => {
+                    emitter.wave(function, (a, values[&a]))
+                }
+                _ => emitter.unary(op, values[&a]),
+            },
             Expr::Binary(op, a, b) => emitter.binary(op, (a, values[&a]), (b, values[&b])),
             Expr::Lookup(lookup, at) => {
                 emitter.lookup(lookup, request.graph.tables(), at.map(|node| values[&node]))

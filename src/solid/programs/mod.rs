@@ -8,3 +8,5 @@ pub mod kernels;
 pub mod number;
 pub mod on_demand;
 pub mod ranges;
+#[cfg(test)]
+mod wave_tests;

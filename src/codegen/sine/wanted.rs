@@ -1,0 +1,68 @@
+//! Which of sine and cosine a program asks for, and the names and signatures of the functions that find them.
+
+use cranelift_codegen::ir::{AbiParam, Signature, Value, types};
+use cranelift_codegen::isa::CallConv;
+
+use crate::ir::UnaryFunction;
+use crate::precision::Precision;
+
+/// Which of the two are asked for of one argument.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub struct Wanted {
+    pub sine: bool,
+    pub cosine: bool,
+}
+
+/// What they are, as far as they are asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Waves {
+    pub sine: Option<Value>,
+    pub cosine: Option<Value>,
+}
+
+impl Wanted {
+    pub fn add(&mut self, function: UnaryFunction) {
+        self.sine |= function == UnaryFunction::Sin;
+        self.cosine |= function == UnaryFunction::Cos;
+    }
+
+    /// The name of the function that finds them.
+    pub fn symbol(self, precision: Precision) -> String {
+        let functions = match (self.sine, self.cosine) {
+            (true, false) => "sines",
+            (false, true) => "cosines",
+            _ => "sines_and_cosines",
+        };
+        format!("rfm_{functions}_{}", precision.name())
+    }
+
+    /// Its signature: a vector for a vector, or two of them, that of the sines first.
+    pub fn signature(self, precision: Precision) -> Signature {
+        let vector = AbiParam::new(match precision {
+            Precision::F32 => types::F32X4,
+            Precision::F64 => types::F64X2,
+        });
+        let mut signature = Signature::new(CallConv::Fast);
+        signature.params = vec![vector];
+        signature.returns = self.functions().map(|_| vector).collect();
+        signature
+    }
+
+    /// The functions themselves.
+    pub fn functions(self) -> impl Iterator<Item = UnaryFunction> {
+        let both = [(self.sine, UnaryFunction::Sin), (self.cosine, UnaryFunction::Cos)];
+        both.into_iter().filter(|&(is_wanted, _)| is_wanted).map(|(_, function)| function)
+    }
+
+    /// The results of a call.
+    pub fn of(self, results: &[Value]) -> Waves {
+        let sine = results.first().copied().filter(|_| self.sine);
+        let cosine = results.last().copied().filter(|_| self.cosine);
+        Waves { sine, cosine }
+    }
+}
+
+/// Whether there are instructions for a function of the mathematical library.
+pub fn is_wave(function: UnaryFunction) -> bool {
+    matches!(function, UnaryFunction::Sin | UnaryFunction::Cos)
+}
