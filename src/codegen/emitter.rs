@@ -165,6 +165,7 @@ impl<'a, 'f> Emitter<'a, 'f> {
             Some(&waves) => waves,
             None => {
                 let (wanted, function) = self.hosts.waves[&node];
+                let x = if self.lanes == 1 { self.in_all_lanes(x) } else { x };
                 let call = self.builder.ins().call(function, &[x]);
                 let waves = wanted.of(self.builder.inst_results(call));
                 self.waves.insert(node, waves);
@@ -173,6 +174,12 @@ impl<'a, 'f> Emitter<'a, 'f> {
         };
         let found = if function == UnaryFunction::Sin { waves.sine } else { waves.cosine };
         found.expect("every use is declared")
+    }
+
+    /// What the first lane holds, in all lanes: lanes without a point may hold what takes a function's slow path.
+    fn in_all_lanes(&mut self, x: Value) -> Value {
+        let (first, vector) = (self.builder.ins().extractlane(x, 0), self.vector_type());
+        self.builder.ins().splat(vector, first)
     }
 
     /// A host function, lane by lane.

@@ -49,7 +49,9 @@ pub fn object(
         let of = |&ObjectProgram { request, .. }: &ObjectProgram<'_>| {
             waves(request, &needed(request)).into_values().map(move |wanted| (request.precision, wanted))
         };
-        for (precision, wanted) in programs.iter().flat_map(of).collect::<FxHashSet<_>>() {
+        let called: FxHashSet<_> = programs.iter().flat_map(of).collect();
+        for function in sine::all().filter(|function| called.contains(function)) {
+            let (precision, wanted) = function;
             sine::define(&mut module, precision, wanted)?;
         }
     }

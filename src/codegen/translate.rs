@@ -211,6 +211,10 @@ fn declare_hosts(
 /// The arguments of sines and cosines that functions of `sine` find.
 pub(super) fn waves(request: Request<'_>, needed: &[Node]) -> FxHashMap<Node, Wanted> {
     let mut waves: FxHashMap<Node, Wanted> = FxHashMap::default();
+    if matches!(request.shape, Shape::Range(_) | Shape::Slopes(_)) {
+        // ranges have rules of their own
+        return waves;
+    }
     for (function, argument) in needed.iter().filter_map(|&node| wave(request, node)) {
         waves.entry(argument).or_default().add(function);
     }

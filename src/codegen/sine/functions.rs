@@ -39,8 +39,9 @@ fn compile(precision: Precision, wanted: Wanted) -> Result<*const u8, CodegenErr
     let mut module = JITModule::new(linker);
     let id = define(&mut module, precision, wanted)?;
     module.finalize_definitions().map_err(|e| CodegenError::Unsupported(e.to_string()))?;
-    // a module that is dropped leaves its memory as it is
-    Ok(module.get_finalized_function(id))
+    let address = module.get_finalized_function(id);
+    std::mem::forget(module);
+    Ok(address)
 }
 
 /// Compiles a function into a module: one of executable memory, or an object file.

@@ -18,4 +18,4 @@ mod single;
 mod wanted;
 
 pub(super) use functions::{address, define};
-pub(super) use wanted::{Wanted, Waves, is_wave};
+pub(super) use wanted::{Wanted, Waves, all, is_wave};

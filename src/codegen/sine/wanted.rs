@@ -29,9 +29,10 @@ impl Wanted {
     /// The name of the function that finds them.
     pub fn symbol(self, precision: Precision) -> String {
         let functions = match (self.sine, self.cosine) {
+            (true, true) => "sines_and_cosines",
             (true, false) => "sines",
             (false, true) => "cosines",
-            _ => "sines_and_cosines",
+            (false, false) => unreachable!("one of them is asked for"),
         };
         format!("rfm_{functions}_{}", precision.name())
     }
@@ -60,6 +61,14 @@ impl Wanted {
         let cosine = results.last().copied().filter(|_| self.cosine);
         Waves { sine, cosine }
     }
+}
+
+/// All functions, in the order in which object files have them.
+pub fn all() -> impl Iterator<Item = (Precision, Wanted)> {
+    let wanted = [(true, false), (false, true), (true, true)].map(|(sine, cosine)| Wanted { sine, cosine });
+    [Precision::F32, Precision::F64]
+        .into_iter()
+        .flat_map(move |precision| wanted.map(|wanted| (precision, wanted)))
 }
 
 /// Whether there are instructions for a function of the mathematical library.

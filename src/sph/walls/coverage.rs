@@ -39,7 +39,7 @@ const LEAST_TAKEN: f64 = 1e-9;
 pub(in crate::sph) struct Coverage<F = ()> {
     /// λ = ∫ W, 0 to 1.
     pub part: f64,
-    /// λ by layers a spacing apart, see [`OfFace::filled`].
+    /// What a wall adds to the sum over a lattice of particles, see [`OfFace::filled`].
     pub filled: f64,
     /// ∇λ = ∫ ∇W, 1/m; it points out of the fluid.
     pub gradient: DVec3,

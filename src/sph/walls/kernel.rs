@@ -170,7 +170,8 @@ pub(in crate::sph) struct Wall {
     /// λ at half a spacing from a wall in layers, where a fluid rests.
     pub at_rest: f64,
     /// How many times λ of layers a lattice behind the face has of the kernel's sum, half a spacing before it: layers
-    /// are planes and a lattice is points. With 2.2 spacings per support radius it is 0.975, with 3 it is 0.997.
+    /// are planes and a lattice is points. With 2.2 spacings per support radius it is 0.975, with 3 it is 0.997, and no
+    /// more than 1 is counted.
     pub lattice: f64,
 }
 
@@ -206,7 +207,7 @@ const NEWTON_STEP: f64 = 1e-8;
 /// λ on a flat face.
 const ON_FACE: f64 = 0.5;
 
-/// Half the width, in λ, of the bend of a barrier.
+/// Half the width, in λ, of the bend of a barrier, at most.
 const BEND: f64 = 0.01;
 
 impl Wall {
@@ -216,7 +217,10 @@ impl Wall {
         let mut wall = Self { kernel, h, layer: None, spacing, at_rest: 0.0, lattice: 1.0 };
         // wide kernels know no difference between planes and points
         if spacing * LONGEST_SUM > 1.0 {
-            wall.lattice = kernel.lattice_behind(1.0 / spacing) / wall.by_layers(0.5 * spacing);
+            let layers = wall.by_layers(0.5 * spacing);
+            // in kernels that hardly reach the first layer planes are no measure
+            let lattice = kernel.lattice_behind(1.0 / spacing) / layers;
+            wall.lattice = if layers > 0.0 { lattice.min(1.0) } else { 1.0 };
         }
         wall
     }
@@ -345,16 +349,18 @@ impl Wall {
     #[inline]
     fn with_barrier(&self, of_face: OfFace) -> OfFace {
         let beyond = of_face.part - self.at_rest;
+        // on the face the bend has ended, however wide the kernel is
+        let bend = BEND.min(0.25 * (ON_FACE - self.at_rest));
         // behind the face the wall is no mirror any more: deep in it B is one, as λ is
-        let (on_face, deep) = (ON_FACE - self.at_rest - BEND, 1.0 - self.lattice);
+        let (on_face, deep) = (ON_FACE - self.at_rest - bend, 1.0 - self.lattice);
         let (more, slope) = match () {
             () if of_face.part > ON_FACE => {
                 let slope = (deep - on_face) / (1.0 - ON_FACE);
                 (on_face + slope * (of_face.part - ON_FACE), slope)
             }
             () if beyond < 0.0 => (0.0, 0.0),
-            () if beyond < 2.0 * BEND => (beyond.powi(2) / (4.0 * BEND), beyond / (2.0 * BEND)),
-            () => (beyond - BEND, 1.0),
+            () if beyond < 2.0 * bend => (beyond.powi(2) / (4.0 * bend), beyond / (2.0 * bend)),
+            () => (beyond - bend, 1.0),
         };
         OfFace {
             barrier: self.lattice * of_face.part + more,
@@ -577,23 +583,41 @@ mod tests {
 
     #[test]
     fn a_barrier_is_continuous_and_has_its_own_slope() {
-        let wall = Wall::in_layers(WallKernel::WendlandC2, 1.0, 1.0 / 2.2);
         let step = 1e-6;
-        for k in 1..=99 {
-            let delta = 0.01 * f64::from(k);
-            let [before, now, after] = [-step, 0.0, step].map(|d| wall.of_face(delta + d, 0.0));
-            let slope = (before.barrier - after.barrier) / (2.0 * step);
-            assert!((slope - now.barrier_area).abs() < 1e-5, "{delta}: {slope} {}", now.barrier_area);
-            // a fluid that B keeps is not denser than what its places say
-            assert!(now.barrier >= now.filled);
+        for ratio in [1.05, 1.2, 1.5, 2.2, 3.0, 7.0, 20.0, 100.0] {
+            let wall = Wall::in_layers(WallKernel::WendlandC2, 1.0, 1.0 / ratio);
+            for k in 1..=99 {
+                let delta = 0.01 * f64::from(k);
+                let [before, now, after] = [-step, 0.0, step].map(|d| wall.of_face(delta + d, 0.0));
+                let slope = (before.barrier - after.barrier) / (2.0 * step);
+                // the slope itself changes by up to 60/h within the step, where a narrow bend begins
+                assert!(
+                    (slope - now.barrier_area).abs() < 1e-4,
+                    "{ratio}, {delta}: {slope} {}",
+                    now.barrier_area
+                );
+                // a fluid that B keeps is not denser than what its places say
+                assert!(now.barrier >= now.filled, "{ratio}, {delta}: {now:?}");
+            }
+            for k in 1..=100 {
+                let deep = wall.of_face(-0.01 * f64::from(k), 0.0);
+                assert!(
+                    deep.barrier <= 1.0 + 1e-12 && deep.barrier >= deep.part - 1e-12,
+                    "{ratio}, {k}: {deep:?}"
+                );
+                assert!(
+                    deep.filled <= 1.0 && deep.filled >= wall.lattice * deep.part - 1e-12,
+                    "{ratio}, {k}: {deep:?}"
+                );
+                // the sum over layers is one up to half a hundredth, so its slope is not quite monotone
+                assert!(ratio < 2.0 || deep.barrier_area >= -0.01, "{ratio}, {k}: {deep:?}");
+            }
+            let [before, behind] = [step, -step].map(|delta| wall.of_face(delta, 0.0).barrier);
+            assert!(before <= behind && behind - before < 1e-4, "{ratio}: {before} {behind}");
         }
-        for k in 1..=100 {
-            let deep = wall.of_face(-0.01 * f64::from(k), 0.0);
-            assert!(deep.barrier <= 1.0 + 1e-12 && deep.barrier >= deep.part - 1e-12, "{k}: {deep:?}");
-            assert!(deep.filled <= 1.0 && deep.filled >= wall.lattice * deep.part, "{k}: {deep:?}");
-            // the sum over layers is one up to half a hundredth, so its slope is not quite monotone
-            assert!(deep.barrier_area >= -0.01, "{k}: {deep:?}");
-        }
+        // a kernel that reaches no layer has no wall before the face
+        let narrow = Wall::in_layers(WallKernel::WendlandC2, 1.0, 1.1).of_face(0.6, 0.0);
+        assert_eq!((narrow.barrier, narrow.filled), (0.0, 0.0));
         // a lattice at rest is as dense before a wall as in its depth
         for ratio in [2.0, 2.2, 3.0] {
             let wall = Wall::in_layers(WallKernel::WendlandC2, 1.0, 1.0 / ratio);

@@ -22,7 +22,7 @@ const MOST: f64 = 0.5;
 const LAYERS: usize = 4;
 
 /// The missing part of a kernel by the length of the normal.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FreeSurface {
     /// |n|·h and the missing part, from the depth to the surface. Points that repeat the first one are unused.
     points: [[f64; 2]; LAYERS + 1],

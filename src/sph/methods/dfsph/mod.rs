@@ -91,7 +91,7 @@ impl Declaration for Dfsph {
         Key {
             name: "iterations",
             block: KeyBlock::Solver,
-            about: "iterations of a step's solver, at most",
+            about: "iterations of a step's solver, at most; thirty times as many where no pressure is known, as in the first step",
             value: Value::Count {
                 least: 1,
                 get: |dfsph| dfsph.most_iterations,

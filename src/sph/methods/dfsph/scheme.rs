@@ -32,7 +32,8 @@
 //! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is a lattice's part where a
 //! fluid at rest touches the wall, and b(s′) by its derivative, exact for each face. The solve therefore meets the
 //! density that is found next, up to the square of the displacement. (With the system of forces a breaking dam
-//! keeps three times the tolerance.)
+//! keeps three times the tolerance.) What is missing before a free surface is that at the present places, so near one the
+//! solve meets the next density up to what changes there in a step.
 //!
 //! Artificial viscosity of rough motion ([`roughness`]) takes the noise of the particles' disorder, which nothing else would
 //! take from a fluid without viscosity. Both viscosities act along the lines between particles, and conserve
@@ -76,12 +77,12 @@ const RELAXATION_STEPS: f64 = 8.0;
 /// at once, and with eight steps a column of eighty layers bursts at its start.
 const RELAXATION_FALLS: f64 = 2.0;
 
-/// The most steps of a relaxation time, for a gravity close to zero: of those that the motion allows. Pressure makes steps
-/// shorter, and a relaxation time that followed would make the pressure grow without end.
+/// A relaxation time has at most so many of the steps that the motion allows, which bounds it where gravity is close to zero.
+/// The steps themselves pressure makes shorter, and a relaxation time that followed them would make the pressure grow without end.
 const MOST_RELAXATION_STEPS: f64 = 100.0;
 
-/// How many times as many iterations, and how much smaller an error, a solve of pressures has that begins with none: a
-/// column that is new, or that strikes the ground, has all of its weight to find. With those of other steps a column of
+/// How many times as many iterations, and how much smaller an error, a solve has that begins with no pressure anywhere, as in
+/// the first step: a new column has all of its weight to find. With those of other steps a column of
 /// sixty layers, whose pressure comes too late, falls and bursts.
 const FIRST_ITERATIONS: u32 = 30;
 const FIRST_TOLERANCE: f64 = 0.1;
@@ -211,10 +212,7 @@ impl DivergenceFree {
             places: Solver::new(Continuation::Barrier, &core.parameters, n),
             debt: vec![0.0; n],
             own_pressure: vec![0.0; n],
-            stiffness: Wendland::lattice_stiffness(
-                core.parameters.support_radius / core.parameters.spacing(),
-            )
-            .max(0.0),
+            stiffness: 0.0,
             spread: vec![0.0; n],
             crowding: Vectors::default(),
             free: Vec::new(),
@@ -225,11 +223,19 @@ impl DivergenceFree {
             drift: Vectors::default(),
             loaded: vec![0.0; n],
             walls: Walls::default(),
-            surface: FreeSurface::of_lattice(core.parameters.support_radius / core.parameters.spacing()),
+            surface: FreeSurface::default(),
             iterations: 0,
         };
+        scheme.find_lattice(&core.parameters);
         scheme.settle(core, &mut []);
         scheme
+    }
+
+    /// Finds what follows from the number of spacings per support radius.
+    pub(super) fn find_lattice(&mut self, parameters: &Parameters) {
+        let ratio = parameters.support_radius / parameters.spacing();
+        self.stiffness = Wendland::lattice_stiffness(ratio).max(0.0);
+        self.surface = FreeSurface::of_lattice(ratio);
     }
 
     /// The longest step, s, in which planes of particles that the present pressure holds together do not
@@ -427,4 +433,36 @@ fn relaxation_time(parameters: &Parameters, speed: f64, dt: f64) -> f64 {
     let in_steps = slow + (moving - slow) * courant;
     let expected = RELAXATION_STEPS * ADVECTION * parameters.spacing() / speed.max(parameters.expected_speed);
     in_steps.max(expected.min(most))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    /// Pressure makes steps short, and a debt must not become a greater speed by that, whatever gives the fluid its weight.
+    #[test]
+    fn a_relaxation_time_does_not_follow_steps_that_pressure_made_short() {
+        let of = |gravity: f64, most_gravity: f64, dt: f64| {
+            let parameters = Parameters {
+                gravity: DVec3::new(0.0, 0.0, -gravity),
+                most_gravity,
+                expected_speed: 3.0,
+                time_step: 1.0,
+                method: Dfsph::default().into(),
+                ..Parameters::default()
+            };
+            relaxation_time(&parameters, 0.0, dt)
+        };
+        let fall = (Parameters::default().support_radius / 9.81).sqrt();
+        for (gravity, most_gravity) in [(9.81, 0.0), (0.0, 9.81)] {
+            for dt in [1e-3, 1e-5, 1e-7] {
+                let found = of(gravity, most_gravity, dt);
+                assert!((found / (RELAXATION_FALLS * fall) - 1.0).abs() < 1e-12, "{gravity} {dt}: {found} s");
+            }
+        }
+        // without weight it is that of the expected motion
+        assert!(of(0.0, 0.0, 1e-7) < 0.5 * fall && of(0.0, 0.0, 1e-7) == of(0.0, 0.0, 1e-5));
+    }
 }

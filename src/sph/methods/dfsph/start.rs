@@ -134,6 +134,7 @@ impl DivergenceFree {
         let (_, density, _) =
             densities.select_nth_unstable_by((FITTING * last as f64) as usize, f64::total_cmp);
         core.scale_masses((core.parameters.rest_density / *density).min(1.0));
+        self.find_lattice(&core.parameters);
         self.settle(core, &mut velocity.components_mut());
     }
 
