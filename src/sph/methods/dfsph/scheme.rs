@@ -90,7 +90,7 @@ const FIRST_TOLERANCE: f64 = 0.1;
 /// Part of a density that displacements take away which becomes a debt. Without it a column of forty layers, ten
 /// wide, sinks at 0.3 m/s with a velocity in which the system of forces sees no divergence, and displacements
 /// cannot hold it. With all of it, and with a third, a column of eighty layers, eight wide, bursts at its start.
-const OWED: f64 = 0.6;
+pub(super) const OWED: f64 = 0.6;
 
 /// The part of 2/ω that a step may be long, for the fastest motion that pressure causes and that the solver
 /// does not see. (Eight layers lie still with 0.75 and burst with 1, as a column of eighty does.)
@@ -141,7 +141,7 @@ impl Scheme for DivergenceFree {
         self.find_other_accelerations(core, dt);
         add_scaled(&mut core.particles.velocity, &core.acceleration, dt);
         self.keep_density(core, dt);
-        self.find_displacements(core, dt);
+        self.find_displacements(core, dt, OWED);
         core.move_obstacles(dt);
         core.drift(dt, Some((&self.displacement, 1.0 / dt)))?;
         self.settle(core, &mut []);
@@ -382,8 +382,8 @@ impl DivergenceFree {
     }
 
     /// Finds the displacements of a step of the length dt: by shifting, and those that keep densities at the
-    /// new places from exceeding that at rest.
-    pub(super) fn find_displacements(&mut self, core: &Core, dt: f64) {
+    /// new places from exceeding that at rest. The part `owed` of what these take away becomes a debt.
+    pub(super) fn find_displacements(&mut self, core: &Core, dt: f64, owed: f64) {
         self.drift.clone_from(&core.particles.velocity);
         if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {
             add_scaled(&mut self.drift, crowding, factor);
@@ -405,7 +405,7 @@ impl DivergenceFree {
             self.displacement.clone_from(&self.places.push);
             for ((debt, excess), rate) in self.debt.iter_mut().zip(&self.free).zip(&self.places.rate) {
                 let left = (excess + rate).max(0.0);
-                *debt += OWED * (excess.max(0.0) - left).max(0.0);
+                *debt += owed * (excess.max(0.0) - left).max(0.0);
             }
         }
         if let Some((crowding, factor)) = shift(self.numbers.shifting, &self.crowding, core) {

@@ -16,7 +16,7 @@ use glam::DVec3;
 use super::super::numerics::Numerics;
 use super::Dfsph;
 use super::passes::Constants;
-use super::scheme::DivergenceFree;
+use super::scheme::{DivergenceFree, OWED};
 use super::walls::Walls;
 use crate::sph::{
     core::Core,
@@ -142,13 +142,15 @@ impl DivergenceFree {
         let rest = core.parameters.rest_density;
         let excess: f64 = self.loaded.iter().map(|rho| (rho / rest - 1.0).max(0.0)).sum();
         let is_crowded = excess > CROWDED * self.loaded.len() as f64;
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let worst = self.loaded.iter().fold(0.0, |worst: f64, rho| worst.max(rho / rest - 1.0));
             if worst < 2.0 * self.numbers.tolerance {
                 break;
             }
             // walls that move do not sweep before the first step
-            self.find_displacements(core, 0.0);
+            // what later rounds take away the earlier ones have brought
+            let owed = if round == 0 { OWED } else { 0.0 };
+            self.find_displacements(core, 0.0, owed);
             let moves = self.displacement.iter().any(|way| way != DVec3::ZERO);
             if moves && !self.displace(core, 1.0, velocity) {
                 break;
