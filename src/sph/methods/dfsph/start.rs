@@ -33,8 +33,8 @@ const PACKING_ROUNDS: usize = 100;
 /// β: how far packing moves particles in a round. With 0.2 they swing instead of coming to rest.
 const PACKING_FACTOR: f64 = 0.05;
 
-/// Mean excess of the density from which on what moving apart takes away is no debt of the first steps. (The particles in a bent
-/// tube, 3 % too dense, would get speeds of 6 m/s from it. A column of forty layers whose places have a jitter of a twentieth
+/// Mean excess of the density from which on what moving apart takes away is no debt of the first steps. (Particles in a bent tube,
+/// 3 % too dense, would gain 0.8 % of their energy from it. A column of forty layers whose places have a jitter of a twentieth
 /// of the spacing needs it: without that push its pressure comes too late, and it bursts.)
 const CROWDED: f64 = 0.01;
 
