@@ -21,7 +21,8 @@ use crate::table::Table;
 pub(super) struct Emitter<'a, 'f> {
     pub builder: &'a mut FunctionBuilder<'f>,
     pub precision: Precision,
-    /// Lanes that hold a point. Functions are called for no others: a single point would pay for the origin as well.
+    /// Lanes that hold a point. Functions of the library are called for no others: a single point would pay for the origin as
+    /// well. Those of `sine` take a whole vector.
     lanes: u8,
     pub forms: &'a Forms,
     pub hosts: &'a Hosts,

@@ -28,7 +28,7 @@ scene deep {{
 }
 
 /// Eighty layers on a lattice, whose first steps are the hardest that `dfsph` meets: nothing is too dense in them, all of the
-/// pressure is to be found at once, and a column that falls for some steps does not stop in time. (It fell with 1 m/s.)
+/// pressure is to be found at once, and a column that falls for some steps does not stop in time. (It reached 0.5 m/s.)
 #[test]
 fn a_deep_column_stands_from_the_first_step() {
     let mut simulation = simulation(&column(80));

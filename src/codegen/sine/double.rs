@@ -41,7 +41,7 @@ const COSINE: [f64; 6] = [
     -1.13596475577881948265e-11,
 ];
 
-/// An argument less the nearest multiple of π/2: its magnitude is reduced, because both functions know their signs.
+/// The magnitude of an argument less the nearest multiple of π/2. Its sign comes back at the end: sine is odd, cosine even.
 struct Reduced {
     /// What remains, |y| ≤ π/4, and what it is too large or too small by.
     y: Value,

@@ -13,7 +13,7 @@ pub(super) const QUARTERS: f64 = std::f64::consts::FRAC_2_PI;
 
 /// Lanes of `f64` as far as they are known without their quadrants.
 pub(super) struct Quadrants {
-    /// Of the magnitude of the argument less the nearest multiple of π/2: both functions know their signs.
+    /// Those of what remains when the nearest multiple of π/2 is taken from the magnitude of the argument.
     pub sine: Value,
     pub cosine: Value,
     /// A number whose last bits hold the multiple.

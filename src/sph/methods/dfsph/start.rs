@@ -147,9 +147,9 @@ impl DivergenceFree {
             if worst < 2.0 * self.numbers.tolerance {
                 break;
             }
-            // walls that move do not sweep before the first step
             // what later rounds take away the earlier ones have brought
             let owed = if round == 0 { OWED } else { 0.0 };
+            // walls that move do not sweep before the first step
             self.find_displacements(core, 0.0, owed);
             let moves = self.displacement.iter().any(|way| way != DVec3::ZERO);
             if moves && !self.displace(core, 1.0, velocity) {
