@@ -66,7 +66,9 @@ file; `x`, `y`, `z`, `pi` and the standard solids and functions are always there
 DUPLICATE_NAME = "E0202":
 "Two items have the same name. All items share one set of names; rename one of them.";
 RESERVED_NAME = "E0203":
-"`x`, `y`, `z`, `t` and `pi` always mean the coordinates, the time and the number: an item cannot take their names.";
+"`x`, `y`, `z` and `pi` always mean the coordinates and the number, and `t` the time: an item cannot take their names. A
+file in which nothing moves may define a param or a value `t` all the same, as may functions and folds; from then on it
+is that, and the file has no time. In its scenes `t` is an error, because there it would be the time.";
 NOT_A_FUNCTION = "E0204":
 "Brackets after a name call a function, but this name is a value (or the other way round).";
 ARGUMENTS = "E0205":

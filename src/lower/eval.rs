@@ -3,7 +3,7 @@
 use super::builtins;
 use super::foreign;
 use super::lowering::Lowering;
-use super::names::Kind;
+use super::names::{Kind, TIME};
 use super::value::Value;
 use crate::diagnostic::{Code, Diagnostic, SourceId, Span};
 use crate::ir::{Axis, Binary, BinaryFunction, Node, Unary};
@@ -142,6 +142,18 @@ impl Lowering<'_> {
         Value::Number(self.constant(value * parsed.factor))
     }
 
+    /// Reports `t` in a scene of a file that gives this name to something else.
+    fn time_is_taken(&mut self, span: Span) -> Value {
+        let diagnostic = Diagnostic::error(Code::RESERVED_NAME, span, "`t` is the time in a scene");
+        let diagnostic = match self.names.defined_at(self.scope.source, TIME) {
+            Some(defined) => diagnostic.label(defined, "and this here in the file"),
+            None => diagnostic,
+        };
+        self.fail(diagnostic.help(
+            "give the other one another name; or another name to its value, as in `let thickness = t` above the scene",
+        ))
+    }
+
     fn name(&mut self, name: &str, span: Span) -> Value {
         if let Some(local) = self.scope.locals.iter().rev().find(|local| local.name == name) {
             return local.value.clone();
@@ -150,7 +162,8 @@ impl Lowering<'_> {
             "x" => Some(Axis::X),
             "y" => Some(Axis::Y),
             "z" => Some(Axis::Z),
-            "t" => Some(Axis::T),
+            TIME if !self.without_time.contains(&self.scope.source) => Some(Axis::T),
+            TIME if self.in_scene && self.scope.calls.is_empty() => return self.time_is_taken(span),
             "pi" => return Value::Number(self.constant(std::f64::consts::PI)),
             _ => None,
         };

@@ -37,6 +37,10 @@ pub(super) struct Lowering<'a> {
     pub files: Files,
     /// Whether the value of a solid is being evaluated, where only lengths and angles have units.
     pub in_shape: bool,
+    /// Whether a scene is being read.
+    pub in_scene: bool,
+    /// The files that give the name of the time to a value of theirs.
+    pub without_time: HashSet<SourceId>,
     /// Whether the value of a `let` is read.
     pub in_let: bool,
     /// Dimensions of the params and names that are defined as one number with a unit.
@@ -98,6 +102,8 @@ impl Lowering<'_> {
             qualifier: String::new(),
             files: Files::default(),
             in_shape: false,
+            in_scene: false,
+            without_time: HashSet::new(),
             in_let: false,
             dimensions: HashMap::new(),
             bare: HashSet::new(),

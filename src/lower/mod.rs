@@ -53,7 +53,7 @@ use crate::sph::Method;
 use crate::syntax::Ast;
 use crate::syntax::ast::{Argument, Attribute, Definition, Expr, ExprKind, Function, Item, Name, Param};
 use lowering::Lowering;
-use names::{Kind, RESERVED};
+use names::{Kind, RESERVED, TIME};
 use value::Value;
 
 /// Limits and overrides of a lowering.
@@ -154,7 +154,7 @@ fn lower_here(
         lowering.imported_file(file, options);
     }
     lowering.scope.source = SourceId::File;
-    lowering.names.announce(ast.items.iter().map(Item::name));
+    lowering.announce(ast);
     for item in &ast.items {
         lowering.item(item, options);
     }
@@ -167,11 +167,20 @@ fn lower_here(
 }
 
 impl<'a> Lowering<'a> {
+    /// Makes the names of a file known, before any of them is defined.
+    fn announce(&mut self, ast: &'a Ast) {
+        self.names.announce(ast.items.iter().map(Item::name));
+        let values = ast.items.iter().filter(|item| matches!(item, Item::Param(_) | Item::Let(_)));
+        if values.map(Item::name).any(|name| name.text == TIME) {
+            self.without_time.insert(self.scope.source);
+        }
+    }
+
     /// Reads the items of an imported file. Its scenes are its own, and so are its solids: they have names there alone.
     fn imported_file(&mut self, file: &'a Imported, options: &Options) {
         self.scope.source = file.source.id;
         self.qualifier = format!("{}.", file.qualified);
-        self.names.announce(file.ast.items.iter().map(Item::name));
+        self.announce(&file.ast);
         self.imported.push((file.source.name.clone(), file.source.id));
         let solids = self.module.solids.len();
         for item in file.ast.items.iter().filter(|item| !matches!(item, Item::Scene(_))) {
@@ -200,7 +209,10 @@ impl<'a> Lowering<'a> {
                 if named {
                     self.names.define(self.scope.source, &scene.name, Kind::Scene);
                 }
-                if let Some(scene) = self.scene(scene)
+                self.in_scene = true;
+                let scene = self.scene(scene);
+                self.in_scene = false;
+                if let Some(scene) = scene
                     && named
                 {
                     self.module.scenes.push(scene);
@@ -210,7 +222,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn param(&mut self, param: &'a Param, options: &Options) {
-        if !self.may_define(&param.name) {
+        if !self.may_be_value(&param.name) {
             return;
         }
         // a param that is given by another one has a value of its own, and so do ranges: nothing is fixed by them
@@ -389,7 +401,7 @@ impl<'a> Lowering<'a> {
         self.in_let = true;
         let value = self.expr(&definition.value);
         self.in_let = false;
-        if self.may_define(&definition.name) {
+        if self.may_be_value(&definition.name) {
             self.remember_units(&definition.name, &definition.value);
             self.names.define(self.scope.source, &definition.name, Kind::Value(value));
         }
@@ -467,6 +479,11 @@ impl<'a> Lowering<'a> {
 
     /// Reports a reserved name of a parameter or of a fold's variable.
     pub(super) fn may_be_local(&mut self, name: &Name) -> bool {
+        name.text == TIME || self.is_free(name)
+    }
+
+    /// Reports a name that has a meaning of its own.
+    fn is_free(&mut self, name: &Name) -> bool {
         let reserved = RESERVED.contains(&name.text.as_str());
         if reserved {
             let message = format!("`{}` has a fixed meaning and cannot be defined", name.text);
@@ -479,9 +496,16 @@ impl<'a> Lowering<'a> {
 
     /// Reports a name that is taken or reserved.
     fn may_define(&mut self, name: &Name) -> bool {
-        if !self.may_be_local(name) {
-            return false;
-        }
+        self.is_free(name) && self.is_new(name)
+    }
+
+    /// Reports a name of a param or a value that is taken or reserved.
+    fn may_be_value(&mut self, name: &Name) -> bool {
+        self.may_be_local(name) && self.is_new(name)
+    }
+
+    /// Reports a name that is taken.
+    fn is_new(&mut self, name: &Name) -> bool {
         if let Some(first) = self.names.defined_at(self.scope.source, &name.text) {
             let message = format!("`{}` is defined twice", name.text);
             self.report(

@@ -6,8 +6,12 @@ use super::value::Value;
 use crate::diagnostic::{SourceId, Span};
 use crate::syntax::ast::{Function, Name};
 
-/// Names with a meaning that no item can change.
-pub(super) const RESERVED: [&str; 5] = ["x", "y", "z", "t", "pi"];
+/// Names with a meaning of their own. [`TIME`] can be given another one.
+pub(super) const RESERVED: [&str; 5] = ["x", "y", "z", TIME, "pi"];
+
+/// The name of the time, unless a file in which nothing moves gives it to a param, a value, a parameter of a function or
+/// the variable of a fold.
+pub(super) const TIME: &str = "t";
 
 /// What a name stands for.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 //! from ω, solids without a surface. The messages ask.
 
 use super::lowering::Lowering;
-use super::names::Kind;
+use super::names::{Kind, TIME};
 use crate::diagnostic::{Code, Diagnostic, SourceId};
 use crate::ir::{Binary, Node};
 use crate::quantity::{Dimension, parse_unit};
@@ -187,7 +187,8 @@ impl Lowering<'_> {
             ExprKind::Quantity { .. } | ExprKind::Text(_) => false,
             ExprKind::Name(name) => {
                 let local = self.scope.locals.iter().rev().find(|local| local.name == *name);
-                local.map_or(name == "t" || self.bare.contains(name), |local| local.bare)
+                let is_time = name == TIME && !self.without_time.contains(&self.scope.source);
+                local.map_or(is_time || self.bare.contains(name), |local| local.bare)
             }
             _ => expr.children().into_iter().all(|part| self.has_no_unit(part)),
         }

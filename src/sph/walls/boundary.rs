@@ -31,7 +31,7 @@ use super::{
     contact::{Trouble, rubbed},
     coverage::Coverage,
     friction::Friction,
-    kernel::Wall,
+    layers::Wall,
     volume::{ChangingShape, Known, Mapped, Maps, RigidPart},
 };
 
@@ -336,12 +336,20 @@ impl Boundary {
         whole: Coverage<F>,
         k: usize,
     ) -> Coverage<F> {
-        let (obstacle, field) = (&self.obstacles[k], self.field(k));
         let mut faces = Faces::new();
-        field.faces(p, wall.h, &mut faces);
-        if faces.is_empty() {
-            return whole;
-        }
+        self.field(k).faces(p, wall.h, &mut faces);
+        if faces.is_empty() { whole } else { whole.or(&self.of_faces(wall, p, faces, k)) }
+    }
+
+    /// What faces of an obstacle near a particle take of its kernel.
+    pub(super) fn of_faces<F: Friction>(
+        &self,
+        wall: &Wall,
+        p: DVec3,
+        mut faces: Faces,
+        k: usize,
+    ) -> Coverage<F> {
+        let (obstacle, field) = (&self.obstacles[k], self.field(k));
         for part in &mut faces {
             if let Part::Face(face) = part
                 && self.ends_at_box(p, face, wall.h)
@@ -361,7 +369,7 @@ impl Boundary {
         if let Some(velocity) = stated.or(motion) {
             coverage.friction.take_along(velocity);
         }
-        whole.or(&coverage)
+        coverage
     }
 
     fn collide_block(&self, block: &mut Block<'_>, contacts: Option<&Contacts>) -> Result<(), Fault> {

@@ -23,7 +23,7 @@ use crate::geom::eigen;
 
 use super::{
     friction::{Friction, LEAST_FREE},
-    kernel::{OfFace, Wall},
+    layers::{OfFace, Wall},
     symmetric::Symmetric,
     volume::Taken,
 };
@@ -45,12 +45,25 @@ pub(in crate::sph) struct Coverage<F = ()> {
     pub gradient: DVec3,
     /// K − λ·1 = Σ d·(A/h)·n⊗n over the faces.
     pub spread: Symmetric,
+    /// Σ λ·n⊗n over the faces: what of λ·1 belongs to directions across walls.
+    pub across: Symmetric,
     /// ∇λ·v for walls that move with the velocity v, 1/s.
     pub sweep: f64,
+    /// What such walls carry along.
+    pub carried: Carried,
     /// The barrier B and its gradient, see [`OfFace::barrier`]; without meaning for a continuous wall.
     pub barrier: Barrier,
     /// Friction with a viscous fluid.
     pub friction: F,
+}
+
+/// The velocities of walls with the weights that these have in K, across them alone, m/s.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::sph) struct Carried {
+    /// Σ λ·n⊗n·v.
+    pub across: DVec3,
+    /// (K − λ·1)·v.
+    pub spread: DVec3,
 }
 
 /// What walls add to the density of a fluid that must not be compressed, see [`OfFace::barrier`].
@@ -79,7 +92,9 @@ impl<F: Friction> Coverage<F> {
             filled,
             gradient: -area / h * face.normal,
             spread: spread * Symmetric::square(face.normal),
+            across: part * Symmetric::square(face.normal),
             sweep: 0.0,
+            carried: Carried::default(),
             barrier: Barrier { part: barrier, gradient: -barrier_area / h * face.normal, sweep: 0.0 },
             friction: F::of_face(face, area / h, h),
         }
@@ -88,6 +103,7 @@ impl<F: Friction> Coverage<F> {
     /// Lets all of these walls move with one velocity, m/s. Friction is told apart.
     pub fn set_in_motion(&mut self, velocity: DVec3) {
         self.sweep = self.gradient.dot(velocity);
+        self.carried = Carried { across: self.across * velocity, spread: self.spread * velocity };
         self.barrier.sweep = self.barrier.gradient.dot(velocity);
     }
 
@@ -145,13 +161,23 @@ impl<F: Friction> Coverage<F> {
 
     /// The coverage with another friction.
     pub fn with_friction<G>(self, friction: G) -> Coverage<G> {
-        let Self { part, filled, gradient, spread, sweep, barrier, friction: _ } = self;
-        Coverage { part, filled, gradient, spread, sweep, barrier, friction }
+        let Self { part, filled, gradient, spread, across, sweep, carried, barrier, friction: _ } = self;
+        Coverage { part, filled, gradient, spread, across, sweep, carried, barrier, friction }
     }
 
     /// The coverage without its friction.
     pub fn without_friction(self) -> Coverage {
         self.with_friction(())
+    }
+
+    /// The velocity that the fluid behind the walls has, m/s, by that of the walls across them and by one along them, m/s:
+    /// the solution r of K·r = Σ (K_n·v + λ·(1 − n⊗n)·along) over the walls.
+    pub fn behind(&self, along: DVec3) -> DVec3 {
+        let Carried { across, spread } = self.carried;
+        let moment = self.part * Symmetric::IDENTITY + self.spread;
+        let slipping = self.part * along - self.across * along;
+        let behind = moment.to_matrix().inverse() * (across + spread + slipping);
+        if behind.is_finite() { behind } else { along }
     }
 
     /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
@@ -176,13 +202,25 @@ impl<F: Friction> Coverage<F> {
     /// Two walls combined by a rule, which says how their λ combine, and the derivatives by both.
     fn joined(&self, other: &Self, rule: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {
         let (part, da, db) = rule(self.part, other.part);
+        // walls look where their gradients point
+        let weight = |slope: f64, of: &Self| slope * of.gradient.length();
+        let (wa, wb) = (weight(da, self), weight(db, other));
+        let share = |weight: f64, of: &Self| {
+            if weight > 0.0 && of.part > 0.0 { part * weight / (wa + wb) / of.part } else { 0.0 }
+        };
+        let (sa, sb) = (share(wa, self), share(wb, other));
         Self {
             part: part.clamp(0.0, 1.0),
             filled: (part + da * (self.filled - self.part) + db * (other.filled - other.part))
                 .clamp(0.0, 1.0),
             gradient: da * self.gradient + db * other.gradient,
             spread: da * self.spread + db * other.spread,
+            across: sa * self.across + sb * other.across,
             sweep: da * self.sweep + db * other.sweep,
+            carried: Carried {
+                across: sa * self.carried.across + sb * other.carried.across,
+                spread: da * self.carried.spread + db * other.carried.spread,
+            },
             barrier: self.barrier.joined(&other.barrier, part, [da, db], [self.part, other.part]),
             friction: self.friction.joined(&other.friction, rule),
         }
@@ -213,13 +251,22 @@ impl Coverage {
         // K of layers differs from that of a continuous wall along the normal; for a plane this is exact
         let of_layers = plane.spread - of_part * delta * slope;
         let normal = gradient.normalize_or_zero();
+        let steep = gradient.length();
+        // of bodies that change their shape the motion of the surface is known
+        let of_surface = if steep > 0.0 { sweep / steep * normal } else { DVec3::ZERO };
+        let velocity = taken.velocity.unwrap_or(of_surface);
+        let part = if wall.layer.is_some() { plane.part } else { part };
+        let across = part * Symmetric::square(normal);
+        let spread = of_part * (taken.moment - taken.part * Symmetric::IDENTITY)
+            + of_layers * Symmetric::square(normal);
         let bodies = Self {
-            part: if wall.layer.is_some() { plane.part } else { part },
+            part,
             filled: plane.filled,
             gradient: of_part * gradient,
-            spread: of_part * (taken.moment - taken.part * Symmetric::IDENTITY)
-                + of_layers * Symmetric::square(normal),
+            spread,
+            across,
             sweep: of_part * sweep,
+            carried: Carried { across: across * velocity, spread: spread * velocity },
             barrier: Barrier {
                 part: plane.barrier,
                 gradient: of_barrier * gradient,
@@ -230,7 +277,8 @@ impl Coverage {
         let (da, db) = (1.0 - bodies.part, 1.0 - self.part);
         let whole = self.joined(&bodies, |_, _| (self.part + db * bodies.part, da, db));
         // K of bodies in the box adds to that of the box
-        Self { spread: self.spread + bodies.spread, ..whole }
+        let carried = Carried { spread: self.carried.spread + bodies.carried.spread, ..whole.carried };
+        Self { spread: self.spread + bodies.spread, carried, ..whole }
     }
 }
 
@@ -287,7 +335,7 @@ mod tests {
         layer: None,
         spacing: 1.0 / 2.6,
         at_rest: 0.0,
-        lattice: 1.0,
+        lattice_over_layers: 1.0,
     };
 
     fn face(distance: f64, normal: DVec3) -> Part {
@@ -360,8 +408,9 @@ mod tests {
             // all but the rounding of a + 1 − 1
             assert!((slab.part - alone.part).abs() < 1e-15, "{slab:?} {alone:?}");
             assert_eq!(slab.friction.tensor, alone.friction.tensor);
-            let Coverage { part, filled, barrier, friction, .. } = alone;
-            assert_eq!(Coverage { part, filled, barrier, friction, ..slab }, alone);
+            assert!(slab.across.to_matrix().abs_diff_eq(alone.across.to_matrix(), 1e-15), "{slab:?}");
+            let Coverage { part, filled, across, barrier, friction, .. } = alone;
+            assert_eq!(Coverage { part, filled, across, barrier, friction, ..slab }, alone);
         }
     }
 
@@ -414,6 +463,36 @@ mod tests {
                 assert!(worst < 0.03, "{cosine} {all}: {worst}");
             }
         }
+    }
+
+    /// Walls that all move with one velocity have it behind them, and so has what slips along them with it: on one wall, in
+    /// corners, between walls, and behind the edge of two.
+    #[test]
+    fn what_moves_as_one_has_one_velocity_behind_its_walls() {
+        let velocity = DVec3::new(2.0, -1.0, 0.5);
+        let (x, y, slanted) = (face(0.1 * H, DVec3::X), face(0.2 * H, DVec3::Y), face(0.3 * H, DVec3::ONE));
+        let faces = [
+            vec![x],
+            vec![Part::Any(2), x, y],
+            vec![Part::All(2), x, y],
+            vec![Part::Any(3), x, y, slanted],
+            vec![Part::Any(2), face(0.4 * H, DVec3::X), face(0.5 * H, -DVec3::X)],
+        ];
+        for faces in faces {
+            let mut wall = Coverage::of_faces(&WALL, &Faces::from_slice(&faces));
+            wall.set_in_motion(velocity);
+            let behind = wall.behind(velocity);
+            assert!((behind - velocity).length() < 1e-9, "{faces:?}: {behind}");
+            // joined to a wall at rest it is dragged by that
+            let floor = Coverage::of_faces(&WALL, &Faces::from_slice(&[face(0.2 * H, DVec3::Z)]));
+            let both = wall.or(&floor).behind(DVec3::ZERO);
+            assert!(both.z.abs() < velocity.z, "{faces:?}: {both}");
+        }
+        // one wall alone has no motion along itself but that of the fluid
+        let mut wall = Coverage::of_faces(&WALL, &Faces::from_slice(&[x]));
+        wall.set_in_motion(velocity);
+        let behind = wall.behind(DVec3::new(7.0, 3.0, 4.0));
+        assert!((behind - DVec3::new(2.0, 3.0, 4.0)).length() < 1e-9, "{behind}");
     }
 
     /// Between two walls, in an edge and in a corner no direction is stretched beyond the limit, and those in which a single

@@ -7,7 +7,7 @@ use super::{
     boundary::{Boundary, FLUSH},
     corner::{Corner, Seen},
     coverage::{Coverage, is_positive_definite},
-    kernel::Wall,
+    layers::Wall,
     symmetric::Symmetric,
 };
 use crate::field::{Face, Faces, Part};
@@ -48,6 +48,24 @@ struct Near {
     moment: DMat3,
     /// Whether the fluid sticks to it. The friction is that of such walls alone.
     sticks: bool,
+}
+
+/// A face of a wall near a particle.
+struct Facing {
+    /// The wall, by its place among those near the particle.
+    wall: usize,
+    face: Face,
+    /// How far behind the face the wall ends, m; infinite where it is as thick as a kernel is wide.
+    thickness: f64,
+}
+
+impl Facing {
+    /// Adds to what its wall takes, so many times, what it would take of the kernel of a particle at a distance, m.
+    fn press(&self, wall: &Wall, distance: f64, times: f64, near: &mut Near) {
+        let behind = |distance: f64| Seen::of(&Coverage::of_face(wall, &Face { distance, ..self.face }));
+        near.add(&behind(distance), times);
+        near.add(&behind(distance + self.thickness), -times);
+    }
 }
 
 impl Boundary {
@@ -97,9 +115,15 @@ impl Boundary {
 
     /// The faces near a particle, with the numbers of their walls, but for those behind another wall, which has what they
     /// would do: a floor of the box below a slab that lies on it, or one of the faces of two walls that overlap.
-    fn seen(&self, wall: &Wall, p: DVec3, near: &mut [Near]) -> Vec<(usize, Face)> {
+    fn seen(&self, wall: &Wall, p: DVec3, near: &mut [Near]) -> Vec<Facing> {
         let of = |k: usize| self.faces_of(wall, p, &near[k]).into_iter().map(move |face| (k, face));
         let faces: Vec<(usize, Face)> = (0..near.len()).flat_map(of).collect();
+        let thickness = |&(k, face): &(usize, Face)| {
+            let own = faces.iter().filter(|&&(other, _)| other == k).map(|(_, other)| other);
+            let backs = own.filter(|other| face.normal.dot(other.normal) < PARALLEL - 1.0);
+            let depths = backs.map(|back| -back.distance - face.distance).filter(|depth| *depth > 0.0);
+            depths.fold(f64::INFINITY, f64::min)
+        };
         let deep = BEHIND * wall.h;
         let behind = |&(k, face): &(usize, Face)| {
             let at = |depth: f64| p - (face.distance + depth) * face.normal;
@@ -137,7 +161,8 @@ impl Boundary {
                 (near[*k].gradient, near[*k].moment, near[*k].part) = (DVec3::ZERO, DMat3::ZERO, 0.0);
             }
         }
-        faces.into_iter().zip(hidden).filter(|(_, hidden)| hidden.is_none()).map(|(face, _)| face).collect()
+        let shown = faces.iter().zip(hidden).filter(|(_, hidden)| hidden.is_none()).map(|(face, _)| face);
+        shown.map(|found| Facing { wall: found.0, face: found.1, thickness: thickness(found) }).collect()
     }
 
     /// Lets each wall press as it does in the corners that it has with others. Whether there are any.
@@ -146,26 +171,37 @@ impl Boundary {
         let deep = BEHIND * wall.h;
         // whether the particle presses on a face itself, and the distances of its images that do; `None` if it is in no corner
         let mut presses: Vec<Option<(bool, SmallVec<[f64; 4]>)>> = vec![None; faces.len()];
-        for (n, (i, one)) in faces.iter().enumerate() {
-            for (m, (j, other)) in faces.iter().enumerate().skip(n + 1).filter(|(_, (j, _))| j != i) {
-                let Some(corner) = Corner::of(one, other, wall.h) else { continue };
+        for (n, one) in faces.iter().enumerate() {
+            for (m, other) in faces.iter().enumerate().skip(n + 1).filter(|(_, other)| other.wall != one.wall)
+            {
+                let (i, j) = (one.wall, other.wall);
+                let Some(corner) = Corner::of(&one.face, &other.face, wall.h) else { continue };
                 let lies_in = |k: usize, depth: [f64; 2]| self.is_in(&near[k], p + corner.edge(depth));
                 // both faces begin at the edge, and there is no gap between the walls
-                let begin = lies_in(*i, [deep, -deep]) && lies_in(*j, [-deep, deep]);
+                let begin = lies_in(i, [deep, -deep]) && lies_in(j, [-deep, deep]);
                 // an obstacle that ends in a wall of the box is taken to go on behind it
                 let beside = 2.0 * FLUSH * wall.h;
                 let is_box = |k: usize| near[k].obstacle.is_none();
                 let go_on = [
-                    lies_in(*i, [deep, if is_box(*j) { -beside } else { deep }]),
-                    lies_in(*j, [if is_box(*i) { -beside } else { deep }, deep]),
+                    lies_in(i, [deep, if is_box(j) { -beside } else { deep }]),
+                    lies_in(j, [if is_box(i) { -beside } else { deep }, deep]),
                 ];
                 if !begin || go_on == [false; 2] {
                     continue;
                 }
                 for (on, at) in [n, m].into_iter().enumerate() {
-                    let (k, face) = &faces[at];
+                    let facing = &faces[at];
                     if !go_on[on] {
-                        near[*k].add(&corner.behind_both(wall.h), wall.strength(face.distance / wall.h));
+                        let strength = wall.strength(facing.face.distance / wall.h);
+                        near[facing.wall].add(&corner.behind_both(wall.h), strength);
+                        // a thin wall goes on as far as it is thick
+                        let mut behind = [one.face, other.face];
+                        behind[on].distance += facing.thickness;
+                        if facing.thickness < wall.h
+                            && let Some(corner) = Corner::of(&behind[0], &behind[1], wall.h)
+                        {
+                            near[facing.wall].add(&corner.behind_both(wall.h), -strength);
+                        }
                     }
                     let [own, image] = corner.pressing(on);
                     let (itself, images) = presses[at].get_or_insert_with(|| (true, SmallVec::new()));
@@ -174,14 +210,14 @@ impl Boundary {
                 }
             }
         }
-        for ((k, face), presses) in faces.iter().zip(&presses) {
+        for (facing, presses) in faces.iter().zip(&presses) {
             let Some((itself, images)) = presses else { continue };
+            let near = &mut near[facing.wall];
             if !itself {
-                near[*k].add(&Seen::of(&Coverage::of_face(wall, face)), -1.0);
+                facing.press(wall, facing.face.distance, -1.0, near);
             }
             for &distance in images {
-                let image = Face { distance, ..*face };
-                near[*k].add(&Seen::of(&Coverage::of_face(wall, &image)), 1.0);
+                facing.press(wall, distance, 1.0, near);
             }
         }
         presses.iter().any(Option::is_some)
@@ -206,8 +242,7 @@ impl Boundary {
                 .map(|(normal, distance)| Face { distance, normal, mean_curvature: 0.0 })
                 .collect();
         };
-        let mut parts = Faces::new();
-        self.field(k).faces(p, wall.h, &mut parts);
+        let parts = self.faces_before(wall, p, k);
         let faces = parts.iter().filter_map(|part| match part {
             Part::Face(face) => Some(*face),
             Part::All(_) | Part::Any(_) => None,
@@ -236,12 +271,55 @@ impl Boundary {
             if self.field(k).is_far(&place, wall.h) {
                 continue;
             }
-            let coverage = self.with_faces(wall, p, Coverage::<()>::default(), k);
+            let coverage =
+                Coverage::<()>::default().or(&self.of_faces(wall, p, self.faces_before(wall, p, k), k));
             if coverage.part > 0.0 {
                 found.push(near(Some(k), &coverage));
             }
         }
         found
+    }
+
+    /// The faces of an obstacle near a particle. Where it ends behind one of them within the support radius, as a thin plate
+    /// does, the face in which it ends is told with it.
+    fn faces_before(&self, wall: &Wall, p: DVec3, k: usize) -> Faces {
+        let mut told = Faces::new();
+        self.field(k).faces(p, wall.h, &mut told);
+        let mut faces = Faces::new();
+        for part in told {
+            if let Part::Face(front) = part
+                && let Some(back) = self.back_of(wall, p, &front, k)
+            {
+                faces.push(Part::All(2));
+                faces.push(Part::Face(back));
+            }
+            faces.push(part);
+        }
+        faces
+    }
+
+    /// The face in which an obstacle ends behind another one that is before a particle; `None` if that is not within the
+    /// support radius.
+    fn back_of(&self, wall: &Wall, p: DVec3, front: &Face, k: usize) -> Option<Face> {
+        if front.distance < -BEHIND * wall.h || front.distance >= wall.h {
+            return None;
+        }
+        let field = self.field(k);
+        let beyond = p - (front.distance + wall.h) * front.normal;
+        if field.omega(beyond) >= 0.0 {
+            return None;
+        }
+        let mut there = Faces::new();
+        field.faces(beyond, wall.h, &mut there);
+        let backs = there.iter().filter_map(|part| match part {
+            Part::Face(back) => {
+                let looks_back = front.normal.dot(back.normal) < PARALLEL - 1.0;
+                (looks_back && back.distance >= 0.0).then_some(back)
+            }
+            Part::All(_) | Part::Any(_) => None,
+        });
+        let back = backs.min_by(|a, b| a.distance.total_cmp(&b.distance))?;
+        Some(Face { distance: back.distance - wall.h - front.distance, ..*back })
     }
 }
 
@@ -342,6 +420,25 @@ mod tests {
         // the image of the fluid in the block is pressed down less than the fluid itself
         assert!(left.z < -0.1 * left.x.abs(), "{left}");
         assert_eq!(right, DVec3::ZERO);
+    }
+
+    /// A plate that stands on the floor presses as much less than a block as it is thinner than a kernel is wide.
+    #[test]
+    fn a_thin_plate_presses_as_what_it_takes() {
+        let text = "rfm 1\nsolid plate = box([-0.1, -9, -9], [0, 9, 9])";
+        let program = crate::Program::from_source("plate.rfm", text).unwrap();
+        let plate = sticky(program.solid("plate").unwrap());
+        let boundary = Boundary { obstacles: vec![plate], ..boundary(9.0) };
+        let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
+        let p = DVec3::new(0.2, 0.0, 0.3);
+        let slope = |distance: f64| wall.kernel.slope(distance);
+        let thin = slope(0.2) - slope(0.3);
+        let gradient = DVec3::new(-thin, 0.0, -slope(0.3));
+        let pushed = Pushed { by_pressure: -4.0 * gradient, factor: -4.0, gradient, ..Pushed::default() };
+        let mut shares = DVec3::ZERO;
+        boundary.divide(&wall, p, &pushed, |_, share| shares += share);
+        // a block as deep as the kernel would press with all of its slope, 3.4 times as much
+        assert!((shares.x - 4.0 * thin).abs() < 0.02 * thin, "{shares} {thin}");
     }
 
     /// A slab on the floor of the box, and the same once more: of walls behind one another the first has all.

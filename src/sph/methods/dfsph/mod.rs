@@ -2,6 +2,7 @@
 
 mod free_surface;
 mod passes;
+mod rigid;
 mod scheme;
 mod solver;
 mod start;

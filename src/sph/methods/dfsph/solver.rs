@@ -4,6 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::passes::{Constants, Continuation, Push, Squeeze};
+use super::rigid::Rigid;
 use super::walls::Walls;
 use crate::sph::{
     core::{CHUNK, Core},
@@ -52,6 +53,15 @@ pub(super) enum Begin {
     Last,
     /// None.
     Nothing,
+}
+
+/// What a rate of density belongs to.
+#[derive(Clone, Copy)]
+pub(super) enum RateOf<'a> {
+    /// Velocities of a fluid that moves as a whole like this, beside walls with motions of their own.
+    Velocity(&'a Rigid),
+    /// Accelerations or displacements by pressure, in which walls have no part.
+    Pressure,
 }
 
 /// What a solve must reach.
@@ -141,7 +151,7 @@ impl Solver {
         loop {
             self.find_push(core, walls);
             let push = std::mem::take(&mut self.push);
-            self.find_rate_of(core, walls, &push, false);
+            self.find_rate_of(core, walls, &push, RateOf::Pressure);
             self.push = push;
             let (errors, uphill) = self.find_errors(free, dt, least, goal);
             let mean = errors.sum / n as f64;
@@ -227,13 +237,18 @@ impl Solver {
         core.sum(&pass, [&self.s], [&mut x[..], y, z]);
     }
 
-    /// Finds the dρ/dt of a velocity, with the motion of the walls, or of an acceleration in a second,
-    /// without it.
-    pub fn find_rate_of(&mut self, core: &Core, walls: &Walls, velocity: &Vectors, with_walls: bool) {
+    /// Finds the dρ/dt of velocities, or of accelerations in a second.
+    pub fn find_rate_of(&mut self, core: &Core, walls: &Walls, velocity: &Vectors, of: RateOf<'_>) {
         let velocity = match self.continuation {
             Continuation::Barrier => velocity,
             Continuation::Linear => {
-                walls.complete(velocity, &mut self.completed);
+                match of {
+                    RateOf::Velocity(whole) => {
+                        let at = &core.particles.position;
+                        walls.complete_velocities(velocity, (at, whole), &mut self.completed);
+                    }
+                    RateOf::Pressure => walls.complete(velocity, &mut self.completed),
+                }
                 &self.completed
             }
         };
@@ -242,7 +257,7 @@ impl Solver {
             walls,
             velocity,
             continuation: self.continuation,
-            with_walls,
+            with_walls: matches!(of, RateOf::Velocity(_)),
         };
         let Vectors { x, y, z } = velocity;
         core.sum(&pass, [&x[..], y, z], [&mut self.rate]);

@@ -3,6 +3,7 @@
 use glam::DMat3;
 use rayon::prelude::*;
 
+use super::rigid::Rigid;
 use crate::sph::{
     core::{CHUNK, Core},
     particles::Vectors,
@@ -55,11 +56,22 @@ impl Walls {
         })
     }
 
-    /// Writes M·v of each particle to `completed`.
-    pub fn complete(&self, v: &Vectors, completed: &mut Vectors) {
-        completed.clone_from(v);
+    /// Writes M·a of each particle to `completed`.
+    pub fn complete(&self, a: &Vectors, completed: &mut Vectors) {
+        completed.clone_from(a);
         for &(i, _, completion) in &self.found {
-            completed.set(i as usize, completion * v.get(i as usize));
+            completed.set(i as usize, completion * a.get(i as usize));
+        }
+    }
+
+    /// Writes r + M·(v − r) of each particle to `completed`, where r is the velocity behind the walls: across them that of the
+    /// walls, and along them that of the fluid as a whole.
+    pub fn complete_velocities(&self, v: &Vectors, (at, whole): (&Vectors, &Rigid), completed: &mut Vectors) {
+        completed.clone_from(v);
+        for (i, wall, completion) in &self.found {
+            let i = *i as usize;
+            let behind = wall.behind(whole.at(at.get(i)));
+            completed.set(i, behind + *completion * (v.get(i) - behind));
         }
     }
 

@@ -39,18 +39,19 @@ pub(in crate::sph) struct Taken {
     pub moment: Symmetric,
     /// −∂λ/∂t, 1/s: ∇λ·v for bodies that move with the velocity v.
     pub sweep: f64,
+    /// The velocity v of bodies that move with one, m/s; `None` if they do not move, or change their shape.
+    pub velocity: Option<DVec3>,
 }
 
 impl Taken {
     /// What turned bodies take.
     pub fn turned(&self, rotation: &DMat3) -> Self {
-        let Self { part, gradient, moment, sweep } = *self;
-        Self { part, gradient: *rotation * gradient, moment: moment.turned(rotation), sweep }
+        Self { gradient: *rotation * self.gradient, moment: self.moment.turned(rotation), ..*self }
     }
 
     /// What bodies take that move with one velocity, m/s.
     pub fn moving(&self, velocity: DVec3) -> Self {
-        Self { sweep: self.gradient.dot(velocity), ..*self }
+        Self { sweep: self.gradient.dot(velocity), velocity: Some(velocity), ..*self }
     }
 }
 
@@ -141,6 +142,7 @@ impl Spline {
             gradient: slopes.as_dvec3() / *step,
             moment: Symmetric::new(diagonal.truncate().as_dvec3(), others.truncate().as_dvec3()),
             sweep: -f64::from(others.w),
+            velocity: None,
         })
     }
 }

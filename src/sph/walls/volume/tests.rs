@@ -47,8 +47,13 @@ fn planes_have_their_closed_forms() {
             if !(0.0..1.0).contains(&delta) {
                 continue;
             }
-            let nothing =
-                Taken { part: 0.0, gradient: DVec3::ZERO, moment: Symmetric::default(), sweep: 0.0 };
+            let nothing = Taken {
+                part: 0.0,
+                gradient: DVec3::ZERO,
+                moment: Symmetric::default(),
+                sweep: 0.0,
+                velocity: None,
+            };
             let taken = map.at(place).unwrap_or(nothing);
             let (part, slope) = (KERNEL.covered(delta), KERNEL.slope(delta));
             let moment = part * Symmetric::IDENTITY + delta * slope * Symmetric::square(normal);
