@@ -22,8 +22,11 @@ const SOON: f64 = 1e-7;
 /// in a sixth of its period.
 const CHANGE: f64 = 1.0 / 16.0;
 
-/// Steps of Newton's method onto the surface.
-const STEPS: usize = 3;
+/// Steps of Newton's method onto the surface, which begins far from it where a body is larger than the box.
+const STEPS: usize = 8;
+
+/// The part of the box's longest side that is no step any more.
+const CLOSE: f64 = 1e-6;
 
 /// The part of the box's longest side within which a place counts as one of the surface.
 const NEAR: f64 = 1e-3;
@@ -143,7 +146,14 @@ fn on_surface(solid: &Solid, domain: &Aabb, start: usize) -> Option<(DVec3, DVec
         let slope = gradient.length();
         normal = -gradient / slope;
         last = omega / slope;
-        p += last * normal;
+        if !last.is_finite() {
+            return None;
+        }
+        // what leaves the box may come back along the surface
+        p = (p + last * normal).clamp(domain.min, domain.max);
+        if last.abs() <= CLOSE * domain.size().max_element() {
+            break;
+        }
     }
     let found = last.abs() <= NEAR * domain.size().max_element() && normal.is_finite() && domain.contains(p);
     found.then_some((p, normal))

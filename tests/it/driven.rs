@@ -454,6 +454,24 @@ scene push {{
     assert!(speed("move([0, 0, 0.001*t])", 9.81) < 4.5);
 }
 
+/// The scene is flat, and the paddle in it much higher.
+#[test]
+fn a_paddle_that_reaches_far_out_of_the_box_is_seen_to_move() {
+    let simulation = run("rfm 1
+solid paddle = box([-0.1, -0.1, -1], [0.1, 0.1, 1]).rotate_z(t)
+scene stirred {
+  box { min: [-0.4, -0.4, 0], max: [0.4, 0.4, 0.12] }
+  obstacle { solid: paddle }
+  fluid oil { shape: z <= 0.1, density: 1000, spacing: 0.05, viscosity: 100 }
+  gravity: [0, 0, 0]
+  run { until: 0.01 s }
+}")
+    .unwrap();
+    // its corners go round at 0.14 m/s, of which 0.1 are across its faces
+    let expected = simulation.parameters().expected_speed;
+    assert!((0.08..0.5).contains(&expected), "{expected}");
+}
+
 #[test]
 fn fast_belts_are_expected() {
     let text = "rfm 1

@@ -8,6 +8,7 @@
 mod declaration;
 mod dfsph;
 mod free_bodies;
+mod free_surface;
 mod negative_pressure;
 mod numerics;
 mod paper;

@@ -31,6 +31,12 @@ pub(super) fn return_rate(core: &Core) -> f64 {
     RETURN * core.speed / core.parameters.support_radius
 }
 
+/// That rate at the speed of a fall through half a support radius, 1/s: what gravity has loosened, it closes again.
+pub(super) fn falling_rate(core: &Core) -> f64 {
+    let gravity = core.parameters.gravity.length().max(core.parameters.most_gravity);
+    RETURN * (gravity / core.parameters.support_radius).sqrt()
+}
+
 /// How far a particle belongs to the fluid's depth, 0 to 1, from its G: one in the depth, a half at a flat
 /// surface.
 pub(super) fn depth(spread: f64) -> f64 {

@@ -1,6 +1,5 @@
 //! The divergence-free method: its numbers, keys and limits. The scheme is in [`scheme`].
 
-mod free_surface;
 mod passes;
 mod rigid;
 mod scheme;

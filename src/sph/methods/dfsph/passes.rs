@@ -13,7 +13,7 @@ use crate::sph::{
     walls::{Friction, Pushed},
 };
 
-use super::free_surface::FreeSurface;
+use super::super::free_surface::FreeSurface;
 use super::walls::{Walls, WallsNear};
 
 /// Constants that the passes share.

@@ -19,7 +19,7 @@
 //! away is added to the debt, see [`OWED`].
 //!
 //! Both systems take the part of the kernel that is missing before a free surface for fluid
-//! ([`free_surface`](super::free_surface)), so that the outermost particles keep their distance as those in the depth do.
+//! ([`free_surface`](super::super::free_surface)), so that the outermost particles keep their distance as those in the depth do.
 //!
 //! The two systems treat walls differently.
 //!
@@ -53,12 +53,12 @@
 use smallvec::{SmallVec, smallvec};
 
 use super::super::{
+    free_surface::FreeSurface,
     roughness::{self, Roughness},
     scheme::Scheme,
     shifting::{depth, restore_crowding, save_crowding, shift},
     tension::Tension,
 };
-use super::free_surface::FreeSurface;
 use super::passes::{Constants, Continuation, Densities, Drag, Field};
 use super::rigid::Rigid;
 use super::solver::{Begin, Errors, Goal, RateOf, Solver};

@@ -16,8 +16,9 @@
 //! a sum of its own the energy is up to 0.5 % above its start, with the extrapolated one 0.05 %.)
 //!
 //! A density that started at a surface knows too much once its particle is deep in the fluid, and diffusion
-//! mixes such densities. In the depth of the fluid they therefore return to what the places say, Σ m W over
-//! its value on a lattice, plus the part of the walls.
+//! mixes such densities. In the fluid they therefore return to what the places say, Σ m W over its value on a lattice,
+//! plus the part of the walls and what is missing before a free surface
+//! ([`free_surface`](super::super::free_surface)), within a hundredth, not slower than a fluid falls together.
 //!
 //! Kernel: Wendland C2 (1995), under which particles do not clump. Density diffusion: Molteni & Colagrossi
 //! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
@@ -57,7 +58,7 @@ use super::super::{
     tension::Tension,
 };
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
-use super::passes::{Pairs, Rates};
+use super::passes::{Missing, Pairs, Rates, closes_gaps};
 use super::{EXPONENT, Gradients, Wcsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
@@ -84,6 +85,8 @@ pub struct Weakly {
     crowding: Vectors,
     /// Predicted ρ − ρ₀.
     excess: Vec<f64>,
+    /// What kernels miss before a free surface, as a part of the rest density, see [`SURFACE_STEPS`].
+    missing: Vec<f64>,
     roughness: Roughness,
     /// Working memory: the Q and the drift that a sum finds.
     found: [Vec<f64>; 2],
@@ -91,7 +94,11 @@ pub struct Weakly {
 }
 
 /// Names of the scheme's columns in a checkpoint.
-const COLUMNS: [&str; 4] = ["places", "density rate", "earlier density rate", "density drift"];
+const COLUMNS: [&str; 5] =
+    ["places", "density rate", "earlier density rate", "density drift", "missing before a surface"];
+
+/// Steps after which what kernels miss before a free surface is found anew: it follows what takes some hundred steps.
+const SURFACE_STEPS: u64 = 8;
 
 /// Name of the length of the last step in a checkpoint.
 const LAST_STEP: &str = "last step";
@@ -108,6 +115,7 @@ impl Scheme for Weakly {
             &mut self.rate,
             &mut self.earlier_rate,
             &mut self.drift,
+            &mut self.missing,
             sx,
             sy,
             sz,
@@ -120,8 +128,8 @@ impl Scheme for Weakly {
     }
 
     fn save(&self, checkpoint: &mut Checkpoint) {
-        for (name, column) in COLUMNS.iter().zip([&self.places, &self.rate, &self.earlier_rate, &self.drift])
-        {
+        let columns = [&self.places, &self.rate, &self.earlier_rate, &self.drift, &self.missing];
+        for (name, column) in COLUMNS.iter().zip(columns) {
             checkpoint.set(name, column.clone());
         }
         checkpoint.set(LAST_STEP, vec![self.last_dt]);
@@ -130,7 +138,8 @@ impl Scheme for Weakly {
     }
 
     fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        let columns = [&mut self.places, &mut self.rate, &mut self.earlier_rate, &mut self.drift];
+        let columns =
+            [&mut self.places, &mut self.rate, &mut self.earlier_rate, &mut self.drift, &mut self.missing];
         for (name, column) in COLUMNS.iter().zip(columns) {
             *column = checkpoint.of_particles(name)?;
         }
@@ -146,8 +155,8 @@ impl Scheme for Weakly {
     }
 
     fn bytes(&self) -> usize {
-        let Self { places, rate, earlier_rate, drift, filled, found: [a, b], excess, .. } = self;
-        let columns = [places, rate, earlier_rate, drift, filled, a, b, excess];
+        let Self { places, rate, earlier_rate, drift, filled, found: [a, b], excess, missing, .. } = self;
+        let columns = [places, rate, earlier_rate, drift, filled, a, b, excess, missing];
         columns.map(|column| 8 * column.capacity()).iter().sum::<usize>()
             + self.crowding.bytes()
             + self.tension.bytes()
@@ -175,6 +184,7 @@ impl Weakly {
             filled: vec![0.0; n],
             crowding: Vectors::default(),
             excess: Vec::new(),
+            missing: vec![0.0; n],
             roughness: Roughness::of(&core.particles.velocity, numbers.gradients == Gradients::Pairs),
             found: [vec![0.0; n], vec![0.0; n]],
             tension: Tension::default(),
@@ -241,7 +251,11 @@ impl Weakly {
             sy,
             sz,
         ];
-        let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, dt);
+        self.missing.resize(n, 0.0);
+        if closes_gaps(numbers) && core.steps.is_multiple_of(SURFACE_STEPS) {
+            core.sum(&Missing::new(core), [], [&mut self.missing]);
+        }
+        let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, &self.missing, dt);
         match (rates.laminar > 0.0, rates.artificial > 0.0, rates.even) {
             (true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
             (true, true, false) => core.sum(&Pairs::<true, true, false>(rates), fields, out),
