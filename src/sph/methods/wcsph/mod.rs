@@ -224,6 +224,7 @@ impl Declaration for Wcsph {
         "density rate",
         "earlier density rate",
         "density drift",
+        "missing before a surface",
         "last step",
         "crowding x",
         "crowding y",
