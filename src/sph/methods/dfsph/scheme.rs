@@ -29,8 +29,8 @@
 //! is that of the fluid as a whole, so that a fluid which moves past a wall is not stirred by
 //! the disorder of M ([`Rigid`]). What pressure does to w is M·a, so the system is symmetric and has no negative
 //! eigenvalue for any vessel, and its solution adds no energy. (With r = 0 water that moved with its tank at 5 m/s was stirred to
-//! 0.9 m/s, and a piston moved the fluid before it by a part of its way only.) (Measured on a still column: with λ and ∇λ alone the pressure of the first layer
-//! comes out 2.2 times too high, and in a narrow vessel all of it by 20 %.)
+//! 0.9 m/s. On a still column, with λ and ∇λ alone, the pressure of the first layer comes out 2.2 times too high, and
+//! in a narrow vessel all of it by 20 %.)
 //!
 //! Places: ρ_i = Σ m W + ρ₀ B with the barrier B of [`OfFace`](crate::sph::walls::OfFace), which is a lattice's part where a
 //! fluid at rest touches the wall, and b(s′) by its derivative, exact for each face. The solve therefore meets the

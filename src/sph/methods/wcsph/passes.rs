@@ -234,8 +234,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         // before a free surface, where a gap beside a wall is none
         let missing = rates.missing[i];
         let whole = filled + if wall.is_some() { missing.min((1.0 - filled).max(0.0)) } else { missing };
-        let returning = if closes_gaps(rates.numbers) { depth(whole) * rates.returns(i, whole) } else { 0.0 };
-        // how far the particle belongs to the depth of the fluid
+        // how far the particle belongs to the depth of the fluid, before a surface as well
+        let whole_depth = depth(whole);
         let depth = depth(if EVEN { spread } else { filled });
         let smooth = if rates.differences { depth } else { 0.0 };
         let mean = if smooth > 0.0 { 1.0 + smooth * (1.0 / spread - 1.0) } else { 1.0 };
@@ -261,8 +261,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> PairPass<8, 
         // differences of pressure make waves grow, so that all their motion is damped
         let smooth =
             if ARTIFICIAL && !rates.differences { DVec3::new(sx, sy, sz) / weights } else { DVec3::ZERO };
-        let returning = if closes_gaps(rates.numbers) { returning } else { depth * rates.returns(i, filled) };
-        let mut drift = denser + returning;
+        let returning = if closes_gaps(rates.numbers) { whole_depth } else { depth };
+        let mut drift = denser + returning * rates.returns(i, whole);
         let rate = if rates.differences {
             // densities follow the equation of continuity
             compression += wall_rate;

@@ -18,7 +18,7 @@
 //! A density that started at a surface knows too much once its particle is deep in the fluid, and diffusion
 //! mixes such densities. In the fluid they therefore return to what the places say, Σ m W over its value on a lattice,
 //! plus the part of the walls and what is missing before a free surface
-//! ([`free_surface`](super::super::free_surface)), within a hundredth, not slower than a fluid falls together.
+//! ([`free_surface`](super::super::free_surface)), within two hundredths where there is room, and there not slower than a fluid falls together.
 //!
 //! Kernel: Wendland C2 (1995), under which particles do not clump. Density diffusion: Molteni & Colagrossi
 //! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
