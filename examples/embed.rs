@@ -1,8 +1,10 @@
 //! A particle loop of your own around a compiled obstacle: `cargo run --release --example embed`.
 
-use rfm::{Program, glam::DVec3};
+use rfm::Program;
+use rfm::glam::DVec3;
+use rfm::sph::{Collision, Rebound, collide};
 
-fn main() -> Result<(), rfm::Error> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/pawn.rfm");
     let pawn = Program::from_path(file)?.with("cx", 1.25)?.solid("pawn")?;
 
@@ -13,6 +15,7 @@ fn main() -> Result<(), rfm::Error> {
     let mut v = vec![DVec3::ZERO; 1000];
     let mut omega = vec![0.0; 1000];
     let (dt, mut hits) = (0.001, 0);
+    let rebound = Rebound::new(0.5, 0.0, 0.1)?; // half of the normal speed returns; nothing is moved farther than 0.1 m
     for _ in 0..1000 {
         for i in 0..1000 {
             v[i].z -= 9.81 * dt;
@@ -21,16 +24,9 @@ fn main() -> Result<(), rfm::Error> {
         }
         pawn.omega_many([&x, &y, &z], &mut omega); // one call for all points: nothing is allocated
         for i in (0..1000).filter(|&i| omega[i] > 0.0) {
-            hits += 1;
-            let (mut w, mut gradient) = pawn.omega_grad(DVec3::new(x[i], y[i], z[i]));
-            let normal = -gradient.normalize();
-            let approach = v[i].dot(normal).min(0.0);
-            v[i] -= 1.5 * approach * normal; // half of the normal speed returns
-            while w > 0.0 {
-                let p = DVec3::new(x[i], y[i], z[i]) + (w / gradient.length() + 1e-9) * -gradient.normalize();
-                (x[i], y[i], z[i]) = (p.x, p.y, p.z);
-                (w, gradient) = pawn.omega_grad(p);
-            }
+            let mut p = DVec3::new(x[i], y[i], z[i]);
+            hits += usize::from(collide(&pawn, &rebound, &mut p, &mut v[i]) == Some(Collision::Hit));
+            (x[i], y[i], z[i]) = (p.x, p.y, p.z);
         }
     }
     pawn.omega_many([&x, &y, &z], &mut omega);

@@ -20,16 +20,22 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::codegen::CodegenError;
 use crate::diagnostic::{Code, Diagnostic, Diagnostics, Label, Severity, Source, SourceId, Span, nearest};
 use crate::geom::Aabb;
 use crate::ir::Node;
-use crate::lower::{self, Imported, Module, OpenParams, Options, Scene, Tolerance};
+use crate::lower::{self, Imported};
 use crate::quantity::Dimension;
 use crate::solid::{Bounds, Chosen, Engine, Solid};
 use crate::sph::Method;
 use crate::syntax::{self, Ast};
 
+#[doc(inline)]
+pub use crate::codegen::CodegenError;
+#[doc(inline)]
+pub use crate::lower::{
+    AskedMean, Bounce, Container, Fluid, Gravity, Measured, Module, NamedSolid, Obstacle, OpenParams,
+    Opening, Options, ParamValue, Picture, Probe, Run, Scene, Skin, Solver, Tolerance, Truth,
+};
 pub use folder::files_beside;
 #[doc(hidden)]
 pub use folder::text_of;
@@ -128,13 +134,37 @@ impl Program {
             .map_err(Error::Diagnostics)
     }
 
-    /// Checks a text. Its messages show `name` in place of a path. It may not name other files: [`Program::check`]
-    /// takes a text with [`Files`](crate::files::Files).
+    /// Checks a text. Its messages show `name` in place of a path. It may not name other files, see
+    /// [`Program::from_source_with`].
     ///
     /// # Errors
     /// [`Error::Diagnostics`] if the text has mistakes.
     pub fn from_source(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Result<Self, Error> {
         Self::check(Source::file(name, text), Options::default()).map_err(Error::Diagnostics)
+    }
+
+    /// Checks a text that may name other files: those of a folder ([`files_beside`]), or texts in memory
+    /// ([`Files`](crate::files::Files)).
+    ///
+    /// ```
+    /// use rfm::{Program, files::Files};
+    ///
+    /// let files = Files::from_memory([("parts.rfm", "rfm 1\nsolid peg = cylinder(0.1, h = 1)")]);
+    /// let text = "rfm 1\nimport \"parts.rfm\" as parts\nsolid board = box([-1, -1, -0.1], [1, 1, 0]) or parts.peg";
+    /// let program = Program::from_source_with("board.rfm", text, files)?;
+    /// assert_eq!(program.solids().collect::<Vec<_>>(), ["board"]);
+    /// # Ok::<(), rfm::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Diagnostics`] if the text has mistakes.
+    pub fn from_source_with(
+        name: impl Into<Arc<str>>,
+        text: impl Into<Arc<str>>,
+        files: crate::files::Files,
+    ) -> Result<Self, Error> {
+        let options = Options { files, ..Options::default() };
+        Self::check(Source::file(name, text), options).map_err(Error::Diagnostics)
     }
 
     /// Checks a text with the overrides of params and the limits that `options` state.
@@ -234,6 +264,21 @@ impl Program {
 
     fn lowered_again(&self, options: Options) -> Result<Self, Error> {
         Self::lowered(self.sources.clone(), self.texts.clone(), options).map_err(Error::Diagnostics)
+    }
+
+    /// Names of the solids, in the order of the file.
+    pub fn solids(&self) -> impl Iterator<Item = &str> {
+        self.module.solids.iter().map(|solid| &*solid.name)
+    }
+
+    /// Names of the scenes, in the order of the file.
+    pub fn scenes(&self) -> impl Iterator<Item = &str> {
+        self.module.scenes.iter().map(|scene| &*scene.name)
+    }
+
+    /// The params, in the order of the file, with the values that they have now.
+    pub fn params(&self) -> &[ParamValue] {
+        &self.module.params
     }
 
     /// The params that were set, with their values. Params with the value of the file are not among them.
@@ -340,7 +385,8 @@ impl Program {
         }
     }
 
-    /// What the file defines: its graph, params, solids and scenes.
+    /// What the file defines, with its places there: the graph of all expressions, params, solids and scenes. Names alone are
+    /// told by [`solids`](Self::solids), [`params`](Self::params) and [`scenes`](Self::scenes).
     pub fn module(&self) -> &Module {
         &self.module
     }

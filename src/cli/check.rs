@@ -166,10 +166,19 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
     let mut document = Document { schema: 1, ok: true, diagnostics: Vec::new(), solids: Vec::new() };
     let mut usage = None;
     for path in &options.files {
-        if options.fix {
-            findings::fix(shared, path)?;
-        }
-        let source = input::read(path)?;
+        let fixed = if options.fix { findings::fix(shared, path) } else { Ok(()) };
+        let source = match fixed.and_then(|()| input::read(path)) {
+            Ok(source) => source,
+            // the other files have their messages
+            Err(Failure::Usage(message)) => {
+                document.ok = false;
+                if let Some(earlier) = usage.replace(message) {
+                    complain(&earlier);
+                }
+                continue;
+            }
+            Err(other) => return Err(other),
+        };
         let file = source.name.to_string();
         let files = input::files(shared, &source);
         let checked = input::check(shared, source, files.clone());
@@ -418,6 +427,7 @@ fn measure(solid: &Solid, file: &str) -> Result<(Facts, ThinCells), Failure> {
             facts.resolved = Some(found.solids == found.solids_coarser && no_thin_parts);
         }
         Err(VolumeError::TooThin) => {}
+        Err(error @ VolumeError::TooFewCells(_)) => return Err(Failure::usage(error)),
         Err(VolumeError::Grid(error)) => return Err(Failure::usage(error)),
         // a field that is not a number somewhere has no volume
         Err(VolumeError::Mesh(_)) => return Ok((facts, ThinCells::NONE)),

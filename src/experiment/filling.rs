@@ -2,9 +2,10 @@
 //!
 //! A lattice seldom divides a shape. Its cells are therefore fitted: in a box that the fluid fills they are
 //! stretched along each axis so that whole layers reach from face to face, and where a number of particles is stated,
-//! some rows hold one more than the others ([`Rows`]). Elsewhere their size is varied until their number times their
-//! volume is that of the fluid, or as many sites are taken as are stated, the deepest. What is left of the difference
-//! goes into the mass of the particles: m = ρ₀·V/N, with the volume V of the shape in the box and outside all bodies.
+//! some rows hold one more than the others ([`Rows`]). Elsewhere they are stretched to fit several levels ([`Chords`]), or
+//! their size is varied until their number times their volume is that of the fluid, or as many sites are taken as are
+//! stated, the deepest. What is left of the difference goes into the mass of the particles: m = ρ₀·V/N, with the volume V of the
+//! shape in the box and outside all bodies.
 //!
 //! A fluid without a surface that must not be compressed is packed once it is placed, and loses some of its mass: see
 //! [`Parameters::fills_vessel`](crate::sph::Parameters::fills_vessel).
@@ -15,7 +16,11 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
-use super::{Experiment, refuse};
+use super::{
+    Experiment,
+    layers::{Chords, Layers},
+    refuse,
+};
 use crate::compile::Error;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::field::{Field, Region};
@@ -39,6 +44,9 @@ const LEAST_ROOM: f64 = 1.03;
 
 /// Lattices that are tried for one shape, at most.
 const TRIALS: usize = 8;
+
+/// Part of a fluid that must come to its place by cells that are longer than wide, or cubes serve as well.
+const WORTH_STRETCHING: f64 = 0.01;
 
 /// Part of a lattice's sites from which on the search for a better lattice goes on, where a number of particles is
 /// stated and the others stay vacant.
@@ -208,7 +216,22 @@ impl Experiment {
             // a sheet thinner than the spacing weighs what it does by the mass of its particles
             size = (size * (-off / free).exp()).clamp((1.0 - TOO_FAR) * spacing, (1.0 + TOO_FAR) * spacing);
         }
-        best.map(|(_, placed)| placed).ok_or_else(|| self.no_lattice())
+        let (off, placed) = best.ok_or_else(|| self.no_lattice())?;
+        let chords = Chords::of(&self.fluid, within, spacing);
+        let misplaced = |cell: DVec3| -> f64 {
+            (0..3).map(|axis| chords.mismatch(axis, self.layers(within, axis, cell[axis]))).sum()
+        };
+        let mut cell = self.cell(within, spacing);
+        for axis in self.free_axes(within) {
+            cell[axis] = chords.fitted(axis, spacing, |width| self.layers(within, axis, width));
+        }
+        if misplaced(cell) + WORTH_STRETCHING > misplaced(placed.2) {
+            return Ok(placed);
+        }
+        let (particles, carved) = self.place(obstacles, Sites::Cells(cell), None, Some(taken))?;
+        let off_stretched = (particles.len() as f64 * cell.element_product() / volume).ln().abs();
+        let gained = misplaced(placed.2) + off - misplaced(cell) - off_stretched;
+        Ok(if gained > WORTH_STRETCHING { (particles, carved, cell) } else { placed })
     }
 
     /// Places a number of particles, each as large as a cell, in a shape of any kind, or takes what is known with its error
@@ -280,21 +303,25 @@ impl Experiment {
     /// The box of a lattice with these cells: it begins at a wall of the box where the fluid touches one, and lies in
     /// the middle of the fluid's bounds elsewhere, so that what is symmetric stays so.
     fn lattice_box(&self, within: Aabb, cell: DVec3) -> Aabb {
-        let domain = self.scene.domain;
-        let layers = (within.size() / cell + 1e-9).floor();
-        let spare = within.size() - layers * cell;
-        let before = DVec3::from_array(std::array::from_fn(|axis| {
-            let low = within.min[axis] <= domain.min[axis];
-            let high = within.max[axis] >= domain.max[axis];
-            match (low, high) {
-                (true, _) => 0.0,
-                (false, true) => spare[axis],
-                (false, false) => 0.5 * spare[axis],
-            }
-        }));
+        let layers: [Layers; 3] = std::array::from_fn(|axis| self.layers(within, axis, cell[axis]));
+        let min = DVec3::from_array(layers.map(|layers| layers.start));
+        let number = DVec3::from_array(layers.map(|layers| layers.number));
         // a hair more room, so that rounding does not take a layer
-        let min = within.min + before;
-        Aabb::new(min, min + layers * cell * (1.0 + 1e-12))
+        Aabb::new(min, min + number * cell * (1.0 + 1e-12))
+    }
+
+    /// The layers of that box along an axis.
+    fn layers(&self, within: Aabb, axis: usize, width: f64) -> Layers {
+        let domain = self.scene.domain;
+        let (low, high) = (within.min[axis], within.max[axis]);
+        let number = ((high - low) / width + 1e-9).floor();
+        let spare = (high - low) - number * width;
+        let before = match (low <= domain.min[axis], high >= domain.max[axis]) {
+            (true, _) => 0.0,
+            (false, true) => spare,
+            (false, false) => 0.5 * spare,
+        };
+        Layers { start: low + before, number, width }
     }
 
     /// [`Self::lattice_box`] with a further layer on each side that is no wall.

@@ -17,6 +17,7 @@ mod deviation;
 mod every;
 mod filling;
 mod fingerprint;
+mod layers;
 mod mean;
 mod parameters;
 mod probes;

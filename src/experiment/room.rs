@@ -76,6 +76,12 @@ impl Experiment {
         };
         let bounds = match self.fluid.bounds() {
             Bounds::Within(bounds) => *bounds,
+            Bounds::Unbounded if self.fluid.range(&domain).hi < 0.0 => {
+                return Err(refuse(
+                    &self.program,
+                    no_room("the shape of the fluid lies outside the box".into()),
+                ));
+            }
             Bounds::Unbounded => without_empty_sides(&self.fluid, domain),
             Bounds::Empty => {
                 let message = "the shape of the fluid is empty";

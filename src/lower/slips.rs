@@ -250,14 +250,19 @@ impl Lowering<'_> {
     }
 }
 
-/// The first number above a whole turn in an expression, and its place. Whole and half multiples of π stand for turns.
 fn without_sign(expr: &Expr) -> &Expr {
     if let ExprKind::Negate(inner) = &expr.kind { inner } else { expr }
 }
 
+/// Functions whose value is as large as an argument. What is large in `0.5*sin(10*t)` is no angle.
+const AS_LARGE: [&str; 8] = ["abs", "ceil", "clamp", "floor", "max", "min", "mod", "round"];
+
+/// The first number above a whole turn in an expression, and its place. Whole and half multiples of π stand for turns.
 fn large_number(expr: &Expr) -> Option<(f64, &Expr)> {
-    let ExprKind::Number(number) = expr.kind else {
-        return expr.children().into_iter().find_map(large_number);
+    let number = match &expr.kind {
+        ExprKind::Number(number) => *number,
+        ExprKind::Call { function, .. } if !AS_LARGE.contains(&function.text.as_str()) => return None,
+        _ => return expr.children().into_iter().find_map(large_number),
     };
     let halves = 2.0 * number / std::f64::consts::PI;
     let is_of_pi = (halves - halves.round()).abs() < 1e-4 * halves;

@@ -24,7 +24,9 @@ pub struct Volume {
 /// Why a volume was not found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum VolumeError {
-    /// There is no grid for the box or the number of cells.
+    /// Fewer cells were asked for than two meshes need.
+    TooFewCells(usize),
+    /// There is no grid for the box.
     Grid(GridError),
     /// The field could not be meshed.
     Mesh(MeshError),
@@ -35,6 +37,13 @@ pub enum VolumeError {
 impl std::fmt::Display for VolumeError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Self::TooFewCells(cells) => {
+                let least = 2 * Grid::MIN_CELLS;
+                write!(
+                    f,
+                    "a volume needs at least {least} cells along the longest side, and {cells} were asked for"
+                )
+            }
             Self::Grid(error) => error.fmt(f),
             Self::Mesh(error) => error.fmt(f),
             Self::TooThin => write!(f, "the solid is too thin for this many cells along its longest side"),
@@ -57,6 +66,9 @@ pub fn volume(field: &dyn Field, bounds: &Aabb, cells: usize) -> Result<Volume, 
         let sums = shells.iter().fold([0.0; 2], |[v, a], shell| [v + shell.volume, a + shell.area]);
         Ok((sums, shells.iter().filter(|shell| shell.is_solid()).count()))
     };
+    if cells / 2 < Grid::MIN_CELLS {
+        return Err(VolumeError::TooFewCells(cells));
+    }
     let ((coarse, solids_coarser), (fine, solids)) = (measured(cells / 2)?, measured(cells)?);
     if fine[1] == 0.0 {
         return Err(VolumeError::TooThin);

@@ -39,6 +39,13 @@ pub enum SetupError {
         /// Number of the obstacle, from 0.
         index: usize,
     },
+    /// A probe asks for the force on an obstacle that is not there.
+    NoObstacle {
+        /// Number that the probe has, from 0.
+        index: usize,
+        /// How many obstacles there are.
+        obstacles: usize,
+    },
     /// There are no particles.
     NoParticles,
     /// The checkpoint does not belong to this method.
@@ -68,6 +75,9 @@ impl fmt::Display for SetupError {
                     f,
                     "obstacle {index} needs a restitution from 0 to 1, a friction of at least 0 and a resolution above 0"
                 )
+            }
+            Self::NoObstacle { index, obstacles } => {
+                write!(f, "there is no obstacle {index}: the simulation has {obstacles}, numbered from 0")
             }
             Self::Checkpoint(error) => write!(f, "the checkpoint cannot be used: {error}"),
             Self::NoParticles => write!(f, "there are no particles"),

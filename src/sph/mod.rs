@@ -94,5 +94,6 @@ pub use stats::Stats;
 pub use vtp::short_time;
 pub use vtp::{write_pvd, write_vtp};
 pub use walls::{
-    ChangingShape, Contact, Obstacle, RigidPart, Undefined, WallKernel, bounce, first_contact, push_out,
+    ChangingShape, Collision, Contact, Obstacle, Rebound, RigidPart, Undefined, WallKernel, bounce, collide,
+    first_contact, push_out, put_back,
 };

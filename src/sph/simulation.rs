@@ -209,7 +209,7 @@ impl Simulation {
     }
 
     /// Takes steps until a time, s, at which the last step ends. `after_step` is called with each state on
-    /// the way and may stop earlier.
+    /// the way and may stop earlier. A time that is no number, or is not after the present one, asks for no step.
     ///
     /// # Errors
     /// As [`Simulation::step`].
@@ -291,7 +291,7 @@ impl Simulation {
         if let Probe::Force { obstacle, .. } = probe {
             let obstacles = self.core.boundary.obstacles.len();
             if obstacle >= obstacles {
-                return Err(SetupError::Obstacle { index: obstacle });
+                return Err(SetupError::NoObstacle { index: obstacle, obstacles });
             }
             self.core.contacts.get_or_insert_with(|| Contacts::of(obstacles));
         }

@@ -106,6 +106,20 @@ fn help_and_usage() {
     }
 }
 
+/// A file that is missing hides neither the messages of the others nor the document.
+#[test]
+fn other_files_are_checked_beside_one_that_is_missing() {
+    let outcome =
+        rfm(root(), &["check", PAWN, "none.rfm", "nor.rfm", "examples/cube.rfm", "--json"]).expect(2);
+    let document: serde_json::Value = serde_json::from_str(&outcome.stdout).unwrap();
+    assert_eq!(document["ok"], false);
+    let names: Vec<_> = document["solids"].as_array().unwrap().iter().map(|solid| &solid["name"]).collect();
+    assert_eq!(names, ["pawn", "cube"]);
+    for name in ["none.rfm", "nor.rfm"] {
+        assert!(outcome.stderr.contains(&format!("cannot read `{name}`")), "{}", outcome.stderr);
+    }
+}
+
 /// Each file to begin with passes its check, and the one with a known outcome is near it.
 #[test]
 fn a_new_user_begins_with_a_file_that_works() {

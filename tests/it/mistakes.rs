@@ -210,6 +210,8 @@ const VALUES: &[&str] = &[
     "let a = 1/0\nsolid s = a - x",
     "solid s = box().rotate_z(45*t)",
     "solid s = box().rotate([0, 0, 1], 360*sin(t))",
+    "solid s = box().rotate_z(0.5*sin(10*t))",
+    "solid s = box().rotate_z(min(90*t, 45))",
     "solid s = sphere(1) - sphere(0.5)",
     "solid a = sphere(1)\nsolid s = a + box()",
     "solid s = sphere(1)*box()",
@@ -233,6 +235,7 @@ const SCENE: [(&str, &str); 5] = [
 
 const SCENES: &[&str] = &[
     "fluid { shape: ball([5, 5, 5], 0.2) }",
+    "fluid { shape: z <= -1 }",
     "fluid { shape: ball([0.5, 0.5, 1], 0.2), spacing: 5 cm }",
     "fluid { shape: box([-1, 0, 0.5], [1, 1, 2]), spacing: 5 cm }",
     "fluid { shape: ball([0.5, 0.5, 0.7], 0.2), spacing: 5 }",

@@ -99,7 +99,9 @@ impl<T: Number> BlockProgram<T> {
         assert_eq!(N, self.outputs, "outputs of the program");
         assert!(
             points.iter().all(|c| c.len() == count) && out.iter().all(|c| c.len() == count),
-            "column lengths"
+            "columns differ in length: x, y, z have {:?} and the answers {:?} numbers",
+            points.map(<[_]>::len),
+            out.each_ref().map(|column| column.len())
         );
         let whole = count / PADDING * PADDING;
         T::with_scratch(|scratch| {

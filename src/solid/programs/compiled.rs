@@ -119,7 +119,9 @@ impl<T: Number> BatchProgram<T> {
         assert_eq!(N, self.code.outputs, "outputs of the program");
         assert!(
             points.iter().all(|c| c.len() == count) && out.iter().all(|c| c.len() == count),
-            "column lengths"
+            "columns differ in length: x, y, z have {:?} and the answers {:?} numbers",
+            points.map(<[_]>::len),
+            out.each_ref().map(|column| column.len())
         );
         let lanes = T::PRECISION.lanes();
         let whole = count / lanes * lanes;
@@ -512,7 +514,9 @@ impl LeafProgram {
         assert_eq!((N, parameters.len()), (self.batch.outputs, self.parameters), "leaf program");
         assert!(
             points.iter().all(|c| c.len() == count) && out.iter().all(|c| c.len() == count),
-            "column lengths"
+            "columns differ in length: x, y, z have {:?} and the answers {:?} numbers",
+            points.map(<[_]>::len),
+            out.each_ref().map(|column| column.len())
         );
         const LANES: usize = Precision::F64.lanes();
         let whole = count / LANES * LANES;

@@ -35,7 +35,8 @@ const MOST_COVERED: f64 = 0.9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Probe {
     /// Height z of the fluid's surface above (x, y), m: the highest place at which half of the kernel's part
-    /// outside walls is filled. Drops and spray do not count. A dry place has the z of the box's floor.
+    /// outside walls is filled. Drops and spray do not count. A dry place has the z of the box's floor, and one beside the box
+    /// has NaN.
     Height {
         /// x of the place, m.
         x: f64,
@@ -216,6 +217,10 @@ fn height(core: &Core, x: f64, y: f64) -> f64 {
     let beside = |p: &DVec3| (p.x - x).hypot(p.y - y) < h;
     let column: Vec<DVec3> = core.particles.position.iter().filter(beside).collect();
     let Aabb { min, max } = core.boundary.domain;
+    let is_in_box = (min.x..=max.x).contains(&x) && (min.y..=max.y).contains(&y);
+    if !is_in_box {
+        return f64::NAN;
+    }
     let is_filled = |z: f64| filling(core, &weight, DVec3::new(x, y, z), column.iter().copied()) >= 0.5;
     let top = column.iter().map(|p| p.z).fold(min.z, f64::max).min(max.z);
     let step = 0.25 * core.parameters.spacing();

@@ -8,6 +8,7 @@
 //! ```
 
 mod boundary;
+mod collide;
 mod contact;
 mod corner;
 mod coverage;
@@ -23,6 +24,7 @@ mod way_out;
 
 pub use boundary::Obstacle;
 pub(super) use boundary::{Boundary, Fault, MARKED, UNKNOWN};
+pub use collide::{Collision, Rebound, collide, put_back};
 pub(super) use contact::Trouble;
 pub use contact::{Contact, Undefined, bounce, first_contact, push_out};
 pub(super) use coverage::Coverage;

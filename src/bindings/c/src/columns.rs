@@ -1,6 +1,7 @@
 //! Questions about many points, and collisions.
 
-use rfm_columns::{Bounce, Collisions, Column, Job, Number, PARTICLES, Particles, Vectors};
+use library::sph::Rebound;
+use rfm_columns::{Collisions, Column, Job, Number, PARTICLES, Particles, Vectors};
 
 use crate::error::{RfmError, RfmStatus, attempt};
 use crate::solid::{RfmSolid, solid as solid_of};
@@ -335,7 +336,7 @@ pub unsafe extern "C" fn rfm_collide(
                 check::<f64>(count, start.is_null(), vectors.stride, true)?;
             }
         }
-        let bounce = Bounce::new(restitution, friction, reach).map_err(RfmError::bad)?;
+        let rebound = Rebound::new(restitution, friction, reach).map_err(RfmError::bad)?;
         let [positions, velocities] = [positions, velocities]
             .map(|vectors| [vectors.x, vectors.y, vectors.z].map(|start| Column::new(start, vectors.stride)));
         // SAFETY: the caller promises so many particles
@@ -343,7 +344,7 @@ pub unsafe extern "C" fn rfm_collide(
         let mut counts = Collisions::default();
         // a part at a time, so that little is remembered
         for start in (0..count).step_by(PARTICLES) {
-            let found = particles.look(start..(start + PARTICLES).min(count), &this.obstacle, &bounce);
+            let found = particles.look(start..(start + PARTICLES).min(count), &this.obstacle, &rebound);
             particles.put(&found);
             counts = counts.and(found.counts);
         }

@@ -76,7 +76,8 @@ pub unsafe extern "C" fn rfm_load_file(
     unsafe { attempt(error, load) }
 }
 
-/// Checks a text, with values for `count` of its params. Messages show `name` in place of a path.
+/// Checks a text, with values for `count` of its params. Messages show `name` in place of a path. The text may name no other
+/// files, see `rfm_load_text_as`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rfm_load_text(
     text: *const c_char,
@@ -93,6 +94,30 @@ pub unsafe extern "C" fn rfm_load_text(
         let options = unsafe { options(params, count) }?;
         // SAFETY: the caller may have it written
         unsafe { hand_out(program, "program", checked(Source::file(name, text), options)?) }
+    };
+    // SAFETY: null, or the caller's
+    unsafe { attempt(error, load) }
+}
+
+/// Checks a text that stands for the file with a path, which is not read: the text may name other files in its folder and
+/// below, and messages show `path`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rfm_load_text_as(
+    text: *const c_char,
+    path: *const c_char,
+    params: *const RfmParam,
+    count: usize,
+    program: *mut *mut RfmProgram,
+    error: *mut *mut RfmError,
+) -> RfmStatus {
+    let load = || {
+        // SAFETY: the caller promises texts
+        let (text, path) = unsafe { (read_text(text, "text")?, read_text(path, "path")?) };
+        // SAFETY: the caller promises so many params
+        let mut options = unsafe { options(params, count) }?;
+        options.files = files_beside(path, false);
+        // SAFETY: the caller may have it written
+        unsafe { hand_out(program, "program", checked(Source::file(path, text), options)?) }
     };
     // SAFETY: null, or the caller's
     unsafe { attempt(error, load) }

@@ -12,6 +12,6 @@ mod collision;
 mod memory;
 mod number;
 
-pub use collision::{Bounce, Collisions, Found, Obstacle, PARTICLES, Particles};
+pub use collision::{Collisions, Found, Obstacle, PARTICLES, Particles};
 pub use memory::{Column, Job, Vectors};
 pub use number::Number;

@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyList, PyTuple, PyType};
 use rayon::prelude::*;
-use rfm_columns::{Bounce, Collisions, Column, Found, Obstacle, Particles, Vectors};
+use rfm::sph::Rebound;
+use rfm_columns::{Collisions, Column, Found, Obstacle, Particles, Vectors};
 
 use crate::evaluate::{CHUNK, WORTH_RELEASING, WORTH_THREADS};
 use crate::memory::{column, columns};
@@ -27,7 +28,7 @@ pub fn collide<'py>(
     obstacle: &Obstacle,
     positions: &Bound<'py, PyAny>,
     velocities: &Bound<'py, PyAny>,
-    bounce: &Bounce,
+    rebound: &Rebound,
     threads: Threads,
 ) -> PyResult<Bound<'py, PyAny>> {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
@@ -40,7 +41,7 @@ pub fn collide<'py>(
     let mut particles = Particles::new(unsafe { Vectors::new(x.count, [x.columns, v.columns]) });
     // with Python's lock, so that nobody forks a process in which this would never end
     obstacle.prepare();
-    let found = look(py, &particles, obstacle, bounce, threads)?;
+    let found = look(py, &particles, obstacle, rebound, threads)?;
     let mut counts = Collisions::default();
     // one part after the other, when all have been read: arrays of the caller may share elements
     for part in &found {
@@ -55,11 +56,11 @@ fn look(
     py: Python<'_>,
     particles: &Particles,
     obstacle: &Obstacle,
-    bounce: &Bounce,
+    rebound: &Rebound,
     threads: Threads,
 ) -> PyResult<Vec<Found>> {
     let count = particles.len();
-    let all = || vec![particles.look(0..count, obstacle, bounce)];
+    let all = || vec![particles.look(0..count, obstacle, rebound)];
     if count < WORTH_RELEASING {
         return Ok(all());
     }
@@ -67,7 +68,7 @@ fn look(
         return Ok(py.detach(all));
     }
     let part =
-        |chunk: usize| particles.look(chunk * CHUNK..((chunk + 1) * CHUNK).min(count), obstacle, bounce);
+        |chunk: usize| particles.look(chunk * CHUNK..((chunk + 1) * CHUNK).min(count), obstacle, rebound);
     run(py, threads, || (0..count.div_ceil(CHUNK)).into_par_iter().map(part).collect())
 }
 

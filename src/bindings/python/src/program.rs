@@ -30,6 +30,9 @@ const TEXT: &str = "<text>";
 /// ----------
 /// path_or_text : str or path
 ///     A text, if it is a str that has several lines or begins with ``rfm ``; otherwise the path of a file.
+/// path : str or path, optional
+///     The path of the file for which a text stands: the text may name other files in its folder and below, and messages
+///     show it. The file itself is not read. Positional only, because params may be called so.
 /// **params : float or str
 ///     Values for params of the file: numbers in SI units, or texts with a unit such as ``"8 mm"``.
 ///
@@ -44,15 +47,20 @@ const TEXT: &str = "<text>";
 /// OSError
 ///     If the file cannot be read.
 #[pyfunction]
-#[pyo3(signature = (path_or_text, /, **params))]
+#[pyo3(signature = (path_or_text, path=None, /, **params))]
 pub fn load(
     py: Python<'_>,
     path_or_text: &Bound<'_, PyAny>,
+    path: Option<PathBuf>,
     params: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<PyProgram> {
-    let source = match path_or_text.cast::<PyString>() {
-        Ok(text) if is_text(&text.to_cow()?) => Source::file(TEXT, text.to_cow()?.into_owned()),
-        _ => read(&path_or_text.extract::<PathBuf>()?)?,
+    let source = match (path_or_text.cast::<PyString>(), path) {
+        (Ok(text), path) if is_text(&text.to_cow()?) => {
+            let name = path.map_or(TEXT.to_string(), |path| path.display().to_string());
+            Source::file(name, text.to_cow()?.into_owned())
+        }
+        (_, None) => read(&path_or_text.extract::<PathBuf>()?)?,
+        (_, Some(_)) => return Err(PyValueError::new_err("a path is for a text, and the first argument is no text")),
     };
     PyProgram::check(py, source, given(params)?)
 }

@@ -10,7 +10,8 @@ use rfm::glam::DVec3;
 use rfm::solid::{Bounds, Chosen};
 use rfm::source::Target;
 use rfm::{Solid, mesh};
-use rfm_columns::{Bounce, Obstacle};
+use rfm::sph::Rebound;
+use rfm_columns::Obstacle;
 
 use crate::collision::collide;
 use crate::error::{of_diagnostics, refused};
@@ -380,8 +381,8 @@ impl PySolid {
         friction: f64,
         threads: Threads,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let bounce = Bounce::new(restitution, friction, reach).map_err(PyValueError::new_err)?;
-        collide(&self.obstacle, positions, velocities, &bounce, threads)
+        let rebound = Rebound::new(restitution, friction, reach).map_err(PyValueError::new_err)?;
+        collide(&self.obstacle, positions, velocities, &rebound, threads)
     }
 
     /// The smallest known box around the solid: an array of shape (2, 3), m, its lowest and its highest corner.

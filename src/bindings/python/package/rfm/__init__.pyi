@@ -88,7 +88,7 @@ class Stats(NamedTuple):
 class RfmError(ValueError):
     diagnostics: tuple[Diagnostic, ...]
 
-def load(path_or_text: _Path, /, **params: float | str) -> Program: ...
+def load(path_or_text: _Path, path: _Path | None = None, /, **params: float | str) -> Program: ...
 @final
 class Program:
     @property
