@@ -106,3 +106,19 @@ def test_the_plugin_gives_the_bits_of_the_callback(tmp_path):
             assert np.abs(table[:, 1:4] - expected["x"]).max() < 1e-7
         last = [line.split() for line in run.stdout.splitlines() if re.match(r" +1003 ", line)][-1]
         assert abs(float(last[4]) - counts[0]) <= 2 and last[5:] == ["0", "0"]
+
+
+def test_a_solid_that_turns_is_judged_at_its_time(tmp_path):
+    # the part lies in a file of its own, and walls are added all the same
+    (tmp_path / "part.rfm").write_text("rfm 1\nsolid blade = box([-0.9, -0.1, -0.4], [0.9, 0.1, 0.4])\n")
+    file = tmp_path / "paddle.rfm"
+    file.write_text('rfm 1\nimport "part.rfm" as part\nparam rate = 1\n'
+                    "solid paddle = part.blade.rotate_z(rate*t).move([1.5, 1.5, 1.1])\n")
+    table = tmp_path / "end.npz"
+    arguments = ("--box", "0,0,0,3,3,3", "-D", "rate=5", "--var", "spacing=0.08", "--seconds", "0.4", "-o", table)
+    run = mpi(1, sys.executable, "run.py", "drop.in", file, *arguments)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "; 0 inside the obstacle" in run.stdout
+    paddle, x = rfm.load(file, rate=5)["paddle"], np.load(table)["x"]
+    # at its start it would hold some
+    assert (paddle.at(0.0).omega(x) > 0.0).any()

@@ -14,7 +14,8 @@ use crate::interval::Interval;
 use crate::ir::Unary;
 
 /// The surface of a solid as seen from a point, see `ir::contact`: accurate near the surface, an estimate far
-/// away. [`Solid::distance`] is slow and right everywhere.
+/// away. [`Solid::distance`] is slow and has a proof: a clearance that is never
+/// too long, beside an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Length, positive in the fluid, negative inside the solid.

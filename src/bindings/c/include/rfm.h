@@ -398,13 +398,23 @@ enum RfmStatus rfm_load_file(const char *path,
                              struct RfmProgram **program,
                              struct RfmError **error);
 
-// Checks a text, with values for `count` of its params. Messages show `name` in place of a path.
+// Checks a text, with values for `count` of its params. Messages show `name` in place of a path. The text may name no other
+// files, see `rfm_load_text_as`.
 enum RfmStatus rfm_load_text(const char *text,
                              const char *name,
                              const struct RfmParam *params,
                              size_t count,
                              struct RfmProgram **program,
                              struct RfmError **error);
+
+// Checks a text that stands for the file with a path, which is not read: the text may name other files in its folder and
+// below, and messages show `path`.
+enum RfmStatus rfm_load_text_as(const char *text,
+                                const char *path,
+                                const struct RfmParam *params,
+                                size_t count,
+                                struct RfmProgram **program,
+                                struct RfmError **error);
 
 // The number of solids of a program.
 size_t rfm_solid_count(const struct RfmProgram *program);
@@ -522,13 +532,23 @@ enum RfmStatus rfm_load_file(const char *path,
                              struct RfmProgram **program,
                              struct RfmError **error);
 
-// Checks a text, with values for `count` of its params. Messages show `name` in place of a path.
+// Checks a text, with values for `count` of its params. Messages show `name` in place of a path. The text may name no other
+// files, see `rfm_load_text_as`.
 enum RfmStatus rfm_load_text(const char *text,
                              const char *name,
                              const struct RfmParam *params,
                              size_t count,
                              struct RfmProgram **program,
                              struct RfmError **error);
+
+// Checks a text that stands for the file with a path, which is not read: the text may name other files in its folder and
+// below, and messages show `path`.
+enum RfmStatus rfm_load_text_as(const char *text,
+                                const char *path,
+                                const struct RfmParam *params,
+                                size_t count,
+                                struct RfmProgram **program,
+                                struct RfmError **error);
 
 // The number of solids of a program.
 size_t rfm_solid_count(const struct RfmProgram *program);

@@ -134,6 +134,13 @@ static void mistakes_become_error_objects(const RfmSolid *pawn) {
     CHECK(rfm_solid(program, "\xff", &solid, NULL) == RFM_BAD_ARGUMENT);
     CHECK(rfm_solid(program, "a", NULL, NULL) == RFM_BAD_ARGUMENT);
     rfm_program_free(program);
+    // a text has no folder, unless it stands for a file
+    const char *half = "rfm 1\nimport \"pawn.rfm\" as chess\nsolid half = chess.pawn and z <= 1\n";
+    CHECK(rfm_load_text(half, "examples/half.rfm", NULL, 0, &program, NULL) == RFM_MISTAKES);
+    CHECK(rfm_load_text_as(half, "examples/half.rfm", NULL, 0, &program, NULL) == RFM_OK);
+    CHECK(rfm_solid_count(program) == 1 && strcmp(rfm_solid_name(program, 0), "half") == 0);
+    rfm_program_free(program);
+    CHECK(rfm_load_text_as(half, NULL, NULL, 0, &program, NULL) == RFM_BAD_ARGUMENT);
     CHECK(rfm_load_text("rfm 1\nparam r = 1", "p", (RfmParam[]){{"q", 2.0}}, 1, &program, NULL) == RFM_MISTAKES);
     CHECK(rfm_load_text(NULL, "p", NULL, 0, &program, NULL) == RFM_BAD_ARGUMENT);
     CHECK(rfm_load_text("rfm 1", "p", NULL, 3, &program, NULL) == RFM_BAD_ARGUMENT);

@@ -60,7 +60,9 @@ pub fn load(
             Source::file(name, text.to_cow()?.into_owned())
         }
         (_, None) => read(&path_or_text.extract::<PathBuf>()?)?,
-        (_, Some(_)) => return Err(PyValueError::new_err("a path is for a text, and the first argument is no text")),
+        (_, Some(_)) => {
+            return Err(PyValueError::new_err("a path is for a text, and the first argument is no text"));
+        }
     };
     PyProgram::check(py, source, given(params)?)
 }

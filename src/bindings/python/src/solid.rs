@@ -9,8 +9,8 @@ use rfm::geom::Aabb;
 use rfm::glam::DVec3;
 use rfm::solid::{Bounds, Chosen};
 use rfm::source::Target;
-use rfm::{Solid, mesh};
 use rfm::sph::Rebound;
+use rfm::{Solid, mesh};
 use rfm_columns::Obstacle;
 
 use crate::collision::collide;

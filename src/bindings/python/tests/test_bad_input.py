@@ -54,6 +54,18 @@ def test_bad_files_params_and_names(wrong, error, words):
         wrong()
 
 
+def test_a_text_names_other_files_if_it_stands_for_one(tmp_path):
+    (tmp_path / "part.rfm").write_text("rfm 1\nsolid peg = cylinder(0.1, h = 1)\n")
+    text = 'rfm 1\nimport "part.rfm" as part\nparam path = 1\nsolid two = part.peg or part.peg.move([path, 0, 0])\n'
+    with pytest.raises(rfm.RfmError, match="cannot be read"):
+        rfm.load(text)
+    program = rfm.load(text, tmp_path / "board.rfm", path=2)
+    assert program["two"](2.0, 0.0, 0.5) > 0.0 and program.path == str(tmp_path / "board.rfm")
+    assert pickle.loads(pickle.dumps(program)).params["path"].value == 2.0
+    with pytest.raises(ValueError, match="no text"):
+        rfm.load(tmp_path / "part.rfm", tmp_path / "board.rfm")
+
+
 def test_a_file_that_is_no_text(tmp_path):
     (tmp_path / "a.rfm").write_bytes(b"rfm 1\n\xff")
     with pytest.raises(rfm.RfmError, match="UTF-8"):
