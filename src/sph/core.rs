@@ -17,7 +17,9 @@ use super::{
     pairs::{Cloud, Columns, Near, PairPass, Real},
     params::Parameters,
     particles::{Particles, Vectors},
-    walls::{Boundary, Coverage, Fault, Friction, MARKED, StepLimits, Trouble, UNKNOWN, Undefined, Wall},
+    walls::{
+        Behind, Boundary, Coverage, Fault, Friction, MARKED, StepLimits, Trouble, UNKNOWN, Undefined, Wall,
+    },
 };
 
 /// Number of particles that one task of a parallel loop handles.
@@ -187,6 +189,11 @@ impl Core {
 
     /// What walls take of the kernel of a particle; `None` if they are farther away than the support radius.
     pub fn coverage<F: Friction>(&self, i: usize) -> Option<Coverage<F>> {
+        self.coverage_with(i)
+    }
+
+    /// The same, with the motion of the fluid behind the walls if that is asked for.
+    pub fn coverage_with<F: Friction, B: Behind>(&self, i: usize) -> Option<Coverage<F, B>> {
         let near = self.near_walls[i / MARKED];
         near.then(|| self.boundary.coverage(&self.wall, self.particles.position.get(i)))?
     }

@@ -152,7 +152,8 @@ impl Wetting<'_> {
         if found.filled == 0.0 || self.is_covered(piece, normal) {
             return DVec3::ZERO;
         }
-        let covered = self.core.boundary.coverage::<()>(self.core.wall(), piece.at).map_or(0.0, |c| c.part);
+        let covered =
+            self.core.boundary.coverage::<(), ()>(self.core.wall(), piece.at).map_or(0.0, |c| c.part);
         let filled = found.filled.max(FILLED * (1.0 - covered.min(MOST_COVERED)));
         let viscosity = self.core.parameters.viscosity;
         (-found.pressure * piece.area + viscosity * piece.area.length() * found.shear) / filled

@@ -28,6 +28,7 @@ use crate::{
 use crate::sph::{VectorField, contacts::Contacts, particles::Vectors, scales::Slip};
 
 use super::{
+    behind::Behind,
     contact::{Trouble, rubbed},
     coverage::Coverage,
     friction::Friction,
@@ -258,26 +259,30 @@ impl Boundary {
 
     /// What the box and the obstacles take of the kernel of a particle; `None` if they are farther away than
     /// h.
-    pub fn coverage<F: Friction>(&self, wall: &Wall, p: DVec3) -> Option<Coverage<F>> {
-        let of_box = self.of_box::<F>(wall, p);
+    pub fn coverage<F: Friction, B: Behind>(&self, wall: &Wall, p: DVec3) -> Option<Coverage<F, B>> {
+        let of_box = self.of_box::<F, B>(wall, p);
+        if self.obstacles.is_empty() {
+            return (of_box.part > 0.0).then_some(of_box);
+        }
         let mut whole = of_box.without_friction();
         if let Some(taken) = self.maps.at_rest(p) {
             let plain = Wall { layer: None, ..*wall };
-            let continuous = if wall.layer.is_some() { self.of_box::<()>(&plain, p) } else { whole };
+            let continuous =
+                if wall.layer.is_some() { self.of_box::<(), ()>(&plain, p) } else { whole.without_behind() };
             whole = whole.with_bodies(wall, &continuous, &taken);
         }
-        let none = Coverage::<()>::default();
+        let (none, nothing) = (Coverage::<(), B>::default(), Coverage::default());
         for k in 0..self.obstacles.len() {
             match self.maps.of(k, p) {
                 Known::AtRest | Known::Nothing => {}
                 Known::Taken(taken) => {
                     let taken = taken.moving(self.field(k).wall_velocity(p));
-                    whole = whole.or(&none.with_bodies(wall, &none, &taken));
+                    whole = whole.or(&none.with_bodies(wall, &nothing, &taken));
                 }
-                Known::Changing(taken) => whole = whole.or(&none.with_bodies(wall, &none, &taken)),
+                Known::Changing(taken) => whole = whole.or(&none.with_bodies(wall, &nothing, &taken)),
                 Known::Parts(parts) => {
                     for (taken, velocity) in &parts {
-                        whole = whole.or(&none.with_bodies(wall, &none, &taken.moving(*velocity)));
+                        whole = whole.or(&none.with_bodies(wall, &nothing, &taken.moving(*velocity)));
                     }
                 }
                 Known::ByFaces => whole = self.with_faces(wall, p, whole, k),
@@ -290,14 +295,15 @@ impl Boundary {
         let friction = if F::IS_NONE {
             F::default()
         } else {
+            let of_box = of_box.without_behind();
             (0..self.obstacles.len()).fold(of_box, |whole, k| self.with_faces(wall, p, whole, k)).friction
         };
         Some(whole.with_friction(friction))
     }
 
     /// What the walls of the box take of the kernel of a particle.
-    pub(super) fn of_box<F: Friction>(&self, wall: &Wall, p: DVec3) -> Coverage<F> {
-        let mut whole = Coverage::<F>::default();
+    pub(super) fn of_box<F: Friction, B: Behind>(&self, wall: &Wall, p: DVec3) -> Coverage<F, B> {
+        let mut whole = Coverage::<F, B>::default();
         for axis in 0..3 {
             for (distance, side) in
                 [(p[axis] - self.domain.min[axis], 1.0), (self.domain.max[axis] - p[axis], -1.0)]
@@ -305,8 +311,13 @@ impl Boundary {
                 if distance < wall.h {
                     let mut normal = DVec3::ZERO;
                     normal[axis] = side;
-                    let face = Face { distance, normal, mean_curvature: 0.0 };
-                    whole = whole.or(&Coverage::of_face(wall, &face));
+                    let face = Coverage::of_face(wall, &Face { distance, normal, mean_curvature: 0.0 });
+                    // most particles near walls have one wall near them
+                    if whole.part == 0.0 {
+                        whole = face;
+                    } else {
+                        whole = whole.or(&face);
+                    }
                 }
             }
         }
@@ -329,26 +340,26 @@ impl Boundary {
     }
 
     /// Adds what an obstacle takes of the kernel of a particle by its faces.
-    pub(super) fn with_faces<F: Friction>(
+    pub(super) fn with_faces<F: Friction, B: Behind>(
         &self,
         wall: &Wall,
         p: DVec3,
-        whole: Coverage<F>,
+        whole: Coverage<F, B>,
         k: usize,
-    ) -> Coverage<F> {
+    ) -> Coverage<F, B> {
         let mut faces = Faces::new();
         self.field(k).faces(p, wall.h, &mut faces);
         if faces.is_empty() { whole } else { whole.or(&self.of_faces(wall, p, faces, k)) }
     }
 
     /// What faces of an obstacle near a particle take of its kernel.
-    pub(super) fn of_faces<F: Friction>(
+    pub(super) fn of_faces<F: Friction, B: Behind>(
         &self,
         wall: &Wall,
         p: DVec3,
         mut faces: Faces,
         k: usize,
-    ) -> Coverage<F> {
+    ) -> Coverage<F, B> {
         let (obstacle, field) = (&self.obstacles[k], self.field(k));
         for part in &mut faces {
             if let Part::Face(face) = part
@@ -357,7 +368,7 @@ impl Boundary {
                 face.distance = -BEYOND_REACH * wall.h;
             }
         }
-        let mut coverage = Coverage::<F>::of_faces(wall, &faces);
+        let mut coverage = Coverage::<F, B>::of_faces(wall, &faces);
         if obstacle.slip == Slip::Free {
             coverage.let_slip();
         }

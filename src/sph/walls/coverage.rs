@@ -22,6 +22,7 @@ use crate::field::{Face, Faces, Part};
 use crate::geom::eigen;
 
 use super::{
+    behind::{Behind, Carried},
     friction::{Friction, LEAST_FREE},
     layers::{OfFace, Wall},
     symmetric::Symmetric,
@@ -36,7 +37,7 @@ const LEAST_TAKEN: f64 = 1e-9;
 
 /// Integrals of a kernel over the walls near a particle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(in crate::sph) struct Coverage<F = ()> {
+pub(in crate::sph) struct Coverage<F = (), B = ()> {
     /// λ = ∫ W, 0 to 1.
     pub part: f64,
     /// What a wall adds to the sum over a lattice of particles, see [`OfFace::filled`].
@@ -45,25 +46,14 @@ pub(in crate::sph) struct Coverage<F = ()> {
     pub gradient: DVec3,
     /// K − λ·1 = Σ d·(A/h)·n⊗n over the faces.
     pub spread: Symmetric,
-    /// Σ λ·n⊗n over the faces: what of λ·1 belongs to directions across walls.
-    pub across: Symmetric,
     /// ∇λ·v for walls that move with the velocity v, 1/s.
     pub sweep: f64,
-    /// What such walls carry along.
-    pub carried: Carried,
     /// The barrier B and its gradient, see [`OfFace::barrier`]; without meaning for a continuous wall.
     pub barrier: Barrier,
     /// Friction with a viscous fluid.
     pub friction: F,
-}
-
-/// The velocities of walls with the weights that these have in K, across them alone, m/s.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(in crate::sph) struct Carried {
-    /// Σ λ·n⊗n·v.
-    pub across: DVec3,
-    /// (K − λ·1)·v.
-    pub spread: DVec3,
+    /// The motion of the fluid behind the walls.
+    pub behind: B,
 }
 
 /// What walls add to the density of a fluid that must not be compressed, see [`OfFace::barrier`].
@@ -77,7 +67,7 @@ pub(in crate::sph) struct Barrier {
     pub sweep: f64,
 }
 
-impl<F: Friction> Coverage<F> {
+impl<F: Friction, B: Behind> Coverage<F, B> {
     /// The coverage by one face.
     pub fn of_face(wall: &Wall, face: &Face) -> Self {
         let h = wall.h;
@@ -92,18 +82,17 @@ impl<F: Friction> Coverage<F> {
             filled,
             gradient: -area / h * face.normal,
             spread: spread * Symmetric::square(face.normal),
-            across: part * Symmetric::square(face.normal),
             sweep: 0.0,
-            carried: Carried::default(),
             barrier: Barrier { part: barrier, gradient: -barrier_area / h * face.normal, sweep: 0.0 },
             friction: F::of_face(face, area / h, h),
+            behind: B::of_face(part, face.normal),
         }
     }
 
     /// Lets all of these walls move with one velocity, m/s. Friction is told apart.
     pub fn set_in_motion(&mut self, velocity: DVec3) {
         self.sweep = self.gradient.dot(velocity);
-        self.carried = Carried { across: self.across * velocity, spread: self.spread * velocity };
+        self.behind.set_in_motion(&self.spread, velocity);
         self.barrier.sweep = self.barrier.gradient.dot(velocity);
     }
 
@@ -160,24 +149,20 @@ impl<F: Friction> Coverage<F> {
     }
 
     /// The coverage with another friction.
-    pub fn with_friction<G>(self, friction: G) -> Coverage<G> {
-        let Self { part, filled, gradient, spread, across, sweep, carried, barrier, friction: _ } = self;
-        Coverage { part, filled, gradient, spread, across, sweep, carried, barrier, friction }
+    pub fn with_friction<G>(self, friction: G) -> Coverage<G, B> {
+        let Self { part, filled, gradient, spread, sweep, barrier, friction: _, behind } = self;
+        Coverage { part, filled, gradient, spread, sweep, barrier, friction, behind }
     }
 
     /// The coverage without its friction.
-    pub fn without_friction(self) -> Coverage {
+    pub fn without_friction(self) -> Coverage<(), B> {
         self.with_friction(())
     }
 
-    /// The velocity that the fluid behind the walls has, m/s, by that of the walls across them and by one along them, m/s:
-    /// the solution r of K·r = Σ (K_n·v + λ·(1 − n⊗n)·along) over the walls.
-    pub fn behind(&self, along: DVec3) -> DVec3 {
-        let Carried { across, spread } = self.carried;
-        let moment = self.part * Symmetric::IDENTITY + self.spread;
-        let slipping = self.part * along - self.across * along;
-        let behind = moment.to_matrix().inverse() * (across + spread + slipping);
-        if behind.is_finite() { behind } else { along }
+    /// The coverage without what is behind the walls.
+    pub fn without_behind(self) -> Coverage<F> {
+        let Self { part, filled, gradient, spread, sweep, barrier, friction, behind: _ } = self;
+        Coverage { part, filled, gradient, spread, sweep, barrier, friction, behind: () }
     }
 
     /// ⅓ tr K, the part of walls in what sums make of the gradient of a position.
@@ -202,37 +187,35 @@ impl<F: Friction> Coverage<F> {
     /// Two walls combined by a rule, which says how their λ combine, and the derivatives by both.
     fn joined(&self, other: &Self, rule: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {
         let (part, da, db) = rule(self.part, other.part);
-        // walls look where their gradients point
-        let weight = |slope: f64, of: &Self| slope * of.gradient.length();
-        let (wa, wb) = (weight(da, self), weight(db, other));
-        let share = |weight: f64, of: &Self| {
-            if weight > 0.0 && of.part > 0.0 { part * weight / (wa + wb) / of.part } else { 0.0 }
+        let shares = || {
+            // walls look where their gradients point
+            let weight = |slope: f64, of: &Self| slope * of.gradient.length();
+            let (wa, wb) = (weight(da, self), weight(db, other));
+            let share = |weight: f64, of: &Self| {
+                if weight > 0.0 && of.part > 0.0 { part * weight / (wa + wb) / of.part } else { 0.0 }
+            };
+            [share(wa, self), share(wb, other)]
         };
-        let (sa, sb) = (share(wa, self), share(wb, other));
         Self {
             part: part.clamp(0.0, 1.0),
             filled: (part + da * (self.filled - self.part) + db * (other.filled - other.part))
                 .clamp(0.0, 1.0),
             gradient: da * self.gradient + db * other.gradient,
             spread: da * self.spread + db * other.spread,
-            across: sa * self.across + sb * other.across,
             sweep: da * self.sweep + db * other.sweep,
-            carried: Carried {
-                across: sa * self.carried.across + sb * other.carried.across,
-                spread: da * self.carried.spread + db * other.carried.spread,
-            },
             barrier: self.barrier.joined(&other.barrier, part, [da, db], [self.part, other.part]),
+            behind: self.behind.joined(&other.behind, shares, [da, db]),
             friction: self.friction.joined(&other.friction, rule),
         }
     }
 }
 
-impl Coverage {
+impl<B: Behind> Coverage<(), B> {
     /// Adds bodies whose volume is known to these walls of the box, which are `continuous` if they are not in layers.
     ///
     /// The bodies take the part b of what the box leaves. What else a wall has follows from its distance. That of the
     /// bodies is the distance of a plane which takes as much; its gradient along the way is that of b.
-    pub fn with_bodies(&self, wall: &Wall, continuous: &Self, taken: &Taken) -> Self {
+    pub fn with_bodies(&self, wall: &Wall, continuous: &Coverage, taken: &Taken) -> Self {
         let left = 1.0 - continuous.part;
         let part = (taken.part / left).min(1.0);
         if part < LEAST_TAKEN {
@@ -251,12 +234,13 @@ impl Coverage {
         // K of layers differs from that of a continuous wall along the normal; for a plane this is exact
         let of_layers = plane.spread - of_part * delta * slope;
         let normal = gradient.normalize_or_zero();
-        let steep = gradient.length();
         // of bodies that change their shape the motion of the surface is known
-        let of_surface = if steep > 0.0 { sweep / steep * normal } else { DVec3::ZERO };
-        let velocity = taken.velocity.unwrap_or(of_surface);
+        let velocity = || {
+            let steep = gradient.length();
+            let of_surface = if steep > 0.0 { sweep / steep * normal } else { DVec3::ZERO };
+            taken.velocity.unwrap_or(of_surface)
+        };
         let part = if wall.layer.is_some() { plane.part } else { part };
-        let across = part * Symmetric::square(normal);
         let spread = of_part * (taken.moment - taken.part * Symmetric::IDENTITY)
             + of_layers * Symmetric::square(normal);
         let bodies = Self {
@@ -264,21 +248,32 @@ impl Coverage {
             filled: plane.filled,
             gradient: of_part * gradient,
             spread,
-            across,
             sweep: of_part * sweep,
-            carried: Carried { across: across * velocity, spread: spread * velocity },
             barrier: Barrier {
                 part: plane.barrier,
                 gradient: of_barrier * gradient,
                 sweep: of_barrier * sweep,
             },
             friction: (),
+            behind: B::of_bodies(part, normal, &spread, velocity),
         };
         let (da, db) = (1.0 - bodies.part, 1.0 - self.part);
         let whole = self.joined(&bodies, |_, _| (self.part + db * bodies.part, da, db));
         // K of bodies in the box adds to that of the box
-        let carried = Carried { spread: self.carried.spread + bodies.carried.spread, ..whole.carried };
-        Self { spread: self.spread + bodies.spread, carried, ..whole }
+        let behind = whole.behind.with_moments_of(&self.behind, &bodies.behind);
+        Self { spread: self.spread + bodies.spread, behind, ..whole }
+    }
+}
+
+impl<F> Coverage<F, Carried> {
+    /// The velocity that the fluid behind the walls has, m/s, by that of the walls across them and by one along them, m/s:
+    /// the solution r of K·r = Σ (K_n·v + λ·(1 − n⊗n)·along) over the walls.
+    pub fn velocity_behind(&self, along: DVec3) -> DVec3 {
+        let Carried { across, by_part, by_spread } = self.behind;
+        let moment = self.part * Symmetric::IDENTITY + self.spread;
+        let slipping = self.part * along - across * along;
+        let behind = moment.to_matrix().inverse() * (by_part + by_spread + slipping);
+        if behind.is_finite() { behind } else { along }
     }
 }
 
@@ -326,7 +321,7 @@ mod tests {
     use super::*;
     use crate::sph::walls::{WallDrag, WallKernel};
 
-    type Coverage = super::Coverage<WallDrag>;
+    type Coverage = super::Coverage<WallDrag, Carried>;
 
     const H: f64 = 0.3;
     const WALL: Wall = Wall {
@@ -408,9 +403,12 @@ mod tests {
             // all but the rounding of a + 1 − 1
             assert!((slab.part - alone.part).abs() < 1e-15, "{slab:?} {alone:?}");
             assert_eq!(slab.friction.tensor, alone.friction.tensor);
-            assert!(slab.across.to_matrix().abs_diff_eq(alone.across.to_matrix(), 1e-15), "{slab:?}");
-            let Coverage { part, filled, across, barrier, friction, .. } = alone;
-            assert_eq!(Coverage { part, filled, across, barrier, friction, ..slab }, alone);
+            assert!(
+                slab.behind.across.to_matrix().abs_diff_eq(alone.behind.across.to_matrix(), 1e-15),
+                "{slab:?}"
+            );
+            let Coverage { part, filled, behind, barrier, friction, .. } = alone;
+            assert_eq!(Coverage { part, filled, behind, barrier, friction, ..slab }, alone);
         }
     }
 
@@ -481,17 +479,17 @@ mod tests {
         for faces in faces {
             let mut wall = Coverage::of_faces(&WALL, &Faces::from_slice(&faces));
             wall.set_in_motion(velocity);
-            let behind = wall.behind(velocity);
+            let behind = wall.velocity_behind(velocity);
             assert!((behind - velocity).length() < 1e-9, "{faces:?}: {behind}");
             // joined to a wall at rest it is dragged by that
             let floor = Coverage::of_faces(&WALL, &Faces::from_slice(&[face(0.2 * H, DVec3::Z)]));
-            let both = wall.or(&floor).behind(DVec3::ZERO);
+            let both = wall.or(&floor).velocity_behind(DVec3::ZERO);
             assert!(both.z.abs() < velocity.z, "{faces:?}: {both}");
         }
         // one wall alone has no motion along itself but that of the fluid
         let mut wall = Coverage::of_faces(&WALL, &Faces::from_slice(&[x]));
         wall.set_in_motion(velocity);
-        let behind = wall.behind(DVec3::new(7.0, 3.0, 4.0));
+        let behind = wall.velocity_behind(DVec3::new(7.0, 3.0, 4.0));
         assert!((behind - DVec3::new(2.0, 3.0, 4.0)).length() < 1e-9, "{behind}");
     }
 

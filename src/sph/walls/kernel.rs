@@ -139,7 +139,9 @@ impl WallKernel {
     /// convex. For balls and cavities the error is at most 0.026·(h/R)², which at h/R = 0.4 is a tenth of the
     /// plane's error.
     pub fn covered_by_curved(self, delta: f64, curvature: f64) -> f64 {
-        self.covered(delta) - 0.5 * curvature * self.curvature_moment(delta)
+        // walls of the box are flat, and most others are
+        let bent = if curvature == 0.0 { 0.0 } else { 0.5 * curvature * self.curvature_moment(delta) };
+        self.covered(delta) - bent
     }
 }
 

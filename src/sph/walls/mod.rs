@@ -7,6 +7,7 @@
 //! Field::first_entry ─▶ Contact ─▶ Boundary::collide: position and velocity
 //! ```
 
+mod behind;
 mod boundary;
 mod collide;
 mod contact;
@@ -22,6 +23,7 @@ mod symmetric;
 mod volume;
 mod way_out;
 
+pub(super) use behind::{Behind, Carried};
 pub use boundary::Obstacle;
 pub(super) use boundary::{Boundary, Fault, MARKED, UNKNOWN};
 pub use collide::{Collision, Rebound, collide, put_back};

@@ -62,7 +62,8 @@ struct Facing {
 impl Facing {
     /// Adds to what its wall takes, so many times, what it would take of the kernel of a particle at a distance, m.
     fn press(&self, wall: &Wall, distance: f64, times: f64, near: &mut Near) {
-        let behind = |distance: f64| Seen::of(&Coverage::of_face(wall, &Face { distance, ..self.face }));
+        let behind =
+            |distance: f64| Seen::of(&Coverage::<(), ()>::of_face(wall, &Face { distance, ..self.face }));
         near.add(&behind(distance), times);
         near.add(&behind(distance + self.thickness), -times);
     }
@@ -154,7 +155,7 @@ impl Boundary {
             // the fluid feels the friction of what it cannot reach, too
             near[other].sticks |= near[*k].sticks;
             if is_seen(*k) {
-                let taken = Coverage::of_face(wall, face);
+                let taken = Coverage::<(), ()>::of_face(wall, face);
                 near[*k].add(&Seen::of(&taken), -1.0);
                 near[*k].part = (near[*k].part - taken.part).max(0.0);
             } else {
@@ -258,7 +259,7 @@ impl Boundary {
             Near { obstacle, part, gradient, moment, sticks: slip == Slip::No }
         };
         let mut found: SmallVec<[Near; 4]> = SmallVec::new();
-        let of_box = self.of_box::<()>(wall, p);
+        let of_box = self.of_box::<(), ()>(wall, p);
         if of_box.part > 0.0 {
             found.push(near(None, &of_box));
         }
@@ -411,7 +412,7 @@ mod tests {
         let p = DVec3::new(0.2, 0.0, 0.3);
         let boundary = boundary(9.0);
         let wall = Wall::new(WallKernel::WendlandC2, 1.0, 0.5);
-        let gradient = boundary.coverage::<()>(&wall, p).unwrap().gradient;
+        let gradient = boundary.coverage::<(), ()>(&wall, p).unwrap().gradient;
         let alone = boundary.with_faces(&wall, p, Coverage::<()>::default(), 0).gradient;
         assert!(gradient.x.abs() < 0.9 * alone.x.abs(), "the walls overlap");
         let pushed = Pushed { by_pressure: -4.0 * gradient, factor: -4.0, gradient, ..Pushed::default() };

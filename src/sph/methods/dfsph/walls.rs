@@ -7,7 +7,7 @@ use super::rigid::Rigid;
 use crate::sph::{
     core::{CHUNK, Core},
     particles::Vectors,
-    walls::{Coverage, WallDrag},
+    walls::{Carried, Coverage, WallDrag},
 };
 
 /// What walls take of the kernels of the particles near them.
@@ -20,7 +20,7 @@ pub(super) struct Walls {
 }
 
 /// What walls take of the kernel of one particle.
-pub(super) type WallsNear = Coverage<WallDrag>;
+pub(super) type WallsNear = Coverage<WallDrag, Carried>;
 
 /// Index of a particle that has no wall near it.
 const NONE: u32 = u32::MAX;
@@ -33,9 +33,9 @@ impl Walls {
         self.found.par_extend((0..n).into_par_iter().with_min_len(CHUNK / 4).filter_map(|i| {
             // without viscosity nothing asks for friction
             let wall: WallsNear = if core.parameters.viscosity > 0.0 {
-                core.coverage(i)?
+                core.coverage_with(i)?
             } else {
-                core.coverage::<()>(i)?.with_friction(WallDrag::default())
+                core.coverage_with::<(), Carried>(i)?.with_friction(WallDrag::default())
             };
             Some((i as u32, wall, wall.completion()))
         }));
@@ -70,7 +70,7 @@ impl Walls {
         completed.clone_from(v);
         for (i, wall, completion) in &self.found {
             let i = *i as usize;
-            let behind = wall.behind(whole.at(at.get(i)));
+            let behind = wall.velocity_behind(whole.at(at.get(i)));
             completed.set(i, behind + *completion * (v.get(i) - behind));
         }
     }
