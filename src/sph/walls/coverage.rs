@@ -173,15 +173,10 @@ impl<F: Friction, B: Behind> Coverage<F, B> {
     /// (1 − K)⁻¹, by which a sum over the fluid alone becomes what it would be if the fluid continued behind
     /// the walls. No direction is stretched by more than 1/[`LEAST_FREE`].
     pub fn completion(&self) -> DMat3 {
-        let moment = DMat3::from_diagonal(DVec3::splat(1.0 - self.part)) - self.spread.to_matrix();
-        if is_positive_definite(&(moment - DMat3::from_diagonal(DVec3::splat(LEAST_FREE)))) {
-            return moment.inverse();
-        }
         // along the normal of one wall K is hardly more than ½ in the fluid; between two that face each other, and in
         // corners, their sum may come near to 1
-        let (free, directions) = eigen(moment);
-        let stretches = free.max(DVec3::splat(LEAST_FREE)).recip();
-        directions * DMat3::from_diagonal(stretches) * directions.transpose()
+        let moment = DMat3::from_diagonal(DVec3::splat(1.0 - self.part)) - self.spread.to_matrix();
+        inverse_above(&moment, LEAST_FREE)
     }
 
     /// Two walls combined by a rule, which says how their λ combine, and the derivatives by both.
@@ -301,6 +296,16 @@ fn common(a: f64, b: f64, cosine: f64) -> (f64, f64, f64) {
     };
     let mix = |square: f64, parallel: f64| (1.0 - weight) * square + weight * parallel;
     (mix(a * b, limit), mix(b, da), mix(a, db))
+}
+
+/// The inverse of a symmetric matrix, of which no eigenvalue counts as smaller than `least`.
+pub(in crate::sph) fn inverse_above(moment: &DMat3, least: f64) -> DMat3 {
+    if is_positive_definite(&(*moment - DMat3::from_diagonal(DVec3::splat(least)))) {
+        return moment.inverse();
+    }
+    let (free, directions) = eigen(*moment);
+    let stretches = free.max(DVec3::splat(least)).recip();
+    directions * DMat3::from_diagonal(stretches) * directions.transpose()
 }
 
 /// Whether all eigenvalues of a symmetric matrix are positive (Sylvester's criterion).

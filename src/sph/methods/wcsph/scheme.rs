@@ -58,7 +58,7 @@ use super::super::{
     tension::Tension,
 };
 use super::numbers::{Numbers, at_rest, sums_crowding, tait};
-use super::passes::{Missing, Pairs, Rates, closes_gaps};
+use super::passes::{Differences, Missing, Pairs, Rates, closes_gaps};
 use super::{EXPONENT, Gradients, Wcsph};
 use crate::sph::{
     checkpoint::{Checkpoint, CheckpointError},
@@ -256,15 +256,24 @@ impl Weakly {
             core.sum(&Missing::new(core), [], [&mut self.missing]);
         }
         let rates = Rates::new(core, numbers, &predicted, &pressure, &self.excess, &self.missing, dt);
-        match (rates.laminar > 0.0, rates.artificial > 0.0, rates.even) {
-            (true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
-            (true, true, false) => core.sum(&Pairs::<true, true, false>(rates), fields, out),
-            (true, false, true) => core.sum(&Pairs::<true, false, true>(rates), fields, out),
-            (true, false, false) => core.sum(&Pairs::<true, false, false>(rates), fields, out),
-            (false, true, true) => core.sum(&Pairs::<false, true, true>(rates), fields, out),
-            (false, true, false) => core.sum(&Pairs::<false, true, false>(rates), fields, out),
-            (false, false, true) => core.sum(&Pairs::<false, false, true>(rates), fields, out),
-            (false, false, false) => core.sum(&Pairs::<false, false, false>(rates), fields, out),
+        if numbers.gradients == Gradients::Differences {
+            match (rates.laminar > 0.0, rates.artificial > 0.0) {
+                (true, true) => core.sum(&Differences::<true, true>(rates), fields, out),
+                (true, false) => core.sum(&Differences::<true, false>(rates), fields, out),
+                (false, true) => core.sum(&Differences::<false, true>(rates), fields, out),
+                (false, false) => core.sum(&Differences::<false, false>(rates), fields, out),
+            }
+        } else {
+            match (rates.laminar > 0.0, rates.artificial > 0.0, rates.even) {
+                (true, true, true) => core.sum(&Pairs::<true, true, true>(rates), fields, out),
+                (true, true, false) => core.sum(&Pairs::<true, true, false>(rates), fields, out),
+                (true, false, true) => core.sum(&Pairs::<true, false, true>(rates), fields, out),
+                (true, false, false) => core.sum(&Pairs::<true, false, false>(rates), fields, out),
+                (false, true, true) => core.sum(&Pairs::<false, true, true>(rates), fields, out),
+                (false, true, false) => core.sum(&Pairs::<false, true, false>(rates), fields, out),
+                (false, false, true) => core.sum(&Pairs::<false, false, true>(rates), fields, out),
+                (false, false, false) => core.sum(&Pairs::<false, false, false>(rates), fields, out),
+            }
         }
         core.acceleration = acceleration;
         core.particles.pressure = pressure;
