@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::tool::root;
 
-const URI: &str = "file:///files/test.rfm";
+pub const URI: &str = "file:///files/test.rfm";
 
 /// An editor with one file.
 pub struct Editor {
@@ -22,6 +22,11 @@ pub struct Editor {
 
 impl Editor {
     pub fn new(encodings: &[&str]) -> Self {
+        Self::able(encodings, json!({}))
+    }
+
+    /// An editor that can do with texts what it tells.
+    pub fn able(encodings: &[&str], text: Value) -> Self {
         let mut server = Command::new(env!("CARGO_BIN_EXE_rfm"))
             .arg("lsp")
             .stdin(Stdio::piped())
@@ -30,7 +35,7 @@ impl Editor {
             .unwrap();
         let (to, from) = (server.stdin.take(), BufReader::new(server.stdout.take().unwrap()));
         let mut editor = Self { server, to, from, last: 0, messages: Vec::new() };
-        let capabilities = json!({ "general": { "positionEncodings": encodings } });
+        let capabilities = json!({ "general": { "positionEncodings": encodings }, "textDocument": text });
         let answer = editor
             .ask("initialize", json!({ "capabilities": capabilities, "processId": null, "rootUri": null }));
         assert_eq!(answer["serverInfo"]["name"], "rfm");
@@ -106,7 +111,7 @@ impl Editor {
         }
     }
 
-    fn open(&mut self, text: &str) -> &[Value] {
+    pub fn open(&mut self, text: &str) -> &[Value] {
         self.give(text);
         self.await_messages()
     }

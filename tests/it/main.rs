@@ -27,6 +27,7 @@ mod leftovers;
 mod lints;
 mod looks;
 mod lsp;
+mod lsp_edits;
 mod lsp_files;
 mod mesh_command;
 mod mesh_properties;

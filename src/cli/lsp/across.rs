@@ -25,6 +25,8 @@ const MOST_ENTRIES: usize = 20_000;
 /// The open files, and where others lie.
 pub(super) struct Workspace {
     pub encoding: Encoding,
+    /// Whether the editor lets the user choose what a completion replaces.
+    pub may_choose: bool,
     pub buffers: Buffers,
     /// The open files by their addresses.
     pub documents: HashMap<String, Arc<Document>>,

@@ -1,8 +1,8 @@
 //! What may be written at the cursor, and which argument of a call it is.
 
 use lsp_types::{
-    CompletionItem, CompletionItemKind, Documentation, ParameterInformation, ParameterLabel, SignatureHelp,
-    SignatureInformation,
+    CompletionItem, CompletionItemKind, CompletionTextEdit, Documentation, InsertReplaceEdit,
+    ParameterInformation, ParameterLabel, SignatureHelp, SignatureInformation, TextEdit,
 };
 
 use rfm::diagnostic::Source;
@@ -16,7 +16,7 @@ use rfm::syntax::{
 use super::context::{Context, Open};
 use super::document::Document;
 use super::keys;
-use super::words::{self, Signature};
+use super::words::{self, Signature, is_of_a_word};
 
 const OPERATORS: [&str; 9] = ["and", "or", "not", "any", "all", "sum", "product", "min", "max"];
 
@@ -30,13 +30,35 @@ fn called(signature: Signature, kind: CompletionItemKind) -> CompletionItem {
     CompletionItem { detail, ..item(signature.name, kind, &signature.about) }
 }
 
-/// What may be written at a byte. The editor leaves out what does not begin with the word that is there.
-pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
+/// What may be written at a byte, each with the word that it replaces: editors have different ideas of what a word is. They
+/// leave out what does not begin with the word that is there. Some let the user choose whether what follows the cursor is
+/// replaced too.
+pub(super) fn at(document: &Document, byte: usize, may_choose: bool) -> Vec<CompletionItem> {
     let context = Context::at(document.text(), byte);
+    let after = document.text().get(byte..).unwrap_or("");
+    let to_end = after.find(|c: char| !is_of_a_word(c)).unwrap_or(after.len());
+    let start = byte - context.prefix.len();
+    let (insert, replace) = (document.range(start..byte), document.range(start..byte + to_end));
+    // in front of a word nothing has been typed of it, so it stays
+    let word = if context.prefix.is_empty() { insert } else { replace };
+    let with_edit = |item: CompletionItem| {
+        let new_text = item.insert_text.unwrap_or_else(|| item.label.clone());
+        let edit = if may_choose {
+            CompletionTextEdit::InsertAndReplace(InsertReplaceEdit { new_text, insert, replace })
+        } else {
+            CompletionTextEdit::Edit(TextEdit::new(word, new_text))
+        };
+        CompletionItem { text_edit: Some(edit), insert_text: None, ..item }
+    };
+    fitting(document, &context, byte).into_iter().map(with_edit).collect()
+}
+
+/// What may be written in a context.
+fn fitting(document: &Document, context: &Context, byte: usize) -> Vec<CompletionItem> {
     if context.is_quiet {
         return Vec::new();
     }
-    if let Some(members) = members(document, &context) {
+    if let Some(members) = members(document, context) {
         return members;
     }
     if context.after_dot {
@@ -64,7 +86,7 @@ pub(super) fn at(document: &Document, byte: usize) -> Vec<CompletionItem> {
         found.extend(words::ITEMS.map(|(word, about)| item(word, CompletionItemKind::KEYWORD, about)));
     }
     if let Some(open) = context.open.last().filter(|open| open.bracket == '(')
-        && let Some(signature) = of_call(document, &context, open)
+        && let Some(signature) = of_call(document, context, open)
     {
         let names = signature.parameters.iter().filter_map(|p| p.split(" = ").next()).filter(|p| *p != "…");
         found.extend(names.map(|name| CompletionItem {

@@ -2,7 +2,7 @@
 
 use rfm::syntax::KEYWORDS;
 
-use super::words::ITEMS;
+use super::words::{ITEMS, is_of_a_word};
 
 /// A bracket that is open at the cursor.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -69,7 +69,7 @@ fn item_start(text: &str) -> usize {
     let mut start = 0;
     let mut at = 0;
     for line in text.split_inclusive('\n') {
-        let word = line.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or("");
+        let word = line.split(|c: char| !is_of_a_word(c)).next().unwrap_or("");
         if ITEMS.iter().any(|(item, _)| *item == word) {
             start = at;
         }
@@ -103,8 +103,8 @@ impl Reader {
                 let end = rest[1..].find(['"', '\n']);
                 self.context.is_quiet = end.is_none();
                 end.map_or(rest.len(), |end| end + 2)
-            } else if c.is_alphanumeric() || c == '_' {
-                let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+            } else if is_of_a_word(c) {
+                let end = rest.find(|c: char| !is_of_a_word(c)).unwrap_or(rest.len());
                 self.word(&rest[..end], end == rest.len());
                 end
             } else {
@@ -235,6 +235,9 @@ mod tests {
         let open = context.open.last().unwrap();
         assert_eq!((open.word.as_str(), open.is_method, open.commas), ("move", true, 1));
         assert!(!at("let a = any i in 0..").after_dot);
+        // exponents are signs of their own
+        assert_eq!(at("let a = x²").prefix, "");
+        assert_eq!(at("let a = x²an").prefix, "an");
     }
 
     #[test]

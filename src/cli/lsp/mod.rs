@@ -153,6 +153,7 @@ fn greet(connection: &Connection) -> Result<Result<Workspace, End>, Failure> {
                 send(Response::new_ok(id, answer))?;
                 return Ok(Ok(Workspace {
                     encoding,
+                    may_choose: may_choose(&parameters),
                     buffers: Buffers::default(),
                     documents: HashMap::new(),
                     roots: roots(&parameters),
@@ -175,6 +176,13 @@ fn greet(connection: &Connection) -> Result<Result<Workspace, End>, Failure> {
 fn roots(parameters: &InitializeParams) -> Vec<PathBuf> {
     let folders = parameters.workspace_folders.iter().flatten().map(|folder| &folder.uri);
     folders.map(|uri| PathBuf::from(path_of(uri))).collect()
+}
+
+/// Whether an editor lets the user choose what a completion replaces.
+fn may_choose(parameters: &InitializeParams) -> bool {
+    let text = parameters.capabilities.text_document.as_ref();
+    let item = text.and_then(|text| text.completion.as_ref()?.completion_item.as_ref());
+    item.and_then(|item| item.insert_replace_support).unwrap_or(false)
 }
 
 fn capabilities(encoding: Encoding) -> ServerCapabilities {
@@ -281,7 +289,7 @@ impl Server<'_> {
             Completion::METHOD => {
                 let asked = asked::<Completion>(parameters)?;
                 let (document, byte) = self.place(&asked.text_document_position)?;
-                given(complete::at(&document, byte))
+                given(complete::at(&document, byte, self.workspace.may_choose))
             }
             SignatureHelpRequest::METHOD => {
                 let asked = asked::<SignatureHelpRequest>(parameters)?;

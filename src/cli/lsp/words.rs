@@ -18,6 +18,11 @@ impl Signature {
     }
 }
 
+/// Whether a sign may stand in a word, as the grammar has it: exponents such as `²` may not.
+pub(super) fn is_of_a_word(c: char) -> bool {
+    c.is_alphabetic() || c.is_ascii_digit() || c == '_'
+}
+
 /// What begins an item, and what it defines.
 pub(super) const ITEMS: [(&str, &str); 6] = [
     ("import", "what another file defines: `import \"chess.rfm\" as chess`"),

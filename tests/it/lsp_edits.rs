@@ -1,0 +1,63 @@
+//! What `rfm lsp` has an editor write, and what the editor writes: completions, other names, parts of a text.
+
+use serde_json::{Value, json};
+
+use crate::lsp::{Editor, URI};
+
+/// The item of a completion with a label.
+fn offered(editor: &mut Editor, label: &str, line: u32, character: u32) -> Value {
+    let items = editor.at("completion", line, character);
+    let found = items.as_array().unwrap().iter().find(|item| item["label"] == label);
+    found.unwrap_or_else(|| panic!("no {label} in {items}")).clone()
+}
+
+fn range(line: u32, start: usize, end: usize) -> Value {
+    json!({ "start": { "line": line, "character": start }, "end": { "line": line, "character": end } })
+}
+
+/// `|` is the cursor, and `_` stand on both sides of what is replaced.
+#[test]
+fn a_completion_replaces_the_word_at_the_cursor() {
+    for (marked, label, written) in [
+        ("let 𝛼 = _sph|_", "sphere", "sphere"),
+        ("let 𝛼 = _sp|h_(1)", "sphere", "sphere"),
+        ("let 𝛼 = _|_", "sphere", "sphere"),
+        ("let 𝛼 = _|_box()", "sphere", "sphere"),
+        ("let 𝛼 = 2*_ωb|a_ + 1", "sphere", "sphere"),
+        // exponents and numbers are no words
+        ("let 𝛼 = x²_|_", "and", "and"),
+        ("let 𝛼 = 12_|_", "or", "or"),
+        ("let 𝛼 = cylinder(_r|_, 1)", "r =", "r = "),
+        ("let 𝛼 = sphere(1)._mo|_", "move", "move"),
+    ] {
+        let text = marked.replace(['_', '|'], "");
+        for (encoding, is_utf16) in [("utf-16", true), ("utf-8", false)] {
+            let before = |mark: char, from: usize| {
+                let at = from + marked[from..].find(mark).unwrap();
+                let part = marked[..at].replace(['_', '|'], "");
+                (if is_utf16 { part.encode_utf16().count() } else { part.len() }, at + 1)
+            };
+            let ((start, after), (cursor, _)) = (before('_', 0), before('|', 0));
+            let (end, _) = before('_', after);
+            let mut editor = Editor::new(&[encoding]);
+            editor.open(&format!("rfm 1\n{text}\n"));
+            let item = offered(&mut editor, label, 1, cursor as u32);
+            let edit = json!({ "newText": written, "range": range(1, start, end) });
+            assert_eq!(item["textEdit"], edit, "{marked} in {encoding}");
+            assert!(item["insertText"].is_null(), "{item}");
+            editor.end();
+        }
+    }
+}
+
+/// An editor that can asks its user whether the rest of a word stays.
+#[test]
+fn a_completion_leaves_the_choice() {
+    let text = json!({ "completion": { "completionItem": { "insertReplaceSupport": true } } });
+    let mut editor = Editor::able(&[], text);
+    editor.open("rfm 1\nlet a = sph(1)\n");
+    let item = offered(&mut editor, "sphere", 1, 10);
+    let edit = json!({ "newText": "sphere", "insert": range(1, 8, 10), "replace": range(1, 8, 11) });
+    assert_eq!(item["textEdit"], edit);
+    editor.end();
+}
