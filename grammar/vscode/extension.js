@@ -85,14 +85,26 @@ class Preview {
     this.draw();
   }
 
+  // asks for one slice at a time: of all that is wanted meanwhile only the newest is asked for next
   async draw() {
-    const wanted = { ...this.wanted };
+    this.isWanted = true;
+    if (this.isAsking) return;
+    this.isAsking = true;
+    while (this.isWanted && this.panel) {
+      this.isWanted = false;
+      await this.ask({ ...this.wanted });
+    }
+    this.isAsking = false;
+  }
+
+  async ask(wanted) {
     try {
       const slice = await client.sendRequest("workspace/executeCommand", {
         command: "rfm.slice",
         arguments: [wanted],
       });
-      if (!this.panel) return;
+      // the panel is closed, or shows another file by now
+      if (!this.panel || wanted.uri !== this.wanted.uri) return;
       this.shown = slice.solid;
       this.panel.title = `${slice.solid}, ${slice.axis} = ${Number(slice.at.toPrecision(4))}`;
       this.panel.webview.postMessage({ slice });

@@ -161,6 +161,10 @@ impl Editor {
 
     pub fn end(mut self) {
         assert!(self.ask("shutdown", Value::Null).is_null());
+        self.end_after_shutdown();
+    }
+
+    pub fn end_after_shutdown(mut self) {
         self.tell("exit", Value::Null);
         drop(self.to.take());
         assert!(self.server.wait().unwrap().success());

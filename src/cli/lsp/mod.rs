@@ -2,7 +2,8 @@
 //!
 //! One thread answers one request after the other: a file is compiled again in milliseconds when it changes, so nothing is
 //! kept from one version of a text to the next. Texts are read when a request needs them, or when no message waits: of many
-//! changes that come together only the last one is read. Another thread looks for warnings that take longer.
+//! changes that come together only the last one is read. Another thread looks for warnings that take longer, and one draws
+//! slices.
 
 mod across;
 mod background;
@@ -18,6 +19,7 @@ mod names;
 mod pipes;
 mod preview;
 mod reading;
+mod slices;
 mod symbols;
 mod words;
 
@@ -29,7 +31,7 @@ use std::sync::Arc;
 use clap::Args;
 use lsp_server::{Connection, ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types::notification::{
-    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, Exit, Notification as _,
+    Cancel, DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, Exit, Notification as _,
     PublishDiagnostics,
 };
 use lsp_types::request::{
@@ -38,11 +40,11 @@ use lsp_types::request::{
     SignatureHelpRequest,
 };
 use lsp_types::{
-    CodeActionKind, CodeActionOptions, CodeActionProviderCapability, CompletionOptions,
-    ExecuteCommandOptions, GotoDefinitionParams, Hover, HoverContents, HoverParams, HoverProviderCapability,
-    InitializeParams, Location, MarkupContent, MarkupKind, OneOf, PrepareRenameResponse, ReferenceParams,
-    RenameOptions, ServerCapabilities, SignatureHelpOptions, TextDocumentPositionParams,
-    TextDocumentSyncCapability, TextDocumentSyncKind, Uri,
+    CancelParams, CodeActionKind, CodeActionOptions, CodeActionProviderCapability, CompletionOptions,
+    ExecuteCommandOptions, ExecuteCommandParams, GotoDefinitionParams, Hover, HoverContents, HoverParams,
+    HoverProviderCapability, InitializeParams, Location, MarkupContent, MarkupKind, NumberOrString, OneOf,
+    PrepareRenameResponse, ReferenceParams, RenameOptions, ServerCapabilities, SignatureHelpOptions,
+    TextDocumentPositionParams, TextDocumentSyncCapability, TextDocumentSyncKind, Uri,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -57,6 +59,7 @@ use buffers::Buffers;
 use document::Document;
 use pipes::Pipes;
 use reading::{Encoding, path_of};
+use slices::{Asked, Slices};
 
 #[derive(Debug, Args)]
 #[command(
@@ -102,7 +105,9 @@ fn serve(connection: &Connection) -> Result<End, Failure> {
     // an editor that is gone is noticed by the other thread
     let send = move |messages| _ = sender.send(publication(messages));
     let background = Background::start(workspace.encoding, workspace.buffers.clone(), send);
-    let mut server = Server { connection, workspace, waiting: Vec::new(), background };
+    let sender = connection.sender.clone();
+    let slices = Slices::start(move |answer| _ = sender.send(Message::Response(answer)));
+    let mut server = Server { connection, workspace, waiting: Vec::new(), background, slices };
     let mut is_shut = false;
     while let Some(message) = server.next()? {
         match message {
@@ -113,12 +118,14 @@ fn serve(connection: &Connection) -> Result<End, Failure> {
             }
             Message::Request(Request { id, method, .. }) if method == Shutdown::METHOD => {
                 is_shut = true;
+                server.slices.cancel_all();
                 server.send(Message::Response(Response::new_ok(id, ())))?;
             }
             Message::Request(request) => {
                 while server.read_next()? {}
-                let answer = server.answer(request);
-                server.send(Message::Response(answer))?;
+                if let Some(answer) = server.answer(request) {
+                    server.send(Message::Response(answer))?;
+                }
             }
             Message::Notification(notification) if notification.method == Exit::METHOD => {
                 return Ok(if is_shut { End::InOrder } else { End::WithoutShutdown });
@@ -127,6 +134,8 @@ fn serve(connection: &Connection) -> Result<End, Failure> {
             Message::Notification(_) | Message::Response(_) => {}
         }
     }
+    // who closes the pipe behind the last request may still read
+    server.slices.finish();
     Ok(End::InOrder)
 }
 
@@ -228,6 +237,10 @@ impl Refusal {
     fn new(code: ErrorCode, message: impl std::fmt::Display) -> Self {
         Self { code, message: message.to_string() }
     }
+
+    fn answer(self, id: RequestId) -> Response {
+        Response::new_err(id, self.code as i32, self.message)
+    }
 }
 
 struct Server<'c> {
@@ -236,6 +249,7 @@ struct Server<'c> {
     /// Texts that have not been read, one for each file at most.
     waiting: Vec<Waiting>,
     background: Background,
+    slices: Slices,
 }
 
 /// A text that is to be read.
@@ -263,17 +277,22 @@ impl Server<'_> {
         }
     }
 
-    fn answer(&self, request: Request) -> Response {
+    /// The answer to a request; `None` for one that is answered later.
+    fn answer(&self, request: Request) -> Option<Response> {
         let id: RequestId = request.id.clone();
+        if request.method == ExecuteCommand::METHOD {
+            let refusal = asked::<ExecuteCommand>(request.params).and_then(|asked| self.command(&id, asked));
+            return refusal.err().map(|refusal| refusal.answer(id));
+        }
         // a bug in one answer must not end the work on all files
         let outcome = catch_unwind(AssertUnwindSafe(|| self.result(request)));
-        match outcome {
+        Some(match outcome {
             Ok(Ok(result)) => Response::new_ok(id, result),
-            Ok(Err(refusal)) => Response::new_err(id, refusal.code as i32, refusal.message),
+            Ok(Err(refusal)) => refusal.answer(id),
             Err(_) => {
                 Response::new_err(id, ErrorCode::InternalError as i32, "this is a mistake of rfm".into())
             }
-        }
+        })
     }
 
     fn result(&self, request: Request) -> Result<Value, Refusal> {
@@ -316,10 +335,6 @@ impl Server<'_> {
                 let edits = self.workspace.rename(uri, &document, byte, &asked.new_name);
                 given(edits.map_err(|why| Refusal::new(ErrorCode::InvalidParams, why))?)
             }
-            ExecuteCommand::METHOD => {
-                let asked = asked::<ExecuteCommand>(parameters)?;
-                self.command(&asked.command, asked.arguments)
-            }
             method => Err(Refusal::new(ErrorCode::MethodNotFound, format!("{method} is not served"))),
         }
     }
@@ -357,7 +372,9 @@ impl Server<'_> {
             .map(|mention| PrepareRenameResponse::Range(document.range(mention.place.clone()))))
     }
 
-    fn command(&self, command: &str, mut arguments: Vec<Value>) -> Result<Value, Refusal> {
+    /// Has the command of a request carried out, which is answered later.
+    fn command(&self, id: &RequestId, asked: ExecuteCommandParams) -> Result<(), Refusal> {
+        let ExecuteCommandParams { command, mut arguments, .. } = asked;
         if command != preview::COMMAND {
             return Err(Refusal::new(
                 ErrorCode::InvalidParams,
@@ -371,7 +388,8 @@ impl Server<'_> {
             Refusal::new(ErrorCode::InvalidParams, format!("{error}: {}", preview::EXPECTED))
         })?;
         let document = self.document(&wanted.uri)?;
-        given(preview::slice(&document, &wanted).map_err(|why| Refusal::new(ErrorCode::RequestFailed, why))?)
+        self.slices.ask(Asked { id: id.clone(), document, wanted });
+        Ok(())
     }
 
     fn document(&self, uri: &Uri) -> Result<Arc<Document>, Refusal> {
@@ -419,6 +437,15 @@ impl Server<'_> {
                 let nothing =
                     lsp_types::PublishDiagnosticsParams { uri, diagnostics: Vec::new(), version: None };
                 self.publish(nothing)
+            }
+            Cancel::METHOD => {
+                let Ok(CancelParams { id }) = serde_json::from_value(parameters) else { return Ok(()) };
+                // all other requests are answered before the next message is read
+                self.slices.cancel(&match id {
+                    NumberOrString::Number(id) => id.into(),
+                    NumberOrString::String(id) => id.into(),
+                });
+                Ok(())
             }
             _ => Ok(()),
         }

@@ -13,8 +13,9 @@ use super::document::Document;
 pub(super) const COMMAND: &str = "rfm.slice";
 
 /// What its arguments are, for a caller that gave others.
-pub(super) const EXPECTED: &str = "rfm.slice takes one object: { \"uri\": address of an open file, \"solid\": its name, \"axis\": \
-     \"x\", \"y\" or \"z\", \"at\": metres along the axis }, of which only `uri` must be there";
+pub(super) const EXPECTED: &str = "rfm.slice takes one object: { \"uri\": address of an open file, \"solid\": its name, \
+     \"axis\": \"x\", \"y\" or \"z\", \"at\": metres along the axis, \"panel\": where it is shown }, of which only `uri` \
+     must be there";
 
 /// Samples along the longer side: enough for a panel beside the text, and quick.
 const SAMPLES: usize = 128;
@@ -24,12 +25,21 @@ const SAMPLES: usize = 128;
 #[serde(rename_all = "camelCase")]
 pub(super) struct Wanted {
     pub uri: Uri,
-    /// The solid; without it the first one that the cursor's line or the file has.
+    /// The solid; without it, or if there is none of this name, the last one of the file.
     solid: Option<String>,
     /// `x`, `y` or `z`; without it the axis across the largest side of the solid.
     axis: Option<String>,
     /// Where the plane meets the axis; without it in the middle of the solid.
     at: Option<f64>,
+    /// What the editor calls the place where it shows the slice; without it there is one for each file.
+    panel: Option<String>,
+}
+
+impl Wanted {
+    /// Where the slice is shown: of two for one place the later one is wanted.
+    pub fn panel(&self) -> &str {
+        self.panel.as_deref().unwrap_or(self.uri.as_str())
+    }
 }
 
 /// A picture, and what it shows.
