@@ -71,9 +71,12 @@ pub struct Function {
 }
 
 impl Function {
+    /// The name of the first parameter of a function that may be called as a method.
+    pub const SHAPE: &str = "shape";
+
     /// Whether it may be called as a method: its first parameter is called `shape`.
     pub fn takes_a_shape(&self) -> bool {
-        self.parameters.first().is_some_and(|first| first.name.text == "shape")
+        self.parameters.first().is_some_and(|first| first.name.text == Self::SHAPE)
     }
 }
 

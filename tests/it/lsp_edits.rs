@@ -61,3 +61,53 @@ fn a_completion_leaves_the_choice() {
     assert_eq!(item["textEdit"], edit);
     editor.end();
 }
+
+/// A function is a method if its first parameter is called `shape`: another name for that is another meaning.
+#[test]
+fn a_name_that_makes_a_method_is_kept() {
+    let text = "rfm 1
+fn twin(shape, by) = shape or shape.move([by, 0, 0])
+fn pair(shape) = shape or shape.move([0, 3, 0])
+fn wide(form, by) = form or form.move([by, 0, 0])
+solid s = pair(sphere(1).twin(3)) or wide(sphere(0.5), 9)
+";
+    let mut editor = Editor::new(&[]);
+    assert!(editor.open(text).is_empty());
+    let mut rename = |line: u32, word: &str, name: &str| {
+        let character = text.lines().nth(line as usize).unwrap().find(word).unwrap();
+        let position = json!({ "line": line, "character": character });
+        let file = json!({ "uri": URI });
+        let asked = json!({ "textDocument": file, "position": position, "newName": name });
+        editor.ask("textDocument/rename", asked)
+    };
+    for (line, word, name, why) in [
+        (
+            1,
+            "shape",
+            "body",
+            "`twin` is called as a method, and is one as its first parameter is called `shape`",
+        ),
+        (1, "shape.move", "body", "`twin` is called as a method"),
+        (3, "form", "shape", "`wide` would become a method: its first parameter would be called `shape`"),
+        (1, "twin", "move", "`move` is a method of all shapes"),
+        (2, "pair", "mirror", "`mirror` is a method of all shapes"),
+    ] {
+        let refused = rename(line, word, name);
+        assert_eq!(refused["code"], -32602, "{word} -> {name}: {refused}");
+        assert!(refused["message"].as_str().unwrap().contains(why), "{refused}");
+    }
+    // what nothing calls as a method, and what is no first parameter
+    for (line, word, name, places) in [
+        (2, "shape", "body", 3),
+        (1, "by", "far", 2),
+        (3, "form", "body", 3),
+        (1, "twin", "two", 2),
+        (3, "wide", "mirror", 2),
+        (1, "shape", "shape", 3),
+    ] {
+        let edits = rename(line, word, name);
+        let edits = edits["changes"][URI].as_array().unwrap_or_else(|| panic!("{word} -> {name}: {edits}"));
+        assert_eq!(edits.len(), places, "{word} -> {name}");
+    }
+    editor.end();
+}

@@ -8,10 +8,10 @@ use std::sync::Arc;
 use lsp_types::{Location, TextEdit, Uri, WorkspaceEdit};
 
 use rfm::compile::text_of;
-use rfm::diagnostic::Source;
+use rfm::diagnostic::{Source, Span};
 use rfm::files::Files;
 use rfm::lower::vocabulary;
-use rfm::syntax::{self, KEYWORDS, ast::Item};
+use rfm::syntax::{self, KEYWORDS, ast::Function, ast::Item};
 
 use super::buffers::Buffers;
 use super::document::Document;
@@ -159,9 +159,14 @@ impl Workspace {
         }
         let places = self.uses(uri, document, byte).ok_or("the file that defines it cannot be read")?;
         let taken = |other: &Mention| other.text == name && is_name(other);
-        let home = places.first().map(|place| place.file.reading());
-        if name != mention.text && home.is_some_and(|home| home.names.mentions.iter().any(taken)) {
-            return Err(format!("`{name}` is used in the file already"));
+        if let Some(defined) = places.first().filter(|_| name != mention.text) {
+            let home = defined.file.reading();
+            if let Some(why) = changes_methods(home, &defined.bytes, name) {
+                return Err(why);
+            }
+            if home.names.mentions.iter().any(taken) {
+                return Err(format!("`{name}` is used in the file already"));
+            }
         }
         Ok(edits(&places, name))
     }
@@ -195,6 +200,29 @@ impl Workspace {
         }
         files
     }
+}
+
+/// Why a text would have other methods of shapes if what it defines at a place had another name; `None` if it would not.
+fn changes_methods(home: &Reading, place: &Range<usize>, name: &str) -> Option<String> {
+    let (shape, is_here) = (Function::SHAPE, |span: Span| span.range() == *place);
+    home.ast.items.iter().find_map(|item| {
+        let Item::Function(function) = item else { return None };
+        let own = &function.name.text;
+        let is_first = function.parameters.first().is_some_and(|first| is_here(first.name.span));
+        if is_first && name == shape {
+            return Some(format!(
+                "`{own}` would become a method: its first parameter would be called `{shape}`"
+            ));
+        }
+        if is_first && home.names.is_called_as_method(function) {
+            return Some(format!(
+                "`{own}` is called as a method, and is one as its first parameter is called `{shape}`"
+            ));
+        }
+        let is_method = is_here(function.name.span) && function.takes_a_shape();
+        let hides = is_method && vocabulary::methods().any(|(known, _)| known == name);
+        hides.then(|| format!("`{name}` is a method of all shapes, which would be hidden from then on"))
+    })
 }
 
 /// Where a text defines a name that others may use: an item, or the parameter of a function.

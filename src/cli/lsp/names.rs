@@ -1,6 +1,6 @@
 //! Names of a file: where each is defined, and where it is used.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use rfm::diagnostic::Span;
@@ -49,17 +49,25 @@ pub(super) struct Mention {
 #[derive(Debug, Default)]
 pub(super) struct Names {
     pub mentions: Vec<Mention>,
+    /// Where the names of functions stand that are called as methods, in their definitions.
+    methods: HashSet<Range<usize>>,
 }
 
 impl Names {
     pub fn of(ast: &Ast) -> Self {
         let items = ast.items.iter().map(|item| (item.name().text.as_str(), item)).rev().collect();
-        let mut reader = Reader { ast, items, locals: Vec::new(), fluids: HashMap::new(), found: Vec::new() };
+        let (fluids, methods) = (HashMap::new(), HashSet::new());
+        let mut reader = Reader { ast, items, locals: Vec::new(), fluids, methods, found: Vec::new() };
         for item in &ast.items {
             reader.item(item);
         }
         reader.found.sort_by_key(|mention| mention.place.start);
-        Self { mentions: reader.found }
+        Self { mentions: reader.found, methods: reader.methods }
+    }
+
+    /// Whether a function of the file is called as a method.
+    pub fn is_called_as_method(&self, function: &Function) -> bool {
+        self.methods.contains(&function.name.span.range())
     }
 
     /// The name at a byte, or directly before it.
@@ -80,6 +88,7 @@ struct Reader<'a> {
     locals: Vec<&'a Name>,
     /// Fluids of the scene that is read.
     fluids: HashMap<&'a str, &'a Name>,
+    methods: HashSet<Range<usize>>,
     found: Vec<Mention>,
 }
 
@@ -232,7 +241,10 @@ impl<'a> Reader<'a> {
                 }
                 let own = self.function(&method.text).filter(|function| function.takes_a_shape());
                 match own {
-                    Some(function) => self.mention(method, Meaning::Defined(function.name.span.range())),
+                    Some(function) => {
+                        self.methods.insert(function.name.span.range());
+                        self.mention(method, Meaning::Defined(function.name.span.range()));
+                    }
                     None => self.mention(method, Meaning::Standard),
                 }
                 self.arguments(arguments, own);
