@@ -62,6 +62,24 @@ fn a_completion_leaves_the_choice() {
     editor.end();
 }
 
+#[test]
+fn parts_of_a_text_are_changed() {
+    for (encoding, after) in [("utf-16", 6), ("utf-8", 8)] {
+        let mut editor = Editor::new(&[encoding]);
+        editor.open("rfm 1\nlet 𝛼 = 1\nsolid s = spere(𝛼)\n");
+        let changes = json!([
+            { "range": range(1, 4, after), "text": "bb" },
+            { "range": range(2, 10, 15), "text": "sphere" },
+            { "range": range(2, 17, 17 + after - 4), "text": "bb" },
+        ]);
+        let file = json!({ "uri": URI, "version": 2 });
+        editor.tell("textDocument/didChange", json!({ "textDocument": file, "contentChanges": changes }));
+        assert!(editor.hover(2, 6).contains("solid s = sphere(bb)"), "{encoding}: {}", editor.hover(2, 6));
+        assert!(editor.hover(1, 5).contains("let bb = 1"), "{encoding}");
+        editor.end();
+    }
+}
+
 /// A function is a method if its first parameter is called `shape`: another name for that is another meaning.
 #[test]
 fn a_name_that_makes_a_method_is_kept() {

@@ -23,6 +23,11 @@ impl Buffers {
         self.texts().insert(path.to_string(), text.into());
     }
 
+    /// The open text of a path.
+    pub fn text(&self, path: &str) -> Option<Arc<str>> {
+        self.texts().get(path).cloned()
+    }
+
     pub fn close(&self, path: &str) {
         self.texts().remove(path);
     }
@@ -42,7 +47,7 @@ struct Shelf {
 impl Reader for Shelf {
     fn read(&self, name: &str) -> Result<Vec<u8>, Unread> {
         let on_disk = self.disk.read(name);
-        let open = self.open.texts().get(name).cloned();
+        let open = self.open.text(name);
         match (open, on_disk) {
             (_, Err(Unread::Outside)) => Err(Unread::Outside),
             (Some(text), _) => Ok(text.as_bytes().to_vec()),

@@ -418,9 +418,11 @@ impl Server<'_> {
                 type Changed = <DidChangeTextDocument as lsp_types::notification::Notification>::Params;
                 let Ok(changed) = serde_json::from_value::<Changed>(parameters) else { return Ok(()) };
                 let file = changed.text_document;
-                // the whole text is sent, so the last change is all there is
-                if let Some(change) = changed.content_changes.into_iter().next_back() {
-                    self.give(file.uri, change.text.into(), Some(file.version));
+                // whole texts are asked for, but some editors send parts all the same
+                let Workspace { encoding, buffers, .. } = &self.workspace;
+                let before = buffers.text(&Files::plain(&path_of(&file.uri)));
+                if let Some(text) = reading::changed(before, changed.content_changes, *encoding) {
+                    self.give(file.uri, text, Some(file.version));
                 }
                 Ok(())
             }

@@ -1,6 +1,8 @@
 //! A text that was read: its tree, its names, and the positions that an editor counts in it.
 
-use lsp_types::{Position, PositionEncodingKind, Range, Uri};
+use std::sync::Arc;
+
+use lsp_types::{Position, PositionEncodingKind, Range, TextDocumentContentChangeEvent, Uri};
 
 use rfm::diagnostic::{Source, Span};
 use rfm::files::Files;
@@ -36,6 +38,44 @@ impl Encoding {
             Self::Utf16 => text.encode_utf16().count() as u32,
         }
     }
+
+    /// The byte at which a character of the first line of a text begins; one beyond the line counts as its end.
+    fn byte_in_line(self, text: &str, character: u32) -> usize {
+        let line = text.split('\n').next().unwrap_or("");
+        let line = line.strip_suffix('\r').unwrap_or(line);
+        let mut before = 0;
+        for (at, c) in line.char_indices() {
+            if before >= character {
+                return at;
+            }
+            before += self.width(c.encode_utf8(&mut [0; 4]));
+        }
+        line.len()
+    }
+
+    /// The byte at a position of a text that has not been read.
+    fn byte(self, text: &str, position: Position) -> usize {
+        let line_ends = text.match_indices('\n').map(|(at, _)| at + 1);
+        let start = std::iter::once(0).chain(line_ends).nth(position.line as usize);
+        start.map_or(text.len(), |start| start + self.byte_in_line(&text[start..], position.character))
+    }
+}
+
+/// The text after changes, which are made one after the other; `None` if one changes a part of a text that is not known.
+pub(super) fn changed(
+    text: Option<Arc<str>>,
+    changes: Vec<TextDocumentContentChangeEvent>,
+    encoding: Encoding,
+) -> Option<Arc<str>> {
+    changes.into_iter().fold(text, |text, change| match change.range {
+        None => Some(change.text.into()),
+        Some(range) => {
+            let text = text?;
+            let ends = [range.start, range.end].map(|end| encoding.byte(&text, end));
+            let (start, end) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+            Some([&text[..start], &change.text, &text[end..]].concat().into())
+        }
+    })
 }
 
 /// A text with its tree.
@@ -69,16 +109,7 @@ impl Reading {
     pub fn byte(&self, position: Position) -> usize {
         let text = self.text();
         let Some(&start) = self.lines.get(position.line as usize) else { return text.len() };
-        let line = text[start..].split('\n').next().unwrap_or("");
-        let line = line.strip_suffix('\r').unwrap_or(line);
-        let mut before = 0;
-        for (at, c) in line.char_indices() {
-            if before >= position.character {
-                return start + at;
-            }
-            before += self.encoding.width(c.encode_utf8(&mut [0; 4]));
-        }
-        start + line.len()
+        start + self.encoding.byte_in_line(&text[start..], position.character)
     }
 
     /// The position of a byte; one within a character counts as its beginning.
@@ -127,6 +158,30 @@ pub(super) fn uri_of(path: &str) -> Option<Uri> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_of_a_text_are_changed_one_after_the_other() {
+        let change = |range: Option<[u32; 4]>, text: &str| TextDocumentContentChangeEvent {
+            range: range.map(|[a, b, c, d]| Range::new(Position::new(a, b), Position::new(c, d))),
+            range_length: None,
+            text: text.to_string(),
+        };
+        let before: Arc<str> = "𝛼 = 1\r\nb\n".into();
+        for (encoding, after) in [(Encoding::Utf16, 2), (Encoding::Utf8, 4)] {
+            let changes = vec![
+                change(Some([0, 0, 0, after]), "ω"),
+                change(Some([1, 0, 9, 0]), "c"),
+                // the end of a line, and ends in the wrong order
+                change(Some([0, 99, 0, 99]), "0"),
+                change(Some([1, 1, 1, 0]), "d"),
+            ];
+            let text = changed(Some(Arc::clone(&before)), changes, encoding);
+            assert_eq!(text.as_deref(), Some("ω = 10\r\nd"));
+        }
+        let unknown = vec![change(Some([0, 0, 0, 0]), "a"), change(None, "whole")];
+        assert_eq!(changed(None, unknown.clone(), Encoding::Utf8).as_deref(), Some("whole"));
+        assert_eq!(changed(None, unknown[..1].to_vec(), Encoding::Utf8), None);
+    }
 
     #[test]
     fn a_path_has_an_address_and_this_leads_back() {
