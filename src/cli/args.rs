@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Arg, Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use super::mesh::{ascii_help, format_name, output_help, unit_help, unit_name};
 use super::render::Surface;
@@ -40,6 +40,22 @@ pub(super) struct Arguments {
     pub shared: Shared,
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// Commands that read no file of the language: options of all commands mean nothing to them.
+const WITHOUT_FILES: [&str; 4] = ["completions", "man", "lsp", "init"];
+
+/// The declaration of all commands. Options of all commands are hidden where they mean nothing.
+pub(super) fn declaration() -> clap::Command {
+    let whole = Arguments::command();
+    let shared: Vec<Arg> = whole.get_arguments().filter(|arg| arg.is_global_set()).cloned().collect();
+    whole.mut_subcommands(|command| {
+        if !WITHOUT_FILES.contains(&command.get_name()) {
+            return command;
+        }
+        // a command's own declaration of an option goes before the one that it would get
+        command.args(shared.iter().map(|arg| arg.clone().hide(true)))
+    })
 }
 
 #[derive(Debug, Clone, Args)]
@@ -581,10 +597,9 @@ fn languages() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_definition_is_consistent() {
-        Arguments::command().debug_assert();
+        declaration().debug_assert();
     }
 }

@@ -3,15 +3,12 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use clap::{Arg, ArgAction, Args, Command, CommandFactory};
+use clap::{Arg, ArgAction, Args, Command};
 use clap_complete::Shell;
 
-use super::args::Arguments;
+use super::args;
 use super::failure::Failure;
 use super::output::{self, Shown};
-
-/// Commands that read no file of the language: options of all commands mean nothing to them.
-const WITHOUT_FILES: [&str; 4] = ["completions", "man", "lsp", "init"];
 
 /// Help without the options of all commands.
 const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\nArguments:\n{positionals}{after-help}";
@@ -38,13 +35,13 @@ pub(super) struct Man {
 /// Prints the completions of a shell.
 pub(super) fn completions(options: &Completions) -> Result<(), Failure> {
     let mut text = Vec::new();
-    clap_complete::generate(options.shell, &mut Arguments::command(), "rfm", &mut text);
+    clap_complete::generate(options.shell, &mut args::declaration(), "rfm", &mut text);
     print(&text)
 }
 
 /// Prints rfm's own page, or writes the pages of all commands.
 pub(super) fn man(options: &Man) -> Result<(), Failure> {
-    let mut whole = Arguments::command();
+    let mut whole = args::declaration();
     whole.build();
     let Some(folder) = &options.folder else { return print(&page(whole)?) };
     std::fs::create_dir_all(folder)
@@ -60,12 +57,7 @@ pub(super) fn man(options: &Man) -> Result<(), Failure> {
 }
 
 fn page(command: Command) -> Result<Vec<u8>, Failure> {
-    let takes_no_file = WITHOUT_FILES.contains(&command.get_name());
-    let command = command.mut_args(|arg| {
-        let means_nothing = takes_no_file && arg.is_global_set();
-        let is_hidden = means_nothing || arg.is_hide_set();
-        arg.hide(is_hidden).hide_short_help(false)
-    });
+    let command = command.mut_args(|arg| arg.hide_short_help(false));
     let usage = synopsis(&command);
     let command = command.override_usage(usage);
     let mut text = Vec::new();

@@ -43,7 +43,7 @@ mod view;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::FromArgMatches;
 use clap::error::{ContextKind, ContextValue};
 use rfm::diagnostic::{is_hidden, printable};
 
@@ -53,7 +53,13 @@ use failure::{Failure, note};
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let hidden = arguments.iter().any(|argument| argument.to_string_lossy().contains(is_hidden));
-    let arguments = match args::Arguments::try_parse_from(arguments) {
+    let mut declaration = args::declaration();
+    let matched = declaration.try_get_matches_from_mut(arguments);
+    let read = matched.and_then(|mut matches| {
+        let read = args::Arguments::from_arg_matches_mut(&mut matches);
+        read.map_err(|error| error.format(&mut declaration))
+    });
+    let arguments = match read {
         Ok(arguments) => arguments,
         Err(error) => {
             if hidden {

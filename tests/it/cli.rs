@@ -156,10 +156,17 @@ fn shells_and_man_know_every_command() {
     rfm(folder.path(), &["man", "pages"]).expect(0);
     let of_man = std::fs::read_to_string(folder.path().join("pages/rfm-man.1")).unwrap();
     assert!(of_man.contains("[DIR]") && !of_man.contains("engine"), "{of_man}");
-    for command in ["man", "completions"] {
+    for command in ["man", "completions", "lsp", "init"] {
         let help = rfm(folder.path(), &[command, "--help"]).expect(0).stdout;
-        assert!(!help.contains("-D") && !help.contains("--engine"), "{help}");
+        for option in ["-D", "--params", "--threads", "--json", "--engine", "--max-nodes", "--allow-outside"]
+        {
+            assert!(!help.contains(option), "{command} {option}: {help}");
+        }
     }
+    let help = rfm(folder.path(), &["init", "--help"]).expect(0).stdout;
+    assert!(help.contains("--template") && help.contains("--help"), "{help}");
+    // as an option of all commands it is still taken
+    rfm(folder.path(), &["init", "-", "--threads", "2"]).expect(0);
     let page = std::fs::read_to_string(folder.path().join("pages/rfm-run.1")).unwrap();
     assert!(page.contains("Simulate"), "{page}");
 }

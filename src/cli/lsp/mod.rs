@@ -63,15 +63,15 @@ use slices::{Asked, Slices};
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Editors start this program themselves and talk to it over standard input and output; there is nothing to\n\
-                        see in a terminal. In VS Code take the extension in grammar/vscode. In Neovim:\n\n  \
+    after_help = "Editors start this program themselves and talk to it over standard input and output; there is\n\
+                        nothing to see in a terminal. In VS Code take the extension in grammar/vscode. In Neovim:\n\n  \
                         vim.lsp.config('rfm', { cmd = { 'rfm', 'lsp' }, filetypes = { 'rfm' } }); vim.lsp.enable('rfm')\n\n\
                         In Helix, in languages.toml:\n\n  \
                         [language-server.rfm]\n  command = \"rfm\"\n  args = [\"lsp\"]\n\n  \
                         [[language]]\n  name = \"rfm\"\n  scope = \"source.rfm\"\n  file-types = [\"rfm\"]\n  \
                         comment-token = \"#\"\n  language-servers = [\"rfm\"]\n\n\
-                        It offers: messages with quick fixes, layout, what is known of a name, definitions, uses, completion,\n\
-                        other names, symbols, arguments of calls, and the command rfm.slice for previews."
+                        It offers: messages with quick fixes, layout, what is known of a name, definitions, uses,\n\
+                        completion, other names, symbols, arguments of calls, and the command rfm.slice for previews."
 )]
 pub(super) struct Lsp {}
 
