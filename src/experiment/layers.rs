@@ -198,7 +198,8 @@ mod tests {
         let fitted = chords.mismatch(2, layers(width));
         assert!(cubes > 0.03 && fitted < 0.007, "{cubes} {fitted}");
         for depth in [0.5, 0.17] {
-            assert!(((depth / width).round() * width / depth - 1.0).abs() < 0.02, "{width}");
+            // an eighth of a layer
+            assert!(((depth / width).round() * width - depth).abs() < 0.13 * width, "{width}");
         }
     }
 

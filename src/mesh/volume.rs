@@ -138,7 +138,7 @@ mod tests {
     fn what_has_no_mesh_has_no_volume() {
         let unit = Aabb::new(DVec3::NEG_ONE, DVec3::ONE);
         assert_eq!(volume(&ball(1e-3), &unit, 16), Err(VolumeError::TooThin));
-        assert_eq!(volume(&ball(1.0), &unit, 3), Err(VolumeError::Grid(GridError::TooFewCells(1))));
+        assert_eq!(volume(&ball(1.0), &unit, 3), Err(VolumeError::TooFewCells(3)));
         let undefined = Closures { omega: |_| f64::NAN, gradient: |_| DVec3::ZERO };
         assert!(matches!(volume(&undefined, &unit, 16), Err(VolumeError::Mesh(_))));
     }

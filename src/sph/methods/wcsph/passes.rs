@@ -307,8 +307,8 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
     }
 }
 
-/// The pass over pairs where pressures act by their differences. It also sums f·d⊗d, by which the gradient of a pressure that
-/// is linear in space is exact wherever the particles lie, at walls and in corners too.
+/// The pass over pairs where pressures act by their differences. It also sums f·d⊗d but for its last component, which follows
+/// from f·d²: by this tensor the gradient of a pressure that is linear in space is exact wherever the particles lie.
 #[derive(Clone, Copy)]
 pub(super) struct Differences<'a, const LAMINAR: bool, const ARTIFICIAL: bool>(pub Rates<'a>);
 
