@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             (x[i], y[i], z[i]) = (p.x, p.y, p.z.max(0.0));
         }
         pawn.omega_many([&x, &y, &z], &mut omega); // one call for all points: nothing is allocated
-        for i in (0..1000).filter(|&i| omega[i] > 0.0) {
+        for i in (0..1000).filter(|&i| omega[i] >= 0.0) {
             let mut p = DVec3::new(x[i], y[i], z[i]);
             hits += usize::from(collide(&pawn, &rebound, &mut p, &mut v[i]) == Some(Collision::Hit));
             (x[i], y[i], z[i]) = (p.x, p.y, p.z);

@@ -25,8 +25,11 @@ struct Memory(BTreeMap<String, Vec<u8>>);
 
 impl Reader for Memory {
     fn read(&self, name: &str) -> Result<Vec<u8>, Unread> {
-        let known = || self.0.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-        self.0.get(name).cloned().ok_or_else(|| Unread::Failed(format!("the files given are {}", known())))
+        let unknown = || match &self.0.keys().map(String::as_str).collect::<Vec<_>>()[..] {
+            [] => "no files are given".to_string(),
+            known => format!("the files given are {}", known.join(", ")),
+        };
+        self.0.get(name).cloned().ok_or_else(|| Unread::Failed(unknown()))
     }
 }
 
@@ -71,11 +74,11 @@ impl Files {
         Self { reader: Some(reader), known: Arc::default() }
     }
 
-    /// Files from memory, by the paths by which they are named.
-    pub fn from_memory<N: Into<String>, B: Into<Vec<u8>>>(files: impl IntoIterator<Item = (N, B)>) -> Self {
-        Self::new(Arc::new(Memory(
-            files.into_iter().map(|(name, bytes)| (name.into(), bytes.into())).collect(),
-        )))
+    /// Files from memory, by their paths. A file names others from its own folder: `dir/board.rfm`, which imports
+    /// `parts.rfm`, finds `dir/parts.rfm`.
+    pub fn from_memory<N: AsRef<str>, B: Into<Vec<u8>>>(files: impl IntoIterator<Item = (N, B)>) -> Self {
+        let named = files.into_iter().map(|(name, bytes)| (Self::plain(name.as_ref()), bytes.into()));
+        Self::new(Arc::new(Memory(named.collect())))
     }
 
     /// The name of a file that another one names by a path.

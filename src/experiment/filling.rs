@@ -217,6 +217,9 @@ impl Experiment {
             size = (size * (-off / free).exp()).clamp((1.0 - TOO_FAR) * spacing, (1.0 + TOO_FAR) * spacing);
         }
         let (off, placed) = best.ok_or_else(|| self.no_lattice())?;
+        if free == 0.0 {
+            return Ok(placed);
+        }
         let chords = Chords::of(&self.fluid, within, spacing);
         let misplaced = |cell: DVec3| -> f64 {
             (0..3).map(|axis| chords.mismatch(axis, self.layers(within, axis, cell[axis]))).sum()
@@ -228,7 +231,9 @@ impl Experiment {
         if misplaced(cell) + WORTH_STRETCHING > misplaced(placed.2) {
             return Ok(placed);
         }
-        let (particles, carved) = self.place(obstacles, Sites::Cells(cell), None, Some(taken))?;
+        let Ok((particles, carved)) = self.place(obstacles, Sites::Cells(cell), None, Some(taken)) else {
+            return Ok(placed);
+        };
         let off_stretched = (particles.len() as f64 * cell.element_product() / volume).ln().abs();
         let gained = misplaced(placed.2) + off - misplaced(cell) - off_stretched;
         Ok(if gained > WORTH_STRETCHING { (particles, carved, cell) } else { placed })

@@ -2,8 +2,9 @@
 //!
 //! The surface of a fluid often lies at several levels: that of two pools, or of a lake and a wet bed behind a gate. A
 //! lattice of cubes ends above or below each of them by up to half a layer. The whole weighs what it should, because the
-//! mass of a particle is fitted, but one pool is too full and the other too empty: 17 cm beside 50 cm were off by +7 and −3 %
-//! with a spacing of 3 cm. Cells that are a few per cent higher or lower than wide fit both.
+//! mass of a particle is fitted, but one pool is too full and the other too empty: with a spacing of 3 cm, 17 cm beside 50 cm
+//! would be off by +7.5 and −2.5 %. Cells that are a few per cent higher or lower than wide fit both. Obstacles are left out: what
+//! they take of a lattice is carved from it by its volume.
 //!
 //! Levels are found by chords: the parts of parallel lines that lie in the shape. Where neighbouring lines have the same
 //! chord, it lies between flat faces. The chords of a ball or of a slope are all different: what a lattice lacks on one line it
@@ -22,9 +23,10 @@ const HALVINGS: usize = 12;
 /// Fewest and most samples along a line.
 const SAMPLE_LIMITS: [f64; 2] = [16.0, 4096.0];
 
-/// Change of a cell's width that is tried, as a part of the spacing, and the number of widths that are.
-const MOST_STRETCHED: f64 = 0.12;
-const WIDTHS: usize = 97;
+/// Change of a cell's width that is tried, as a part of the spacing, and the number of widths that are. That of the spacing
+/// itself, which is a mean over the axes, is no greater.
+const MOST_STRETCHED: f64 = 0.1;
+const WIDTHS: usize = 81;
 
 /// Difference between the ends of chords that counts as none, as a part of the spacing.
 const SAME: f64 = 0.01;

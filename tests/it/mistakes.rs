@@ -210,7 +210,6 @@ const VALUES: &[&str] = &[
     "let a = 1/0\nsolid s = a - x",
     "solid s = box().rotate_z(45*t)",
     "solid s = box().rotate([0, 0, 1], 360*sin(t))",
-    "solid s = box().rotate_z(0.5*sin(10*t))",
     "solid s = box().rotate_z(min(90*t, 45))",
     "solid s = sphere(1) - sphere(0.5)",
     "solid a = sphere(1)\nsolid s = a + box()",

@@ -280,14 +280,18 @@ impl Server<'_> {
     /// The answer to a request; `None` for one that is answered later.
     fn answer(&self, request: Request) -> Option<Response> {
         let id: RequestId = request.id.clone();
-        if request.method == ExecuteCommand::METHOD {
-            let refusal = asked::<ExecuteCommand>(request.params).and_then(|asked| self.command(&id, asked));
-            return refusal.err().map(|refusal| refusal.answer(id));
-        }
         // a bug in one answer must not end the work on all files
-        let outcome = catch_unwind(AssertUnwindSafe(|| self.result(request)));
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            if request.method == ExecuteCommand::METHOD {
+                asked::<ExecuteCommand>(request.params)
+                    .and_then(|asked| self.command(&id, asked))
+                    .map(|()| None)
+            } else {
+                self.result(request).map(Some)
+            }
+        }));
         Some(match outcome {
-            Ok(Ok(result)) => Response::new_ok(id, result),
+            Ok(Ok(result)) => return result.map(|result| Response::new_ok(id, result)),
             Ok(Err(refusal)) => refusal.answer(id),
             Err(_) => {
                 Response::new_err(id, ErrorCode::InternalError as i32, "this is a mistake of rfm".into())

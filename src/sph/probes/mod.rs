@@ -212,15 +212,15 @@ fn filling(core: &Core, weight: &Weight, at: DVec3, particles: impl Iterator<Ite
 }
 
 fn height(core: &Core, x: f64, y: f64) -> f64 {
-    let h = core.parameters.support_radius;
-    let weight = Weight::of(core);
-    let beside = |p: &DVec3| (p.x - x).hypot(p.y - y) < h;
-    let column: Vec<DVec3> = core.particles.position.iter().filter(beside).collect();
     let Aabb { min, max } = core.boundary.domain;
     let is_in_box = (min.x..=max.x).contains(&x) && (min.y..=max.y).contains(&y);
     if !is_in_box {
         return f64::NAN;
     }
+    let h = core.parameters.support_radius;
+    let weight = Weight::of(core);
+    let beside = |p: &DVec3| (p.x - x).hypot(p.y - y) < h;
+    let column: Vec<DVec3> = core.particles.position.iter().filter(beside).collect();
     let is_filled = |z: f64| filling(core, &weight, DVec3::new(x, y, z), column.iter().copied()) >= 0.5;
     let top = column.iter().map(|p| p.z).fold(min.z, f64::max).min(max.z);
     let step = 0.25 * core.parameters.spacing();

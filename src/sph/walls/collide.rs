@@ -44,7 +44,7 @@ pub enum Collision {
 
 /// Puts a particle that has entered walls (ω ≥ 0) back to the nearest place outside, and reflects its velocity relative to
 /// the surface's own. In a corner it keeps its speed towards none of the faces that it has passed. `None` if it is
-/// outside.
+/// outside, unless its velocity is not finite.
 ///
 /// `walls` is a [`Solid`](crate::Solid), at the time of the particle if it moves, or what has its sign and its surface: that of
 /// [`Solid::surface`](crate::Solid::surface) is faster for many parts. Only places count, and not the way there: a

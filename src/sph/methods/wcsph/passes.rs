@@ -254,7 +254,7 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         let pairs = push;
         push -= (1.0 - smooth) * 2.0 * rates.pressure[i] * crowding;
         let by_pairs = pairs - 2.0 * rates.pressure[i] * crowding_by_pairs;
-        let sums_of_pressures = push;
+        let blended = push;
         if let Some(wall) = &wall {
             let balanced =
                 if rates.differences { 1.0 } else { depth.max(held(filled) * rates.calm(i, velocity)) };
@@ -263,13 +263,14 @@ impl<const LAMINAR: bool, const ARTIFICIAL: bool, const EVEN: bool> Pairs<'_, LA
         push *= mean;
         if let Some(moment) = moment.filter(|_| smooth > 0.0) {
             let gradient = inverse_above(&(steepness * moment).to_matrix(), LEAST_MOMENT);
-            push = push.lerp(gradient * sums_of_pressures, smooth);
+            push = push.lerp(gradient * blended, smooth);
         }
         if let Some(wall) = &wall {
             let pressure = rates.pressure[i];
             if let Some(reaction) = &rates.reaction {
                 let by_pressure = (push - by_pairs) / density;
                 let factor = -2.0 * pressure / density;
+                let by_friction = mean * by_friction;
                 reaction.add(i, Pushed { by_pressure, factor, gradient: wall.gradient, by_friction });
             }
         }

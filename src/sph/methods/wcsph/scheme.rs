@@ -24,13 +24,13 @@
 //! (2009), without the hydrostatic part ρᴴ (Fourtakas et al. 2019), so that it does not lift a fluid at rest.
 //! Viscosity: laminar (Monaghan & Gingold 1983, with the factor 2(d + 2) = 10 of three dimensions) and artificial
 //! (Monaghan 1992), with pairs of pressures that of rough motion alone ([`Roughness`]). Both act along the lines between
-//! particles and so conserve angular momentum.
+//! particles and so, with pairs of pressures, conserve angular momentum.
 //!
 //! With `gradients: differences` the depth of the fluid has gradients by differences instead, divided by what the same sum
 //! makes of the gradient of a position: the tensor −Σ V r⊗∇W over a particle's neighbours (Bonet & Lok 1999). So a pressure
 //! that is linear in space has its exact gradient, however far above zero it lies, wherever the neighbours are, and at walls,
-//! where half of them are missing, too. (Closed forms of what walls take hold for walls that are whole. With these still
-//! water moved along edges and out of corners for ever, at 4 cm/s and more.) Such forces do not push particles apart; shifting
+//! where half of them are missing, too. (Closed forms of what walls take hold for walls that are whole, and not for the places of
+//! particles: with these still water would move along edges and out of corners for ever, at 4 cm/s and more.) Such forces do not push particles apart; shifting
 //! keeps the particles evenly distributed instead ([`super::super::shifting`]). At a free surface and in spray, where
 //! G = −⅓ Σ V r·∇W + ⅓ tr K is small (it is 0.98 on a lattice at h = 2.6 spacings), pressures act as sums p_i + p_j there too.
 //! Densities then follow the equation of continuity, and neither energy nor momentum is conserved by construction.
