@@ -90,11 +90,14 @@ class Preview {
     this.isWanted = true;
     if (this.isAsking) return;
     this.isAsking = true;
-    while (this.isWanted && this.panel) {
-      this.isWanted = false;
-      await this.ask({ ...this.wanted });
+    try {
+      while (this.isWanted && this.panel) {
+        this.isWanted = false;
+        await this.ask({ ...this.wanted });
+      }
+    } finally {
+      this.isAsking = false;
     }
-    this.isAsking = false;
   }
 
   async ask(wanted) {

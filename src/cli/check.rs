@@ -169,6 +169,7 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
         match check_file(shared, options, path, &mut document, named) {
             Ok(()) => {}
             // the other files have their messages
+            Err(Failure::Findings) => document.ok = false,
             Err(Failure::Usage(message)) => {
                 document.ok = false;
                 if let Some(earlier) = usage.replace(message) {
@@ -189,7 +190,7 @@ fn once(shared: &Shared, options: &Check, named: &mut Vec<PathBuf>) -> Result<()
     }
 }
 
-/// Checks one file, and adds to the document what is known of it.
+/// Checks one file, and adds to the document what is known of it and all messages, which are errors if it fails by findings.
 fn check_file(
     shared: &Shared,
     options: &Check,
@@ -208,12 +209,8 @@ fn check_file(
     let program = match checked {
         Ok(program) => program,
         Err(diagnostics) => {
-            document.ok = false;
             show(shared, options, document, &diagnostics);
-            return match input::failure(&diagnostics) {
-                usage @ Failure::Usage(_) => Err(usage),
-                _ => Ok(()),
-            };
+            return Err(input::failure(&diagnostics));
         }
     };
     let mut diagnostics = program.warnings();

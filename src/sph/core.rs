@@ -192,7 +192,7 @@ impl Core {
         self.coverage_with(i)
     }
 
-    /// The same, with the motion of the fluid behind the walls if that is asked for.
+    /// What walls take of the kernel of a particle, with what is known of the motion behind them if B asks for it.
     pub fn coverage_with<F: Friction, B: Behind>(&self, i: usize) -> Option<Coverage<F, B>> {
         let near = self.near_walls[i / MARKED];
         near.then(|| self.boundary.coverage(&self.wall, self.particles.position.get(i)))?

@@ -5,7 +5,8 @@ use glam::DVec3;
 
 use super::symmetric::Symmetric;
 
-/// What is known of the motion behind the faces near a particle, a part of [`super::Coverage`]. It is `()` where nobody asks.
+/// What is known of the motion behind the faces near a particle, a part of [`super::Coverage`]. It is `()` for fluids that do
+/// not ask.
 pub(in crate::sph) trait Behind: Copy + Default {
     /// What is known of one face at rest, with its λ.
     fn of_face(part: f64, normal: DVec3) -> Self;
@@ -19,7 +20,7 @@ pub(in crate::sph) trait Behind: Copy + Default {
     /// What is known of bodies, with their λ and their K − λ·1, whose surface moves with a velocity, m/s.
     fn of_bodies(part: f64, normal: DVec3, spread: &Symmetric, velocity: impl FnOnce() -> DVec3) -> Self;
 
-    /// The same where K of bodies adds to that of the box.
+    /// What is known of a box with bodies in it, whose K add up: all but the part of K is as two walls make it.
     fn with_moments_of(self, of_box: &Self, bodies: &Self) -> Self;
 }
 
