@@ -5,6 +5,7 @@
 //! (`scheme.rs`), a line in the list of this file, and an arm in `start.rs`. `rfm explain --methods` then
 //! writes the page beside it.
 
+mod crowding;
 mod declaration;
 mod dfsph;
 mod free_bodies;

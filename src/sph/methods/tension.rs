@@ -18,10 +18,10 @@
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
+use super::crowding::Crowding;
 use super::free_bodies;
 use crate::sph::{
     core::{Core, add_scaled},
-    kernel::Wendland,
     pairs::{PairPass, Real},
     params::Parameters,
     particles::Vectors,
@@ -58,14 +58,13 @@ impl Tension {
             vectors.resize(n);
         }
         self.weight.resize(n, 0.0);
-        let kernel = Wendland::new(parameters.support_radius);
-        let steepness = parameters.particle_mass / parameters.rest_density * kernel.steepness;
+        let crowding = Crowding::of(parameters);
 
-        let pass = Normals { kernel, steepness, core };
+        let pass = Normals { crowding, core };
         let (Vectors { x, y, z }, Vectors { x: dx, y: dy, z: dz }) = (&mut self.normal, &mut self.direction);
         core.sum(&pass, [], [x, y, z, dx, dy, dz, &mut self.weight]);
 
-        let pass = Curvature { kernel, steepness, parameters, normal: &self.normal, weight: &self.weight };
+        let pass = Curvature { crowding, parameters, normal: &self.normal, weight: &self.weight };
         let Vectors { x: dx, y: dy, z: dz } = &self.direction;
         let Vectors { x, y, z } = &mut self.force;
         core.sum(&pass, [&dx[..], dy, dz, &self.weight], [x, y, z]);
@@ -83,9 +82,7 @@ impl Tension {
 /// Finds n, n̂ and its weight.
 #[derive(Clone, Copy)]
 struct Normals<'a> {
-    kernel: Wendland,
-    /// The factor V·c of the kernel's gradient.
-    steepness: f64,
+    crowding: Crowding,
     core: &'a Core,
 }
 
@@ -99,21 +96,17 @@ impl PairPass<0, 3, 7> for Normals<'_> {
         _: [V; 0],
         sums: &mut [V; 3],
     ) {
-        let s = self.kernel.nearness(r2);
-        let f = s * s * s;
-        for k in 0..3 {
-            sums[k] = f.mul_add(d[k], sums[k]);
-        }
+        self.crowding.add(d, r2, sums);
     }
 
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 7] {
-        let mut normal = -self.steepness * DVec3::from_array(sums);
+        let mut normal = self.crowding.total(sums);
         if let Some(wall) = self.core.coverage::<()>(i) {
             normal += wall.gradient;
         }
         let length = normal.length();
         let [none, full] = NORMAL;
-        let weight = ((length * self.kernel.h - none) / (full - none)).clamp(0.0, 1.0);
+        let weight = ((length * self.crowding.kernel.h - none) / (full - none)).clamp(0.0, 1.0);
         let direction = if weight > 0.0 { normal / length } else { DVec3::ZERO };
         [normal.x, normal.y, normal.z, direction.x, direction.y, direction.z, weight]
     }
@@ -122,9 +115,7 @@ impl PairPass<0, 3, 7> for Normals<'_> {
 /// Finds the acceleration by surface tension.
 #[derive(Clone, Copy)]
 struct Curvature<'a> {
-    kernel: Wendland,
-    /// The factor V·c of the kernel's gradient.
-    steepness: f64,
+    crowding: Crowding,
     parameters: &'a Parameters,
     normal: &'a Vectors,
     weight: &'a [f64],
@@ -140,7 +131,7 @@ impl PairPass<4, 2, 3> for Curvature<'_> {
         other: [V; 4],
         sums: &mut [V; 2],
     ) {
-        let s = self.kernel.nearness(r2);
+        let s = self.crowding.kernel.nearness(r2);
         let f = s * s * s * other[3];
         let turn = (other[0] - own[0]) * d[0];
         let turn = (other[1] - own[1]).mul_add(d[1], turn);
@@ -152,12 +143,12 @@ impl PairPass<4, 2, 3> for Curvature<'_> {
 
     fn finish(&self, i: usize, [turn, moment]: [f64; 2]) -> [f64; 3] {
         let normal = self.normal.get(i);
-        let moment = 0.5 * self.steepness * moment;
+        let moment = 0.5 * self.crowding.steepness() * moment;
         if moment < LEAST_MOMENT {
             return [0.0; 3];
         }
         // with d from the neighbour, ∇·n̂ = −Σ V (n̂_j − n̂_i)·cf·d over the moment
-        let curvature = self.steepness * turn / moment;
+        let curvature = self.crowding.steepness() * turn / moment;
         let Parameters { surface_tension, rest_density, .. } = *self.parameters;
         (2.0 * surface_tension / rest_density * self.weight[i] * curvature * normal).to_array()
     }

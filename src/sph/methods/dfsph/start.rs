@@ -13,9 +13,8 @@ use std::collections::HashMap;
 use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
-use super::super::numerics::Numerics;
+use super::super::{crowding::Crowding, numerics::Numerics};
 use super::Dfsph;
-use super::passes::Constants;
 use super::scheme::{DivergenceFree, OWED};
 use super::walls::Walls;
 use crate::sph::{
@@ -54,12 +53,12 @@ const SPREAD_ITERATIONS: u32 = 30;
 
 /// Finds how particles crowd: Σ V ∇W + ∇B, 1/m, with the barrier B of the walls.
 #[derive(Clone, Copy)]
-struct Crowding<'a> {
-    constants: Constants,
+struct Packing<'a> {
+    crowding: Crowding,
     walls: &'a Walls,
 }
 
-impl PairPass<0, 3, 3> for Crowding<'_> {
+impl PairPass<0, 3, 3> for Packing<'_> {
     #[inline(always)]
     fn add<S: Simd, V: SimdFloat<S, Element: Real>>(
         &self,
@@ -69,18 +68,12 @@ impl PairPass<0, 3, 3> for Crowding<'_> {
         _: [V; 0],
         sums: &mut [V; 3],
     ) {
-        let s = self.constants.kernel.nearness(r2);
-        let slope = s * s * s;
-        for k in 0..3 {
-            sums[k] = slope.mul_add(d[k], sums[k]);
-        }
+        self.crowding.add(d, r2, sums);
     }
 
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 3] {
-        let Constants { mass_steepness, rest_density, .. } = self.constants;
-        let of_fluid = -mass_steepness / rest_density * DVec3::from_array(sums);
         let of_walls = self.walls.near(i).map_or(DVec3::ZERO, |(wall, _)| wall.barrier.gradient);
-        (of_fluid + of_walls).to_array()
+        (self.crowding.total(sums) + of_walls).to_array()
     }
 }
 
@@ -119,7 +112,7 @@ impl DivergenceFree {
     fn pack(&mut self, core: &mut Core, velocity: &mut Vectors) {
         let (h, spacing) = (core.parameters.support_radius, core.parameters.spacing());
         for _ in 0..PACKING_ROUNDS {
-            let pass = Crowding { constants: Constants::of(&core.parameters), walls: &self.walls };
+            let pass = Packing { crowding: Crowding::of(&core.parameters), walls: &self.walls };
             self.displacement.resize(core.particles.len());
             let Vectors { x, y, z } = &mut self.displacement;
             core.sum(&pass, [], [x, y, z]);

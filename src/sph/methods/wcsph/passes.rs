@@ -4,6 +4,7 @@ use fearless_simd::{Simd, SimdFloat};
 use glam::DVec3;
 
 use super::super::{
+    crowding::Crowding,
     free_surface::FreeSurface,
     negative_pressure::NegativePressure,
     roughness,
@@ -384,19 +385,15 @@ pub(super) fn closes_gaps(numbers: &Numbers) -> bool {
 #[derive(Clone, Copy)]
 pub(super) struct Missing<'a> {
     core: &'a Core,
-    kernel: Wendland,
-    /// The factor V·c of V∇W = −V·c·(1 − q)³·r.
-    steepness: f64,
+    crowding: Crowding,
     surface: FreeSurface,
 }
 
 impl<'a> Missing<'a> {
     pub fn new(core: &'a Core) -> Self {
         let parameters = &core.parameters;
-        let kernel = Wendland::new(parameters.support_radius);
-        let steepness = parameters.particle_mass / parameters.rest_density * kernel.steepness;
         let surface = FreeSurface::of_lattice(parameters.support_radius / parameters.spacing());
-        Self { core, kernel, steepness, surface }
+        Self { core, crowding: Crowding::of(parameters), surface }
     }
 }
 
@@ -410,18 +407,14 @@ impl PairPass<0, 3, 1> for Missing<'_> {
         _: [V; 0],
         sums: &mut [V; 3],
     ) {
-        let s = self.kernel.nearness(r2);
-        let f = s * s * s;
-        for k in 0..3 {
-            sums[k] = f.mul_add(d[k], sums[k]);
-        }
+        self.crowding.add(d, r2, sums);
     }
 
     fn finish(&self, i: usize, sums: [f64; 3]) -> [f64; 1] {
-        let mut crowding = -self.steepness * DVec3::from_array(sums);
+        let mut crowding = self.crowding.total(sums);
         if let Some(wall) = self.core.coverage::<()>(i) {
             crowding += wall.gradient;
         }
-        [self.surface.missing(crowding.length() * self.kernel.h)]
+        [self.surface.missing(crowding.length() * self.crowding.kernel.h)]
     }
 }
